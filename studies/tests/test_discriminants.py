@@ -41,7 +41,7 @@ def test_discriminants_are_scikit_learns_svd(trials, features, classes):
 def test_a_ridge_that_rounding_loses_is_named(ridge, scale):
     x, y = np.random.default_rng(3).normal(size=(30, 4)), np.repeat([0, 1, 2], 10)
     gram = scale * (x @ x.T)
-    with pytest.raises(ProblemError, match=r"^ridge: .* is lost in their rounding"):
+    with pytest.raises(ProblemError, match=r"^ridge: .* is below their rounding error"):
         GramLDA(features=4, ridge=ridge).fit(gram, y)
 
 

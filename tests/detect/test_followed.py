@@ -116,5 +116,5 @@ def test_points_to_choose_from_are_checked_by_name() -> None:
         Recipe(encoder, {}, {"contact": {"choose": [{"taus": 1.0}]}})
     with pytest.raises(ProblemError, match=r"neurons\.contact\.choose: fewer is -1"):
         Recipe(encoder, {}, {"contact": {"choose": [{"fewer": -1}]}})
-    with pytest.raises(ProblemError, match=r"neurons\.contact\.choose: inputs: no encoder 'loads'"):
+    with pytest.raises(ProblemError, match=r"neurons\.contact\.choose: inputs: 'loads' is not the name of an encoder"):
         Recipe(encoder, {}, {"contact": {"choose": [{"inputs": ["loads"]}]}})

@@ -392,7 +392,8 @@ def test_ctrl_c_while_a_training_reads_or_learns_ends_it_and_leaves_nothing(tmp_
     ("words", "said"),
     [
         (["train", "a.npy", "-o", "r.json"], "notes: names no event in a.npy; give --labels FILE"),
-        (["info", "a.npy", "--topic", "/a"], "a.npy: not a ROS bag; topic, field, types and ros are only for ROS bags"),
+        (["info", "a.npy", "--topic", "/a"], "a.npy: is not a ROS bag; topic, field, types and ros are only for "
+        "ROS bags"),
         (["info", "b.npy", "--rate-hz", "-3"], "must be above 0"),
         (["info", "a.npy", "--array", "0x5"], "--array is 0x5: rows is 0: must be a whole number from 1 to 65535"),
         (["info", "labels.csv"], "line 1: a table of labels (docs/command-line.md), not a recording"),

@@ -84,7 +84,7 @@ def test_the_order_in_which_parts_are_given_says_nothing() -> None:
     ("parts", "text"),
     [
         ({}, "parts is empty"),
-        (None, "parts is None: must be encoders by name"),
+        (None, "parts is None: must be a dict of encoders"),
         ({"a": 3}, r"parts\['a'\] is 3: must be a taxel.encode.Encoder"),
         ({" ": FA1()}, "the name of a part is empty"),
         ({3: FA1()}, "a name in parts is 3"),
@@ -114,8 +114,8 @@ def test_an_error_in_a_part_names_it(parts: object, text: str) -> None:
 @pytest.mark.parametrize(
     ("names", "text"),
     [
-        (["b"], "no encoder 'b': the encoders are a"),
-        (["a", "a"], "'a' comes twice"),
+        (["b"], "'b' is not the name of an encoder: must be one of a"),
+        (["a", "a"], "'a' appears twice"),
         ([], "inputs is empty"),
         (3, "sequence"),
     ],

@@ -83,7 +83,7 @@ def test_a_noise_floor_of_0_is_of_whole_numbers_alone():
     encoder = ContactArea(noise_floor=0, levels=[2], tare=Tare.take(frames, stop_us=2000))
     assert len(encoder.encode(frames).times) == 1
     values[3] = 0.4
-    with refused("noise_floor is 0: 0 is only for whole numbers.* for values in N, give the noise at rest"):
+    with refused("noise_floor is 0, but the values are in N: must be the noise at rest.*; 0 is only for whole numbers"):
         encoder.encode(Frames(values, frames.t, unit="N"))
 
 
@@ -95,7 +95,7 @@ def test_a_noise_floor_of_0_is_of_whole_numbers_alone():
         (lambda: ContactArea(levels=[0, 2]), r"levels are \[0, 2\]"),
         (lambda: ContactArea(levels=[2, 2]), r"levels are \[2, 2\]"),
         (lambda: ContactArea(levels=[2.5]), r"levels\[0\] is 2.5: must be a whole number"),
-        (lambda: ContactArea(tare="soon"), "tare is .soon.: must be a taxel.Tare, or seconds"),
+        (lambda: ContactArea(tare="soon"), "tare is .soon.: must be a taxel.Tare, or a number of seconds"),
         (lambda: ContactArea().encode(Frames(np.zeros((1, 3, 4)), [0])), "without a tare"),
         (lambda: ContactArea().stream(ARRAY), "without a tare"),
         (lambda: ContactArea().with_tare(None), "tare is None"),

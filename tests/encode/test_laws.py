@@ -407,7 +407,7 @@ def test_a_long_silence_costs_no_time_once_nothing_can_come():
         (lambda: Encoder.from_json('{"name": "fa1", "tau": 5}'), 'tau is not known: there is "alpha", '),
         (lambda: Encoder.from_json('{"name": "level_crossing"}'), "levels is missing"),
         (lambda: Encoder.from_json(None), "must be JSON text"),
-        (lambda: FA1().encode([1, 2]), "list: encoders take"),
+        (lambda: FA1().encode([1, 2]), "list cannot be encoded"),
         (lambda: FA1().stream(5), "array is 5"),
         (lambda: FA1().trains(None), "array is None"),
         (lambda: FA1().stream().push("x"), "str: encoders take"),

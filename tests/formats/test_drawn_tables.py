@@ -118,24 +118,26 @@ def test_drawn_events_open_by_the_layout_that_is_printed_of_them(order, named, p
 @pytest.mark.parametrize(
     ("text", "layout", "said"),
     [
-        ("1 2\n3 4\n\n5 6\n\n7 8\n9 1\n", 'frame_end = "blank"', "line 4: a frame of 1 line; must be 2 as of the"),
-        ("1 2\n3 4\n\n5 6\n7 8\n9 1\n", 'frame_end = "blank"', "line 4: a frame of 3 lines; must be 2"),
-        ("1 2\n3 4\n5 6\n\n7 8\n9 1\n", "frame_lines = 2", "line 4: an empty line after 1 line of a frame"),
+        ("1 2\n3 4\n\n5 6\n\n7 8\n9 1\n", 'frame_end = "blank"', "line 4: the frame has 1 line; must have 2, like the"),
+        ("1 2\n3 4\n\n5 6\n7 8\n9 1\n", 'frame_end = "blank"', "line 4: the frame has 3 lines; must have 2"),
+        ("1 2\n3 4\n5 6\n\n7 8\n9 1\n", "frame_lines = 2", "line 4: an empty line follows 1 line of a frame"),
         ("1 2\n3 4\n\n1 2\n3 x\n", 'frame_end = "blank"', "line 5: column 2 is 'x', not a number"),
         ("0 2\n0 4\n\n0 2\n0 3\n", "frame_lines = 2\ntime_column = 1", "line 4: time 0 s is not after"),
         (
             "86399.96 2 3\n0.04 4 3\n",
             "time_column = 1",
-            r"time 0\.04 s is not after 86399\.96 s, the time before; if these are times of day, they begin again at",
+            r"time 0\.04 s is not after 86399\.96 s, the time before it; times of day begin again at",
         ),
         ("1714562289.75 2 3\n1714562289.73 4 3\n", "time_column = 1", r"562289\.73 s is not after \d+\.75 s"),
         ("1 2\n3 4\n", "rows = 2\ncolumns = 2\n[table]", "2 columns; .* states 2 x 2 taxels; if 2 lines are"),
-        ("1 2\n", 'frame_lines = 2\nframe_end = "blank"', "frame_end is given, and so is frame_lines: give one"),
+        ("1 2\n", 'frame_lines = 2\nframe_end = "blank"', "frame_end is given together with frame_lines: give "
+        "only one"),
         ("1 2\n", 'frame_end = "line"', "frame_end is 'line': must be one of 'blank'"),
         ("1 2\n", 'decimal = " "', "decimal is ' ': must be"),
-        ("1 2\n", "events = true", "events is true: must have a time_column"),
-        ("1 2 3\n", 'events = true\ntime_column = 1', "column 3 beside the time; events must have x, y, p"),
-        ("1 2 3 4\n", 'columns = ["t"]', "line 1: 4 columns; the layout has 1 name"),
+        ("1 2\n", "events = true", "events is true: the table must have a time_column"),
+        ("1 2 3\n", 'events = true\ntime_column = 1', "the columns beside the time are column 2, column 3; must "
+        "be x, y, p for events"),
+        ("1 2 3 4\n", 'columns = ["t"]', "line 1: 4 columns, but the layout states 1 name"),
     ],
 )  # fmt: skip
 def test_frames_and_events_that_do_not_fit_their_layout_are_refused(tmp_path: Path, text, layout, said) -> None:
@@ -150,7 +152,7 @@ def test_frames_and_events_that_do_not_fit_their_layout_are_refused(tmp_path: Pa
 
 @pytest.mark.parametrize(("row", "said"), [
     ("1,2,2,3", "line 3: p is 2; must be 0 or 1, or -1 or 1"), ("1.5,2,1,3", "line 3: x is 1.5; must be"),
-    ("1,70000,1,3", "line 3: y is 70000"), ("1,2,1,0", "line 3: time 0 s is before that of the line above"),
+    ("1,70000,1,3", "line 3: y is 70000"), ("1,2,1,0", "line 3: time 0 s is before"),
 ])  # fmt: skip
 def test_an_event_that_is_none_is_named_by_its_line(tmp_path: Path, row: str, said: str) -> None:
     layout = '[table]\ncolumns = ["x", "y", "p", "t"]\ntime_column = "t"\ntime_unit = "us"\nevents = true\n'
@@ -173,8 +175,8 @@ def test_a_skipped_frame_is_refused(tmp_path: Path, skip_lines: int) -> None:
     if skip_lines < 2:
         assert len(table(tmp_path, text, layout).frames()) == 3
         return
-    said = f"line {skip_lines}: a frame of '2024-05-01T10:00:0{skip_lines - 2}', which the layout skips: skip_lines is"
-    with pytest.raises(FormatError, match=f"{said} {skip_lines}, must be at most {skip_lines - 1}"):
+    said = f"line {skip_lines}: the layout skips the frame at '2024-05-01T10:00:0{skip_lines - 2}': skip_lines is"
+    with pytest.raises(FormatError, match=f"{said} {skip_lines}; must be at most {skip_lines - 1}"):
         table(tmp_path, text, layout)
 
 
@@ -192,5 +194,7 @@ def test_a_table_of_taxel_that_a_spreadsheet_saved_opens(tmp_path: Path, header:
 @pytest.mark.parametrize("name", ["a.csv", "a.txt"])
 def test_a_text_without_a_line_end_is_one_clear_line(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(b"1,2,3 " * 1_000_000)
-    with pytest.raises(FormatError, match=f"^{name}, line 1: more than 4194304 bytes; at most 4194304 are read$"):
+    with pytest.raises(
+        FormatError, match=f"^{name}, line 1: the line has more than 4194304 bytes; must have at most 4194304$"
+    ):
         taxel.open(tmp_path / name)

@@ -142,24 +142,28 @@ def test_a_table_named_dat_is_a_table(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("kind", "change", "said"),
     [
-        ("evt3", lambda data: data[:-1], r"ends within a word, 1 of 2 bytes from byte (\d+) on: .* head -c \1 "),
-        ("evt2", lambda data: data[:-3], "ends within a word, 1 of 4 bytes from byte"),
-        ("dat", lambda data: data[:-5], "ends within a word, 3 of 8 bytes from byte"),
+        ("evt3", lambda data: data[:-1], r"the last word, at byte (\d+), has 1 of 2 bytes, .* head -c \1 "),
+        ("evt2", lambda data: data[:-3], "the last word, at byte \\d+, has 1 of 4 bytes"),
+        ("dat", lambda data: data[:-5], "the last word, at byte \\d+, has 3 of 8 bytes"),
         ("evt3", lambda data: data[data.index(b"% end\n") + 6 :], r"byte 0: starts with .*, not with a header"),
         ("dat", lambda data: data[data.index(b"\x0c\x08") + 2 :], r"byte 0: starts with .*, not with a header"),
         ("evt3", lambda data: b"", "empty; must have a header"),
-        ("evt3", lambda data: data[: data.index(b"% end\n") + 6], "ends after its header, byte .*: damaged"),
-        ("evt3", lambda data: data[: data.index(b"% end\n") + 6] + b"\x00\x80\x01\x60", "holds no event: damaged, or"),
+        ("evt3", lambda data: data[: data.index(b"% end\n") + 6], "ends after its header, at byte .*; it is damaged"),
+        (
+            "evt3",
+            lambda data: data[: data.index(b"% end\n") + 6] + b"\x00\x80\x01\x60",
+            "contains no event; the file is damaged, or",
+        ),
         (
             "evt3",
             lambda data: data.replace(b"evt 3.0", b"evt 4").replace(b"EVT3", b"EVT4"),
-            "states EVT4; EVT2 and EVT3",
+            "states EVT4; taxel reads EVT2 and EVT3",
         ),
         ("evt3", lambda data: data.replace(b"% evt 3.0\n% format EVT3;", b"% form "), "states no version"),
         (
             "evt2",
             lambda data: data.replace(b"64x48", b"").replace(b"EVT2;height=48", b"EVT2"),
-            "states no size; add a line",
+            "does not state the size; add a line",
         ),
         ("evt2", lambda data: data.replace(b"64", b"16"), "not a whole file of an event camera .*x="),
     ],
@@ -184,7 +188,7 @@ def test_an_aedat_that_ends_anywhere_is_named(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="empty; must be AEDAT 4"):
         taxel.open(path)
     path.write_bytes(b"#!AER-DAT2.0\r\n" + data[14:])
-    with pytest.raises(FormatError, match=r"its header states AEDAT 2; only AEDAT 4 is read"):
+    with pytest.raises(FormatError, match=r"the header states AEDAT 2; taxel reads only AEDAT 4"):
         taxel.open(path)
 
 
@@ -217,7 +221,7 @@ def test_a_library_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.Monke
 def test_without_the_extra_one_line_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / "a.raw", some_rows())
     monkeypatch.setattr(reading, "find_spec", lambda name: None)
-    with pytest.raises(ImportError, match=r"faery is not installed: pip install 'taxel\[events\]'"):
+    with pytest.raises(ImportError, match=r"needs faery, which is not installed: pip install 'taxel\[events\]'"):
         taxel.open(path)
 
 
@@ -281,13 +285,13 @@ def test_strong_bursts_are_told_from_weaker_ones(tmp_path: Path) -> None:
     ("options", "said"),
     [
         ({"region": "0:65,0:48"}, "region '0:65,0:48': must be within the sensor's 64 columns and 48 rows"),
-        ({"region": "9:9,0:48"}, "region '9:9,0:48': columns 9:9 is empty, because the last is not included"),
-        ({"region": "0:9,40:4"}, "region '0:9,40:4': rows 40:4: the first must be below the last"),
-        ({"region": "1,2"}, "region is '1,2': must be columns and rows A:B,C:D"),
+        ({"region": "9:9,0:48"}, "region '9:9,0:48': columns 9:9 is empty, because the second number is not included"),
+        ({"region": "0:9,40:4"}, "region '0:9,40:4': rows 40:4: the first number must be below the second"),
+        ({"region": "1,2"}, "region is '1,2': must be columns A:B and rows C:D"),
         ({"region": 3}, "region is 3"),
         ({"bin": 0}, "bin is 0"),
         ({"bin": 1.5}, "bin is 1.5"),
-        ({"window_ms": 0.0015}, "window_ms is 0.0015: must be whole us"),
+        ({"window_ms": 0.0015}, "window_ms is 0.0015: must be a whole number of us"),
         ({"window_ms": 0}, "window_ms is 0"),
         ({"window_ms": float("nan")}, "window_ms is nan"),
         ({"polarity": "red"}, "polarity is 'red': must be one of 'both', 'on', 'off'"),
@@ -303,7 +307,7 @@ def test_the_options_are_of_events_without_intensities_alone(tmp_path: Path) -> 
     one = {"array": taxel.Array(4, 4), "intensity": [7]}
     taxel.convert(Events([0], [0], [0], [True], **one), tmp_path / "b.npz")
     for place in (tmp_path / "a.npz", tmp_path, tmp_path / "b.npz"):
-        with refused("holds no events without intensities; region, bin, window_ms and"):
+        with refused("region, bin, window_ms and polarity are only for events without intensities"):
             taxel.open_all(place, bin=2)
 
 
@@ -342,9 +346,10 @@ def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, window_ms: 
         (
             "a.aedat",
             b"#!AER-DAT2.0\r\n",
-            r"\(AEDAT 2\), not with a recording; taxel reads these files of event cameras: .raw, .dat, .aedat4",
+            r"\(AEDAT 2\), not with a recording; save it as a file of event cameras that taxel reads: .raw, "
+            r".dat, .aedat4",
         ),
-        ("a.aedat", b"#!AER-DAT4.0\r\n", r"AEDAT 4\), .*; name it .aedat4"),
+        ("a.aedat", b"#!AER-DAT4.0\r\n", r"AEDAT 4\), .*; rename it to .aedat4"),
         ("a.dat", b"", "is empty: not a recording"),
     ],
 )
@@ -355,7 +360,9 @@ def test_what_is_no_file_of_a_camera_names_those(name: str, begins: bytes, said:
 
 
 def test_too_many_frames_name_a_larger_window(tmp_path: Path) -> None:
-    with refused(r"frames of 48 x 64 taxels \(fewer with --region, a larger --bin, or a larger window", FormatError):
+    with refused(
+        r"frames of 48 x 64 taxels \(to make fewer, use --region, a larger --bin, or a larger window", FormatError
+    ):
         taxel.open(write(tmp_path / "a.raw", some_rows()), window_ms=0.001, limit=10_000)
 
 

@@ -35,12 +35,17 @@ def test_gaitndd_gives_step_times_and_leaves_out_invalid_samples(tmp_path):
 @pytest.mark.parametrize(
     ("file", "old", "new", "said"),
     [
-        (".hea", " 212 ", " 16 ", "line 2: format 16; only 212 is read"),
-        (".hea", "300 3000\r", "300 3001\r", "4500 bytes; 3001 samples of format 212 are 4503"),
-        (".hea", " 0 500 ", " 0 501 ", "first value 500; the header says 501"),
+        (".hea", " 212 ", " 16 ", "line 2: the format is 16; must be 212"),
+        (".hea", "300 3000\r", "300 3001\r", "4500 bytes; must be 4503 for 3001 samples of format 212"),
+        (".hea", " 0 500 ", " 0 501 ", "the first value is 500; must be 501, as the header states"),
         (".hea", "control99.let", "../control99.let", "is not a plain file name"),
         (".ts", "5.0000\t1.0000", "5,0000\t1.0000", "line 3: time has a decimal comma"),
-        (".ts", "5.0000\t1.0000", "4.0000\t1.0000", "line 3: times must ascend, and 0 < swing < stride"),
+        (
+            ".ts",
+            "5.0000\t1.0000",
+            "4.0000\t1.0000",
+            "line 3: times must ascend, and swing must be above 0 and below stride",
+        ),
     ],
 )
 def test_a_spoilt_gaitndd_file_is_named(tmp_path, file, old, new, said):
@@ -57,7 +62,7 @@ def test_a_wrong_checksum_is_found(tmp_path):
     data = bytearray(path.read_bytes())
     data[100] ^= 1
     path.write_bytes(data)
-    with pytest.raises(FormatError, match="samples sum to"):
+    with pytest.raises(FormatError, match="the sum of the samples is"):
         list(formats.trials(tmp_path))
 
 

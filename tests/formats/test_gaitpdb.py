@@ -34,13 +34,13 @@ def test_short_stances_do_not_count():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda r: [*r[:6], r[6] + "\t1", *r[7:]], "line 7: 20 cells, must have 19"),
+        (lambda r: [*r[:6], r[6] + "\t1", *r[7:]], "line 7: 20 cells; must have 19"),
         (lambda r: [*r[:6], r[6].replace("0.06", "0,06"), *r[7:]], "line 7: time has a decimal comma"),
         (lambda r: [*r[:6], "\t" + r[6].split("\t", 1)[1], *r[7:]], "line 7: time is empty"),
         (lambda r: [*r[:6], "x" + r[6], *r[7:]], "line 7: time is 'x0.06', not a number"),
         (lambda r: [*r[:6], "nan" + r[6][4:], *r[7:]], "line 7: time is 'nan', not a finite number"),
         (lambda r: [*r[:6], r[2], *r[7:]], "line 7: time 0.02 s is not after"),
-        (lambda r: r[:1], "fewer than 2 lines"),
+        (lambda r: r[:1], "the file has fewer than 2 lines"),
     ],
 )
 def test_a_spoilt_gaitpdb_line_is_named(tmp_path, change, said):
@@ -52,7 +52,7 @@ def test_a_spoilt_gaitpdb_line_is_named(tmp_path, change, said):
 def test_a_damaged_gzip_file_is_one_error(tmp_path):
     file = write_gaitpdb(tmp_path, "GaCo99_01.txt.gz")
     file.write_bytes(file.read_bytes()[:-40])
-    with pytest.raises(FormatError, match="not a whole gzip file"):
+    with pytest.raises(FormatError, match="the gzip file is damaged or not complete"):
         list(formats.trials(tmp_path))
 
 

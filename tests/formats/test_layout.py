@@ -121,7 +121,7 @@ def test_a_table_is_the_same_however_many_rows_are_read_at_once(
     expected = VALUES.copy()
     expected[1, 0] = np.nan
     np.testing.assert_array_equal(frames.values[:, 0], expected.astype(np.float32))
-    for cell, said in (("9,", "line 3: column 1 is 'x'"), ("9,8,", "line 3: 5 cells, must have 6")):
+    for cell, said in (("9,", "line 3: column 1 is 'x'"), ("9,8,", "line 3: 5 cells; must have 6")):
         wrong = lines(VALUES).replace(cell, "x," if cell == "9," else "9,")
         with pytest.raises(FormatError, match=said):
             table(tmp_path, wrong, layout)
@@ -143,7 +143,9 @@ def test_frames_that_would_come_after_the_times_of_files_are_refused(tmp_path: P
 
 
 def test_readings_whose_difference_no_frame_holds_are_named(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"step\.layout\.toml: falls is -3.*; step.* reads 3.*does not fit 32 bits"):
+    with pytest.raises(
+        FormatError, match=r"step\.layout\.toml: falls is -3.*, but step.* contains 3.*does not fit 32 bits"
+    ):
         table(tmp_path, lines(np.full((3, 6), 3.0e38)), "falls = -3e38\nrate_hz = 100")
 
 
@@ -156,9 +158,10 @@ def test_values_that_fall_as_the_layout_turns_them_name_it(tmp_path: Path, falls
     table(tmp_path, lines(rows), f"{falls}[table]\ntime_column = 1\n")
     shown = CliRunner().invoke(app, ["info", str(tmp_path / "step.txt")]).stdout
     of_it = (
-        "after step.layout.toml inverted them: if they need no inversion, remove the line falls from step.layout.toml"
+        "after step.layout.toml inverted them: if the values need no inversion, remove the line falls from "
+        "step.layout.toml"
         if falls
-        else "write falls = true in the layout file that is given as layout; without one, in step.layout.toml beside it"
+        else "write falls = true in a layout file, "
     )
     assert of_it in shown
 
@@ -240,7 +243,7 @@ def test_a_given_sensor_lays_out_arrays_of_somebody_else_and_another_is_refused(
         opened = taxel.open(tmp_path / "a.npy", array=array)
         assert (opened.array.shape, opened.array.pitch_mm) == (array.shape, array.pitch_mm)
         np.testing.assert_array_equal(opened.frames().values.reshape(3, 6), VALUES.astype(np.float32))
-    with pytest.raises(taxel.ProblemError, match=r"array: 5 x 1 taxels; .*a\.npy holds frames of 1 x 6"):
+    with pytest.raises(taxel.ProblemError, match=r"array has 5 x 1 taxels; the frames of .*a\.npy have 1 x 6"):
         taxel.open(tmp_path / "a.npy", array=Array(5, 1))
     with pytest.raises(taxel.ProblemError, match="array is '2x3'"):
         taxel.open(tmp_path / "a.npy", array="2x3")
@@ -265,20 +268,22 @@ def test_a_layout_names_a_data_set_in_a_group_by_its_path(tmp_path: Path) -> Non
         assert recording.frames().t.tolist() == [0, 250_000, 750_000]
         assert recording.lost == ("other arrays of the file: run1/pressure, run1/when",)
     layout.write_text('[data]\narray = "pressure"\n')
-    with pytest.raises(FormatError, match=r"no array pressure; there are run1/pressure \(3 x 2 x 3\), run2/pressure"):
+    with pytest.raises(
+        FormatError, match=r"no array pressure; its arrays are run1/pressure \(3 x 2 x 3\), run2/pressure"
+    ):
         taxel.open(tmp_path / "a.h5")
 
 
 @pytest.mark.parametrize(
     ("layout", "said"),
     [
-        ('array = "2x3"', "unknown key array; a size is given by rows = 2, columns = 3; there are"),
-        ('array = "palm"', r"unknown key array; it belongs in \[data\], for arrays in a file; there are"),
+        ('array = "2x3"', "unknown key array; to state a size, write rows = 2, columns = 3; must be one of"),
+        ('array = "palm"', r"unknown key array; write it in \[data\], for arrays in a file; must be one of"),
         (
             '[data]\narray = "2x3x4.5"',
-            r"the layout states \[data\] array: a size is given by rows = 2, .*pitch_mm = 4.5",
+            r"the layout states \[data\] array; to state a size, write rows = 2, .*pitch_mm = 4.5",
         ),
-        ('[data]\ntime = "when"', r"the layout states \[data\] time: leave it out"),
+        ('[data]\ntime = "when"', r"the layout states \[data\] time; remove time"),
     ],
 )
 def test_a_size_or_a_name_where_none_belongs_is_told_where_it_does(tmp_path: Path, layout: str, said: str) -> None:
@@ -288,7 +293,9 @@ def test_a_size_or_a_name_where_none_belongs_is_told_where_it_does(tmp_path: Pat
         taxel.open(tmp_path / "a.npy")
     np.savez(tmp_path / "b.npz", palm=VALUES, when=[1, 2, 3])
     (tmp_path / "b.layout.toml").write_text('[data]\narray = "2x3"')
-    with pytest.raises(FormatError, match=r"no array 2x3; there are palm .*; a size is given by rows = 2, columns = 3"):
+    with pytest.raises(
+        FormatError, match=r"no array 2x3; its arrays are palm .*; to state a size, write rows = 2, columns = 3"
+    ):
         taxel.open(tmp_path / "b.npz")
 
 
@@ -333,8 +340,8 @@ def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("layout", "match"),
     [
-        ("pich_mm = 3", "unknown key pich_mm; there are rows, columns, pitch_mm"),
-        ("[table]\nsep = ';'", r"unknown key table\.sep; there are separator, decimal, skip_lines"),
+        ("pich_mm = 3", "unknown key pich_mm; must be one of rows, columns, pitch_mm"),
+        ("[table]\nsep = ';'", r"unknown key table\.sep; must be one of separator, decimal, skip_lines"),
         ("[ros]\ntopics = 'a'", r"unknown key ros\.topics"),
         ("[places]\nx = [1]\ny = [1]\nz = [1]", r"unknown key places\.z"),
         ("rows = 2", "rows and columns: give both or neither"),
@@ -348,22 +355,22 @@ def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) ->
         ("[source]\nbaud = 9600", r"\[source\]: place is missing"),
         (
             "[table]\nbaud = 9600",
-            r"unknown key table\.baud; it belongs in \[source\], for taxel live --source; there are",
+            r"unknown key table\.baud; write it in \[source\], for taxel live --source; must be one of",
         ),
-        ("[table]\ntime = 't:ms'", r"table\.time; it belongs in \[data\], .* or \[source\], for taxel live"),
+        ("[table]\ntime = 't:ms'", r"table\.time; write it in \[data\], .* or \[source\], for taxel live"),
         (
             "[source]\ntime_column = 1",
-            r"source\.time_column; it belongs in \[table\], for recorded tables; there are place",
+            r"source\.time_column; write it in \[table\], for recorded tables; must be one of place",
         ),
         (
             "[source]\nseparator = ';'",
-            r"source\.separator; it belongs in \[table\], for recorded tables; there are place",
+            r"source\.separator; write it in \[table\], for recorded tables; must be one of place",
         ),
-        ("[table]\nrows = 2", r"table\.rows; it belongs above the line \[table\]"),
-        ("[source]\nunit = 'N'", r"source\.unit; it belongs above the line \[source\]"),
-        ("[source]\nrate = 50", r"source\.rate; it is rate_hz, above the line \[source\]"),
-        ("[source]\narray = '2x3'", r"source\.array; a size is given by rows = 2, columns = 3"),
-        ("separator = ';'", r"unknown key separator; it belongs in \[table\], for recorded tables; there are rows"),
+        ("[table]\nrows = 2", r"table\.rows; write it above the line \[table\]"),
+        ("[source]\nunit = 'N'", r"source\.unit; write it above the line \[source\]"),
+        ("[source]\nrate = 50", r"source\.rate; write rate_hz above the line \[source\]"),
+        ("[source]\narray = '2x3'", r"source\.array; to state a size, write rows = 2, columns = 3"),
+        ("separator = ';'", r"unknown key separator; write it in \[table\], for recorded tables; must be one of rows"),
         ("side = 'up'", "side"),
         ("heel = 'left'", "heel"),
         ("falls = 'yes'", "falls"),
@@ -378,9 +385,9 @@ def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) ->
         ("zeros_before_s = 0", "zeros_before_s is 0: must be from 1e-06 to 60"),
         ("table = 3", "table"),
         ("[table]\nseparator = ', '", "separator is ', ': must be one character"),
-        ("[table]\nskip_lines = 40", "no line after the 40 skipped lines"),
+        ("[table]\nskip_lines = 40", "no line follows the 40 skipped lines"),
         ("[table]\ntime_column = 'when'", "no column 'when' of times"),
-        ("[table]\ntime_column = 9", "6 columns; time_column is 9"),
+        ("[table]\ntime_column = 9", "time_column is 9, but the table has 6 columns"),
         ("rows = [", "not TOML"),
     ],
 )
@@ -421,13 +428,13 @@ def test_a_name_with_a_comma_over_one_column_is_a_name(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("frames", "layout", "match"),
     [
-        (Frames(VALUES[:, None], [0, 1, 2]), "rows = 2\ncolumns = 4", "states 2 x 4 taxels; the recording holds 1 x 6"),
+        (Frames(VALUES[:, None], [0, 1, 2]), "rows = 2\ncolumns = 4", "states 2 x 4 taxels; the recording has 1 x 6"),
         (
             Frames(VALUES.reshape(3, 2, 3), [0, 1, 2]),
             "rows = 3\ncolumns = 2",
             "states 3 x 2 taxels; the file states 2 x 3",
         ),
-        (Frames(VALUES[:, None], [0, 1, 2], unit="N"), "unit = 'kPa'", "states unit kPa; one.npz is in N"),
+        (Frames(VALUES[:, None], [0, 1, 2], unit="N"), "unit = 'kPa'", "states the unit kPa, but one.npz is in N"),
         (
             Frames(VALUES[:, None], [0, 10_000, 20_000]),
             "rate_hz = 50",
@@ -475,7 +482,7 @@ def test_a_recording_that_is_converted_beside_its_layout_is_turned_once(
         ):
             taxel.open(recording.path, layout=given)
     given.write_text('heel = "bottom"\n')
-    with pytest.raises(FormatError, match=r"states heel bottom; .* states top"):
+    with pytest.raises(FormatError, match=r"states heel bottom, but .* states top"):
         taxel.open(recording.path, layout=given)
 
 
@@ -485,7 +492,7 @@ def test_turned_readings_are_not_written_where_a_layout_would_turn_them_again(tm
         taxel.ProblemError, match=r"inverted already, which a \.csv cannot state, and .*step\.layout\.toml"
     ):
         taxel.convert(recording, tmp_path / "step.csv")
-    assert "that its readings were inverted (falls = 0)" in taxel.convert(recording, tmp_path / "other.csv")
+    assert "that the readings were inverted (falls = 0)" in taxel.convert(recording, tmp_path / "other.csv")
 
 
 def test_a_layout_for_tables_says_nothing_of_a_board_s_recording_in_the_same_folder(tmp_path: Path) -> None:
@@ -509,7 +516,7 @@ def test_a_layout_for_another_count_of_channels_of_a_trial_is_refused(tmp_path: 
     [
         (
             lambda place: np.savez(place, a=np.zeros((2, 6)), b=np.zeros(3)),
-            r"holds a \(2 x 6\), b \(3\); name one in the layout",
+            r"contains a \(2 x 6\), b \(3\); name one array in the layout",
         ),
         (lambda place: np.savez(place, a=np.zeros(6)), "must be numbers of shape frames x rows x columns"),
         (lambda place: np.savez(place, a=np.array([["x"] * 6])), "must contain numbers"),
@@ -560,7 +567,7 @@ def test_the_rate_on_the_command_line_opens_an_array_without_a_layout(tmp_path: 
     np.save(palm, VALUES)
     assert TextOptions(rate_hz=100.0, array=["2x3"]).open_one(palm).array.shape == (2, 3)
     refused = CliRunner().invoke(app, ["info", str(palm)])
-    assert ", or rate_hz, describes it" in str(refused.exception)
+    assert "give rate_hz, or describe it" in str(refused.exception)
 
 
 @pytest.mark.parametrize(
@@ -613,10 +620,12 @@ def test_zeros_come_before_a_first_frame_that_is_loaded_and_once(
 
 
 def test_zeros_before_frames_without_times_or_before_events_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"zeros_before_s: \S+ has no times; rate_hz gives them"):
+    with pytest.raises(
+        FormatError, match=r"zeros_before_s needs times, but \S+ has none; to give times, write rate_hz"
+    ):
         table(tmp_path, lines(np.ones((5, 6))), "zeros_before_s = 0.5")
     events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
     taxel.convert(events, tmp_path / "board.mcap")
     (tmp_path / "given.toml").write_text("zeros_before_s = 0.5")
-    with pytest.raises(FormatError, match=r"holds events; .* and zeros_before_s are for frames"):
+    with pytest.raises(FormatError, match=r"contains events; .* and zeros_before_s are only for frames"):
         taxel.open(tmp_path / "board.mcap", layout=tmp_path / "given.toml")

@@ -27,7 +27,7 @@ def test_what_is_wrong_is_one_clear_error(tmp_path):
     with pytest.raises(taxel.FormatError, match="poses x snapshots x rows x columns"):
         list(popu.trials(lying))
     write_popu(tmp_path, np.zeros((1, 2, 3, 3)), ["???"])
-    with pytest.raises(taxel.FormatError, match="must be named like supine3_1"):
+    with pytest.raises(taxel.FormatError, match="must have a name like supine3_1"):
         list(popu.trials(tmp_path))
     lying.write_bytes(lying.read_bytes()[:100])
     with pytest.raises(taxel.FormatError, match=r"no \.npz with readings"):

@@ -21,7 +21,7 @@ from .making import write_gaitpdb, write_moticon, write_pedar
 
 
 def test_a_folder_of_no_or_of_several_formats_is_refused(tmp_path):
-    with pytest.raises(FormatError, match="holds no known format"):
+    with pytest.raises(FormatError, match="contains no known format"):
         list(formats.trials(tmp_path))
     write_pedar(tmp_path)
     write_gaitpdb(tmp_path)
@@ -195,7 +195,7 @@ def test_a_trial_may_hold_events_as_well_as_frames() -> None:
     trial = formats.Trial("a", "a", events, {"contact": np.array([0])}, "made here")
     assert trial.events is events
     assert trial.scored == (0, 300)
-    with pytest.raises(ProblemError, match="holds events and no frames"):
+    with pytest.raises(ProblemError, match="contains events and no frames"):
         _ = trial.frames
 
 

@@ -266,7 +266,7 @@ def test_where_rebounds_of_values_that_fall_are_learnt_and_detected_what_turns_t
     taxel.convert(palm(5, -1, 0.4, rebound=0.25), tmp_path / "palm.npz")
     rows = [f"press,{1_000_000 + 650_000 * k}\n" for k in range(12)]
     (tmp_path / "palm.notes.csv").write_text("label,t_us\n" + "".join(rows))
-    turns = "falls = true in the layout file that is given as layout; without one, in palm.layout.toml beside it"
+    turns = "falls = true in a layout file, palm.layout.toml beside it"
     code, _, said = call(capsys, "train", tmp_path / "palm.npz", "--folds", 0, "-o", tmp_path / "a.json")
     assert code == 0
     (line,) = said.splitlines()

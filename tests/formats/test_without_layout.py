@@ -22,7 +22,8 @@ def layout_said_of(place: Path) -> str:
         taxel.open(place)
     said, _, lines = str(caught.value).partition("\n")
     name = f"{place.name.removesuffix('.gz').rpartition('.')[0]}.layout.toml"
-    assert f", not written by taxel; a layout file beside it, {name}, or one given as layout, " in said
+    assert ", not written by taxel; " in said
+    assert f" in a layout file, {name} beside it or another file given as layout " in said
     assert said.endswith(" (docs/files.md):")
     return lines
 
@@ -267,16 +268,19 @@ def test_one_cell_that_is_no_number_hides_no_line_before_it(tmp_path: Path, at: 
 @pytest.mark.parametrize(
     ("layout", "match"),
     [
-        ('leave_out = ["x"]', r"a\.csv: no column 'x'; there are time, a, who"),
-        ("leave_out = [4]", r"a\.csv: 3 columns; leave_out is 4"),
+        ('leave_out = ["x"]', r"a\.csv: no column 'x'; the columns are time, a, who"),
+        ("leave_out = [4]", r"a\.csv: leave_out is 4, but the table has 3 columns"),
         ("leave_out = [0]", "leave_out is 0: must be a whole number from 1"),
         ('leave_out = "who"', "leave_out is 'who': must be a list of columns"),
-        ('leave_out = ["time", "who"]\ntime_column = "time"', "column 'time' is the time_column, and is left out"),
+        (
+            'leave_out = ["time", "who"]\ntime_column = "time"',
+            "column 'time' is the time_column, but is also in leave_out",
+        ),
         (
             'leave_out = ["who"]\ntime_column = "time"\ntime_unit = "iso"',
             r"line 3: time is 'noon'; must be like 2024-05-01T",
         ),
-        ('leave_out = ["who"]', r"column 'time' holds times, as its name shows"),
+        ('leave_out = ["who"]', r"column 'time' contains times, as its name shows"),
         ('leave_out = ["time", "a"]', "line 2: who is 'me', not a number"),
     ],
 )
@@ -290,14 +294,17 @@ def test_columns_and_times_that_do_not_fit_their_table_are_refused(tmp_path: Pat
 @pytest.mark.parametrize("code", ["utf-16-le", "utf-16-be"])
 def test_a_table_in_utf_16_without_its_mark_says_how_to_save_it(tmp_path: Path, code: str) -> None:
     (tmp_path / "a.csv").write_bytes("time,a\n0,1\n".encode(code))
-    with pytest.raises(FormatError, match=r"a\.csv, byte \d: a zero byte; UTF-16 without its mark: save it as UTF-8"):
+    with pytest.raises(
+        FormatError,
+        match=r"a\.csv, byte \d: this byte is zero; the file is UTF-16 without a byte-order mark: save it as UTF-8",
+    ):
         taxel.open(tmp_path / "a.csv")
 
 
 def test_a_line_with_too_few_cells_is_named_where_columns_are_left_out(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time,a,b,who\n0,1,2,me\n1,2,me\n")
     (tmp_path / "a.layout.toml").write_text('[table]\ntime_column = "time"\nleave_out = ["who"]\n')
-    with pytest.raises(FormatError, match=r"a\.csv, line 3: 3 cells, must have 4"):
+    with pytest.raises(FormatError, match=r"a\.csv, line 3: 3 cells; must have 4"):
         taxel.open(tmp_path / "a.csv")
 
 
@@ -313,11 +320,11 @@ def test_a_table_of_one_frame_without_a_layout_prints_no_rate(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("names", "times", "said"),
     [
-        (["Uhrzeit"], [["23:59:59.9"], ["00:00:00.1"]], '["Uhrzeit"]  # "Uhrzeit" holds times, which do not ascend'),
+        (["Uhrzeit"], [["23:59:59.9"], ["00:00:00.1"]], '["Uhrzeit"]  # "Uhrzeit" contains times that do not ascend'),
         (
             ["Time"],
             [["11:59:59 PM"], ["12:00:00 AM"]],
-            '["Time"]  # "Time" holds times in a form that taxel does not read',
+            '["Time"]  # "Time" contains times in a form that taxel does not read',
         ),
         (["who"], [["me"], ["you"]], '["who"]'),
     ],
@@ -336,7 +343,7 @@ def test_times_that_are_left_out_are_told_why(
 def test_a_folder_of_tables_without_a_layout_says_the_same(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(lines(VALUES))
     (tmp_path / "read me.txt").write_text("of a hand")
-    with pytest.raises(FormatError, match=r"a\.csv: holds a table of 6 columns, .*\nrows = 1\ncolumns = 6"):
+    with pytest.raises(FormatError, match=r"a\.csv: contains a table of 6 columns, .*\nrows = 1\ncolumns = 6"):
         taxel.open_all(tmp_path)
 
 
@@ -420,7 +427,7 @@ def test_a_folder_of_arrays_without_times_needs_their_rate_alone(tmp_path: Path)
     assert [np.diff(each.frames().t).tolist() for each in opened] == [[25_000] * (4 + k) for k in range(12)]
     # A table says more than its rate: its layout is asked for.
     (tmp_path / "a.csv").write_text("a,b\n1,2\n3,4\n")
-    with pytest.raises(FormatError, match="a layout file beside it"):
+    with pytest.raises(FormatError, match="in a layout file, "):
         TextOptions(rate_hz=40).open_trials(tmp_path)
 
 

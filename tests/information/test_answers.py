@@ -314,10 +314,10 @@ def test_neurons_name_touches_too():
         ({"periods_ms": [0.5]}, "finer than the recordings"),
         ({"window_ms": None}, "has no end"),
         ({"windows_ms": [80]}, "must be in"),
-        ({"taxels": [7]}, "2 taxels of the array send events"),
+        ({"taxels": [7]}, "must be at most 2, because only these taxels send events"),
         ({"taxels_at_ms": 3}, "one of the periods"),
         ({"classifiers": ["forest"]}, "must be one of"),
-        ({"encoder": ChangeEvents(noise_floor=1e6)}, "no event in any of them"),
+        ({"encoder": ChangeEvents(noise_floor=1e6)}, "found no event in any trial"),
         ({"encoder": taxel.encode.LevelCrossing([5.0])}, "must be ChangeEvents or FA1"),
     ],
 )
@@ -335,7 +335,7 @@ def test_what_cannot_be_answered_is_one_clear_error(change, text):
 
 def test_trials_of_two_arrays_are_refused():
     other = taxel.Frames(np.zeros((5, 2, 2)), np.arange(5))
-    with pytest.raises(taxel.ProblemError, match="must all be of one"):
+    with pytest.raises(taxel.ProblemError, match="must all have one"):
         answer([*trials_of(4), LabelledTrial(other, "left first", 0)], window_ms=20)
 
 
@@ -382,7 +382,7 @@ def test_bits_that_shuffled_labels_reach_are_told_from_nothing_nowhere():
     assert found.full.found.right < 0.25
     assert found.empty
     assert [point.verdict.says for point in (*found.by_period[1:], *found.taxels)] == ["nothing"] * 2
-    assert any(text.startswith("not distinguishable from 0 bits") for text in found.warnings)
+    assert any(text.startswith("the bits cannot be distinguished from 0") for text in found.warnings)
     assert any("guessing gives 50 %" in text for text in found.warnings)
 
 

@@ -171,8 +171,12 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
         ("recording,label\na,b\n", [], "no column 't_us'"),
         ("recording,t_us,label,t_us\na,1,b,2\n", [], "column 't_us' appears twice"),
         ("recording,t_us,label\n", [], "names no trial"),
-        (GOOD.replace("touches.npz", "other.npz", 1), [], "line 2: recording 'other.npz' is not among those given"),
-        (GOOD.replace("touches.npz", "other.npz"), [], "is not among those given"),
+        (
+            GOOD.replace("touches.npz", "other.npz", 1),
+            [],
+            "line 2: recording 'other.npz' is not one of the given recordings",
+        ),
+        (GOOD.replace("touches.npz", "other.npz"), [], "is not one of the given recordings"),
         (GOOD.replace("100000,a", "noon,a"), [], "line 2: t_us is 'noon', must be whole us"),
         (GOOD.replace("100000,a,200000", "99000000,a,99100000"), [], "line 2: t_us 99000000 is outside touches.npz"),
         (GOOD.replace("100000,a,200000", "100000,a,90000"), [], "stop 90000 us is not after start"),
@@ -186,7 +190,7 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
             "labels.csv: 4 trials for 10 folds",
         ),
         (GOOD.replace(",b,", ",c,", 1), [], "labels.csv: label 'c': all its trials are in group 'v'"),
-        ("recording,t_us,label\ntouches.npz,100000,a\ntouches.npz,500000,b\n", [], "has no stop_us"),
+        ("recording,t_us,label\ntouches.npz,100000,a\ntouches.npz,500000,b\n", [], "stop_us is missing"),
         (
             "recording,t_us,label\ntouches.npz,100000,a\ntouches.npz,500000,b\n",
             ["--window-ms", "450"],
@@ -201,7 +205,7 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
             [],
             "line 2: '9' is in a column without a name",
         ),
-        ("\n\n", [], "labels.csv: holds nothing; must be recording,t_us,label"),
+        ("\n\n", [], "labels.csv: contains nothing; must be recording,t_us,label"),
         (GOOD, ["--periods", "fast"], "must be numbers, for example 1,2,5"),
         (GOOD, ["--periods", "0"], "--periods is [0.0]: must be whole us"),
         (GOOD, ["--windows", "1000"], "--windows is [1000.0]: must be in"),
@@ -266,7 +270,7 @@ def test_frames_without_times_are_told_so(tmp_path):
         for k in range(12):
             taxel.convert(taxel.Frames(values, np.arange(12)), tmp_path / label / f"{k}.npz")
     done = run(tmp_path / "a", tmp_path / "b", "--report", tmp_path / "page.html")
-    assert "its frames are all within 11 us, so they have no times" in str(done.exception)
+    assert "all frames are within 11 us, so they have no times" in str(done.exception)
 
 
 def test_a_folder_stands_for_its_recordings(tmp_path):
@@ -337,7 +341,7 @@ def test_folders_of_labels_are_named_where_their_folder_is_given(tmp_path):
         taxel.convert(events, tmp_path / "trials" / label / "one.npz")
     done = run(tmp_path / "trials", "--window-ms", "60", "--report", tmp_path / "page.html")
     assert str(done.exception).endswith(
-        "trials: holds no recording; its folders left, right hold recordings: name these folders"
+        "trials: contains no recording; its folders left, right contain recordings: name these folders"
     )
 
 

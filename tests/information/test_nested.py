@@ -23,7 +23,7 @@ def clouds(trials, features, classes, seed, apart=1.0):
 @pytest.mark.parametrize("ridge", [5e-324, 1e-310, 1e-200, 1e-17])
 def test_a_ridge_that_rounding_loses_is_named(ridge, scale):
     x, y = np.random.default_rng(3).normal(size=(30, 4)), np.repeat([0, 1, 2], 10)
-    lost = r"^ridge: .* in the unit of inner products is lost in their rounding; must be at least"
+    lost = r"^ridge: .* in the unit of the inner products is below their rounding error; must be at least"
     with pytest.raises(ProblemError, match=lost):
         nested_predictions([scale * (x @ x.T)], [4], y, ridges=[1.0, ridge])
 

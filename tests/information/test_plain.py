@@ -136,7 +136,7 @@ def test_a_training_curve_takes_the_matrices_and_trials_of_its_predictions_alone
     one_too_far = replace(first, chosen={**first.chosen, 0: (len(grams), 0.1)})
     fewer = replace(first, folds=first.folds[:-1])
     for wrong in (one_too_far, fewer):
-        with refused("^nested is of other trials or matrices"):
+        with refused("^nested was made from other trials or matrices"):
             training_curve(grams, features, y, wrong, [3])
 
 

@@ -320,7 +320,7 @@ def test_the_rows_of_the_check_are_those_of_the_problem(kernel_in_time, after_sp
 def test_a_certificate_of_a_row_that_is_not_there_is_one_clear_error():
     cone = refuted()
     for row, said in (
-        (Row("silence", 99, 5.0), "a row of pattern 99, there are 8"),
+        (Row("silence", 99, 5.0), "a row is of pattern 99; must be from 0 to 7"),
         (Row("target", 0, 7), "the problem has no such row"),
         (Row("silence", 0, 1e6), "the problem has no such row"),
         (Row("behind", 0, 0), "the problem has no such row"),

@@ -375,7 +375,7 @@ def test_of_a_fit_that_ended_early_the_gap_is_proven():
     cone = ConeX(lambdas=(1, 0, 0), lb=-1, ub=1, max_seconds=1e-9).fit(patterns, targets)
     assert cone.status_ == "stopped"
     assert check_gap(cone, patterns, targets) <= max(cone.gap_, 1e-6) * (1 + 1e-6)
-    with pytest.raises(ProblemError, match="ConeX requires it everywhere"):
+    with pytest.raises(ProblemError, match="ConeX requires silence everywhere"):
         check_gap(cone, patterns, targets, silence=[None] * 20)
 
 

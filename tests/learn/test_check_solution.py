@@ -327,7 +327,7 @@ def test_what_cannot_be_checked_is_one_clear_error():
     with pytest.raises(NotFittedError, match="call fit first"):
         check_solution(ConeX(), patterns, targets)
     cone = ConeX(lb=-0.1, ub=0.1).fit(patterns, targets)
-    with pytest.raises(ProblemError, match="is infeasible and has no weights"):
+    with pytest.raises(ProblemError, match="is infeasible, so it has no weights"):
         check_solution(cone, patterns, targets)
     with pytest.raises(ProblemError, match=r"must be a taxel\.learn\.ConeX"):
         check_solution(Neuron(), patterns, targets)

@@ -386,7 +386,7 @@ def test_a_pattern_without_targets_teaches_silence():
 def test_a_target_out_of_reach_is_named_and_the_rest_is_fitted():
     trains = SpikeTrains.from_lists([[20.0], [25.0], [80.0], [85.0]], stop=120.0)
     cone = ConeR(lambdas=(0, 1e-3, 0, 100, 1), lb=-1.0, ub=1.0)
-    with pytest.warns(UserWarning, match="pattern 0 target 0 to the threshold; the rest was fitted"):
+    with pytest.warns(UserWarning, match="to the threshold at pattern 0 target 0; the other targets were fitted"):
         cone.fit([trains], [[10.0, 90.0]])
     assert cone.unreachable_ == [(0, 0)]
     assert cone.neuron_.potential(cone.weights_, trains, [90.0]) == pytest.approx(

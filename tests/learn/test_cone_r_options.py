@@ -214,7 +214,7 @@ def test_an_option_that_is_not_known_is_refused(options, said):
         ([[(0.0, float("inf"))]], "pattern 0, window 0 of silence: 0 to inf ms"),
         ([[(0.0, 5.0)], []], "silence: 2 lists for 1 patterns; must be one per pattern"),
         ([], "silence: 0 lists for 1 patterns"),
-        ([[0.0, 5.0]], r"silence of pattern 0 has shape \(2,\): must hold windows"),
+        ([[0.0, 5.0]], r"silence of pattern 0 has shape \(2,\): must contain windows"),
         ([[(0.0, 5.0, 6.0)]], r"silence of pattern 0 has shape \(1, 3\)"),
         ([[("a", "b")]], "silence of pattern 0: holds"),
         (5.0, "silence is 5: must be a sequence"),

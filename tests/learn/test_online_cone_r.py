@@ -110,7 +110,7 @@ def test_an_empty_window_and_a_misspelt_parameter_are_one_clear_error_each():
         OnlineConeR().set_params(**{"lambda": 1})
     with pytest.raises(ProblemError, match="must be one per pattern"):
         OnlineConeR().fit([], [])
-    with pytest.raises(ProblemError, match="start: a window starts from its own last fit"):
+    with pytest.raises(ProblemError, match="start: must be left out, because a window starts from its last fit"):
         OnlineConeR().fit(*zip(*stream(0, 2), strict=True), start=[0.0])
 
 
@@ -135,7 +135,7 @@ def test_control_c_keeps_the_best_so_far_and_the_pattern():
 @pytest.mark.parametrize("learner", [ConeR(), OnlineConeR(window=2)])
 def test_more_trains_than_memory_holds_are_refused_in_one_line(learner):
     many = SpikeTrains.from_lists([[1.0]] * 10_001, stop=20.0)
-    with pytest.raises(ProblemError, match=r"10001 trains.*, at most 10000 can be weighed"):
+    with pytest.raises(ProblemError, match=r"10001 trains.*; must be at most 10000"):
         learner.fit([many], [[10.0]])
     few = SpikeTrains.from_lists([[1.0], [4.0]], stop=20.0)
     assert learner.fit([few], [[10.0]]).weights_.shape == (2,)

@@ -208,7 +208,7 @@ def test_a_layout_file_names_a_source(tmp_path: Path) -> None:
     assert (frames.t.tolist(), frames.values[:, 0].tolist()) == ([0, 20_000], [[23, 0], [123, 0]])
     assert frames.array.pitch_mm == 5
     layout.write_text("rows = 1\ncolumns = 2\n")
-    with pytest.raises(taxel.FormatError, match=r"has no \[source\] place"):
+    with pytest.raises(taxel.FormatError, match=r"\[source\] place is missing"):
         Live(sources=str(layout))
 
 

@@ -207,8 +207,11 @@ def test_who_cannot_have_it_refuses_it_by_name(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("after_spike", "said"),
     [
-        ("keep", 'after_spike "reset", a refractory above 3 ms or a theta_plus above 0.2 mV would prevent them'),
-        ("reset", "with no target between: a refractory above 3 ms or a theta_plus above 0.2 mV would prevent them"),
+        ("keep", 'to prevent this, use after_spike "reset", a refractory above 3 ms or a theta_plus above 0.2 mV'),
+        (
+            "reset",
+            "without a target between; to prevent this, use a refractory above 3 ms or a theta_plus above 0.2 mV",
+        ),
     ],
 )
 def test_the_warning_of_repeated_spikes_names_what_is_not_set(after_spike: str, said: str) -> None:

@@ -149,7 +149,7 @@ def test_two_loads_that_two_exponents_fit_are_said_to_be_too_few():
     ratio = [(strong**e).sum() / (between**e).sum() for e in (0.5, 1.0, 3.0)]
     assert ratio[0] > ratio[1] < ratio[2], "the same share of the two loads belongs to two exponents"
     loads = [Load(frames(read), float((read[read > 0] ** 0.5).sum())) for read in (strong, between)]
-    with pytest.warns(UserWarning, match="fits them as well; one more load"):
+    with pytest.warns(UserWarning, match="would fit the loads as well; to be sure, add a load"):
         Calibration.fit(loads, date=DAY)
     loads.append(Load(frames(strong + between), float(((strong + between) ** 0.5).sum())))
     found = Calibration.fit(loads, date=DAY)
@@ -196,7 +196,7 @@ def test_a_table_of_each_taxel_is_a_table_by_taxel():
     table = Calibration.table(ARRAY, [5 * own, 20 * own], [1.0, 8.0], unit="kPa", date=DAY)
     assert table.apply(frames(5 * own)).values == pytest.approx(1.0)
     assert table.apply(frames(12.5 * own)).values == pytest.approx(4.5)
-    with pytest.raises(ProblemError, match=r"readings are of \(3, 3\) taxels: the array has \(3, 4\)"):
+    with pytest.raises(ProblemError, match=r"readings have the shape \(3, 3\): must have that of the array, \(3, 4\)"):
         Calibration.table(ARRAY, np.ones((1, 3, 3)), [1.0], unit="N")
 
 
@@ -225,14 +225,14 @@ def test_without_one_nothing_is_called_newton(tmp_path):
     recording = taxel.open(tmp_path / "press.npz")
     assert recording.calibration is None
     with pytest.raises(
-        ProblemError, match=r"there is no calibration beside it, .*; taxel calibrate makes a calibration"
+        ProblemError, match=r"no calibration was found beside it, .*; to make a calibration, run taxel calibrate"
     ):
         recording.calibrated()
 
 
 def test_a_calibration_of_another_array_is_one_clear_error(tmp_path):
     other = Calibration.table(Array(4, 3, pitch_mm=6.0, name="other"), [40.0], [4.0], unit="N", date=DAY)
-    with pytest.raises(ProblemError, match="the calibration is of another array"):
+    with pytest.raises(ProblemError, match="that of the calibration is"):
         other.apply(frames(1.0))
     recording = made_beside(tmp_path, other)
     with refused(r"press.calibration.json: .* another array"):
@@ -260,7 +260,7 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
         (lambda: Calibration.fit([Load(frames(1.0), 1.0)], each=True), "each: no load determines a single taxel"),
         (
             lambda: Calibration.fit([Load(frames(1.0), 1.0), Load(frames(1.0, "ticks"), 1.0)]),
-            "frames of load 2: in ticks; the calibration needs loads in counts",
+            "frames of load 2: the unit is ticks; the calibration needs loads in counts",
         ),
         (
             lambda: Calibration.fit([Load(frames(1.0, "N"), 1.0)]),
@@ -268,7 +268,7 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
         ),
         (
             lambda: Calibration.table(ARRAY, [1.0, 1.0], [1.0, 2.0], unit="N"),
-            r"readings\[1\] is 1: must begin at 0 or more, and rise",
+            r"readings\[1\] is 1: the numbers must begin at 0 or more, and rise",
         ),
         (lambda: Calibration.table(ARRAY, [1.0], [1.0, 2.0], unit="N"), "1 reading and 2 values"),
         (
@@ -287,7 +287,7 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
         (lambda: Calibration.law(ARRAY, gain=0.0), "gain: must be above 0"),
         (
             lambda: Calibration.law(ARRAY).apply(frames(1.0)),
-            "the frames: in counts; the calibration needs loads in ticks",
+            "the frames: the unit is counts; the calibration needs loads in ticks",
         ),
     ],
 )

@@ -216,7 +216,7 @@ def test_newtons_from_kpa_use_each_taxel_s_area(array: Array, weights: np.ndarra
     fitted = Calibration.fit([Load(Frames(pressed, [0], array=array), load, "N")], unit="kPa", exponent=1.0)
     np.testing.assert_allclose(fitted.apply(Frames(pressed, [0], array=array)).values, 10.0 * pressed, rtol=1e-6)
     without = Array(*array.shape, name="flat")
-    with pytest.raises(ProblemError, match="area of each taxel, which is not known"):
+    with pytest.raises(ProblemError, match="area of each taxel, which is unknown"):
         Calibration.fit([Load(Frames(pressed, [0], array=without), load, "N")], unit="kPa")
 
 

@@ -130,7 +130,7 @@ def test_a_file_without_spike_times_is_one_error(tmp_path: Path) -> None:
     pynwb = pytest.importorskip("pynwb")
     with pynwb.NWBHDF5IO(tmp_path / "a.nwb", "w") as io:
         io.write(pynwb.NWBFile("none", "none", datetime(2020, 1, 1, tzinfo=UTC)))
-    with pytest.raises(FormatError, match=r"a\.nwb: an NWB file without spike times"):
+    with pytest.raises(FormatError, match=r"a\.nwb: the NWB file contains no spike times"):
         SpikeTrains.from_nwb(tmp_path / "a.nwb")
     (tmp_path / "b.nwb").write_text("nothing of the kind")
     with pytest.raises(FormatError, match=r"b\.nwb: not a whole HDF5 file"):

@@ -116,7 +116,7 @@ def test_a_refused_bag_is_named_once_on_the_page(tmp_path):
     with viewed(tmp_path, "mat.npz") as page:
         refused = page.ask("open", name="grasp.bag")
         assert (refused["type"], refused["field"]) == ("refused", "name")
-        assert refused["reason"].startswith(f"{tmp_path / 'grasp.bag'}: a ROS bag: choose one of its topics")
+        assert refused["reason"].startswith(f"{tmp_path / 'grasp.bag'}: is a ROS bag; choose one of its topics")
 
 
 def test_a_folder_of_bags_is_shown_by_options_that_hold_for_each(capsys, tmp_path):
@@ -254,7 +254,7 @@ def test_tables_and_arrays_of_other_programs_are_shown_by_their_layout(beside, c
         (folder, f"{folder}: contains no recording; name a file, or one of the folders in it"),
         (
             folder / "palm.npy",
-            "layout.toml, or one given as layout, or rate_hz, describes it (docs/files.md):",
+            "layout.toml beside it or another file given as layout (docs/files.md):",
         ),
     ):
         code, _, errors = call(capsys, "view", words, "--no-open", "--seconds", 1)
@@ -340,4 +340,4 @@ def test_a_table_or_array_of_another_program_is_refused_by_the_command_with_the_
     status, _, error = call(capsys, "view", name, "--no-open", "--seconds", "0.1")
     assert status == 2
     assert says in error
-    assert "a layout file beside it, plain.layout.toml, or one given as layout, " in error
+    assert "in a layout file, plain.layout.toml beside it or another file given as layout " in error

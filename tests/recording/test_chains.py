@@ -229,10 +229,10 @@ def through(m: Model, kind: str, made: bool) -> tuple[Model, set[str]]:
         said |= {"raw datagrams"} if made and m.datagrams else set()
         return replace(m, datagrams=True, counts=True, source=True, lost=m.lost | said), said
     words = {
-        "sensor": True, "held at the beginning": bool(m.held), "registers": m.registers is not None,
+        "sensor": True, "at the beginning": bool(m.held), "registers": m.registers is not None,
         "of the registers": bool(m.changes), "of the board": bool(m.board), "note": bool(m.notes),
         "detection": bool(m.found), "zeroed taxel": bool(m.zeroed), "arrival times": m.clock, "received": m.counts,
-        "where it came from": m.source,
+        "the origin of the recording": m.source,
     }  # fmt: skip
     said = {word for word, there in words.items() if there}
     if kind == ".lsa" and any(t % 100 for t, *_ in m.rows):

@@ -66,7 +66,7 @@ class Model:
             values=self.values[:, y, x],
             columns=self.columns and self.columns[x],
             samples=False,
-            lost=self.lost | ({"the lines of the stream as they came"} if self.samples else set()),
+            lost=self.lost | ({"the lines of the stream as received"} if self.samples else set()),
         )
 
     def merged(self, at: int, name: str) -> Model:
@@ -76,19 +76,19 @@ class Model:
         both.notes = [(name, int(side.t[0]) if len(side.t) else 0) for side in sides]
         both.notes += [note for side in sides for note in side.notes]
         both.found = sides[0].found + sides[1].found
-        both.lost |= {"the lines of the stream as they came"} if self.samples else set()
+        both.lost |= {"the lines of the stream as received"} if self.samples else set()
         return both
 
     def through(self, kind: str) -> tuple[Model, set[str]]:
         """Return what a file of a kind gives back, and the words that converting must say."""
-        said = {"the lines of the stream as they came"} if self.samples and kind != ".mcap" else set()
+        said = {"the lines of the stream as received"} if self.samples and kind != ".mcap" else set()
         said |= {"arrival times"} if self.clock and (kind != ".mcap" or not self.samples) else set()
         if kind != ".csv":
             samples = self.samples and kind == ".mcap"
             return replace(self, clock=samples, samples=samples, lost=self.lost | said), said
         words = {
             "the unit": self.unit != "counts", "the side": self.side, "where the heel is": self.heel,
-            "that its readings were inverted": self.turned is not None, "the names of the columns": self.columns,
+            "that the readings were inverted": self.turned is not None, "the names of the columns": self.columns,
             "note": self.notes, "detection": self.found,
         }  # fmt: skip
         said |= {word for word, there in words.items() if there}
@@ -256,7 +256,7 @@ def test_in_any_chain_of_steps_frames_and_what_is_beside_them_stay_or_are_said_t
                 t = recording.frames().t
                 assert np.abs(t - t[0] - (m.t - m.t[0])).max() <= 2, where
                 # The fit of the clock is exact to 2 us only, so the model continues with the times that taxel computed.
-                said = {"the lines of the stream as they came"} if m.samples else set()
+                said = {"the lines of the stream as received"} if m.samples else set()
                 notes = [(n.text, n.t) for n in recording.notes]
                 models = {name: replace(m, t=t, notes=notes, samples=False, lost=m.lost | said)}
             case "pick":
@@ -306,7 +306,7 @@ def test_of_a_board_beside_a_stream_each_has_its_own_clock_until_they_share_one(
         part, shared = both.between(a, b), host.between(a + BEGAN // 1000, b + BEGAN // 1000)
         expected = [k for k in range(30) if a <= 1000 * k < b]
         assert (part.events.intensity - 60).tolist() == expected
-        with pytest.raises(taxel.ProblemError, match=r"its sources \(board, imu\) have different clocks"):
+        with pytest.raises(taxel.ProblemError, match=r"the sources \(board, imu\) have different clocks"):
             _ = part.sources
         assert (shared.events.intensity - 60).tolist() == expected
         assert shared.sources["imu"].frames().values.ravel().tolist() == expected

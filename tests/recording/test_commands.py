@@ -117,11 +117,11 @@ def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_pat
     [
         (("info",), "FILE is missing"),
         (("info", "nothing.mcap"), "nothing.mcap: no such file or directory"),
-        (("info", "."), ".: holds no recording; taxel reads .mcap"),
+        (("info", "."), ".: contains no recording; taxel reads .mcap"),
         (("convert", "WALK", "walk.xyz"), "must be .mcap, .lsa, .npz, .csv"),
         (("convert", "WALK", "WALK"), "exists already"),
-        (("convert", "WALK", "a.npz", "--array", "6x6"), "holds its own sensor, Array("),
-        (("info", "WALK", "--array", "6x6"), "holds its own sensor, Array("),
+        (("convert", "WALK", "a.npz", "--array", "6x6"), "states its sensor, Array("),
+        (("info", "WALK", "--array", "6x6"), "states its sensor, Array("),
         (
             ("info", "WALK", "--array", "6 by 6"),
             "--array is 6 by 6: must be rows x columns, for example 64x64, or with the pitch",
@@ -198,7 +198,7 @@ def test_info_says_what_spike_trains_are_and_other_commands_refuse_them_by_name(
     said = json.loads(run("info", path, "--json").stdout)
     assert (said["trains"], said["spikes"], said["trains_kind"]) == (3, 3, kind)
     refused = run("train", path, "-o", tmp_path / "r.json")
-    assert (refused.returncode, "spike trains, as taxel encode writes them, not a recording" in refused.stderr) == (
+    assert (refused.returncode, "contains spike trains, not a recording" in refused.stderr) == (
         2,
         True,
     )

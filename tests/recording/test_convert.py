@@ -199,7 +199,7 @@ def test_frames_of_events_are_written_where_a_rate_is_asked_for(tmp_path: Path) 
 
 
 def test_frames_do_not_go_into_files_of_events(tmp_path: Path) -> None:
-    with pytest.raises(ProblemError, match="holds events and no frames"):
+    with pytest.raises(ProblemError, match="contains events and no frames"):
         taxel.convert(some_frames(), tmp_path / "a.lsa")
     assert not list(tmp_path.iterdir())
 
@@ -240,7 +240,7 @@ def test_a_slice_of_a_recording_is_converted_as_a_slice(tmp_path: Path) -> None:
         (("E", "a.npz", {"frames_hz": 0}), "frames_hz is 0"),
         (("E", "a.npz", {"frames_hz": "fast"}), "frames_hz is 'fast'"),
         (("E", "a.npz", {"frames_hz": float("nan")}), "frames_hz is nan"),
-        (("F", "a.npz", {"frames_hz": 10}), "frames keep their times"),
+        (("F", "a.npz", {"frames_hz": 10}), "the times of frames are not changed"),
         (("E", "a.npz", {"overwrite": "yes"}), "overwrite is 'yes'"),
     ],
 )

@@ -25,7 +25,7 @@ from taxel.recording.writers.npz import columns_of
 
 from .making import record, some_events, some_frames
 
-DAMAGED = "damaged: its content is not what was written"
+DAMAGED = "the file is damaged: its content differs from what was written"
 
 
 def converted(folder: Path, kind: str) -> Path:

@@ -105,7 +105,7 @@ def test_a_huge_text_in_a_description_is_refused(tmp_path: Path) -> None:
 def test_a_sensor_that_is_too_large_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     np.savez(path, t=[0], x=[60_000], y=[60_000], p=[True])
-    unreadable(path, f"60001 x 60001 taxels; at most {limits.TAXELS}")
+    unreadable(path, f"60001 x 60001 taxels; must have at most {limits.TAXELS}")
     huge = {"rows": 65_535, "columns": 65_535, "pitch_mm": 1.0, "name": ""}
     with pytest.raises(taxel.ProblemError, match="65535 x 65535 taxels; at most"):
         record(tmp_path / "a.mcap", some_events(), header={"array": huge})
@@ -122,7 +122,7 @@ def test_a_time_out_of_all_reason_is_refused(tmp_path: Path) -> None:
 def test_a_table_of_very_many_columns_is_refused_before_it_is_read(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("t_us" + ",a" * 3_000_000 + "\n")
-    unreadable(path, f"line 1: 3000001 columns; at most {limits.COLUMNS}")
+    unreadable(path, f"line 1: 3000001 columns; must have at most {limits.COLUMNS}")
     path.write_text("t_us,x0y0,x2000y2000\n" + "".join(f"{k},1,1\n" for k in range(1000)))
     unreadable(path, "most are missing")
 

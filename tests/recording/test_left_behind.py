@@ -73,7 +73,7 @@ def test_what_a_part_began_with_is_there_again(tmp_path: Path, kind: str) -> Non
     assert again.board_changes == recording.board_changes != ()
     assert again.register_changes == recording.register_changes != ()
     told = taxel.convert(part, tmp_path / "part.csv")
-    assert any("taxels held at the beginning" in line for line in told)
+    assert any("taxels at the beginning" in line for line in told)
 
 
 def test_a_stream_on_another_clock_is_a_stream(tmp_path: Path) -> None:
@@ -92,7 +92,7 @@ def test_a_stream_on_another_clock_is_a_stream(tmp_path: Path) -> None:
             taxel.ProblemError, match="source 'imu' is a stream of numbers, which has lines and no data"
         ):
             one.datagrams()
-    assert moved.lost == ("the lines of the stream as they came",)
+    assert moved.lost == ("the lines of the stream as received",)
     part = imu.between(50_000, 100_000)
     assert taxel.convert(part, tmp_path / "part.mcap") == ["arrival times of lines outside the part"]
     assert taxel.open(tmp_path / "part.mcap").frames() == part.frames()
@@ -103,7 +103,7 @@ def test_a_board_on_another_clock_has_the_datagrams_of_its_file(tmp_path: Path) 
     assert len(recording.on_clock("host").datagrams()) == len(recording.datagrams()) > 100
     taxel.convert(recording, tmp_path / "a.npz")
     table = taxel.open(tmp_path / "a.npz")
-    with pytest.raises(taxel.ProblemError, match=r"holds no datagrams; only \.mcap does"):
+    with pytest.raises(taxel.ProblemError, match=r"contains no datagrams; only a \.mcap does"):
         table.datagrams()
 
 

@@ -62,7 +62,9 @@ def test_what_is_no_array_of_numbers_is_named_or_left_out(tmp_path: Path) -> Non
     place = tmp_path / "walk.mat"
     savemat(place, {"trial": {"pressure": np.ones((5, 2))}, "name": "walk", "z": np.array([1j])})
     assert mat_shapes(place) == {}
-    with pytest.raises(FormatError, match=r"holds no numbers; .*; of a struct, save the fields: save\('FILE.mat', "):
+    with pytest.raises(
+        FormatError, match=r"contains no numbers; .*; if the data are in a struct, save its fields: save\('FILE.mat', "
+    ):
         taxel.open(place)
     place.write_bytes(b"5, 6\n7, 8\n" * 30)
     with pytest.raises(FormatError, match=r"not a MATLAB file of version 5 to 7\.3"):

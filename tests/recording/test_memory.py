@@ -374,7 +374,7 @@ STRANGE: dict[str, tuple[Callable[[], dict[str, Any]], str]] = {
     "lists": (lambda: as_events(about=np.array('{"notes":[' + "[]," * 5_000_000 + "[]]}")), "a larger limit"),
     "a long about": (lambda: as_events(about=np.array('{"a":"' + "x" * 40_000_000 + '"}')), "a larger limit"),
     "a unit": (lambda: of_frames(3, unit=np.array("N" * 40_000_000)), "a larger limit"),
-    "times": (lambda: of_frames(3, t=np.zeros(20_000_000, np.int64)), "a time for each of 3 frames"),
+    "times": (lambda: of_frames(3, t=np.zeros(20_000_000, np.int64)), "one time for each of 3 frames"),
     "held": (lambda: as_events(held=np.zeros((9000, 9000), np.uint16)), "at most 4194304"),
     "columns": (lambda: as_events(x=np.zeros(20_000_000)), "as many as in t"),
     "complex frames": (lambda: of_frames(20_000, values=np.zeros((20_000, 8, 64), "c16")), "complex128"),
@@ -445,7 +445,7 @@ def test_what_taxel_would_not_read_again_it_does_not_write(tmp_path: Path) -> No
     few = np.zeros(3, np.uint16)
     markers = [(k, True) for k in range((1 << 18) + 1)]
     for name in ("a.npz", "a.h5"):
-        with refused("262145 markers; a .npz and a .h5 hold at most 262144"):
+        with refused("262145 markers; must be at most 262144"):
             taxel.convert(
                 taxel.Events([0, 1, 2], few, few, few.astype(bool), array=taxel.Array(4, 4), markers=markers),
                 tmp_path / name,

@@ -97,7 +97,7 @@ def test_what_describes_a_recording_is_a_file(read: Callable[[Path], Any], no_fi
     make, called = no_file
     make(path := tmp_path / "GaCo99_01.txt")
     taxel.convert(some_frames(), tmp_path / "ok.npz")
-    with refused(f"{called}; must be a file|holds no spike trains", FormatError):
+    with refused(f"{called}; must be a file|contains no spike trains", FormatError):
         read(path)
 
 

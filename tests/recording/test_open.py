@@ -68,7 +68,7 @@ def npz(**columns: object) -> bytes:
         ("a.txt", b"hello", "not a recording; taxel reads .mcap, .lsa, .npz, .csv, .h5"),
         ("a.h5", b"\x89HDF\r\n\x1a\n", "not a whole HDF5 file"),
         ("a.h5", b"hello", "not with the magic of HDF5 (89 48 44 46)"),
-        ("a.bag", b"#ROSBAG V2.0", "a ROS bag: choose one of its topics, or write [ros] in a layout file"),
+        ("a.bag", b"#ROSBAG V2.0", "is a ROS bag; choose one of its topics, or write [ros] in a layout file"),
     ],
 )
 def test_a_wrong_file_is_one_line_with_place_and_remedy(tmp_path: Path, name: str, content: bytes, said: str) -> None:
@@ -93,7 +93,7 @@ def test_a_missing_file_and_a_folder_are_refused_where_one_recording_is_opened(t
     with pytest.raises(FileNotFoundError):
         taxel.open(tmp_path / "nothing.mcap")
     for refuse in (taxel.open, lambda path: taxel.convert(path, tmp_path / "a.npz")):
-        with pytest.raises(ProblemError, match=r": a folder; name one of its recordings"):
+        with pytest.raises(ProblemError, match=r": is a folder; name one of its recordings"):
             refuse(tmp_path)
 
 
@@ -126,7 +126,7 @@ def test_raw_bytes_need_no_magic_and_say_whether_they_are_complete(tmp_path: Pat
     assert not rec.truncated
     assert rec.events == events
     assert rec.verdict == "losses unknown: the .lsa does not record them"
-    assert "short by whole turns of 6.5536 s" in rec.remarks[0]
+    assert "too early by a multiple of 6.5536 s" in rec.remarks[0]
     (tmp_path / "a.lss").unlink()
     assert taxel.open(path).truncated
     assert "a.lss is missing" in taxel.open(path).verdict
@@ -153,7 +153,9 @@ def test_tables_without_a_layout_beside_one_that_has_its_own_are_left_out_with_a
     (tmp_path / "labels.csv").write_text("recording,label,t_us\nday1,contact,5\n")
     own = tmp_path / "day1.layout.toml"
     own.write_text('[table]\ntime_column = "time_s"\ntime_unit = "s"\n')
-    with pytest.warns(UserWarning, match=r": day2.csv left out, as no layout file describes them; a file named layout"):
+    with pytest.warns(
+        UserWarning, match=r": day2.csv are left out, because no layout file describes them; to describe"
+    ):
         assert [one.name for one in taxel.open_all(tmp_path)] == ["day1.csv"]
     own.rename(tmp_path / "layout.toml")
     with warnings.catch_warnings():
@@ -170,7 +172,8 @@ def test_a_table_with_a_layout_beside_a_recording_is_left_out_with_a_warning(tmp
     taxel.convert(taxel.open(tmp_path / "day1.csv"), tmp_path / "day1.npz")
     with pytest.warns(
         UserWarning,
-        match=r": day2.csv left out, because tables and arrays are not read in a folder with recordings \(day1.npz\)",
+        match=r": day2.csv are left out, because tables and arrays are not read in a folder with recordings "
+        r"\(day1.npz\)",
     ):
         assert [one.name for one in taxel.open_all(tmp_path)] == ["day1.npz"]
     (tmp_path / "day2.csv").unlink()
@@ -185,7 +188,9 @@ def test_frames_on_a_given_array_of_another_size_are_refused_by_its_name(tmp_pat
     taxel.convert(Frames(np.zeros((2, 4, 4), np.float32), [0, 7]), path)
     for array in (taxel.Array(3, 5), taxel.Array(2, 8), taxel.Array(1, 16)):
         size = " x ".join(map(str, array.shape))
-        with pytest.raises(taxel.ProblemError, match=f"array: {size} taxels; .*a.{ending} holds frames of 4 x 4$"):
+        with pytest.raises(
+            taxel.ProblemError, match=f"array: has {size} taxels; the frames of .*a.{ending} have 4 x 4$"
+        ):
             taxel.open(path, array=array)
     assert taxel.open(path, array=taxel.Array(4, 4, 5.0)).array.pitch_mm == 5.0
 
@@ -319,9 +324,9 @@ def test_frames_of_a_file_of_frames_are_its_own_or_the_last_at_each_time(tmp_pat
     assert held.t.tolist() == [0, 1000, 2000]
     assert held.values[:, 0, 0].tolist() == [0, 4, 4]
     assert rec.between(500, 3000).frames().t.tolist() == [1000, 2500]
-    with pytest.raises(ProblemError, match="holds frames and no events"):
+    with pytest.raises(ProblemError, match="contains frames and no events"):
         _ = rec.events
-    with pytest.raises(ProblemError, match=r"only \.mcap does"):
+    with pytest.raises(ProblemError, match=r"only a \.mcap does"):
         rec.datagrams()
     assert rec.clock is None
     assert "3 frames" in repr(rec)
@@ -393,11 +398,14 @@ def test_one_recording_is_opened_and_of_several_the_error_names_the_function_for
     place = foreign.write_pedar(tmp_path)
     left, right = taxel.open_all(place)
     assert (left.side, right.side) == ("left", "right")
-    with pytest.raises(ProblemError, match=r"2 recordings \(.* left, .* right\); taxel convert .* FOLDER writes them"):
+    with pytest.raises(
+        ProblemError,
+        match=r"2 recordings \(.* left, .* right\); to write each to a file of taxel, run taxel convert .* FOLDER",
+    ):
         taxel.open(place)
     taxel.convert(left, tmp_path / "left.npz")
     assert taxel.open(tmp_path / "left.npz").frames() == taxel.open_all(tmp_path / "left.npz")[0].frames()
-    with pytest.raises(ProblemError, match=r": a folder; name one of its recordings"):
+    with pytest.raises(ProblemError, match=r": is a folder; name one of its recordings"):
         taxel.open(tmp_path)
     assert [one.name for one in taxel.open_all(tmp_path)] == ["left.npz"]
 

@@ -71,7 +71,7 @@ def test_other_peoples_h5_is_a_list_of_trials_whose_truth_is_notes(tmp_path: Pat
         assert {n.text: n.t for n in rec.notes} == {e: int(t[0]) for e, t in trial.truth.items()}
     with h5py.File(tmp_path / "other.h5", "w") as h5:
         h5["t"] = [1]
-    with pytest.raises(FormatError, match=r"holds t \(1\); must be either arrays t, x, y, p \(events\)"):
+    with pytest.raises(FormatError, match=r"contains t \(1\); must contain arrays t, x, y, p \(events\)"):
         taxel.open(tmp_path / "other.h5")
 
 
@@ -93,7 +93,7 @@ def test_a_folder_is_a_list_in_the_order_of_the_names_with_its_labels_as_notes(t
         [],
     ]
     (tmp_path / "labels.csv").write_text("recording,label,t_us\nrun,heel,700\n")
-    with pytest.raises(FormatError, match=r"run is not a recording of this folder; there are a\.h5, walk1\.csv"):
+    with pytest.raises(FormatError, match=r"run is not a recording of this folder; must be one of a\.h5, walk1\.csv"):
         taxel.open_all(tmp_path)
 
 
@@ -105,13 +105,13 @@ def test_a_folder_of_other_peoples_files_is_its_trials(tmp_path: Path, name: str
 
 
 def test_a_folder_without_a_recording_says_what_there_is_to_read(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"holds no recording; taxel reads .mcap, .lsa"):
+    with pytest.raises(FormatError, match=r"contains no recording; taxel reads .mcap, .lsa"):
         taxel.open_all(tmp_path)
 
 
 def test_a_folder_without_a_recording_names_bags_arrays_and_tables_too(tmp_path: Path) -> None:
     (tmp_path / "notes.pdf").write_bytes(b"%PDF")
-    readable = r"taxel reads .*ROS bags .*tekscan.*by a layout file \.npy, \.txt and"
+    readable = r"taxel reads .*ROS bags .*tekscan.*with a layout file, arrays and tables, for example \.npy"
     with pytest.raises(FormatError, match=readable) as said:
         taxel.open_all(tmp_path)
     assert "\n" not in str(said.value)

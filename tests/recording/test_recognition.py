@@ -135,7 +135,8 @@ def test_a_folder_leaves_out_what_is_of_others_whatever_its_ending(tmp_path: Pat
     (tmp_path / "others.layout.toml").write_text("rows = 1\ncolumns = 3\nrate_hz = 100\n")
     with pytest.warns(
         UserWarning,
-        match=r"others\.npz left out, because tables and arrays are not read in a folder with recordings \(walk\.npz\)",
+        match=r"others\.npz are left out, because tables and arrays are not read in a folder with recordings "
+        r"\(walk\.npz\)",
     ):
         assert [recording.path for recording in taxel.open_all(tmp_path)] == [own]
 

@@ -129,7 +129,7 @@ def test_of_several_boards_none_is_the_files_own(several: tuple[Path, dict[str, 
         lambda: taxel.cut(recording, stop_us=5.0)[0].events,
     ):
         with pytest.raises(
-            taxel.ProblemError, match=r"holds 4 sources \(right, left, imu, given\); choose one by"
+            taxel.ProblemError, match=r"contains 4 sources \(right, left, imu, given\); choose one with"
         ) as refused:
             ask()
         assert "\n" not in str(refused.value)
@@ -375,7 +375,7 @@ def test_times_go_from_one_clock_to_the_other_and_nothing_else_moves(
     assert len(cut["left"].events) == 5
     with pytest.raises(taxel.ProblemError, match="has no clock 'up'; there are right, left, imu, given, host"):
         recording.on_clock("up")
-    with pytest.raises(taxel.ProblemError, match="is on the clock of left already"):
+    with pytest.raises(taxel.ProblemError, match="is already on the clock of left"):
         recording.on_clock("left").on_clock("host")
     with pytest.raises(taxel.ProblemError, match=r"call on_clock\('left'\) before between"):
         plain["left"].between(0, 5).on_clock("left")

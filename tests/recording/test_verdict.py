@@ -81,7 +81,7 @@ def test_a_verdict_says_whether_anything_was_lost(seed: int) -> None:
 @pytest.mark.parametrize("kind", [".mcap", ".npz", ".h5"])
 def test_remarks_go_to_files_and_back_beside_the_verdict(tmp_path: Path, kind: str) -> None:
     frames = taxel.Frames([[[1.0, 2.0]], [[3.0, 4.0]]], [0, 10_000])
-    said = ("at the bag's times", "2 messages of another length left out")
+    said = ("the times are those of the bag", "2 messages of another length left out")
     fine = taxel.Verdict.from_dict({"status": "complete", "text": "nothing lost"})
     losses = Losses(remarks=said, verdict=known(fine))
     of = source_from(frames, Origin(tmp_path / "a.bag", "a.bag", "ros"), losses=losses)
@@ -94,7 +94,7 @@ def test_remarks_go_to_files_and_back_beside_the_verdict(tmp_path: Path, kind: s
     taxel.convert(back, tmp_path / "b.mcap")
     assert taxel.open(tmp_path / "b.mcap").remarks == (*said, *made, f"converted from a{kind}")
     lost = taxel.convert(back, tmp_path / "b.csv")
-    assert "the remark: at the bag's times" in lost
+    assert "the remark: the times are those of the bag" in lost
     assert taxel.open(tmp_path / "b.csv").remarks == ()
 
 

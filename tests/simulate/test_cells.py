@@ -237,5 +237,5 @@ def test_a_layer_refuses_cells_and_frames_that_do_not_fit():
     for cells in (0, 17, 1.5, "two"):
         with pytest.raises(ProblemError, match="cells_per_pitch"):
             Layer(cells_per_pitch=cells)
-    with pytest.raises(ProblemError, match=r"shape \(14, 14\): the array has \(42, 42\)"):
+    with pytest.raises(ProblemError, match=r"shape \(14, 14\): must be \(42, 42\)"):
         Layer(None, SMALL, cells_per_pitch=3).press(np.zeros((14, 14)))

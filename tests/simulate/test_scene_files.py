@@ -153,7 +153,7 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
         (("seed = 5", "seed = 1.5"), "seed is 1.5"),
         (("seed = 5", 'preset = "9 kHz"'), "preset"),
         (("seed = 5", "foam.modulus_kpa = -1"), "modulus_kpa is -1 kPa: must be above 0"),
-        (("seed = 5", "foam.modulus_kpa = 1e300"), "foam: the force on it is too large for a float32"),
+        (("seed = 5", "foam.modulus_kpa = 1e300"), "foam: the force on the foam is too large for a float32"),
         (("seed = 5", "foam.modulus = 1"), r"foam.modulus is not known"),
         (("seed = 5", "taxels.exponent = 3"), "exponent is 3"),
         (("seed = 5", "taxels.noise = 3"), "taxels.noise is not known"),
@@ -164,7 +164,7 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
         ),
         (
             ("seed = 5", 'preset = "128 x 128, 2 kHz"\narray.rows = 300\narray.columns = 300'),
-            r'preset "128 x 128, 2 kHz" does not read 300 x 300 taxels: .* x step_',
+            r'preset "128 x 128, 2 kHz" cannot read 300 x 300 taxels: .* x step_',
         ),
         (
             ("seed = 5", 'preset = "128 x 128, 1 kHz"'),

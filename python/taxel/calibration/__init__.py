@@ -105,7 +105,9 @@ class Calibration(Saved):
         if not reading_unit or reading_unit in UNITS:
             raise refused("reading_unit", f" is {reading_unit!r}: must be the unit of the readings: ticks, counts")
         if isinstance(curve, PointCurve) and curve.x.ndim == 3 and curve.x.shape[1:] != array.shape:
-            raise refused("readings", f" are of {curve.x.shape[1:]} taxels: the array has {array.shape}")
+            raise refused(
+                "readings", f" have the shape {curve.x.shape[1:]}: must have that of the array, {array.shape}"
+            )
         calibration.gain = _by_taxel("gain", how.get("gain", 1.0), array)
         if not (np.isfinite(calibration.gain) & (calibration.gain > 0)).all():
             raise refused("gain", ": must be above 0 and finite at every taxel")
@@ -282,7 +284,7 @@ class Calibration(Saved):
         checked_text("unit", unit, UNITS)
         measured = [instance("loads", load, Load) for load in several("loads", loads)]
         if not measured:
-            raise refused("loads", " is empty: must hold at least one known load")
+            raise refused("loads", " is empty: must contain at least one load")
         array, reading_unit = instance("frames", measured[0].frames, Frames).array, measured[0].frames.unit
         curve: Curve = Power(1.0)
         if start is not None:
@@ -361,7 +363,7 @@ class Calibration(Saved):
             same(self.array, rest.array, "the tare")
             rest = rest.rest
         elif rest is not None and np.isnan(numbers("rest", rest, np.float64)).any():
-            raise refused("rest", " holds NaN: must be finite; give a Tare where the rest of a taxel is not known")
+            raise refused("rest", " contains NaN: must be finite; if the rest of a taxel is unknown, give a Tare")
         if rest is not None:
             return _by_taxel("rest", rest, self.array)
         if self.rest is not None:
@@ -444,9 +446,11 @@ class Calibration(Saved):
             how = {name: document[name] for name in names if name in document} | {"rest": rest, "loads": loads}
             return cls._made(array, curve, unit, checked_text("of", document["of"]), how)
         except KeyError as error:
-            raise FormatError(f"{entry}: {error.args[0]} is missing; must be as Calibration.save writes it") from None
+            raise FormatError(
+                f"{entry}: {error.args[0]} is missing; the text must be as Calibration.save writes it"
+            ) from None
         except (ValueError, TypeError, AttributeError, IndexError, OverflowError, ProblemError) as error:
-            raise FormatError(f"{entry}: {first_line(error)}; must be as Calibration.save writes it") from None
+            raise FormatError(f"{entry}: {first_line(error)}; the text must be as Calibration.save writes it") from None
 
     @staticmethod
     def beside(recording: str | os.PathLike[str]) -> Path | None:
@@ -496,9 +500,9 @@ def _32_bits(values: Values) -> NDArray[np.float32]:
 def _by_taxel(name: str, value: Any, array: Array) -> Values:
     values = numbers(name, value, np.float64)
     if isinstance(value, bool):
-        raise refused(name, f" is {value}: must be a number, or {array.shape}")
+        raise refused(name, f" is {value}: must be a number, or an array of shape {array.shape}")
     if values.shape not in ((), array.shape):
-        raise refused(name, f" has shape {values.shape}: must be a number, or {array.shape}")
+        raise refused(name, f" has shape {values.shape}: must be a number, or an array of shape {array.shape}")
     if np.isinf(values).any():
         raise refused(name, ": must be finite")
     return frozen(np.broadcast_to(values, array.shape).copy())

@@ -69,8 +69,9 @@ class PointCurve:
         if self.x.ndim not in (1, 3) or not self.y.size or len(self.x) != len(self.y):
             points = len(self.x) if self.x.ndim else 0
             raise ProblemError(
-                f"a table of {counted(points, 'reading')} and {counted(len(self.y), 'value')}: must be equally many, 1 "
-                "or more, for one taxel (points,) or for each (points, rows, columns)"
+                f"the table has {counted(points, 'reading')} and {counted(len(self.y), 'value')}: must have as "
+                f"many readings "
+                "as values, 1 or more; the shape of readings is (points,), or (points, rows, columns) if taxels differ"
             )
         for name, column in (("readings", self.x), ("values", self.y)):
             rising = np.isfinite(column) & (np.diff(column, axis=0, prepend=-np.inf) > 0) & (column >= 0)
@@ -78,7 +79,9 @@ class PointCurve:
             if len(wrong):
                 position = tuple(wrong[0])
                 index = "".join(f"[{k}]" for k in position)
-                raise ProblemError(f"{name}{index} is {column[position]:g}: must begin at 0 or more, and rise")
+                raise ProblemError(
+                    f"{name}{index} is {column[position]:g}: the numbers must begin at 0 or more, and rise"
+                )
         at_rest = self.x[0] == 0
         if np.any(at_rest != (self.y[0] == 0)):
             first = float(np.ravel(self.x[0])[0])
@@ -110,7 +113,7 @@ class PointCurve:
         return {"table": {"readings": self.x.tolist(), "values": self.y.tolist()}}
 
     def bent(self, exponent: float) -> PointCurve:  # noqa: ARG002  what a curve with an exponent takes
-        raise refused("exponent", ": a table has none; only its gain is fitted")
+        raise refused("exponent", ": a table has no exponent; only the gain of a table is fitted")
 
 
 class Law:

@@ -82,7 +82,7 @@ class LoadEquations(NamedTuple):
         same(sensor.array, frames.array, f"the frames of {location}", frames.unit, sensor.reading_unit)
         value, unit = above_0(location, load.load), checked_text("unit", load.unit, UNITS)
         if not len(frames):
-            raise ProblemError(f"{location}: there is no frame while the load is on the array")
+            raise ProblemError(f"{location}: no frame was recorded while the load was on the array")
         rest = sensor.rest
         readings = frames.values.mean(axis=0, dtype=np.float64)
         chosen = sensor.array._there() & ~np.isnan(rest)
@@ -104,8 +104,9 @@ class LoadEquations(NamedTuple):
             areas = sensor.array.area_mm2
             if areas is None:
                 raise ProblemError(
-                    f"{location}: in {unit}, and the calibration in {sensor.unit}: to convert, taxel needs the area "
-                    f"of each taxel, which is not known for {sensor.array!r}"
+                    f"{location}: the unit is {unit}, but that of the calibration is {sensor.unit}; to convert, "
+                    f"taxel needs "
+                    f"the area of each taxel, which is unknown for {sensor.array!r}"
                 )
             weight = 1 / (areas * N_PER_KPA_MM2) if unit == "kPa" else areas * N_PER_KPA_MM2
         alone = unit == "kPa" or load.taxel is not None
@@ -157,8 +158,9 @@ def best_exponent(curve: Curve, equations: Sequence[LoadEquations]) -> float:
     if alike:
         also = ", ".join(f"{exponent:.3g}" for exponent in alike)
         warn(
-            f"loads: an exponent of {best[1]:.3g} is used, but {also} fits them as well; one more load, or a given "
-            "exponent, would decide",
+            f"loads: the exponent {best[1]:.3g} is used, but {also} would fit the loads as well; to be sure, "
+            f"add a load "
+            "or give the exponent",
             stacklevel=3,
         )
     return best[1]
@@ -172,7 +174,7 @@ def gains(array: Array, curve: Curve, equations: Sequence[LoadEquations], each: 
         return by_taxel, common
     if not any(load.alone for load in equations):
         raise refused(
-            "each", ": no load determines a single taxel; give a uniform pressure (kPa), or the taxel of a load"
+            "each", ": no load determines a single taxel; give a load of uniform pressure (kPa), or the taxel of a load"
         )
     share = np.array([load.by_taxel(curve) / load.load for load in equations if load.alone])
     squares = (share**2).sum(axis=0)
@@ -183,7 +185,7 @@ def gains(array: Array, curve: Curve, equations: Sequence[LoadEquations], each: 
 def same(calibrated: Array, given: Array, subject: str, unit: str | None = None, expected: str | None = None) -> None:
     """Refuse what has other taxels, or another unit; warn of another pitch."""
     if not calibrated.fits(given):
-        raise ProblemError(f"{subject}: of {given!r}; the calibration is of another array, {calibrated!r}")
+        raise ProblemError(f"{subject}: the array is {given!r}; that of the calibration is {calibrated!r}")
     calibrated._warn_apart(given, subject, stacklevel=3)
     if unit != expected:
-        raise ProblemError(f"{subject}: in {unit}; the calibration needs loads in {expected}")
+        raise ProblemError(f"{subject}: the unit is {unit}; the calibration needs loads in {expected}")

@@ -53,7 +53,7 @@ class Composite(Encoder):
 
     def _json(self) -> str:
         if not isinstance(self.parts, Mapping):
-            raise refused("parts", f" is {shown(self.parts)}: must be encoders by name")
+            raise refused("parts", f" is {shown(self.parts)}: must be a dict of encoders, with their names as keys")
         # The parts write themselves, as a tare is inserted as text.
         each = [
             f"{json.dumps(text('a name in parts', name))}: {instance(f'parts[{name!r}]', part, Encoder)._json()}"
@@ -137,9 +137,12 @@ class Composite(Encoder):
         given = [text("inputs", name) for name in several("inputs", names)]
         for n, name in enumerate(given):
             if name not in self.parts:
-                raise refused("inputs", f": no encoder {name!r}: the encoders are {', '.join(sorted(self.parts))}")
+                raise refused(
+                    "inputs",
+                    f": {name!r} is not the name of an encoder: must be one of {', '.join(sorted(self.parts))}",
+                )
             if name in given[:n]:
-                raise refused("inputs", f": {name!r} comes twice")
+                raise refused("inputs", f": {name!r} appears twice")
         if not given:
             raise refused("inputs", " is empty: must be names of encoders, one or more")
         return tuple(sorted(given))

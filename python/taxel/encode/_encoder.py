@@ -399,5 +399,5 @@ class EncoderStream:
 def frames_of(x: object) -> Frames:
     """Return `x` if it is frames; raise a ProblemError otherwise."""
     if not isinstance(x, Frames):
-        raise ProblemError(f"{type(x).__name__}: encoders take taxel.Events or taxel.Frames")
+        raise ProblemError(f"{type(x).__name__} cannot be encoded: must be taxel.Events or taxel.Frames")
     return x

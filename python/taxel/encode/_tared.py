@@ -46,7 +46,7 @@ class Tared(Encoder):
         try:
             finite("tare", self.tare, "s")
         except ProblemError:
-            raise refused("tare", f" is {shown(self.tare)}: must be a taxel.Tare, or seconds") from None
+            raise refused("tare", f" is {shown(self.tare)}: must be a taxel.Tare, or a number of seconds") from None
         return False
 
     def _plain(self) -> dict[str, Any]:
@@ -59,8 +59,9 @@ class Tared(Encoder):
         if isinstance(source, Frames) and getattr(self, "noise_floor", None) == 0 and _has_fractions(source.values):
             raise refused(
                 "noise_floor",
-                " is 0: 0 is only for whole numbers, for which half a step above rest is a load; for values in "
-                f"{source.unit}, give the noise at rest, for example 0.01",
+                f" is 0, but the values are in {source.unit}: must be the noise at rest, for example 0.01; 0 is "
+                f"only for "
+                "whole numbers",
             )
         return super(Tared, encoder).encode(source)
 
@@ -80,7 +81,9 @@ class Tared(Encoder):
         rest_us = integer("tare, us", round(1e6 * finite("tare", self.tare, "s")), 1, 2**53)
         if 2 * rest_us > last - first:
             lasts = f"the recording lasts {(last - first) / 1e6:g} s"
-            raise refused("tare", f" is {self.tare} s: more than half of the recording would be rest: {lasts}")
+            raise refused(
+                "tare", f" is {self.tare} s, more than half of the recording: must be shorter, because {lasts}"
+            )
         return self.with_tare(Tare.take(source, stop_us=first + rest_us)), source
 
     def __eq__(self, other: object) -> bool:

@@ -103,7 +103,7 @@ def trials(path: str | Path, format: str | None = None, **how: Any) -> Iterator[
     names = [format] if format else [name for name, kind in FORMATS.items() if kind.files(source)]
     if len(names) != 1:
         problem = "no known format" if not names else "several formats (" + ", ".join(names) + ")"
-        raise FormatError(f"{source}: holds {problem}; give format, one of {', '.join(FORMATS)}")
+        raise FormatError(f"{source}: contains {problem}; set format to one of {', '.join(FORMATS)}")
     try:
         yield from FORMATS[names[0]].trials(source, **how)
     except MemoryError as error:

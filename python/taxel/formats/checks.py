@@ -39,7 +39,7 @@ def files_at(path: str | Path, files: Callable[[Path], list[Path]], noun: str) -
     file = Path(checked_path("path", path))
     found = files(file)
     if not found:
-        raise FormatError(f"{file}: holds no {noun}")
+        raise FormatError(f"{file}: contains no {noun}")
     return found
 
 
@@ -51,7 +51,9 @@ def sensor(location: str, array: Array) -> Array:
     FormatError : more taxels than a file's sensor may have
     """
     if array.rows * array.columns > TAXELS:
-        raise FormatError(f"{location}: a sensor of {array.rows} x {array.columns} taxels; at most {TAXELS} are read")
+        raise FormatError(
+            f"{location}: the sensor has {array.rows} x {array.columns} taxels; must have at most {TAXELS}"
+        )
     return array
 
 
@@ -109,9 +111,9 @@ def ascending(location: str, t: NDArray[np.int64], first_line: int | Callable[[i
         k = int(back[0]) + 1
         line = first_line(k) if callable(first_line) else first_line + k
         is_midnight = 0 <= t[k] < _NOON_US < t[k - 1] <= 2 * _NOON_US
-        hint = "; if these are times of day, they begin again at midnight: write dates too" if is_midnight else ""
+        hint = "; times of day begin again at midnight, so the file must also have dates" if is_midnight else ""
         raise FormatError(
-            f"{location}, line {line}: time {in_s(t[k])} s is not after {in_s(t[k - 1])} s, the time before{hint}"
+            f"{location}, line {line}: time {in_s(t[k])} s is not after {in_s(t[k - 1])} s, the time before it{hint}"
         )
     return t
 

@@ -105,15 +105,15 @@ def _read(file: Path) -> Trial:
     above, begin = text.before(content, lambda line: _FRAME_LINE.search(line) is not None)
     shape, size, period = _head(file, [*above, *([] if begin is None else [begin])], len(above))
     if begin is None:
-        raise FormatError(f"{file.name}: no page with a frame's number (Pict-No.: 1)")
+        raise FormatError(f"{file.name}: no page has the number of a frame (Pict-No.: 1)")
     area, pages = size[0] * size[1], list[_Page]()
     read = Growing(file.name, values=(shape, np.float32))
     for first, lines in _pages(len(above) + 1, begin, content):
         page, indices, cells = _page(file, lines, first, shape)
         if pages and page.number <= pages[-1].number:
             raise FormatError(
-                f"{file.name}, line {page.line}: frame {page.number} follows frame {pages[-1].number}; numbers must "
-                "ascend"
+                f"{file.name}, line {page.line}: frame {page.number} follows frame {pages[-1].number}; the numbers of "
+                "frames must ascend"
             )
         frame = np.zeros((1, *shape), np.float32)
         frame[0][np.ix_(*indices)] = cells
@@ -121,7 +121,9 @@ def _read(file: Path) -> Trial:
         pages.append(page)
     t = np.rint(to_us((np.array([page.number for page in pages], np.float64) - 1) * period))
     if t[-1] > TIME_US or (np.diff(t) <= 0).any():
-        raise FormatError(f"{file.name}: {period:g} ms per frame; must be .001 ms or more, and end within 142 years")
+        raise FormatError(
+            f"{file.name}: {period:g} ms per frame; must be .001 ms or more, and all frames must end within 142 years"
+        )
     # The size is named as the matrix is: across first.
     array = Array(*shape, pitch_mm=(10 * size[1], 10 * size[0]), name="emed plate")
     return Trial(
@@ -142,17 +144,15 @@ def _head(file: Path, content: Sequence[str], first: int) -> tuple[tuple[int, in
     expected = {"matrix": "Matrix: 64x95", "size": "Sensor size: 0.500x0.500 cm", "period": "Time/picture:10.0 ms"}
     for name, match in matches.items():
         if match is None:
-            raise FormatError(f"{file.name}, line {first + 1}: no '{expected[name]}' before it")
+            raise FormatError(f"{file.name}, line {first + 1}: a line like '{expected[name]}' is missing above")
     values = {name: tuple(float(n) for n in match.groups()) for name, match in matches.items() if match is not None}
     for name, numbers in values.items():
         if min(numbers) <= 0:
-            raise FormatError(
-                f"{file.name}, line {first + 1}: before it a {name} of 0; must be like '{expected[name]}'"
-            )
+            raise FormatError(f"{file.name}, line {first + 1}: the {name} above is 0; must be like '{expected[name]}'")
     # The columns are named first, so the printed rows begin after the first number.
     columns, rows = (int(n) for n in values["matrix"])
     if max(rows, columns) > 65_535:
-        raise FormatError(f"{file.name}: a matrix of {columns} x {rows}; at most 65535 on each side")
+        raise FormatError(f"{file.name}: the matrix has {columns} x {rows} cells; must have at most 65535 on each side")
     sensor(file.name, Array(rows, columns))
     return (rows, columns), (values["size"][0], values["size"][1]), values["period"][0]
 
@@ -167,7 +167,9 @@ def _page(
     head = next((k for k in range(1, end) if content[k].strip()), end)
     names = content[head].split() if head < end else []
     if len(names) < 2 or names[-1] != _MARGIN:
-        raise FormatError(f"{file.name}, line {before + head + 1}: no line of column numbers that ends in {_MARGIN}")
+        raise FormatError(
+            f"{file.name}, line {before + head + 1}: a line of column numbers that ends in {_MARGIN} is missing here"
+        )
     last = next((k for k in range(head + 1, end) if content[k].startswith(_MARGIN)), None)
     if last is None:
         raise FormatError(f"{file.name}, line {before + end}: frame {match[1]} ends without the line {_MARGIN}")
@@ -176,7 +178,7 @@ def _page(
     read = text.numbers(lines, file, before + head + 2, labels)
     margin = content[last].split()
     if len(margin) != len(names) + 1:
-        raise FormatError(f"{file.name}, line {before + last + 1}: {len(margin) - 1} forces, must have {len(names)}")
+        raise FormatError(f"{file.name}, line {before + last + 1}: {len(margin) - 1} forces; must have {len(names)}")
     numbers = np.array([text.number(n, file, before + head + 1, "column number") for n in names[:-1]])
     indices = (
         _indices(file, before + head + 2, "row", read[:, 0], shape[0], step=1),
@@ -196,7 +198,8 @@ def _indices(
     if wrong.any():
         k = int(np.flatnonzero(wrong)[0])
         raise FormatError(
-            f"{file.name}, line {line + step * k}: {noun} {numbers[k]:g}; must ascend, whole numbers of 1 to {most}"
+            f"{file.name}, line {line + step * k}: {noun} {numbers[k]:g}; must be whole numbers from 1 to "
+            f"{most} that ascend"
         )
     return np.asarray(numbers.astype(np.int64) - 1)
 
@@ -215,7 +218,7 @@ def _unit(file: Path, pages: Sequence[_Page], area_cm2: float) -> str:
     if len(wrong):
         page, found_force = pages[int(wrong[0])], _NEWTON[unit] * sums[wrong[0]]
         raise FormatError(
-            f"{file.name}, line {page.force_line}: {_MARGIN} is {page.force:g} N; the cells of frame {page.number} "
-            f"make {found_force:g} N ({unit} on {area_cm2:g} cm2)"
+            f"{file.name}, line {page.force_line}: {_MARGIN} is {page.force:g} N, but the cells of frame "
+            f"{page.number} add up to {found_force:g} N ({unit} on {area_cm2:g} cm2)"
         )
     return unit

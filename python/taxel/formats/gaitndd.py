@@ -37,7 +37,7 @@ _TS_COLUMNS = [
     *("time", "left stride", "right stride", "left swing", "right swing", "left swing %", "right swing %"),
     *("left stance", "right stance", "left stance %", "right stance %", "double support", "double support %"),
 ]
-_SOURCE = "step times that the authors derived from this very channel (left foot only)"
+_SOURCE = "step times that the authors derived from this channel (left foot only)"
 
 
 def files(path: Path) -> list[Path]:
@@ -112,7 +112,9 @@ def format_212(data: bytes, name: str = "data") -> NDArray[np.int16]:
     if not isinstance(data, bytes | bytearray | memoryview):
         raise refused("data", f" is {arguments.shown(data)}: must be bytes")
     if len(data) % 3:
-        raise FormatError(f"{name}: {len(data)} bytes; format 212 has two samples in three bytes, so a multiple of 3")
+        raise FormatError(
+            f"{name}: {len(data)} bytes; must be a multiple of 3, because format 212 has two samples in three bytes"
+        )
     b = np.frombuffer(data, np.uint8).reshape(-1, 3).astype(np.int16)
     pairs = np.stack([b[:, 0] + 256 * (b[:, 1] & 15), b[:, 2] + 256 * (b[:, 1] >> 4)], axis=1)
     return np.where(pairs > 2047, pairs - 4096, pairs).astype(np.int16).ravel()
@@ -140,12 +142,14 @@ def step_times(path: Path) -> dict[str, NDArray[np.int64]]:
     rows = [line.split() for line in text.lines(path)]
     values = text.numbers(rows, path, 1, _TS_COLUMNS)
     if not len(values):
-        raise FormatError(f"{path.name}: empty; must hold one line per stride")
+        raise FormatError(f"{path.name}: the file is empty; must have a line for each stride")
     time, stride, swing = values[:, 0], values[:, 1], values[:, 3]
     off = time - swing
     wrong = np.flatnonzero((np.diff(time, prepend=-np.inf) <= 0) | (stride <= 0) | (swing <= 0) | (swing >= stride))
     if len(wrong):
-        raise FormatError(f"{path.name}, line {wrong[0] + 1}: times must ascend, and 0 < swing < stride")
+        raise FormatError(
+            f"{path.name}, line {wrong[0] + 1}: times must ascend, and swing must be above 0 and below stride"
+        )
     strikes = np.unique(whole_us(path.name, np.concatenate([[time[0] - stride[0]], time])))
     return {"contact": strikes, "foot_off": whole_us(path.name, off)}
 
@@ -154,22 +158,22 @@ def _header(path: Path) -> tuple[float, int, list[tuple[str, int, int]]]:
     """Return the rate, the number of samples, and file, first value and checksum of each signal."""
     rows = [(k, line.split()) for k, line in enumerate(text.lines(path), start=1) if line.strip() and line[0] != "#"]
     if not rows or len(rows[0][1]) < 4:
-        raise FormatError(f"{path.name}, line 1: must hold name, signals, rate and samples")
+        raise FormatError(f"{path.name}, line 1: must contain name, signals, rate and samples")
     k, record = rows[0]
     signals = int(text.number(record[1], path, k, "number of signals"))
     rate = text.number(record[2].split("/")[0].split("(")[0], path, k, "rate")
     samples = int(text.number(record[3], path, k, "number of samples"))
     if not 0 < rate <= 1e6 or samples < 1 or signals < 1:
         values = f"{signals} signals, {rate:g} Hz, {samples} samples"
-        raise FormatError(f"{path.name}, line {k}: {values}; must be above 0, at most 1000000 Hz")
+        raise FormatError(f"{path.name}, line {k}: {values}; must be above 0, and the rate at most 1000000 Hz")
     if len(rows) < 1 + signals:
-        raise FormatError(f"{path.name}: {len(rows) - 1} signal lines for {signals} signals")
+        raise FormatError(f"{path.name}: {len(rows) - 1} lines of signals; must be {signals}, as line 1 states")
     channels = []
     for k, cells in rows[1 : 1 + signals]:
         if len(cells) < 7:
-            raise FormatError(f"{path.name}, line {k}: {len(cells)} cells; must hold file, format ... checksum")
+            raise FormatError(f"{path.name}, line {k}: {len(cells)} cells; must be file, format ... checksum")
         if cells[1] != "212":
-            raise FormatError(f"{path.name}, line {k}: format {cells[1]}; only 212 is read")
+            raise FormatError(f"{path.name}, line {k}: the format is {cells[1]}; must be 212")
         if not re.fullmatch(r"[\w.-]+", cells[0]):
             raise FormatError(f"{path.name}, line {k}: {cells[0]!r} is not a plain file name")
         first, checksum = (int(text.number(cells[c], path, k, w)) for c, w in ((5, "first value"), (6, "checksum")))
@@ -181,12 +185,12 @@ def _samples(path: Path, samples: int, first: int, checksum: int) -> NDArray[np.
     try:
         file = open_file(path)
     except FileNotFoundError:
-        raise FormatError(f"{path.name}: named in the header, but not there") from None
+        raise FormatError(f"{path.name}: the header names this file, but it is missing") from None
     with file:
         size = os.fstat(file.fileno()).st_size
         if size != 3 * ((samples + 1) // 2):
             raise FormatError(
-                f"{path.name}: {size} bytes; {samples} samples of format 212 are {3 * ((samples + 1) // 2)}"
+                f"{path.name}: {size} bytes; must be {3 * ((samples + 1) // 2)} for {samples} samples of format 212"
             )
         # A frame of one channel has 12 bytes.
         unpacked(path.name, 12 * samples)
@@ -196,12 +200,15 @@ def _samples(path: Path, samples: int, first: int, checksum: int) -> NDArray[np.
     values = np.asarray(read.column("values")[:samples], np.int16)
     expected = NO_SAMPLE if first == -32768 else first
     if values[0] != expected:
-        raise FormatError(f"{path.name}: first value {values[0]}; the header says {first}")
+        raise FormatError(f"{path.name}: the first value is {values[0]}; must be {first}, as the header states")
     # In the header's checksum an invalid sample counts as -32768.
     plain = int(values.sum(dtype=np.int64))
     total = plain + (-32768 - NO_SAMPLE) * int(np.count_nonzero(values == NO_SAMPLE))
     if checksum not in {_int16(total), _int16(plain)}:
-        raise FormatError(f"{path.name}: samples sum to {_int16(total)} (16 bits); the header says {checksum}")
+        raise FormatError(
+            f"{path.name}: the sum of the samples is {_int16(total)} (16 bits); must be {checksum}, as the "
+            f"header states"
+        )
     return values
 
 

@@ -32,7 +32,7 @@ _COLUMNS = [
     "total left",
     "total right",
 ]
-_SOURCE = "the foot's own total force: contact above 50 N, foot-off below 25 N, stances of 0.2 s or more"
+_SOURCE = "the total force of this foot: contact above 50 N, foot-off below 25 N, stances of 0.2 s or more"
 
 
 def files(path: Path) -> list[Path]:
@@ -70,13 +70,14 @@ def trials(path: str | Path) -> Iterator[Trial]:
             read.add(t=t, left=rows[:, 1:9], right=rows[:, 9:17], totals=rows[:, 17:])
         t = ascending(file.name, read.column("t"))
         if len(t) < 2:
-            raise FormatError(f"{file.name}: fewer than 2 lines: must have 2 or more")
+            raise FormatError(f"{file.name}: the file has fewer than 2 lines; must have 2 or more")
         totals = read.column("totals").T
         for foot, total in zip(("left", "right"), totals, strict=True):
             samples = known[person, foot] if (person, foot) in known else contacts(total)
             if samples.size and samples.max() >= len(t):
                 raise FormatError(
-                    f"events.csv: {person} {foot}, sample {samples.max()}; {file.name} has {len(t)} lines"
+                    f"events.csv: {person} {foot}, sample {samples.max()} is not in {file.name}, which has "
+                    f"{len(t)} lines"
                 )
             truth = {"contact": t[samples[:, 0]], "foot_off": t[samples[:, 1]]}
             yield Trial(
@@ -127,6 +128,8 @@ def _events_table(path: Path) -> dict[tuple[str, str], NDArray[np.int64]]:
     for row in text.table(path, ["person", "foot", "contact_sample", "off_sample"], optional=True):
         samples = [int(text.number(row[c], path, int(row["line"]), c)) for c in ("contact_sample", "off_sample")]
         if not 0 <= samples[0] < samples[1]:
-            raise FormatError(f"{path.name}, line {row['line']}: contact {samples[0]}, off {samples[1]}; must ascend")
+            raise FormatError(
+                f"{path.name}, line {row['line']}: contact is {samples[0]}, off is {samples[1]}; must ascend"
+            )
         walks.setdefault((row["person"], row["foot"]), []).append(samples)
     return {key: np.array(rows, np.int64) for key, rows in walks.items()}

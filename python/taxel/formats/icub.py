@@ -74,7 +74,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
                 unpacked(file.name, _GRASP * len(grasps))
             grasp = grasps[row["trial"]]
             if text.number(row["slice"], file, line, "slice") != len(grasp):
-                raise FormatError(f"{file.name}, line {line}: slice is {row['slice']}, must be {len(grasp)}")
+                raise FormatError(f"{file.name}, line {line}: slice is {row['slice']}; must be {len(grasp)}")
             taxels, joints = (
                 text.numbers([[row[n] for n in names]], file, line, names) for names in (_TAXELS, _JOINTS)
             )

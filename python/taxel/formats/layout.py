@@ -86,16 +86,16 @@ class Table:
         if len(text("separator", self.separator)) != 1:
             raise refused("separator", f" is {shown(self.separator)}: must be one character")
         if text("decimal", self.decimal, (".", ",")) == self.separator:
-            raise refused("decimal", f" is {shown(self.decimal)}, and separator is too: they must differ")
+            raise refused("decimal", f" is {shown(self.decimal)}, and so is separator: must be different characters")
         for column in several("columns", self.columns):
             text("columns", column)
         _check_end(self)
         if self.frame_begin is not None and not text("frame_begin", self.frame_begin).strip():
             raise refused("frame_begin", f" is {shown(self.frame_begin)}: must be a text")
         if self.frame_begin is not None and (self.frame_lines is not None or self.frame_end is not None):
-            raise refused("frame_begin", " is given, and so is frame_lines or frame_end: give one")
+            raise refused("frame_begin", " is given together with frame_lines or frame_end: give only one of them")
         if flag("events", self.events) and (self.time_column is None or self.has_lines):
-            raise refused("events", " is true: must have a time_column, and no frames of several lines")
+            raise refused("events", " is true: the table must have a time_column, and no frames of several lines")
         integer("skip_lines", self.skip_lines, 0)
         if self.time_column is not None:
             _column("time_column", self.time_column)
@@ -124,7 +124,7 @@ def _check_end(how: Table | PrintedFrames) -> None:
     if how.frame_end is not None:
         text("frame_end", how.frame_end, ("blank",))
         if how.frame_lines is not None:
-            raise refused("frame_end", " is given, and so is frame_lines: give one")
+            raise refused("frame_end", " is given together with frame_lines: give only one of them")
 
 
 def _column(name: str, value: object) -> None:
@@ -365,8 +365,8 @@ class Layout:
         FormatError : it names no source, or no rows and columns
         """
         if self.source is None or self.rows is None or self.columns is None:
-            lacks = "no [source] place" if self.source is None else "no rows and columns"
-            raise FormatError(f"{self.path}: has {lacks}; a live source needs them")
+            lacks = "[source] place is missing" if self.source is None else "rows and columns are missing"
+            raise FormatError(f"{self.path}: {lacks}; must be in the layout file of a live source")
         pitch = "" if self.pitch_mm is None or isinstance(self.pitch_mm, tuple) else f"x{self.pitch_mm:g}"
         keys = {"array": f"{self.rows}x{self.columns}{pitch}", **self.source.options()}
         if self.unit is not None:
@@ -401,7 +401,7 @@ class Layout:
         rows, columns = (integer(name, n, 1, 65_535) for name, n in zip(("rows", "columns"), shape, strict=True))
         if stated is not None and rows * columns != stated.rows * stated.columns:
             raise ProblemError(
-                f"states {rows} x {columns} taxels; the recording holds {stated.rows} x {stated.columns}"
+                f"the layout states {rows} x {columns} taxels; the recording has {stated.rows} x {stated.columns}"
             )
         places, is_mirrored = self.places, bool(self.side and side and self.side != side)
         if places is not None and is_mirrored:
@@ -411,20 +411,20 @@ class Layout:
         return Array(rows, columns, self.pitch_mm, exists, name, places, None if stated is None else stated.names)
 
 
-def advice(path: Path, says: str) -> str:
-    """Return the end of an error: which layout file beside a recording, or given as `layout`, says what is lacking.
+def advice(path: Path, does: str) -> str:
+    """Return the end of an error: what to write in a layout file beside a recording, or given as `layout`.
 
     Examples
     --------
-    >>> advice(Path("data/walk.csv.gz"), "describes a table")
-    'a layout file beside it, walk.layout.toml, or one given as layout, describes a table (docs/files.md)'
+    >>> advice(Path("data/walk.csv.gz"), "describe the table")
+    'describe the table in a layout file, walk.layout.toml beside it or another file given as layout (docs/files.md)'
     """
-    return f"a layout file {or_given(path)}, {says} (docs/files.md)"
+    return f"{does} in a layout file, {or_given(path)} (docs/files.md)"
 
 
 def or_given(path: Path) -> str:
     """Return which layout file is read with a recording, as part of a sentence."""
-    return f"beside it, {layout_name(path)}, or one given as layout"
+    return f"{layout_name(path)} beside it or another file given as layout"
 
 
 def layout_name(path: Path) -> str:
@@ -486,15 +486,15 @@ def _known(table: str, values: Mapping[str, Any]) -> None:
         return
     hint = ""
     if size := as_size(values[unknown]):
-        hint = f"a size is given by {size}"
+        hint = f"to state a size, write {size}"
     elif table == "source" and unknown in _OTHERWISE:
-        hint = f"it is {_OTHERWISE[unknown]}, above the line [source]"
+        hint = f"write {_OTHERWISE[unknown]} above the line [source] instead"
     elif table and unknown in _keys(""):
-        hint = f"it belongs above the line [{table}]"
+        hint = f"write it above the line [{table}]"
     elif groups := [f"[{group}]{_FOR.get(group, '')}" for group in _TABLES if unknown in _keys(group)]:
-        hint = f"it belongs in {' or '.join(groups)}"
+        hint = f"write it in {' or '.join(groups)}"
     raise ProblemError(
-        f"unknown key {table}{'.' * bool(table)}{unknown}{f'; {hint}' * bool(hint)}; there are {', '.join(names)}"
+        f"unknown key {table}{'.' * bool(table)}{unknown}{f'; {hint}' * bool(hint)}; must be one of {', '.join(names)}"
     )
 
 

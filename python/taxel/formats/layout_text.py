@@ -50,7 +50,9 @@ def of_source(text: str) -> str:
     place, *pairs = text.split(",")
     keys = {name: value for name, _, value in (pair.partition("=") for pair in pairs)}
     if not keys.get("array"):
-        raise refused("source", f" is {shown(text)}: needs array=ROWSxCOLUMNS; Show what arrives finds it")
+        raise refused(
+            "source", f" is {shown(text)}: must contain array=ROWSxCOLUMNS; to find the size, use Show what arrives"
+        )
     array = of_size(keys.pop("array"), of_wire=False)
     lines = [f"rows = {array.rows}", f"columns = {array.columns}"]
     if array.pitch_mm is not None:
@@ -107,7 +109,7 @@ def with_keys(path: Path, text: str, keys: Mapping[str, Any]) -> str:
     Layout.of_text(path, made)
     if tomllib.loads(made) != wanted:
         raise ProblemError(
-            f"{path}: taxel cannot change a file written in this way; set {', '.join(keys)} in it by hand"
+            f"{path}: taxel cannot edit this layout file; write {', '.join(keys)} in it with a text editor"
         )
     return made
 

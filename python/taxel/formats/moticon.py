@@ -32,7 +32,7 @@ MARKERS = {
     21: ("right", "contact"),
     25: ("right", "foot_off"),
 }
-_SOURCE = "the maker's step finder (neither the first nor the last loaded frame)"
+_SOURCE = "steps found by the maker's program (neither the first nor the last loaded frame)"
 
 
 def files(path: Path) -> list[Path]:
@@ -72,7 +72,10 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
     above, begin = text.before(content, lambda line: not line.startswith("#"))
     head = len(above)
     if head == 0 or begin is None:
-        raise FormatError(f"{file.name}, line {head + 1}: must hold lines of #, column names the last, then rows")
+        raise FormatError(
+            f"{file.name}, line {head + 1}: the file must begin with lines of #, the last with the names of "
+            f"columns, followed by rows"
+        )
     names = above[-1].lstrip("# ").split("\t")
     about = dict(line[2:].split(": ", 1) for line in above[:-1] if ": " in line)
     first = head + 1
@@ -128,14 +131,14 @@ def _column(names: list[str], pattern: str, file: Path, line: int) -> int:
     for k, name in enumerate(names):
         if re.fullmatch(pattern, name):
             return k
-    raise FormatError(f"{file.name}, line {line}: no column that matches {pattern!r}")
+    raise FormatError(f"{file.name}, line {line}: no column matches {pattern!r}")
 
 
 def _columns(names: list[str], foot: str, file: Path, line: int) -> list[int]:
     """Return which columns are the pressures and, last, the total force of a foot."""
     pressures = [k for k, name in enumerate(names) if re.match(rf"{foot} pressure \d+", name)]
     if not pressures:
-        raise FormatError(f"{file.name}, line {line}: no column '{foot} pressure 1'")
+        raise FormatError(f"{file.name}, line {line}: the column '{foot} pressure 1' is missing")
     return [*pressures, _column(names, rf"{foot} total force.*", file, line)]
 
 
@@ -143,7 +146,10 @@ def _is_there(row: Sequence[str], columns: list[int], names: list[str], file: Pa
     """Return whether a foot has values in a row; a row that has some of them is an error."""
     empty = [c for c in columns if not row[c].strip()]
     if empty and len(empty) < len(columns):
-        raise FormatError(f"{file.name}, line {line}: {names[empty[0]]} is empty, but other cells of this foot are not")
+        raise FormatError(
+            f"{file.name}, line {line}: {names[empty[0]]} is empty; must have a number, because other cells of "
+            f"this foot have one"
+        )
     return not empty
 
 
@@ -170,7 +176,9 @@ def _mark(
             if row[c].strip():
                 code = int(text.number(row[c], file, first + k, names[c]))
                 if code not in MARKERS:
-                    raise FormatError(f"{file.name}, line {first + k}: marker {code}; must be one of {sorted(MARKERS)}")
+                    raise FormatError(
+                        f"{file.name}, line {first + k}: marker is {code}; must be one of {sorted(MARKERS)}"
+                    )
                 marked[MARKERS[code]].append(int(t[k]))
 
 
@@ -179,7 +187,7 @@ def _steps_table(path: Path) -> dict[str, dict[tuple[str, str], list[float]]]:
     for row in text.table(path, ["recording", "foot", "contact_s", "toe_off_s"], optional=True):
         times = recordings.setdefault(row["recording"], {(f, e): [] for f, e in MARKERS.values()})
         if row["foot"] not in {"left", "right"}:
-            raise FormatError(f"{path.name}, line {row['line']}: foot {row['foot']!r}; must be left or right")
+            raise FormatError(f"{path.name}, line {row['line']}: foot is {row['foot']!r}; must be left or right")
         for column, event in (("contact_s", "contact"), ("toe_off_s", "foot_off")):
             times[row["foot"], event].append(text.number(row[column], path, int(row["line"]), column))
     return recordings

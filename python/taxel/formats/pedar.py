@@ -25,7 +25,7 @@ from taxel.frames import Frames
 
 __all__ = ["contacts", "files", "trials"]
 
-_SOURCE = "the insole's own sum, 10 % of its largest: not an independent truth"
+_SOURCE = "the sum of the same insole, at 10 % of its largest value: not independent of the readings"
 
 
 def files(path: Path) -> list[Path]:
@@ -60,14 +60,14 @@ def _read(file: Path) -> Iterator[Trial]:
     before, columns = text.before(content, lambda line: line.startswith("time[secs]"))
     head = len(before)
     if columns is None:
-        raise FormatError(f"{file.name}: no line of column names (time[secs] 1 2 ...)")
+        raise FormatError(f"{file.name}: the line of column names (time[secs] 1 2 ...) is missing")
     header = "\n".join(before)
     rate = re.search(r"scanning rate\s*\[Hz\]:\s*(\S+)", header)
     if rate is None:
-        raise FormatError(f"{file.name}, line {head + 1}: no 'scanning rate [Hz]' before it")
+        raise FormatError(f"{file.name}, line {head + 1}: a line 'scanning rate [Hz]' is missing above")
     hertz = text.number(rate[1], file, 1 + header[: rate.start()].count("\n"), "scanning rate")
     if hertz <= 0:
-        raise FormatError(f"{file.name}: scanning rate {hertz:g} Hz; must be above 0")
+        raise FormatError(f"{file.name}: the scanning rate is {hertz:g} Hz; must be above 0")
     unit = re.search(r"pressure values in\s+(\S+)", header)
     names = columns.split()
     begins = [k for k, name in enumerate(names) if name == "1"]
@@ -88,7 +88,7 @@ def _read(file: Path) -> Iterator[Trial]:
     if len(far):
         k = int(far[0])
         raise FormatError(
-            f"{file.name}, line {head + 3 + k}: {t[k + 1] - t[k]} us after the line before, at {hertz:g} Hz"
+            f"{file.name}, line {head + 3 + k}: {t[k + 1] - t[k]} us after the line above; must fit {hertz:g} Hz"
         )
     for foot, total in zip(feet, read.column("totals").T, strict=True):
         frames = contacts(total)

@@ -34,7 +34,7 @@ FRAME_US = 2000
 ROW_MM, COLUMN_MM = 7.62, 5.08
 
 _SOURCE = (
-    "the full plate itself: contact and foot-off are its first and last loaded frame; heel-off is the time when the "
+    "the full plate: contact and foot-off are the first and the last loaded frame; heel-off is the time when the "
     "load of the heel region falls below 5 % of its peak"
 )
 
@@ -72,7 +72,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
             for name in sorted(h5.entries):
                 match = re.fullmatch(r"img([0-9]{1,18})", name)
                 if match is None:
-                    raise FormatError(f"{file.name}: data set {name!r}; must be named imgNNN")
+                    raise FormatError(f"{file.name}: the data set {name!r} must have a name like imgNNN")
                 number, image = int(match[1]), _image(h5, name, file)
                 yield _trial(person, number, image, file, known.get((person, number)), about.get((person, number)))
 
@@ -83,7 +83,7 @@ def _image(h5: H5File, name: str, file: Path) -> NDArray[np.int32]:
         raise FormatError(f"{file.name}, {name}: must be whole numbers, rows x columns x frames")
     image: NDArray[np.int32] = h5.numbers(name, np.int32)
     if image.min() < 0 or not image.any():
-        raise FormatError(f"{file.name}, {name}: {'counts below 0' if image.min() < 0 else 'never loaded'}")
+        raise FormatError(f"{file.name}, {name}: {'counts are below 0' if image.min() < 0 else 'no count is above 0'}")
     return image
 
 
@@ -211,7 +211,8 @@ def _check_image(image: NDArray[np.int32]) -> NDArray[np.int32]:
     if counts.ndim != 3 or not counts.any() or counts.min() < 0:
         raise refused(
             "image",
-            f" has shape {counts.shape}: must be rows x columns x frames of counts from 0, at least one above 0",
+            f" has shape {counts.shape}: must be counts of 0 or more, rows x columns x frames, at least one of "
+            f"them above 0",
         )
     return counts
 

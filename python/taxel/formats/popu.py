@@ -58,7 +58,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
         for name, frames in zip(names, readings, strict=True):
             match = _NAME.fullmatch(str(name))
             if match is None:
-                raise FormatError(f"{file.name}: pose {arguments.shown(str(name))}; must be named like supine3_1")
+                raise FormatError(f"{file.name}: the pose {arguments.shown(str(name))} must have a name like supine3_1")
             yield Trial(
                 str(name),
                 "",

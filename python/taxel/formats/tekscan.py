@@ -80,12 +80,12 @@ def _read(file: Path) -> Trial:
     content = text.stream(file)
     above, begins = text.before(content, lambda line: line.rstrip(", \t") == "ASCII_DATA @@")
     if begins is None:
-        raise FormatError(f"{file.name}: no line ASCII_DATA @@ after the header")
+        raise FormatError(f"{file.name}: a line ASCII_DATA @@ must follow the header, but is missing")
     header = _Header(file, above)
     if header.text("DATA_TYPE") != "MOVIE":
         raise FormatError(
             f"{file.name}, line {header.line('DATA_TYPE')}: DATA_TYPE is "
-            f"{arguments.shown(header.text('DATA_TYPE'))}; only a MOVIE is read"
+            f"{arguments.shown(header.text('DATA_TYPE'))}; must be a MOVIE"
         )
     rows, columns = header.size("ROWS"), header.size("COLS")
     down, across = header.length_mm("ROW_SPACING"), header.length_mm("COL_SPACING")
@@ -114,11 +114,13 @@ def _read(file: Path) -> Trial:
             raw_sum = text.number(match[1], file, frame.line, "Raw Sum")
         cell_sum = values.sum(dtype=np.float64)
         if unit == "counts" and not np.isnan(raw_sum) and raw_sum != cell_sum:
-            raise FormatError(f"{file.name}, line {frame.line}: Raw Sum is {raw_sum:g}; the cells make {cell_sum:g}")
+            raise FormatError(
+                f"{file.name}, line {frame.line}: Raw Sum is {raw_sum:g}, but the cells add up to {cell_sum:g}"
+            )
         frames.append(replace(frame, text=""))
         read.add(values=values[None], sums=[raw_sum])
     if not frames:
-        raise FormatError(f"{file.name}, line {len(above) + 1}: no frame after it")
+        raise FormatError(f"{file.name}, line {len(above) + 1}: no frame follows this line")
     t, sums = _times(file, frames, period), read.column("sums")
     about: dict[str, str | float] = {**header.values, "row_spacing_mm": down, "column_spacing_mm": across}
     array = Array(
@@ -150,7 +152,7 @@ class _Header:
             match = _KEY.fullmatch(line.rstrip(", \t"))
             # Comment lines are free text, so a repeated key may be part of a comment.
             if match and match[1] in self.values and match[1] in _NEEDED and match[2] != self.values[match[1]]:
-                raise FormatError(f"{file.name}, line {k}: {match[1]} is given a second time, with another value")
+                raise FormatError(f"{file.name}, line {k}: {match[1]} appears a second time, with another value")
             if match:
                 self.values.setdefault(match[1], match[2])
                 self._lines.setdefault(match[1], k)
@@ -160,7 +162,7 @@ class _Header:
 
     def text(self, key: str) -> str:
         if key not in self.values:
-            raise FormatError(f"{self.file.name}: no line {key} in the header")
+            raise FormatError(f"{self.file.name}: the header has no line {key}")
         return self.values[key]
 
     def positive(self, key: str) -> float:
@@ -172,7 +174,7 @@ class _Header:
     def size(self, key: str) -> int:
         value = self.positive(key)
         if value != int(value) or value > 65_535:
-            raise FormatError(f"{self.file.name}, line {self.line(key)}: {key} is {value:g}; must be 1 to 65535")
+            raise FormatError(f"{self.file.name}, line {self.line(key)}: {key} is {value:g}; must be from 1 to 65535")
         return int(value)
 
     def length_mm(self, key: str) -> float:
@@ -214,18 +216,22 @@ def _frames(file: Path, content: Iterator[str], begin: int, rows: int) -> Iterat
             return
         match = _FRAME.fullmatch(line)
         if match is None or len(match[1]) > 15:
-            raise FormatError(f"{file.name}, line {at}: {arguments.shown(line)}; must begin a frame, like 'Frame 7'")
+            raise FormatError(
+                f"{file.name}, line {at}: {arguments.shown(line)}; must be the first line of a frame, like 'Frame 7'"
+            )
         number = int(match[1])
         if before and number <= before:
-            raise FormatError(f"{file.name}, line {at}: frame {number} follows frame {before}; numbers must ascend")
+            raise FormatError(
+                f"{file.name}, line {at}: frame {number} follows frame {before}; the numbers of frames must ascend"
+            )
         lines = list(islice(content, rows))
         if len(lines) < rows:
             raise FormatError(
-                f"{file.name}, line {at + len(lines)}: ends within frame {number}; the file was cut short"
+                f"{file.name}, line {at + len(lines)}: the file ends within frame {number}; its end is missing"
             )
         yield _Frame(at, row_text, number, match[2] or ""), lines
         at, before = at + 1 + rows, number
-    raise FormatError(f"{file.name}, line {at - 1}: ends without @@; the file was cut short")
+    raise FormatError(f"{file.name}, line {at - 1}: the file ends without @@; its end is missing")
 
 
 def _times(file: Path, frames: Sequence[_Frame], period: float) -> NDArray[np.int64]:
@@ -240,12 +246,15 @@ def _times(file: Path, frames: Sequence[_Frame], period: float) -> NDArray[np.in
     far = np.flatnonzero(np.abs(seconds) * 1e6 > TIME_US)
     if len(far):
         k = int(far[0])
-        raise FormatError(f"{file.name}, line {frames[k].line}: at {seconds[k]:g} s; must be within 142 years of 0")
+        raise FormatError(f"{file.name}, line {frames[k].line}: time {seconds[k]:g} s; must be within 142 years of 0")
     t = np.rint(seconds * 1e6).astype(np.int64)
     back = np.flatnonzero(np.diff(t) <= 0)
     if len(back):
         k = int(back[0])
-        raise FormatError(f"{file.name}, line {frames[k + 1].line}: at {t[k + 1]} us, not after {t[k]} us")
+        raise FormatError(
+            f"{file.name}, line {frames[k + 1].line}: time {t[k + 1]} us is not after {t[k]} us, the time of "
+            f"the frame before"
+        )
     return np.asarray(t)
 
 
@@ -257,7 +266,7 @@ def _cells(file: Path, lines: Sequence[str], first_line: int, columns: int) -> N
         while len(row) > columns and not row[-1]:
             row.pop()
         if len(row) != columns:
-            raise FormatError(f"{file.name}, line {first_line + k}: {len(row)} cells, must have {columns}")
+            raise FormatError(f"{file.name}, line {first_line + k}: {len(row)} cells; must have {columns}")
     return np.array(rows)
 
 

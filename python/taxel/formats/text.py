@@ -89,11 +89,13 @@ def stream(path: Path) -> Iterator[str]:
         # A carriage return at the end of a piece may be half of a line end.
         end = max(data.rfind(b"\n"), data.rfind(b"\r", 0, len(data) - 1)) + 1
         if len(data) - end > LINE:
-            raise FormatError(f"{path.name}, line {number}: more than {LINE} bytes; at most {LINE} are read")
+            raise FormatError(
+                f"{path.name}, line {number}: the line has more than {LINE} bytes; must have at most {LINE}"
+            )
         found = _lines(path, data[:end], begin)
         empty += found.count("") + sum(map(str.isspace, found))
         if empty > _EMPTY:
-            raise FormatError(f"{path.name}, line {number}: {empty} empty lines up to here; at most {_EMPTY} are read")
+            raise FormatError(f"{path.name}, line {number}: {empty} empty lines so far; must have at most {_EMPTY}")
         yield from found
         rest, number, begin = data[end:], number + len(found), begin + end
     yield from _lines(path, rest, begin)
@@ -115,7 +117,7 @@ def _up_to(path: Path, most: int) -> Iterator[bytes]:
         while piece := file.read(_PIECE):
             total += len(piece)
             if total > most:
-                error = FormatError(f"{path.name}: {total} bytes of text or more; at most {most} are read")
+                error = FormatError(f"{path.name}: the text has {total} bytes or more; must have at most {most}")
                 raise helped(error, "limit", "larger")
             yield piece
 
@@ -156,7 +158,7 @@ def beginning(path: Path, most: int = _BEGINNING) -> list[str]:
     data = _bytes(path, most)
     ended = data if len(data) < most else data[: max(data.rfind(b"\n"), data.rfind(b"\r", 0, -1)) + 1]
     if not ended and len(data) > LINE:
-        raise FormatError(f"{path.name}, line 1: more than {LINE} bytes; at most {LINE} are read")
+        raise FormatError(f"{path.name}, line 1: the line has more than {LINE} bytes; must have at most {LINE}")
     return _lines(path, ended.removeprefix(_UTF_8))
 
 
@@ -181,7 +183,9 @@ def _open(path: Path) -> Iterator[BinaryIO]:
         try:
             yield as_utf_8(path.name, cast(BinaryIO, gzip.GzipFile(fileobj=raw)) if path.suffix == ".gz" else raw)
         except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-            raise FormatError(f"{path.name}: not a whole gzip file ({error}); get it again") from None
+            raise FormatError(
+                f"{path.name}: the gzip file is damaged or not complete ({error}); download or copy it again"
+            ) from None
 
 
 def _lines(path: Path, data: bytes, begin: int = 0) -> list[str]:
@@ -190,8 +194,12 @@ def _lines(path: Path, data: bytes, begin: int = 0) -> list[str]:
         # Every second byte of an English text in UTF-16 is zero.
         zeros = [not data[parity:8:2].strip(b"\0") for parity in (0, 1)]
         is_utf_16 = not begin and len(data) > 3 and zeros[0] != zeros[1]
-        why = "UTF-16 without its mark: save it as UTF-8" if is_utf_16 else "this is not a text file"
-        raise FormatError(f"{path.name}, byte {begin + data.index(0)}: a zero byte; {why}")
+        why = (
+            "the file is UTF-16 without a byte-order mark: save it as UTF-8"
+            if is_utf_16
+            else "the file is not a text file"
+        )
+        raise FormatError(f"{path.name}, byte {begin + data.index(0)}: this byte is zero; {why}")
     ends = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     try:
         content = ends.decode().split("\n")
@@ -218,7 +226,9 @@ def number(cell: str, path: Path, line: int, noun: str, *, unmarked: bool = Fals
     """
     text, noun = cell.strip(), short(noun)
     remedy = (
-        f"; if it marks a missing value, write in a layout file: [table] missing = {shown(text)}" if unmarked else ("")
+        f"; if this text marks a missing value, write in a layout file: [table] missing = {shown(text)}"
+        if unmarked
+        else ("")
     )
     try:
         value = float_of(text)
@@ -298,7 +308,7 @@ def group_rows(
             line, some, characters = line + len(some) + 1, [], 0
             continue
         if len(row) != columns:
-            raise FormatError(f"{path.name}, line {line + len(some)}: {len(row)} cells, must have {columns}")
+            raise FormatError(f"{path.name}, line {line + len(some)}: {len(row)} cells; must have {columns}")
         some.append(row)
         characters += sum(map(len, row))
         if len(some) * columns >= _CELLS or characters >= LINE:
@@ -349,6 +359,6 @@ def table(path: Path, columns: Sequence[str], *, optional: bool = False) -> list
         return []
     parsed = HeaderTable.read(path.name, lines(path))
     if not parsed.header:
-        raise FormatError(f"{path.name}: empty; must begin with a line of column names")
+        raise FormatError(f"{path.name}: the file is empty; must begin with a line of column names")
     parsed.has(columns)
     return [{**cells, "line": str(line)} for line, cells in parsed]

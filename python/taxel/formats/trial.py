@@ -95,20 +95,24 @@ class Trial:
             back = np.flatnonzero(np.diff(times) <= 0)
             if len(back):
                 k = int(back[0])
-                raise ProblemError(f"{self.name}: {event} {k + 1} at {times[k + 1]} us is not after {times[k]} us")
+                raise ProblemError(
+                    f"{self.name}: {event} {k + 1} is at {times[k + 1]} us; must be after {event} {k}, at {times[k]} us"
+                )
         for name, column in self.series.items():
             if np.shape(column)[:1] != (len(self.recorded),):
-                raise ProblemError(f"{self.name}: {name} has shape {np.shape(column)} for {self.recorded!r}")
+                raise ProblemError(
+                    f"{self.name}: {name} has shape {np.shape(column)}, which does not fit {self.recorded!r}"
+                )
         if self.scored is None:
             t = self.recorded.t
             object.__setattr__(self, "scored", (int(t.min()), int(t.max())) if len(t) else (0, 0))
         else:
             ends = arguments.several("scored", self.scored)
             if len(ends) != 2:
-                raise refused("scored", f" is {arguments.shown(self.scored)}: must be two times, us")
+                raise refused("scored", f" is {arguments.shown(self.scored)}: must be two times in us")
             first, last = (arguments.integer("scored", end, unit="us") for end in ends)
             if first > last:
-                raise refused("scored", f" is {first} to {last} us: must not end before it begins")
+                raise refused("scored", f" is {first} to {last} us: the end must not be before the beginning")
             object.__setattr__(self, "scored", (first, last))
 
     @property
@@ -120,7 +124,7 @@ class Trial:
         ProblemError : the trial holds events
         """
         if not isinstance(self.recorded, Frames):
-            raise ProblemError(f"{self.name}: holds events and no frames")
+            raise ProblemError(f"{self.name}: contains events and no frames")
         return self.recorded
 
     @property
@@ -132,7 +136,7 @@ class Trial:
         ProblemError : the trial holds frames
         """
         if not isinstance(self.recorded, Events):
-            raise ProblemError(f"{self.name}: holds frames and no events")
+            raise ProblemError(f"{self.name}: contains frames and no events")
         return self.recorded
 
     def __repr__(self) -> str:

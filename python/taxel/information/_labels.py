@@ -68,5 +68,5 @@ def labelled(y: ArrayLike, trials: int) -> tuple[NDArray[np.generic], NDArray[np
         raise refused("y", f" has {len(labels)} entries: must be {trials}, one per trial")
     classes, row = np.unique(labels, return_inverse=True)
     if len(classes) < 2:
-        raise refused("y", f" names {len(classes)} class: must be at least two")
+        raise refused("y", f" has {len(classes)} class: must have at least two")
     return classes, row

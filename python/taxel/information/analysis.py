@@ -278,15 +278,17 @@ class _Answering(Question):
         self.notes += sorted(missing)[:3]
         if self.groups is None:
             self.notes.append(
-                "no groups are named: if trials of one person, session or pose resemble each other, this counts as "
-                "information about the label"
+                "the trials have no groups: if trials of one person, session or pose resemble each other, this "
+                "similarity "
+                "counts as information about the label"
             )
         runs = 1 + int(np.count_nonzero(self.labels[1:] != self.labels[:-1]))
         # Recordings with one trial each may be in any order.
         ordered = len({id(trial.source) for trial in self.trials}) < len(self.trials)
         if ordered and runs == len(np.unique(self.labels)) and len(self.labels) > 2 * runs:
             self.notes.append(
-                "each label's trials are recorded together: a drift of the sensor would count as information about "
+                "the trials of each label are recorded together: a drift of the sensor would count as "
+                "information about "
                 "the label"
             )
         if not self.ended:

@@ -166,14 +166,15 @@ class Answer:
         lines = []
         if estimate.bits <= self.zero.level:
             lines.append(
-                "not distinguishable from 0 bits: shuffled labels give as much (95 % of the shuffles give less than "
+                "the bits cannot be distinguished from 0: shuffled labels give as much (95 % of the shuffles "
+                "give less than "
                 f"{self.zero.level:.2f})"
             )
         guessed, least = _guessing(estimate)
         if estimate.right < least:
             lines.append(
-                f"{100 * estimate.right:.0f} % are classified correctly, guessing gives {100 * guessed:.0f} %: the "
-                "bits are from the wrong answers"
+                f"{100 * estimate.right:.0f} % are classified correctly, but guessing gives {100 * guessed:.0f} %: "
+                "the bits come from the wrong answers"
                 + (", for example if a group has mostly one label" if self.groups else "")
             )
         if not self.empty:

@@ -63,7 +63,7 @@ def confusion_matrix(
     if len(truth) != len(answered):
         raise refused("responses", f" has {len(answered)} entries: must be {len(truth)}, one per label")
     if not len(truth):
-        raise refused("labels", " is []: must hold at least one trial")
+        raise refused("labels", " is []: must contain at least one trial")
     try:
         known = np.unique(np.concatenate([truth, answered]))
         order = known if classes is None else words("classes", classes)
@@ -283,7 +283,9 @@ def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: i
     rounds, random = integer("repetitions", repetitions, 1), np.random.default_rng(integer("seed", seed, 0))
     trials = int(table.sum())
     if trials < 4:
-        raise refused("counts", f" holds {trials} trials: must be at least 4, to be divided into four parts")
+        raise refused(
+            "counts", f" contains {trials} trials: must contain at least 4, because they are divided into four parts"
+        )
     cells = np.repeat(np.arange(table.size), table.ravel())
     means = [float(plug_in(table))]
     for parts in (2, 4):
@@ -355,9 +357,9 @@ def _blocks(rows: int, columns: int) -> list[slice]:
 def _counts(counts: ArrayLike) -> NDArray[np.int64]:
     table: NDArray[np.int64] = numbers("counts", counts, np.int64)
     if table.ndim < 1 or 0 in table.shape:
-        raise refused("counts", f" has shape {table.shape}: must hold at least one response")
+        raise refused("counts", f" has shape {table.shape}: must contain at least one response")
     if table.min() < 0 or table.max() > 2**40:
-        raise refused("counts", f" reaches from {table.min()} to {table.max()}: must be from 0 to 2^40")
+        raise refused("counts", f" contains numbers from {table.min()} to {table.max()}: must be from 0 to 2^40")
     return table
 
 
@@ -366,5 +368,5 @@ def _table(counts: ArrayLike) -> NDArray[np.int64]:
     if table.ndim < 2:
         raise refused("counts", f" has shape {table.shape}: must be (labels, responses)")
     if (table.sum((-1, -2)) == 0).any():
-        raise refused("counts", " holds no trial")
+        raise refused("counts", " contains no trial")
     return table

@@ -34,7 +34,7 @@ def controls(question: Question) -> tuple[Control, ...]:
         results.append(Control("length", _scalar(question, length), "from contact to the trial's end"))
     else:
         results.append(Control("length", _scalar(question, last), "from contact to the last event in the window"))
-    results.append(Control("event count", _scalar(question, count), "events to the whole window"))
+    results.append(Control("event count", _scalar(question, count), "number of events in the whole window"))
     if all(isinstance(trial.source, Frames) for trial in question.trials):
         start = [
             held.at(np.array([t.start_us - finest]))[0] for held, t in zip(question.held, question.trials, strict=True)
@@ -43,7 +43,7 @@ def controls(question: Question) -> tuple[Control, ...]:
         if np.ptp(first, axis=0).any():
             gram = Matrices([first @ first.T], [first.shape[1]])
             bits = question.estimate(question.nested(gram).responses)
-            results.append(Control("first frame", bits, "the pressure itself before the start, no change since"))
+            results.append(Control("first frame", bits, "the pressure before the start, without later changes"))
     return tuple(results)
 
 
@@ -91,7 +91,7 @@ def _before(question: Question) -> Control:
     )
     estimate = question.estimate(question.nested(question.matrices(spikes, [length])[0]).responses)
     without = int((room < length).sum())
-    about = f"{to_ms(length):g} ms before it" + (
-        f", {without} of {len(room)} have less and count as silent" if without else ""
+    about = f"{to_ms(length):g} ms before the contact" + (
+        f"; {without} of {len(room)} trials have less time before it and count as silent" if without else ""
     )
     return Control("before contact", estimate, about)

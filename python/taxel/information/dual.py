@@ -45,11 +45,12 @@ def residual(square: NDArray[np.float64], level: float) -> NDArray[np.float64]:
     if level < least:
         raise refused(
             "ridge",
-            f": {level:.3g} in the unit of inner products is lost in their rounding; must be at least {least:.3g}",
+            f": {level:.3g} in the unit of the inner products is below their rounding error; must be at least "
+            f"{least:.3g}",
         )
     factor, fault = scipy.linalg.lapack.dpotrf(centred / level + np.eye(trials), lower=1, clean=1)
     if fault:
-        raise refused("grams", ": a matrix has a direction of negative length, so it is not a matrix of inner products")
+        raise refused("grams", ": a matrix has a negative eigenvalue, so it is not a matrix of inner products")
     inverse = scipy.linalg.lapack.dpotri(factor, lower=1, overwrite_c=1)[0]
     return np.asarray(inverse + np.tril(inverse, -1).T - 1 / trials)
 
@@ -158,7 +159,7 @@ def gram_matrix(gram: ArrayLike) -> NDArray[np.float64]:
     if square.ndim != 2 or square.shape[0] != square.shape[1] or not len(square):
         raise refused("gram", f" has shape {square.shape}: must be (trials, trials)")
     if (largest := float(np.abs(square).max())) > _LARGEST:
-        raise refused("gram", f" reaches {largest:.3g}: must be at most {_LARGEST:g}")
+        raise refused("gram", f" contains the number {largest:.3g}: numbers must be at most {_LARGEST:g}")
     if np.abs(square - square.T).max() > 1e-6 * max(largest, 1e-300):
         raise refused("gram", " is not symmetric: entry i, j is the inner product of trials i and j")
     return square

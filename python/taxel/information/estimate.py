@@ -176,7 +176,9 @@ def estimate(
         array = np.empty(0, object)
     answered = np.stack([words("responses", row) for row in np.atleast_2d(array)]) if array.size else array
     if answered.ndim != 2 or answered.shape[1] != len(truth) or not len(truth):
-        raise refused("responses", f" has shape {array.shape}: must be ({len(truth)},), one per label, or draws of it")
+        raise refused(
+            "responses", f" has shape {array.shape}: must be ({len(truth)},), one per label, or (draws, {len(truth)})"
+        )
     share = number("confidence", confidence)
     if not 0 < share < 1:
         raise refused("confidence", f" is {shown(confidence)}: must be between 0 and 1")
@@ -188,7 +190,7 @@ def estimate(
     if len(np.unique(row)) < 2:
         raise refused(
             "labels",
-            f" are all {shown(truth[0].item())}: must be at least two, otherwise there is nothing to distinguish",
+            f" are all {shown(truth[0].item())}: must be at least two different labels",
         )
     belongs = None if groups is None else belonging(groups, len(truth))
     cells = row * len(classes) + column
@@ -276,14 +278,14 @@ def zero_test(
     belongs = None if groups is None else belonging(groups, len(truth))
     there = finite("found", found)
     if not len(truth):
-        raise refused("labels", " is []: must hold at least one trial")
+        raise refused("labels", " is []: must contain at least one trial")
     classes, row = np.unique(truth, return_inverse=True)
     bits = []
     for _ in range(integer("shuffles", shuffles, 1)):
         mixed = _shuffled(row, belongs, random)
         answered = np.searchsorted(classes, words("responses", answer(classes[mixed])))
         if answered.shape != row.shape or answered.max() >= len(classes):
-            raise refused("answer", " does not return one of the labels for each trial")
+            raise refused("answer", " must return one of the labels for each trial")
         bits.append(
             float(panzeri_treves(_tables(mixed * len(classes) + answered, np.ones((1, len(row))), len(classes))[0]))
         )
@@ -418,5 +420,5 @@ def _warnings(least: int, relevant: float, interval: tuple[float, float], tenth:
         )
     half = (interval[1] - interval[0]) / 2
     if half > 0.1:
-        lines.append(f"uncertain by {half:.2f} bit: for a tenth, about {tenth} trials are needed")
+        lines.append(f"uncertain by {half:.2f} bit: for 0.1 bit, about {tenth} trials are needed")
     return tuple(lines)

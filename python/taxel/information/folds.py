@@ -49,7 +49,7 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
     classes, row = np.unique(truth, return_inverse=True)
     if len(classes) < 2:
         values = f"all {shown(truth[0].item())}" if len(truth) else "[]"
-        raise refused("labels", f" are {values}: must be at least two, otherwise there is nothing to distinguish")
+        raise refused("labels", f" are {values}: must be at least two different labels")
     if groups is None:
         if len(truth) < parts:
             raise ProblemError(
@@ -67,8 +67,8 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
         if len(group_numbers) < 2:
             group = words("groups", groups)[np.flatnonzero(belongs == group_numbers[0])[0]].item()
             raise ProblemError(
-                f"label {shown(name.item())}: all its trials are in group {shown(group)}, so it could never be both "
-                f"trained and tested; must be in at least two groups"
+                f"label {shown(name.item())}: all its trials are in group {shown(group)}, so it cannot be both "
+                "trained and tested; its trials must be in at least two groups"
             )
     return _whole_groups(row, belongs, parts, random)
 

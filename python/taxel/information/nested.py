@@ -190,7 +190,7 @@ def training_curve(
     random, curve = np.random.default_rng(integer("seed", seed, 0)), []
     used = sorted(set(instance("nested", nested, Nested).chosen.values()))
     if len(nested.folds) != len(row) or any(matrix >= len(matrices.squares) for matrix, _ in used):
-        raise refused("nested", " is of other trials or matrices")
+        raise refused("nested", " was made from other trials or matrices")
     is_class = np.asarray(row[:, None] == np.arange(len(classes)), np.float64)
     regressions = Regressions(np.stack([matrices.residual(*way) for way in used]), is_class)
     for size in several("sizes", sizes):
@@ -221,10 +221,10 @@ class Matrices:
     def __init__(self, grams: object, features: object) -> None:
         self.squares = [gram_matrix(gram) for gram in several("grams", grams)]
         if not self.squares:
-            raise refused("grams", " is []: must hold at least one matrix")
+            raise refused("grams", " is []: must contain at least one matrix")
         self.trials = len(self.squares[0])
         if any(len(gram) != self.trials for gram in self.squares):
-            raise refused("grams", f" are of {[len(gram) for gram in self.squares]} trials: must be equally many")
+            raise refused("grams", f" have {[len(gram) for gram in self.squares]} trials: must have equally many")
         self.features = [integer("features", count, 1) for count in several("features", features)]
         if len(self.features) != len(self.squares):
             raise refused("features", f" has {len(self.features)} entries: must be {len(self.squares)}, one per matrix")

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import integer, number, several, shown
 from taxel._base.errors import refused
-from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.encode import FA1, ChangeEvents, Encoder
 from taxel.frames import Frames
@@ -55,14 +54,15 @@ class Question:
 
     def __post_init__(self) -> None:
         if not self.trials:
-            raise refused("trials", " is []: must hold at least one")
+            raise refused("trials", " is []: must contain at least one")
         shape = self.trials[0].array.shape
         differing = next((trial for trial in self.trials if trial.array.shape != shape), None)
         if differing is not None:
             sizes = " x ".join(map(str, differing.array.shape)), " x ".join(map(str, shape))
             raise ProblemError(
-                f"{differing.name}: is of an array of {sizes[0]}, {self.trials[0].name} of {sizes[1]}: must all be of "
-                "one size"
+                f"{differing.name}: the array has {sizes[0]} taxels, but that of {self.trials[0].name} has "
+                f"{sizes[1]}: must "
+                "all have one size"
             )
         self.labels = np.array([trial.label for trial in self.trials])
         groups = [trial.group for trial in self.trials]
@@ -79,7 +79,9 @@ class Question:
         if self.window_ms is None:
             endless = next((trial for trial in self.trials if trial.stop_us is None), None)
             if endless is not None:
-                raise ProblemError(f"{endless.name}: has no end; give window_ms, or every trial its stop_us")
+                raise ProblemError(
+                    f"{endless.name}: the trial has no end; give window_ms, or a stop_us for every trial"
+                )
             reach = np.inf
         else:
             reach = to_us(number("window_ms", self.window_ms))
@@ -92,10 +94,10 @@ class Question:
             lasts = max(int(np.ptp(trial.source.t)) for trial in self.trials if len(trial.source))
             if lasts < STEP_US:
                 raise ProblemError(
-                    f"{self.trials[0].name}: its frames are all within {lasts} us, so they have no times; "
-                    "give them some (rate_hz in a layout file, t of taxel.Frames)"
+                    f"{self.trials[0].name}: all frames are within {lasts} us, so they have no times; to give "
+                    "times, write rate_hz in a layout file, or set t of taxel.Frames"
                 )
-            raise refused("trials", f": no event in any of them by {self.encoder!r}; a lower noise_floor may help")
+            raise refused("trials", f": {self.encoder!r} found no event in any trial; a lower noise_floor may help")
         ends = np.array([np.inf if trial.stop_us is None else trial.stop_us for trial in self.trials])
         self.ended = bool(np.isfinite(ends).all())
         lengths = (ends - self.contact)[~np.isnan(self.contact)]
@@ -103,8 +105,7 @@ class Question:
         if np.isfinite(reach) and (lengths < self.window_us).any():
             short = int((lengths < self.window_us).sum())
             self.notes.append(
-                f"{counted(short, 'trial')} shorter than {to_ms(self.window_us):g} ms: late events may show how long a "
-                "trial is"
+                f"trials shorter than {to_ms(self.window_us):g} ms: {short}; late events may show how long a trial is"
             )
 
     def set_out(
@@ -133,7 +134,8 @@ class Question:
             chosen_windows = sorted(to_us(number("windows_ms", w)) for w in several("windows_ms", windows_ms))
             if any(not self.finest <= w <= window for w in chosen_windows):
                 raise refused(
-                    "windows_ms", f" is {shown(windows_ms)}: must be in {to_ms(self.finest):g} to {to_ms(window):g} ms"
+                    "windows_ms",
+                    f" is {shown(windows_ms)}: must be from {to_ms(self.finest):g} to {to_ms(window):g} ms",
                 )
             self.windows = sorted({*chosen_windows, window})
         self.taxels_at = self.periods[0]
@@ -148,12 +150,14 @@ class Question:
         there = len(self.active)
         numbers = [integer("taxels", n, 1) for n in several("taxels", (10, 30, 100, 300) if taxels is None else taxels)]
         if taxels is not None and any(n > there for n in numbers):
-            raise refused("taxels", f" is {shown(taxels)}: only {there} taxels of the array send events")
+            raise refused(
+                "taxels", f" is {shown(taxels)}: must be at most {there}, because only these taxels send events"
+            )
         self.random_taxels = [n for n in numbers if n < there]
         sides = [integer("pools", n, 2) for n in several("pools", (2, 4, 7) if pools is None else pools)]
         rows, columns = self.trials[0].array.shape
         if pools is not None and any(n > max(rows, columns) for n in sides):
-            raise refused("pools", f" is {shown(pools)}: the array is {rows} x {columns}")
+            raise refused("pools", f" is {shown(pools)}: must fit the array of {rows} x {columns} taxels")
         self.pools = [n for n in sides if n <= max(rows, columns)]
         self.columns = self._parameter_columns()
 
@@ -207,7 +211,7 @@ class Question:
                 self.notes.append(f"parameter {name} is left out: it is the same as the label")
                 continue
             if (column == "").any():
-                self.notes.append(f"parameter {name} is left out: some trials have none")
+                self.notes.append(f"parameter {name} is left out: some trials have no value")
                 continue
             try:
                 stratified(column, count=self.folds, groups=self.groups, seed=self.seed)
@@ -228,7 +232,7 @@ def floor_of(trials: Sequence[LabelledTrial]) -> float:
     sources = {id(trial.source): trial.source for trial in trials}.values()
     largest = max(float(np.abs(source.values).max(initial=0.0)) for source in sources if isinstance(source, Frames))
     if largest == 0:
-        raise refused("trials", ": every frame is 0")
+        raise refused("trials", ": all values are 0: must contain a touch")
     return float(f"{largest / 40:.2g}")
 
 

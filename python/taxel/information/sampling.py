@@ -330,6 +330,7 @@ def checked_periods(periods_us: Sequence[int], finest: int) -> list[int]:
         raise ProblemError("periods is []: must name at least one")
     if periods[0] < finest:
         raise ProblemError(
-            f"period {to_ms(periods[0]):g} ms is finer than the recordings, which show {to_ms(finest):g} ms at best"
+            f"period {to_ms(periods[0]):g} ms is shorter than the recordings resolve: must be at least "
+            f"{to_ms(finest):g} ms"
         )
     return periods

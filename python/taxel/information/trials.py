@@ -135,12 +135,14 @@ def read_trials(
             )
         there = sorted({recording.name for recording in opened})
         listed = ", ".join(there[:5]) + (" ..." if len(there) > 5 else "")
-        raise ProblemError(f"{file}, line {line}: recording {strange[0]!r} is not among those given: {listed}")
+        raise ProblemError(
+            f"{file}, line {line}: recording {strange[0]!r} is not one of the given recordings: {listed}"
+        )
     unnamed = [
         recording.path for recording in opened if not {str(recording.path), recording.name, _stem(recording)} & names
     ]
     if unnamed:
-        raise ProblemError(f"{file}: does not name {unnamed[0]}; add it, or leave the recording out")
+        raise ProblemError(f"{file}: has no trial of {unnamed[0]}; add one, or leave the recording out")
     sources = {id(recording): _source(recording) for recording in opened}
     spans = {key: _span(source) for key, source in sources.items()}
     clocks = (
@@ -156,7 +158,7 @@ def read_trials(
         ahead = ahead_us(Note(row["label"], start, host_ns or 0), recording.path, clocks.get(id(recording)), file)
         start, stop = start - ahead, None if end is None else end - ahead
         if stop is None and window_ms is None:
-            error = ProblemError(f"{where}: has no stop_us, and the length of trials is not known")
+            error = ProblemError(f"{where}: stop_us is missing, so the length of the trial is not known")
             raise helped(error, "window_ms", "give")
         if not row["label"]:
             raise FormatError(f"{where}: label is empty")
@@ -169,7 +171,7 @@ def read_trials(
         _inside(trials[-1], recording.name, spans[id(recording)], window_us)
     if any(trial.group for trial in trials) and not all(trial.group for trial in trials):
         nameless = next(trial for trial in trials if not trial.group)
-        raise ProblemError(f"{nameless.name}: group is empty; give every trial a group, or none")
+        raise ProblemError(f"{nameless.name}: group is empty; give a group to every trial, or to none")
     _apart(trials, window_us)
     return trials
 
@@ -234,7 +236,7 @@ def recordings_as_trials(recordings: Sequence[Recording], *, window_ms: float | 
         source = _source(recording)
         span = _span(source)
         if span is None:
-            raise ProblemError(f"{recording.path}: holds nothing; leave it out")
+            raise ProblemError(f"{recording.path}: contains nothing; leave the recording out")
         start, stop = span[0], span[1] + 1
         label = recording.path.resolve().parent.name
         trials.append(
@@ -278,7 +280,7 @@ def _inside(trial: LabelledTrial, recording: str, span: tuple[int, int] | None, 
     end = trial.start_us + window_us if trial.stop_us is None else trial.stop_us
     if span is None or trial.start_us > span[1] or end < span[0]:
         content = "nothing" if span is None else f"{span[0]} to {span[1]} us"
-        raise ProblemError(f"{trial.name}: t_us {trial.start_us} is outside {recording}, which holds {content}")
+        raise ProblemError(f"{trial.name}: t_us {trial.start_us} is outside {recording}, which contains {content}")
 
 
 def _apart(trials: list[LabelledTrial], window_us: int) -> None:
@@ -290,7 +292,7 @@ def _apart(trials: list[LabelledTrial], window_us: int) -> None:
         for trial, after in pairwise(sorted(trials_of_source, key=lambda trial: trial.start_us)):
             before, apart = trial.name.split(", ")[-1], after.start_us - trial.start_us
             if apart == 0:
-                raise ProblemError(f"{after.name}: begins where {before} does; each touch must be listed once")
+                raise ProblemError(f"{after.name}: begins at the same time as {before}; each touch must be listed once")
             if trial.stop_us is None and apart < window_us:
                 raise refused(
                     "window_ms",
@@ -321,7 +323,7 @@ def _rows(file: Path, recordings: Sequence[Recording]) -> list[tuple[int, dict[s
         raise FormatError(f"{file}: is a directory; must be a .csv {','.join(_COLUMNS)}")
     table = HeaderTable.read(file, text_of(file))
     if not table.header:
-        raise FormatError(f"{file}: holds nothing; must be {','.join(_COLUMNS)} ...")
+        raise FormatError(f"{file}: contains nothing; must be {','.join(_COLUMNS)} ...")
     alone = len(recordings) == 1 and "recording" not in table.header
     only = {"recording": str(recordings[0].path)} if alone else {}
     table.has([name for name in _COLUMNS if name not in only])
@@ -344,5 +346,5 @@ def _whole(where: str, column: str, cell: str) -> int:
             real = np.nan
         value = int(real) if np.isfinite(real) and real.is_integer() else None
     if value is None or not abs(value) < 2**62:
-        raise FormatError(f"{where}: {column} is {shown(cell)}, must be whole {column[-2:]}")
+        raise FormatError(f"{where}: {column} is {shown(cell)}; must be whole {column[-2:]}")
     return value

@@ -46,9 +46,9 @@ def checked_examples(
         )
     for p, pattern in enumerate(trained):
         if len(pattern) != trains:
-            raise ProblemError(f"pattern {p}: {counted(len(pattern), 'train')}, must be {trains}, as in the fit")
+            raise ProblemError(f"pattern {p}: {counted(len(pattern), 'train')}; must be {trains}, as in the fit")
         if pattern.kind == "signed":
-            raise ProblemError(f"pattern {p}: spikes are signed, split them into ON and OFF trains first")
+            raise ProblemError(f"pattern {p}: spikes are signed; split them into ON and OFF trains first")
         for k in np.flatnonzero(~((pattern.start <= times[p]) & (times[p] <= pattern.stop)))[:1]:
             window = f"{pattern.start:g} to {pattern.stop:g} ms"
             raise ProblemError(
@@ -58,8 +58,11 @@ def checked_examples(
             raise ProblemError(f"targets of pattern {p}: must ascend")
     for name, bound in (("lb", cone.lb), ("ub", cone.ub)):
         if np.ndim(bound) and np.size(bound) != trains:
-            raise refused(name, f": {np.size(bound)} bounds for {trains} trains, must be one per train, or one for all")
+            raise refused(name, f": {np.size(bound)} bounds for {trains} trains; must be one per train, or one for all")
     horizon = np.asarray(0.0 if cone.horizon is None else cone.horizon)
     if horizon.ndim and horizon.size != len(trained):
-        raise refused("horizon", f": {horizon.size} values, must be one, or one per pattern, {len(trained)}")
+        raise refused(
+            "horizon",
+            f": {horizon.size} values for {counted(len(trained), 'pattern')}; must be one per pattern, or one for all",
+        )
     return trained, times, silences

@@ -20,7 +20,9 @@ def examples(patterns: object, targets: object) -> tuple[list[tuple[Any, ...]], 
         raise refused("patterns", f" is one SpikeTrains ({patterns!r}): must be a list of them, one per pattern")
     trains = [instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in enumerate(several("patterns", patterns))]
     if not np.iterable(targets):
-        raise refused("targets", f" is {shown(targets)}: must be a list of times (ms) for each pattern, [[20.0], []]")
+        raise refused(
+            "targets", f" is {shown(targets)}: must be a list of times (ms) for each pattern, for example [[20.0], []]"
+        )
     times = []
     of_pattern: Any
     for p, of_pattern in enumerate(several("targets", targets)):
@@ -38,5 +40,5 @@ def windows(name: str, given: object) -> NDArray[float64] | None:
         return None
     ends = numbers(name, given, np.float64, "ms")  # type: ignore[arg-type]
     if ends.size and (ends.ndim != 2 or ends.shape[1] != 2):
-        raise refused(name, f" has shape {ends.shape}: must hold windows, each with a start and a stop")
+        raise refused(name, f" has shape {ends.shape}: must contain windows, each with a start and a stop")
     return ends.reshape(-1)

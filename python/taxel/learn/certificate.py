@@ -77,7 +77,7 @@ def check_certificate(problem: ConeXProblem, certificate: Certificate, *, margin
     multipliers = np.ldexp(certificate.multipliers, -np.frexp(np.abs(certificate.multipliers).max(initial=0.0))[1])
     for (kind, pattern, at), multiplier in zip(certificate.rows, multipliers, strict=True):
         if not 0 <= pattern < len(rows):
-            raise refused("certificate", f": a row of pattern {pattern}, there are {len(rows)}")
+            raise refused("certificate", f": a row is of pattern {pattern}; must be from 0 to {len(rows) - 1}")
         if multiplier < 0 and kind != "target":
             return False
         here = rows[pattern]
@@ -160,7 +160,7 @@ def check_gap(
     w = fitted(cone)
     hard = isinstance(cone, ConeX)
     if hard and silence is not None:
-        raise refused("silence", ": ConeX requires it everywhere and has no windows")
+        raise refused("silence", ": must be None, because ConeX requires silence everywhere")
     trained, times, silences = checked_examples(cone, len(w), patterns, targets, silence)
     margin = cone.problem_.margin if isinstance(cone, ConeX) else Margin(cone.margin, 0.0)
     stated = Stated(cone, pattern_rows(cone, cone.neuron_, trained, times, margin=margin, windows=silences), len(w))
@@ -213,12 +213,12 @@ def _multipliers(cone: ConeX | ConeR, trains: int) -> tuple[dict[tuple[str, int,
     """Return the multipliers of a fit by the names of their rows, and that of the l2 term."""
     proof = cone.multipliers_
     if proof is None:
-        raise NotFittedError(f"cone: has no multipliers_, as its fit is {cone.status_}; fit it again")
+        raise NotFittedError(f"cone: has no multipliers_, because its fit is {cone.status_}; fit it again")
     values, pull = floats("multipliers_.values", proof.values), floats("multipliers_.pull", proof.pull)
     if len(values) != len(proof.rows) or len(pull) != trains:
         raise ProblemError(
-            f"multipliers_: {len(values)} for {counted(len(proof.rows), 'row')}, a pull of {len(pull)} for "
-            f"{counted(trains, 'train')}"
+            f"multipliers_: {counted(len(values), 'value')} for {counted(len(proof.rows), 'row')}, {len(pull)} of pull "
+            f"for {counted(trains, 'train')}; must be one per row and one per train"
         )
     given: dict[tuple[str, int, float], float] = defaultdict(float)
     for (kind, pattern, at), value in zip(proof.rows, values, strict=True):

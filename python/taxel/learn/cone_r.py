@@ -306,12 +306,13 @@ class ConeRProblem:
             bound = np.asarray(plain[name], np.float64)
             if bound.ndim and len(bound) != self._trains:
                 raise refused(
-                    name, f": {len(bound)} bounds for {self._trains} trains, must be one per train, or one for all"
+                    name, f": {len(bound)} bounds for {self._trains} trains; must be one per train, or one for all"
                 )
             if away(bound, 0.0)[silent if bound.ndim else ...].any():
                 raise refused(
                     name,
-                    ": forbids the weight 0 of a train without spikes; prepare the rows by a ConeR of these bounds",
+                    ": forbids the weight 0 of a train without spikes; prepare the rows with a ConeR that has "
+                    "these bounds",
                 )
             largest = np.maximum(largest, np.abs(bound[silent] if bound.ndim else bound))
             if bound.ndim:
@@ -373,7 +374,7 @@ class ConeRProblem:
         if self._counted is None:
             return weights
         if weights.shape != (self._trains,):
-            raise refused("weights", f": {weights.size} for {self._trains} trains, must be one per train")
+            raise refused("weights", f": {weights.size} weights for {self._trains} trains; must be one per train")
         return weights[self._counted]
 
 
@@ -382,9 +383,8 @@ def _weighed(name: str, count: int, trains: str) -> None:
     if count > _MOST_TRAINS:
         raise refused(
             name,
-            f": {count} {trains}, at most {_MOST_TRAINS} can be weighed, because memory grows with their square and "
-            "time "
-            f"with their cube; take an encoder that pools taxels (taxel train --recipe touch, or --encoder "
+            f": {count} {trains}; must be at most {_MOST_TRAINS}, because memory grows with the square of this number "
+            "and time with its cube; use an encoder that pools taxels (taxel train --recipe touch, or --encoder "
             "contact_area), fewer levels, or a part of the array",
         )
 
@@ -437,7 +437,8 @@ def _warn(cone: ConeR) -> None:
         more = f" and {len(cone.unreachable_) - 5} more" if len(cone.unreachable_) > 5 else ""
         within = f"within {_shown(cone.lb)} to {_shown(cone.ub)} mV"
         warn(
-            f"no weights {within} raise {listed}{more} to the threshold; the rest was fitted",
+            f"no weights {within} raise the potential to the threshold at {listed}{more}; the other targets "
+            f"were fitted",
             stacklevel=4,
         )
     if cone.refires_:
@@ -445,14 +446,13 @@ def _warn(cone: ConeR) -> None:
         others = [] if neuron.after_spike == "reset" else ['after_spike "reset"']
         others += [f"a refractory above {neuron.refractory:g} ms", f"a theta_plus above {neuron.theta_plus:g} mV"]
         warn(
-            f"on its training patterns the trained neuron fires {counted(cone.refires_, 'extra spike')} within tau of "
-            f"another of its spikes, with no target between: {', '.join(others[:-1])} or {others[-1]} would "
-            "prevent them",
+            f"on its training patterns, the trained neuron fires {counted(cone.refires_, 'extra spike')} within tau of "
+            f"another spike, without a target between; to prevent this, use {', '.join(others[:-1])} or {others[-1]}",
             stacklevel=4,
         )
     if cone.status_ != "solved":
         warn(
-            f"the objective is only proven to be within {cone.gap_:.1e} of its least value (tolerance "
+            f"the objective is only proven to be within {cone.gap_:.1e} of its minimum (tolerance "
             f"{cone.tolerance:.1e})",
             stacklevel=4,
         )

@@ -164,16 +164,16 @@ class OnlineConeR(ConeR):
         ProblemError : invalid patterns or targets (names pattern and target)
         """
         if start is not None:
-            raise refused("start", ": a window starts from its own last fit")
+            raise refused("start", ": must be left out, because a window starts from its last fit")
         if progress is not None:
             callback("progress", progress)
-            raise refused("progress", ": a window reports none")
+            raise refused("progress", ": must be left out, because a window reports no progress")
         trains, times = several("patterns", patterns), several("targets", targets)
         if len(trains) != len(times) or not trains:
-            raise refused("targets", f": {len(times)} lists for {len(trains)} patterns, must be one per pattern")
+            raise refused("targets", f": {len(times)} lists for {len(trains)} patterns; must be one per pattern")
         each = [None] * len(trains) if silence is None else several("silence", silence)
         if len(each) != len(trains):
-            raise refused("silence", f": {len(each)} lists for {len(trains)} patterns, must be one per pattern")
+            raise refused("silence", f": {len(each)} lists for {len(trains)} patterns; must be one per pattern")
         silences = [windows(f"silence of pattern {p}", silence) for p, silence in enumerate(each)]
         with self._locked():
             self._begin()

@@ -113,7 +113,7 @@ def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets
     """
     w = fitted(cone)
     if not np.isfinite(w).all():
-        raise refused("cone", f": is {cone.status_} and has no weights to be checked")
+        raise refused("cone", f" is {cone.status_}, so it has no weights to check")
     trained, times, _ = checked_examples(cone, len(w), patterns, targets)
     all_rows = pattern_rows(cone, cone.neuron_, trained, times, margin=Margin(0.0, 0.0))
     missed, room, slope = 0.0, np.inf, np.inf
@@ -138,7 +138,10 @@ def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets
             off, fires = _at_target(rows, w, exact, k, touch)
             missed = max(missed, abs(off))
             if fires is False:
-                wrong.append(f"pattern {p}: does not fire at target {k} ({t:g} ms), {-off:.1e} mV below the threshold")
+                wrong.append(
+                    f"pattern {p}: does not fire at target {k} ({t:g} ms): its potential is {-off:.1e} mV below "
+                    f"the threshold"
+                )
             elif fires is None:
                 unproven.append(f"pattern {p}: whether it fires at target {k} ({t:g} ms) is not proven")
             if rows.on_grid and not rows.is_point(float(t)):

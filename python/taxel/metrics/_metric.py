@@ -32,7 +32,7 @@ def _plain(metric: str, name: str, value: Any) -> Any:
     if name == "window" and value is not None:
         ends = floats(name, value, "ms")
         if len(ends) != 2:
-            raise refused(name, f" has {len(ends)} entries: must be start and stop, ms")
+            raise refused(name, f" has {len(ends)} entries: must be two, start and stop in ms")
         return ends.tolist()
     known = ranges(metric).get(name, {})
     if "infinite" in known:

@@ -44,7 +44,7 @@ def html(noun: Drawn) -> str:
     True
     """
     if not isinstance(noun, Drawn):
-        raise refused("noun", f" is {shown(noun)}: must be one that draws itself, for example taxel.Events")
+        raise refused("noun", f" is {shown(noun)}: must be an object that draws itself, for example taxel.Events")
     line = f"<code>{escape(repr(noun))}</code>"
     # A figure without pyplot, so that no window or notebook shows it a second time.
     figure = Figure(figsize=(7.0, 2.6) if isinstance(noun, Recording) else (4.2, 2.8), layout="constrained")

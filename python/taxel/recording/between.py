@@ -120,8 +120,9 @@ class Slices(Mapping[str, RecordedSource]):
         source = self._slices[name]
         if self._apart():
             raise ProblemError(
-                f"{self._origin.path}: was cut by one clock, but its sources ({', '.join(self)}) have different "
-                f"clocks; call on_clock(name) before between"
+                f"{self._origin.path}: the sources ({', '.join(self)}) have different clocks, so one interval "
+                f"does not fit "
+                "all; call on_clock(name) before between"
             )
         return source
 

@@ -264,8 +264,8 @@ def several(sources: Mapping[str, RecordedSource]) -> Several:
 
     def refuse() -> NoReturn:
         raise ProblemError(
-            f"{path}: holds {len(sources)} sources ({names}); choose one by recording.sources["
-            f"{next(iter(sources))!r}]; taxel convert --source NAME writes a source to a separate file"
+            f"{path}: contains {len(sources)} sources ({names}); choose one with recording.sources["
+            f"{next(iter(sources))!r}], or write one to a separate file with taxel convert --source NAME"
         )
 
     refused: Once[Any] = Once(refuse)

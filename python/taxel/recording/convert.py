@@ -86,7 +86,7 @@ def convert(
     path = Path(checked_path("target", target))
     kind = path.suffix.lower()
     if kind not in KINDS:
-        raise ProblemError(f"{path}: ends in {kind or 'nothing'!r}; must be {', '.join(KINDS)}")
+        raise ProblemError(f"{path}: ends in {kind or 'nothing'!r}; must end in one of {', '.join(KINDS)}")
     text("compression", compression, ("none", "lz4", "zstd"))
     if not flag("overwrite", overwrite) and os.path.lexists(path):
         raise FileExistsError(errno.EEXIST, "exists already; give overwrite=True to replace it", str(path))
@@ -95,7 +95,10 @@ def convert(
     contents = _contents(source)
     if frames_hz is not None:
         if isinstance(source, Frames):
-            raise refused("frames_hz", ": frames keep their times; open the file and call frames(rate_hz)")
+            raise refused(
+                "frames_hz",
+                ": the times of frames are not changed; to resample frames, open the file and call frames(rate_hz)",
+            )
         if contents.is_several and share_clock(contents.sources):
             contents = alone(
                 {name: as_frames(source, frames_hz, name="frames_hz") for name, source in contents.sources.items()}

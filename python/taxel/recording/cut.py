@@ -97,14 +97,16 @@ def region(contents: Contents, columns: slice, rows: slice) -> Contents:
     (left, right), (top, bottom) = array.region(columns, rows)
     for name, chosen, count in (("columns", columns, array.columns), ("rows", rows, array.rows)):
         if any(not -count <= end <= count for end in (chosen.start, chosen.stop) if end is not None):
-            raise ProblemError(f"{name} {_bounds(chosen)}: there are {count} {name}, 0 to {count - 1}")
+            raise ProblemError(
+                f"{name} {_bounds(chosen)}: must be within 0 to {count - 1}, because there are {count} {name}"
+            )
     if right <= left or bottom <= top:
         bounds = " and ".join(
             f"{name} {_bounds(chosen)}"
             for name, chosen in (("columns", columns), ("rows", rows))
             if chosen != slice(None)
         )
-        raise ProblemError(f"{bounds}: no taxel is there; there are {array.columns} columns and {array.rows} rows")
+        raise ProblemError(f"{bounds}: no taxel is there; the array has {array.columns} columns and {array.rows} rows")
     if (bottom - top, right - left) == array.shape:
         return contents
     refuse_several(contents.main)
@@ -157,5 +159,5 @@ def span_us(recording: Recording) -> tuple[int, int]:
     """Return the first and the last time of a recording; refuse an empty one."""
     times = recording.events.t if recording.has_events else recording.frames().t
     if not len(times):
-        raise ProblemError(f"{recording.path}: holds nothing")
+        raise ProblemError(f"{recording.path}: contains nothing")
     return int(times.min()), int(times.max())

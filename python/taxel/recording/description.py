@@ -71,8 +71,8 @@ def json_of(source: RecordedSource) -> str:
     described = json.dumps({name: value for name, value in document.items() if value or isinstance(value, float)})
     if (size := memory_of_json(described)) > limits.ABOUT:
         raise ProblemError(
-            f"{source.origin.name}: its description (sensor, notes, registers, detections) takes {size} bytes of "
-            f"memory; a .npz and a .h5 hold at most {limits.ABOUT}"
+            f"{source.origin.name}: the description (sensor, notes, registers, detections) takes {size} bytes of "
+            f"memory; must take at most {limits.ABOUT} in a .npz or .h5"
         )
     return described
 
@@ -89,7 +89,7 @@ def about_of(location: str, document: str) -> dict[str, Any]:
     try:
         about = of_json(location, document, limits.ABOUT, room=limits.ABOUT)
         if not isinstance(about, dict):
-            raise ProblemError("no object")
+            raise ProblemError("not an object")
         for entry, read in _ENTRIES.items():
             if about.get(entry) is not None:
                 fields[entry] = read(about[entry], location)
@@ -100,7 +100,9 @@ def about_of(location: str, document: str) -> dict[str, Any]:
     except FormatError:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, ProblemError) as error:
-        raise FormatError(f"{location}, {entry}: {first_line(error)}; must be JSON as taxel writes it") from None
+        raise FormatError(
+            f"{location}, {entry}: {first_line(error)}; the description must be JSON as taxel writes it"
+        ) from None
     return fields
 
 
@@ -139,7 +141,7 @@ def described_source(
 def array_of(geometry: Mapping[str, Any]) -> Array:
     """Return the sensor that a file describes."""
     if not isinstance(geometry, Mapping):
-        raise ProblemError("no object")
+        raise ProblemError("not an object")
     return Array._from_geometry(dict(geometry))
 
 
@@ -199,7 +201,7 @@ def _registers(values: Any, driven: Array) -> Any:
 def counts_of(counts: Any, depth: int = 0) -> dict[str, Any]:
     """Return counts by cause, whole numbers of 0 or more; those of the decoder are a nested mapping."""
     if not isinstance(counts, dict):
-        raise ProblemError("no object")
+        raise ProblemError("not an object")
     return {
         name: n if n is None else counts_of(n, 1) if isinstance(n, dict) and depth == 0 else integer(name, n, 0)
         for name, n in ((_OLD_KEYS.get(name, str(name)), n) for name, n in counts.items())
@@ -218,7 +220,7 @@ def frame_us_of(value: Any) -> float:
 
 def _texts(texts: Any) -> tuple[str, ...]:
     if not isinstance(texts, list):
-        raise ProblemError("no list")
+        raise ProblemError("not a list")
     return tuple(text("entry", entry) for entry in texts)
 
 

@@ -44,7 +44,7 @@ def period_us(name: str, rate_hz: float) -> int:
     if not 0 < rate <= 1e6:
         raise refused(name, f" is {rate}: must be above 0, at most 1000000")
     if rate < 1e-9:
-        raise refused(name, f" is {rate}: must be 1e-9 or more, a frame in 31 years")
+        raise refused(name, f" is {rate}: must be 1e-9 (a frame in 31 years) or more")
     return round(1e6 / rate)
 
 
@@ -88,7 +88,8 @@ def as_frames(source: RecordedSource, rate_hz: float | None = None, *, name: str
     period = None if rate_hz is None else period_us(name, rate_hz)
     if period is not None and source.untimed:
         raise ProblemError(
-            f"{source.origin.path}: its frames have no times, so they have no rate; see recording.at_rate"
+            f"{source.origin.path}: the frames have no times, so their rate is unknown; to give one, call "
+            f"recording.at_rate"
         )
     if isinstance(source, FrameSource):
         return replace(
@@ -129,7 +130,9 @@ def at_rate(contents: Contents, rate_hz: float) -> Contents:
     """
     period_us("rate_hz", rate_hz)
     if not contents.main.untimed:
-        raise ProblemError(f"{contents.main.origin.path}: has times; a rate is only for frames without times")
+        raise ProblemError(
+            f"{contents.main.origin.path}: the frames have times; a rate is only for frames without times"
+        )
     sources = {name: _at_rate(source, rate_hz) for name, source in contents.sources.items()}
     return Contents(several(sources) if contents.is_several else _at_rate(contents.main, rate_hz), sources)
 
@@ -166,8 +169,8 @@ def calibrate(source: RecordedSource, rate_hz: float | None = None, rest: Tare |
     calibration = source.sensor.calibration()
     if calibration is None:
         raise ProblemError(
-            f"{source.origin.path}: there is no calibration beside it, so its values cannot be converted to N or "
-            f"kPa; taxel calibrate makes a calibration"
+            f"{source.origin.path}: no calibration was found beside it, so the values cannot be converted to N or "
+            "kPa; to make a calibration, run taxel calibrate"
         )
     drawn = as_frames(source, rate_hz)
     calibrated = replace(

@@ -37,7 +37,7 @@ def check_size(path: Path, size: tuple[int, ...], array: Array) -> None:
     """
     if size != array.shape:
         shape = " x ".join(map(str, size))
-        raise refused("array", f": {array.rows} x {array.columns} taxels; {path} holds frames of {shape}")
+        raise refused("array", f" has {array.rows} x {array.columns} taxels; the frames of {path} have {shape}")
 
 
 def is_row_of(stated: Array, array: Array) -> bool:
@@ -101,20 +101,20 @@ def _apply_layout(source: RecordedSource, layout: Layout, *, given: bool) -> Rec
             raise FormatError(f"{layout.path}: {name}: {first_line(error)}") from None
         array = sensor.array
     if strict and sensor.heel and layout.heel not in ("", sensor.heel):
-        raise FormatError(f"{layout.path}: states heel {layout.heel}; {name} states {sensor.heel}")
+        raise FormatError(f"{layout.path}: states heel {layout.heel}, but {name} states {sensor.heel}")
     same = source if array == sensor.array else on_array(source, array)
     same = replace(same, sensor=replace(same.sensor, side=sensor.side or layout.side, heel=sensor.heel or layout.heel))
     if not isinstance(same, FrameSource):
         if strict and (layout.turned is not None or layout.unit or layout.rate_hz or layout.zeros_before_s):
-            of_frames = "falls, unit, rate_hz and zeros_before_s are for frames"
-            raise FormatError(f"{layout.path}: {name} holds events; {of_frames}")
+            of_frames = "falls, unit, rate_hz and zeros_before_s are only for frames"
+            raise FormatError(f"{layout.path}: {name} contains events; {of_frames}")
         return same
     was = same.frame_table.turned
     if strict and was is not None and layout.falls is not None and layout.turned != was:
         falls = "false" if layout.turned is None else f"{layout.turned:g}"
         raise FormatError(
             f"{layout.path}: states falls = {falls}, but the readings of {name} were already inverted with falls = "
-            f"{was:g}; leave falls out"
+            f"{was:g}; remove falls from the layout file"
         )
     full = layout.turned if was is None else None
     # Read at once, so that a layout that contradicts the file is refused where the file is opened.
@@ -122,7 +122,9 @@ def _apply_layout(source: RecordedSource, layout: Layout, *, given: bool) -> Rec
     untimed = same.untimed and layout.rate_hz is None
     if layout.zeros_before_s is not None:
         if untimed:
-            raise FormatError(f"{layout.path}: zeros_before_s: {name} has no times; rate_hz gives them")
+            raise FormatError(
+                f"{layout.path}: zeros_before_s needs times, but {name} has none; to give times, write rate_hz"
+            )
         frames = _after_zeros(frames, layout.zeros_before_s)
     return replace(same, frame_table=FrameTable(known(frames), untimed, was if full is None else full))
 
@@ -133,11 +135,11 @@ def _array(source: RecordedSource, layout: Layout) -> Array:
     array = layout.array(stated.rows * stated.columns, stated, source.sensor.side)
     if source.has_events and array.shape != stated.shape:
         raise ProblemError(
-            f"states {array.rows} x {array.columns} taxels; its events are of {stated.rows} x {stated.columns}"
+            f"the layout states {array.rows} x {array.columns} taxels; the events have {stated.rows} x {stated.columns}"
         )
     if min(stated.shape) > 1 and array.shape != stated.shape:
         raise ProblemError(
-            f"states {array.rows} x {array.columns} taxels; the file states {stated.rows} x {stated.columns}"
+            f"the layout states {array.rows} x {array.columns} taxels; the file states {stated.rows} x {stated.columns}"
         )
     if not array._is_measured:
         with_names = (
@@ -148,7 +150,7 @@ def _array(source: RecordedSource, layout: Layout) -> Array:
         kind in _ALONG and stated.places == load_packaged(kind).array(stated.columns, stated, source.sensor.side).places
     )
     if stated._is_measured and not along and (stated.pitch_mm, stated.places) != (array.pitch_mm, array.places):
-        raise ProblemError(f"states taxels {array._apart()}; the file states {stated._apart()}")
+        raise ProblemError(f"the layout states taxels {array._apart()}; the file states {stated._apart()}")
     return array
 
 
@@ -175,7 +177,7 @@ def _read(table: Frames, layout: Layout, full: float | None, name: str, *, is_al
         if unit in _UNSAID:
             unit = layout.unit
         elif strict and unit != layout.unit:
-            raise FormatError(f"{layout.path}: states unit {layout.unit}; {name} is in {unit}")
+            raise FormatError(f"{layout.path}: states the unit {layout.unit}, but {name} is in {unit}")
     if layout.rate_hz is not None:
         if _are_numbers(t):
             try:
@@ -195,8 +197,8 @@ def _read(table: Frames, layout: Layout, full: float | None, name: str, *, is_al
                 risen = np.float32(full) - block
             if (large := np.isinf(risen)).any():
                 raise FormatError(
-                    f"{layout.path}: falls is {layout.falls}; {name} reads {shown(block[large][0].item())}, and the "
-                    "difference does not fit 32 bits"
+                    f"{layout.path}: falls is {layout.falls}, but {name} contains {shown(block[large][0].item())}, and "
+                    "the difference does not fit 32 bits"
                 )
             block[...] = risen
         frozen_whole(values)

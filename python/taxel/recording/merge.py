@@ -94,7 +94,8 @@ def merge_contents(recordings: Sequence[Contents], gap: float | None = None, *, 
         differing = next(source for source in sources if source.has_events != sources[0].has_events)
         events, frames = (sources[0], differing) if sources[0].has_events else (differing, sources[0])
         raise ProblemError(
-            f"recordings: {events.origin.name} holds events, {frames.origin.name} frames; convert one of them first"
+            f"recordings: {events.origin.name} contains events, {frames.origin.name} contains frames; convert "
+            f"one of them first"
         )
     tables = [source.table for source in sources]
     shifts = _shifts(tables, gap)
@@ -312,7 +313,9 @@ class _Merging:
             done = upto
             known = held != UNKNOWN
             if (now[known] != held[known]).any():
-                self.lost.append(f"what {counted(int(known.sum()), 'taxel')} held where {source.origin.name} begins")
+                self.lost.append(
+                    f"the values of {counted(int(known.sum()), 'taxel')} at the beginning of {source.origin.name}"
+                )
         return first
 
 
@@ -388,8 +391,9 @@ def _common(sources: Sequence[RecordedSource], tables: Sequence[Events | Frames]
     for source, table in zip(sources, tables, strict=True):
         if not array.fits(table.array):
             raise ProblemError(
-                f"{source.origin.name}: {table.array!r}, {sources[0].origin.name}: {array!r}; different sensors can "
-                f"only be merged beside one another"
+                f"{source.origin.name} has {table.array!r}, {sources[0].origin.name} has {array!r}; different "
+                f"sensors can "
+                "only be merged beside one another"
             )
     return array
 
@@ -428,11 +432,11 @@ def _frames(tables: list[Frames], shifts: list[int], array: Array, lefts: list[i
     """Return all frames in order of time, or those of sensors side by side, the first columns of which are `lefts`."""
     units = {table.unit for table in tables}
     if len(units) > 1:
-        raise ProblemError(f"recordings: frames in {' and '.join(sorted(units))}; must be in one unit")
+        raise ProblemError(f"recordings: the frames are in {' and '.join(sorted(units))}; must be in one unit")
     times = [table.t + shift for table, shift in zip(tables, shifts, strict=True)]
     if lefts is not None:
         if any(not np.array_equal(t, times[0]) for t in times):
-            raise ProblemError("recordings: frames beside one another must have the same times")
+            raise ProblemError("recordings: frames that are merged beside one another must have the same times")
         zeros = np.zeros((len(times[0]), *array.shape), np.float32)
         values = _side_by_side(zeros, zip((table.values for table in tables), lefts, strict=True))
         return Frames(values, times[0], unit=tables[0].unit, array=array)

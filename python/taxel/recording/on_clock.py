@@ -41,11 +41,11 @@ def on_clock(contents: Contents, name: str) -> Contents:
     main, sources = contents.main, contents.sources
     path, label = main.origin.path, main.origin.label
     if main.timing.interval is not None and main.timing.clock_of is None:
-        raise ProblemError(f"{path}: was cut by its own clock; call on_clock({name!r}) before between")
+        raise ProblemError(f"{path}: was already cut with between; call on_clock({name!r}) before between")
     if name not in (*sources, HOST):
-        raise ProblemError(f"{path}: has no clock {name!r}; there are {', '.join((*sources, HOST))}")
+        raise ProblemError(f"{path}: has no clock {name!r}; must be one of {', '.join((*sources, HOST))}")
     if main.timing.clock_of is not None:
-        raise ProblemError(f"{path}: is on the clock of {main.timing.clock_of} already")
+        raise ProblemError(f"{path}: is already on the clock of {main.timing.clock_of}")
     to = None if name == HOST else _clock(sources[name])
     moved = {
         of_source: _move(source, name, None if of_source == name else _times(_clock(source), to))

@@ -101,8 +101,8 @@ class OpenOptions(SharedOptions):
 
 def _no_camera(path: Path) -> ProblemError:
     return ProblemError(
-        f"{path}: holds no events without intensities; region, bin, window_ms and polarity are only for such events, "
-        "for example of an event camera"
+        f"{path}: region, bin, window_ms and polarity are only for events without intensities, for example of an event "
+        "camera; this file has none"
     )
 
 
@@ -174,13 +174,15 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     """
     file = Path(arguments.checked_path("path", path))
     if recognition.is_folder(file):
-        raise ProblemError(f"{file}: a folder; name one of its recordings (in Python taxel.open_all opens all)")
+        raise ProblemError(
+            f"{file}: is a folder; name one of its recordings (in Python, taxel.open_all opens all of them)"
+        )
     recordings = _open(file, options)
     if len(recordings) != 1:
         names = ", ".join(recording.name for recording in recordings[:3]) + ", ..." * (len(recordings) > 3)
         raise ProblemError(
-            f"{file}: holds {len(recordings)} recordings ({names}); taxel convert {quote(str(file))} FOLDER writes "
-            "them as files of taxel (in Python taxel.open_all opens all)"
+            f"{file}: contains {len(recordings)} recordings ({names}); to write each to a file of taxel, run taxel "
+            f"convert {quote(str(file))} FOLDER (in Python, taxel.open_all opens all of them)"
         )
     return recordings[0]
 
@@ -262,7 +264,7 @@ def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
             case recognition.ForeignFile():
                 assert layout is not None  # one without is refused
                 if options.topics.are_given:
-                    raise ProblemError(f"{path}: not a ROS bag; topic, field, types and ros are only for ROS bags")
+                    raise ProblemError(f"{path}: is not a ROS bag; topic, field, types and ros are only for ROS bags")
                 array = None if options.array is None else Array._given(options.array)
                 contents = Contents.single(read_foreign(path, layout, array))
                 if array is not None and not contents.main.has_events:
@@ -370,15 +372,15 @@ def _refuse_folder(folder: Path, files: Sequence[Path], names: Sequence[str]) ->
         if inner.is_dir() and os.access(inner, os.R_OK | os.X_OK) and recognition.recorded_by_taxel(inner.iterdir())
     )
     hint = (
-        f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} hold recordings: name these folders"
+        f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} contain recordings: name these folders"
         if deeper
         else ""
     )
     known_kinds = (
-        f"taxel reads {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and by a "
-        "layout file .npy, .txt and other arrays and tables (docs/files.md)"
+        f"taxel reads {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and, "
+        "with a layout file, arrays and tables, for example .npy and .txt (docs/files.md)"
     )
-    raise FormatError(f"{folder}: holds {problem}; {hint or known_kinds}")
+    raise FormatError(f"{folder}: contains {problem}; {hint or known_kinds}")
 
 
 def _counting_memory(trials: Iterable[Trial]) -> Iterator[Trial]:
@@ -417,7 +419,7 @@ def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path
         names = ", ".join(left[:5]) + " ..." * (len(left) > 5)
         beside = ", ".join(file.name for file in recorded[:3]) + " ..." * (len(recorded) > 3)
         warn(
-            f"{folder}: {names} left out, because tables and arrays are not read in a folder with recordings "
+            f"{folder}: {names} are left out, because tables and arrays are not read in a folder with recordings "
             f"({beside}): "
             f"convert them, or move them to a separate folder",
             stacklevel=6,
@@ -428,8 +430,8 @@ def _warn_of_undescribed(folder: Path, described: Sequence[Path], files: Sequenc
     """Warn of tables and arrays that no layout describes, beside others of their kind that have one."""
     if left := [file.name for file in recognition.undescribed_tables(files, described)]:
         warn(
-            f"{folder}: {', '.join(left[:5])}{' ...' * (len(left) > 5)} left out, as no layout file describes them; a "
-            "file named layout.toml in the folder describes all of its tables",
+            f"{folder}: {', '.join(left[:5])}{' ...' * (len(left) > 5)} are left out, because no layout file describes "
+            "them; to describe all tables of the folder, write a file layout.toml in it",
             stacklevel=6,
         )
 
@@ -443,7 +445,7 @@ def _add_labels(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Record
     unknown = [name for name in labels.recordings if name not in known]
     if unknown:
         names = ", ".join(str(name) for name, _ in pairs[:8])
-        raise FormatError(f"{table}: {unknown[0]} is not a recording of this folder; there are {names}")
+        raise FormatError(f"{table}: {unknown[0]} is not a recording of this folder; must be one of {names}")
     # The feet of one trial are one recording.
     count = len({trial_of(str(name), recording.label) for name, recording in pairs})
     if count > 1 and any(not row.recording for row in labels.rows):

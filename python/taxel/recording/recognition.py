@@ -47,11 +47,10 @@ _STRANGERS = {
     b"\x89PNG": "a PNG picture, not a recording",
     b"%PDF": "a PDF document, not a recording",
     **{
-        b"#!AER-DAT%d" % k: f"AEDAT {k}; taxel reads these files of event cameras: {', '.join(CAMERA)}; save it as "
-        f"one of them"
+        b"#!AER-DAT%d" % k: f"AEDAT {k}; save it as a file of event cameras that taxel reads: {', '.join(CAMERA)}"
         for k in (1, 2, 3)
     },
-    b"#!AER-DAT4": "AEDAT 4; name it .aedat4",
+    b"#!AER-DAT4": "AEDAT 4; rename it to .aedat4",
     b"\x93NUMPY": "a single NumPy array; describe it in NAME.layout.toml",
 }
 
@@ -307,8 +306,8 @@ def _companion(path: Path, *, has_layout: bool) -> str:
         return ", line 1: a table of labels (docs/command-line.md), not a recording"
     if are_spike_trains(path) and not has_layout:
         return (
-            ": spike trains, as taxel encode writes them, not a recording; taxel info describes them, and "
-            "taxel.SpikeTrains.load reads them"
+            ": contains spike trains, not a recording; to describe them, run taxel info; to read them in Python, call "
+            "taxel.SpikeTrains.load"
         )
     return ""
 
@@ -373,7 +372,7 @@ def _by_first_bytes(path: Path) -> TaxelFile | Refusal:
         kind, _, then = stranger.partition("; ")
         return Refusal(FormatError(f"{starts} ({kind}), not with {right}" + f"; {then}" * bool(then)))
     if ending is None:
-        describes = advice(path, "describes a table or an array of another program")
+        describes = advice(path, "describe a table or an array of another program")
         known = f"{', '.join(ENDINGS)}, and of event cameras {', '.join(CAMERA)}"
         wrong = (
             f"{starts}: not a recording; taxel reads {known}; {describes}"

@@ -86,7 +86,7 @@ class Recording:
 
     def __init__(self, contents: Contents) -> None:
         if not isinstance(contents, Contents):
-            raise refused("contents", f" is {shown(contents)}: open a recording by taxel.open(path)")
+            raise refused("contents", f" is {shown(contents)}: to open a recording, call taxel.open(path)")
         self._contents = contents
         main = contents.main
         self.path, self.name, self.kind = main.origin.path, main.origin.name, main.origin.kind
@@ -110,7 +110,7 @@ class Recording:
         """
         events = self._contents.main.table
         if not isinstance(events, Events):
-            raise ProblemError(f"{self.path}: holds frames and no events; call frames()")
+            raise ProblemError(f"{self.path}: contains frames and no events; call frames()")
         return events
 
     def frames(self, rate_hz: float | None = None) -> Frames:
@@ -354,7 +354,7 @@ class Recording:
         elif self.kind == "mcap":
             why = "a part of the sensor has no datagrams; the datagrams of the file belong to the whole sensor"
         else:
-            why = f"the {kind_of_file(self.kind)} holds no datagrams; only .mcap does"
+            why = f"the {kind_of_file(self.kind)} contains no datagrams; only a .mcap does"
         raise ProblemError(f"{self.path}: {why}")
 
     @property

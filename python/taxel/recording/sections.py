@@ -68,7 +68,7 @@ class Origin:
 
     def losses(self) -> list[str]:
         """Return what a file without this section does not hold, one line each."""
-        return [f"where it came from ({self.source})"] * bool(self.source)
+        return [f"the origin of the recording ({self.source})"] * bool(self.source)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +116,9 @@ class Settings:
     def losses(self) -> list[str]:
         """Return what a file without this section does not hold, one line each."""
         held, changes = self.held(), self.register_changes()
-        lines = [] if held is None else [f"what {counted(int(np.sum(held != UNKNOWN)), 'taxel')} held at the beginning"]
+        lines = (
+            [] if held is None else [f"the values of {counted(int(np.sum(held != UNKNOWN)), 'taxel')} at the beginning"]
+        )
         lines = lines * self.held.holds() + ["the board's registers"] * (self.registers() is not None)
         return lines + [f"{counted(len(changes), 'setting')} of the registers"] * bool(changes)
 
@@ -202,7 +204,9 @@ class Losses:
 
     def damage(self) -> list[str]:
         """Return what a file that does not state its damage lacks."""
-        return ["that its end is missing"] * self.truncated + ["the remarks on reading it"] * self.rebuilt.holds()
+        return ["that the end of the recording is missing"] * self.truncated + [
+            "the remarks on reading the recording"
+        ] * self.rebuilt.holds()
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,8 +242,8 @@ class FrameTable:
 
     def losses(self) -> list[str]:
         """Return what a file without this section does not hold, except the frames."""
-        lines = ["that its frames have no times"] * self.untimed
-        lines += [] if self.turned is None else [f"that its readings were inverted (falls = {self.turned:g})"]
+        lines = ["that the frames have no times"] * self.untimed
+        lines += [] if self.turned is None else [f"that the readings were inverted (falls = {self.turned:g})"]
         return lines + (
             [] if self.frame_us is None else [f"the length of a frame that a readout assumed, {self.frame_us:g} us"]
         )
@@ -299,7 +303,7 @@ class SampleColumns:
 
     def received(self) -> list[str]:
         """Return what a file without the lines as received does not hold."""
-        return ["the lines of the stream as they came"] * self.samples.holds()
+        return ["the lines of the stream as received"] * self.samples.holds()
 
 
 #: A function has a rule for each of these types: `match` them, and end with `assert_never`.

@@ -87,7 +87,7 @@ def _fitting(path: Path, source: RecordedSource) -> Calibration:
     unit = source.table.unit if isinstance(source, FrameSource) else "ticks"
     if not calibration.array.fits(source.sensor.array) or calibration.reading_unit != unit:
         raise ProblemError(
-            f"{path}: converts {calibration.reading_unit} of {calibration.array!r} to {calibration.unit}; "
-            f"{source.origin.name} holds {unit} of {source.sensor.array!r}, another array"
+            f"{path}: the calibration is for {calibration.reading_unit} of {calibration.array!r}; "
+            f"{source.origin.name} contains {unit} of {source.sensor.array!r}"
         )
     return calibration

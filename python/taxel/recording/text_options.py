@@ -99,7 +99,9 @@ class TextOptions(SharedOptions):
         differs = array.pitch_mm is not None and (stated.pitch_mm, stated.places) != (array.pitch_mm, None)
         if stated.shape != array.shape or differs:
             sizes = ", ".join(self.array)
-            raise refused("array", f" is {sizes}: {recording.path} holds its own sensor, {stated!r}; leave it out")
+            raise refused(
+                "array", f" is {sizes}: must be left out, because {recording.path} states its sensor, {stated!r}"
+            )
         # A .mcap holds its sensor, whose pitch may be unknown, and a camera's file its pixels.
         if not recording.has_events or stated._is_measured or recording.kind in ("mcap", "event_camera"):
             return recording
@@ -129,7 +131,7 @@ class TextOptions(SharedOptions):
         recordings = self.open_joined(path)
         if len(recordings) != 1:
             some = ", ".join(recording.name for recording in recordings[:3]) + ", ..." * (len(recordings) > 3)
-            raise ProblemError(f"{path}: holds {len(recordings)} recordings ({some}); must be one")
+            raise ProblemError(f"{path}: contains {len(recordings)} recordings ({some}); must contain one")
         return recordings[0]
 
 

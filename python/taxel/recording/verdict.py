@@ -287,7 +287,7 @@ def _check(held: Any) -> dict[str, Any]:
         inner = part["status"]
         if STATUSES.index(inner) > STATUSES.index(values["status"]):
             raise ProblemError(
-                f"verdict: its status is {values['status']}, that of {name} is {inner}: must be no better"
+                f"verdict: its status is {values['status']}, but that of {name} is {inner}: must not be better"
             )
     for name, totals in zip(_NUMBERS, numbers, strict=True):
         for cause in {cause for part in stated.values() for cause in part[name]}:
@@ -295,8 +295,8 @@ def _check(held: Any) -> dict[str, Any]:
             least = max(part[name].get(cause, 0) for part in stated.values())
             if totals.get(cause, 0) < least:
                 raise ProblemError(
-                    f"verdict: its {name} has {totals.get(cause, 0)} of {cause}, its parts {least}: must be at least "
-                    "as many"
+                    f"verdict: its {name} states {totals.get(cause, 0)} of {cause}, but its parts state {least}: must "
+                    "be at least as many"
                 )
     fields = {"status": values["status"], "text": values["text"], doubtful: values.get(doubtful)}
     fields |= {"steps_back": [dict(step) for step in values.get("steps_back", [])]}

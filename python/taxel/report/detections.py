@@ -408,7 +408,7 @@ def _moves(aligned: Alignment | None) -> Figure | None:
     axis.plot(number[aligned.unpaired], np.zeros(aligned.unpaired.sum()), "x", color=_DETECTED, label="no input near")
     axis.axhline(0, color="#999999", linewidth=0.8)
     axis.set_xlabel("label, in the order of recordings and time")
-    axis.set_ylabel("felt minus given, ms")
+    axis.set_ylabel("sensor minus label, ms")
     axis.legend()
     return figure
 

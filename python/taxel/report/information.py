@@ -78,7 +78,7 @@ def _curves(answer: Answer) -> Figure:
         axes[0, 1].plot(
             [p.window_ms for p in line], [p.found.bits for p in line], marker="o", ms=3, label=f"{period:g} ms"
         )
-    axes[0, 1].set(xscale="log", xlabel="time since contact, ms", title="when it is known (lines: periods)")
+    axes[0, 1].set(xscale="log", xlabel="time since contact, ms", title="bits over time (one line per period)")
     axes[0, 1].legend(frameon=False)
     _by_taxels(axes[1, 0], answer)
     for point in (*answer.by_period, *answer.taxels):
@@ -92,7 +92,7 @@ def _curves(answer: Answer) -> Figure:
     axes[1, 1].legend(frameon=False)
     n, bits = zip(*answer.training, strict=True)
     axes[2, 0].plot(n, bits, marker="o", ms=3, color=_COLOURS["keeps"])
-    axes[2, 0].set(xlabel="training trials a label", title="how much training there was")
+    axes[2, 0].set(xlabel="training trials a label", title="effect of the number of training trials")
     names = [c.name for c in answer.controls if c.found is not None] + ["full"]
     values = [c.found for c in answer.controls if c.found is not None] + [answer.full.found]
     axes[2, 1].barh(names, [v.bits for v in values], color=[*["0.7"] * (len(names) - 1), _COLOURS["keeps"]])
@@ -168,6 +168,8 @@ def _confusion(answer: Answer) -> Figure:
     if len(names) <= _MOST_NAMES:
         ax.set_xticks(range(len(names)), names, rotation=45, ha="right")
         ax.set_yticks(range(len(names)), names)
-    ax.set(xlabel="taken for", ylabel="label", title=f"{answer.full.period_ms:g} ms, to {answer.full.window_ms:g} ms")
+    ax.set(
+        xlabel="classified as", ylabel="label", title=f"{answer.full.period_ms:g} ms, to {answer.full.window_ms:g} ms"
+    )
     figure.colorbar(picture, ax=ax, label="share of the label's trials")
     return figure

@@ -79,7 +79,7 @@ def reading(circuit: Circuit | None, asynchronous: bool) -> dict[str, Any]:
     """
     lines = None if circuit is None else instance("circuit", circuit, Circuit)._plain()
     if flag("asynchronous", asynchronous) and lines is not None:
-        raise refused("asynchronous", ": taxels that compare by themselves share no lines: circuit must be left out")
+        raise refused("asynchronous", ": must be left out if circuit is given, because these taxels share no lines")
     return {"circuit": lines, "asynchronous": asynchronous}
 
 
@@ -100,7 +100,7 @@ def fitting(preset: str | None, array: Array) -> Registers:
         return Registers._of(values, array)
     except DeviceError as error:
         size = f"{array.rows} x {array.columns} taxels"
-        raise DeviceError(f'preset "{preset}" does not read {size}: {error}') from None
+        raise DeviceError(f'preset "{preset}" cannot read {size}: {error}') from None
 
 
 def pattern(frame: int, *, array: Array | None = None, ramp: int = 150) -> NDArray[np.uint16]:

@@ -76,12 +76,14 @@ class EmulatorReport:
         late = f"late by {late}; {self.late_frames} of {self.frames} by a frame or more"
         if self.held:
             pace = (
-                "held" if self.late_frames <= 0.01 * self.frames else "reached on average, but single frames were late"
+                "reached"
+                if self.late_frames <= 0.01 * self.frames
+                else "reached on average, but single frames were late"
             )
             return f"{self.wanted_hz:.0f} frames/s {pace}; frames were {late}"
         short = 100.0 * (1.0 - self.reached_hz / self.wanted_hz)
         return (
-            f"this machine cannot hold {self.wanted_hz:.0f} frames/s: it reached {self.reached_hz:.0f}, "
+            f"this machine is too slow for {self.wanted_hz:.0f} frames/s: it reached {self.reached_hz:.0f}, "
             f"{short:.1f} % less; frames were {late}"
         )
 

@@ -182,7 +182,7 @@ class Layer:
         sunk = finite_numbers("sunk_mm", sunk_mm)
         cells = (self.array.rows * self.cells_per_pitch, self.array.columns * self.cells_per_pitch)
         if sunk.shape != cells:
-            raise refused("sunk_mm", f" has shape {sunk.shape}: the array has {cells}")
+            raise refused("sunk_mm", f" has shape {sunk.shape}: must be {cells}")
         pressure, base = self._core.press(sunk.reshape(-1))
         above = _KPA * pressure.reshape(self.array.shape)
         # MPa mm^2 is N.

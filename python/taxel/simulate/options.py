@@ -49,15 +49,15 @@ class EmulateOptions:
     tare_ms: float = 50.0
     array: Array | None = None
     sensor: Mapping[str, float] | None = None
-    wire: Literal[1, 2] | None = option(None, "Version of the wire. Default: by the registers.", least=1, most=2)
+    wire: Literal[1, 2] | None = option(None, "Version of the wire. Default: the registers decide.", least=1, most=2)
     previous: Literal["last_sent", "last_sample"] = "last_sent"
     intensity: Literal["value", "difference", "nothing"] = "value"
     version_2: Version2 | None = None
     circuit: Circuit | None = option(
         None,
         "Simulate the circuit of shared lines; NAME is one of gain, switch_ohm, wire_ohm, offset_mv, hysteresis_v, "
-        "settle_us, amplifier_us. One of them is enough: the whole circuit is simulated, the others with their usual "
-        "values. The board then reaches about 2.4 kHz.",
+        "settle_us, amplifier_us. One value is enough: the whole circuit is simulated, with the usual values for the "
+        "other names. The board then reaches about 2.4 kHz.",
     )
     asynchronous: bool = option(False, "Taxels send by themselves, without a scan, with stamps of 1 us (wire 2).")
     flaws: Flaws | None = option(
@@ -71,14 +71,15 @@ class EmulateOptions:
         "May be repeated.",
     )
     reset_every_s: float | None = option(None, "Interval between resets of the board, s. Default: none.", least=0.001)
-    drift_ppm: float = option(0.0, "By how many parts per million the board's clock runs too fast.")
-    control: str | None = option(None, "Accept commands on this TCP port of loopback; 0 finds a free one.")
+    drift_ppm: float = option(0.0, "Error of the board's clock in parts per million; above 0, it runs too fast.")
+    control: str | None = option(None, "Accept commands on this TCP port, from this computer only; 0 finds a free one.")
     line: str | os.PathLike[str] | None = option(
         None, "Accept commands on a serial line of this name (a link to a pseudo-terminal)."
     )
     baud: int = option(115_200, "Baud rate of --line. Default: 115200.", least=BAUDS[0], most=BAUDS[1])
     sync: str | os.PathLike[str] | None = option(
-        None, "Write the sync line as text to a new file or a pipe: board us, 1 or 0, host ns."
+        None,
+        "Write the sync line as text to a new file or a pipe, in lines of board time (us), 1 or 0, host time (ns).",
     )
     overwrite: bool = option(False, "Replace output files that exist already.")
     source_port: int = option(0, "The UDP port to send from; 0: any.", least=0, most=65_535)

@@ -47,7 +47,7 @@ class Replay:
         if not isinstance(source, Events | Frames):
             raise refused("source", f" is {shown(source)}: must be a Recording, Events or Frames")
         if not len(source):
-            raise refused("source", ": nothing to play in it")
+            raise refused("source", " is empty: must contain events or frames")
         self.source: Events | Frames = source
 
     @property

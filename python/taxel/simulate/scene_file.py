@@ -137,7 +137,7 @@ class SceneFile:
         # Refuses what is invalid here, instead of when the scene is played.
         _core.check_scene(array._parts(), scene._part(), json.dumps(sensor))
         if not np.isfinite(scene.motion(array=array).force_n).all():
-            raise SceneError("foam: the force on it is too large for a float32; must be softer")
+            raise SceneError("foam: the force on the foam is too large for a float32; the foam must be softer")
         preset = text("preset", document["preset"]) if "preset" in document else cls.preset
         fitting(preset, array)
         tare_ms = number("tare_ms", document.get("tare_ms", cls.tare_ms))
@@ -175,7 +175,9 @@ def _known(location: str, table: object, names: tuple[str, ...] | list[str]) -> 
         if name not in names:
             near = difflib.get_close_matches(name, names, 1)
             meant = f" (did you mean {near[0]}?)" if near else ""
-            raise SceneError(f"{location}{'.' * bool(location)}{name} is not known{meant}: there is {', '.join(names)}")
+            raise SceneError(
+                f"{location}{'.' * bool(location)}{name} is not known{meant}: must be one of {', '.join(names)}"
+            )
 
 
 def _bodies(described: Any, folder: Path) -> Any:
@@ -190,7 +192,7 @@ def _bodies(described: Any, folder: Path) -> Any:
             for part in ("shape", "motion"):
                 kinds = body.get(part)
                 if isinstance(kinds, Mapping) and len(kinds) > 1:
-                    raise SceneError(f"bodies[{n}].{part} is {' and '.join(kinds)}: must be one of them")
+                    raise SceneError(f"bodies[{n}].{part} is {' and '.join(kinds)}: must be only one of them")
             if "mass_g" in body and "material" in body:
                 raise SceneError(f"bodies[{n}] has mass_g and material: must have only one of them")
         shape: Any = body.get("shape") if isinstance(body, Mapping) else None

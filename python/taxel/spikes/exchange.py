@@ -43,9 +43,11 @@ def write_nwb(
     try:
         begun = begun.astimezone()
     except (OverflowError, ValueError, OSError):
-        raise refused("begun", f" is {begun}: must be a date that this machine's clock knows") from None
+        raise refused("begun", f" is {begun}: must be a date that this computer can represent") from None
     if "\0" in text("description", description):
-        raise refused("description", f" is {shown(description)}: NWB takes no zero in a text")
+        raise refused(
+            "description", f" is {shown(description)}: must not contain a zero byte, because NWB does not allow it"
+        )
     sent = (description, str(uuid4()), begun, times, values, kind, np.array([window_ms]) / 1000.0)
     write_h5(path, _write, lambda pipe: pickle.dump(sent, pipe), overwrite=overwrite)
     return Path(path)
@@ -83,9 +85,9 @@ def read_nwb(path: str | os.PathLike[str], start: float | None, stop: float | No
     ]
     with H5File(file) as h5:
         if h5.attribute("nwb_version") is None:
-            raise FormatError(f"{file}: no NWB file: it has no attribute nwb_version")
+            raise FormatError(f"{file}: is not an NWB file, because the attribute nwb_version is missing")
         if "units/spike_times" not in h5.entries:
-            raise FormatError(f"{file}: an NWB file without spike times in a table of units")
+            raise FormatError(f"{file}: the NWB file contains no spike times in a table of units")
         seconds, offsets = _lists(h5, "spike_times")
         values: NDArray[Any] | None = None
         kind: Kind = "unsigned"
@@ -114,7 +116,7 @@ def _lists(h5: H5File, name: str) -> tuple[NDArray[Any], NDArray[np.int64]]:
     """Return a column of the table of units, of which each row is a list: all values, and the offsets of the lists."""
     column, index = f"units/{name}", f"units/{name}_index"
     if index not in h5.entries:
-        raise FormatError(f"{h5.path}, {column}: has no list for each unit: there is no {index}")
+        raise FormatError(f"{h5.path}, {column}: must have a list for each unit, but {index} is missing")
     values, ends = h5.numbers(column), h5.numbers(index)
     if values.ndim != 1 or ends.ndim != 1 or ends.dtype.kind not in "ui":
         raise FormatError(f"{h5.path}, {column}: {values.dtype} of shape {values.shape}; must be a list for each unit")

@@ -219,7 +219,7 @@ class SpikeTrains(FrozenColumns):
         """
         each = [instance(f"parts[{n}]", part, SpikeTrains) for n, part in enumerate(several("parts", parts))]
         if not each:
-            raise refused("parts", ": is empty, must have one train or more")
+            raise refused("parts", " is empty: must have one train or more")
         each = [trains.split_by_sign() if trains.signed else trains for trains in each]
         graded = any(trains.kind == "graded" for trains in each)
         return cls._of_own(
@@ -298,7 +298,7 @@ class SpikeTrains(FrozenColumns):
         numbers = column("trains", chosen, np.int64).tolist()
         outside = [n for n in numbers if not 0 <= n < len(self)]
         if outside:
-            raise ProblemError(f"train {outside[0]}: there are trains 0 to {len(self) - 1}")
+            raise ProblemError(f"train {outside[0]}: must be from 0 to {len(self) - 1}")
         values = None
         if self.values is not None:
             values = [self.values[self.offsets[n] : self.offsets[n + 1]] for n in numbers]
@@ -566,7 +566,7 @@ class SpikeTrains(FrozenColumns):
             start, stop = arrays["start"].item(), arrays["stop"].item()
             return cls(arrays["times"], arrays["offsets"], start, stop, arrays.get("values"), kind=kind)
         except (ValueError, KeyError, ProblemError, FormatError) as error:
-            raise FormatError(f"{file}: holds no spike trains: {shown(str(error))}") from None
+            raise FormatError(f"{file}: contains no spike trains: {shown(str(error))}") from None
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the raster: time (ms) to the right, trains upwards, OFF spikes and values below 0 in another colour."""

@@ -62,7 +62,7 @@ class Columns:
             self.p: NDArray[np.bool_] = memory(n, np.bool_)
             self.present: NDArray[np.bool_] = memory(n, np.bool_)
         except MemoryError:
-            raise refused("rows", f" is {n}: not enough memory for so many") from None
+            raise refused("rows", f" is {n}: needs more memory than is available") from None
 
     def __len__(self) -> int:
         return len(self.t)

@@ -79,7 +79,7 @@ def decode(
     room, fresh = Columns._or_fresh(columns, _core.wire_rows(decoder.version, len(stream)))
     if decoder.version == 2:
         if lengths is not None:
-            raise refused("lengths", ": must be left out with version 2, where each datagram begins with its length")
+            raise refused("lengths", ": must be left out, because in version 2 each datagram begins with its length")
         filled = _core.decode_datagrams(stream, decoder.array._parts(), room._parts())
     elif lengths is not None:
         filled = decoder._core.fill_datagrams(stream, column("lengths", lengths, np.int64), room._parts())
@@ -160,9 +160,7 @@ class Decoder:
         self.array = Array._of(array)
         text("pairing", pairing, _PAIRINGS)
         if self.version == 2 and (pairing != "direct" or flag("differences", differences)):
-            raise ProblemError(
-                "pairing and differences are for version 1: leave them out, because datagrams of version 2 state both"
-            )
+            raise ProblemError("pairing and differences are only for version 1: datagrams of version 2 state both")
         parts = self.array._parts()
         self._core = _core.WireDecoder(self.version, parts, pairing, flag("differences", differences))
 

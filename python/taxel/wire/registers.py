@@ -176,7 +176,7 @@ class Registers:
         """
         eight = [integer(f"words[{n}]", word, 0, 2**32 - 1) for n, word in enumerate(several("words", words))]
         if len(eight) != 8:
-            raise refused("words", f": {len(eight)}, must be 8")
+            raise refused("words", f": {len(eight)} words; must be 8")
         values = _core.registers_of_words(eight, integer("channels", channels, 0, 255))
         return cls._of(values, Array._of(array))
 

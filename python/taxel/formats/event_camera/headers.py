@@ -64,26 +64,31 @@ def _check_words(path: Path, file: BinaryIO, size: int, kind: str) -> None:
     end = _end_of_lines(head)
     if not end:
         if not size:
-            raise FormatError(f"{path}: empty; must have a header (lines of %), and events below it")
+            raise FormatError(
+                f"{path}: the file is empty; must have a header (lines that begin with %), and events below it"
+            )
         begins = " ".join(f"{byte:02X}" for byte in head[:4])
-        raise FormatError(f"{path}, byte 0: starts with {begins}, not with a header (lines of %): damaged")
+        raise FormatError(
+            f"{path}, byte 0: starts with {begins}, not with a header (lines that begin with %); the file is damaged"
+        )
     found = _VERSION[kind].search(head[:end])
     version, known = ("" if found is None else found[1].decode()), _WORDS[kind]
     word = known.get(version.removesuffix(".0"))
     if word is None:
         names = " and ".join(f"{kind.upper()}{number}" for number in known)
         states = f"states {kind.upper()}{version}" if version else "states no version"
-        raise FormatError(f"{path}: its header {states}; {names} are read")
+        raise FormatError(f"{path}: the header {states}; taxel reads {names}")
     # Two bytes say the type of a .dat's events and their size.
     begin = end + 2 * (kind == "dat")
     if begin >= size:
-        raise FormatError(f"{path}: ends after its header, byte {size}: damaged, because it holds no event")
+        raise FormatError(f"{path}: the file ends after its header, at byte {size}, without an event; it is damaged")
     if (size - begin) % word:
         over = (size - begin) % word
         at_word = size - over
         raise FormatError(
-            f"{path}: ends within a word, {over} of {word} bytes from byte {at_word} on: damaged; taxel reads the file "
-            f"without them: head -c {at_word} {escaped(shlex.quote(str(path)))} > whole{path.suffix}"
+            f"{path}: the last word, at byte {at_word}, has {over} of {word} bytes, so the file is damaged; "
+            f"taxel reads "
+            f"the file without this word: head -c {at_word} {escaped(shlex.quote(str(path)))} > whole{path.suffix}"
         )
 
 
@@ -101,32 +106,36 @@ def _check_packets(path: Path, file: BinaryIO, size: int) -> None:
     """Refuse an AEDAT 4.0 whose packets do not end where its header, or the file, does."""
     magic = file.read(len(_AEDAT))
     if not magic:
-        raise FormatError(f"{path}: empty; must be AEDAT 4")
+        raise FormatError(f"{path}: the file is empty; must be AEDAT 4")
     if (older := re.match(rb"#!AER-DAT([0-3])", magic)) is not None:
         raise FormatError(
-            f"{path}: its header states AEDAT {older[1].decode()}; only AEDAT 4 is read: save it as AEDAT 4"
+            f"{path}: the header states AEDAT {older[1].decode()}; taxel reads only AEDAT 4: save the file as AEDAT 4"
         )
     if magic != _AEDAT:
         begins = " ".join(f"{byte:02X}" for byte in magic[:4])
-        raise FormatError(f"{path}, byte 0: starts with {begins}, not with #!AER-DAT4.0: damaged, or not AEDAT")
+        raise FormatError(
+            f"{path}, byte 0: starts with {begins}, not with #!AER-DAT4.0; the file is damaged, or not AEDAT"
+        )
     try:
         (length,) = struct.unpack("<I", file.read(4))
         if length > min(size, _HEADER):
             raise struct.error
         table = _table_at(file.read(length))
     except struct.error:
-        raise FormatError(f"{path}: its header is damaged") from None
+        raise FormatError(f"{path}: the header is damaged") from None
     at, end = len(_AEDAT) + 4 + length, size if table < 0 else table
     if end > size:
-        raise FormatError(f"{path}: ends at byte {size}, before its table of packets at byte {table}: damaged")
+        raise FormatError(
+            f"{path}: the file ends at byte {size}, but its table of packets would begin at byte {table}; it is damaged"
+        )
     if at == end:
-        raise FormatError(f"{path}: ends after its header, byte {size}: damaged, because it holds no event")
+        raise FormatError(f"{path}: the file ends after its header, at byte {size}, without an event; it is damaged")
     while at < end:
         file.seek(at)
         packet = file.read(8)
         after = at + 8 + (struct.unpack("<I", packet[4:])[0] if len(packet) == 8 else 0)
         if len(packet) < 8 or after > end:
-            raise FormatError(f"{path}: ends within the packet that begins at byte {at}: damaged")
+            raise FormatError(f"{path}: the file ends within the packet that begins at byte {at}; it is damaged")
         at = after
 
 

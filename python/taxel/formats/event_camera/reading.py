@@ -50,7 +50,8 @@ def read(path: Path, reduction: Reduction) -> Events | Frames:
     kind = check(path)
     if find_spec("faery") is None:
         raise ImportError(
-            f"{escaped(path)}: an event camera's file, and faery is not installed: {installing('events')}"
+            f"{escaped(path)}: to read a file of an event camera, taxel needs faery, which is not installed: "
+            f"{installing('events')}"
         )
     with _EventFile(path, kind) as file:
         return file.read(reduction)
@@ -68,7 +69,10 @@ class _EventFile(ReadingChild):
         self._order({"kind": self._encoding})
         columns, rows = self._answer()["size"]
         if not columns or not rows:
-            raise FormatError(f"{self.path}: its header states no size; add a line such as % geometry 640x480")
+            raise FormatError(
+                f"{self.path}: the header does not state the size; add a line to the header, for example % "
+                f"geometry 640x480"
+            )
         left, right, top, bottom = reduction.bounds(columns, rows)
         array = sensor(str(self.path), Array(*reduction.shape(columns, rows), name="event camera"))
         how = {
@@ -81,10 +85,12 @@ class _EventFile(ReadingChild):
         while "total" not in (found := self._answer()):
             pass
         if not found["total"]:
-            raise FormatError(f"{self.path}: holds no event: damaged, or nothing moved")
+            raise FormatError(f"{self.path}: contains no event; the file is damaged, or nothing moved")
         first, last = found["ends"]
         if last > TIME_US:
-            raise FormatError(f"{self.path}: reaches {last} us; times must be within {TIME_US} us (142 years) of 0")
+            raise FormatError(
+                f"{self.path}: the last time is {last} us; times must be within {TIME_US} us (142 years) of 0"
+            )
         self._order({**how, "columns": True})
         if reduction.window_us is None:
             return self._events(array, found["count"])
@@ -107,7 +113,7 @@ class _EventFile(ReadingChild):
                 read[name][at:end] = column
             at = end
         if at != count:
-            raise FormatError(f"{self.path}: was changed while it was read")
+            raise FormatError(f"{self.path}: the file changed while taxel read it")
         t, x, y, p = (frozen(column) for column in read.values())
         return Events(t, x, y, p, array=array)
 
@@ -115,5 +121,5 @@ class _EventFile(ReadingChild):
         counts = CountWindows(str(self.path), array, first, last, reduction)
         for piece in self._pieces():
             if not counts.add(piece["t"], piece["x"], piece["y"]):
-                raise FormatError(f"{self.path}: was changed while it was read")
+                raise FormatError(f"{self.path}: the file changed while taxel read it")
         return counts.frames()

@@ -55,7 +55,7 @@ class Reduction:
         if self.window_ms is not None:
             window_us = to_us(finite("window_ms", self.window_ms, "ms", least=0.001, most=_LONGEST_MS))
             if round(window_us, 6) % 1:
-                raise ProblemError(f"window_ms is {shown(self.window_ms)}: must be whole us")
+                raise ProblemError(f"window_ms is {shown(self.window_ms)}: must be a whole number of us")
         if self.polarity is not None:
             text("polarity", self.polarity, POLARITIES)
 
@@ -115,9 +115,9 @@ class Reduction:
         for name, first, end in (("columns", left, right), ("rows", top, bottom)):
             if first >= end:
                 order = (
-                    ": the first must be below the last"
+                    ": the first number must be below the second"
                     if first > end
-                    else " is empty, because the last is not included"
+                    else " is empty, because the second number is not included"
                 )
                 raise ProblemError(f"region {shown(self.region)}: {name} {first}:{end}{order}")
         if not (right <= columns and bottom <= rows):
@@ -137,6 +137,6 @@ def _ends(region: str) -> tuple[int, int | None, int, int | None]:
     """Return the ends of a region's columns and rows; None for the sensor's own."""
     found = re.fullmatch(r"(\d{0,5}):(\d{0,5}),(\d{0,5}):(\d{0,5})", text("region", region), re.ASCII)
     if found is None:
-        raise refused("region", f" is {shown(region)}: must be columns and rows A:B,C:D, for example 100:420,60:300")
+        raise refused("region", f" is {shown(region)}: must be columns A:B and rows C:D, for example 100:420,60:300")
     left, right, top, bottom = (int(end) if end else None for end in found.groups())
     return left or 0, right, top or 0, bottom

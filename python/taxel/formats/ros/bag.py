@@ -71,14 +71,16 @@ class Bag:
         types = sorted({connection.msgtype for connection in found})
         if not found:
             there = ", ".join(sorted(self.topics())) or "none"
-            raise FormatError(f"{self.path}: has no topic {topic}; its topics are {there}")
+            raise FormatError(f"{self.path}: the bag has no topic {topic}; its topics are {there}")
         if len(types) > 1:
-            raise FormatError(f"{self.path}: topic {topic} has messages of several types ({', '.join(types)})")
+            raise FormatError(
+                f"{self.path}: topic {topic} has messages of several types ({', '.join(types)}); must have one type"
+            )
         undefined = self.undefined(types[0])
         if undefined:
             error = FormatError(
-                f"{self.path}: holds no definition of {undefined} (topic {topic}); a folder of .msg or .idl files may "
-                f"have it, or a release of ROS, one of {', '.join(_stores())}"
+                f"{self.path}: the definition of {undefined} (topic {topic}) is not in the bag; it may be in a "
+                f"folder of .msg or .idl files, or in a release of ROS, one of {', '.join(_stores())}"
             )
             raise helped(error, "types", "give")
         for connection in found:
@@ -121,8 +123,8 @@ class Bag:
         digest = self.store.generate_msgdef(sent.msgtype)[1] if self.is_ros1 else self.store.hash_rihs01(sent.msgtype)
         if digest != sent.digest:
             raise FormatError(
-                f"{self.path}: was recorded with another definition of {sent.msgtype} than the one given; its digest "
-                f"is {sent.digest}"
+                f"{self.path}: the bag was recorded with another definition of {sent.msgtype} than the given files "
+                f"contain; the digest in the bag is {sent.digest}"
             )
 
 
@@ -132,7 +134,9 @@ def open_bag(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
     try:
         from rosbags import rosbag1, rosbag2  # noqa: PLC0415  an extra
     except ImportError:
-        raise ImportError(f"{escaped(path)}: a ROS bag, and rosbags is not installed: {installing('ros')}") from None
+        raise ImportError(
+            f"{escaped(path)}: to read a ROS bag, taxel needs rosbags, which is not installed: {installing('ros')}"
+        ) from None
     try:
         is_ros1 = path.is_file() and _begins(path, len(_ROS1)) == _ROS1
         for part in path.iterdir() if path.is_dir() else [path]:
@@ -153,13 +157,13 @@ def open_bag(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
             raise
         why = "more memory than is available" if isinstance(error, MemoryError) else first_line(error)
         if is_position:
-            why = "it is damaged: it names a position that no file has"
+            why = "the bag is damaged: a position in it is beyond the end of any file"
         elif "index" in why.lower() and path.suffix == ".bag":
-            why = (
-                "its index is missing or damaged, as in a recording that was cut off; rosbag reindex makes a new index"
-            )
+            why = "the index is missing or damaged, probably because the recording was interrupted; to make a "
+            "new index, run rosbag reindex"
         elif "magic" in why.lower() and path.suffix not in (".bag", ".db3"):
-            why = "its end is missing, as in a recording that was cut off; mcap recover makes a whole file of it"
+            why = "the end is missing, probably because the recording was interrupted; to repair the file, run "
+            "mcap recover"
         raise FormatError(f"{path}: cannot be read as a ROS bag: {why}") from None
 
 
@@ -184,16 +188,16 @@ def _bounded_unpacker(name: str) -> Callable[..., bytes]:
 
     def unpack(data: bytes, size: int = CHUNK) -> bytes:
         if size > CHUNK:
-            raise ValueError(f"a chunk of {size} bytes, unpacked; at most {CHUNK} are read")
+            raise ValueError(f"an unpacked chunk has {size} bytes; must have at most {CHUNK}")
         unpacker, parts, left = _UNPACKERS[name](), list[bytes](), min(size, CHUNK) + 1
         while left > 0 and not unpacker.eof and (part := unpacker.decompress(data, max_length=left)):
             parts.append(part)
             left -= len(part)
             data = b""
         if left <= 0:
-            raise ValueError(f"a chunk unpacks to more than {size} bytes; at most that are read")
+            raise ValueError(f"an unpacked chunk has more than {size} bytes; must have at most {size}")
         if not unpacker.eof:
-            raise EOFError("a chunk ends before its content does")
+            raise EOFError("a chunk ends before the end of its content")
         return b"".join(parts)
 
     return unpack
@@ -249,7 +253,7 @@ def _of_folder(folder: Path, needed: Iterable[str]) -> dict[str, Any]:
 
     files = sorted(file for file in folder.rglob("*") if file.suffix in (".msg", ".idl"))
     if not files:
-        raise ProblemError(f"{folder}: not a folder with .msg or .idl files")
+        raise ProblemError(f"{folder}: must be a folder with .msg or .idl files")
     defined: dict[str, Any] = {}
     for file in files:
         try:
@@ -259,7 +263,7 @@ def _of_folder(folder: Path, needed: Iterable[str]) -> dict[str, Any]:
             else:
                 defined |= get_types_from_msg(text, f"{_package(file, needed)}/msg/{file.stem}")
         except Exception as error:  # of the parser, and of text that is not UTF-8
-            raise FormatError(f"{file}: cannot be read as a definition of messages: {first_line(error)}") from None
+            raise FormatError(f"{file}: the definition of messages in it cannot be read: {first_line(error)}") from None
     return defined
 
 

@@ -16,8 +16,10 @@ __all__ = ["IMAGE", "grid", "is_empty", "leaves", "values"]
 IMAGE = "sensor_msgs/msg/Image"
 #: Messages that hold bytes, not numbers, and how they could be read.
 _BYTES = {
-    "sensor_msgs/msg/CompressedImage": "a compressed image; record it as sensor_msgs/Image with one channel",
-    "sensor_msgs/msg/PointCloud2": "a cloud of points; record its readings as an array or an image",
+    "sensor_msgs/msg/CompressedImage": "a compressed image, which taxel does not read; record it as "
+    "sensor_msgs/Image with one channel",
+    "sensor_msgs/msg/PointCloud2": "a cloud of points, which taxel does not read; record its readings as an "
+    "array or an image",
 }
 #: Types whose numbers are no readings: times, shapes, and bytes.
 _WITHOUT_READINGS = (
@@ -111,7 +113,7 @@ def _pixels(image: Any) -> NDArray[Any]:
     """Return an image's pixels, shape (rows, columns); none if its data are shorter than it says."""
     if image.encoding not in _PIXELS:
         raise FormatError(
-            f"images of encoding {image.encoding}; must have one channel and be one of {', '.join(_PIXELS)}"
+            f"the encoding of the images is {image.encoding}; must be one with a single channel: {', '.join(_PIXELS)}"
         )
     kind = np.dtype(_PIXELS[image.encoding]).newbyteorder(">" if image.is_bigendian else "<")
     width = image.width * kind.itemsize

@@ -162,7 +162,7 @@ class _Held:
         self.are_whole.append(numbers.dtype.kind in "ui")
         if numbers.dtype.kind == "f" and (np.abs(numbers) > VALUE).any():
             raise FormatError(
-                f"{self.location}, message {len(self.values)}: a value is infinite, or too large for 32 bits"
+                f"{self.location}, message {len(self.values)}: a value is infinite, or does not fit 32 bits"
             )
         self.values.append(_Shape(numbers.shape, numbers.size, numbers.ndim))
         self.numbers.add(numbers=numbers.reshape(-1))
@@ -176,22 +176,22 @@ class _Held:
         found = list(leaves(message))
         there = [path for path, numbers in found if numbers.size > 1]
         if len(there) > 1:
-            raise helped(FormatError(f"has several fields with numbers, {_there(message)}"), "field", "give")
+            raise helped(FormatError(f"has several fields with numbers: {_there(message)}"), "field", "give")
         if not there and not is_empty(found):
-            self.trouble = "no field with more numbers than one; taxel info lists topics that have one"
+            self.trouble = "no field has more than one number; to find topics with such a field, run taxel info"
         return there[0] if there else None
 
     def _numbers(self, message: Any, field: str) -> NDArray[Any]:
         try:
             return values(message, field)
         except LookupError:
-            self.trouble = f"no field with numbers; there are {_there(message)}"
+            self.trouble = f"the field has no numbers; fields with numbers: {_there(message)}"
             return np.empty(0)
 
     def read(self, kind: str, unread: tuple[str, ...]) -> Read:
         """Return the frames of the messages."""
         if not self.values:
-            raise FormatError(f"{self.location}: holds no message")
+            raise FormatError(f"{self.location}: contains no message")
         if self.trouble and not any(value.size for value in self.values):
             raise FormatError(f"{self.location}: {self.trouble}")
         array = sensor(self.location, self.array or self._stated())
@@ -200,7 +200,8 @@ class _Held:
             some = next((value for value in self.values if value.size), self.values[0])
             size = " x ".join(map(str, some.shape)) if some.ndim == 2 else f"{some.size}"
             raise FormatError(
-                f"{self.location}: its messages hold {size} values; the array has {array.rows} x {array.columns}"
+                f"{self.location}: the messages have {size} values each; the array has {array.rows} x "
+                f"{array.columns} taxels"
             )
         bag = np.array(self.bag_ns, np.int64)[fits]
         stamps = [stamp for stamp, fit in zip(self.stamps_ns, fits, strict=True) if fit]
@@ -210,7 +211,7 @@ class _Held:
         t, by_the_bag = _times(np.array(stamps, np.int64)[order], bag) if has_stamps else (bag, 0)
         if np.abs(t).max() // 1000 > TIME_US:
             raise FormatError(
-                f"{self.location}: a message at {t[np.abs(t).argmax()]} ns; must be within 142 years of 0"
+                f"{self.location}: a message has the time {t[np.abs(t).argmax()]} ns; must be within 142 years of 0"
             )
         return Read(
             self.topic,
@@ -244,7 +245,7 @@ class _Held:
         """Return the most frequent length: in rows and columns as most of its messages state them, else in one row."""
         lengths = Counter(value.shape for value in self.values if value.size)
         if not lengths:
-            raise FormatError(f"{self.location}: its messages hold no values")
+            raise FormatError(f"{self.location}: the messages contain no values")
         ((most, _),) = lengths.most_common(1)
         stated = Counter(g for value, g in zip(self.values, self.grids, strict=True) if g and value.shape == most)
         rows, columns = stated.most_common(1)[0][0] if stated else (1, most[0])
@@ -252,7 +253,7 @@ class _Held:
             return Array(rows, columns, name=self.topic)
         except ProblemError as error:
             raise FormatError(
-                f"{self.location}: its messages hold {math.prod(most)} values: {first_line(error)}"
+                f"{self.location}: the messages have {math.prod(most)} values each: {first_line(error)}"
             ) from None
 
 

@@ -152,7 +152,7 @@ class Health:
         untested = int(np.count_nonzero(self.untested))
         return (
             f"Health({counted(self.array.taxels, 'taxel')}: {counts}"
-            + f", {untested} not touched enough to say" * bool(untested)
+            + f", {untested} not touched enough to say whether they work" * bool(untested)
             + ")"
         )
 

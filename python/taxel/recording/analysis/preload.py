@@ -62,8 +62,8 @@ def standing(frames: Frames) -> str:
 
 def _line(recording: Recording, rest: Rest, *, found: bool) -> str:
     """Return the line on a tare beside a rest with something on the array, where a time without it was found or not."""
-    without = "so the tare is measured in a time without it"
-    lacks = "and there is no other rest, so the tare includes it; give a tare's file"
+    without = "so the tare is measured at a time when nothing was there"
+    lacks = "and no other rest was found, so the tare contains this load; give a file of a tare"
     return f"{recording.path}: the rest is {rest}, {without if found else lacks}"
 
 

@@ -120,12 +120,12 @@ class Rest:
             "tare": "the given tare",
             "calibration": "the calibration's",
             "unit": "0, because the values are force or pressure",
-            "none": "not known, because no half second was both quiet and without load; a tare can be given",
+            "none": "unknown, because no half second was quiet and without load; to set the rest, give a tare",
         }
         text = words.get(self.source, "")
         if self.quiet_us is not None:
             first, end = ((us - self.begin_us) / 1e6 for us in self.quiet_us)
-            text = f"that of a quiet stretch, {first:.3f} to {end:.3f} s, later following slow changes"
+            text = f"that of a quiet stretch, {first:.3f} to {end:.3f} s; later the rest follows slow changes"
             text += f"; something was on {self.preload_at} during this stretch" * bool(self.preload_at)
         if self.falls:
             text += f"; {self.fall(path, turned)}"
@@ -137,8 +137,8 @@ class Rest:
         layout, turning = Rest.turning(path, turned)
         if layout:
             return (
-                f"values fall from their rest after {layout} inverted them: if they need no inversion, remove the "
-                f"line falls from {layout}"
+                f"values fall from their rest after {layout} inverted them: if the values need no inversion, remove "
+                f"the line falls from {layout}"
             )
         return f"values fall from their rest: if smaller values mean more pressure, write {turning}"
 
@@ -154,8 +154,7 @@ class Rest:
                 return file.name, f"no falls in {file.name}"
         if turned is not None:
             return "its layout", "no falls in its layout"
-        named = "" if path is None else f" that is given as layout; without one, in {layout_name(path)} beside it"
-        return "", f"falls = true in {'the' if named else 'a'} layout file{named}"
+        return "", "falls = true in a layout file" + ("" if path is None else f", {or_given(path)}")
 
     def described(self) -> dict[str, object]:
         """Return source, quiet stretch, number of zeroed taxels and whether values fall, as JSON values."""

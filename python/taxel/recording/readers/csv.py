@@ -83,7 +83,7 @@ def _head(path: Path, file: BinaryIO) -> tuple[list[str], bytes]:
     """Return the names of the columns, and what separates the cells."""
     head = file.readline(_HEAD + 1)
     if len(head) > _HEAD:
-        raise FormatError(f"{path}, line 1: more than {_HEAD} bytes; at most {_HEAD} are read")
+        raise FormatError(f"{path}, line 1: the line has more than {_HEAD} bytes; must have at most {_HEAD}")
     return _names(path, head), _separator(head)
 
 
@@ -100,13 +100,13 @@ def _names(path: Path, head: bytes) -> list[str]:
     """Return the names of the columns in the first line."""
     columns = head.count(_separator(head)) + 1
     if columns > COLUMNS:
-        raise FormatError(f"{path}, line 1: {columns} columns; at most {COLUMNS} are read")
+        raise FormatError(f"{path}, line 1: {columns} columns; must have at most {COLUMNS}")
     names = names_in(head)
     if names[0] != "t_us" or len(names) < 2:
         begin = repr(_text_of(head)[:40].decode("utf-8", "replace"))
         raise FormatError(
             f"{path}, line 1: {begin}: must be t_us,x,y,p[,intensity][,repaired], or t_us and a column for each taxel; "
-            + advice(path, "describes a table of another program")
+            + advice(path, "describe a table of another program")
         )
     if tuple(names[:4]) == EVENTS:
         if names[4:] != [name for name in MORE if name in names[4:]]:
@@ -151,7 +151,7 @@ def _blocks(path: Path, file: BinaryIO, separator: bytes) -> Iterator[_Block]:
         block += (end := file.readline(LINE + 1))
         if len(end) > LINE:
             line = first + block.count(b"\n")
-            raise FormatError(f"{path}, line {line}: more than {LINE} bytes; at most {LINE} are read")
+            raise FormatError(f"{path}, line {line}: the line has more than {LINE} bytes; must have at most {LINE}")
         if separator != b",":
             block = block.replace(b",", b".").replace(separator, b",")
         yield first, block.replace(b"\r\n", b"\n")
@@ -199,10 +199,13 @@ def _places(path: Path, names: list[str], array: Array | None) -> tuple[list[tup
         return places, None
     if any(matches):
         odd = names[matches.index(None)]
-        raise FormatError(f"{path}, line 1: column {shown(odd)} among taxels: must be named like x3y5")
+        raise FormatError(f"{path}, line 1: column {shown(odd)} must be named like x3y5, as the other taxels are")
     rows, columns = (1, len(names)) if array is None else array.shape
     if rows * columns != len(names):
-        raise FormatError(f"{path}, line 1: {counted(len(names), 'column')} for an array of {rows} x {columns} taxels")
+        raise FormatError(
+            f"{path}, line 1: {counted(len(names), 'column')} for taxels; must have {rows * columns}, for "
+            f"{rows} x {columns} taxels"
+        )
     return [(k % columns, k // columns) for k in range(len(names))], names
 
 

@@ -75,7 +75,7 @@ def read_foreign(path: Path, layout: Layout, array: Array | None = None) -> Reco
         if layout.rows is not None and layout.columns is not None and taxels != layout.rows * layout.columns:
             hint = frames_hint(layout, taxels) if is_table else ""
             raise FormatError(
-                f"{path}: {read.size}; {layout.path} states {layout.rows} x {layout.columns} taxels{hint}"
+                f"{path}: contains {read.size}; {layout.path} states {layout.rows} x {layout.columns} taxels{hint}"
             )
         grid = Array(values.shape[1], values.shape[2], name=path.stem) if values.ndim == 3 else None
         # More channels than a sensor may have columns are a grid by the layout.
@@ -108,8 +108,10 @@ def _data(path: Path, how: Data) -> Readings:
         key = next((key for key in ("array", "time") if getattr(how, key) is not None), None)
         if key is not None:
             size = as_size(getattr(how, key))
-            right = f"a size is given by {size}" if size else "leave it out"
-            raise FormatError(f"{path}: one array without a name; the layout states [data] {key}: {right}")
+            right = f"to state a size, write {size}" if size else f"remove {key}"
+            raise FormatError(
+                f"{path}: the file has one array, without a name, but the layout states [data] {key}; {right}"
+            )
         arrays = {"": read_array(path, np.float32)}
         stored_names: list[str] = [""]
         wanted = stored_names
@@ -117,7 +119,9 @@ def _data(path: Path, how: Data) -> Readings:
         stored_shapes = shapes_of(path)
         stored_names = list(stored_shapes)
         if how.array is None and len(stored_names) != 1:
-            raise FormatError(f"{path}: holds {list_arrays(stored_shapes)}; name one in the layout file: [data] array")
+            raise FormatError(
+                f"{path}: contains {list_arrays(stored_shapes)}; name one array in the layout file: [data] array"
+            )
         # A path within a .h5 may begin at its root.
         named = [
             name if name in stored_shapes else name.strip("/") for name in (how.array, how.time) if name is not None
@@ -128,14 +132,17 @@ def _data(path: Path, how: Data) -> Readings:
             if (why := _left_out_of(path).get(missing)) is not None:
                 raise FormatError(f"{path}, {missing}: {why}")
             size = as_size(missing)
-            hint = f"; a size is given by {size}" if size else ""
-            raise FormatError(f"{path}: holds no array {missing}; there are {list_arrays(stored_shapes)}{hint}")
+            hint = f"; to state a size, write {size}" if size else ""
+            raise FormatError(f"{path}: contains no array {missing}; its arrays are {list_arrays(stored_shapes)}{hint}")
         along = -1 if how.frames == "last" else 0
         frames = math.prod(stored_shapes[wanted[0]][along : along + 1 or None])
         # MATLAB's times are a column or a row.
         if len(wanted) > 1 and [n for n in stored_shapes[wanted[1]] if n != 1] != [n for n in (frames,) if n != 1]:
             count = math.prod(stored_shapes[wanted[1]])
-            raise FormatError(f"{path}, {wanted[1]}: {counted(count, 'time')} for {counted(frames, 'frame')}")
+            raise FormatError(
+                f"{path}, {wanted[1]}: {counted(count, 'time')} for {counted(frames, 'frame')}; must be as many "
+                f"times as frames"
+            )
         arrays = arrays_of(path, wanted, frames=wanted[0])
     values = arrays[wanted[0]]
     if how.frames == "last" and values.ndim > 1:

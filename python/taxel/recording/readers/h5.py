@@ -57,8 +57,8 @@ def read_h5(path: Path, array: Array | None) -> RecordedSource:
         version = h5.attribute(MARK)
         if version is None:
             raise FormatError(
-                f"{path}: an HDF5 file without the attribute taxel, which taxel convert writes; taxel.open and "
-                f"taxel.formats.trials read files of other programs"
+                f"{path}: this HDF5 file was not written by taxel (it has no attribute taxel); to read files of other "
+                "programs, use taxel.open or taxel.formats.trials"
             )
         if version != VERSION:
             number = version if isinstance(version, int) else "not a whole number"

@@ -37,7 +37,7 @@ def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Board
     losses = Losses(
         known({"bytes": len(read.payload), "decoder": read.counts}),
         known(Verdict._of({"raw": [unmarked, read.damage]})),
-        ("times after a silence of more than 6.45 s are short by whole turns of 6.5536 s",),
+        ("after a silence of more than 6.45 s, times are too early by a multiple of 6.5536 s",),
         truncated=not read.complete,
     )
     events = known(Events._from_parts(read.events, array))

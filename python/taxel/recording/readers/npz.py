@@ -63,12 +63,12 @@ def _wrong_shape(name: str, shapes: Mapping[str, tuple[int, ...]]) -> str | None
         return "16 bytes" if math.prod(shape) > 16 else None
     if name == "markers":
         is_right = len(shape) == 2 and shape[0] <= MARKERS and shape[1] == 2
-        return None if is_right else f"a time and whether it is a start, of at most {MARKERS} markers"
+        return None if is_right else f"for each of at most {MARKERS} markers its time, and 1 if it is a start"
     if name == "held":
-        return f"a value for each taxel, at most {TAXELS}" if math.prod(shape) > TAXELS else None
+        return f"one value for each taxel, for at most {TAXELS} taxels" if math.prod(shape) > TAXELS else None
     if frames is not None:
         is_right = name == "values" or shape == frames[:1]
-        return None if is_right else f"a time for each of {counted(math.prod(frames[:1]), 'frame')}"
+        return None if is_right else f"one time for each of {counted(math.prod(frames[:1]), 'frame')}"
     is_right = len(shape) == 1 and shape == shapes.get("t", shape)
     return None if is_right else "one value for each event, as many as in t"
 
@@ -90,7 +90,7 @@ def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], a
     ProblemError : the given sensor has other rows or columns than the frames
     """
     if DIGEST in columns and not np.array_equal(columns[DIGEST], digest_of(columns)):
-        raise FormatError(f"{path}: damaged: its content is not what was written")
+        raise FormatError(f"{path}: the file is damaged: its content differs from what was written")
     values = columns.get("values")
     if values is not None and values.dtype.kind == "f" and values.flags.writeable:
         # A damaged file may hold signalling NaNs, of which each computation would warn.
@@ -118,7 +118,8 @@ def source_of_columns(path: Path, kind: str, columns: dict[str, NDArray[Any]], a
             if missing:
                 names = ", ".join(columns) or "nothing"
                 raise FormatError(
-                    f"{path}: holds {names}: {missing[0]} is missing; must be t, x, y, p (events) or values, t (frames)"
+                    f"{path}: {missing[0]} is missing; must contain t, x, y, p (events) or values, t (frames), "
+                    f"but contains {names}"
                 )
             t, x, y, p = (columns[name] for name in EVENTS)
             markers = [(int(at), bool(start)) for at, start in columns.get("markers", np.empty((0, 2)))]
@@ -161,7 +162,7 @@ def read_records(path: Path, array: Array | None) -> RecordedSource:
     """
     records = read_array(path)
     if records.ndim != 1:
-        raise FormatError(f"{path}: records of shape {records.shape}: must be one for each event")
+        raise FormatError(f"{path}: records has shape {records.shape}: must have one record for each event")
     names = records.dtype.fields or ()
     columns = {name: records[name].copy() for name in _OF_EVENTS if name in names}
     return source_of_columns(path, "records", columns, array)

@@ -65,7 +65,9 @@ class Topics:
         count = max(len(topics), len(fields), len(arrays))
         for name, times in (("topic", len(topics)), ("field", len(fields)), ("array", len(arrays))):
             if times not in (0, 1, count):
-                raise refused(name, f": given {times} times for {count} sources; must be given once, or once for each")
+                raise refused(
+                    name, f" is given {times} times for {count} sources; must be given once, or once for each source"
+                )
         topics = topics * count if len(topics) == 1 else topics
         every_field: Sequence[str | None] = fields * count if len(fields) == 1 else fields or [None] * count
         every_array: Sequence[Array | None] = arrays * count if len(arrays) == 1 else arrays or [None] * count
@@ -96,8 +98,8 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
     """
     if not topics.topic:
         error = FormatError(
-            f"{path}: a ROS bag: choose one of its topics, or write [ros] in a layout file; taxel info {path} lists "
-            f"the topics"
+            f"{path}: is a ROS bag; choose one of its topics, or write [ros] in a layout file; to list the topics, run "
+            f"taxel info {path}"
         )
         raise helped(error, "topic", "give")
     reads = read(path, topics.chosen(array), topics.folder, topics.ros)
@@ -114,7 +116,9 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
                     "times_by_the_bag": topic.by_the_bag,
                 }
             ),
-            remarks=() if topic.has_stamps else ("at the bag's times, because its messages have no header",),
+            remarks=()
+            if topic.has_stamps
+            else ("the times are those of the bag, because the messages have no header",),
             lost=known(
                 (*left_out, f"other topics of the bag: {', '.join(topic.unread)}") if topic.unread else left_out
             ),
@@ -138,7 +142,7 @@ def _names(path: Path, reads: Sequence[Read]) -> list[str]:
             raise ProblemError(
                 f"{path}: {also} is chosen twice"
                 if also == full_names[k]
-                else f"{path}: {also} and {full_names[k]} would both be the source {name}; open one at a time"
+                else f"{path}: {also} and {full_names[k]} would both have the name {name}; open one at a time"
             )
     return names
 
@@ -148,9 +152,10 @@ def _lines_of_losses(topic: Read) -> Iterator[str]:
     if topic.left_out:
         total = counted(topic.left_out + len(topic.t), "message")
         rows, columns = topic.array.shape
-        yield f"{topic.left_out} of {total} left out, because they do not hold {rows} x {columns} values"
+        yield f"{topic.left_out} of {total} are left out, because they do not have {rows} x {columns} values"
     if topic.by_the_bag:
         yield (
-            f"{topic.by_the_bag} of {counted(len(topic.t), 'message')} at the bag's time, because stamps are 0, do not "
-            "ascend, or are far from it"
+            f"{topic.by_the_bag} of {counted(len(topic.t), 'message')} have the time of the bag, because their "
+            f"stamps are "
+            "0, do not ascend, or are far from that time"
         )

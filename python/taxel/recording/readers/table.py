@@ -85,12 +85,12 @@ class _Head:
         skipped, lines = _beginning(path, how)
         if not lines:
             raise FormatError(
-                f"{path.name}, line {how.skip_lines + 1}: no line after the {how.skip_lines} skipped lines"
+                f"{path.name}, line {how.skip_lines + 1}: no line follows the {how.skip_lines} skipped lines"
             )
         (first, text_of_first), *_ = lines
         names = cells(text_of_first, how.separator)
         if len(names) > COLUMNS:
-            raise FormatError(f"{path.name}, line {first}: {len(names)} columns; at most {COLUMNS} are read")
+            raise FormatError(f"{path.name}, line {first}: {len(names)} columns; must have at most {COLUMNS}")
         separator = next((mark for mark in ",;\t " if all(mark in line.strip() for _, line in lines[:2])), None)
         is_decimal = separator == how.decimal
         if len(names) == 1 and separator is not None and not is_decimal:
@@ -116,21 +116,25 @@ class _Head:
             names = names[: len(cells(begin.rstrip(" ").removesuffix(how.separator), how.separator))]
         if how.columns and len(how.columns) != len(names):
             stated = counted(len(how.columns), "name")
-            raise FormatError(f"{path.name}, line {first}: {counted(len(names), 'column')}; the layout has {stated}")
+            raise FormatError(
+                f"{path.name}, line {first}: {counted(len(names), 'column')}, but the layout states {stated}"
+            )
         names = list(how.columns) or (names if named else [f"column {k}" for k in range(1, len(names) + 1)])
         is_named = named or bool(how.columns)
         time = None if how.time_column is None else _column(path, "time_column", how.time_column, names, is_named)
         left = {_column(path, "leave_out", column, names, is_named) for column in how.leave_out}
         if time in left:
-            raise FormatError(f"{path.name}: column {shown(names[time or 0])} is the time_column, and is left out")
+            raise FormatError(
+                f"{path.name}: column {shown(names[time or 0])} is the time_column, but is also in leave_out; "
+                f"remove it from one of them"
+            )
         times = times_of([name if k not in left else "" for k, name in enumerate(names)])
         if time is None and times:
             name, at = names[times[0]], lines[0][0]
             raise FormatError(
-                f"{path.name}, line {at}: column {shown(name)} holds times, as its name shows; write in the layout "
-                f"file: [table] "
-                f"time_column = {json.dumps(name, ensure_ascii=False)}, and time_unit if not s; or, if it is a taxel, "
-                f"skip the names: skip_lines = {first - 1}"
+                f"{path.name}, line {at}: column {shown(name)} contains times, as its name shows; write in the layout "
+                f"file: [table] time_column = {json.dumps(name, ensure_ascii=False)}, and time_unit if the unit is not "
+                f"s; or, if the column is a taxel, skip the names: skip_lines = {first - 1}"
             )
         return cls(path, how, first, above, names, is_named, left, all_end)
 
@@ -223,7 +227,7 @@ def read_events(path: Path, layout: Layout, array: Array | None) -> RecordedSour
     head = _Head.read(path, how, None)
     columns = [name for k, name in enumerate(head.kept) if k != head.time]
     if sorted(columns) != ["p", "x", "y"]:
-        raise FormatError(f"{path}: columns {', '.join(columns)} beside the time; events must have x, y, p")
+        raise FormatError(f"{path}: the columns beside the time are {', '.join(columns)}; must be x, y, p for events")
     read = Growing(str(path), t=((), np.int64), x=((), np.uint16), y=((), np.uint16), p=((), np.bool_))
     last = -(1 << 62)
     for line, block in text.blocks(head.rows(), path, head.first, head.kept, frozenset()):
@@ -242,7 +246,7 @@ def read_events(path: Path, layout: Layout, array: Array | None) -> RecordedSour
             at = int(back[0])
             before = in_s(last if at == 0 else t[at - 1])
             raise FormatError(
-                f"{path.name}, line {line + at}: time {in_s(t[at])} s is before that of the line above, {before} s"
+                f"{path.name}, line {line + at}: time {in_s(t[at])} s is before {before} s, the time of the line above"
             )
         last = int(t[-1])
         read.add(t=t, x=by_name["x"], y=by_name["y"], p=by_name["p"] > 0)
@@ -272,8 +276,8 @@ def _lines_of_frame(head: _Head, rows: int, needed: int | None) -> int:
         wrong = next((row for row in ends if row % how.frame_lines), None)
         if wrong is not None:
             raise FormatError(
-                f"{head.path.name}, line {head.line(wrong - 1) + 1}: an empty line after "
-                f"{counted(wrong % how.frame_lines, 'line')} of a frame; frame_lines is {how.frame_lines}"
+                f"{head.path.name}, line {head.line(wrong - 1) + 1}: an empty line follows "
+                f"{counted(wrong % how.frame_lines, 'line')} of a frame, but frame_lines is {how.frame_lines}"
             )
         return how.frame_lines
     lines = ends[0] if ends else max(rows, 1)
@@ -282,13 +286,13 @@ def _lines_of_frame(head: _Head, rows: int, needed: int | None) -> int:
     for begin, end in pairwise(starts):
         if end - begin != (needed or lines):
             raise FormatError(
-                f"{head.path.name}, line {head.line(begin)}: a frame of {counted(end - begin, 'line')}; must be "
-                f"{needed or lines}" + " as of the first frame" * (needed is None)
+                f"{head.path.name}, line {head.line(begin)}: the frame has {counted(end - begin, 'line')}; must "
+                f"have {needed or lines}" + ", like the first frame" * (needed is None)
             )
     if rows - starts[-1] > (needed or lines):
         raise FormatError(
-            f"{head.path.name}, line {head.line(starts[-1])}: a frame of {counted(rows - starts[-1], 'line')}; must be "
-            f"{needed or lines}"
+            f"{head.path.name}, line {head.line(starts[-1])}: the frame has {counted(rows - starts[-1], 'line')}; "
+            f"must have {needed or lines}"
         )
     return needed or lines
 
@@ -316,8 +320,8 @@ def _refuse_skipped(path: Path, how: Table, skipped: tuple[int, str] | None, col
     texts = cells(line, how.separator)
     if len(texts) == columns and how.time_column <= columns and not math.isnan(seconds_of(texts[how.time_column - 1])):
         raise FormatError(
-            f"{path.name}, line {number}: a frame of {shown(texts[how.time_column - 1])}, which the layout skips: "
-            f"skip_lines is {how.skip_lines}, must be at most {number - 1}"
+            f"{path.name}, line {number}: the layout skips the frame at {shown(texts[how.time_column - 1])}: "
+            f"skip_lines is {how.skip_lines}; must be at most {number - 1}"
         )
 
 
@@ -391,7 +395,7 @@ def _with_points(texts: list[str], time: int | None, names: Sequence[str], path:
 def _without(row: list[str], left: Collection[int], columns: int, path: Path, line: int) -> list[str]:
     """Return the cells of a line but those of columns that are left out."""
     if len(row) != columns:
-        raise FormatError(f"{path.name}, line {line}: {len(row)} cells, must have {columns}")
+        raise FormatError(f"{path.name}, line {line}: {len(row)} cells; must have {columns}")
     return [cell for k, cell in enumerate(row) if k not in left]
 
 
@@ -408,16 +412,16 @@ def _column(path: Path, key: str, column: str | int, names: Sequence[str], named
     """Return the place of a column that a layout names."""
     if isinstance(column, int):
         if column > len(names):
-            raise FormatError(f"{path.name}: {counted(len(names), 'column')}; {key} is {column}")
+            raise FormatError(f"{path.name}: {key} is {column}, but the table has {counted(len(names), 'column')}")
         return column - 1
     # Quotes are no part of a name.
     name = column.strip("\"'")
     if name not in names:
         known_names = (
-            ", ".join(map(short, names[:8])) + " ..." * (len(names) > 8)
+            f"the columns are {', '.join(map(short, names[:8]))}" + " ..." * (len(names) > 8)
             if named
-            else "no names, so give its number, counted from 1"
+            else "the columns have no names, so give the number of the column, counted from 1"
         )
         kind = " of times" if key == "time_column" else ""
-        raise FormatError(f"{path.name}: no column {shown(name)}{kind}; there are {known_names}")
+        raise FormatError(f"{path.name}: the table has no column {shown(name)}{kind}; {known_names}")
     return names.index(name)

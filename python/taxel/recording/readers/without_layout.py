@@ -73,8 +73,10 @@ _RATE = re.compile(
 )
 _UNITS = re.compile(r"(?i:(?:[a-z]+[ _-])?units?)")
 _FACTS = re.compile(f"{_RATE.pattern}|{_UNITS.pattern}")
-_NO_RATE = "# rate_hz = 100  # frames per second: the file does not state it, and without it frames are numbered"
-_NO_UNIT = '# unit = "kPa"  # of the readings: the file does not state it, and without it they are counts'
+_NO_RATE = "# rate_hz = 100  # frames per second, which the file does not state; without it, frames have no times"
+_NO_UNIT = (
+    '# unit = "kPa"  # of the readings, which the file does not state; without this line, the readings are counts'
+)
 #: Names of the columns of events in the orders that programs write without names.
 _EVENTS = (("x", "y", "p", "t"), ("t", "x", "y", "p"))
 _EVENT_NAMES: dict[str, Callable[[str], bool]] = {
@@ -103,21 +105,21 @@ def refuse_without_layout(path: Path) -> None:
         # Compressed texts are several times larger.
         size = path.stat().st_size * (4 if path.suffix.lower() == ".gz" else 1)
         holds, lines = _of_table(found, max(1.0, size / sum(len(line) + 1 for line in lines)), begin)
-        says = "describes how to read it"
+        says = "describe it"
     else:
         shapes = shapes_of(path)
         name = next((name for name, shape in shapes.items() if len(shape) in (2, 3)), None)
         if name is None:
             raise FormatError(
-                f"{path}: holds {list_arrays(shapes)}; must be either arrays t, x, y, p (events), or arrays values, t "
-                "(frames); with a layout file also one array of frames x rows x columns or frames x taxels "
+                f"{path}: contains {list_arrays(shapes)}; must contain arrays t, x, y, p (events), or arrays values, t "
+                "(frames), or, with a layout file, one array of frames x rows x columns or frames x taxels "
                 "(docs/files.md)"
-                + "; of a struct, save the fields: save('FILE.mat', '-struct', 'NAME')"
+                + "; if the data are in a struct, save its fields: save('FILE.mat', '-struct', 'NAME')"
                 * path.name.endswith(".mat")
             )
         holds, lines = list_arrays(shapes), _of_arrays(path, name, shapes)
-        says = "names the array of frames" if len(shapes) > 1 else "or rate_hz, describes it"
-    raise FormatError(f"{path}: holds {holds}, not written by taxel; {advice(path, says)}:", "\n".join(lines))
+        says = "name the array of frames" if len(shapes) > 1 else "give rate_hz, or describe it"
+    raise FormatError(f"{path}: contains {holds}, not written by taxel; {advice(path, says)}:", "\n".join(lines))
 
 
 def _beginning(path: Path) -> list[str]:
@@ -303,7 +305,7 @@ class _TextTable:
             return [*lines, f"time_unit = {_quote(ISO)}"]
         name = self.names[column] if self.names else ""
         if unit_of(name) is None and not self._is_unit_of_time(column):
-            lines = [f"{lines[0]}  # it ascends; leave this out if it is a taxel"]
+            lines = [f"{lines[0]}  # this column ascends; if it is a taxel, remove this line"]
         unit = f"{name} {self.units[column].strip('[]()')}" if self.units else name
         times = self.numbers(column)
         times = times[:: self.lines_of(times)]
@@ -359,9 +361,9 @@ class _TextTable:
         """Return the comment on columns that are left out, if one of them holds times; else ""."""
         for column in left:
             if np.isfinite([seconds_of(row[column]) for row in self.body]).all():
-                return f"  # {self.called(column)} holds times, which do not ascend"
+                return f"  # {self.called(column)} contains times that do not ascend"
         named = [column for column in times_of(self.names) if column in left]
-        return f"  # {self.called(named[0])} holds times in a form that taxel does not read" if named else ""
+        return f"  # {self.called(named[0])} contains times in a form that taxel does not read" if named else ""
 
     def _in_brackets(self, column: int) -> str:
         within = _IN_BRACKETS.search(self.names[column]) if self.names else None
@@ -498,12 +500,14 @@ def _of_events(found: _TextTable, order: Sequence[str]) -> tuple[str, list[str]]
         *skipped.form(),
         f"columns = [{', '.join(map(_quote, columns))}]",
         'time_column = "t"',
-        f"time_unit = {_quote(unit)}" + "  # if it is not another unit" * (not unit_of(name)),
+        f"time_unit = {_quote(unit)}" + "  # if the unit is another, change it here" * (not unit_of(name)),
         *([f"leave_out = [{', '.join(map(str, left))}]"] if left else []),
         "events = true",
     ]
     x, y = (int(found.numbers(order.index(axis)).max()) + 1 for axis in "xy")
-    size = f"# rows = {y} and columns = {x} at least, or those of the sensor: the file does not state them"
+    size = (
+        f"# write the rows and columns of the sensor (at least rows = {y}, columns = {x}): the file does not state them"
+    )
     return f"a table of events ({', '.join(filter(None, order))})", [size, "[table]", *table]
 
 
@@ -537,9 +541,9 @@ def _size(taxels: int, names: Sequence[str]) -> list[str]:
     columns = taxels // rows
     is_grid = rows == columns if taxels < _LARGE else columns <= _FLATTEST * rows
     if words or not is_grid or taxels < (_NAMED_GRID if any(names) else _GRID):
-        note = "" if words or taxels < 2 else "  # for a grid, row by row: write its rows and columns"
+        note = "" if words or taxels < 2 else "  # if the taxels are a grid, row by row, write its rows and columns"
         return ["rows = 1", f"columns = {taxels}{note}"]
-    guess = f"  # a guess from {taxels} taxels: for another grid, or a row, write its rows and columns"
+    guess = f"  # a guess from {taxels} taxels: if the grid is another, or a row, write its rows and columns"
     return [f"rows = {rows}{guess}", f"columns = {columns}"]
 
 

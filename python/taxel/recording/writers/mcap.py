@@ -229,8 +229,8 @@ def encode_events(
     try:
         encoded = _core.encode_datagrams(events._parts(), begins, clock is not None)
     except ProblemError as error:
-        smaller = "region and bin of an event camera's file make fewer taxels"
-        raise ProblemError(f"{first_line(error)}; .npz, .h5 and .csv hold such events; {smaller}") from None
+        smaller = "to make fewer taxels of an event camera's file, use region and bin"
+        raise ProblemError(f"{first_line(error)}; write such events to a .npz, .h5 or .csv; {smaller}") from None
     at = (
         encoded.times * 1000
         if clock is None or not len(encoded.times)

@@ -27,7 +27,7 @@ def columns_of(source: RecordedSource) -> dict[str, NDArray[Any]]:
     if isinstance(table, Frames):
         if (count := len(table.unit)) > UNIT:
             raise ProblemError(
-                f"{source.origin.name}: a unit of {count} characters; a .npz and a .h5 hold at most {UNIT}"
+                f"{source.origin.name}: the unit has {count} characters; must have at most {UNIT} in a .npz or .h5"
             )
         columns = {"values": table.values, "t": table.t, "unit": np.array(table.unit)}
     else:
@@ -38,7 +38,7 @@ def columns_of(source: RecordedSource) -> dict[str, NDArray[Any]]:
             columns["repaired"] = table.repaired
         if len(table.markers) > MARKERS:
             raise ProblemError(
-                f"{source.origin.name}: {len(table.markers)} markers; a .npz and a .h5 hold at most {MARKERS}"
+                f"{source.origin.name}: {len(table.markers)} markers; must be at most {MARKERS} in a .npz or .h5"
             )
         columns["markers"] = np.array(table.markers, np.int64).reshape(-1, 2)
     if (held := source.settings.held()) is not None:

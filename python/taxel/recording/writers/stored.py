@@ -86,7 +86,7 @@ def _storable(source: RecordedSource, ending: str, path: Path) -> RecordedSource
     )
     alone = source.sensor.calibration.holds() and not beside.holds()
     return with_losses(
-        stored, lambda: [*lines, *["the calibration, a separate file: put a copy beside the new file"] * alone]
+        stored, lambda: [*lines, *["the calibration, which is a separate file: put a copy beside the new file"] * alone]
     )
 
 
@@ -152,7 +152,7 @@ def _csv(source: RecordedSource, path: Path) -> _Kept:
     if is_turned and beside is not None and Layout.read(beside).turned is not None:
         raise ProblemError(
             f"{path}: the readings were inverted already, which a .csv cannot state, and {beside} beside it would "
-            "invert them again; write it to another folder, or as a .npz, .h5 or .mcap"
+            "invert them again; write the recording to another folder, or as a .npz, .h5 or .mcap"
         )
     original, stated = source.table, source.sensor.array
     array = array_in_csv(original)
@@ -272,6 +272,6 @@ def _wire(board: BoardSource, clock: Clock | None, lost: list[str]) -> sections.
 def _board(source: RecordedSource, path: Path) -> BoardSource:
     if not isinstance(source, BoardSource):
         raise ProblemError(
-            f"{path}: a {path.suffix.lower()} holds events and no frames; write those to .mcap, .npz, .csv or .h5"
+            f"{path}: a {path.suffix.lower()} contains events and no frames; write frames to .mcap, .npz, .csv or .h5"
         )
     return source
