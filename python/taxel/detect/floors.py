@@ -15,7 +15,7 @@ from taxel.tare import Tare
 
 #: At least this share of the range above rest: taxels without noise drift and creep.
 _SHARE_OF_RANGE = 0.01
-#: That of channels with one kind of touch, which is unlike no other: a drift of several times a small noise is no touch.
+#: The same with one kind of touch, where any load is one: so a drift of several times a small noise is none.
 _SHARE_OF_ONE_KIND = 0.03
 #: The third quartile of normal noise is so many standard deviations above its median.
 _THIRD_QUARTILE = 0.6745
@@ -69,7 +69,8 @@ def floor_alone(examples: Sequence[Example], floor: float, *, kinds: int) -> flo
     floor : float, in the sensor's unit
         As of `measured_floor`, or stated.
     kinds : int
-        How many kinds of touch there are; of one, the floor is three hundredths of the largest value above rest at least.
+        How many kinds of touch there are. With one, the floor is at least three hundredths of the largest value
+        above rest.
     """
     noises, floors = [], [floor]
     for example in examples:

@@ -176,7 +176,7 @@ def of_other_sources(
 
 
 def _opened(path: Path, recordings: Sequence[Recording]) -> Labels:
-    """Open a table of labels; on grids of no side, such as plates, which have both feet, sides are no sources."""
+    """Open a table of labels; on grids of no side, such as plates, which have both feet, sides do not name sources."""
     table = Labels(path)
     sides = {row.source for row in table.rows} - {""}
     files = {(recording.path, trial_name(recording)) for recording in recordings}

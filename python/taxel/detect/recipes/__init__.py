@@ -118,7 +118,7 @@ def chosen(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool =
     known, steps = False, None
     if array.taxels < 2 or not array._has_neighbours:
         sensor = counted(array.taxels, "channel" if array.is_channels else "taxel")
-        # A contact without its lift may be that of a step, and so may one label that no recipe knows, in a unit of steps.
+        # A contact without its lift may be that of a step, and so may one unknown label, in a unit of steps.
         kinds = {_listed(recipes[grids], label) for label in labels} if grids is not None else set()
         ends = [] if grids is None else [_own(recipes[grids], label) for label in labels]
         if "lift" in kinds and None not in kinds:

@@ -17,7 +17,7 @@ from taxel import _core
 from taxel._base.times import beginning_us
 from taxel._core import FormatError
 from taxel.formats.event_camera import are_counts
-from taxel.formats.layout import Layout, layout_name
+from taxel.formats.layout import Layout, or_given
 from taxel.frames import Frames
 from taxel.tare import Tare
 
