@@ -224,7 +224,7 @@ def test_in_any_chain_of_steps_frames_and_what_is_beside_them_stay_or_are_said_t
                 x, y = (slice(*sorted(draw.choice(n + 1, 2, replace=False).tolist())) for n in (columns, rows))
                 where = f"{where}; cut {x} {y}"
                 if several and m.cropped(x, y) is not m:
-                    with pytest.raises(taxel.ProblemError, match="holds 2 sources"):
+                    with pytest.raises(taxel.ProblemError, match="contains 2 sources"):
                         taxel.cut(recording, columns=x, rows=y)
                     continue
                 [recording] = taxel.cut(recording, columns=x, rows=y)
@@ -236,7 +236,7 @@ def test_in_any_chain_of_steps_frames_and_what_is_beside_them_stay_or_are_said_t
                     f"{where}; merge at {at}",
                 )
                 if several:
-                    with pytest.raises(taxel.ProblemError, match="holds 2 sources"):
+                    with pytest.raises(taxel.ProblemError, match="contains 2 sources"):
                         taxel.merge(parts)
                     continue
                 models = {"board": m.merged(at, recording.name)}
@@ -271,7 +271,7 @@ def test_in_any_chain_of_steps_frames_and_what_is_beside_them_stay_or_are_said_t
             case kind:
                 file, where = tmp_path / f"{k}{kind}", f"{where}; to {kind}"
                 if several and kind != ".mcap":
-                    with pytest.raises(taxel.ProblemError, match="holds 2 sources"):
+                    with pytest.raises(taxel.ProblemError, match="contains 2 sources"):
                         taxel.convert(recording, file)
                     continue
                 whose = {"the clock of the times"} if recording.is_on_clock else set()

@@ -450,7 +450,7 @@ def test_what_taxel_would_not_read_again_it_does_not_write(tmp_path: Path) -> No
                 taxel.Events([0, 1, 2], few, few, few.astype(bool), array=taxel.Array(4, 4), markers=markers),
                 tmp_path / name,
             )
-        with refused("a unit of 257 characters"):
+        with refused("the unit has 257 characters"):
             taxel.convert(taxel.Frames(np.zeros((1, 2, 2)), [0], unit="N" * 257), tmp_path / name)
         assert not (tmp_path / name).exists()
         most = taxel.Events([0, 1, 2], few, few, few.astype(bool), array=taxel.Array(4, 4), markers=markers[1:])

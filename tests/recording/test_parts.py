@@ -212,7 +212,7 @@ def test_merge_refuses_what_does_not_go_together(tmp_path: Path) -> None:
     events, frames = opened(some_events(20), tmp_path), opened(some_frames(), tmp_path, "f.npz")
     small = opened(taxel.Events([0], [0], [0], [True], array=taxel.Array(2, 2)), tmp_path, "s.npz")
     for parts, said in (
-        ([events, frames], "holds events, .* frames; convert one of them"),
+        ([events, frames], "contains events, .* contains frames; convert one of them"),
         ([], "one or more"),
         ([events, small], "different"),
     ):
