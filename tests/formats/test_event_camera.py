@@ -361,7 +361,7 @@ def test_what_is_no_file_of_a_camera_names_those(name: str, begins: bytes, said:
 
 def test_too_many_frames_name_a_larger_window(tmp_path: Path) -> None:
     with refused(
-        r"frames of 48 x 64 taxels \(to make fewer, use --region, a larger --bin, or a larger window", FormatError
+        r"frames of 48 x 64 taxels \(for fewer frames, use --region, a larger --bin or a larger --count-ms", FormatError
     ):
         taxel.open(write(tmp_path / "a.raw", some_rows()), window_ms=0.001, limit=10_000)
 

@@ -108,7 +108,7 @@ def test_ctrl_c_ends_the_command_soon_with_the_bits_so_far(tmp_path: Path) -> No
     assert float(ended.stdout) < SOON_S
     line = ended.stderr.splitlines()[-1]
     assert line.startswith(
-        "stopped after 1 to 2 of 3 draws; bits so far, without intervals: period 1 ms: 1.00 within 10 ms, 1.00 within "
+        "stopped after 1 to 2 of 3 draws; bits so far, without confidence intervals: period 1 ms: 1.00 within 10 ms, 1.00 within "
         "60 ms; "
     )
     assert re.fullmatch(r".*; period 10 ms: 0\.\d\d within 10 ms, 0\.\d\d within 60 ms", line)
@@ -118,7 +118,7 @@ def test_ctrl_c_ends_the_command_soon_with_the_bits_so_far(tmp_path: Path) -> No
 def test_ctrl_c_says_the_same_beside_json(tmp_path: Path) -> None:
     ended = stopped(tmp_path, after=1, more=["--json"])
     assert ended.returncode == 130
-    expected = "stopped after 1 of 3 draws; bits so far, without intervals: period 1 ms: 1.00 within 10 ms"
+    expected = "stopped after 1 of 3 draws; bits so far, without confidence intervals: period 1 ms: 1.00 within 10 ms"
     assert ended.stderr.splitlines() == [expected]
 
 

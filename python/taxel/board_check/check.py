@@ -109,7 +109,7 @@ class _Check:
             why = (
                 "a frame does not last as long as the registers say"
                 if device is not None
-                else "the board does not make the pattern, or its registers match no preset: "
+                else "the board does not send the test pattern, or its registers match no preset: "
                 "give its serial port, for example taxel device check /dev/ttyACM0"
             )
             self.tell("values", False, f"only {share:.0%} of the values fit the pattern: {why}")

@@ -36,7 +36,7 @@ _ROWS = 40
 @app.command()
 def detect(
     recordings: Annotated[list[Path], typer.Argument(help=f"Recordings: {READ_HELP}, or folders of them.")],
-    readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote, or a plain rule.")],
+    readout: Annotated[Path, typer.Option(help="A file that taxel train wrote: a readout or a plain rule.")],
     files: FileOptions,
     tare: Annotated[str | None, tare_option("Default: 0 for force and pressure, else the first quiet stretch.")] = None,
     frame_us: Annotated[

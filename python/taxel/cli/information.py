@@ -71,7 +71,7 @@ def information(
         ),
     ] = "neighbours",
     draws: Annotated[
-        int, typer.Option(help="Number of random phases of the sampling; the results are their means.")
+        int, typer.Option(help="Number of random phases of the sampling; the results are means over these phases.")
     ] = 5,
     folds: Annotated[int, typer.Option(help="Number of folds; all trials of a group are in the same fold.")] = 10,
     shuffles: Annotated[int, typer.Option(help="Number of shuffles of the labels, for the test against zero.")] = 20,
@@ -158,7 +158,7 @@ class _KnownBits:
             + ", ".join(f"{bits:.2f} within {window:g} ms" for window, (bits, _) in by_window.items())
             for period, by_window in self._bits.items()
         )
-        return f"stopped after {done} of {counted(draws, 'draw')}; bits so far, without intervals: {by_period}"
+        return f"stopped after {done} of {counted(draws, 'draw')}; bits so far, without confidence intervals: {by_period}"
 
 
 def lines(answer: Answer) -> list[str]:

@@ -84,7 +84,7 @@ def from_json(saved: dict[str, Any]) -> Acknowledged:
 
 
 def not_saved(path: Path, error: Exception) -> FormatError:
-    reason = f"damaged, so the labels that taxel acknowledged are not known ({error})"
+    reason = f"damaged, so taxel does not know which labels it had confirmed ({error})"
     return FormatError(f"{state_path(path)}: {reason}; delete this file to continue without them")
 
 

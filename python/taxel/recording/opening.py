@@ -102,7 +102,7 @@ class OpenOptions(SharedOptions):
 def _no_camera(path: Path) -> ProblemError:
     return ProblemError(
         f"{path}: region, bin, window_ms and polarity are only for events without intensities, for example of an event "
-        "camera; this file has none"
+        "camera; this file has no such events"
     )
 
 

@@ -279,8 +279,8 @@ def _check(held: Any) -> dict[str, Any]:
             )
     if STATUSES.index(values["status"]) < STATUSES.index("damaged") and values.get(doubtful) is not None:
         raise ProblemError(
-            f"verdict: its status is {values['status']}, but its times are doubtful: the status must be "
-            "'damaged' or worse"
+            f"verdict: status is {values['status']}; must be 'damaged' or worse, because the times of the "
+            "recording are doubtful"
         )
     stated = {str(name): _check(part) for name, part in parts.items()}
     for name, part in stated.items():

@@ -41,7 +41,7 @@ class CountWindows:
         self._begin = first // self._window_us
         count = last // self._window_us - self._begin + 1
         size = f"{count} frames of {array.rows} x {array.columns} taxels"
-        fewer = "to make fewer, use --region, a larger --bin, or a larger window, --count-ms (window_ms in Python)"
+        fewer = "for fewer frames, use --region, a larger --bin or a larger --count-ms (in Python: window_ms)"
         unpacked(f"{name}, {size} ({fewer})", count * (4 * array.rows * array.columns + 8))
         self._values = np.zeros((count, *array.shape), np.float32)
 

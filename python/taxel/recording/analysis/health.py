@@ -281,7 +281,7 @@ class Touches(NamedTuple):
     taxels: NDArray[np.uint32]
     """Their indices."""
     touches: NDArray[np.uint32]
-    """Number of touches of its place, as its neighbours show them."""
+    """Number of touches at the taxel's place, counted from its neighbours."""
     missed: NDArray[np.uint32]
     """Number of these touches in which the taxel did not change."""
     pressed: NDArray[np.uint32]
@@ -303,7 +303,7 @@ class TaxelStatistics(NamedTuple):
     activity: NDArray[np.int64]
     """Number of events."""
     moved: NDArray[np.int64]
-    """Number of events with the polarity of the taxel's event before."""
+    """Number of events that have the same polarity as the taxel's previous event."""
     touches: Touches
     values: NDArray[np.signedinteger] | None = None
     """Number of different intensities of its events: 0, 1, or 2 for more; None if events have none."""

@@ -210,7 +210,7 @@ def _mcap(source: RecordedSource, path: Path) -> _Kept:
     if samples is not None:
         bad = source.losses.counts().get("lines_that_could_not_be_read", 0)
         lines += [f"{bad} lines that could not be read"] * bool(bad)
-        lines += ["arrival times of lines outside the part"] * (
+        lines += ["arrival times of lines that are not in this part of the recording"] * (
             clock is not None and len(clock.board_us) > len(samples)
         )
     elif isinstance(source, FrameSource):
