@@ -93,7 +93,7 @@ class _EmulateArguments:
         typer.Option(
             min=0,
             max=65_535,
-            help="Version 2 of the wire: the number of the first session. Default: random, as at each reset of a board.",
+            help="Version 2 of the wire: the number of the first session. Default: random.",
         ),
     ] = None
     hold: Annotated[float, _in_ms("hold_us")] = to_ms(Version2.hold_us)

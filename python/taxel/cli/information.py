@@ -158,7 +158,9 @@ class _KnownBits:
             + ", ".join(f"{bits:.2f} within {window:g} ms" for window, (bits, _) in by_window.items())
             for period, by_window in self._bits.items()
         )
-        return f"stopped after {done} of {counted(draws, 'draw')}; bits so far, without confidence intervals: {by_period}"
+        return (
+            f"stopped after {done} of {counted(draws, 'draw')}; bits so far, without confidence intervals: {by_period}"
+        )
 
 
 def lines(answer: Answer) -> list[str]:

@@ -313,7 +313,9 @@ def _save(file: _File, saved: dict[str, Any]) -> None:
     }
     text = json.dumps({**about, **saved}, ensure_ascii=False).encode()
     if len(text) > MOST_SAVED:
-        raise ProblemError(f"{file.path}: too many labels: the file beside the table, with what taxel confirmed, may have at most {MOST_SAVED} bytes")
+        raise ProblemError(
+            f"{file.path}: too many labels: the file with their confirmed state would have more than {MOST_SAVED} bytes"
+        )
     state = state_path(file.path)
     with _new_file(state, _about(file), text) as name:
         os.replace(name, state)

@@ -78,7 +78,8 @@ def film(
     times = np.arange(begin, int(events.t[-1]) + period_us, period_us)
     if len(times) > _MOST:
         raise ProblemError(
-            f"{len(times)} frames; must be at most {_MOST}: choose a value of slower below {slower * _MOST / len(times):.3g}"
+            f"{len(times)} frames; must be at most {_MOST}: choose a value of slower below "
+            f"{slower * _MOST / len(times):.3g}"
         )
     over = above_rest_at(events, times.astype(np.int64))
 

@@ -301,7 +301,8 @@ def zero_by_unit(recording: Recording) -> Tare | None:
         )
         if where:
             reads = (
-                f"an object is on the sensor from beginning to end, at {where}; if nothing else touches the sensor in {stretch}"
+                f"an object is on the sensor from beginning to end, at {where}; if nothing else touches the sensor in "
+                f"{stretch}"
             )
         warn(f"{recording.path}: {reads}, {option}", stacklevel=3)
     return zero
