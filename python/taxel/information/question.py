@@ -105,7 +105,7 @@ class Question:
         if np.isfinite(reach) and (lengths < self.window_us).any():
             short = int((lengths < self.window_us).sum())
             self.notes.append(
-                f"trials shorter than {to_ms(self.window_us):g} ms: {short}; late events may show the length of these trials"
+                f"trials shorter than {to_ms(self.window_us):g} ms: {short}; late events may show their length"
             )
 
     def set_out(
