@@ -977,7 +977,7 @@ mod tests {
         let line = |k: usize| format!("{k},2,palm_link,0.5,1\n");
         let lines: String = (0..40).map(line).collect();
         let error = opened("text", &lines, "array=1x2,time=1+2,rate=75", FirstLineWait::default()).unwrap_err();
-        let said = "40 lines came within 3 s, all with a text in column 3 (\"palm_link\"): add leave_out=3";
+        let said = "40 lines arrived within 3 s, all with a text in column 3 (\"palm_link\"): add leave_out=3";
         assert!(error.to_string().contains(said), "{error}");
         for (texts, leave_out, fields, said) in [
             (
