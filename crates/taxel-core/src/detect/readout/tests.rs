@@ -88,7 +88,10 @@ fn a_readout_refuses_neurons_that_were_trained_otherwise() {
     let mut other = readout();
     other.neurons.get_mut("lift").unwrap().neuron.after_spike = AfterSpike::Reset;
     let message = other.check().unwrap_err().to_string();
-    assert_eq!(message, "lift: the neuron was trained for after_spike \"reset\", but this readout is for after_spike \"keep\"");
+    assert_eq!(
+        message,
+        "lift: the neuron was trained for after_spike \"reset\", but this readout is for after_spike \"keep\""
+    );
     let mut other = readout();
     other.neurons.get_mut("lift").unwrap().neuron.time = Time::Continuous;
     assert!(other.check().unwrap_err().to_string().starts_with("lift: the neuron was trained for time \"continuous\""));
