@@ -90,8 +90,8 @@ def test_a_readout_is_saved_in_any_folder(folder: Path) -> None:
     ("path", "fault"),
     [
         ("aux.mcap", "device"), ("data/Com1", "device"), ("nul .tar.gz", "device"), ("CON", "device"),
-        ("lpt²", "device"), ("12:30.mcap", "':'"), ("a/what?.csv", "'?'"), ('"', "has '\"'"), ("x\n", "has '\\n'"),
-        ("walk. ", "ends with ' '"), ("data./walk.mcap", "ends with '.'"),
+        ("lpt²", "device"), ("12:30.mcap", "':'"), ("a/what?.csv", "'?'"), ('"', "contains '\"'"),
+        ("x\n", "contains '\\n'"), ("walk. ", "ends with ' '"), ("data./walk.mcap", "ends with '.'"),
     ],
 )  # fmt: skip
 def test_a_name_that_windows_forbids_is_refused_there(path: str, fault: str, monkeypatch: pytest.MonkeyPatch) -> None:

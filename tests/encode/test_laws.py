@@ -410,7 +410,7 @@ def test_a_long_silence_costs_no_time_once_nothing_can_come():
         (lambda: FA1().encode([1, 2]), "list cannot be encoded"),
         (lambda: FA1().stream(5), "array is 5"),
         (lambda: FA1().trains(None), "array is None"),
-        (lambda: FA1().stream().push("x"), "str: encoders take"),
+        (lambda: FA1().stream().push("x"), "str cannot be encoded: must be taxel.Events or taxel.Frames"),
         (lambda: FA1().stream().advance(1.5), "t_us is 1.5"),
         (lambda: FA1().stream().advance("x"), "t_us is 'x'"),
         (lambda: FA1().stream().advance(2**62), "t_us is "),

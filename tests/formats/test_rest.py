@@ -131,7 +131,7 @@ def test_presses_that_are_held_fall_too(tmp_path, capsys, seed: int, bad: float 
     taxel.convert(frames, tmp_path / "mat.npz")
     code, shown, _ = call(capsys, "info", tmp_path / "mat.npz")
     assert code == 0
-    assert "write falls = true in the layout file" in shown
+    assert "write falls = true in a layout file" in shown
     assert "contact area" not in shown
 
 
@@ -254,7 +254,7 @@ def test_a_recording_of_values_that_fall_in_which_nothing_is_detected_says_what_
         assert bool(found) == finds
         if sign < 0:
             assert remarks[0].startswith("rest: that of a quiet stretch")
-            assert "write falls = true in the layout file" in remarks[0]
+            assert "write falls = true in a layout file" in remarks[0]
             assert remarks[0] in shown
         else:
             assert not remarks

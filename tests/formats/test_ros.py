@@ -295,10 +295,10 @@ def test_the_most_frequent_length_is_read_whatever_comes_first(
     assert opened.frames().values[:, 0, 0].tolist() == places
     left = len(lengths) - len(places)
     assert opened.counts["messages_of_another_length"] == left
-    assert [f"{left} of {len(lengths)} messages left out" in line for line in opened.lost] == [True] * (left > 0)
+    assert [f"{left} of {len(lengths)} messages are left out" in line for line in opened.lost] == [True] * (left > 0)
     # The count is told before anything else, and the list of topics names the shape of most.
     head, first, *_ = call(capsys, "info", bag, "--topic", "/raw")[1].splitlines()
-    assert (f"{left} of {len(lengths)} messages left out" in first) == (left > 0), head
+    assert (f"{left} of {len(lengths)} messages are left out" in first) == (left > 0), head
     (listed,) = ros.topics(bag)
     assert listed.shape == ((2, read) if layout == "a grid" else (read,))
 
@@ -343,14 +343,16 @@ def test_a_bag_without_definitions_names_both_options_and_opens_by_them(tmp_path
     bag = without_definitions(bags.write(tmp_path / "grasp.db3", palms()))
     (listed,) = ros.topics(bag)
     assert (listed.messages, listed.trouble) == (6, f"no definition of {PALM}")
-    said = rf"the definition of {PALM} \(topic /palm\) is not in the bag; .*folder of .* release of ROS, one of "
-    r".*humble.*; give types"
+    said = (
+        rf"the definition of {PALM} \(topic /palm\) is not in the bag; .*folder of .* release of ROS, one of "
+        r".*humble.*; give types"
+    )
     with pytest.raises(FormatError, match=said):
         taxel.open(bag, topic="/palm")
     (tmp_path / "skins_msgs" / "msg").mkdir(parents=True)
     own = tmp_path / "skins_msgs" / "msg" / "Palm.msg"
     own.write_text(bags.DEFINITIONS[PALM])
-    with pytest.raises(FormatError, match=r"no definition of std_msgs/msg/Header .*release of ROS"):
+    with pytest.raises(FormatError, match=r"the definition of std_msgs/msg/Header .*release of ROS"):
         taxel.open(bag, topic="/palm", types=tmp_path / "skins_msgs")
     flat = tmp_path / "flat"
     flat.mkdir()
@@ -389,7 +391,7 @@ def test_a_definition_in_idl_opens_a_bag(tmp_path: Path) -> None:
         ),
         ({"topic": "/hand", "field": "note"}, FormatError, "field note: the field has no numbers"),
         ({"topic": "/palm", "field": "taxels.3"}, FormatError, r"field taxels\.3: the field has no numbers"),
-        ({"topic": ["/hand", "/palm"], "field": ["a"] * 3}, ProblemError, "topic: given 2 times for 3 sources"),
+        ({"topic": ["/hand", "/palm"], "field": ["a"] * 3}, ProblemError, "topic is given 2 times for 3 sources"),
         ({"topic": ["/palm", "/palm"]}, ProblemError, "palm.taxels is chosen twice"),
         ({"topic": "/palm", "ros": "hubble"}, ProblemError, "ros is hubble: must be one of .*humble"),
         ({"topic": "/palm", "types": "nowhere"}, ProblemError, "nowhere: must be a folder with .msg or .idl files"),
@@ -476,7 +478,7 @@ def test_a_layout_file_says_the_topic_and_that_less_means_more(tmp_path: Path, c
     assert frames.array.shape == (24, 32)
     assert json.loads(call(capsys, "info", bag, "--json")[1])["frames"] == 6
     layout.write_text('[ros]\ntopics = "/palm"\n')
-    with pytest.raises(FormatError, match=r"unknown key ros\.topics; there are topic, field, types, ros"):
+    with pytest.raises(FormatError, match=r"unknown key ros\.topics; must be one of topic, field, types, ros"):
         taxel.open(bag)
 
 

@@ -311,9 +311,9 @@ def test_neurons_name_touches_too():
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"periods_ms": [0.5]}, "finer than the recordings"),
+        ({"periods_ms": [0.5]}, "shorter than the recordings resolve"),
         ({"window_ms": None}, "has no end"),
-        ({"windows_ms": [80]}, "must be in"),
+        ({"windows_ms": [80]}, "must be from"),
         ({"taxels": [7]}, "must be at most 2, because only these taxels send events"),
         ({"taxels_at_ms": 3}, "one of the periods"),
         ({"classifiers": ["forest"]}, "must be one of"),

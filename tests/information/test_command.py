@@ -177,7 +177,7 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
             "line 2: recording 'other.npz' is not one of the given recordings",
         ),
         (GOOD.replace("touches.npz", "other.npz"), [], "is not one of the given recordings"),
-        (GOOD.replace("100000,a", "noon,a"), [], "line 2: t_us is 'noon', must be whole us"),
+        (GOOD.replace("100000,a", "noon,a"), [], "line 2: t_us is 'noon'; must be whole us"),
         (GOOD.replace("100000,a,200000", "99000000,a,99100000"), [], "line 2: t_us 99000000 is outside touches.npz"),
         (GOOD.replace("100000,a,200000", "100000,a,90000"), [], "stop 90000 us is not after start"),
         (GOOD.replace(",b,", ",a,"), [], "labels.csv: labels are all 'a'"),
@@ -196,9 +196,9 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
             ["--window-ms", "450"],
             "begins 400 ms after line 2: the window must be at most 400 ms, or the trials must have stop_us",
         ),
-        (GOOD.replace("100000,a,200000", "1e30,a,200000"), [], "line 2: t_us is '1e30', must be whole us"),
+        (GOOD.replace("100000,a,200000", "1e30,a,200000"), [], "line 2: t_us is '1e30'; must be whole us"),
         (GOOD.replace("100000,a,200000", "100000,a,500001"), [], "line 3: begins before line 2 ends at 500001 us"),
-        (GOOD + GOOD.splitlines()[1], [], "line 26: begins where line 2 does"),
+        (GOOD + GOOD.splitlines()[1], [], "line 26: begins at the same time as line 2"),
         (GOOD.replace(",a,", ',"a,', 1), [], "labels.csv, line 2: a quote is opened and not closed"),
         (
             GOOD.replace("group\n", "group,\n").replace("u\n", "u,9\n"),
@@ -251,7 +251,7 @@ def test_recordings_that_make_no_sense_together_are_one_clear_error(tmp_path):
         ([first, second], "labels.csv", f"labels.csv, line 2: recording 'touches.npz' may be {first} or {second}"),
         ([tmp_path / "empty"], "labels.csv", f"{tmp_path / 'empty'}: contains no recording"),
         ([first], "empty", f"{tmp_path / 'empty'}: is a directory; must be a .csv recording,t_us,label"),
-        ([first, tmp_path / "wide.npz"], "both.csv", "line 26: is of an array of 2 x 3"),
+        ([first, tmp_path / "wide.npz"], "both.csv", "line 26: the array has 2 x 3 taxels, but that of "),
     ):
         done = run(*given, "--labels", tmp_path / labels, "--window-ms", "50", "--report", tmp_path / "page.html")
         assert isinstance(done.exception, taxel.Error), done.output
@@ -309,7 +309,7 @@ def test_a_recording_that_the_table_does_not_name_is_said(tmp_path):
     done = run(
         recording, tmp_path / "forgotten.npz", "--labels", labels, "--window-ms", "20", "--report", tmp_path / "p.html"
     )
-    assert "does not name" in str(done.exception)
+    assert "has no trial of" in str(done.exception)
 
 
 def test_a_label_that_tables_write_for_what_is_missing_is_refused(tmp_path):

@@ -75,7 +75,7 @@ def test_a_class_that_a_training_set_lacks_is_said():
         (lambda: nested_predictions([[[1.0, 2.0], [3.0, 1.0]]], [3], [0, 1], count=2), "not symmetric"),
         (lambda: nested_predictions([np.eye(4)], [4, 4], [0, 1, 0, 1], count=2), "one per matrix"),
         (lambda: nested_predictions([np.eye(4)], [4], [0, 1, 0, 1], count=2, ridges=[0.0]), "above 0"),
-        (lambda: nested_predictions([np.eye(4)], [4], [0, 0, 0, 0], count=2), "must be at least two"),
+        (lambda: nested_predictions([np.eye(4)], [4], [0, 0, 0, 0], count=2), "must have at least two"),
         (lambda: ConeRReadout().predict([]), "not fitted"),
         (lambda: ConeRReadout().set_params(bounds=1), "no parameter 'bounds'"),
     ],

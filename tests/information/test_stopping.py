@@ -108,8 +108,8 @@ def test_ctrl_c_ends_the_command_soon_with_the_bits_so_far(tmp_path: Path) -> No
     assert float(ended.stdout) < SOON_S
     line = ended.stderr.splitlines()[-1]
     assert line.startswith(
-        "stopped after 1 to 2 of 3 draws; bits so far, without confidence intervals: period 1 ms: 1.00 within 10 ms, 1.00 within "
-        "60 ms; "
+        "stopped after 1 to 2 of 3 draws; bits so far, without confidence intervals: period 1 ms: "
+        "1.00 within 10 ms, 1.00 within 60 ms; "
     )
     assert re.fullmatch(r".*; period 10 ms: 0\.\d\d within 10 ms, 0\.\d\d within 60 ms", line)
     assert not (tmp_path / "page.html").exists()

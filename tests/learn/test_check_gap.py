@@ -285,8 +285,8 @@ def test_what_cannot_be_checked_is_one_clear_error():
     for given, said in (
         ((patterns[:1], targets), "1 pattern, 2 lists of targets"),
         ((patterns, targets[:1]), "2 patterns, 1 list of targets"),
-        (([p.select([0, 1]) for p in patterns], targets), "pattern 0: 2 trains, must be 20, as in the fit"),
-        (([signed, signed], [[50.0], []]), "pattern 0: spikes are signed, split them"),
+        (([p.select([0, 1]) for p in patterns], targets), "pattern 0: 2 trains; must be 20, as in the fit"),
+        (([signed, signed], [[50.0], []]), "pattern 0: spikes are signed; split them"),
     ):
         with pytest.raises(ProblemError, match=said):
             check_gap(cone, *given)

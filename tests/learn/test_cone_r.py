@@ -571,7 +571,7 @@ def test_trains_without_a_spike_have_weight_0_and_count_in_the_normalisers():
     assert among.objective_ == pytest.approx(online.objective_, rel=2e-6)
     again = ConeR(lb=list(-bounds), ub=list(bounds)).fit(many, targets, start=among)
     assert again.objective_ == pytest.approx(among.objective_, rel=1e-5)
-    with pytest.raises(ProblemError, match="weights: 25 for 60 trains"):
+    with pytest.raises(ProblemError, match="weights: 25 weights for 60 trains"):
         ConeR().fit(many, targets, start=alone)
     problem = ConeR().prepare(many, targets)
     with pytest.raises(ProblemError, match="lb: 3 bounds for 60 trains"):
@@ -584,5 +584,5 @@ def test_trains_without_a_spike_have_weight_0_and_count_in_the_normalisers():
 
 def test_more_trains_than_can_be_weighed_are_refused_before_memory_is_asked_for():
     trains = SpikeTrains.from_lists([[1.0 + n % 50] for n in range(10_001)], stop=100)
-    with pytest.raises(ProblemError, match="10001 trains have spikes, at most 10000"):
+    with pytest.raises(ProblemError, match="10001 trains have spikes; must be at most 10000"):
         ConeR().fit([trains], [[60.0]])

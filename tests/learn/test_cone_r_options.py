@@ -208,7 +208,7 @@ def test_an_option_that_is_not_known_is_refused(options, said):
 @pytest.mark.parametrize(
     ("silence", "said"),
     [
-        ([[(20.0, 10.0)]], "pattern 0, window 0 of silence: 20 to 10 ms, start must not be after stop"),
+        ([[(20.0, 10.0)]], "pattern 0, window 0 of silence: 20 to 10 ms; start must not be after stop"),
         ([[(0.0, 5.0), (4.0, 9.0)]], "pattern 0, window 1 of silence: begins at 4 ms, but the window before ends"),
         ([[(0.0, float("nan"))]], "pattern 0, window 0 of silence: 0 to NaN ms"),
         ([[(0.0, float("inf"))]], "pattern 0, window 0 of silence: 0 to inf ms"),
@@ -216,7 +216,7 @@ def test_an_option_that_is_not_known_is_refused(options, said):
         ([], "silence: 0 lists for 1 patterns"),
         ([[0.0, 5.0]], r"silence of pattern 0 has shape \(2,\): must contain windows"),
         ([[(0.0, 5.0, 6.0)]], r"silence of pattern 0 has shape \(1, 3\)"),
-        ([[("a", "b")]], "silence of pattern 0: holds"),
+        ([[("a", "b")]], "silence of pattern 0: contains"),
         (5.0, "silence is 5: must be a sequence"),
     ],
 )

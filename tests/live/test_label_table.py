@@ -334,7 +334,8 @@ def test_what_was_acknowledged_is_damaged(table: Path, tables) -> None:
     mark(tables, table, "heel", 1)
     (table.parent / ".walk.notes.csv.acknowledged").write_text("[]")
     with pytest.raises(
-        FormatError, match=r"damaged, so taxel does not know which labels it had confirmed.*delete this file to continue"
+        FormatError,
+        match=r"damaged, so taxel does not know which labels it had confirmed.*delete this file to continue",
     ):
         mark(tables, table, "toe", 2)
     assert sorted(held(table)) == [("heel", 1)]

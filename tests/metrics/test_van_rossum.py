@@ -127,7 +127,7 @@ def test_parameters_that_make_no_sense_are_one_clear_error_each():
             'normalisation is "max": must be "spike", "tau"',
         ),
         (van_rossum_absolute, {"tau": 1.0, "step_ms": 0.0}, "step_ms is 0 ms: must be above 0"),
-        (van_rossum_absolute, {"tau": 1.0, "window": (5.0, 1.0)}, "window is 5 to 1 ms: must be finite, and its start"),
+        (van_rossum_absolute, {"tau": 1.0, "window": (5.0, 1.0)}, "window is 5 to 1 ms: must be finite, with start"),
         (van_rossum_absolute, {"tau": 1.0, "window": (5.0,)}, "window has 1 entries: must be two, start and stop"),
     ):
         with pytest.raises(ProblemError, match=said):

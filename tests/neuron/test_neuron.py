@@ -284,7 +284,7 @@ def test_other_arguments_that_make_no_sense_are_one_clear_error_each():
             r"times\[1\] is 1 ms and comes after 2 ms: times must ascend",
         ),
         (lambda: Neuron().potential([1.0], trains, [float("nan")]), r"times\[0\] is NaN: must be finite"),
-        (lambda: Neuron().potential([1.0], trains, [1.0], spikes=[5.0, 3.0]), r"spikes\[1\] is 3 ms, after 5 ms"),
+        (lambda: Neuron().potential([1.0], trains, [1.0], spikes=[5.0, 3.0]), r"spikes\[1\] is 3 ms and comes after 5"),
         (lambda: Neuron(tau=-1), "tau is -1 ms: must be above 0 and finite"),
         (lambda: Neuron(time="often"), 'time is "often": must be "continuous" or "grid"'),
         (lambda: Neuron(step_ms=None), "step_ms is None: must be a number"),

@@ -235,7 +235,7 @@ def test_a_calibration_of_another_array_is_one_clear_error(tmp_path):
     with pytest.raises(ProblemError, match="that of the calibration is"):
         other.apply(frames(1.0))
     recording = made_beside(tmp_path, other)
-    with refused(r"press.calibration.json: .* another array"):
+    with refused(r"press\.calibration\.json: the calibration is for counts of Array\(other: .*; press\.npz contains"):
         recording.calibrated()
 
 

@@ -236,7 +236,7 @@ GOOD = {"t": [0, 5], "x": [1, 2], "y": [3, 4], "p": [True, False]}
     [
         ("t", [0, float("nan")], r"t\[1\] is nan"),
         ("t", [0, 0.5], r"t\[1\] is 0.5"),
-        ("t", ["0", "5"], "t: holds"),
+        ("t", ["0", "5"], "t: contains"),
         ("t", None, "t"),
         ("t", [[0, 5]], "t has 2 dimensions"),
         ("t", [0, 2**63], "t"),
@@ -251,7 +251,7 @@ GOOD = {"t": [0, 5], "x": [1, 2], "y": [3, 4], "p": [True, False]}
         ("y", object(), "y"),
         ("p", [2, 0], r"p\[0\] is 2"),
         ("p", [0.5, 0], r"p\[0\] is 0.5"),
-        ("p", ["yes", "no"], "p: holds"),
+        ("p", ["yes", "no"], "p: contains"),
         ("p", [True], "p has 1 entries"),
         ("array", None, "array is None"),
         ("array", (8, 12), "array is"),

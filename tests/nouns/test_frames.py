@@ -118,7 +118,7 @@ def test_frames_draw_themselves() -> None:
         ({"t": [0, 0.5]}, r"t\[1\] is 0.5"),
         ({"t": [0, np.nan]}, r"t\[1\] is nan"),
         ({"t": None}, "t"),
-        ({"t": ["a", "b"]}, "t: holds"),
+        ({"t": ["a", "b"]}, "t: contains"),
         ({"unit": 3}, "unit is 3"),
         ({"unit": None}, "unit is None"),
         ({"unit": ""}, "unit is ''"),

@@ -94,7 +94,9 @@ def test_a_stream_on_another_clock_is_a_stream(tmp_path: Path) -> None:
             one.datagrams()
     assert moved.lost == ("the lines of the stream as received",)
     part = imu.between(50_000, 100_000)
-    assert taxel.convert(part, tmp_path / "part.mcap") == ["arrival times of lines that are not in this part of the recording"]
+    assert taxel.convert(part, tmp_path / "part.mcap") == [
+        "arrival times of lines that are not in this part of the recording"
+    ]
     assert taxel.open(tmp_path / "part.mcap").frames() == part.frames()
 
 

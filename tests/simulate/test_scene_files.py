@@ -140,11 +140,11 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
         ),
         (
             ("x_mm = 70", "x_mm = 70\nshape.edge.slope_deg = 30"),
-            r"bodies\[0\].shape is sphere and edge: must be one of",
+            r"bodies\[0\].shape is sphere and edge: must be only one of",
         ),
         (
             ("x_mm = 70", "x_mm = 70\nmotion.pressed.peak_n = 3"),
-            r"bodies\[0\].motion is pressed and dropped: must be one",
+            r"bodies\[0\].motion is pressed and dropped: must be only one",
         ),
         (("radius_mm", "radus_mm"), r"radus_mm is not known \(did you mean radius_mm\?\)"),
         (("mass_g", "mass"), r"bodies\[0\].mass is not known"),
