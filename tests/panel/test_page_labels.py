@@ -217,7 +217,7 @@ def test_both_versions_of_labels_are_shown_until_one_is_chosen(
         assert page.locator("#label-conflict").is_hidden()
         table.write_text(older + "toe,4000000\n")
         shows(page, "label-conflict", "lacks 1 label that was set on the page")
-        shows(page, "notice-text", r"^Another program saved walk\.notes\.csv: it lacks 1 label")
+        shows(page, "notice-text", r"^Another program saved walk\.notes\.csv: the file lacks 1 label")
         page.locator("#notice-offer").click()
         bar = page.locator("footer").bounding_box()
         for name in ("#conflict-restore", "#conflict-accept"):
@@ -240,7 +240,7 @@ def test_both_versions_of_labels_are_shown_until_one_is_chosen(
         shows(page, "label-conflict", "Two versions of the labels")
         table.write_text(older + "toe,4000000\nball,5000000\n")
         shows(page, "conflict-rows", "ball")
-        shows(page, "notice-text", r"^Another program saved walk\.notes\.csv: it lacks 1 label")
+        shows(page, "notice-text", r"^Another program saved walk\.notes\.csv: the file lacks 1 label")
         page.locator("#conflict-restore" if restore else "#conflict-accept").click()
         until(lambda: page.locator("#label-conflict").is_hidden(), "it is settled")
         assert page.locator("#notice").is_hidden()

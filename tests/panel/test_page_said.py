@@ -419,7 +419,7 @@ def test_what_lay_there_is_said_of_events_in_the_same_words(
     assert bool(read[1].preload_at) is bool(load)
     with shown(chromium, tmp_path / "mat.mcap") as page:
         if load:
-            shows(page, "silence", r"^Something pressed on the sensor while its rest was measured ")
+            shows(page, "silence", r"^Something pressed on the sensor while its rest was measured: ")
             assert page.locator("#silence").inner_text().endswith(f"while its rest was measured: {read[1].preload_at}.")
         else:
             assert page.locator("#silence").is_hidden()
