@@ -56,6 +56,7 @@ _FEW_HELD = 2
 #: Causes of a bad score that are of labels or of the recording, not of the readout.
 _OF_LABELS = (
     "exchanged_sources",
+    "exchanged_names",
     "shifted_labels",
     "window",
     "gaps",
@@ -64,7 +65,7 @@ _OF_LABELS = (
     "standing_load",
 )
 #: Those of them that need no advice.
-_WITHOUT_ADVICE = ("exchanged_sources", "gaps", "standing_load")
+_WITHOUT_ADVICE = ("exchanged_sources", "exchanged_names", "gaps", "standing_load")
 #: The noise is compared with that of the training from so many times that.
 _NOISIER = 1.5
 #: No event.
