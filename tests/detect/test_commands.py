@@ -482,7 +482,7 @@ def test_labels_behind_the_last_event_are_named(
     arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare", folder / "tare.json", "--truth")
     code, out, error = call(capsys, *arguments, late, "--json")
     assert (code, json.loads(out)["score"]["missed"]) == (0, 0 if how == "outside" else 1)
-    behind = f"1 of the 13 events of {late} are later than the last recorded event, at {last / 1e6:.3f} s (contact at "
+    behind = f"1 of the 13 events of {late} is later than the last recorded event, at {last / 1e6:.3f} s (contact at "
     assert (behind in error) == (how == "behind")
     assert ("left out: outside" in error) == (how == "outside")
 

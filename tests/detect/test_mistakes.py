@@ -110,7 +110,7 @@ SITUATIONS: dict[str, tuple[Callable[[int], Outcome], str, str, str]] = {
     "late": (
         late,
         "shifted_labels",
-        "40 of 40 missed have a false detection 320 ms earlier; the detections are where loads begin or end",
+        "40 of 40 missed labels have a false detection 320 ms earlier; the detections are where loads begin or end",
         "to move the labels by -320 ms (--shift-ms -320)",
     ),
     "of late labels": (
@@ -134,10 +134,10 @@ SITUATIONS: dict[str, tuple[Callable[[int], Outcome], str, str, str]] = {
     "nearly late": (
         nearly_late,
         "shifted_labels",
-        "40 of 40 missed have a false detection 60 ms later",
+        "40 of 40 missed labels have a false detection 60 ms later",
         "--shift-ms 60",
     ),
-    "rising slowly": (rising_slowly, "window", "20 of 20 missed have a false detection 60 ms", "--window-ms 60"),
+    "rising slowly": (rising_slowly, "window", "20 of 20 missed labels have a false detection 60 ms", "--window-ms 60"),
     "felt late": (felt_late, "shifted_labels", "170 ms later, while lift fits: contact is felt later there", ""),
     "alike": (alike, "other_name", "20 of 20 false detections of lift are within 100 ms of labels of contact", ""),
     "misplaced": (

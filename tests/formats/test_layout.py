@@ -158,7 +158,7 @@ def test_values_that_fall_as_the_layout_turns_them_name_it(tmp_path: Path, falls
     of_it = (
         "after step.layout.toml inverted them: if they need no inversion, remove the line falls from step.layout.toml"
         if falls
-        else "write falls = true in a layout file beside"
+        else "write falls = true in the layout file that is given as layout; without one, in step.layout.toml beside it"
     )
     assert of_it in shown
 

@@ -131,7 +131,7 @@ def test_presses_that_are_held_fall_too(tmp_path, capsys, seed: int, bad: float 
     taxel.convert(frames, tmp_path / "mat.npz")
     code, shown, _ = call(capsys, "info", tmp_path / "mat.npz")
     assert code == 0
-    assert "write falls = true in a layout file" in shown
+    assert "write falls = true in the layout file" in shown
     assert "contact area" not in shown
 
 
@@ -254,7 +254,7 @@ def test_a_recording_of_values_that_fall_in_which_nothing_is_detected_says_what_
         assert bool(found) == finds
         if sign < 0:
             assert remarks[0].startswith("rest: that of a quiet stretch")
-            assert "write falls = true in a layout file" in remarks[0]
+            assert "write falls = true in the layout file" in remarks[0]
             assert remarks[0] in shown
         else:
             assert not remarks
@@ -266,7 +266,7 @@ def test_where_rebounds_of_values_that_fall_are_learnt_and_detected_what_turns_t
     taxel.convert(palm(5, -1, 0.4, rebound=0.25), tmp_path / "palm.npz")
     rows = [f"press,{1_000_000 + 650_000 * k}\n" for k in range(12)]
     (tmp_path / "palm.notes.csv").write_text("label,t_us\n" + "".join(rows))
-    turns = "falls = true in a layout file beside it, palm.layout.toml"
+    turns = "falls = true in the layout file that is given as layout; without one, in palm.layout.toml beside it"
     code, _, said = call(capsys, "train", tmp_path / "palm.npz", "--folds", 0, "-o", tmp_path / "a.json")
     assert code == 0
     (line,) = said.splitlines()
@@ -279,6 +279,15 @@ def test_where_rebounds_of_values_that_fall_are_learnt_and_detected_what_turns_t
     assert found
     assert turns in hint
     assert hint in call(capsys, *command)[1]
+    (tmp_path / "given.toml").write_text("falls = true\n")
+    given = (*command, "--layout", tmp_path / "given.toml", "--json")
+    assert json.loads(call(capsys, *given)[1])["remarks"] == []
+    taxel.convert(palm(5, 1, 0.4, rebound=0.25), tmp_path / "palm.npz", overwrite=True)
+    [hint] = json.loads(call(capsys, *given)[1])["remarks"]
+    assert hint.endswith(
+        "after its layout inverted them: if they need no inversion, remove the line falls from its layout"
+    )
+    taxel.convert(palm(5, -1, 0.4, rebound=0.25), tmp_path / "palm.npz", overwrite=True)
     (tmp_path / "palm.layout.toml").write_text("falls = true\n")
     assert json.loads(call(capsys, *command, "--json")[1])["remarks"] == []
     assert "falls" not in call(capsys, "train", tmp_path / "palm.npz", "--folds", 0, "-o", tmp_path / "b.json")[2]

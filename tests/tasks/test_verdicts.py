@@ -165,7 +165,7 @@ def test_a_window_is_advised_only_with_what_a_trial_of_it_left() -> None:
     times = np.arange(1, 26) * 1_000_000
     late = taxel.Detections(["contact"] * 25, times + 80_000, times + 80_000)
     scores = {ms: taxel.detect.score(late, {"contact": times, "lift": []}, ms) for ms in (50.0, 60.0, 100.0)}
-    fact = "25 of 25 missed have a false detection 80 ms later"
+    fact = "25 of 25 missed labels have a false detection 80 ms later"
     cause = by_option("window", "contact", 50, fact, "--window-ms 80", window_ms=80.0)
     for trial_ms, advice in ((None, ""), (60.0, ""), (100.0, "--window-ms 80")):
         tried = None if trial_ms is None else lambda *_, ms=trial_ms: Judged((), scores[ms], "")

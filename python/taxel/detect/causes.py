@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from taxel._base.messages import counted, escaped
+from taxel._base.messages import are, counted, escaped
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.cause import Cause, by_option, ordered
@@ -262,7 +262,8 @@ class Mistakes:
         alone = self.learnt[label]
         if 2 * alone.rank[0] <= wrong:
             measured = (
-                f"of the labels that it learnt, {alone.missed} are missed, and {alone.false} detections are false"
+                f"on the training data {alone.missed} of {counted(alone.events, 'label')} {are(alone.missed)} missed, "
+                f"and {counted(alone.false, 'detection')} {are(alone.false)} false"
             )
             yield Cause("overfitting", (label,), wrong, measured, "more labels")
             return

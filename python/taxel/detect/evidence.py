@@ -100,7 +100,7 @@ class Evidence:
         for example in self.examples:
             source = recorded(example.source, hold=False)
             if isinstance(source, Frames) and (rest := of_frames(source)).falls:
-                layout, advice = rest.turning(getattr(example.source, "path", None))
+                layout, advice = rest.turning(*(getattr(example.source, name, None) for name in ("path", "_turned")))
                 turned = f" after {layout} inverted them" * bool(layout)
                 return advice, f"{example.name}: " * bool(example.name) + f"values fall from their rest{turned}"
         return "", ""

@@ -327,7 +327,7 @@ class Measured:
         here = later_ms <= later_ms[is_slow].max()
         count = int(here.sum())
         measured = (
-            f"{count} of {len(left.missed)} missed have a false detection "
+            f"{count} of {len(left.missed)} missed labels have a false detection "
             f"{ranged(later_ms[here].min(), later_ms[here].max())} ms later, because the load "
             f"{'falls' if falls else 'rises'} slowly: {label} is felt later there"
         )
@@ -348,7 +348,7 @@ class Measured:
         if least_ms * most_ms > 0:
             low, high = sorted(np.abs([pairs.errors_ms.min(), pairs.errors_ms.max()]))
             where = f"{ranged(low, high)} ms {'later' if least_ms > 0 else 'earlier'}"
-        measured = f"{pairs.found} of {len(left.missed)} missed have a false detection {where}"
+        measured = f"{pairs.found} of {len(left.missed)} missed labels have a false detection {where}"
         cause = by_option("window", label, mistakes, measured, f"--window-ms {window_ms:g}", window_ms=window_ms)
         detected, events = pairs.pairs.T
         return cause, left.without(_at(events, left.missed), _at(detected, left.false))
@@ -399,7 +399,9 @@ class Measured:
         stretch = "" if are_all else stretch_of(telling, members, self._examples)
         distance = f"{abs(ms):.0f} ms"
         count = len(missed)
-        measured = f"{count} of {sum(shift.total for shift in group)} missed have a false detection {distance} {side}"
+        measured = (
+            f"{count} of {sum(shift.total for shift in group)} missed labels have a false detection {distance} {side}"
+        )
 
         def cause(measured: str, advice: str, option: str = "", kind: str = "shifted_labels") -> Cause:
             arguments = {"shift_ms": float(-round(ms))} if option else {}
@@ -477,7 +479,9 @@ class Measured:
             return None
         if self._standing is not None:
             text, option, arguments = self._standing
-            measured = f"{text}; {count} of {len(inside)} missed of {label} {are(count)} while it stays"
+            measured = (
+                f"{text}; {count} of {counted(len(inside), 'missed label')} of {label} {are(count)} within that time"
+            )
             cause = by_option("standing_load", label, count, measured, option, **arguments)
             return cause, left.without(inside, np.zeros(len(left.false), np.bool_))
         # Loads that overlap have labels of their other edges too; without such labels a load holds a label too many.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.messages import counted, three_digits
+from taxel._base.messages import are, counted, three_digits
 from taxel._base.progress import reporting
 from taxel._core import ProblemError
 from taxel.detect.detector import _Detector
@@ -81,7 +81,7 @@ class _Measured:
     reading: float
     """Reading of the most loaded taxel above rest, median over loads."""
     stays: bool
-    """Whether a load lasts so long that the loads are no touches."""
+    """Whether a load lasts so long that no load is a touch."""
 
     def are_touches(self, strength: float) -> NDArray[np.bool_]:
         """Return which loads are touches, if those of the training are so strong."""
@@ -251,7 +251,7 @@ def _of_touches(
         never = int(np.count_nonzero(touched & ~_within(measured.reached, shape)))
         if never >= max(1.0, _FEWER * np.count_nonzero(touched)):
             trained = counted(int(touched.sum()), "taxel")
-            yield f"{never} of {trained} that touches of the training loaded are never loaded"
+            yield f"{never} of {trained} that touches of the training loaded {are(never)} never loaded"
 
 
 def _undetected(data: Mapping[str, Any], measured: _Measured, found: Detections) -> Iterator[str]:
@@ -261,8 +261,8 @@ def _undetected(data: Mapping[str, Any], measured: _Measured, found: Detections)
     missing = touches - int(np.count_nonzero(measured.detected(found.t) & are_touches))
     if touches >= _LEAST and missing / touches >= 1.0 - data["detected"] + _FEWER:
         yield (
-            f"{missing} of {counted(touches, 'touch', 'touches')} have no detection, in the training "
-            f"{1.0 - data['detected']:.0%}"
+            f"{missing} of {counted(touches, 'touch', 'touches')} {'has' if missing == 1 else 'have'} no detection, in "
+            f"the training {1.0 - data['detected']:.0%}"
         )
 
 
@@ -377,7 +377,7 @@ def _squares(source: Frames) -> _Values:
     begins = np.linspace(0, len(source) - _FRAMES, _STRETCHES).astype(np.int64)
     values = (source.values[begin : begin + _FRAMES].astype(np.float64) for begin in begins)
     # Of independent noise two neighbours in time differ by twice its variance.
-    return np.array([np.diff(stretch, axis=0) ** 2 for stretch in values]).mean(axis=1) / 2.0
+    return np.asarray(np.mean([np.diff(stretch, axis=0) ** 2 for stretch in values], axis=1) / 2.0)
 
 
 def _noise(source: Events | Frames) -> float:

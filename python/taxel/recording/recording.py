@@ -295,6 +295,12 @@ class Recording:
         return main.frame_table.frame_us if isinstance(main, FrameSource) else None
 
     @property
+    def _turned(self) -> float | None:
+        """The number that readings were subtracted from, as a layout says; None of others."""
+        main = self._contents.main
+        return main.frame_table.turned if isinstance(main, FrameSource) else None
+
+    @property
     def register_changes(self) -> tuple[tuple[int, Registers], ...]:
         """The registers at each change while recording, with the host's time (ns since 1970)."""
         return self._contents.main.settings.register_changes()

@@ -422,8 +422,8 @@ def _detected(
     if scored is not None and not scored.events:
         remarks.insert(
             0,
-            f"0 labels: {counted(scored.false, 'detection')} count as false, so this does not show whether they are "
-            "right",
+            f"0 labels: {counted(scored.false, 'detection')} {'counts' if scored.false == 1 else 'count'} as false, so "
+            "the score does not show whether detections are right",
         )
     stays = None if scored is None or not scored.rank[0] else _standing(readout, recording, felt, options)
     return _Found(Detected(recording, outcome, taken, tuple(remarks)), felt, differs.sensor, stays)
@@ -517,7 +517,7 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
     lines, source, tare = list(_of_gaps(recording, outcome)), recorded(recording, hold=False), outcome.example.tare
     if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
         # What else is measured is measured upside down.
-        return [*lines, f"rest: {quiet.text(recording.path)}"], Unlike()
+        return [*lines, f"rest: {quiet.text(recording.path, recording._turned)}"], Unlike()
     lines += _of_taxels(source)
     floors = noise_floors(readout)
     if tare is not None and floors and not isinstance(source, SpikeTrains):
@@ -525,9 +525,8 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
         if count:
             lines.append(
                 f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that touches "
-                "may seem not to end, and other touches may be missed: take a tare between touches, at a time nearer "
-                "to them "
-                "(taxel cut RECORDING FILE --from S --to S, --tare FILE)"
+                "may seem not to end, and other touches may be missed: take a tare between later touches (taxel cut "
+                "RECORDING FILE --from S --to S, then --tare FILE)"
             )
     if tare is not None and isinstance(source, Frames) and (floor := measured_floor([outcome.example])) is not None:
         count = count_loaded(source, tare, floor)

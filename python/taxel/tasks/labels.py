@@ -399,8 +399,8 @@ def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where
     if behind:
         (at, label), begin = behind[0], beginning_us(np.array([first]))
         warn(
-            f"{len(behind)} of the {total} events of {where} are later than the last recorded event, at "
-            f"{(end - begin) / 1e6:.3f} s ({label} at {(at - begin) / 1e6:.3f} s): they are scored, and count as "
+            f"{len(behind)} of the {total} events of {where} {are(len(behind))} later than the last recorded event, at "
+            f"{(end - begin) / 1e6:.3f} s ({label} at {(at - begin) / 1e6:.3f} s): these labels are scored, and "
             "missed if the recording stopped before them",
             stacklevel=2,
         )

@@ -17,7 +17,7 @@ from taxel import _core
 from taxel._base.times import beginning_us
 from taxel._core import FormatError
 from taxel.formats.event_camera import are_counts
-from taxel.formats.layout import Layout, or_given
+from taxel.formats.layout import Layout, layout_name
 from taxel.frames import Frames
 from taxel.tare import Tare
 
@@ -114,8 +114,8 @@ class Rest:
         """Return the line of ``taxel info``."""
         return self.text()
 
-    def text(self, path: Path | None = None) -> str:
-        """Return the line of ``taxel info``; of the recording of a path it names the layout file."""
+    def text(self, path: Path | None = None, turned: float | None = None) -> str:
+        """Return the line of ``taxel info``; `path`, `turned`: as of `turning`."""
         words = {
             "tare": "the given tare",
             "calibration": "the calibration's",
@@ -128,13 +128,13 @@ class Rest:
             text = f"that of a quiet stretch, {first:.3f} to {end:.3f} s, later following slow changes"
             text += f"; something was on {self.preload_at} during this stretch" * bool(self.preload_at)
         if self.falls:
-            text += f"; {self.fall(path)}"
+            text += f"; {self.fall(path, turned)}"
         return text + f"; {self.zeroed} zeroed" * bool(self.zeroed)
 
     @staticmethod
-    def fall(path: Path | None = None) -> str:
-        """Return what to do of values that fall; of the recording of a path it names the layout file."""
-        layout, turning = Rest.turning(path)
+    def fall(path: Path | None = None, turned: float | None = None) -> str:
+        """Return what to do of values that fall; `path`, `turned`: as of `turning`."""
+        layout, turning = Rest.turning(path, turned)
         if layout:
             return (
                 f"values fall from their rest after {layout} inverted them: if they need no inversion, remove the "
@@ -143,13 +143,19 @@ class Rest:
         return f"values fall from their rest: if smaller values mean more pressure, write {turning}"
 
     @staticmethod
-    def turning(path: Path | None = None) -> tuple[str, str]:
-        """Return the layout file that turns a recording's values ("" if none does), and what turns them again."""
+    def turning(path: Path | None = None, turned: float | None = None) -> tuple[str, str]:
+        """Return the layout file that turns a recording's values ("" if none does), and what turns them again.
+
+        `path`: that of the recording; `turned`: what its values were turned by, if they were.
+        """
         file = None if path is None else Layout.beside(path)
         with suppress(FormatError, OSError):
             if file is not None and Layout.read(file).turned is not None:
                 return file.name, f"no falls in {file.name}"
-        return "", "falls = true in a layout file" + ("" if path is None else f" {or_given(path)}")
+        if turned is not None:
+            return "its layout", "no falls in its layout"
+        named = "" if path is None else f" that is given as layout; without one, in {layout_name(path)} beside it"
+        return "", f"falls = true in {'the' if named else 'a'} layout file{named}"
 
     def described(self) -> dict[str, object]:
         """Return source, quiet stretch, number of zeroed taxels and whether values fall, as JSON values."""

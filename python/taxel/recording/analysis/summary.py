@@ -87,7 +87,11 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         }
     calibration = recording.calibration
     facts["calibration"] = None if calibration is None else calibration.described()
-    facts["rest"] = None if pressed is None else {**pressed.rest.described(), "text": pressed.rest.text(recording.path)}
+    facts["rest"] = (
+        None
+        if pressed is None
+        else {**pressed.rest.described(), "text": pressed.rest.text(recording.path, recording._turned)}
+    )
     # Above the rest of readings that fall is nothing but noise.
     facts["pressure"] = None if pressed is None or pressed.rest.falls else _pressure(pressed)
     of_taxels = health(table)
