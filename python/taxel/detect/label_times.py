@@ -79,7 +79,7 @@ class Off(NamedTuple):
 
     @property
     def arguments(self) -> dict[str, float]:
-        """What moves the labels to what was felt, and the window that their spread needs, as options are named."""
+        """The shift that moves labels to what was felt, and the window for their spread, by the names of options."""
         moved = {} if self.is_around else {"shift_ms": -float(round(self.ms))}
         return moved | ({"window_ms": self._reach_ms} if self.within_ms > WINDOW_MS else {})
 

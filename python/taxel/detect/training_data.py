@@ -231,7 +231,7 @@ def _of_steps(source: Frames, noise: float, reading: float) -> Iterator[str]:
 
 
 def _of_jumps(source: Frames, rest: _Values, noise: float) -> Iterator[str]:
-    """Yield how many taxels jump below their rest for a while, where no touch brings them."""
+    """Yield how many taxels jump below their rest for a while, although touches only add load."""
     begins, stretches = _stretches(source)
     quiet = np.sqrt(np.quantile(_squares(source), _QUIET, axis=0))
     change = np.abs(np.diff(np.minimum(stretches - rest, 0.0), axis=1)).mean(axis=1)
