@@ -384,6 +384,18 @@ def test_labels_are_moved_by_the_distance_that_they_agree_on_best() -> None:
     assert not [cause for cause in again if cause.kind == "shifted_labels"]
 
 
+@pytest.mark.parametrize("seed", [2, 3])
+def test_marks_of_a_hand_around_what_was_felt_need_a_window_and_no_move(seed: int) -> None:
+    frames, truth = touched(seed, 60)
+    spread = np.rint(np.random.default_rng(seed).normal(0, 55_000, 60)).astype(int)
+    [cause] = evidence(frames, {"contact": truth["contact"] + spread}).causes({"contact": 20})
+    reach = rf"{cause.arguments['window_ms']:.0f} ms"
+    assert cause.option == f"--window-ms {reach.removesuffix(' ms')}"
+    assert re.fullmatch(
+        rf"\d\d of 60 are within {reach} of what the sensor felt, like keys pressed live", cause.measured
+    )
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_labels_of_footfalls_that_overlap_are_not_called_wrong(seed: int) -> None:
     """Steps at two places, each of which begins before the one before has ended: one load for the array."""

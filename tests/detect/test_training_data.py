@@ -27,8 +27,14 @@ def made(
     flicker: bool = False,
     shape: tuple[int, int] = SHAPE,
     touches: int = 30,
+    step: float = 1.0,
+    hold: int = 1,
+    loose: int = 0,
 ) -> tuple[Path, dict[str, NDArray[np.int64]]]:
-    """Write a recording of touches that last .4 s each; return it with the labels."""
+    """Write a recording of touches that last .4 s each; return it with the labels.
+
+    Values come in steps, each of them for so many frames; the cable of so many rows is loose for 4 s.
+    """
     rng = np.random.default_rng(seed)
     begins = 300 + np.cumsum(rng.integers(90, 130, touches))
     values = 500.0 + noise * rng.standard_normal((int(begins[-1]) + 200, *shape))
@@ -41,7 +47,10 @@ def made(
     if dead is not None:
         values[:, dead] = 500.0
     t = np.arange(len(values)) * round(1e6 / RATE)
-    frames = taxel.Frames(np.round(values), t, unit="counts", array=taxel.Array(*shape))
+    values = step * np.round(values / step)[np.arange(len(values)) // hold * hold]
+    if loose:
+        values[600:1000, :loose] = rng.uniform(0.0, 200.0, (400, loose, shape[1])).round()
+    frames = taxel.Frames(values, t, unit="counts", array=taxel.Array(*shape))
     path = place / f"{seed}-{len(list(place.iterdir()))}.npz"
     taxel.convert(frames, path)
     return path, {"contact": t[begins], "lift": t[begins + 40]}
@@ -84,6 +93,25 @@ def test_noise_strength_and_taxels_that_differ_are_named(
     assert "taxels that touches of the training loaded are never loaded" in remarks(
         training, made(tmp_path, seed, dead=heel)[0]
     )
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_values_in_steps_and_held_ones_and_a_loose_cable_are_named(
+    training: taxel.tasks.Training, tmp_path: Path, seed: int
+) -> None:
+    ending = r"; the noise of the training is [0-9.]+ counts"
+    steps = remarks(training, made(tmp_path, seed, step=25.0)[0])
+    assert re.match(
+        rf"unlike the training: values change in steps of 25 counts, and \d+% of frames equal the one before{ending}",
+        steps,
+    )
+    held = remarks(training, made(tmp_path, seed, hold=20)[0])
+    assert re.match(rf"unlike the training: 9\d% of frames equal the one before{ending}", held)
+    said = remarks(training, made(tmp_path, seed, loose=3)[0])
+    jumps = (
+        r"24 taxels jump below the rest in \d+% of the time, for example at [5-9]\.\d s, by more than 5 times the noise"
+    )
+    assert re.match(f"unlike the training: {jumps}: a loose cable, or interference", said)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

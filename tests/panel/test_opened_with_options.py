@@ -289,7 +289,7 @@ def test_frames_are_in_the_unit_of_a_calibration(capsys, tmp_path):
     words = (tmp_path / "other.npz", "--calibration", tmp_path / "of another name.json", "--seconds", 1)
     code, _, errors = call(capsys, "view", *words)
     assert code == 2
-    assert "another array" in errors
+    assert "the calibration is for counts of Array(" in errors
 
 
 def test_labels_of_a_trial_are_its_own_and_training_takes_the_labelled_trials(capsys, tmp_path):

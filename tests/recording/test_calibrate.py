@@ -138,4 +138,4 @@ def test_a_calibration_of_another_sensor_beside_a_recording_is_one_line(tmp_path
     other.save(tmp_path / "calibration.json")
     done = run("info", path)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "another array" in done.stderr
+    assert "the calibration is for counts of Array(other: " in done.stderr

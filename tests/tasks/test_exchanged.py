@@ -76,3 +76,43 @@ def test_late_labels_are_not_called_exchanged(tmp_path: Path, seed: int) -> None
     kinds = [cause.kind for each in detect(RULE, recordings, late).each for cause in each.outcome.causes]
     assert kinds
     assert "exchanged_sources" not in kinds
+
+
+def one(folder: Path, seed: int, swap: bool, kinds: tuple[str, ...] = RULE.labels) -> list[str]:
+    """Return the causes of a recording of which contacts are called releases if they are swapped."""
+    recordings, begins = walk(folder, seed, "left", "right")
+    names = reversed(RULE.labels) if swap else RULE.labels
+    late = {name: begins["left"] + by for name, by in zip(names, (0, 300_000), strict=True)}
+    labels = {name: times for name, times in late.items() if name in kinds}
+    [each] = detect(RULE, recordings[0].sources["left"], [labels]).each
+    return [f"{cause.kind}: {cause}" for cause in each.outcome.causes]
+
+
+@pytest.mark.parametrize("seed", [7, 8])
+def test_exchanged_names_of_labels_are_named_in_the_place_of_all_else(tmp_path: Path, seed: int) -> None:
+    assert one(tmp_path, seed, swap=False) == []
+    first, second = sorted(RULE.labels)
+    assert one(tmp_path, seed, swap=True) == [
+        f"exchanged_names: the names {first} and {second} are exchanged, in these labels or in those of the training: "
+        "with the names exchanged, 40 of 40 labels are found"
+    ]
+    # Labels of one name alone show no exchange.
+    assert not any("exchanged" in cause for cause in one(tmp_path, seed, swap=True, kinds=RULE.labels[:1]))
+
+
+@pytest.mark.parametrize("seed", [9, 10])
+def test_the_verdict_names_the_recording_in_which_all_mistakes_are(tmp_path: Path, seed: int) -> None:
+    sources, labels = [], []
+    for k in range(3):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        recordings, begins = walk(folder, seed + k, "left", "right")
+        sources.append(recordings[0].sources["left"])
+        names = RULE.labels[::-1] if k == 0 else RULE.labels
+        labels.append({name: begins["left"] + by for name, by in zip(names, (0, 300_000), strict=True)})
+    found = detect(RULE, sources, labels)
+    assert len(found.unreliable) == 2
+    assert all("do not rely on this score in " in text and "0 of 20 labels" in text for text in found.unreliable)
+    # Where most recordings are bad, the verdict is of all.
+    labels[1] = dict(zip(labels[1], list(labels[1].values())[::-1], strict=True))
+    assert all("do not rely on this score here" in text for text in detect(RULE, sources, labels).unreliable)

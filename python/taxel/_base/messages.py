@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from itertools import chain
 
 #: C0, DEL and C1, the marks and overrides of direction, the separators of lines and paragraphs, and halves of surrogate
 #: pairs, which represent bytes of file names that are not UTF-8. `crates/taxel-panel/web/dom.js` has the same.
@@ -112,9 +113,9 @@ def ranged(least: float, most: float) -> str:
 def of_names(named: Sequence[tuple[str, str]], total: int) -> list[str]:
     """Return texts with their names before them; a text that several names share is returned once.
 
-    Texts that differ only in numbers become one text with the ranges of the numbers, unless these are times. Where a
-    single number differs, of few names, and by far, it has that of each name in their order. A text of all names begins
-    with how many these are; if there is a single name, it is left out.
+    Texts that differ only in numbers become one text with the ranges of the numbers, unless these are times, or several
+    numbers differ between few names. Where a single number differs, of few names, and by far, it has that of each name
+    in their order. A text of all names begins with how many these are; if there is a single name, it is left out.
 
     Parameters
     ----------
@@ -131,19 +132,32 @@ def of_names(named: Sequence[tuple[str, str]], total: int) -> list[str]:
     ['all 3: 51 to 54 ms later']
     >>> of_names([(name, f"{ratio} times as strong") for name, ratio in (("a", 0.3), ("b", 0.9), ("c", 0.4))], 4)
     ['a, b, c: 0.3, 0.9 and 0.4 times as strong']
+    >>> of_names([("a", "3 of 33 are far"), ("b", "30 of 63 are far")], 2)
+    ['a: 3 of 33 are far', 'b: 30 of 63 are far']
     """
     alike: dict[str, list[tuple[str, str]]] = {}
     for name, text in named:
         key = text if _SECONDS.search(text) else _RANGE.sub("\0", text)
         alike.setdefault(key, []).append((name, text))
     texts = []
-    for pairs in alike.values():
+    for pairs in chain.from_iterable(map(_readable, alike.values())):
         names = list(dict.fromkeys(name for name, _ in pairs))
         who = f"all {total}" if len(names) == total else ", ".join(names)
         texts.append(
             f"{who}: " * (total > 1) + _with_ranges([text for _, text in pairs], is_of_each=len(names) == len(pairs))
         )
     return texts
+
+
+def _readable(pairs: list[tuple[str, str]]) -> list[list[tuple[str, str]]]:
+    """Return names and texts that differ in numbers alone, those of few names by their texts if several numbers do."""
+    numbers = zip(*(_RANGE.findall(text) for _, text in pairs), strict=True)
+    if len(pairs) > _MOST_LISTED or sum(len(set(of_each)) > 1 for of_each in numbers) < 2:
+        return [pairs]
+    same: dict[str, list[tuple[str, str]]] = {}
+    for name, text in pairs:
+        same.setdefault(text if name else "", []).append((name, text))
+    return list(same.values())
 
 
 def _with_ranges(texts: Sequence[str], *, is_of_each: bool) -> str:

@@ -199,7 +199,7 @@ class Mistakes:
                 found.append(cause)
                 continue
             if cause.option not in tried:
-                tried[cause.option] = self.tried(cause.arguments["window_ms"], cause.arguments["shift_ms"])
+                tried[cause.option] = self.tried(cause.arguments["window_ms"], cause.arguments.get("shift_ms", 0.0))
             if left := _left(cause.labels[0], self.scored, tried[cause.option].together):
                 found.append(replace(cause, measured=f"{cause.measured}; {left}"))
         return found
@@ -351,7 +351,7 @@ def _off_in_parts(evidence: Evidence, each: Sequence[Score], wrong: Mapping[str,
         many = {label: s.rank[0] for label in wrong if (s := score.by_label.get(label)) and s.missed >= _LEAST_OFF}
         alone = evidence.without([place for place in range(len(each)) if place != k]) if many else None
         for cause in alone.causes(many) if alone is not None else ():
-            if cause.kind == "shifted_labels":
+            if cause.kind == "shifted_labels" and ("shift_ms" in cause.arguments or not cause.option):
                 found[cause.labels[0]].append((example.name, cause))
     for label, parts in found.items():
         mistakes = sum(cause.mistakes for _, cause in parts)

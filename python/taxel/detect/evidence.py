@@ -316,12 +316,11 @@ class Evidence:
                 continue
             if label in self.felt_apart and not self.is_of_one_name:
                 continue
-            if (best.is_far or self._is_shifted) and abs(distance.ms - best.ms) <= 2 * WINDOW_MS:
-                option, arguments = f"--shift-ms {-best.ms:.0f}", {"shift_ms": -float(round(best.ms))}
-                if best.within_ms > WINDOW_MS:
-                    option = f"{option} --window-ms {best.within_ms:.0f}"
-                    arguments["window_ms"] = best.within_ms
-                measured = f"{distance}; the score is then against the moved labels"
+            together = (best.is_far or self._is_shifted) and abs(distance.ms - best.ms) <= 2 * WINDOW_MS
+            if together or distance.is_around:
+                arguments = (best if together else distance).arguments
+                option = " ".join(f"--{name.replace('_', '-')} {value:.0f}" for name, value in arguments.items())
+                measured = f"{distance}{'; the score is then against the moved labels' * ('shift_ms' in arguments)}"
                 yield by_option("shifted_labels", label, wrong[label], measured, option, **arguments)
             else:
                 side = "earlier" if distance.ms > 0 else "later"

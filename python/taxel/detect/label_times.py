@@ -34,6 +34,8 @@ _SHARE, _LEAST = 0.8, 5
 #: Marks that a hand sets live have a common distance of at most that, ms, and the same share of them is in a stretch
 #: of at most that, ms; all but a few in so many standard deviations around it, in steps of that, ms.
 _HAND_MS, _HAND_SPREAD_MS, _DEVIATIONS, _STEP_MS = 500.0, 170.0, 3.0, 10.0
+#: Marks are around what was felt, neither early nor late, whose common distance is at most this share of the spread.
+_BESIDE = 0.25
 #: A load changes after its label where it has changed in the middle part of the time until it is felt, looked at so
 #: often, of so many labels; what falls has fallen to that share.
 _MIDDLE, _LOOKS, _MOST, _FALLEN = (0.25, 0.75), 8, 0.85, 0.75
@@ -70,7 +72,26 @@ class Off(NamedTuple):
         """Whether more than a few of the labels are too far from what was felt to be aligned."""
         return self.beyond > (1 - _SHARE) * self.alike
 
+    @property
+    def is_around(self) -> bool:
+        """Whether labels that a hand set are as far before what was felt as after it, beside how far they spread."""
+        return self.within_ms > WINDOW_MS and abs(self.ms) <= _BESIDE * self.within_ms
+
+    @property
+    def arguments(self) -> dict[str, float]:
+        """The shift that moves labels to what was felt, and the window for their spread, by the names of options."""
+        moved = {} if self.is_around else {"shift_ms": -float(round(self.ms))}
+        return moved | ({"window_ms": self._reach_ms} if self.within_ms > WINDOW_MS else {})
+
+    @property
+    def _reach_ms(self) -> float:
+        """The window of labels by a hand, which reaches to both sides of where they are moved to."""
+        return float(self.within_ms + _STEP_MS * np.ceil(abs(self.ms) / _STEP_MS) * self.is_around)
+
     def __str__(self) -> str:
+        if self.is_around:
+            reach = f"within {self._reach_ms:.0f} ms of what the sensor felt, like keys pressed live"
+            return f"{self.alike} of {self.labels} are {reach}"
         side = "after" if self.ms > 0 else "before"
         if self.changes_from_label:
             return (

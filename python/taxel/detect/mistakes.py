@@ -14,6 +14,7 @@ from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.cause import Cause, by_option, ordered
 from taxel.detect.examples import Example, Outcome, check_examples
+from taxel.detect.exchanged import exchanged_names
 from taxel.detect.label_times import PEAK, FeltLoads, chance_of, same_distance
 from taxel.detect.scoring import APART_US, Mistake, Score, mistakes_of, score, score_together
 from taxel.detections import Detections
@@ -116,8 +117,10 @@ def causes_of(
     scores = [cast("Score", outcome.score) for outcome in outcomes]
     mistakes = mistakes_of(found, [example.labels for example in examples], scores)
     measured = Measured(examples, mistakes, scored, window_ms, differences=differences, standing=standing)
+    names = list(exchanged_names(outcomes, window_ms))
+    others = {label: count for label, count in wrong.items() if all(label not in cause.labels for cause in names)}
     # That far too many are false is what `unreliable` says.
-    return ordered([cause for cause in measured.causes(wrong) if cause.kind != "many_false"])
+    return ordered([*names, *(cause for cause in measured.causes(others) if cause.kind != "many_false")])
 
 
 class Standing(NamedTuple):

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._base.messages import are, counted, three_digits
 from taxel._base.progress import reporting
+from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.detect.detector import _Detector
 from taxel.detect.examples import Example, check_examples
@@ -52,6 +53,11 @@ _LEAST, _FEWER = 5, 0.2
 #: The last such part of a recording is compared with the first; a taxel has moved by so many times the noise, and by
 #: that share of what the most loaded taxel reads in a touch.
 _PARTS, _MOVED, _OF_TOUCH = 8, 5.0, 0.05
+#: Values come in steps where the noise is below this share of the training's, and each change is so many times that,
+#: and that share of what a touch reads, at least; they are held where such a share of frames equals the one before.
+_STILL, _STEP, _HELD = 0.25, 5.0, 0.5
+#: A taxel jumps below its rest where it changes there by so many times the noise (mean), in so many stretches.
+_JUMPS, _SPELLS = 5.0, 2
 #: A channel that counts alone has moved by so many times its own noise.
 _ALONE = 10.0
 #: Two detections are close at this part of the shortest time between labels; this share of close ones is a difference.
@@ -183,6 +189,11 @@ def unlike(readout: _Detector, example: Example, found: Detections) -> Unlike:
     is_counts = readout.unit is not None and are_counts(readout.unit)
     noisier = noise / data["noise"] if data["noise"] > 0.0 else 1.0
     sensor, detections = list(_of_noise(noisier, is_counts=is_counts)), list[str]()
+    if isinstance(source, Frames) and not is_counts and len(source) >= 2 * _FRAMES:
+        if noisier < _STILL:
+            sensor += _of_steps(source, data["noise"], 0.0 if measured is None else measured.reading)
+        if example.tare is not None:
+            sensor += _of_jumps(source, example.tare.rest, data["noise"])
     if measured is not None and (count := _moved(source, data["noise"], measured.reading)):
         # Touches are measured above the rest.
         sensor.append(
@@ -205,6 +216,35 @@ def _of_noise(noisier: float, *, is_counts: bool) -> Iterator[str]:
         yield f"{noisier**2:.2g} times as many events at rest as in the training"
     elif not is_counts and noisier >= _NOISIER:
         yield f"the noise at rest is {noisier:.2g} times as strong as in the training"
+
+
+def _of_steps(source: Frames, noise: float, reading: float) -> Iterator[str]:
+    """Yield that values come in steps, by the noise of the training, or are held."""
+    here = np.unique(np.linspace(0, len(source) - 2, _LOOKS).astype(np.int64))
+    change = np.abs(source.values[here + 1].astype(np.float64) - source.values[here])
+    step = float(np.min(change, initial=np.inf, where=change > 0))
+    held = float((change == 0).all(axis=(1, 2)).mean())
+    parts = [f"values change in steps of {step:.3g} {source.unit}"] * (step >= max(_STEP * noise, _OF_TOUCH * reading))
+    parts += [f"{held:.0%} of frames equal the one before"] * (held >= _HELD)
+    if parts and np.isfinite(step):
+        yield f"{', and '.join(parts)}; the noise of the training is {noise:.3g} {source.unit}"
+
+
+def _of_jumps(source: Frames, rest: _Values, noise: float) -> Iterator[str]:
+    """Yield how many taxels jump below their rest for a while, although touches only add load."""
+    begins, stretches = _stretches(source)
+    quiet = np.sqrt(np.quantile(_squares(source), _QUIET, axis=0))
+    change = np.abs(np.diff(np.minimum(stretches - rest, 0.0), axis=1)).mean(axis=1)
+    jumps = change > _JUMPS * np.maximum(quiet, noise)
+    taxels = jumps.sum(axis=0) >= _SPELLS
+    if count := int(np.count_nonzero(taxels)):
+        at = jumps[:, taxels].any(axis=1)
+        first = int(source.t[begins[at][0]]) - beginning_us(source.t)
+        yield (
+            f"{counted(count, 'taxel')} {'jumps' if count == 1 else 'jump'} below the rest in {at.mean():.0%} of the "
+            f"time, for example at {first / 1e6:.1f} s, by more than {_JUMPS:.0f} times the noise: a loose cable, or "
+            "interference"
+        )
 
 
 def _of_channels(source: Events | Frames | SpikeTrains) -> Iterator[str]:
@@ -372,12 +412,16 @@ def _ends(source: Frames) -> _Values:
     return np.asarray(np.quantile(ends, 0.1, axis=1))
 
 
+def _stretches(source: Frames) -> tuple[NDArray[np.int64], _Values]:
+    """Return the first frames of some stretches, and the values of their frames."""
+    begins = np.linspace(0, len(source) - _FRAMES, _STRETCHES).astype(np.int64)
+    return begins, source.values[begins[:, None] + np.arange(_FRAMES)].astype(np.float64)
+
+
 def _squares(source: Frames) -> _Values:
     """Return the squared noise of each taxel in some stretches."""
-    begins = np.linspace(0, len(source) - _FRAMES, _STRETCHES).astype(np.int64)
-    values = (source.values[begin : begin + _FRAMES].astype(np.float64) for begin in begins)
     # Of independent noise two neighbours in time differ by twice its variance.
-    return np.asarray(np.mean([np.diff(stretch, axis=0) ** 2 for stretch in values], axis=1) / 2.0)
+    return np.asarray((np.diff(_stretches(source)[1], axis=1) ** 2).mean(axis=1) / 2.0)
 
 
 def _noise(source: Events | Frames) -> float:

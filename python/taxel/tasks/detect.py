@@ -56,6 +56,7 @@ _FEW_HELD = 2
 #: Causes of a bad score that are of labels or of the recording, not of the readout.
 _OF_LABELS = (
     "exchanged_sources",
+    "exchanged_names",
     "shifted_labels",
     "window",
     "gaps",
@@ -64,7 +65,9 @@ _OF_LABELS = (
     "standing_load",
 )
 #: Those of them that need no advice.
-_WITHOUT_ADVICE = ("exchanged_sources", "gaps", "standing_load")
+_WITHOUT_ADVICE = ("exchanged_sources", "exchanged_names", "window", "gaps", "standing_load")
+#: So many recordings of several are few.
+_FEW_BAD = 2
 #: The noise is compared with that of the training from so many times that.
 _NOISIER = 1.5
 #: No event.
@@ -348,7 +351,8 @@ def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) 
     scores = {group: score_of(members, window_ms).by_label for group, members in groups.items()}
     for label, of_all in together.by_label.items():
         causes = [cause for members in groups.values() for cause in members[0].causes]
-        if text := unreliable(label, of_all, "labels", f"this {_at_fault(label, of_all, causes)} here"):
+        text = unreliable(label, of_all, "labels", f"this {_at_fault(label, of_all, causes)} here")
+        if text and not _in_few(label, groups, scores, window_ms):
             yield text
             continue
         for group, members in groups.items() if len(groups) > 1 else ():
@@ -358,6 +362,21 @@ def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) 
                 text = unreliable(label, of_group, "labels", f"this {fault} in {group.strip()}")
                 # By how much the labels of a recording are off, the score of all does not say.
                 yield from ["; ".join(filter(None, (text, of_group.missed_text)))] if text else []
+
+
+def _in_few(
+    label: str,
+    groups: Mapping[str, Sequence[Outcome]],
+    scores: Mapping[str, Mapping[str, Score]],
+    window_ms: float,
+) -> bool:
+    """Whether a label is unreliable in a few of several recordings, and not in the others together."""
+    bad = {group for group, of_group in scores.items() if label in of_group and unreliable(label, of_group[label], "")}
+    rest = [outcome for group, members in groups.items() if group not in bad for outcome in members]
+    if not bad or len(bad) > _FEW_BAD or 2 * len(bad) > len(groups):
+        return False
+    of_rest = score_of(rest, window_ms).by_label.get(label)
+    return of_rest is not None and not unreliable(label, of_rest, "")
 
 
 def _at_fault(label: str, scored: Score, causes: Sequence[Cause]) -> str:
