@@ -43,7 +43,7 @@ def npz(**columns: object) -> bytes:
         ("a.npz", b"\x89MCAP0\r\n", "(a .mcap file), not with the magic of a .npz; rename it"),
         ("a.npz", b"t_us,x,y,p\n", "not with the magic of a .npz"),
         ("a.npz", npz(t=[1])[:40], "cannot be unpacked"),
-        ("a.npz", npz(t=[1], x=[2]), "holds t, x: y is missing"),
+        ("a.npz", npz(t=[1], x=[2]), "y is missing; must contain t, x, y, p (events) or values, t (frames), but contains t, x"),
         ("a.npz", npz(t=[1], x=[2], y=[3], p=[True, False]), "p"),
         ("a.npz", npz(t=[1], x=[2], y=[3], p=[True], about="{"), "array about"),
         ("a.npz", npz(t=[1], values=np.zeros((2, 3, 3))), "t has shape"),
@@ -60,7 +60,7 @@ def npz(**columns: object) -> bytes:
         ("a.csv", b"t_us,x,y,p\n1.5,2,3,0\n", "line 2, column t_us"),
         ("a.csv", b"t_us,x,y,p,intensity\n1,2,3,0,70000\n", "column intensity: is 70000; must be 0 to 65535"),
         ("a.csv", b"t_us,x0y0,x0y0\n0,1,2\n", "column 'x0y0' appears twice"),
-        ("a.csv", b"t_us,x0y0,heel\n0,1,2\n", "column 'heel' among taxels"),
+        ("a.csv", b"t_us,x0y0,heel\n0,1,2\n", "column 'heel' must be named like x3y5"),
         ("a.csv", b"t_us,x0y0\n0,1\n0,2\n", "t[1] is 0 us, not after"),
         ("a.csv", b"t_us,x0y0\n0.5,1\n", "a.csv, line 2, column t_us: is 0.5; must be a whole number of us"),
         ("a.csv", b"t_us,x0y0\n0,1\n1,2,3\n", "line 3"),
@@ -189,7 +189,7 @@ def test_frames_on_a_given_array_of_another_size_are_refused_by_its_name(tmp_pat
     for array in (taxel.Array(3, 5), taxel.Array(2, 8), taxel.Array(1, 16)):
         size = " x ".join(map(str, array.shape))
         with pytest.raises(
-            taxel.ProblemError, match=f"array: has {size} taxels; the frames of .*a.{ending} have 4 x 4$"
+            taxel.ProblemError, match=f"array has {size} taxels; the frames of .*a.{ending} have 4 x 4$"
         ):
             taxel.open(path, array=array)
     assert taxel.open(path, array=taxel.Array(4, 4, 5.0)).array.pitch_mm == 5.0

@@ -165,10 +165,10 @@ def test_what_is_cut_along_a_column_and_put_beside_is_whole_again(tmp_path: Path
 @pytest.mark.parametrize(
     ("asked", "there"),
     [
-        ({"columns": slice(3, 99)}, "columns 3 to 99: there are 6 columns, 0 to 5"),
-        ({"columns": slice(7, None)}, "columns 7 to the last: there are 6 columns"),
-        ({"rows": slice(None, 5)}, "rows 0 to 5: there are 4 rows, 0 to 3"),
-        ({"rows": slice(-9, 2)}, "rows -9 to 2: there are 4 rows"),
+        ({"columns": slice(3, 99)}, "columns 3 to 99: must be within 0 to 5, because there are 6 columns"),
+        ({"columns": slice(7, None)}, "columns 7 to the last: must be within 0 to 5"),
+        ({"rows": slice(None, 5)}, "rows 0 to 5: must be within 0 to 3, because there are 4 rows"),
+        ({"rows": slice(-9, 2)}, "rows -9 to 2: must be within 0 to 3"),
     ],
 )
 def test_a_part_beyond_the_array_is_refused(tmp_path: Path, asked: dict[str, slice], there: str) -> None:

@@ -194,7 +194,7 @@ def test_the_command_line_shows_and_writes_one_source(
     assert run("cut", several[0], tmp_path / "left.npz", "--source", "left", "--to", "0.1").returncode == 0
     refused = run("convert", several[0], tmp_path / "x.csv")
     assert refused.returncode == 2
-    assert refused.stderr.startswith(f"taxel: {several[0]}: holds 4 sources (right, left, imu, given)")
+    assert refused.stderr.startswith(f"taxel: {several[0]}: contains 4 sources (right, left, imu, given)")
     unknown = run("cut", several[0], tmp_path / "x.npz", "--source", "up")
     assert unknown.stderr == f"taxel: --source up: {several[0]} contains only right, left, imu, given\n"
 
@@ -373,7 +373,7 @@ def test_times_go_from_one_clock_to_the_other_and_nothing_else_moves(
     assert recording.sources["right"].events == plain["right"].events, "what was opened stays as it was"
     cut = recording.on_clock("left").between(0, 100_000).sources
     assert len(cut["left"].events) == 5
-    with pytest.raises(taxel.ProblemError, match="has no clock 'up'; there are right, left, imu, given, host"):
+    with pytest.raises(taxel.ProblemError, match="has no clock 'up'; must be one of right, left, imu, given, host"):
         recording.on_clock("up")
     with pytest.raises(taxel.ProblemError, match="is already on the clock of left"):
         recording.on_clock("left").on_clock("host")
