@@ -197,7 +197,7 @@ def check(recording: taxel.Recording, models: dict[str, Model], where: str) -> N
     for name, model in models.items():
         same(sources[name], model, f"{where}, {name}")
     if len(models) > 1:
-        with pytest.raises(taxel.ProblemError, match=f"holds {len(models)} sources"):
+        with pytest.raises(taxel.ProblemError, match=f"contains {len(models)} sources"):
             recording.frames()
 
 

@@ -118,7 +118,7 @@ def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_pat
         (("info",), "FILE is missing"),
         (("info", "nothing.mcap"), "nothing.mcap: no such file or directory"),
         (("info", "."), ".: contains no recording; taxel reads .mcap"),
-        (("convert", "WALK", "walk.xyz"), "must be .mcap, .lsa, .npz, .csv"),
+        (("convert", "WALK", "walk.xyz"), "must end in one of .mcap, .lsa, .npz, .csv"),
         (("convert", "WALK", "WALK"), "exists already"),
         (("convert", "WALK", "a.npz", "--array", "6x6"), "states its sensor, Array("),
         (("info", "WALK", "--array", "6x6"), "states its sensor, Array("),

@@ -233,7 +233,7 @@ def test_a_slice_of_a_recording_is_converted_as_a_slice(tmp_path: Path) -> None:
         ((None, "a.npz"), "source is None"),
         (("E", 7), "target is 7"),
         (("E", b"a.npz"), "target is b'a.npz'"),
-        (("E", "a.xyz"), "ends in '.xyz'; must be .mcap, .lsa, .npz, .csv"),
+        (("E", "a.xyz"), "ends in '.xyz'; must end in one of .mcap, .lsa, .npz, .csv"),
         (("E", "a"), "ends in 'nothing'"),
         (("E", "a.mcap", {"compression": "gzip"}), "compression is 'gzip'"),
         (("E", "a.mcap", {"compression": None}), "compression is None"),

@@ -218,7 +218,7 @@ def test_both_feet_of_a_file_become_sources_left_and_right(
     assert call(capsys, "convert", file, tmp_path / "both.mcap")[0] == 0
     both = taxel.open(tmp_path / "both.mcap")
     assert list(both.sources) == ["left", "right"]
-    with pytest.raises(ProblemError, match="holds 2 sources \\(left, right\\)"):
+    with pytest.raises(ProblemError, match="contains 2 sources \\(left, right\\)"):
         both.frames()
     for one, label in zip(trials, ("left", "right"), strict=True):
         source = both.sources[label]

@@ -119,7 +119,7 @@ def test_two_parts_that_agree_are_merged_whole_and_two_that_do_not_say_so(tmp_pa
     assert whole.clock is not None
     both = taxel.merge([recording, other], gap_us=1000)
     said = " | ".join(both.lost)
-    for word in ("arrival times", "changes of the board", "zeroed taxels", "taxels held where 1.mcap begins"):
+    for word in ("arrival times", "changes of the board", "zeroed taxels", "taxels at the beginning of 1.mcap"):
         assert word in said, said
     assert both.zeroings == ()
     assert both.registers == recording.registers

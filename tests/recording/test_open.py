@@ -43,7 +43,7 @@ def npz(**columns: object) -> bytes:
         ("a.npz", b"\x89MCAP0\r\n", "(a .mcap file), not with the magic of a .npz; rename it"),
         ("a.npz", b"t_us,x,y,p\n", "not with the magic of a .npz"),
         ("a.npz", npz(t=[1])[:40], "cannot be unpacked"),
-        ("a.npz", npz(t=[1], x=[2]), "y is missing; must contain t, x, y, p (events) or values, t (frames), but contains t, x"),
+        ("a.npz", npz(t=[1], x=[2]), "y is missing; must contain t, x, y, p (events) or values, t (frames), "),
         ("a.npz", npz(t=[1], x=[2], y=[3], p=[True, False]), "p"),
         ("a.npz", npz(t=[1], x=[2], y=[3], p=[True], about="{"), "array about"),
         ("a.npz", npz(t=[1], values=np.zeros((2, 3, 3))), "t has shape"),
