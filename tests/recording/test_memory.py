@@ -170,7 +170,7 @@ def test_a_chunk_of_a_bag_that_unpacks_to_too_much_is_refused(ending: str, tmp_p
     write_packed(path)
     assert path.stat().st_size < 200_000
     said = opened(path, topic="/hand", field="thumb")
-    assert re.search("an unpacked chunk has (more than 67108864|68\\d{6}) bytes; must have at most 67108864", said["refused"])
+    assert re.search(r"an unpacked chunk has (more than 67108864|68\d{6}) bytes; must have at most ", said["refused"])
     assert said["peak"] < 256 * MIB
 
 

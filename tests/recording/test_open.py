@@ -437,5 +437,5 @@ def test_the_page_opens_an_array_whose_rate_is_given(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", np.ones((4, 256)))
     with Panel(tmp_path / "a.npy", options=TextOptions(rate_hz=30.0)) as panel:
         assert panel.url
-    with pytest.raises(FormatError, match=r"a\.npy: holds an array"):
+    with pytest.raises(FormatError, match=r"a\.npy: contains an array"):
         Panel(tmp_path / "a.npy")
