@@ -202,7 +202,7 @@ def test_taxels_whose_rest_is_not_in_the_tare_are_said(folder: Path, trained: Pa
     known = np.count_nonzero(~np.isnan(taxel.Tare.take(events, stop_us=int(events.t[0]) + 50_000).rest))
     assert code == 0
     assert f"the rest of {heard.sum() - known} of {heard.sum()} taxels is not known" in error
-    assert "give a file of a tare" in error
+    assert "give a tare's file" in error
     code, _, error = call(capsys, "detect", folder / "9.npz", "--readout", trained, "--tare", 0.05)
     assert (code, error) == (0, "")
 

@@ -290,7 +290,7 @@ def test_inputs_are_chosen_among_the_points_and_what_none_uses_is_not_encoded() 
         ({"neurons": {"a": {"inputs": ["moments"], "delay_ms": 3.0}}}, "neurons.a: delay_ms is 3, but .* 0, 4, 6"),
         (
             {"neurons": {"a": {"delay_ms": 4.0, "search": [{"inputs": ["b"]}]}}},
-            "neurons.a.search: inputs: the composite has no encoder",
+            "neurons.a.search: inputs: .b. is not the name of an encoder",
         ),
         ({"encoders": {"area": {"name": "areas"}}}, "recipe: encoders.area: encoder areas: must be one of"),
         ({"encoders": {"area": 3}}, "recipe: encoders.area"),

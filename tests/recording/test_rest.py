@@ -103,7 +103,7 @@ def test_frames_of_force_rest_at_0_and_others_where_they_are_quiet(tmp_path: Pat
 def test_what_is_never_quiet_has_no_rest_and_the_page_says_so(tmp_path: Path) -> None:
     values = np.arange(40)[:, None, None] % 2 * 30.0 + np.full((40, 3, 3), 50.0)
     taxel.convert(taxel.Frames(values, np.arange(40) * 50_000, unit="counts"), tmp_path / "a.npz")
-    assert "rest                not known" in run("info", tmp_path / "a.npz").stdout
+    assert "rest                unknown" in run("info", tmp_path / "a.npz").stdout
     found = above_rest(taxel.open(tmp_path / "a.npz"))
     assert found is not None
     assert float(found[0].values.max()) == 80.0
