@@ -350,7 +350,7 @@ def test_a_row_of_channels_is_told_how_it_is_laid_out_and_array_does_it(tmp_path
     taxel.detect.PlainRule("local_load", 3).save(tmp_path / "rule.json")
     detect = ("detect", tmp_path / "flat.npy", "--readout", tmp_path / "rule.json", "--tare", "0.05")
     assert "1 x 12 channels without a pitch; give --array ROWSxCOLUMNS" in call(capsys, *detect)[2]
-    assert "--array: 4 x 4 taxels; " in call(capsys, *detect, "--array", "4x4")[2]
+    assert "--array has 4 x 4 taxels; " in call(capsys, *detect, "--array", "4x4")[2]
     status, said, _ = call(capsys, *detect, "--array", "3x4", "--json")
     assert status == 0
     assert [one["t_us"] / 1000 for one in json.loads(said)["detections"]] == [100, 200, 250, 300]

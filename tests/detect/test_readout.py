@@ -253,7 +253,7 @@ def test_neurons_trained_otherwise_are_refused() -> None:
     weights = np.ones(6)
     area = ContactArea(levels=(2, 4, 8))
     first = (taxel.Neuron(), weights)
-    with pytest.raises(taxel.ProblemError, match='b: trained for after_spike "reset", this readout is for'):
+    with pytest.raises(taxel.ProblemError, match='b: the neuron was trained for after_spike "reset", but this'):
         Readout(area, {"a": first, "b": (taxel.Neuron(after_spike="reset"), weights)})
     with pytest.raises(
         taxel.ProblemError, match='b: the neuron was trained for time "grid", but this readout is for time "continuous"'
