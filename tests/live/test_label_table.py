@@ -391,9 +391,9 @@ def test_recordings_of_one_stem_share_what_was_acknowledged(table: Path, tables)
 def test_what_no_table_has_was_not_acknowledged(row, table: Path, tables) -> None:
     saved = {"acknowledged": {"labels": [row], "deleted": [], "table": None}, "next": None}
     table.with_name(SAVED).write_text(json.dumps(saved))
-    with pytest.raises(FormatError, match="damaged, so the labels that taxel acknowledged"):
+    with pytest.raises(FormatError, match="damaged, so taxel does not know which labels"):
         tables.read(table, OWN)
-    with pytest.raises(FormatError, match="damaged, so the labels that taxel acknowledged"):
+    with pytest.raises(FormatError, match="damaged, so taxel does not know which labels"):
         mark(tables, table, "toe", 1)
     assert not table.exists()
 
