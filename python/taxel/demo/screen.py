@@ -101,7 +101,7 @@ class Screen:
         if len(true):
             nearest = int(np.abs(true - detection.t).argmin())
             line.append(f"{self._kinds[nearest]:<7} known {to_ms(detection.known - true[nearest]):+6.2f} ms, ")
-            line.append(f"output {to_ms(detection.reported - true[nearest]):+6.2f} ms after the true time", style="dim")
+            line.append(f"output {to_ms(detection.reported - true[nearest]):+6.2f} ms after truth", style="dim")
         return line
 
 
