@@ -114,7 +114,7 @@ def play_live(
     if summary.counters["late"]:
         verdicts.append(
             f"{counted(summary.counters['late'], 'event')} arrived more than 5 frames late, so the readout had "
-            "continued without them: this machine was too busy. Detections of these events are late, at wrong times or missing. "
-            "The recording contains all events. --no-clock simulates without the clock"
+            "continued without them: this machine was too busy. Detections of these events are late, at wrong times or "
+            "missing. The recording contains all events. --no-clock simulates without the clock"
         )
     return Playing(evaluation, summary.counters, emulator, verdicts, recording, agrees)
