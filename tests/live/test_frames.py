@@ -367,7 +367,7 @@ def test_numbers_that_a_program_passes_are_frames(tmp_path: Path) -> None:
 
 def test_a_readout_of_another_unit_or_shape_is_refused(tmp_path: Path) -> None:
     for options, why in [
-        ("array=2x2,unit=kPa", "live values are in kPa, but the readout was trained on N.*state unit=N in --source"),
+        ("array=2x2,unit=kPa", "live values are in kPa, but the readout was trained on N: .*add unit=N in --source"),
         ("array=2x3,unit=N", "trained on 2 x 2"),
         ("array=2x2,columns=a:b:c", "lines have 3 values: must be 4 per frame"),
         ("array=2x2,frame_lines=3", "lines have 1 values, 3 lines per frame: must be 4 per frame"),
@@ -427,6 +427,8 @@ def test_the_command_says_which_sources_it_does_not_read_out(
         code, _, err = call(capsys, "live", *words, "--readout", readout, "--record", path, "--seconds", "0.3")
     assert code == 0, err
     told = [line for line in err.splitlines() if "recorded, but" in line]
-    assert told == ["right: recorded, but neither read out nor shown; a second taxel live can read it out"]
+    assert told == [
+        "right: this source is recorded, but neither read out nor shown; a second taxel live can read it out"
+    ]
     code, _, err = call(capsys, "detect", path, "--readout", readout, "--tare", "0.1")
     assert code == 0, err
