@@ -157,7 +157,7 @@ def test_control_c_stops_it_promptly():
         ({"kernel": "double_exponential", "tau_s": 20.0}, "tau_s is 20 ms: must be below tau, 15 ms"),
         ({"pulse_ms": 0.0}, "pulse_ms is 0 ms"),
         ({"ridge": -1.0}, "ridge is -1: must be 0 or more"),
-        ({"branches": 10}, "spread: none was published for a layer of branches, give one"),
+        ({"branches": 10}, "spread: none was published for a layer of branches; give one"),
         ({"branches": 10, "spread": 1.0}, "delay_ms: none was published"),
         ({"branches": 0, "spread": 1.0, "delay_ms": 0.0}, "branches is 0: must be from 1 to 100000"),
         (
