@@ -322,7 +322,7 @@ def test_a_label_outside_the_recording_is_refused(tmp_path):
             more = 10_000 if name == "table.csv" else 1
             for t_us, side in ((last + late + more, "after the end"), (first - late - more, "before the beginning")):
                 refused = page.ask("mark", label="a", t_us=t_us)
-                said = f"a label {far} {side} of {name}: must be within the recording"
+                said = f"a label is {far} {side} of {name}: must be within the recording"
                 assert (refused["field"], refused["reason"]) == ("t_us", said)
             mine = labels_of(page)[0]["label_id"]
             assert page.ask("move", label_id=mine, t_us=10**12)["type"] == "refused"
