@@ -306,8 +306,8 @@ def test_a_file_that_cannot_be_read_is_left_out_and_said(ran, damaged, tmp_path,
     assert not ended.value.code
     out, error = capsys.readouterr()
     assert error.startswith("gait: reading the recordings in ")
-    assert "left out: insole_gaitpdb/GaPt99_01.txt: line" in out
-    assert "left out: pressure_formats/pliance.asc: the line of column names" in out
+    assert "left out, because it could not be read: insole_gaitpdb/GaPt99_01.txt: line" in out
+    assert "left out, because it could not be read: pressure_formats/pliance.asc: the line of column names" in out
     section = json.loads((tmp_path / "report" / "gait" / "summary.json").read_text())
     assert list(section["unread"]) == ["insole_gaitpdb/GaPt99_01.txt", "pressure_formats/pliance.asc"]
     assert "pliance.asc" in (tmp_path / "report" / "index.html").read_text()

@@ -565,9 +565,9 @@ def test_a_table_of_labels_claims_what_it_takes(tmp_path: Path) -> None:
             files[-1].write_text(f"{head}\n{rows}", encoding="utf-8")
     done = subprocess.run([sys.executable, "-c", LABELS, *files], check=True, capture_output=True, text=True)
     for many, taken in zip(files[1::2], done.stdout.split(), strict=True):
-        with limits.opening(1), pytest.raises(FormatError, match="states") as refusal:
+        with limits.opening(1), pytest.raises(FormatError, match="when unpacked") as refusal:
             taxel.Labels(many)
-        claimed = int(re.findall(r"states (\d+) bytes", str(refusal.value))[0])
+        claimed = int(re.findall(r"would have (\d+) bytes", str(refusal.value))[0])
         assert claimed / 3 <= int(taken) <= 1.05 * claimed, many.read_text()[:50]
 
 

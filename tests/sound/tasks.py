@@ -102,7 +102,10 @@ SOUND: dict[str, Sound] = {
     "taxel.tasks.calibrate": one(
         tasks.calibrate, "counts", loads=[tasks.KnownLoad(9.0)], options=tasks.CalibrateOptions(exponent=1.0)
     ),
-    "taxel.tasks.Training.command": lambda: (RESULTS["taxel.tasks.Training"]().command, {"readout": "readout.json"}),
+    "taxel.tasks.Training.command": lambda: (
+        RESULTS["taxel.tasks.Training"]().command,
+        {"readout": "readout.json", "is_rule": False},
+    ),
     "taxel.tasks.read_loads": lambda: (tasks.read_loads, {"path": "here_loads.csv"}),
     "taxel.tasks.CalibrateOptions": plain(
         lambda **given: tasks.calibrate(pressed("counts"), [tasks.KnownLoad(9.0)], tasks.CalibrateOptions(**given)),

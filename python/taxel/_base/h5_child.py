@@ -62,7 +62,7 @@ def main() -> None:
             send(listed=True)
             for order in orders():
                 if "attribute" in order:
-                    send(done=listing.attribute(order["of"], order["attribute"]))
+                    send(done=listing.attribute(order["entry"], order["attribute"]))
                     continue
                 if "attributes" in order:
                     send(done=listing.attributes(order["attributes"]))
@@ -168,16 +168,16 @@ class Listing:
                 name,
             )
 
-    def attributes(self, of: str) -> list[str]:
+    def attributes(self, entry: str) -> list[str]:
         """Return the names of the attributes of an entry."""
-        names = list(self.h5[of].attrs)
+        names = list(self.h5[entry].attrs)
         for name in names:
             self.count(name)
         return names
 
-    def attribute(self, of: str, name: str) -> int | float | str | None:
+    def attribute(self, entry: str, name: str) -> int | float | str | None:
         """Return an attribute: a number, a short text, "" for another value, None if it is missing."""
-        attributes = self.h5[of].attrs
+        attributes = self.h5[entry].attrs
         if name not in attributes:
             return None
         about = attributes.get_id(name)

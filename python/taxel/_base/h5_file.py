@@ -83,25 +83,25 @@ class H5File(ReadingChild):
             self.close()
             raise
 
-    def attribute(self, name: str, of: str = "/") -> int | float | str | None:
+    def attribute(self, name: str, entry: str = "/") -> int | float | str | None:
         """Return an attribute of an entry or the root: a number, a short text, "" if it is another value, or None.
 
         Raises
         ------
         FormatError : the attribute is damaged
         """
-        self._order({"attribute": name, "of": of})
+        self._order({"attribute": name, "entry": entry})
         value: int | float | str | None = self._answer()["done"]
         return value
 
-    def attributes(self, of: str = "/") -> list[str]:
+    def attributes(self, entry: str = "/") -> list[str]:
         """Return the names of the attributes of an entry or the root.
 
         Raises
         ------
         FormatError : damage
         """
-        self._order({"attributes": of})
+        self._order({"attributes": entry})
         names: list[str] = self._answer()["done"]
         return names
 

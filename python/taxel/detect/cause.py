@@ -161,11 +161,11 @@ def _together(causes: Sequence[Cause]) -> str:
     """Return what was measured of causes: what is the same of all once, all else behind the labels that it is of."""
     parts = [cause.measured.split("; ") for cause in causes]
     same = [part for part in parts[0] if all(part in each for each in parts)]
-    own: dict[str, tuple[str, ...]] = {}
+    apart: dict[str, tuple[str, ...]] = {}
     for cause, each in zip(causes, parts, strict=True):
         text = "; ".join(part for part in each if part not in same)
-        own[text] = tuple(dict.fromkeys((*own.get(text, ()), *cause.labels)))
-    of_labels = {labels: [text for text in own if own[text] == labels] for labels in own.values()}
+        apart[text] = tuple(dict.fromkeys((*apart.get(text, ()), *cause.labels)))
+    of_labels = {labels: [text for text in apart if apart[text] == labels] for labels in apart.values()}
     before = next((k for k, part in enumerate(parts[0]) if part not in same), len(same))
     texts = [
         f"{', '.join(labels)}: " * (len(of_labels) > 1) + text

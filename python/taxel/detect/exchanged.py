@@ -14,7 +14,7 @@ from taxel.detect.scoring import Score, score_together
 
 #: Labels fit the detections of another source or name, which find this share of them, of so many or more, ...
 _FITS, _LEAST = 0.8, 8
-#: ... with at most this share of the mistakes that their own make, which find at most this share of them.
+#: ... with at most this share of the mistakes that the labels as they are make, which find at most this share of them.
 _FEWER, _OWN = 0.5, 0.5
 
 _NONE = np.empty(0, np.int64)
@@ -57,23 +57,23 @@ def _exchanged(
     fit = _fitting(outcomes, swapped, [outcome.example.labels for outcome in outcomes], window_ms)
     if fit is None:
         return None
-    with_swapped, own = fit
+    with_swapped, given = fit
     names = " and ".join(sorted((source, partner)))
     measured = (
         f"{names} are exchanged, in the labels or in the recording: with the labels exchanged, "
         f"{with_swapped.found} of {with_swapped.events} events are found"
     )
-    labels = [label for label, part in own.by_label.items() if part.events]
-    return Cause("exchanged_sources", tuple(labels), own.rank[0], measured, "")
+    labels = [label for label, part in given.by_label.items() if part.events]
+    return Cause("exchanged_sources", tuple(labels), given.rank[0], measured, "")
 
 
 def exchanged_names(outcomes: Sequence[Outcome], window_ms: float) -> Iterator[Cause]:
     """Yield the pairs of labels whose names are exchanged, in the labels or in those of the training."""
     names = sorted({label for outcome in outcomes for label in outcome.example.labels})
     for pair in combinations(names, 2):
-        own = [{name: outcome.example.labels.get(name, _NONE) for name in pair} for outcome in outcomes]
-        swapped = [dict(zip(pair, reversed(labels.values()), strict=True)) for labels in own]
-        fit = _fitting(outcomes, swapped, own, window_ms)
+        given = [{name: outcome.example.labels.get(name, _NONE) for name in pair} for outcome in outcomes]
+        swapped = [dict(zip(pair, reversed(labels.values()), strict=True)) for labels in given]
+        fit = _fitting(outcomes, swapped, given, window_ms)
         # Where labels have one of both names only, another fault may bring them to detections of the other.
         if fit is None or any(2 * part.found <= part.events for part in fit[0].by_label.values()):
             continue
@@ -85,13 +85,13 @@ def exchanged_names(outcomes: Sequence[Outcome], window_ms: float) -> Iterator[C
 
 
 def _fitting(
-    outcomes: Sequence[Outcome], swapped: Sequence[_Labels], own: Sequence[_Labels], window_ms: float
+    outcomes: Sequence[Outcome], swapped: Sequence[_Labels], given: Sequence[_Labels], window_ms: float
 ) -> tuple[Score, Score] | None:
-    """Return the scores of swapped labels, which fit, and of the own ones, which do not; else None."""
+    """Return the scores of swapped labels, which fit, and of the given ones, which do not; else None."""
     detections = []
-    for outcome, labels in zip(outcomes, own, strict=True):
+    for outcome, labels in zip(outcomes, given, strict=True):
         known = outcome.example._known(outcome.found)
         detections.append(known[np.isin(known.label, list(labels))])
-    fits, before = (score_together(detections, labels, window_ms) for labels in (swapped, own))
+    fits, before = (score_together(detections, labels, window_ms) for labels in (swapped, given))
     is_fit = fits.events >= _LEAST and fits.found >= _FITS * fits.events and before.found <= _OWN * before.events
     return (fits, before) if is_fit and fits.rank[0] <= _FEWER * before.rank[0] else None

@@ -257,10 +257,10 @@ class Training:
 
         Raises
         ------
-        ProblemError : no text
+        ProblemError : no text, or neither true nor false
         """
         readout = text("readout", readout)
-        if not is_rule and any(self.unreliable()):
+        if not flag("is_rule", is_rule) and any(self.unreliable()):
             return ""
         tare = "FILE" if isinstance(self.options.tare, Tare) else self.options.tare
         if tare is None:

@@ -159,11 +159,11 @@ def open_bag(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
         if is_position:
             why = "the bag is damaged: a position in it is beyond the end of any file"
         elif "index" in why.lower() and path.suffix == ".bag":
-            why = "the index is missing or damaged, probably because the recording was interrupted; to make a "
-            "new index, run rosbag reindex"
+            why = (
+                "the index is missing or damaged, as if the recording was interrupted; to repair it, run rosbag reindex"
+            )
         elif "magic" in why.lower() and path.suffix not in (".bag", ".db3"):
-            why = "the end is missing, probably because the recording was interrupted; to repair the file, run "
-            "mcap recover"
+            why = "the end is missing, as if the recording was interrupted; to repair the file, run mcap recover"
         raise FormatError(f"{path}: cannot be read as a ROS bag: {why}") from None
 
 

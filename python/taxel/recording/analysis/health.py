@@ -124,7 +124,7 @@ class Health:
     --------
     >>> from taxel.frames import Frames
     >>> health(Frames([[[0.0, 5.0]], [[0.0, 7.0]], [[0.0, 5.0]]], [0, 10_000, 20_000]))
-    Health(2 taxels: 0 dead, 0 stuck, 0 noisy, 2 not touched enough to say)
+    Health(2 taxels: 0 dead, 0 stuck, 0 noisy, 2 not touched enough to say whether they work)
     """
 
     array: Array

@@ -237,10 +237,10 @@ def facts_of(path: Path, array: str, named: re.Pattern[str]) -> dict[str, float 
     if _is_hdf5(path):
         with H5File(path) as h5:
             groups = [array.rsplit("/", k)[0] for k in range(array.count("/") + 1)]
-            for of in (*groups, "/"):
-                for name in h5.attributes(of):
+            for entry in (*groups, "/"):
+                for name in h5.attributes(entry):
                     if named.fullmatch(name) and name not in found:
-                        found[name] = h5.attribute(name, of)
+                        found[name] = h5.attribute(name, entry)
     with contextlib.suppress(FormatError):
         found = {**arrays_of(path, names), **found} if names else found
     facts = {name: value.item() if isinstance(value, np.ndarray) else value for name, value in found.items()}
