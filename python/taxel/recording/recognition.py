@@ -239,10 +239,7 @@ def bags_of(files: Iterable[Path]) -> list[Path]:
 
 
 def described_tables(files: Iterable[Path], layout: GivenLayout) -> list[Path]:
-    """Return the tables and arrays of other programs of which a layout says how to read them.
-
-    A layout that describes arrays alone, or tables alone, says nothing of the other files of a folder.
-    """
+    """Return the tables and arrays of other programs of which a layout says how to read them."""
     tables = (file for file in files if not file.name.endswith(".notes.csv") and _describes(layout, file))
     return [file for file in tables if _is_of_another_program(file, layout)]
 
@@ -275,11 +272,10 @@ def _has_layout(path: Path, layout: GivenLayout) -> bool:
 
 
 def _describes(given: GivenLayout, path: Path) -> bool:
-    """Return whether a layout is given or beside a file of arrays or a text, and is not of the other kind alone."""
+    """Return whether a layout is given or beside a file; one of arrays alone describes no text."""
     layout = layout_of(path, given)
-    if layout is None or (layout.table is None) == (layout.data is None):
-        return layout is not None
-    return (layout.data is not None) == (path.suffix.lower() in ARRAYS)
+    of_arrays = layout is not None and layout.data is not None and layout.table is None
+    return layout is not None and (not of_arrays or path.suffix.lower() in ARRAYS)
 
 
 def is_label_table(path: Path) -> bool:
