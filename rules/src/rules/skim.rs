@@ -115,7 +115,8 @@ impl Normal {
         let (m, r, z) = (self.columns, self.r(), self.z());
         let r = MatRef::from_row_major_slice(&r, m, m);
         let z = Mat::from_fn(m, 1, |j, _| z[j]);
-        let svd = r.thin_svd().map_err(|_| problem!("the singular values of these patterns' rows cannot be computed"))?;
+        let svd =
+            r.thin_svd().map_err(|_| problem!("the singular values of these patterns' rows cannot be computed"))?;
         let values = svd.S().column_vector();
         let least = f64::EPSILON * m as f64 * values.iter().copied().fold(0.0, f64::max);
         let mut along = svd.U().transpose() * &z;

@@ -88,9 +88,7 @@ impl Exposure {
         if let Some((start, stop)) = window
             && !(start.is_finite() && stop.is_finite() && start <= stop)
         {
-            return Err(
-                problem!("window"; " is {start} to {stop} ms: must be finite, with start not after stop"),
-            );
+            return Err(problem!("window"; " is {start} to {stop} ms: must be finite, with start not after stop"));
         }
         Ok(())
     }

@@ -86,7 +86,8 @@ impl Smoothing {
             for (p, n) in (0..side.count).flat_map(|p| (0..side.trains).map(move |n| (p, n))) {
                 if !exists[n % taxels] && !side.train(p, n).is_empty() {
                     return Err(problem!(
-                        "{}: has spikes, but the array has no taxel at this place", side.train_name(p, n)
+                        "{}: has spikes, but the array has no taxel at this place",
+                        side.train_name(p, n)
                     ));
                 }
             }
