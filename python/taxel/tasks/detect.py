@@ -464,7 +464,7 @@ def _standing(
     if quiet is None or quiet[0] > source.t[0]:
         return Standing(text)
     seconds = float(np.floor((quiet[1] - quiet[0]) / 1e4) / 100)
-    with collected():  # nobody gave this tare
+    with collected():  # no option states this tare
         tare = given_tare(seconds, recording)
         found, _ = run_counting(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=tare.stop_us)
     tried = score(outcome.example._known(found), outcome.example.labels, options.window_ms)
