@@ -1007,7 +1007,7 @@ mod tests {
                 Some(3),
                 "all with a text in column 2 (\"a\"): add leave_out=2",
             ),
-            (vec!["1;2;", "1;2;"], vec!["1"], Some(3), "the last of 3 columns is empty: add leave_out=1:3"),
+            (vec!["1;2;", "1;2;"], vec!["1"], Some(3), "but the last of 3 columns is empty: add leave_out=1:3"),
         ] {
             let leave_out: Vec<String> = leave_out.into_iter().map(str::to_owned).collect();
             let found = unread(&texts, &leave_out, fields);
