@@ -117,15 +117,18 @@ encoders! {
     moments: Moments,
     /// The largest deviation of a taxel in units of its own noise.
     peak: Peak,
+    /// Begins and ends of loads that are apart.
+    separate_loads: SeparateLoads,
     /// How long a touch lasted and how large it was, when it ends.
     touch_ends: TouchEnds,
 }
 
 impl Encoder {
-    /// The train with the duration of each touch as it ends; `None` of encoders that do not wait for that.
+    /// The train with the duration of each touch as it ends, from which its beginning follows; `None` of encoders whose
+    /// detections do not have that as their time.
     pub(crate) fn duration_train(&self, array: &Array) -> Option<usize> {
         match self {
-            Self::TouchEnds(_) => Some(touch_ends::DURATION),
+            Self::TouchEnds(ends) => (!ends.at_end).then_some(touch_ends::DURATION),
             Self::Composite(encoder) => {
                 let mut first = 0;
                 for part in encoder.parts.values() {
@@ -145,6 +148,8 @@ impl Encoder {
         match self {
             Self::ContactArea(encoder) => encoder.noise_floor,
             Self::Moments(encoder) => encoder.noise_floor,
+            Self::SeparateLoads(encoder) => encoder.noise_floor,
+            Self::TouchEnds(encoder) => encoder.noise_floor,
             Self::Composite(encoder) => encoder.parts.values().map(Self::noise_floor).fold(0.0, f64::max),
             _ => 0.0,
         }

@@ -21,7 +21,7 @@ class TouchEnds(Tared):
 
     The trains are log(1 + duration in ms); log(1 + the largest) of its area, of its total and of its peak, as in
     `Moments`; and 1. A touch that has not ended gives nothing. The detections of a neuron that receives them have the
-    beginning of the touch as their time `t`, and are `known` after its end.
+    beginning of the touch as their time `t`, or its end, and are `known` after its end.
 
     Parameters
     ----------
@@ -30,6 +30,8 @@ class TouchEnds(Tared):
     tare : Tare, or float, s, optional
         The taxels' rest, or the duration of rest at the beginning of each recording. It is valid for one board on one
         day, so a saved readout has no tare; encoding requires one.
+    at_end : bool
+        Whether the time `t` of a detection is the end of the touch, not its beginning.
 
     Raises
     ------
@@ -55,3 +57,4 @@ class TouchEnds(Tared):
 
     noise_floor: float = _DEFAULT.noise_floor
     tare: Tare | float | None = _DEFAULT.tare
+    at_end: bool = _DEFAULT.at_end

@@ -37,6 +37,8 @@ parameters! {
         /// used.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub tare: Option<Tare> = None;
+        /// Whether the time of a detection is the end of the touch, not its beginning.
+        pub at_end: bool = false;
     }
 }
 
