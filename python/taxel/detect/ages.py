@@ -65,12 +65,20 @@ def onsets(pattern: SpikeTrains, ages: Ages) -> NDArray[np.float64]:
     return found
 
 
-def duration_train(encoder: Encoder, array: Array | None) -> int | None:
+class EndTrain(NamedTuple):
+    """The train with the duration of each touch as it ends."""
+
+    train: int
+    at_end: bool
+    """Whether the time of a detection is the end of the touch, not its beginning (`TouchEnds`)."""
+
+
+def end_train(encoder: Encoder, array: Array | None) -> EndTrain | None:
     """Return the train with the duration of each touch as it ends; None of encoders that do not wait for that."""
     first = 0
     for part in encoder._each():
         if isinstance(part, TouchEnds):
-            return first
+            return EndTrain(first, part.at_end)
         first += part.trains(array or Array(1, 1)) * (2 if part.signed else 1)
     return None
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from taxel._base.arguments import integer
 from taxel._base.messages import counted, escaped
 from taxel._core import ProblemError
-from taxel.detect.ages import Ages, EndedTouches, onsets
+from taxel.detect.ages import Ages, EndedTouches, EndTrain, onsets
 from taxel.detect.followed import off_ms, one_after_another
 from taxel.detect.scoring import Score, score
 from taxel.detections import Detections
@@ -105,7 +105,7 @@ def align(
     given: Sequence[NDArray[np.int64]],
     latency_ms: float,
     ages: Ages | None = None,
-    duration: int | None = None,
+    ends: EndTrain | None = None,
     *,
     alone: bool = False,
 ) -> Alignment:
@@ -126,9 +126,9 @@ def align(
     latency_ms : float, ms
     ages : Ages, optional
         The trains of ages, if there are any.
-    duration : int, optional
-        The train with the duration of each touch as it ends, if there is one: then the begins of these touches alone
-        are compared with the labels.
+    ends : EndTrain, optional
+        The train with the duration of each touch as it ends, if there is one: then the begins of these touches, or
+        their ends, alone are compared with the labels.
     alone : bool
         Whether the train is to tell the labels alone, of trains that are levels of one quantity: then it is the middle
         one of those with the fewest missed and false, which is farthest from noise and from what weaker events reach.
@@ -154,9 +154,11 @@ def align(
     }
     if ages is not None:
         candidates[ages.trains[0]] = [onsets(pattern, ages) for pattern in patterns]
-    if duration is not None:
-        begins = [to_ms(EndedTouches.from_trains(pattern, duration).begin) + latency_ms for pattern in patterns]
-        candidates = {duration: begins}
+    if ends is not None and ends.at_end:
+        candidates = {ends.train: [pattern[ends.train] for pattern in patterns]}
+    elif ends is not None:
+        begins = [to_ms(EndedTouches.from_trains(pattern, ends.train).begin) + latency_ms for pattern in patterns]
+        candidates = {ends.train: begins}
     scores = {}
     for train, spikes in candidates.items():
         fired = one_after_another([np.rint(to_us(ms - latency_ms)).astype(np.int64) for ms in spikes], patterns)

@@ -25,7 +25,7 @@ from taxel.detect.ages import (
     Ages,
     EndedTouches,
     ages_of,
-    duration_train,
+    end_train,
     in_frames,
     later_us,
     silent_windows,
@@ -36,6 +36,7 @@ from taxel.detect.floors import floor_alone
 from taxel.detect.followed import FOLLOWED_MS, Followed, distinct, follow, only, silence
 from taxel.detect.levels import fit_levels
 from taxel.detect.loads import clock_of, lacks_neighbours
+from taxel.detect.raised_floor import fit_floor
 from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Score, score_together
@@ -90,6 +91,8 @@ class Trained(NamedTuple):
         By how much its labels were moved to what the sensor felt, by label; empty where the recipe does not align them.
     fitted_levels : bool
         Whether the encoder's levels are of the training data (`Recipe`).
+    raised_floor : float, in the sensor's unit, optional
+        The noise floor, where labels raised it above what the noise requires.
     chosen : mapping of str to str
         For each label, the chosen point of `choose`, the first one, and the mistakes of both in the training data.
     """
@@ -99,6 +102,7 @@ class Trained(NamedTuple):
     readout: Readout
     alignments: Mapping[str, Alignment]
     fitted_levels: bool = False
+    raised_floor: float | None = None
     chosen: Mapping[str, str] = {}
 
 
@@ -152,8 +156,13 @@ def fit_aligned(examples: Sequence[Example], recipe: Recipe, progress: Progress 
     sound, clocks = check_examples(examples), [clock_of(example) for example in examples]
     report = reporting(progress)
     recipe = in_frames(instance("recipe", recipe, Recipe), sound, clocks)
+    parts = [(k, -np.inf, np.inf) for k in range(len(sound))]
+    by_noise = recipe.encoder
+    recipe = fit_floor(recipe, sound, parts)
+    floor = max((getattr(part, "noise_floor", 0.0) for part in recipe.encoder._each()), default=0.0)
+    raised_floor = floor if recipe.encoder != by_noise else None
     stated = recipe.encoder
-    recipe = fit_levels(recipe, sound, [(k, -np.inf, np.inf) for k in range(len(sound))])
+    recipe = fit_levels(recipe, sound, parts)
     possibly = possible(recipe, sound)
     unit = unit_of(sound)
     trained = learn(EncodedExamples(sound, possibly, report), possibly, array_of(sound), report)
@@ -161,6 +170,7 @@ def fit_aligned(examples: Sequence[Example], recipe: Recipe, progress: Progress 
         recipe=recipe._at(trained.recipe.neurons),
         readout=trained.readout._with(unit=unit, pads=len(sizes_of(examples)) > 0),
         fitted_levels=recipe.encoder != stated,
+        raised_floor=raised_floor,
     )
 
 
@@ -357,7 +367,7 @@ def _best(
             continue
         others = []
         received = recipe._received({**recipe.learner, **point})
-        several = received._quantities() or duration_train(received, array) is not None
+        several = received._quantities() or end_train(received, array) is not None
         for rank in range(_FOLLOWED if several else 1):
             with contextlib.suppress(ProblemError):
                 others.append(fitted(point, rank))
@@ -429,7 +439,7 @@ class Fitting:
         examples = [examples[k] for k in self.places]
         learner, delay_ms = recipe.learner_of(label)
         received = recipe._received(recipe._of(label))
-        ages, self._duration = ages_of(received, array), duration_train(received, array)
+        ages, self._ends = ages_of(received, array), end_train(received, array)
         #: How much later than the event the neuron is trained to fire, ms, the encoder's latency apart. Where an age of
         #: the touch begins then it is later: a spike at that age acts after its time, or at once where the potential
         #: jumps.
@@ -454,7 +464,7 @@ class Fitting:
             followed = followers[rank] if followers else None
             self.alignment = align_by(label, label_times, followed and (followed.train, followed.score))
         elif recipe.align:
-            how = received.latency_ms, ages, self._duration
+            how = received.latency_ms, ages, self._ends
             self.alignment = align(sources, label, label_times, *how, alone=_learns_one(received))
         self._names = [name_of(k, example) for k, example in enumerate(examples)]
         self._inputs, self._sources = sources, self._received(sources, received, quantities, followed, rank)
@@ -467,7 +477,7 @@ class Fitting:
             self._at(to_ms(t + more) + shift_ms, neuron, trains.start)
             for trains, t, more in zip(sources, felt, later, strict=True)
         ]
-        if self._duration is None:
+        if self._ends is None:
             self.delay_ms += to_ms(float(np.median(np.concatenate(later))))
         self._shift_ms = received.latency_ms + self.delay_ms
         lasting = self._until_targets(self._sources)
@@ -493,9 +503,9 @@ class Fitting:
         """Return the trains that the neuron learns from, of those that it receives."""
         if followed is not None:
             return [only(trains_of, quantities[followed.train]) for trains_of in sources]
-        if self._duration is not None and rank == 0:
+        if self._ends is not None and rank == 0:
             # Beside the duration the last train alone, which is 1: how large touches are may be learnt by heart.
-            return [only(trains_of, [self._duration, len(trains_of) - 1]) for trains_of in sources]
+            return [only(trains_of, [self._ends.train, len(trains_of) - 1]) for trains_of in sources]
         train = None if self.alignment is None else self.alignment.train
         if train is not None and _learns_one(received):
             return [only(trains_of, [train]) for trains_of in sources]
@@ -513,12 +523,12 @@ class Fitting:
 
         Targets behind the first inputs have the latency of the encoder in `behind_input_ms`.
         """
-        if self._duration is not None:
+        if self._ends is not None:
             if self.alignment is None or self.alignment.train is None:
-                raise ProblemError(
-                    f"{self._label}: no touch that ended begins near its labels, to which they must be aligned"
-                )
-            return [_lasted(source, self._duration, times) for source, times in zip(sources, felt, strict=True)]
+                edge = "ends" if self._ends.at_end else "that ended begins"
+                raise ProblemError(f"{self._label}: no touch {edge} near its labels, to which they must be aligned")
+            if not self._ends.at_end:
+                return [_lasted(source, self._ends.train, times) for source, times in zip(sources, felt, strict=True)]
         if ages is not None and self.alignment is not None and self.alignment.train == ages.trains[0]:
             return [later_us(source, ages, to_ms(t), delay_ms) for source, t in zip(sources, felt, strict=True)]
         wait_ms = 0.0 if behind_input_ms is None else _first_input_ms(sources, felt, behind_input_ms)
@@ -529,7 +539,7 @@ class Fitting:
 
         There a potential that jumped is greatest, and silence before the target must not be asked of it.
         """
-        if self._duration is None:
+        if self._ends is None:
             return targets
         return start + neuron.step_ms * np.floor((targets - start) / neuron.step_ms + _SAME_STEP)
 
@@ -540,7 +550,7 @@ class Fitting:
 
     def precedes_input(self, cone: ConeR) -> bool:
         """Whether most labels, which are not aligned, are so early that no neuron can fire by their targets."""
-        return self.alignment is None and self._duration is None and 2 * len(cone.unreachable_) > self.count
+        return self.alignment is None and self._ends is None and 2 * len(cone.unreachable_) > self.count
 
     def _until_targets(self, sources: Sequence[SpikeTrains]) -> list[SpikeTrains]:
         """Return trains with an end after the last target, which may come after the last spike."""
@@ -601,8 +611,8 @@ class Fitting:
         found, truths = [], []
         for source, times in zip(self._sources, self._label_times, strict=True):
             t = np.rint(to_us(neuron.run(cone.weights_, source) - self._shift_ms)).astype(np.int64)
-            if self._duration is not None:
-                t = EndedTouches.from_trains(source, self._duration).begin_of(t)
+            if self._ends is not None and not self._ends.at_end:
+                t = EndedTouches.from_trains(source, self._ends.train).begin_of(t)
             found.append(Detections([self._label] * len(t), t, t))
             truths.append({self._label: times})
         return score_together(found, truths, FOLLOWED_MS)

@@ -35,6 +35,7 @@ from taxel.detect.fitting import (
 from taxel.detect.levels import fit_levels
 from taxel.detect.loads import Clock, clock_of
 from taxel.detect.plain_score import PlainScore, plain_score
+from taxel.detect.raised_floor import fit_floor
 from taxel.detect.readout import Readout, run
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Mistake, Score, mistakes_of, score, score_together
@@ -185,7 +186,7 @@ def judge(
     trained = []
     for n, fold in enumerate(ways):
         report(f"fold {n + 1} of {len(ways)}", n, len(ways))
-        plan = fit_levels(recipe, examples, fold.train)
+        plan = fit_levels(fit_floor(recipe, examples, fold.train), examples, fold.train)
         encoded = patterns
         if plan is not recipe:
             encoded = EncodedExamples(examples, plan, report, search=search)
@@ -273,7 +274,7 @@ def choose(
     recipe = in_frames(instance("recipe", recipe, Recipe), examples, clocks)
     report = reporting(progress)
     parts = [Part(n) for n in range(len(examples))]
-    recipe = fit_levels(recipe, examples, parts)
+    recipe = fit_levels(fit_floor(recipe, examples, parts), examples, parts)
     ways = integer("k", k, 2, 2**31) if isinstance(k, int | np.integer) else _folds(examples, k)[0]
     narrowed = recipe._narrowed(recipe._labels(examples), search=True)
     chosen = _choose(

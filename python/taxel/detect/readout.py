@@ -17,7 +17,7 @@ from taxel._base.messages import escaped
 from taxel._base.saved import read
 from taxel._core import NotFittedError, ProblemError
 from taxel.array import Array
-from taxel.detect.ages import EndedTouches, duration_train
+from taxel.detect.ages import EndedTouches, end_train
 from taxel.detect.detector import _Detector, detector, tare_text
 from taxel.detect.exchange import Parts, read_nir, write_nir
 from taxel.detect.plain_rule import PlainRule
@@ -487,9 +487,9 @@ def _run_spikes(readout: Readout, trains: SpikeTrains) -> Detections:
         )
         offset_ms = readout.encoder_of(label).latency_ms + trained.delay_ms
         t, known = (np.rint(to_us(ms)).astype(np.int64) for ms in (spikes - offset_ms, spikes))
-        duration = duration_train(readout.encoder_of(label), readout.array)
-        if duration is not None:
-            t = EndedTouches.from_trains(inputs, duration).begin_of(t)
+        ends = end_train(readout.encoder_of(label), readout.array)
+        if ends is not None and not ends.at_end:
+            t = EndedTouches.from_trains(inputs, ends.train).begin_of(t)
         detections += Detections([label] * len(spikes), t, known, slopes)
     return detections[np.argsort(detections.known, kind="stable")]
 

@@ -291,7 +291,13 @@ class Training:
             )
 
     def _levels(self) -> Iterator[str]:
-        """Yield the levels that the training data gave, if they did."""
+        """Yield the levels and the noise floor that the training data gave, if they did."""
+        if self.made.raised_floor is not None:
+            yield (
+                f"noise floor: {self.made.raised_floor:g} {self.readout.unit}, more than the noise requires, because "
+                "touches then begin and end nearer to the labels; some sensors also read what only comes near them; "
+                "--set encoders.NAME.noise_floor=... sets another"
+            )
         if self.fitted_levels:
             levels = ", ".join(f"{level:g}" for level in self.fitted_levels)
             yield (
