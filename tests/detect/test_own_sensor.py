@@ -436,7 +436,7 @@ def test_a_plain_rule_is_written_and_detects_what_the_training_says(
     assert sorted(tmp_path.glob("rule*")) == sorted(places)
     tare = Tare.take(frames, stop_us=int(truth["contact"][0]) - 20_000)
     for label, one in zip(labels, places, strict=True):
-        assert f"plain rule of {label}: written to {one}" in out
+        assert f"plain rule for {label} written to {one}" in out
         found = score(run(load(one), frames, tare=tare), {label: truth[label]})
         counts = f"{label}, plain rule: {found.found} of 12 found, {found.missed} missed, {found.false} false"
         assert counts in out

@@ -85,7 +85,7 @@ def test_a_wrong_order_is_refused_half_way():
         ),
         ({"step_read": 0.75, "ramp": 221}, r"ramp 221 ticks is too long for step_read 0.75 us = 225 ticks"),
         ({"ramp": 0}, r"ramp 0 does not fit: must be 1 to 65534 \(rule 4\)"),
-        ({"lines": 65}, r"65 lines: the array has 64 columns to drive \(rule 4\)"),
+        ({"lines": 65}, r"lines is 65: must be at most 64, the number of the array's columns \(rule 4\)"),
         ({"lines": 257}, r"lines 257 does not fit: must be 1 to 256 \(rule 4\)"),
         (
             {"random_lines": True, "line_period": 10.23},
@@ -97,7 +97,10 @@ def test_a_wrong_order_is_refused_half_way():
         ({"noise_floor": 256}, r"noise_floor 256 does not fit: must be 0 to 255 \(rule 4\)"),
         ({"line_period": 1e9}, r"line_period 1000000000 us does not fit into the bits of its register \(rule 4\)"),
         ({"channels": 32}, "32 channels: the converter has 16 or 64"),
-        ({"array": taxel.Array(64, 8), "lines": 64}, r"64 lines: the array has 8 columns to drive \(rule 4\)"),
+        (
+            {"array": taxel.Array(64, 8), "lines": 64},
+            r"lines is 64: must be at most 8, the number of the array's columns \(rule 4\)",
+        ),
     ],
 )
 def test_a_broken_rule_is_named_with_its_numbers(fields, text):

@@ -142,7 +142,7 @@ def train(
         say(json.dumps({"readout": str(out), **training.to_dict(), **written}))
     else:
         say(*training.lines(), "", f"written to {out}{_next(training, out, rules)}")
-        say(*(f"plain rule of {' and '.join(each)}: written to {path}" for path, each in rules.items()))
+        say(*(f"plain rule for {' and '.join(each)} written to {path}" for path, each in rules.items()))
         say(*(f"warning: {warning}" for warning in training.unreliable()))
     if report is not None:  # last, so that nothing is lost where it fails
         place = taxel.report.write_detections(

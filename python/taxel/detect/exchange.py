@@ -98,19 +98,19 @@ def lost(readout: Parts) -> list[str]:
     """Return what NIR's nodes cannot hold of a readout, one line each."""
     neurons = [trained.neuron for trained in readout.neurons.values()]
     lines = [
-        "the encoder: the graph's inputs are its spike trains",
-        "labels and trained delays: outputs come in the order of the labels",
+        "the encoder, whose spike trains are the inputs of the graph",
+        "labels and trained delays; the outputs have the order of the labels",
     ]
     if any(neuron.refractory > 0 for neuron in neurons):
-        lines.append("the refractory time: a NIR neuron may fire again at once")
+        lines.append("the refractory time, so a NIR neuron may fire again at once")
     if any(neuron.theta_plus > 0 for neuron in neurons):
         lines.append("the rise of the threshold by a spike")
     lines.append(
-        f'after_spike="{readout.after_spike}": a NIR neuron falls to 0 and keeps its current; its first spike is that '
-        "of taxel's neuron, later spikes may differ"
+        f'after_spike="{readout.after_spike}": after a spike, the potential of a NIR neuron is 0 and its input current '
+        "continues, so spikes after the first may differ from those of taxel's neuron"
     )
     if readout.time == "continuous":
-        lines.append("continuous time: a simulator has a time step, and fires up to one step later")
+        lines.append("continuous time: a simulator has time steps, so its neurons fire up to one step later")
     return lines
 
 

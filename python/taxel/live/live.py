@@ -116,7 +116,8 @@ class Live:
     readout_events : int, 0 to 2147483647
         How many events may wait for the readout.
     gro : bool
-        Let the kernel hand over trains of datagrams in one piece (`UDP_GRO`). It then counts its drops in trains.
+        Let the kernel join several datagrams and hand them over together (`UDP_GRO`). Then each joined piece that the
+        kernel drops counts as one.
     say : callable, optional
         Called with each `Detection` in the thread that detected it, one at a time; an exception ends the pipeline and
         is raised by `next`. The function must not call `stop`. Where it takes longer than 2 ms another thread continues

@@ -285,7 +285,7 @@ impl Verdict {
         let counted_by_kernel = counts.dropped_by_kernel.plus(bridged.dropped_by_kernel).are_known();
         let board = [
             (of_board(BOARD_DROPPED), "dropped_by_board", "times that the board dropped events"),
-            (of_board(EVENTS_DROPPED), EVENTS_DROPPED, "events dropped by the board by its own count"),
+            (of_board(EVENTS_DROPPED), EVENTS_DROPPED, "events that the board itself counted as dropped"),
         ];
         let way = if !counted_by_kernel && missing > behind {
             (

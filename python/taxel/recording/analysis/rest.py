@@ -138,7 +138,7 @@ class Rest:
         if layout:
             return (
                 f"values fall from their rest after {layout} inverted them: if the values need no inversion, remove "
-                f"the line falls from {layout}"
+                f"the line 'falls = ...' from {layout}"
             )
         return f"values fall from their rest: if smaller values mean more pressure, write {turning}"
 
@@ -151,9 +151,9 @@ class Rest:
         file = None if path is None else Layout.beside(path)
         with suppress(FormatError, OSError):
             if file is not None and Layout.read(file).turned is not None:
-                return file.name, f"no falls in {file.name}"
+                return file.name, f"{file.name} without falls"
         if turned is not None:
-            return "its layout", "no falls in its layout"
+            return "its layout", "its layout without falls"
         return "", "falls = true in a layout file" + ("" if path is None else f", {or_given(path)}")
 
     def described(self) -> dict[str, object]:
