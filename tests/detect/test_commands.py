@@ -530,7 +530,7 @@ def test_a_line_of_labels_that_makes_no_sense_is_named(tmp_path: Path) -> None:
     for text, said in [
         ("a,b\n", "line 1: no column 'label'; there are 'a', 'b'; must be label,t_us"),
         ("label,t_us\nstep,soon\n", "line 2: t_us is 'soon'; must be whole us"),
-        ("label,t_us\nstep\n", "line 2: 1 cells, must have 2"),
+        ("label,t_us\nstep\n", "line 2: 1 cells; must have 2"),
         ("label,t_us\n,5\n", "line 2: must have a label"),
         ("label,t_us\nstep,99999999999999999999\n", "line 2: must have a label, and a time within 2"),
     ]:

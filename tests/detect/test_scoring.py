@@ -167,7 +167,7 @@ def test_a_slope_keeps_every_digit_in_a_table(tmp_path) -> None:
     [
         ("", "line 1: contains nothing"),
         ("a,b\n", "line 1: contains a,b"),
-        ("label,t_us,known_us,slope_mv_per_ms\nx,1,2\n", "line 2: 3 cells, must have 4"),
+        ("label,t_us,known_us,slope_mv_per_ms\nx,1,2\n", "line 2: 3 cells; must have 4"),
         ("label,t_us,known_us,slope_mv_per_ms\nx,1,soon,0\n", "line 2: invalid literal"),
     ],
 )

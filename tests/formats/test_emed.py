@@ -81,7 +81,7 @@ def swap(old, new):
         (swap("Matrix: 8x10", "Matrix: 0x10"), "the matrix above is 0"),
         (swap("Time/picture:10.0", "Time/picture:0.0"), "the period above is 0"),
         (swap("Pict-No.: 2", "Pict-No.: 1"), "line 20: frame 1 follows frame 1"),
-        (lambda rows: [r for r in rows if "Pict-No" not in r], "no page has the number of a frame"),
+        (lambda rows: [r for r in rows if "Pict-No" not in r], "no page states the number of its frame"),
         (lambda rows: rows[:-5], "frame 3 ends without the line Force"),
     ],
 )

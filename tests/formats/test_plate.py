@@ -34,7 +34,7 @@ def test_interpolated_rows_come_back_within_one_count(seed, start, sensors):
 
 def test_rows_that_were_not_interpolated_are_refused():
     image = np.random.default_rng(1).integers(0, 500, (30, 8, 8))
-    with pytest.raises(FormatError, match="not interpolated three from two"):
+    with pytest.raises(FormatError, match="cells do not fit rows that were interpolated"):
         plate.sensor_rows(image)
 
 
@@ -83,7 +83,7 @@ def test_a_plate_file_that_is_none_says_where(tmp_path, spoil, said):
 def test_a_cut_hdf5_file_is_one_error(tmp_path):
     file = write_plate(tmp_path)
     file.write_bytes(file.read_bytes()[:3000])
-    with pytest.raises(FormatError, match=r"subj900.h5: not a whole HDF5 file"):
+    with pytest.raises(FormatError, match=r"subj900.h5: the HDF5 file is damaged"):
         list(formats.trials(tmp_path, "plate"))
 
 

@@ -281,7 +281,7 @@ def test_one_cell_that_is_no_number_hides_no_line_before_it(tmp_path: Path, at: 
             r"line 3: time is 'noon'; must be like 2024-05-01T",
         ),
         ('leave_out = ["who"]', r"column 'time' contains times, as its name shows"),
-        ('leave_out = ["time", "a"]', "line 2: who is 'me', not a number"),
+        ('leave_out = ["time", "a"]', "line 2: column 'who' is 'me', not a number"),
     ],
 )
 def test_columns_and_times_that_do_not_fit_their_table_are_refused(tmp_path: Path, layout: str, match: str) -> None:

@@ -324,7 +324,7 @@ def test_a_table_of_another_program_is_read_by_the_names_of_its_columns(
         ),
         ("start;Ereignis\n1;auf\n", "line 1: no column 't_us'; there are 'start', 'Ereignis'; must be label,t_us"),
         ("# my labels\nlabel,t_us\n", "line 1: no column 'label'"),
-        ("t_s;Ereignis\n1\n", "line 2: 1 cells, must have 2"),
+        ("t_s;Ereignis\n1\n", "line 2: 1 cells; must have 2"),
     ],
 )
 def test_a_table_of_another_program_without_times_or_labels_is_refused(tmp_path: Path, text: str, said: str) -> None:

@@ -205,7 +205,7 @@ def test_the_command_line_shows_and_writes_one_source(
         ({"imu": "nowhere"}, "must be [NAME=]board:HOST:PORT, serial:PLACE, lines:PATH"),
         ({"imu": "given"}, "needs columns=A:B:C"),
         ({"imu": "given,columns=a:a"}, "two columns have this name"),
-        ({"imu": "given,columns=t_us"}, "holds no column of values"),
+        ({"imu": "given,columns=t_us"}, "contains no column of values"),
         ({"board": "given,columns=a"}, "two sources have this name"),
         ({"a b": "given,columns=a"}, "a name must have at most 64 letters, digits"),
         ({"imu": 3}, "source imu is 3"),

@@ -126,7 +126,7 @@ def test_the_manuals_names_are_aliases_in_its_own_units():
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda: Registers(speed=1), 'register "speed" is not known; registers: random_lines, '),
+        (lambda: Registers(speed=1), 'register "speed" is not known: must be one of random_lines, '),
         (lambda: Registers(line_period=3.001), "line_period is 3.001 us: must be a whole multiple of 0.01 us"),
         (lambda: Registers(line_period="slow"), "line_period is 'slow': must be a number"),
         (lambda: Registers(line_period=float("nan")), "line_period is nan: must be finite"),
@@ -135,15 +135,15 @@ def test_the_manuals_names_are_aliases_in_its_own_units():
         (lambda: Registers(nrows=0.5), "nrows is 0.5: must be a whole number from 0 to 255"),
         (lambda: Registers(frame_sync="yes"), "frame_sync is 'yes': must be True or False"),
         (lambda: Registers(array=3), "array is 3: must be a taxel.Array"),
-        (lambda: Registers.preset("fast"), 'preset "fast" is not known; presets: "5.2 kHz", "2 kHz", "20.8 kHz"'),
+        (lambda: Registers.preset("fast"), 'preset "fast" is not known: must be one of "5.2 kHz", "2 kHz", "20.8 kHz"'),
         (lambda: Registers.preset(5), "preset is 5: must be a text"),
         (
             lambda: Registers().with_preset("128 x 128, 1 kHz"),
-            'preset "128 x 128, 1 kHz" is not for a board of 64 x 64 taxels; presets of that size: "5.2 kHz", "2 kHz"',
+            'preset "128 x 128, 1 kHz" is not for a board of 64 x 64 taxels: must be one of "5.2 kHz", "2 kHz"',
         ),
         (
             lambda: Registers(array=taxel.Array(128, 128)).with_preset("2 kHz"),
-            'preset "2 kHz" is not for a board of 128 x 128 taxels; presets of that size: "128 x 128, 1 kHz", ',
+            'preset "2 kHz" is not for a board of 128 x 128 taxels: must be one of "128 x 128, 1 kHz", ',
         ),
         (lambda: Registers().commands_to(None), "target is None: must be a taxel.wire.Registers"),
         (lambda: Command(8, 0), "register is 8: must be a whole number from 0 to 7"),

@@ -129,6 +129,11 @@ def refused(name: str, text: str) -> ProblemError:
     return error
 
 
+def damaged(path: object, kind: str, why: str) -> FormatError:
+    """Return the error of a file that a library cannot read to its end; `kind` names it, as "HDF5 file"."""
+    return FormatError(f"{path}: the {kind} is damaged or not complete ({why}); copy or write it again")
+
+
 def helped(error: _Error, argument: str, hint: str) -> _Error:
     """Return the same error with a remedy, of which `argument` is what helps."""
     if hint not in _REMEDIES:

@@ -112,7 +112,7 @@ class HeaderTable:
 
     def _row(self, line: int, cells: tuple[str, ...]) -> tuple[str, ...]:
         if len(cells) != len(self.header):
-            raise FormatError(f"{self.location}, line {line}: {len(cells)} cells, must have {len(self.header)}")
+            raise FormatError(f"{self.location}, line {line}: {len(cells)} cells; must have {len(self.header)}")
         return cells
 
     def has(self, required: Sequence[str]) -> None:

@@ -375,7 +375,7 @@ def _encoder_of(values: Mapping[str, Any]) -> Encoder:
     single, each = values.get("encoder"), values.get("encoders")
     if isinstance(single, Mapping) == isinstance(each, Mapping):
         if single is not None and each is not None:
-            raise refused("recipe", ": states both encoder and encoders: give one of them")
+            raise refused("recipe", ": encoder and encoders are both given: give only one of them")
         raise helped(ProblemError("recipe: states no encoder: add [encoder]"), "encoder", "give")
 
     def stated(encoder: Mapping[str, Any]) -> Encoder:

@@ -106,8 +106,8 @@ class Question:
         if np.isfinite(reach) and (lengths < self.window_us).any():
             short = int((lengths < self.window_us).sum())
             self.notes.append(
-                f"{counted(short, 'trial')} {are(short)} shorter than the window of {to_ms(self.window_us):g} ms, so late "
-                "events may show the length of a trial; with a shorter window they cannot"
+                f"{counted(short, 'trial')} {are(short)} shorter than the window of {to_ms(self.window_us):g} ms, so "
+                "late events may show the length of a trial; with a shorter window they cannot"
             )
 
     def set_out(

@@ -391,7 +391,7 @@ class Live:
         arrival = None if arrived_ns is None else integer("arrived_ns", arrived_ns, 0)
         row = numbers("values", values, np.float64).reshape(-1)
         for k in np.flatnonzero(np.abs(row) > VALUE)[:1]:
-            raise refused("values", f"[{k}] is {shown(row[k].item())}: must fit 32 bits, or be NaN where it is missing")
+            raise refused("values", f"[{k}] is {shown(row[k].item())}: must fit 32 bits, or be NaN if it is missing")
         self._core.sample(text("name", name), row.tolist(), arrival)
 
     def zero(self, x: ArrayLike, y: ArrayLike) -> tuple[Zeroing, ...]:

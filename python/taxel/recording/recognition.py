@@ -373,7 +373,7 @@ def _by_first_bytes(path: Path) -> TaxelFile | Refusal:
         wrong = (
             f"{starts}: not a recording; taxel reads {known}; {describes}"
             if head
-            else (f"{path}: is empty: not a recording")
+            else f"{path}: the file is empty; must be a recording"
         )
         return Refusal(FormatError(wrong))
     if ending in {"npz", "h5"}:

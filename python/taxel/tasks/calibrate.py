@@ -207,7 +207,10 @@ def _calibrated(recording: Recording, known: Sequence[KnownLoad], options: Calib
     calibration: Calibration | None = None
     if options.law:
         if frames.unit != "ticks":
-            raise refused("law", f": converts ticks of a board to {options.unit}; {recording.path} holds {frames.unit}")
+            raise refused(
+                "law",
+                f": converts ticks of a board to {options.unit}; the values of {recording.path} are in {frames.unit}",
+            )
         registers = recording.registers
         ramp = 150.0 if registers is None else float(registers.ramp)
         calibration = Calibration.law(recording.array, ramp=ramp, sensor=options.sensor, **how)
@@ -225,7 +228,7 @@ def _read(recording: Recording, tare: GivenTare | None) -> tuple[Frames, NDArray
     """Return the readings, those at rest, and the floor above rest from which a taxel counts as loaded."""
     values = readings(recording, None if tare is None else given_tare(tare, recording))
     if values is None:
-        raise ProblemError(f"{recording.path}: holds events without intensities, so there is nothing to calibrate")
+        raise ProblemError(f"{recording.path}: contains events without intensities, so there is nothing to calibrate")
     frames, rest, floor = values
     if rest.source == "none" and recording.has_events:
         error = ProblemError(

@@ -252,7 +252,7 @@ impl FromStr for SourceText {
             source.rate_hz = number("rate", take("rate"))?;
             source.end = match (take("frame_lines"), take("frame_end")) {
                 (Some(_), Some(_)) => {
-                    return Err(refused("frame_lines and frame_end: give one of them".to_owned()));
+                    return Err(refused("frame_lines and frame_end are both given: give only one of them".to_owned()));
                 }
                 (Some(lines), None) => match lines.parse() {
                     Ok(lines @ 1..=65_535) => Some(FrameEnd::Lines(lines)),

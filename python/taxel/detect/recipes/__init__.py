@@ -176,7 +176,7 @@ def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
         file = Path(__file__).parent / f"{recipe}.toml"
     values = read_json(file) if file.suffix.lower() == ".json" else read_toml(file)
     if not isinstance(values, dict):
-        raise FormatError(f"{file}: must hold a recipe (values by name)")
+        raise FormatError(f"{file}: must contain a recipe (values by name)")
     return values
 
 

@@ -227,7 +227,9 @@ def read_events(path: Path, layout: Layout, array: Array | None) -> RecordedSour
     head = _Head.read(path, how, None)
     columns = [name for k, name in enumerate(head.kept) if k != head.time]
     if sorted(columns) != ["p", "x", "y"]:
-        raise FormatError(f"{path}: the columns beside the time are {', '.join(columns)}; must be x, y, p for events")
+        raise FormatError(
+            f"{path}: the columns other than the time are {', '.join(columns)}; must be x, y, p for events"
+        )
     read = Growing(str(path), t=((), np.int64), x=((), np.uint16), y=((), np.uint16), p=((), np.bool_))
     last = -(1 << 62)
     for line, block in text.blocks(head.rows(), path, head.first, head.kept, frozenset()):
