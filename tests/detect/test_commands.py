@@ -528,7 +528,7 @@ def test_a_label_without_a_neuron_is_an_error(folder: Path, capsys, tmp_path: Pa
 def test_a_line_of_labels_that_makes_no_sense_is_named(tmp_path: Path) -> None:
     table = tmp_path / "labels.csv"
     for text, said in [
-        ("a,b\n", "line 1: no column 'label'; there are 'a', 'b'; must be label,t_us"),
+        ("a,b\n", "line 1: column 'label' is missing; the columns are 'a', 'b'; must be label,t_us"),
         ("label,t_us\nstep,soon\n", "line 2: t_us is 'soon'; must be whole us"),
         ("label,t_us\nstep\n", "line 2: 1 cells; must have 2"),
         ("label,t_us\n,5\n", "line 2: must have a label"),

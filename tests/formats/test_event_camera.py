@@ -348,7 +348,7 @@ def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, window_ms: 
         (
             "a.aedat",
             b"#!AER-DAT2.0\r\n",
-            r"\(AEDAT 2\), not with a recording; save it as a file of event cameras that taxel reads: .raw, "
+            r"\(AEDAT 2\): not a recording; save it as a file of event cameras that taxel reads: .raw, "
             r".dat, .aedat4",
         ),
         ("a.aedat", b"#!AER-DAT4.0\r\n", r"AEDAT 4\), .*; rename it to .aedat4"),

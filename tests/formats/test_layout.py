@@ -388,7 +388,7 @@ def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) ->
         ("table = 3", "table"),
         ("[table]\nseparator = ', '", "separator is ', ': must be one character"),
         ("[table]\nskip_lines = 40", "no line follows the 40 skipped lines"),
-        ("[table]\ntime_column = 'when'", "the table has no column 'when' of times"),
+        ("[table]\ntime_column = 'when'", "column 'when' of times is missing"),
         ("[table]\ntime_column = 9", "time_column is 9, but the table has 6 columns"),
         ("rows = [", "not TOML"),
     ],

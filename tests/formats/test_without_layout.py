@@ -268,7 +268,7 @@ def test_one_cell_that_is_no_number_hides_no_line_before_it(tmp_path: Path, at: 
 @pytest.mark.parametrize(
     ("layout", "match"),
     [
-        ('leave_out = ["x"]', r"a\.csv: the table has no column 'x'; the columns are time, a, who"),
+        ('leave_out = ["x"]', r"a\.csv: column 'x' is missing; the columns are time, a, who"),
         ("leave_out = [4]", r"a\.csv: leave_out is 4, but the table has 3 columns"),
         ("leave_out = [0]", "leave_out is 0: must be a whole number from 1"),
         ('leave_out = "who"', "leave_out is 'who': must be a list of columns"),

@@ -168,7 +168,7 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
 @pytest.mark.parametrize(
     ("table", "arguments", "text"),
     [
-        ("recording,label\na,b\n", [], "no column 't_us'"),
+        ("recording,label\na,b\n", [], "column 't_us' is missing"),
         ("recording,t_us,label,t_us\na,1,b,2\n", [], "column 't_us' appears twice"),
         ("recording,t_us,label\n", [], "names no trial"),
         (

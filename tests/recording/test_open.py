@@ -47,7 +47,7 @@ def npz(**columns: object) -> bytes:
         ("a.npz", npz(t=[1], x=[2], y=[3], p=[True, False]), "p"),
         ("a.npz", npz(t=[1], x=[2], y=[3], p=[True], about="{"), "array about"),
         ("a.npz", npz(t=[1], values=np.zeros((2, 3, 3))), "t has shape"),
-        ("a.csv", b"\x89PNG\r\n", "a PNG picture, not a recording"),
+        ("a.csv", b"\x89PNG\r\n", "(a PNG picture), not with the names of columns"),
         ("a.csv", b"", "line 1: '': must be"),
         ("a.csv", b"time,x,y\n", "line 1: 'time,x,y': must be t_us,x,y,p[,intensity]"),
         ("a.csv", b"\xff\xfe\x00", "byte 2: not text in UTF-16 (truncated data); save it as UTF-8"),

@@ -138,7 +138,7 @@ def _columns(names: list[str], foot: str, file: Path, line: int) -> list[int]:
     """Return which columns are the pressures and, last, the total force of a foot."""
     pressures = [k for k, name in enumerate(names) if re.match(rf"{foot} pressure \d+", name)]
     if not pressures:
-        raise FormatError(f"{file.name}, line {line}: the column '{foot} pressure 1' is missing")
+        raise FormatError(f"{file.name}, line {line}: column '{foot} pressure 1' is missing")
     return [*pressures, _column(names, rf"{foot} total force.*", file, line)]
 
 

@@ -571,7 +571,7 @@ fn index_of(key: &str, column: &str, columns: &[String]) -> taxel_core::Result<u
     match column.parse::<usize>() {
         Ok(number) if (1..=columns.len()).contains(&number) => Ok(number - 1),
         Ok(_) => Err(problem!("{key}={column}: a line has {} columns", columns.len())),
-        Err(_) => Err(problem!("{key}={column}: no column has this name; the columns are {}", columns.join(", "))),
+        Err(_) => Err(problem!("{key}={column}: this column is missing; the columns are {}", columns.join(", "))),
     }
 }
 

@@ -425,5 +425,5 @@ def _column(path: Path, key: str, column: str | int, names: Sequence[str], named
             else "the columns have no names, so give the number of the column, counted from 1"
         )
         kind = " of times" if key == "time_column" else ""
-        raise FormatError(f"{path.name}: the table has no column {shown(name)}{kind}; {known_names}")
+        raise FormatError(f"{path.name}: column {shown(name)}{kind} is missing; {known_names}")
     return names.index(name)
