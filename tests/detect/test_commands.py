@@ -405,7 +405,7 @@ def test_without_a_tare_the_rest_is_taken_from_before_the_first_label(folder: Pa
     code, said, _ = call(capsys, *arguments, "-o", tmp_path / "by_itself.json")
     first = min(row.t for row in taxel.Labels(folder / "truth.csv").rows)
     assert code == 0
-    assert f"tare: what the recording holds from 0 to {first / 1000 - 20:g} ms; another can be given" in said
+    assert f"tare: measured in the recording from 0 to {first / 1000 - 20:g} ms; --tare sets another tare" in said
     taxel.Tare.take(events, stop_us=first - 20_000).save(tmp_path / "tare.json")
     assert call(capsys, *arguments, "--tare", tmp_path / "tare.json", "-o", tmp_path / "said.json")[0] == 0
     assert taxel.Readout.load(tmp_path / "by_itself.json") == taxel.Readout.load(tmp_path / "said.json")

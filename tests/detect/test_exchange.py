@@ -186,7 +186,7 @@ TWO = np.ones(2)
     [
         ({"weights": nir.Affine(np.ones((2, 8)), np.ones(2))}, "weights: has a bias"),
         ({"neurons": nir.IF(TWO, TWO)}, "LIF or CubaLIF"),
-        ({"neurons": nir.LIF(0 * TWO, TWO, 0 * TWO, TWO)}, r"neurons\[0\]: time constant"),
+        ({"neurons": nir.LIF(0 * TWO, TWO, 0 * TWO, TWO)}, r"neurons\[0\]: the time constant"),
         ({"neurons": nir.CubaLIF(2 * TWO, TWO, TWO, 0 * TWO, TWO)}, "tau_syn"),
         ({"neurons": nir.LIF(TWO, TWO, 2 * TWO, TWO)}, "threshold"),
     ],

@@ -36,7 +36,7 @@ def test_short_stances_do_not_count():
     [
         (lambda r: [*r[:6], r[6] + "\t1", *r[7:]], "line 7: 20 cells; must have 19"),
         (lambda r: [*r[:6], r[6].replace("0.06", "0,06"), *r[7:]], "line 7: column 'time' has a decimal comma"),
-        (lambda r: [*r[:6], "\t" + r[6].split("\t", 1)[1], *r[7:]], "line 7: time is empty"),
+        (lambda r: [*r[:6], "\t" + r[6].split("\t", 1)[1], *r[7:]], "line 7: column 'time' is empty"),
         (lambda r: [*r[:6], "x" + r[6], *r[7:]], "line 7: column 'time' is 'x0.06', not a number"),
         (lambda r: [*r[:6], "nan" + r[6][4:], *r[7:]], "line 7: column 'time' is 'nan', not a finite number"),
         (lambda r: [*r[:6], r[2], *r[7:]], "line 7: time 0.02 s is not after"),

@@ -66,7 +66,7 @@ def test_events_csv_of_the_folder_is_taken_where_it_is(tmp_path):
             lambda h5: h5.create_dataset("notes", data=[1]),
             "subj900.h5: the data set 'notes' must have a name like imgNNN",
         ),
-        (lambda h5: h5.create_dataset("img002", data=[1.5]), "subj900.h5, img002: must be whole numbers"),
+        (lambda h5: h5.create_dataset("img002", data=[1.5]), "subj900.h5, img002: must contain whole numbers"),
         (
             lambda h5: h5.create_dataset("img002", data=np.zeros((9, 4, 5), int)),
             "subj900.h5, img002: no count is above 0",

@@ -259,7 +259,7 @@ def test_one_cell_that_is_no_number_hides_no_line_before_it(tmp_path: Path, at: 
     said = layout_said_of(tmp_path / "a.csv")
     assert "skip_lines" not in said
     (tmp_path / "a.layout.toml").write_text(said)
-    with pytest.raises(FormatError, match=rf"a\.csv, line {at + 4}: b is '{cell}'.*missing = '{cell}'"):
+    with pytest.raises(FormatError, match=rf"a\.csv, line {at + 4}: column 'b' is '{cell}'.*missing = '{cell}'"):
         taxel.open(tmp_path / "a.csv")
     (tmp_path / "a.layout.toml").write_text(f'{said}\nmissing = "{cell}"')
     assert taxel.open(tmp_path / "a.csv").frames().missing == 1

@@ -311,8 +311,8 @@ def test_a_table_of_another_program_is_read_by_the_names_of_its_columns(
         *(
             (
                 f"{name};Ereignis\n250;auf\n",
-                rf"line 1: column 't_us' is missing; the columns are .*; '{re.escape(name)}' contains numbers of frames, "
-                r"not times: "
+                rf"line 1: column 't_us' is missing; the columns are .*; '{re.escape(name)}' contains numbers of "
+                r"frames, not times: "
                 r"write t_us = FRAME \* 1000000 / RATE \(frame 250 at 100 frames/s is at 2500000 us\); "
                 r"must be",
             )

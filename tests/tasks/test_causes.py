@@ -305,7 +305,7 @@ def test_labels_near_nothing_are_learnt_as_given_where_that_is_asked(tmp_path: P
     words = ("train", recording, "--labels", labels, "--tare", "0.5", "--folds", 0, "--labels-as-given")
     code, out, _ = call(capsys, *words, "-o", tmp_path / "r.json")
     assert (code, (tmp_path / "r.json").exists()) == (0, True)
-    assert out.startswith("not held out, on its own training data")
+    assert out.startswith("not held out, but scored on its own training data")
 
 
 @pytest.mark.parametrize("answer", [True, False])

@@ -220,7 +220,9 @@ def _next(training: Training, out: Path, rules: Iterable[Path]) -> str:
     """Return what to do next: detect by the readout, or by the rules that are advised instead; or train again."""
     advised, following = training.again(), training.command(str(out))
     if advised is not None:
-        following = f"train again with {advised.option}" if advised.option else "do what may help, then train again"
+        following = (
+            f"train again with {advised.option}" if advised.option else "follow the advice above, then train again"
+        )
         if advised.option == "--rule FILE" and rules:
             following = "; ".join(training.command(str(path), is_rule=True) for path in rules)
     return f"; next: {following}" if following else ""

@@ -353,7 +353,7 @@ class Evidence:
 
     def _of_label(self, label: str, wrong: int) -> Iterator[Cause]:
         if (count := self._counts.get(label, 0)) < TWO_FOLDS:
-            there = f"there {are(count)} {count}"
+            there = f"there {are(count)} only {counted(count, 'label')}"
             folds = f"a score on held-out data needs at least {TWO_FOLDS}, and five folds need {FIVE_FOLDS}"
             yield Cause("few_labels", (label,), wrong, f"{there}; {folds}", "more labels")
         if not self.plan.fit_levels:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.messages import counted
 from taxel._base.times import beginning_us
 from taxel._core import FormatError
 from taxel.formats.event_camera import are_counts
@@ -129,7 +130,7 @@ class Rest:
             text += f"; something was on {self.preload_at} during this stretch" * bool(self.preload_at)
         if self.falls:
             text += f"; {self.fall(path, turned)}"
-        return text + f"; {self.zeroed} zeroed" * bool(self.zeroed)
+        return text + f"; {counted(self.zeroed, 'taxel')} zeroed" * bool(self.zeroed)
 
     @staticmethod
     def fall(path: Path | None = None, turned: float | None = None) -> str:
