@@ -152,7 +152,7 @@ def test_labels_within_the_refractory_time_are_named_and_leave_no_readout(tmp_pa
     code, _, error = call(capsys, "train", recording, "--labels", labels, "--no-align", "--tare", 0.03, "-o", out)
     assert (code, error.count("\n"), out.exists()) == (2, 1, False)
     assert re.search(
-        rf"contact: {recording} has a label at 95000 us, 5000 us after the label before; labels must be more than "
+        rf"contact: {recording} has a label at 95000 us, 5000 us after the previous label; labels must be more than "
         rf"[\d.]+",
         error,
     )
@@ -194,7 +194,7 @@ def test_a_recording_without_a_spike_is_refused_in_one_line(tmp_path: Path, caps
     arguments = ("train", tmp_path / "still.npz", "--labels", tmp_path / "labels.csv", "--recipe", "touch")
     code, _, error = call(capsys, *arguments, "-o", tmp_path / "r.json")
     assert code == 2
-    assert error.startswith("taxel: contact: nothing was felt in the recording up to the last of its 3 events; ")
+    assert error.startswith("taxel: contact: the sensor felt nothing in the recording up to the last of its 3 events; ")
     assert error.count("\n") == 1
     assert "what may help" not in error, "labels may be of touches that are too weak"
 

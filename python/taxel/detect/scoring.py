@@ -336,7 +336,7 @@ def _truth(detections: Detections, truth: Mapping[str, ArrayLike] | ArrayLike) -
     if isinstance(truth, Mapping):
         wrong = [label for label in truth if not isinstance(label, str)]
         if wrong:
-            raise refused("truth", f": {shown(wrong[0])} is not a label, which must be a text")
+            raise refused("truth", f": the label {shown(wrong[0])} must be a text")
         columns = {label: column(f"truth[{label!r}]", times, np.int64, "us") for label, times in truth.items()}
         labels = [label for label, times in columns.items() for _ in range(len(times))]
         return labels, np.concatenate([*columns.values(), np.empty(0, np.int64)])

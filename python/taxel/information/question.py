@@ -62,8 +62,7 @@ class Question:
             sizes = " x ".join(map(str, differing.array.shape)), " x ".join(map(str, shape))
             raise ProblemError(
                 f"{differing.name}: the array has {sizes[0]} taxels, but that of {self.trials[0].name} has "
-                f"{sizes[1]}: must "
-                "all have one size"
+                f"{sizes[1]}: all arrays must have the same size"
             )
         self.labels = np.array([trial.label for trial in self.trials])
         groups = [trial.group for trial in self.trials]

@@ -192,9 +192,11 @@ def calibrate(
     table = isinstance(loads, str | os.PathLike)
     known = read_loads(checked_path("loads", loads)) if table else several("loads", loads)
     if not known and not options.law and options.table is None:
-        raise helped(ProblemError("there is no law and no table to calibrate by"), "loads", "give")
+        raise helped(
+            ProblemError("law, table and loads are missing, so there is nothing to calibrate by"), "loads", "give"
+        )
     if not known and (options.each or options.exponent is not None):
-        raise helped(ProblemError("each and exponent are only for a fit"), "loads", "give")
+        raise helped(ProblemError("each and exponent are only for a fit to loads"), "loads", "give")
     with collected() as warnings:
         made = _calibrated(recording, [instance("loads", load, KnownLoad) for load in known], options)
     return replace(Calibrated(made), warnings=tuple(warnings))
@@ -289,7 +291,7 @@ def read_loads(path: str | os.PathLike[str]) -> list[KnownLoad]:
         unit, stretch = row["unit"].strip(), (value("from_s"), value("to_s"))
         loads.append(KnownLoad(value("load"), unit, *stretch, taxel, location))
     if not loads:
-        raise FormatError(f"{path.name}: no load in it")
+        raise FormatError(f"{path.name}: contains no load")
     return loads
 
 
@@ -314,6 +316,7 @@ def _points(path: Path, array: Array) -> tuple[NDArray[np.float64], NDArray[np.f
     if len(missing):
         point, y, x = missing[0]
         raise FormatError(
-            f"{path.name}: no reading of row {y}, column {x} under {values[point]:g}; each taxel needs each value"
+            f"{path.name}: no reading of row {y}, column {x} at value {values[point]:g}; each taxel must have a "
+            "reading for each value"
         )
     return readings, values

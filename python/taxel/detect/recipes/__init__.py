@@ -214,7 +214,7 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
         neuron = listed.get(label, listed.get(named[label] or (last[label] if alone else None), rest))
         if neuron is None:
             raise ProblemError(
-                f"recipe: it is for {' and '.join(listed)}, not for {shown(label)}: leave that label out, or choose "
+                f"recipe: is for {' and '.join(listed)}, not for {shown(label)}: leave this label out, or choose "
                 f"another recipe; the recipes are {', '.join(names())}"
             )
         neurons[label] = dict(neuron)
