@@ -223,7 +223,7 @@ def test_advice_names_the_rule_that_won() -> None:
     for made in (of_area, of_area._replace(recipe=Recipe(LevelCrossing([40.0])))):
         cause = first_cause(made, [example], scored(6), scored(12), rule)
         assert cause.advice == "the plain rule (--rule FILE)"
-        assert "leaves 0 missed and false on the same labels, and the neuron 6" in cause.measured
+        assert "leaves 0 missed and false on the same labels; the neuron leaves 6" in cause.measured
         assert first_cause(made, [example], scored(6), scored(12)).advice == "more labels"
 
 

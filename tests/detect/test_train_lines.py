@@ -67,7 +67,7 @@ def test_a_label_of_which_nothing_was_felt_is_named_by_recording_and_time(tmp_pa
     arguments = ("train", first, second, "--labels", labels, "--tare", 0.03, "--overwrite", "-o", tmp_path / "r.json")
     code, out, _ = call(capsys, *arguments)
     assert (code, out.splitlines()[0]) == (0, "held out: whole recordings, 2 folds (window 50 ms)")
-    unlearnt = "contact: no input that contact is learnt from is within 50 ms of 1 label, not learnt"
+    unlearnt = "contact: no input that contact is learnt from is within 50 ms of 1 label, which was not learnt"
     assert f"{unlearnt}: {second} at {alone / 1e6:.3f} s" in out
     assert "contact, neuron: 12 of 13 found, 1 missed, 0 false" in out, "it counts as missed"
     result = json.loads(call(capsys, *arguments, "--json")[1])
@@ -317,7 +317,7 @@ def test_another_tare_may_help_where_taxels_are_loaded_at_rest(made) -> None:
     )
     (cause, *_) = causes(readout, [stale], scored(9, 1, 0), scored(9, 1, 0))
     assert (cause.kind, cause.option) == ("tare", "--tare FILE.npz")
-    trial = r"tried with that of 0.000 to 0.190 s: 12 of 12 labels are where a load begins or ends, now 0"
+    trial = r"with a tare of 0.000 to 0.190 s, 12 of 12 labels are where a load begins or ends; now 0"
     assert cause.measured == (
         f"64 taxels read above the tare while nothing touches them; {trial}; to make this file, run: "
         "taxel cut 'example 0' FILE.npz --from 0.000 --to 0.190"

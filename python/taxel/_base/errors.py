@@ -19,7 +19,7 @@ _REMEDIES = {
     "give": "give {}",
     "go_on": "to continue anyway, give {}",
     "larger": "a larger {} reads more",
-    "lay_out": "give {}, or rows and columns in a layout file, if they are a grid's taxels row by row",
+    "lay_out": "if the taxels are a grid, row by row, give {}, or rows and columns in a layout file",
     "pitch": "give {} with the pitch in mm, or pitch_mm in a layout file",
     "unfelt": (
         "possible reasons: the first label is later than its touch, so the tare contains a touch (give {}); "

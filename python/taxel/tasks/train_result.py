@@ -420,8 +420,8 @@ class Training:
                 named = ", ".join(events[:_NAMED]) + more
                 weaker = next((f"; {c.measured}" for c in self.causes if c.kind == "levels" and label in c.labels), "")
                 yield (
-                    f"{label}: no input that {label} is learnt from is within 50 ms of {labels}, not learnt: {named}"
-                    f"{weaker}"
+                    f"{label}: no input that {label} is learnt from is within 50 ms of {labels}, which "
+                    f"{'was' if len(events) == 1 else 'were'} not learnt: {named}{weaker}"
                 )
 
 

@@ -272,6 +272,6 @@ def _wire(board: BoardSource, clock: Clock | None, lost: list[str]) -> sections.
 def _board(source: RecordedSource, path: Path) -> BoardSource:
     if not isinstance(source, BoardSource):
         raise ProblemError(
-            f"{path}: a {path.suffix.lower()} contains events and no frames; write frames to .mcap, .npz, .csv or .h5"
+            f"{path}: a {path.suffix.lower()} can contain only events; write frames to .mcap, .npz, .csv or .h5"
         )
     return source
