@@ -279,7 +279,7 @@ def test_neurons_trained_otherwise_are_refused() -> None:
         ({"array": (8, 8)}, "array is"),
         ({"delay_ms": -1.0}, "a: delay_ms is -1"),
         ({"delay_ms": math.nan}, "delay_ms is nan"),
-        ({"delay_ms": {"b": 1.0}}, "delay_ms: there is none for 'a'"),
+        ({"delay_ms": {"b": 1.0}}, "delay_ms: the value for 'a' is missing"),
         ({"delay_ms": "soon"}, "a: delay_ms is 'soon'"),
         ({"run_threshold": 0.0}, "run_threshold is 0"),
         ({"run_threshold": math.inf}, "run_threshold is inf"),

@@ -167,5 +167,5 @@ def test_bytes_that_are_no_command_are_refused_by_place():
 
 
 def test_boards_with_other_channels_are_not_led_to():
-    with pytest.raises(taxel.DeviceError, match="the board has 16 channels, the registers are for 64"):
+    with pytest.raises(taxel.DeviceError, match="the board has 16 channels, but the registers are for 64"):
         Registers().commands_to(Registers.preset("20.8 kHz"))

@@ -266,9 +266,8 @@ class Evidence:
         if recipes.knows("touch", label) or not fits or 2 * within <= total or self._loaded.taxels >= TOUCH:
             return
         measured = (
-            f"{within} of {counted(total, 'label')} {are(within)} within touches; {', '.join(fits)} "
-            f"{'fits' if len(fits) == 1 else 'fit'} where touches begin or end; no recipe detects what happens while a "
-            "touch lasts"
+            f"{within} of {counted(total, 'label')} {are(within)} within touches; labels of {', '.join(fits)} are "
+            "where touches begin or end; no recipe detects what happens while a touch lasts"
         )
         yield Cause("label_name", (label,), wrong, measured, "labels where touches begin or end")
 

@@ -500,7 +500,7 @@ def _neuron_of(
     """Return a neuron with weights, delay and inputs, given a learner or a tuple."""
     if isinstance(delay_ms, Mapping):
         if label not in delay_ms:
-            raise refused("delay_ms", f": there is none for {label!r}")
+            raise refused("delay_ms", f": the value for {label!r} is missing")
         delay_ms = delay_ms[label]
     delay, named = delay_ms, () if inputs is None else inputs
     if isinstance(learner, tuple) and len(learner) in (2, 3, 4):

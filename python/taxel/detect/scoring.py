@@ -352,7 +352,7 @@ def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
     if isinstance(window_ms, Mapping):
         for label in dict.fromkeys(labels):
             if label not in window_ms:
-                raise refused("window_ms", f": there is none for {label!r}")
+                raise refused("window_ms", f": the value for {label!r} is missing")
             of_label = np.array([name == label for name in labels])
             windows[of_label] = _windows([label] * int(of_label.sum()), window_ms[label])
         return windows

@@ -226,7 +226,7 @@ class Training:
             lines += self._scores(label)
         lines += [*self._advised(), *self._better(), *self._aligned()]
         if self.options.shift_ms:
-            lines.append(f"labels moved by {self.options.shift_ms:+g} ms before, as asked")
+            lines.append(f"labels moved by {self.options.shift_ms:+g} ms before training (--shift-ms)")
         lines += [f"{label}: {chosen}" for label, chosen in self.made.chosen.items()]
         lines += self._kinds()
         if recipe is not None:

@@ -294,7 +294,7 @@ impl Registers {
         target.check(array)?;
         if self.channels != target.channels {
             return Err(Error::device(format!(
-                "the board has {} channels, the registers are for {}",
+                "the board has {} channels, but the registers are for {}",
                 self.channels, target.channels
             )));
         }

@@ -306,7 +306,7 @@ class TaxelStatistics(NamedTuple):
     """Number of events that have the same polarity as the taxel's previous event."""
     touches: Touches
     values: NDArray[np.signedinteger] | None = None
-    """Number of different intensities of the taxel's events: 0, 1, or 2 for more; None if events have no intensities."""
+    """Number of different intensities of the taxel's events: 0, 1, or 2 for more; None without intensities."""
     least: NDArray[np.signedinteger] | None = None
     """The least value that the taxel is known to have had, ticks; -1 for a taxel without any event."""
     greatest: NDArray[np.signedinteger] | None = None
