@@ -73,10 +73,10 @@ def _lone_surrogate(value: str) -> bool:
     return False
 
 
-def instance(name: str, value: object, kind: type[T]) -> T:
-    """Return a value of the given class; refuse any other."""
-    if not isinstance(value, kind):
-        raise refused(name, f" is {shown(value)}: must be a {public_name(kind)}")
+def instance(name: str, value: object, *kinds: type[T]) -> T:
+    """Return a value of one of the given classes; refuse any other."""
+    if not isinstance(value, kinds):
+        raise refused(name, f" is {shown(value)}: must be a {' or '.join(map(public_name, kinds))}")
     return value
 
 

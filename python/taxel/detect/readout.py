@@ -442,7 +442,10 @@ def run_counting(
         source = recorded(source)
     if isinstance(source, SpikeTrains):
         if not isinstance(readout, Readout):
-            raise refused("source", f" is {shown(source)}: a plain rule reads a recording, events or frames")
+            raise refused(
+                "source",
+                f" is {shown(source)}: must be a taxel.Recording, taxel.Events or taxel.Frames, for a plain rule",
+            )
         return _run_spikes(readout, source), None
     if isinstance(source, Events | Frames):
         readout._check_unit(unit_of(source))

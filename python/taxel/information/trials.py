@@ -74,8 +74,7 @@ class LabelledTrial:
     name: str = "trial"
 
     def __post_init__(self) -> None:
-        if not isinstance(self.source, Events | Frames):
-            raise refused("source", f" is {shown(self.source)}: must be taxel.Events or taxel.Frames")
+        instance("source", self.source, Events, Frames)
         text("name", self.name)
         if not text("label", self.label):
             raise ProblemError(f"{self.name}: label is empty")
