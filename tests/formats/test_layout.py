@@ -494,7 +494,7 @@ def test_turned_readings_are_not_written_where_a_layout_would_turn_them_again(tm
         taxel.ProblemError, match=r"inverted already, which a \.csv cannot state, and .*step\.layout\.toml"
     ):
         taxel.convert(recording, tmp_path / "step.csv")
-    assert "that the readings were inverted (falls = 0)" in taxel.convert(recording, tmp_path / "other.csv")
+    assert "the fact that the readings were inverted (falls = 0)" in taxel.convert(recording, tmp_path / "other.csv")
 
 
 def test_a_layout_for_tables_says_nothing_of_a_board_s_recording_in_the_same_folder(tmp_path: Path) -> None:
