@@ -80,7 +80,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ),
         (("record", "--compression", "x", "a.mcap"), '--compression is "x": must be none, lz4 or zstd'),
         (("record", "--host", "no such host", "a.mcap"), '--host is "no such host": must be an IP address or the name'),
-        (("record", "--preset", "9 kHz", "a.mcap"), 'preset "9 kHz" is not known; presets: "5.2 kHz"'),
+        (("record", "--preset", "9 kHz", "a.mcap"), 'preset "9 kHz" is not known: must be one of "5.2 kHz"'),
         (("record", "there.mcap"), "there.mcap: exists already; give --overwrite, or another name"),
         (("record", "--trials", "3", "a.mcap"), "--trials needs --length"),
         (("record",), "FILE is missing; see taxel record --help"),
@@ -109,7 +109,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ),
         (
             ("encode", "walk.npz", "s.npz", "--encoder", "fa1", "--set", "wings=2"),
-            'wings is not known: there is "alpha", "a", "b"',
+            'wings is not known: must be "alpha", "a", "b"',
         ),
         (
             ("encode", "walk.npz", "s.npz", "--encoder", "fa1", "--set", "decay=s"),

@@ -164,7 +164,7 @@ class Array:
             object.__setattr__(self, "exists", frozen(exists))
         if self.places is not None:
             if self.pitch_mm is not None:
-                raise ProblemError("pitch_mm and places are both given: give one of them")
+                raise ProblemError("pitch_mm and places are both given: give only one of them")
             object.__setattr__(self, "places", instance("places", self.places, Places)._placed_on(self))
         if self.names is not None:
             names = tuple(text("names", entry) for entry in several("names", self.names))

@@ -202,7 +202,7 @@ class Detections(FrozenColumns):
         except (IndexError, TypeError, ValueError) as error:
             raise ProblemError(f"detections: choose by a label, a slice, a mask or numbers: {error}") from None
         if rows.ndim != 1:
-            raise ProblemError(f"detections: {shown(chosen)} has {rows.ndim} dimensions, must have one")
+            raise ProblemError(f"detections: {shown(chosen)} has {rows.ndim} dimensions: must have one")
         reported = None if self.reported is None else self.reported[rows]
         label, t, known, slope = self.label[rows], self.t[rows], self.known[rows], self.slope[rows]
         return Detections._of(label, t, known, slope, reported, self.repaired[rows])

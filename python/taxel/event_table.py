@@ -121,7 +121,9 @@ def _time(table: HeaderTable) -> int:
     missing = "t_us" if any(name.lower() in _LABELS for name in table.header) else "label"
     frames = next((name for name in table.header if _FRAMES.fullmatch(name)), None)
     counts = "" if frames is None else f"; {shown(frames)} contains numbers of frames, not times: {_CONVERT}"
-    raise FormatError(f"{table.location}, line 1: no column {missing!r}; there are {there}{counts}; {_RIGHT}")
+    raise FormatError(
+        f"{table.location}, line 1: column {missing!r} is missing; the columns are {there}{counts}; {_RIGHT}"
+    )
 
 
 def _label(table: HeaderTable, header: Sequence[str], rows: Sequence[Sequence[str]], separator: str) -> int:
@@ -137,9 +139,11 @@ def _label(table: HeaderTable, header: Sequence[str], rows: Sequence[Sequence[st
     ]
     if len(texts) == 1:
         return texts[0]
-    found = f"{' and '.join(shown(header[k]) for k in texts)} are texts" if texts else "no column 'label'"
+    found = "column 'label' is missing"
+    if texts:
+        found = f"{' and '.join(shown(header[k]) for k in texts)} are texts, so the column of the labels is not clear"
     there = ", ".join(map(shown, table.header))
-    raise FormatError(f"{table.location}, line 1: {found}; there are {there}; {_RIGHT}")
+    raise FormatError(f"{table.location}, line 1: {found}; the columns are {there}; {_RIGHT}")
 
 
 def _is_text(cell: str, separator: str = ";") -> bool:

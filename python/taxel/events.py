@@ -118,7 +118,7 @@ class Events(FrozenColumns):
                 # An absent intensity is stored as 0, so that equal events have equal columns.
                 self.intensity = frozen(np.where(self.present, self.intensity, np.uint16(0)))
         elif present is not None:
-            raise ProblemError("present without intensity: give both or neither")
+            raise ProblemError("present is given without intensity: give both or neither")
         self.repaired = None if repaired is None else _where_any(frozen_column("repaired", repaired, np.bool_))
         self.markers = _markers(markers)
         _core.check_events(self._parts())

@@ -170,7 +170,7 @@ class Neuron(Value):
             raise refused("weights", f" has {matrix.ndim} dimensions: must have two, neurons and trains")
         if matrix.shape[1] != len(_trains(trains)):
             raise refused(
-                "weights", f": {matrix.shape[1]} per neuron for {counted(len(trains), 'train')}, must be one per train"
+                "weights", f": {matrix.shape[1]} per neuron for {counted(len(trains), 'train')}; must be one per train"
             )
         factor = number("threshold", threshold)
         return SpikeTrains._from_parts(

@@ -113,7 +113,7 @@ class Tare(Saved):
             return cls.from_json(_core.tare_of_events(x._parts(), *window, note))
         if isinstance(x, Frames):
             return cls.from_json(_core.tare_of_frames(x._parts(), *window, note))
-        raise ProblemError(f"{type(x).__name__}: a tare is measured from taxel.Events or taxel.Frames")
+        raise refused("x", f" is {shown(x)}: must be a taxel.Events or taxel.Frames")
 
     def off(self, frames: Frames) -> Frames:
         """Return frames with each taxel's rest subtracted: 0 if it reads less, or if its rest is unknown.

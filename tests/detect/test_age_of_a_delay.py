@@ -21,7 +21,11 @@ def test_a_delay_at_which_an_age_begins_is_trained(delay_ms: float) -> None:
 @pytest.mark.parametrize(
     ("learner", "neurons", "text"),
     [
-        ({}, {"large": {"delay_ms": 5.5}}, "neurons.large: delay_ms is 5.5, but the encoder's ages_ms are 0, 5, 6.3"),
+        (
+            {},
+            {"large": {"delay_ms": 5.5}},
+            "neurons.large: delay_ms is 5.5: must be one of the encoder's ages_ms, 0, 5, 6.3",
+        ),
         ({"delay_ms": 4.999}, {"large": {}}, "neurons.large: delay_ms is 4.999"),
         ({}, {"large": {"search": [{"delay_ms": 5.0}, {"delay_ms": 7.0}]}}, "neurons.large.search: delay_ms is 7"),
     ],

@@ -405,7 +405,7 @@ def test_without_a_tare_the_rest_is_taken_from_before_the_first_label(folder: Pa
     code, said, _ = call(capsys, *arguments, "-o", tmp_path / "by_itself.json")
     first = min(row.t for row in taxel.Labels(folder / "truth.csv").rows)
     assert code == 0
-    assert f"tare: what the recording holds from 0 to {first / 1000 - 20:g} ms; another can be given" in said
+    assert f"tare: measured in the recording from 0 to {first / 1000 - 20:g} ms; --tare sets another tare" in said
     taxel.Tare.take(events, stop_us=first - 20_000).save(tmp_path / "tare.json")
     assert call(capsys, *arguments, "--tare", tmp_path / "tare.json", "-o", tmp_path / "said.json")[0] == 0
     assert taxel.Readout.load(tmp_path / "by_itself.json") == taxel.Readout.load(tmp_path / "said.json")
@@ -528,9 +528,9 @@ def test_a_label_without_a_neuron_is_an_error(folder: Path, capsys, tmp_path: Pa
 def test_a_line_of_labels_that_makes_no_sense_is_named(tmp_path: Path) -> None:
     table = tmp_path / "labels.csv"
     for text, said in [
-        ("a,b\n", "line 1: no column 'label'; there are 'a', 'b'; must be label,t_us"),
+        ("a,b\n", "line 1: column 'label' is missing; the columns are 'a', 'b'; must be label,t_us"),
         ("label,t_us\nstep,soon\n", "line 2: t_us is 'soon'; must be whole us"),
-        ("label,t_us\nstep\n", "line 2: 1 cells, must have 2"),
+        ("label,t_us\nstep\n", "line 2: 1 cells; must have 2"),
         ("label,t_us\n,5\n", "line 2: must have a label"),
         ("label,t_us\nstep,99999999999999999999\n", "line 2: must have a label, and a time within 2"),
     ]:

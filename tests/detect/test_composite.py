@@ -287,7 +287,7 @@ def test_inputs_are_chosen_among_the_points_and_what_none_uses_is_not_encoded() 
             "neurons.a: inputs: 'skin' is not the name of an encoder: must be one of area, moments",
         ),
         ({"neurons": {"a": {"inputs": []}}}, "neurons.a: inputs is empty"),
-        ({"neurons": {"a": {"inputs": ["moments"], "delay_ms": 3.0}}}, "neurons.a: delay_ms is 3, but .* 0, 4, 6"),
+        ({"neurons": {"a": {"inputs": ["moments"], "delay_ms": 3.0}}}, "neurons.a: delay_ms is 3: .* 0, 4, 6"),
         (
             {"neurons": {"a": {"delay_ms": 4.0, "search": [{"inputs": ["b"]}]}}},
             "neurons.a.search: inputs: .b. is not the name of an encoder",

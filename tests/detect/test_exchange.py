@@ -186,7 +186,7 @@ TWO = np.ones(2)
     [
         ({"weights": nir.Affine(np.ones((2, 8)), np.ones(2))}, "weights: has a bias"),
         ({"neurons": nir.IF(TWO, TWO)}, "LIF or CubaLIF"),
-        ({"neurons": nir.LIF(0 * TWO, TWO, 0 * TWO, TWO)}, r"neurons\[0\]: time constant"),
+        ({"neurons": nir.LIF(0 * TWO, TWO, 0 * TWO, TWO)}, r"neurons\[0\]: the time constant"),
         ({"neurons": nir.CubaLIF(2 * TWO, TWO, TWO, 0 * TWO, TWO)}, "tau_syn"),
         ({"neurons": nir.LIF(TWO, TWO, 2 * TWO, TWO)}, "threshold"),
     ],
@@ -218,7 +218,7 @@ def test_graded_spikes_are_refused(tmp_path: Path) -> None:
 
 def test_another_file_is_one_error(tmp_path: Path) -> None:
     (tmp_path / "a.nir").write_text("nothing of the kind")
-    with pytest.raises(taxel.FormatError, match=r"a\.nir: not a whole HDF5 file"):
+    with pytest.raises(taxel.FormatError, match=r"a\.nir: the HDF5 file is damaged"):
         taxel.Readout.from_nir(tmp_path / "a.nir")
     with pytest.raises(FileNotFoundError):
         taxel.Readout.from_nir(tmp_path / "b.nir")

@@ -223,7 +223,7 @@ def test_advice_names_the_rule_that_won() -> None:
     for made in (of_area, of_area._replace(recipe=Recipe(LevelCrossing([40.0])))):
         cause = first_cause(made, [example], scored(6), scored(12), rule)
         assert cause.advice == "the plain rule (--rule FILE)"
-        assert "leaves 0 missed and false on the same labels, and the neuron 6" in cause.measured
+        assert "leaves 0 missed and false on the same labels; the neuron leaves 6" in cause.measured
         assert first_cause(made, [example], scored(6), scored(12)).advice == "more labels"
 
 
@@ -436,7 +436,7 @@ def test_a_plain_rule_is_written_and_detects_what_the_training_says(
     assert sorted(tmp_path.glob("rule*")) == sorted(places)
     tare = Tare.take(frames, stop_us=int(truth["contact"][0]) - 20_000)
     for label, one in zip(labels, places, strict=True):
-        assert f"plain rule of {label}: written to {one}" in out
+        assert f"plain rule for {label} written to {one}" in out
         found = score(run(load(one), frames, tare=tare), {label: truth[label]})
         counts = f"{label}, plain rule: {found.found} of 12 found, {found.missed} missed, {found.false} false"
         assert counts in out

@@ -418,7 +418,7 @@ def test_what_a_rule_cannot_read_is_refused():
     rule = PlainRule("area", 2)
     with pytest.raises(ProblemError, match="plain rule without a tare"):
         run(rule, press())
-    with pytest.raises(ProblemError, match="a plain rule reads a recording"):
+    with pytest.raises(ProblemError, match=r"must be a taxel\.Recording, .*, for a plain rule"):
         run(rule, taxel.SpikeTrains.from_lists([[1.0]]))
     with pytest.raises(ProblemError, match="tare of 3 x 4"):
         run(rule, press(array=Array(4, 4)), tare=tare())

@@ -279,7 +279,7 @@ def test_neurons_trained_otherwise_are_refused() -> None:
         ({"array": (8, 8)}, "array is"),
         ({"delay_ms": -1.0}, "a: delay_ms is -1"),
         ({"delay_ms": math.nan}, "delay_ms is nan"),
-        ({"delay_ms": {"b": 1.0}}, "delay_ms: there is none for 'a'"),
+        ({"delay_ms": {"b": 1.0}}, "delay_ms: the value for 'a' is missing"),
         ({"delay_ms": "soon"}, "a: delay_ms is 'soon'"),
         ({"run_threshold": 0.0}, "run_threshold is 0"),
         ({"run_threshold": math.inf}, "run_threshold is inf"),
@@ -299,7 +299,7 @@ def test_files_that_are_no_readout_are_refused_by_name(readout: Readout, tmp_pat
         (b"", "not a JSON object: empty"),
         (b"{}", 'the key "format" is missing'),
         (json.dumps({**good, "version": 2}).encode(), "version is 2; this taxel reads only version 1"),
-        (json.dumps({**good, "wings": 2}).encode(), 'readout: wings is not known: there is "encoder", "array"'),
+        (json.dumps({**good, "wings": 2}).encode(), 'readout: wings is not known: must be "encoder", "array"'),
         (json.dumps({**good, "neurons": {}}).encode(), "has no neuron"),
         (json.dumps({**good, "time": "always"}).encode(), 'readout: time is "always": must be "continuous" or "grid"'),
         (readout.to_json()[:500].encode(), "not JSON"),
@@ -317,7 +317,7 @@ def test_files_that_are_no_readout_are_refused_by_name(readout: Readout, tmp_pat
 def test_a_readout_listens_to_recordings_events_and_frames_only(readout: Readout, source: object) -> None:
     with pytest.raises(taxel.ProblemError, match="source is"):
         run(readout, source)
-    with pytest.raises(taxel.ProblemError, match="a readout reads"):
+    with pytest.raises(taxel.ProblemError, match=r"must be a taxel\.Events or taxel\.Frames"):
         readout.stream(tare=tare()).push(source)  # type: ignore[arg-type]
 
 

@@ -128,7 +128,7 @@ def test_both_sides_are_kinds_of_touch_and_ends_of_steps() -> None:
 def test_a_recipe_for_certain_labels_refuses_others(tmp_path: Path) -> None:
     (tmp_path / "certain.toml").write_text('fits = ["events"]\n[encoder]\nname = "fa1"\n[neurons.contact]\ntau = 2.0\n')
     with pytest.raises(
-        ProblemError, match=r"it is for contact, not for 'ball': .* the recipes are event_counts, gait_channel, "
+        ProblemError, match=r"recipe: is for contact, not for 'ball': .* the recipes are event_counts, gait_channel, "
     ):
         Recipe.load(tmp_path / "certain.toml", labels=["contact", "ball"])
 

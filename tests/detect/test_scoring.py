@@ -119,7 +119,7 @@ def test_the_spread_is_numpys(values: list[float]) -> None:
         ({"a": [1]}, "wide", "window_ms"),
         ({"a": [1]}, None, "window_ms is None"),
         ({"a": [1]}, [1, 2], "one number for each of 1 event"),
-        ({"a": [1]}, {"b": 1}, "window_ms: there is none for 'a'"),
+        ({"a": [1]}, {"b": 1}, "window_ms: the value for 'a' is missing"),
     ],
 )
 def test_nonsense_in_a_score_is_one_clear_error(truth: object, window_ms: object, said: str) -> None:
@@ -167,7 +167,7 @@ def test_a_slope_keeps_every_digit_in_a_table(tmp_path) -> None:
     [
         ("", "line 1: contains nothing"),
         ("a,b\n", "line 1: contains a,b"),
-        ("label,t_us,known_us,slope_mv_per_ms\nx,1,2\n", "line 2: 3 cells, must have 4"),
+        ("label,t_us,known_us,slope_mv_per_ms\nx,1,2\n", "line 2: 3 cells; must have 4"),
         ("label,t_us,known_us,slope_mv_per_ms\nx,1,soon,0\n", "line 2: invalid literal"),
     ],
 )

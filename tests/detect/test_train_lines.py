@@ -67,7 +67,7 @@ def test_a_label_of_which_nothing_was_felt_is_named_by_recording_and_time(tmp_pa
     arguments = ("train", first, second, "--labels", labels, "--tare", 0.03, "--overwrite", "-o", tmp_path / "r.json")
     code, out, _ = call(capsys, *arguments)
     assert (code, out.splitlines()[0]) == (0, "held out: whole recordings, 2 folds (window 50 ms)")
-    unlearnt = "contact: no input that contact is learnt from is within 50 ms of 1 label, not learnt"
+    unlearnt = "contact: no input that contact is learnt from is within 50 ms of 1 label, which was not learnt"
     assert f"{unlearnt}: {second} at {alone / 1e6:.3f} s" in out
     assert "contact, neuron: 12 of 13 found, 1 missed, 0 false" in out, "it counts as missed"
     result = json.loads(call(capsys, *arguments, "--json")[1])
@@ -92,7 +92,7 @@ def test_the_last_lines_warn_of_labels_that_are_not_found_and_the_readout_is_wri
     result = json.loads(call(capsys, *arguments, "--window-ms", 1, "--json")[1])
     assert [f"warning: {one}" for one in result["warnings"]] == out.splitlines()[-2:]
     assert "contact, lift: what may help is to look where a load begins (taxel view); --shift-ms -7 moves these" in out
-    assert "; next: do what may help, then train again\n" in out
+    assert "; next: follow the advice above, then train again\n" in out
     request = {"recordings": [str(recording)], "labels": str(labels), "out": str(tmp_path / "p.json")}
     for window_ms, command in ((1, ""), (10, f"taxel detect RECORDING --readout {tmp_path / 'p.json'}")):
         options = {"options": {"folds": folds, "window_ms": window_ms}, "overwrite": True}
@@ -152,7 +152,7 @@ def test_labels_within_the_refractory_time_are_named_and_leave_no_readout(tmp_pa
     code, _, error = call(capsys, "train", recording, "--labels", labels, "--no-align", "--tare", 0.03, "-o", out)
     assert (code, error.count("\n"), out.exists()) == (2, 1, False)
     assert re.search(
-        rf"contact: {recording} has a label at 95000 us, 5000 us after the label before; labels must be more than "
+        rf"contact: {recording} has a label at 95000 us, 5000 us after the previous label; labels must be more than "
         rf"[\d.]+",
         error,
     )
@@ -173,7 +173,7 @@ def test_what_cannot_be_held_out_or_is_not_to_be_says_why(
     arguments = ("train", recording, "--labels", labels, "--overwrite", "-o", tmp_path / "r.json", *options)
     code, out, error = call(capsys, *arguments)
     assert (code, error) == (0, "")
-    assert out.splitlines()[0] == f"not held out, on its own training data (window 50 ms): {why}"
+    assert out.splitlines()[0] == f"not held out, but scored on its own training data (window 50 ms): {why}"
     result = json.loads(call(capsys, *arguments, "--json")[1])
     assert (result["held_out"], result["judged_on"]) == (False, "its own training data")
     assert result["score"]["events"] == 2 * count == result["score"]["found"]
@@ -194,7 +194,7 @@ def test_a_recording_without_a_spike_is_refused_in_one_line(tmp_path: Path, caps
     arguments = ("train", tmp_path / "still.npz", "--labels", tmp_path / "labels.csv", "--recipe", "touch")
     code, _, error = call(capsys, *arguments, "-o", tmp_path / "r.json")
     assert code == 2
-    assert error.startswith("taxel: contact: nothing was felt in the recording up to the last of its 3 events; ")
+    assert error.startswith("taxel: contact: the sensor felt nothing in the recording up to the last of its 3 events; ")
     assert error.count("\n") == 1
     assert "what may help" not in error, "labels may be of touches that are too weak"
 
@@ -213,7 +213,9 @@ def test_a_fold_that_cannot_be_learnt_leaves_the_training_as_it_is(tmp_path: Pat
     arguments = ("train", first, tmp_path / "still.npz", "--labels", labels, *tared, "--overwrite")
     code, out, _ = call(capsys, *arguments, "-o", tmp_path / "r.json")
     assert code == 0
-    assert out.startswith("not held out, on its own training data (window 50 ms): a part of the training data cannot")
+    assert out.startswith(
+        "not held out, but scored on its own training data (window 50 ms): a part of the training data cannot"
+    )
     assert "contact, neuron: 6 of 7 found, 1 missed, 0 false" in out
     code, _, error = call(capsys, *arguments, "--folds", 2, "-o", tmp_path / "r.json")
     assert (code, "nothing was felt" in error) == (2, True), "folds that were asked for are not left out"
@@ -311,11 +313,11 @@ def test_another_tare_may_help_where_taxels_are_loaded_at_rest(made) -> None:
     few = causes(readout, [example._replace(labels={"contact": [9000]})], scored(0, 1, 0), scored(0, 1, 0))[0]
     assert (few.advice, few.measured) == (
         "more labels",
-        "there is 1; a score on held-out data needs at least 4, and five folds need 10",
+        "there is only 1 label; a score on held-out data needs at least 4, and five folds need 10",
     )
     (cause, *_) = causes(readout, [stale], scored(9, 1, 0), scored(9, 1, 0))
     assert (cause.kind, cause.option) == ("tare", "--tare FILE.npz")
-    trial = r"tried with that of 0.000 to 0.190 s: 12 of 12 labels are where a load begins or ends, now 0"
+    trial = r"with a tare of 0.000 to 0.190 s, 12 of 12 labels are where a load begins or ends; now 0"
     assert cause.measured == (
         f"64 taxels read above the tare while nothing touches them; {trial}; to make this file, run: "
         "taxel cut 'example 0' FILE.npz --from 0.000 --to 0.190"
@@ -328,7 +330,7 @@ def test_another_tare_may_help_where_taxels_are_loaded_at_rest(made) -> None:
         ("--rule FILE", [], "train again with --rule FILE"),
         ("--rule FILE", [Path("rule.json")], "taxel detect RECORDING --readout rule.json"),
         ("--shift-ms -200", [Path("rule.json")], "train again with --shift-ms -200"),
-        ("", [], "do what may help, then train again"),
+        ("", [], "follow the advice above, then train again"),
     ],
 )
 def test_a_rule_that_is_advised_and_written_is_used_next(option: str, rules: list[Path], following: str) -> None:

@@ -75,7 +75,7 @@ def test_fa1_on_ticks_by_table_equals_fa1_on_the_same_numbers_without_it():
         (lambda: FA1(theta_0=-1), "theta_0 is -1"),
         (lambda: FA1(range=0), "range is 0"),
         (lambda: FA1(bits=11), "bits is 11"),
-        (lambda: FA1(range=1, theta_0=1), "theta_0 and range: give one"),
+        (lambda: FA1(range=1, theta_0=1), "theta_0 and range are both given"),
         (lambda: FA1(decay="s"), 'decay is "s": must be "sample" or "ms"'),
     ],
 )
@@ -86,7 +86,7 @@ def test_nonsense_gets_one_clear_line(call, said):
 
 def test_fa1_refuses_frames_that_do_not_come_at_its_period():
     with pytest.raises(
-        taxel.ProblemError, match=r"5 ms after the frame before: frames must come every 1 ms; give period_ms"
+        taxel.ProblemError, match=r"5 ms after the previous frame: frames must come every 1 ms; give period_ms"
     ):
         FA1().encode(frames_of([0, 1000, 6000], np.zeros((3, 1))))
     FA1(period_ms=0.192).encode(frames_of([0, 100, 300, 500, 700], np.zeros((5, 1))))

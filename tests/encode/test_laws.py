@@ -404,7 +404,7 @@ def test_a_long_silence_costs_no_time_once_nothing_can_come():
         (lambda: Encoder.from_json("[]"), r"encoder is \[\]: must be an object \(names and values\)"),
         (lambda: Encoder.from_json("{}"), "the name is missing: must be one of change_events"),
         (lambda: Encoder.from_json('{"name": "sa3"}'), "encoder sa3: must be one of"),
-        (lambda: Encoder.from_json('{"name": "fa1", "tau": 5}'), 'tau is not known: there is "alpha", '),
+        (lambda: Encoder.from_json('{"name": "fa1", "tau": 5}'), 'tau is not known: must be "alpha", '),
         (lambda: Encoder.from_json('{"name": "level_crossing"}'), "levels is missing"),
         (lambda: Encoder.from_json(None), "must be JSON text"),
         (lambda: FA1().encode([1, 2]), "list cannot be encoded"),

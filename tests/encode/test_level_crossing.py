@@ -112,7 +112,7 @@ def test_renewals_go_on_over_a_gap_longer_than_the_window():
         (lambda: LevelCrossing([1.0], release_share=1.01), "release_share is 1.01"),
         (lambda: LevelCrossing([-1.0, 1.0], release_share=0.7), "use release_by"),
         (lambda: LevelCrossing([1.0], release_by=-1), "release_by is -1"),
-        (lambda: LevelCrossing([1.0], release_by=1, release_share=1), "give one of them"),
+        (lambda: LevelCrossing([1.0], release_by=1, release_share=1), "are both given: give only one of them"),
         (lambda: LevelCrossing([1.0], hold_ms=-1), "hold_ms is -1"),
         (lambda: LevelCrossing([1.0], tonic_ms=0), "tonic_ms is 0"),
         (lambda: LevelCrossing([1.0], tonic_level=1.0), "without tonic_ms"),

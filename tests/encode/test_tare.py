@@ -83,7 +83,7 @@ EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: Tare.take(5), "int: a tare is measured from"),
+        (lambda: Tare.take(5), "x is 5: must be a taxel.Events or taxel.Frames"),
         (lambda: Tare.take(EVENTS, start_us=1.5), "start_us is 1.5"),
         (lambda: Tare.take(EVENTS, stop_us=True), "stop_us is True"),
         (lambda: Tare.take(EVENTS, start_us=900, stop_us=900), "start must be before stop"),

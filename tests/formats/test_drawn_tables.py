@@ -135,7 +135,7 @@ def test_drawn_events_open_by_the_layout_that_is_printed_of_them(order, named, p
         ("1 2\n", 'frame_end = "line"', "frame_end is 'line': must be one of 'blank'"),
         ("1 2\n", 'decimal = " "', "decimal is ' ': must be"),
         ("1 2\n", "events = true", "events is true: the table must have a time_column"),
-        ("1 2 3\n", 'events = true\ntime_column = 1', "the columns beside the time are column 2, column 3; must "
+        ("1 2 3\n", 'events = true\ntime_column = 1', "the columns other than the time are column 2, column 3; must "
         "be x, y, p for events"),
         ("1 2 3 4\n", 'columns = ["t"]', "line 1: 4 columns, but the layout states 1 name"),
     ],

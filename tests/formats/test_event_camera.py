@@ -165,7 +165,7 @@ def test_a_table_named_dat_is_a_table(tmp_path: Path) -> None:
             lambda data: data.replace(b"64x48", b"").replace(b"EVT2;height=48", b"EVT2"),
             "does not state the size; add a line",
         ),
-        ("evt2", lambda data: data.replace(b"64", b"16"), "not a whole file of an event camera .*x="),
+        ("evt2", lambda data: data.replace(b"64", b"16"), "the file of an event camera is damaged .*x="),
     ],
 )
 def test_damage_is_named(kind: str, change, said: str, tmp_path: Path) -> None:
@@ -214,7 +214,7 @@ def test_a_library_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.Monke
     child.write_text("print('{\"running\": true}', flush=True)\n__import__('time').sleep(600)\n")
     monkeypatch.setattr(reading, "_CHILD", child)
     monkeypatch.setattr(reading, "PATIENCE_S", 0.5)
-    with pytest.raises(FormatError, match=r"not a whole file of an event camera \(the library has read nothing"):
+    with pytest.raises(FormatError, match=r"the file of an event camera is damaged .*the library has read nothing"):
         taxel.open(write(tmp_path / "a.raw", some_rows()))
 
 
@@ -235,7 +235,9 @@ def test_training_on_events_names_what_works_and_a_burst_is_learnt_from_counts(t
     rows = np.concatenate([noise, *bursts]).astype(np.int64)
     path = write(tmp_path / "a.raw", rows[np.argsort(rows[:, 0], kind="stable")])
     labels = [{"contact": begins.tolist()}]
-    with refused("events without intensities, which the recipe touch and its encoders need: frames of an event camera"):
+    with refused(
+        "the events have no intensities, but the recipe touch and its encoders need them: for an event camera"
+    ):
         taxel.train(taxel.open(path), labels)
     training = taxel.train(taxel.open(path, bin=4, window_ms=5), labels)
     assert training.score["contact"].found == 12
@@ -346,11 +348,11 @@ def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, window_ms: 
         (
             "a.aedat",
             b"#!AER-DAT2.0\r\n",
-            r"\(AEDAT 2\), not with a recording; save it as a file of event cameras that taxel reads: .raw, "
+            r"\(AEDAT 2\): not a recording; save it as a file of event cameras that taxel reads: .raw, "
             r".dat, .aedat4",
         ),
         ("a.aedat", b"#!AER-DAT4.0\r\n", r"AEDAT 4\), .*; rename it to .aedat4"),
-        ("a.dat", b"", "is empty: not a recording"),
+        ("a.dat", b"", "the file is empty; must be a recording"),
     ],
 )
 def test_what_is_no_file_of_a_camera_names_those(name: str, begins: bytes, said: str, tmp_path: Path) -> None:

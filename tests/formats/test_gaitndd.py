@@ -39,7 +39,7 @@ def test_gaitndd_gives_step_times_and_leaves_out_invalid_samples(tmp_path):
         (".hea", "300 3000\r", "300 3001\r", "4500 bytes; must be 4503 for 3001 samples of format 212"),
         (".hea", " 0 500 ", " 0 501 ", "the first value is 500; must be 501, as the header states"),
         (".hea", "control99.let", "../control99.let", "is not a plain file name"),
-        (".ts", "5.0000\t1.0000", "5,0000\t1.0000", "line 3: time has a decimal comma"),
+        (".ts", "5.0000\t1.0000", "5,0000\t1.0000", "line 3: column 'time' has a decimal comma"),
         (
             ".ts",
             "5.0000\t1.0000",

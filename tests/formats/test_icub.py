@@ -26,10 +26,10 @@ def test_grasps_rise_with_pressure_and_count_slices(tmp_path):
     ("old", "new", "text"),
     [
         ("\n1,1,", "\n1,3,", "ball.csv, line 3: slice is 3; must be 1"),
-        (",0\n", ",x\n", "ball.csv, line 2: little_12 is 'x', not a number"),
-        (",0\n", ",\n", "ball.csv, line 2: little_12 is empty"),
-        (",0\n", "\n", "ball.csv, line 2: 75 cells, must have 76"),
-        ("thumb_3", "thumb_x", "no column 'thumb_3'"),
+        (",0\n", ",x\n", "ball.csv, line 2: column 'little_12' is 'x', not a number"),
+        (",0\n", ",\n", "ball.csv, line 2: column 'little_12' is empty"),
+        (",0\n", "\n", "ball.csv, line 2: 75 cells; must have 76"),
+        ("thumb_3", "thumb_x", "column 'thumb_3' is missing"),
         ("trial,slice", "slice,trial", "no table of grasps"),
     ],
 )

@@ -72,10 +72,10 @@ def test_moticon_reports_are_taken_where_they_are(tmp_path):
     [
         (lambda r: [*r[:20], r[20] + "\t", *r[21:]], "line 21: 54 cells; must have 53"),
         (lambda r: [*r[:20], r[20].replace("0.00\t", "\t", 1), *r[21:]], "line 21: .* is empty; must have a number"),
-        (lambda r: [*r[:20], r[20].replace("0.17", "0,17"), *r[21:]], "line 21: time has a decimal comma"),
+        (lambda r: [*r[:20], r[20].replace("0.17", "0,17"), *r[21:]], "line 21: column 'time' has a decimal comma"),
         (
             lambda r: [r[0], r[1], r[2].replace("left pressure", "left force"), *r[3:]],
-            "the column 'left pressure 1' is missing",
+            "column 'left pressure 1' is missing",
         ),
     ],
 )

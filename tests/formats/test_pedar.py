@@ -26,8 +26,11 @@ def test_pedar_gives_two_insoles_and_its_own_sum_as_truth(tmp_path):
     ("change", "said"),
     [
         (lambda r: [*r[:9], r[9] + "\t1.0", *r[10:]], "line 10: 12 cells; must have 11"),
-        (lambda r: [*r[:9], r[9].replace(".", ","), *r[10:]], "line 10: time.secs. has a decimal comma"),
-        (lambda r: [r[0], r[1].replace("100", "50"), *r[2:]], "line 7: 10000 us after the line above; must fit 50 Hz"),
+        (lambda r: [*r[:9], r[9].replace(".", ","), *r[10:]], "line 10: column 'time.secs.' has a decimal comma"),
+        (
+            lambda r: [r[0], r[1].replace("100", "50"), *r[2:]],
+            "line 7: the time is 10000 us after that of the line above; must fit 50 Hz",
+        ),
         (lambda r: [r[0], *r[2:]], "a line 'scanning rate"),
         (lambda r: [*r[:4], *r[5:]], "the line of column names"),
     ],

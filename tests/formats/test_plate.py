@@ -34,7 +34,7 @@ def test_interpolated_rows_come_back_within_one_count(seed, start, sensors):
 
 def test_rows_that_were_not_interpolated_are_refused():
     image = np.random.default_rng(1).integers(0, 500, (30, 8, 8))
-    with pytest.raises(FormatError, match="not interpolated three from two"):
+    with pytest.raises(FormatError, match="cells do not fit rows that were interpolated"):
         plate.sensor_rows(image)
 
 
@@ -66,7 +66,7 @@ def test_events_csv_of_the_folder_is_taken_where_it_is(tmp_path):
             lambda h5: h5.create_dataset("notes", data=[1]),
             "subj900.h5: the data set 'notes' must have a name like imgNNN",
         ),
-        (lambda h5: h5.create_dataset("img002", data=[1.5]), "subj900.h5, img002: must be whole numbers"),
+        (lambda h5: h5.create_dataset("img002", data=[1.5]), "subj900.h5, img002: must contain whole numbers"),
         (
             lambda h5: h5.create_dataset("img002", data=np.zeros((9, 4, 5), int)),
             "subj900.h5, img002: no count is above 0",
@@ -83,7 +83,7 @@ def test_a_plate_file_that_is_none_says_where(tmp_path, spoil, said):
 def test_a_cut_hdf5_file_is_one_error(tmp_path):
     file = write_plate(tmp_path)
     file.write_bytes(file.read_bytes()[:3000])
-    with pytest.raises(FormatError, match=r"subj900.h5: not a whole HDF5 file"):
+    with pytest.raises(FormatError, match=r"subj900.h5: the HDF5 file is damaged"):
         list(formats.trials(tmp_path, "plate"))
 
 

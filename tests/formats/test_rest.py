@@ -232,7 +232,7 @@ def test_training_on_values_that_fall_says_what_turns_them(tmp_path, capsys) -> 
     for encoder, fails in ((("--encoder", "contact_area"), True), ((), False)):
         code, _, said = call(capsys, *command, tmp_path / f"{fails}", *encoder)
         assert code == 2 * fails
-        assert ("nothing was felt in the recording up to" in said) == fails
+        assert ("the sensor felt nothing in the recording up to" in said) == fails
         assert "falls = true" in said
         assert "palm.layout.toml" in said
         assert "tare" not in said
@@ -285,7 +285,7 @@ def test_where_rebounds_of_values_that_fall_are_learnt_and_detected_what_turns_t
     taxel.convert(palm(5, 1, 0.4, rebound=0.25), tmp_path / "palm.npz", overwrite=True)
     [hint] = json.loads(call(capsys, *given)[1])["remarks"]
     assert hint.endswith(
-        "after its layout inverted them: if the values need no inversion, remove the line falls from its layout"
+        "after its layout inverted them: if the values need no inversion, remove the line 'falls = ...' from its layout"
     )
     taxel.convert(palm(5, -1, 0.4, rebound=0.25), tmp_path / "palm.npz", overwrite=True)
     (tmp_path / "palm.layout.toml").write_text("falls = true\n")

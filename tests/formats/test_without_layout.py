@@ -259,7 +259,7 @@ def test_one_cell_that_is_no_number_hides_no_line_before_it(tmp_path: Path, at: 
     said = layout_said_of(tmp_path / "a.csv")
     assert "skip_lines" not in said
     (tmp_path / "a.layout.toml").write_text(said)
-    with pytest.raises(FormatError, match=rf"a\.csv, line {at + 4}: b is '{cell}'.*missing = '{cell}'"):
+    with pytest.raises(FormatError, match=rf"a\.csv, line {at + 4}: column 'b' is '{cell}'.*missing = '{cell}'"):
         taxel.open(tmp_path / "a.csv")
     (tmp_path / "a.layout.toml").write_text(f'{said}\nmissing = "{cell}"')
     assert taxel.open(tmp_path / "a.csv").frames().missing == 1
@@ -268,7 +268,7 @@ def test_one_cell_that_is_no_number_hides_no_line_before_it(tmp_path: Path, at: 
 @pytest.mark.parametrize(
     ("layout", "match"),
     [
-        ('leave_out = ["x"]', r"a\.csv: the table has no column 'x'; the columns are time, a, who"),
+        ('leave_out = ["x"]', r"a\.csv: column 'x' is missing; the columns are time, a, who"),
         ("leave_out = [4]", r"a\.csv: leave_out is 4, but the table has 3 columns"),
         ("leave_out = [0]", "leave_out is 0: must be a whole number from 1"),
         ('leave_out = "who"', "leave_out is 'who': must be a list of columns"),
@@ -281,7 +281,7 @@ def test_one_cell_that_is_no_number_hides_no_line_before_it(tmp_path: Path, at: 
             r"line 3: time is 'noon'; must be like 2024-05-01T",
         ),
         ('leave_out = ["who"]', r"column 'time' contains times, as its name shows"),
-        ('leave_out = ["time", "a"]', "line 2: who is 'me', not a number"),
+        ('leave_out = ["time", "a"]', "line 2: column 'who' is 'me', not a number"),
     ],
 )
 def test_columns_and_times_that_do_not_fit_their_table_are_refused(tmp_path: Path, layout: str, match: str) -> None:

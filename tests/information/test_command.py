@@ -157,7 +157,7 @@ def test_recordings_of_one_folder_without_labels_are_told_of_the_table(tmp_path)
     taxel.convert(events, tmp_path / "touches.npz")
     done = run(tmp_path / "touches.npz", "--window-ms", "20", "--report", tmp_path / "page.html")
     assert isinstance(done.exception, taxel.Error), done.output
-    assert f"here '{tmp_path.name}' alone; give --labels FILE" in str(done.exception)
+    assert f"there is only '{tmp_path.name}'; give --labels FILE" in str(done.exception)
 
 
 GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
@@ -168,7 +168,7 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
 @pytest.mark.parametrize(
     ("table", "arguments", "text"),
     [
-        ("recording,label\na,b\n", [], "no column 't_us'"),
+        ("recording,label\na,b\n", [], "column 't_us' is missing"),
         ("recording,t_us,label,t_us\na,1,b,2\n", [], "column 't_us' appears twice"),
         ("recording,t_us,label\n", [], "names no trial"),
         (

@@ -167,7 +167,7 @@ def test_a_row_that_the_problem_does_not_have_is_one_clear_error():
     ):
         with pytest.raises(ProblemError, match=said):
             problem.row(row)
-    with pytest.raises(ProblemError, match="a slope is required only in continuous time"):
+    with pytest.raises(ProblemError, match='a row of kind slope needs time "continuous"'):
         refuted(time="grid").problem_.slope(0, 0)
     with pytest.raises(ProblemError, match="not on the grid"):
         refuted(time="grid").problem_.silence(0, 0.25)

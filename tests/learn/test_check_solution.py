@@ -185,7 +185,7 @@ def test_fits_with_less_weight_are_held_against_the_exact_potential(seeds):
             elif not found:
                 assert found.unproven is None
                 p, k = at[reached.index(False)]
-                assert found.wrong.startswith(f"pattern {p}: does not fire at target {k} "), (
+                assert found.wrong.startswith(f"pattern {p}: the neuron does not fire at target {k} "), (
                     f"seed {seed}: {found.wrong}"
                 )
                 missed += 1

@@ -130,7 +130,7 @@ def test_a_line_that_is_being_written_is_waited_for(table: Path, tables) -> None
     ("text", "said"),
     [
         (b"label,t_us\nheel,soon\n", "line 2: t_us is 'soon'"),
-        (b"# my labels\nlabel,t_us\n", "line 1: no column 'label'"),
+        (b"# my labels\nlabel,t_us\n", "line 1: column 'label' is missing"),
         (b'label,t_us\n"heel,1\n', "a quote is opened"),
         (
             "label,t_us\nheel,1\n".encode("utf-16") + b"\0",

@@ -206,7 +206,11 @@ def test_a_reader_that_comes_late_hears_what_is_said_from_then_on(tmp_path: Path
 @pytest.mark.parametrize(
     ("to", "kind", "said"),
     [
-        ("nowhere", taxel.ProblemError, "must be serial:PLACE, lines:PATH, lines+tcp:HOST:PORT or lines+udp:HOST:PORT"),
+        (
+            "nowhere",
+            taxel.ProblemError,
+            "must be serial:PLACE[,baud=RATE], lines:PATH, lines+tcp:HOST:PORT or lines+udp:HOST:PORT",
+        ),
         ("lines+udp:9000", taxel.ProblemError, "must be a host and a port"),
         ("serial:/dev/null,baud=fast", taxel.ProblemError, "'fast'".replace("'", '"')),
         ("lines:/dev/null", taxel.ProblemError, "/dev/null: is not a named pipe; mkfifo creates it"),

@@ -175,7 +175,7 @@ def test_arguments_that_make_no_sense_are_one_clear_error_each():
         (lambda: pairwise("van_rossum", several(1, 2), trains, tau=1.0), "a has 6 trains, b has 1: must be equally"),
         (
             lambda: pairwise("van_rossum_spatial", several(1, 2), array=Array(2, 2, 1.0)),
-            "a has 6 trains, the array 4 taxels",
+            "a has 6 trains, but the array has 4 taxels",
         ),
     ):
         with pytest.raises(ProblemError, match=said):

@@ -99,7 +99,7 @@ def test_on_and_off_trains_are_smoothed_apart_and_missing_taxels_do_not_count():
     assert van_rossum_spatial(*half, array=lacking) == pytest.approx(2.0)
     with pytest.raises(ProblemError, match="a, train 1: has spikes, but the array has no taxel at this place"):
         van_rossum_spatial(SpikeTrains.from_lists([[], [1.0]]), half[1], array=lacking)
-    with pytest.raises(ProblemError, match="a has 3 trains, the array 2 taxels"):
+    with pytest.raises(ProblemError, match="a has 3 trains, but the array has 2 taxels"):
         van_rossum_spatial(on.select([0, 1, 2]), on.select([0, 1, 2]), array=one)
     with pytest.raises(ProblemError, match="sigma is 0 mm"):
         van_rossum_spatial(on, off, array=one, sigma=0.0)

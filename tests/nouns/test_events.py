@@ -258,7 +258,7 @@ GOOD = {"t": [0, 5], "x": [1, 2], "y": [3, 4], "p": [True, False]}
         ("intensity", [1], "intensity has 1 entries"),
         ("intensity", [1, -1], r"intensity\[1\] is -1"),
         ("intensity", [1, 65_536], r"intensity\[1\]"),
-        ("present", [True, False], "present without intensity"),
+        ("present", [True, False], "present is given without intensity"),
         ("markers", 3, "markers is 3"),
         ("markers", [3], "markers is"),
         ("markers", [(0.5, True)], "markers"),

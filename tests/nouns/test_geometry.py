@@ -140,7 +140,7 @@ def test_without_a_pitch_a_grid_counts_in_columns_and_rows_and_channels_refuse()
             lambda: taxel.encode.Skin(seed=1).afferents(Array(8, 8, name="mat")),
             "skin needs distances in mm, but the pitch of mat",
         ),
-        (lambda: taxel.encode.Skin(seed=1).afferents(FOOT), "skin needs one pitch, but foot has a place"),
+        (lambda: taxel.encode.Skin(seed=1).afferents(FOOT), "skin needs one pitch, but foot states the position"),
         (
             lambda: _moments(Array(4, 4, name="mat"), displacement_mm=(1.0, 9.0)),
             "displacement_mm needs distances in mm",

@@ -133,7 +133,7 @@ def test_a_file_without_spike_times_is_one_error(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"a\.nwb: the NWB file contains no spike times"):
         SpikeTrains.from_nwb(tmp_path / "a.nwb")
     (tmp_path / "b.nwb").write_text("nothing of the kind")
-    with pytest.raises(FormatError, match=r"b\.nwb: not a whole HDF5 file"):
+    with pytest.raises(FormatError, match=r"b\.nwb: the HDF5 file is damaged"):
         SpikeTrains.from_nwb(tmp_path / "b.nwb")
     with pytest.raises(FileNotFoundError):
         SpikeTrains.from_nwb(tmp_path / "c.nwb")

@@ -33,16 +33,16 @@ WORDS: dict[str, tuple[str, ...]] = {
     "losses.counts": ("the counts of received and lost data, by cause",),
     "losses.verdict": ("the counts of received and lost data, by cause", "the summary of losses"),
     "losses.remarks": ("the remark: ",),
-    "losses.truncated": ("that the end of the recording is missing",),
+    "losses.truncated": ("the fact that the end of the recording is missing",),
     "losses.rebuilt": ("the remarks on reading the recording",),
-    "frame_table.untimed": ("that the frames have no times",),
-    "frame_table.turned": ("that the readings were inverted",),
+    "frame_table.untimed": ("the fact that the frames have no times",),
+    "frame_table.turned": ("the fact that the readings were inverted",),
     "frame_table.frame_us": ("the length of a frame that a readout assumed",),
     "stream.columns": ("the names of the columns",),
     "stream.samples": ("the lines of the stream as received",),
     "wire.datagrams": ("raw datagrams", "where datagrams begin"),
     "wire.payload": ("raw bytes",),
-    "wire.differences": ("that intensities are differences",),
+    "wire.differences": ("the fact that intensities are differences",),
 }
 #: How the bytes are encoded, which is lost with them.
 OF_BYTES = {"wire.differences", "wire.version_2", "wire.origin_us", "wire.unmarked"}

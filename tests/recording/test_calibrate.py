@@ -96,7 +96,7 @@ def test_a_table_by_taxel_names_what_it_lacks(tmp_path: Path) -> None:
     lines = [",".join(map(str, row)) for row in rows]
     table.write_text("\n".join(["x,y,reading,value", *lines[:-1]]))
     done = run("calibrate", path, "--table", table)
-    assert (done.returncode, "no reading of row 1, column 1 under 4" in done.stderr) == (2, True)
+    assert (done.returncode, "no reading of row 1, column 1 at value 4" in done.stderr) == (2, True)
     table.write_text("\n".join(["x,y,reading,value", *lines]))
     assert run("calibrate", path, "--table", table).returncode == 0
     # 1, 2 and 3 counts on taxels that read 1, 2 and 2 counts a newton.
@@ -106,7 +106,7 @@ def test_a_table_by_taxel_names_what_it_lacks(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ((), "there is no law and no table to calibrate by; give --loads"),
+        ((), "law, table and loads are missing, so there is nothing to calibrate by; give --loads"),
         (("--load", "0"), "load 1 is 0: must be above 0"),
         (("--load", "3", "--from", "7", "--to", "9"), "--load: nothing was recorded from 7.0 to 9.0 s"),
         (("--load", "3", "--from", "99"), "--load: nothing was recorded from 99.0 s to the end"),

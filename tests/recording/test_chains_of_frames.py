@@ -88,7 +88,8 @@ class Model:
             return replace(self, clock=samples, samples=samples, lost=self.lost | said), said
         words = {
             "the unit": self.unit != "counts", "the side": self.side, "where the heel is": self.heel,
-            "that the readings were inverted": self.turned is not None, "the names of the columns": self.columns,
+            "the fact that the readings were inverted": self.turned is not None,
+            "the names of the columns": self.columns,
             "note": self.notes, "detection": self.found,
         }  # fmt: skip
         said |= {word for word, there in words.items() if there}

@@ -131,7 +131,7 @@ def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_pat
         (("convert", "WALK", "a.csv", "--frames", "-3"), "frames_hz is -3"),
         (
             ("cut", "WALK", "a.mcap", "--from", "99"),
-            "walk.mcap lasts from 0.0001 to 0.0635 s; must not be after its end",
+            "walk.mcap, which lasts from 0.0001 to 0.0635 s",
         ),
         (("cut", "WALK", "a.mcap", "--to", "0.0001"), "--to 0.0001: "),
         (("cut", "WALK", "a.csv", "--from", "2", "--to", "1"), "must not end before it begins"),

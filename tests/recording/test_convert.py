@@ -199,7 +199,7 @@ def test_frames_of_events_are_written_where_a_rate_is_asked_for(tmp_path: Path) 
 
 
 def test_frames_do_not_go_into_files_of_events(tmp_path: Path) -> None:
-    with pytest.raises(ProblemError, match="contains events and no frames"):
+    with pytest.raises(ProblemError, match="can contain only events"):
         taxel.convert(some_frames(), tmp_path / "a.lsa")
     assert not list(tmp_path.iterdir())
 

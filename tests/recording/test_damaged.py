@@ -69,7 +69,7 @@ def test_a_file_cut_before_its_end_says_that_it_is_truncated(small: Path, tmp_pa
     assert rec.verdict.startswith("not finished")
     assert rec.rebuilt["torn_bytes"] > 0
     lost = taxel.convert(rec, tmp_path / "again.mcap")
-    assert lost == ["that the end of the recording is missing", "the remarks on reading the recording"]
+    assert lost == ["the fact that the end of the recording is missing", "the remarks on reading the recording"]
     assert taxel.open(tmp_path / "again.mcap").lost == tuple(lost)
 
 

@@ -320,7 +320,7 @@ def test_frames_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest.C
     for ending in (".npz", ".h5", ".mcap"):
         taxel.convert(opened[0], tmp_path / f"one{ending}")
         assert not taxel.open(tmp_path / f"one{ending}").timed
-    assert "that the frames have no times" in taxel.convert(opened[0], tmp_path / "one.csv")
+    assert "the fact that the frames have no times" in taxel.convert(opened[0], tmp_path / "one.csv")
     one = taxel.open(tmp_path / "one.mcap")
     assert decoded(tmp_path / "one.mcap")[0][1]["clock"] == "false"
     with pytest.raises(ProblemError, match="its frames have no times; give rate_hz"):

@@ -205,7 +205,7 @@ def test_the_command_line_shows_and_writes_one_source(
         ({"imu": "nowhere"}, "must be [NAME=]board:HOST:PORT, serial:PLACE, lines:PATH"),
         ({"imu": "given"}, "needs columns=A:B:C"),
         ({"imu": "given,columns=a:a"}, "two columns have this name"),
-        ({"imu": "given,columns=t_us"}, "holds no column of values"),
+        ({"imu": "given,columns=t_us"}, "contains no column of values"),
         ({"board": "given,columns=a"}, "two sources have this name"),
         ({"a b": "given,columns=a"}, "a name must have at most 64 letters, digits"),
         ({"imu": 3}, "source imu is 3"),
@@ -222,7 +222,7 @@ def test_a_source_that_is_none_is_refused_and_leaves_no_file(tmp_path: Path, sou
 
 
 def test_a_source_needs_a_recording_that_can_hold_it_and_its_place(tmp_path: Path) -> None:
-    with pytest.raises(taxel.ProblemError, match="source imu: needs a recording"):
+    with pytest.raises(taxel.ProblemError, match="source imu: taxel can only record this source"):
         Live(0, host=LOOPBACK, sources={"imu": "given,columns=a"})
     with pytest.raises(taxel.ProblemError, match=r"only a \.mcap file can contain several sources"):
         Live(0, host=LOOPBACK, record=tmp_path / "no.lsa", sources={"imu": "given,columns=a"})

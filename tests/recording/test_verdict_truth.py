@@ -833,11 +833,13 @@ def test_what_two_generations_of_a_file_lost_adds_up(tmp_path: Path) -> None:
 def test_a_board_that_was_reset_has_not_lost_nothing() -> None:
     counts = {"received": 5, "recorded": 5, "missing": 0, "decoder": {"resets": 2}}
     verdict = Verdict._of({"counts": counts})
-    assert verdict == "nothing lost, except unknown losses at resets; 2 resets of the board"
+    assert verdict == "nothing lost, but losses at resets are unknown; 2 resets of the board"
     assert verdict.status == "complete after arrival"
     assert Verdict._of({"counts": counts | {"decoder": {}}}) == "nothing lost"
     lost = Verdict._of({"counts": counts | {"missing": 3}})
-    assert lost == "LOST: 3 datagrams lost or damaged on the way, and unknown losses at resets; 2 resets of the board"
+    assert (
+        lost == "LOST: 3 datagrams lost or damaged on the way, and losses at resets are unknown; 2 resets of the board"
+    )
 
 
 def test_intact_datagrams_of_another_board_are_no_damaged_ones(tmp_path: Path) -> None:

@@ -261,7 +261,10 @@ def test_another_sensors_frames_come_through_a_pipe(listener, tmp_path):
         Pipe(source)
     with path.open("wb") as sink:
         sink.write(json.dumps(about).encode() + b"\n" + frames.tobytes()[:-3])
-    with path.open("rb") as source, pytest.raises(taxel.FormatError, match="frame 29: ends after 27 bytes, must be 30"):
+    with (
+        path.open("rb") as source,
+        pytest.raises(taxel.FormatError, match="frame 29: ends after 27 bytes; must have 30"),
+    ):
         emulate(heard.to, Pipe(source))
 
 
@@ -361,7 +364,7 @@ def test_taxels_have_flaws_by_their_own_seeds(listener):
     for nonsense in ({"dead": 2.0}, {"gain": -1.0}):
         with pytest.raises(ProblemError, match=r"^(dead|gain) is .*: must be"):
             Flaws(**nonsense)
-    with pytest.raises(ProblemError, match="is unknown: must be one of"):
+    with pytest.raises(ProblemError, match="is not known: must be one of"):
         Flaws(seeds={"cold": 1})
 
 

@@ -160,7 +160,7 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
         (("seed = 5", "array.rows = 0"), "rows"),
         (
             ("seed = 5", 'preset = "5.2 kHz"\narray.rows = 300\narray.columns = 300'),
-            r'preset "5.2 kHz" is not for a board of 300 x 300 taxels; presets of that size: "128 x 128, 1 kHz",',
+            r'preset "5.2 kHz" is not for a board of 300 x 300 taxels: must be one of "128 x 128, 1 kHz",',
         ),
         (
             ("seed = 5", 'preset = "128 x 128, 2 kHz"\narray.rows = 300\narray.columns = 300'),
@@ -168,7 +168,7 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
         ),
         (
             ("seed = 5", 'preset = "128 x 128, 1 kHz"'),
-            'board of 64 x 64 taxels; presets of that size: "5.2 kHz", "2 kHz"',
+            'board of 64 x 64 taxels: must be one of "5.2 kHz", "2 kHz"',
         ),
         (("seed = 5", "tare_ms = -50"), "tare_ms is -50 ms: must be from 0 to 60000"),
         (("seed = 5", "tare_ms = 1e15"), r"tare_ms is 1e\+15 ms: must be from 0"),

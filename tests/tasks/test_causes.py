@@ -305,7 +305,7 @@ def test_labels_near_nothing_are_learnt_as_given_where_that_is_asked(tmp_path: P
     words = ("train", recording, "--labels", labels, "--tare", "0.5", "--folds", 0, "--labels-as-given")
     code, out, _ = call(capsys, *words, "-o", tmp_path / "r.json")
     assert (code, (tmp_path / "r.json").exists()) == (0, True)
-    assert out.startswith("not held out, on its own training data")
+    assert out.startswith("not held out, but scored on its own training data")
 
 
 @pytest.mark.parametrize("answer", [True, False])
@@ -335,7 +335,7 @@ def test_causes_are_data_and_their_arguments_are_options_of_a_training(tmp_path:
     assert training.to_dict()["options"] == ["--shift-ms -300"]
     again = taxel.train(taxel.open(tmp_path / "a.npz"), late, replace(options, **cause.arguments))
     assert (again.score.found, again.score.false, again.causes) == (20, 0, ())
-    assert "labels moved by -300 ms before, as asked" in again.lines()
+    assert "labels moved by -300 ms before training (--shift-ms)" in again.lines()
 
 
 def grasped(seed: int) -> tuple[taxel.Frames, Labels]:
@@ -364,7 +364,7 @@ def test_what_happens_while_a_touch_lasts_is_no_label_of_another_recording(seed:
     (cause,) = Evidence([example], check_examples([example]), plan).causes({"slip": 15})
     assert (cause.kind, cause.labels, cause.mistakes) == ("label_name", ("slip",), 15)
     assert (
-        "are within touches; onset, release fit where touches begin or end; no recipe detects what happens while a"
+        "are within touches; labels of onset, release are where touches begin or end; no recipe detects what"
         in cause.measured
     )
     # Where no label fits the touches, labels may be of another recording.

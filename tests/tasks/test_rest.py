@@ -168,7 +168,7 @@ def test_what_lay_on_the_array_in_its_first_quiet_stretch_is_no_rest(tmp_path: P
     source, _ = preloaded(events=events)
     taxel.convert(source, tmp_path / "a.npz")
     with pytest.warns(
-        UserWarning, match="something was on rows 2 to 4, columns 5 to 7 .* at a time when nothing was there"
+        UserWarning, match="something was on rows 2 to 4, columns 5 to 7 .* at a time when nothing was on the sensor"
     ):
         taken = rest(taxel.open(tmp_path / "a.npz"))
     assert (taken.source, taken.tare.start_us >= 800_000) == ("quiet", True)

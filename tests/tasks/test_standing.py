@@ -78,7 +78,7 @@ def test_another_tare_is_not_advised_where_somebody_stays_on_a_mattress(tmp_path
     training = taxel.train(taxel.open(tmp_path / "night.npz"), labels, taxel.tasks.TrainOptions(labels_as_given=True))
     cause, *_ = training.causes
     assert (cause.kind, cause.advice, cause.option) == ("standing_load", "", "")
-    assert "tare of such a time does not help (tried with that of " in cause.measured
+    assert "tare of such a time does not help (with a tare of " in cause.measured
     assert not any("--tare" in line for line in (*training.lines(), *training.warnings))
     found = detect(training.readout, taxel.open(tmp_path / "night.npz"), labels)
     assert found.warnings == (), "a tare that was tried is not a given one"

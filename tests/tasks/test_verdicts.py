@@ -157,7 +157,7 @@ def test_a_training_names_the_part_of_each_recording_whose_labels_are_off(tmp_pa
         assert f"of {folder / f'{seed}.npz'} from {begin_s:.1f} s to the end 2" in cause
     assert not any("the plain rule is better" in line for line in lines), "it learnt wrong labels"
     [last] = [line for line in lines if line.startswith("written to ")]
-    assert "; next: do what may help, then train again" in last
+    assert "; next: follow the advice above, then train again" in last
     assert "taxel detect" not in last
 
 

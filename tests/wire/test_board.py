@@ -119,5 +119,5 @@ def test_nonsense_is_refused_in_one_line(call, text):
 
 
 def test_a_preset_for_more_lines_than_the_array_has_is_refused():
-    with pytest.raises(taxel.DeviceError, match="64 lines: the array has 8 columns to drive"):
+    with pytest.raises(taxel.DeviceError, match="lines is 64: must be at most 8, the number of"):
         Board(Registers.preset("5.2 kHz"), taxel.Array(8, 8))

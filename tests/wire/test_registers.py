@@ -85,7 +85,7 @@ def test_a_wrong_order_is_refused_half_way():
         ),
         ({"step_read": 0.75, "ramp": 221}, r"ramp 221 ticks is too long for step_read 0.75 us = 225 ticks"),
         ({"ramp": 0}, r"ramp 0 does not fit: must be 1 to 65534 \(rule 4\)"),
-        ({"lines": 65}, r"65 lines: the array has 64 columns to drive \(rule 4\)"),
+        ({"lines": 65}, r"lines is 65: must be at most 64, the number of the array's columns \(rule 4\)"),
         ({"lines": 257}, r"lines 257 does not fit: must be 1 to 256 \(rule 4\)"),
         (
             {"random_lines": True, "line_period": 10.23},
@@ -97,7 +97,10 @@ def test_a_wrong_order_is_refused_half_way():
         ({"noise_floor": 256}, r"noise_floor 256 does not fit: must be 0 to 255 \(rule 4\)"),
         ({"line_period": 1e9}, r"line_period 1000000000 us does not fit into the bits of its register \(rule 4\)"),
         ({"channels": 32}, "32 channels: the converter has 16 or 64"),
-        ({"array": taxel.Array(64, 8), "lines": 64}, r"64 lines: the array has 8 columns to drive \(rule 4\)"),
+        (
+            {"array": taxel.Array(64, 8), "lines": 64},
+            r"lines is 64: must be at most 8, the number of the array's columns \(rule 4\)",
+        ),
     ],
 )
 def test_a_broken_rule_is_named_with_its_numbers(fields, text):
@@ -123,7 +126,7 @@ def test_the_manuals_names_are_aliases_in_its_own_units():
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda: Registers(speed=1), 'register "speed" is not known; registers: random_lines, '),
+        (lambda: Registers(speed=1), 'register "speed" is not known: must be one of random_lines, '),
         (lambda: Registers(line_period=3.001), "line_period is 3.001 us: must be a whole multiple of 0.01 us"),
         (lambda: Registers(line_period="slow"), "line_period is 'slow': must be a number"),
         (lambda: Registers(line_period=float("nan")), "line_period is nan: must be finite"),
@@ -132,15 +135,15 @@ def test_the_manuals_names_are_aliases_in_its_own_units():
         (lambda: Registers(nrows=0.5), "nrows is 0.5: must be a whole number from 0 to 255"),
         (lambda: Registers(frame_sync="yes"), "frame_sync is 'yes': must be True or False"),
         (lambda: Registers(array=3), "array is 3: must be a taxel.Array"),
-        (lambda: Registers.preset("fast"), 'preset "fast" is not known; presets: "5.2 kHz", "2 kHz", "20.8 kHz"'),
+        (lambda: Registers.preset("fast"), 'preset "fast" is not known: must be one of "5.2 kHz", "2 kHz", "20.8 kHz"'),
         (lambda: Registers.preset(5), "preset is 5: must be a text"),
         (
             lambda: Registers().with_preset("128 x 128, 1 kHz"),
-            'preset "128 x 128, 1 kHz" is not for a board of 64 x 64 taxels; presets of that size: "5.2 kHz", "2 kHz"',
+            'preset "128 x 128, 1 kHz" is not for a board of 64 x 64 taxels: must be one of "5.2 kHz", "2 kHz"',
         ),
         (
             lambda: Registers(array=taxel.Array(128, 128)).with_preset("2 kHz"),
-            'preset "2 kHz" is not for a board of 128 x 128 taxels; presets of that size: "128 x 128, 1 kHz", ',
+            'preset "2 kHz" is not for a board of 128 x 128 taxels: must be one of "128 x 128, 1 kHz", ',
         ),
         (lambda: Registers().commands_to(None), "target is None: must be a taxel.wire.Registers"),
         (lambda: Command(8, 0), "register is 8: must be a whole number from 0 to 7"),
@@ -164,5 +167,5 @@ def test_bytes_that_are_no_command_are_refused_by_place():
 
 
 def test_boards_with_other_channels_are_not_led_to():
-    with pytest.raises(taxel.DeviceError, match="the board has 16 channels, the registers are for 64"):
+    with pytest.raises(taxel.DeviceError, match="the board has 16 channels, but the registers are for 64"):
         Registers().commands_to(Registers.preset("20.8 kHz"))

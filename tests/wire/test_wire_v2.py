@@ -328,4 +328,4 @@ def test_what_the_board_counted_as_dropped_is_lost_though_no_flag_came(first, tm
     del writer
     verdict = taxel.open(tmp_path / "a.mcap").verdict
     assert verdict.lost == {"events_dropped_by_board": dropped}
-    assert f"LOST: {dropped} events dropped by the board by its own count" in verdict
+    assert f"LOST: {dropped} events that the board itself counted as dropped" in verdict

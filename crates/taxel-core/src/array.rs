@@ -259,7 +259,7 @@ impl Array {
         self.pitch_mm.ok_or_else(|| match self.places {
             None => problem!("{subject} needs distances in mm, but the pitch of {name} is not known")
                 .with_hint("array", Hint::Pitch),
-            Some(_) => problem!("{subject} needs one pitch, but {name} has a place for each taxel"),
+            Some(_) => problem!("{subject} needs one pitch, but {name} states the position of each taxel separately"),
         })
     }
 

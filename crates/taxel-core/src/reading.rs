@@ -105,7 +105,7 @@ fn in_words(path: String, value: Option<&Value>, message: &str) -> Unfit {
         let meant = nearest(name, wanted).map_or(String::new(), |near| format!(" (did you mean {near}?)"));
         return Unfit {
             path: beside(&path, name),
-            message: format!(" is not known{meant}: there is {}", choice(wanted)),
+            message: format!(" is not known{meant}: must be {}", choice(wanted)),
         };
     }
     if let Some(name) = quoted("missing field ") {
@@ -246,8 +246,8 @@ mod tests {
             (r#""tau": 1, "inner": 7"#, "inner is 7: must be an object (names and values)"),
             (r#""tau": 1, "each": {"a b": {}}"#, "each.a b.tau is missing"),
             (r#""small": 1"#, "tau is missing"),
-            (r#""tau": 1, "inner": {"tau": 1, "wings": 2}"#, "inner.wings is not known: there is \"tau\""),
-            (r#""tau": 1, "wings": 2"#, "wings is not known: there is \"tau\""),
+            (r#""tau": 1, "inner": {"tau": 1, "wings": 2}"#, "inner.wings is not known: must be \"tau\""),
+            (r#""tau": 1, "wings": 2"#, "wings is not known: must be \"tau\""),
         ] {
             let text = format!("{{{parameter}}}");
             assert!(message(&text).starts_with(&format!("whole: {words}")), "{}", message(&text));

@@ -11,7 +11,7 @@ use crate::serial_line::{BAUD, SerialPlace};
 use crate::{Result, address};
 
 /// How places are written, for errors.
-pub const FORMS: &str = "serial:PLACE, lines:PATH, lines+tcp:HOST:PORT or lines+udp:HOST:PORT";
+pub const FORMS: &str = "serial:PLACE[,baud=RATE], lines:PATH, lines+tcp:HOST:PORT or lines+udp:HOST:PORT";
 
 /// The place of lines of text.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -224,7 +224,7 @@ impl Live {
         }
         if let (None, false, Some(source)) = (&options.record, options.record_later, others.texts.first()) {
             return Err(problem!(
-                "source {}: needs a recording, because taxel only saves this source; give record",
+                "source {}: taxel can only record this source; give record, the file of the recording",
                 source.name()
             )
             .into());

@@ -201,7 +201,7 @@ impl Header {
         self.array.check()?;
         let (rows, columns) = (self.array.rows, self.array.columns);
         if self.array.len() > limits::TAXELS {
-            return Err(problem!("a sensor of {rows} x {columns} taxels; at most {} are read", limits::TAXELS));
+            return Err(problem!("the sensor has {rows} x {columns} taxels; must have at most {}", limits::TAXELS));
         }
         if !(-limits::TIME_US..=limits::TIME_US).contains(&self.decoding.origin_us) {
             return Err(problem!("origin_us"; " is {}: must be within 142 years of 0", self.decoding.origin_us));
@@ -227,7 +227,7 @@ impl Header {
         driven.check()?;
         self.registers.map_or(Ok(()), |registers| registers.check_fit(driven))?;
         if self.sources.len() >= limits::SOURCES {
-            return Err(problem!("{} sources; a file can contain at most {}", self.sources.len() + 1, limits::SOURCES));
+            return Err(problem!("{} sources; must be at most {} in a file", self.sources.len() + 1, limits::SOURCES));
         }
         let mut names = vec![&self.name];
         for source in &self.sources {

@@ -125,7 +125,7 @@ fn a_large_array_is_recorded_and_every_loss_is_counted() {
         assert_eq!((counters.decoding.wire_version, counters.decoding.wire.bytes), (2, 0));
         assert_eq!(counters.decoding.wire_v2.missing, lost);
         let verdict = if lossy {
-            let kernel = if ways::is_portable() { " or dropped uncounted by a kernel" } else { "" };
+            let kernel = if ways::is_portable() { ", or dropped and not counted by a kernel" } else { "" };
             format!("LOST: {lost} datagrams lost or damaged on the way{kernel}")
         } else {
             "nothing lost".to_owned()

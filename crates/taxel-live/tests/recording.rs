@@ -335,7 +335,7 @@ fn what_a_kernel_does_not_count_is_unknown_unless_the_board_numbers_what_it_send
     let missing = RecordingCounts { missing: Some(5), dropped_by_queue: 2, recorded: 8, ..uncounted.clone() }.verdict();
     assert_eq!(missing.lost, [("dropped_by_queue".to_owned(), 2), ("lost_on_the_way_or_dropped".to_owned(), 3)].into());
     let dropped = RecordingCounts { dropped_by_queue: 1, recorded: 9, ..uncounted.clone() }.verdict();
-    assert_eq!(dropped.text, "LOST: 1 datagram dropped by taxel's queue, and unknown losses in the kernel");
+    assert_eq!(dropped.text, "LOST: 1 datagram dropped by taxel's queue, and losses in the kernel are unknown");
     // A kernel of another computer that does not count is no better.
     let bridged = Bridged { dropped_by_kernel: KernelDrops::UNKNOWN, ..Bridged::default() };
     let verdict = RecordingCounts { bridged: Some(Box::new(bridged)), ..sound.clone() }.verdict();

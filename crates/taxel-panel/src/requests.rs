@@ -300,7 +300,7 @@ async fn health(hub: &Hub, shown: Option<&OpenRecording>) -> Answer<Message> {
             return Ok(Message::Health { source, taxels, active: taxels, found });
         }
         None => {
-            let live = hub.live().ok_or("nothing is shown")?;
+            let live = hub.live().ok_or("nothing is shown: open a recording first")?;
             let activity = lock(&live.activity).clone();
             (live.array().clone(), activity)
         }
@@ -319,7 +319,7 @@ async fn cut(hub: &Hub, shown: Option<&OpenRecording>, (start_us, stop_us): (i64
     let (path, us) = (hub.folder.file(&name)?, indexed.us());
     let out = hub.folder.file(to).map_err(|error| Refusal::of_field("name", error))?;
     if out.exists() {
-        return Err(Refusal::of_field("name", format!("{to} exists already; name another")));
+        return Err(Refusal::of_field("name", format!("{to}: exists already; choose another name")));
     }
     // The first frame from the start on, and the first after the end.
     let in_file = |t: i64| -(-t).div_euclid(us);

@@ -74,7 +74,7 @@ export function refused(v) {
     }
   }
   const { random_lines, wire_version, line_period, line_read, step_period, step_read, ramp, lines, channels, steps, driven_lines, sense_lines } = v;
-  if (lines > driven_lines) broken.push({ rule: 4, text: `${lines} lines: the array has ${driven_lines} columns to drive (rule 4)` });
+  if (lines > driven_lines) broken.push({ rule: 4, text: `lines is ${lines}: must be at most ${driven_lines}, the number of the array's columns (rule 4)` });
   if (line_read > line_period) broken.push({ rule: 1, text: `line_read ${us(line_read)} us is longer than line_period ${us(line_period)} us (rule 1)` });
   if (step_read > step_period) broken.push({ rule: 1, text: `step_read ${us(step_read)} us is longer than step_period ${us(step_period)} us (rule 1)` });
   if (steps * step_period > line_read) broken.push({ rule: 2, text: `${steps} x step_period ${us(step_period)} us is longer than line_read ${us(line_read)} us (rule 2)` });

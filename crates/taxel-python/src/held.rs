@@ -44,7 +44,7 @@ impl HeldValues {
         let n = self.0.with(py, |held| held.taxels());
         let all = times.len().saturating_mul(n);
         if Vec::<f32>::new().try_reserve_exact(all).is_err() {
-            return Err(core(problem!("{} frames of {n} taxels need more memory than there is", times.len())));
+            return Err(core(problem!("{} frames of {n} taxels need more memory than is available", times.len())));
         }
         // Memory of NumPy, which asks for large pages.
         let values = PyArray1::zeros(py, all, false);

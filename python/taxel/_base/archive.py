@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from taxel._base.arguments import refuse_changed
+from taxel._base.errors import damaged
 from taxel._base.files import open_file
 from taxel._base.limits import UNPACKED, unpacked
 from taxel._base.messages import first_line
@@ -74,9 +75,7 @@ def shapes(path: str | os.PathLike[str]) -> dict[str, tuple[int, ...]]:
             return found
         # As in `read_arrays`.
         except Exception as error:
-            raise FormatError(
-                f"{path}: not a whole {Path(path).suffix} ({first_line(error)}); write it again"
-            ) from None
+            raise damaged(path, f"{Path(path).suffix} file", first_line(error)) from None
 
 
 def fields_of(path: str | os.PathLike[str]) -> tuple[str, ...]:
@@ -131,9 +130,7 @@ def read_array(path: str | os.PathLike[str], dtype: DTypeLike | None = None) -> 
             if dtype is not None and stored_as.kind not in "biuf":
                 raise FormatError(f"{path}: contains {stored_as} of shape {shape}; must be a NumPy array of numbers")
             if size > stored:
-                raise FormatError(
-                    f"{path}: states {size} bytes of values ({shape}, {stored_as}), but contains {stored}"
-                )
+                raise FormatError(f"{path}: {stored} bytes of values; must be {size}, for {stored_as} of shape {shape}")
             unpacked(str(path), _kept(shape, stored_as, dtype))
             file.seek(0)
             return _read(file, dtype, str(path))
@@ -190,7 +187,7 @@ def read_arrays(
         # NumPy and zipfile raise many kinds of errors on damage: zlib.error, NotImplementedError, TokenError,
         # struct.error, OSError for an archive with a negative offset ...
         except Exception as error:
-            raise FormatError(f"{path}: the .npz cannot be unpacked ({first_line(error)}); write it again") from None
+            raise damaged(path, ".npz file", first_line(error)) from None
 
 
 def _arrays(
@@ -226,9 +223,7 @@ def _arrays(
             unpacked(location, total)
             stored = archive.getinfo(members[name]).file_size - begin
             if size != stored:
-                raise FormatError(
-                    f"{location}: states {size} bytes of values ({shape}, {dtype}), but contains {stored}"
-                )
+                raise FormatError(f"{location}: {stored} bytes of values; must be {size}, for {dtype} of shape {shape}")
         for name in there:
             with archive.open(members[name]) as array:
                 columns[name] = _read(array, dtypes.get(name), f"{path}: {name}")

@@ -73,10 +73,10 @@ def _lone_surrogate(value: str) -> bool:
     return False
 
 
-def instance(name: str, value: object, kind: type[T]) -> T:
-    """Return a value of the given class; refuse any other."""
-    if not isinstance(value, kind):
-        raise refused(name, f" is {shown(value)}: must be a {public_name(kind)}")
+def instance(name: str, value: object, *kinds: type[T]) -> T:
+    """Return a value of one of the given classes; refuse any other."""
+    if not isinstance(value, kinds):
+        raise refused(name, f" is {shown(value)}: must be a {' or '.join(map(public_name, kinds))}")
     return value
 
 
@@ -403,7 +403,7 @@ def rows(name: str, chosen: object, length: int) -> NDArray[Any]:
     if index.ndim != 1 or index.dtype.kind not in "biu":
         raise refused(name, f"[{shown(chosen)}]: choose by a slice, a mask or whole numbers")
     if index.dtype.kind == "b" and len(index) != length:
-        raise refused(name, f": the mask has {len(index)} entries, must have {length}")
+        raise refused(name, f": the mask has {len(index)} entries; must have {length}")
     if index.dtype.kind != "b" and not (-length <= index.min() and index.max() < length):
         raise refused(
             name, f": rows {index.min()} to {index.max()} are asked for, but only rows 0 to {length - 1} exist"

@@ -19,7 +19,7 @@ _REMEDIES = {
     "give": "give {}",
     "go_on": "to continue anyway, give {}",
     "larger": "a larger {} reads more",
-    "lay_out": "give {}, or rows and columns in a layout file, if they are a grid's taxels row by row",
+    "lay_out": "if the taxels are a grid, row by row, give {}, or rows and columns in a layout file",
     "pitch": "give {} with the pitch in mm, or pitch_mm in a layout file",
     "unfelt": (
         "possible reasons: the first label is later than its touch, so the tare contains a touch (give {}); "
@@ -127,6 +127,11 @@ def refused(name: str, text: str) -> ProblemError:
     error = ProblemError(f"{name.removeprefix(argument)}{text}")
     error.argument = argument
     return error
+
+
+def damaged(path: object, kind: str, why: str) -> FormatError:
+    """Return the error of a file that a library cannot read to its end; `kind` names it, as "HDF5 file"."""
+    return FormatError(f"{path}: the {kind} is damaged or not complete ({why}); copy or write it again")
 
 
 def helped(error: _Error, argument: str, hint: str) -> _Error:

@@ -62,13 +62,13 @@ class H5File(ReadingChild):
 
     Raises
     ------
-    FormatError : not a whole HDF5 file; one at which the library hangs or crashes; one of which a link or a data set
+    FormatError : a damaged HDF5 file; one at which the library hangs or crashes; one of which a link or a data set
         leads to another file (names it)
     OSError : the file is not there, or cannot be read
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        super().__init__(_CHILD, path, "a whole HDF5 file", PATIENCE_S)
+        super().__init__(_CHILD, path, "HDF5 file", PATIENCE_S)
         self._claimed = 0
         self.entries: dict[str, Entry] = {}
         self.left_out: dict[str, str] = {}

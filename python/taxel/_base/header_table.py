@@ -112,7 +112,7 @@ class HeaderTable:
 
     def _row(self, line: int, cells: tuple[str, ...]) -> tuple[str, ...]:
         if len(cells) != len(self.header):
-            raise FormatError(f"{self.location}, line {line}: {len(cells)} cells, must have {len(self.header)}")
+            raise FormatError(f"{self.location}, line {line}: {len(cells)} cells; must have {len(self.header)}")
         return cells
 
     def has(self, required: Sequence[str]) -> None:
@@ -124,9 +124,9 @@ class HeaderTable:
         """
         missing = [name for name in required if name not in self.header]
         if missing:
-            there = f"there are {', '.join(map(shown, self.header))}" if self.header else "the line is empty"
+            there = f"the columns are {', '.join(map(shown, self.header))}" if self.header else "the line is empty"
             raise FormatError(
-                f"{self.location}, line 1: no column {missing[0]!r}; {there}; must be {','.join(required)} ..."
+                f"{self.location}, line 1: column {missing[0]!r} is missing; {there}; must be {','.join(required)} ..."
             )
 
     def __iter__(self) -> Iterator[tuple[int, dict[str, str]]]:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.errors import damaged
 from taxel._base.files import open_file
 from taxel._base.limits import unpacked
 from taxel._base.messages import first_line
@@ -73,7 +74,7 @@ def read_mat(path: str | os.PathLike[str], names: Sequence[str]) -> dict[str, ND
     try:
         return {name: found[name].values() for name in names}
     except (ValueError, struct.error, zlib.error, KeyError) as error:
-        raise _damaged(path, error) from None
+        raise damaged(path, "MATLAB file", first_line(error)) from None
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ def _matrices(path: str | os.PathLike[str]) -> Iterator[_Matrix]:
                 yield found
             at += _TAG + count
     except (ValueError, struct.error, zlib.error, KeyError) as error:
-        raise _damaged(path, error) from None
+        raise damaged(path, "MATLAB file", first_line(error)) from None
 
 
 def _matrix(element: bytes, kind: int, order: str) -> _Matrix | None:
@@ -152,7 +153,3 @@ def _part(data: bytes, at: int, order: str) -> tuple[int, bytes, int]:
     if len(part) < count:
         raise ValueError(f"an array states {count} bytes, but only {len(part)} follow")
     return kind, part, end
-
-
-def _damaged(path: str | os.PathLike[str], error: Exception) -> FormatError:
-    return FormatError(f"{path}: not a whole MATLAB file ({first_line(error)}); save it again")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import shown
 from taxel._base.child_process import ChildProcess, pipe_may_be_closed, search_path
+from taxel._base.errors import damaged
 from taxel._base.files import open_file
 from taxel._core import FormatError
 
@@ -37,7 +38,7 @@ class ReadingChild:
         What the child runs; its argument is a path of the open file.
     path : path
     kind : str
-        What a file must be, for errors: "a whole HDF5 file".
+        What a file is, for errors: "HDF5 file".
     patience_s : float, s
         The longest time between two lines of the child.
 
@@ -111,7 +112,7 @@ class ReadingChild:
             location = f"{self.path}, {shown(answer['entry'])}" if answer["entry"] else str(self.path)
             raise FormatError(f"{location}: {answer['refused']}")
         if "error" in answer:
-            raise FormatError(f"{self.path}: not {self._kind} ({answer['error']})")
+            raise damaged(self.path, self._kind, answer["error"])
         return answer
 
     def _bytes(self, size: int) -> NDArray[np.uint8]:
@@ -129,7 +130,7 @@ class ReadingChild:
         why = f"the library crashed while reading it, status {self._child.wait()}"
         if self._is_late:
             why = f"the library has read nothing for {patience_s:g} s"
-        return FormatError(f"{self.path}: not {self._kind} ({why})")
+        return damaged(self.path, self._kind, why)
 
     def close(self) -> None:
         """End the child."""

@@ -302,8 +302,8 @@ def check_board(
     where = integer("port", port, 1, 65_535)
     if not 0.1 <= number("seconds", seconds) <= 3600:
         raise refused("seconds", f" is {seconds:g}: must be from 0.1 to 3600")
-    if preset is not None and text("preset", preset) not in PRESETS:
-        raise ProblemError(f"preset {preset!r} is not known; presets: {', '.join(map(repr, PRESETS))}")
+    if preset is not None:
+        text("preset", preset, PRESETS)
     if preset is not None and place is not None:
         raise refused("preset", ": not needed with a serial line, where the board states its registers; leave it out")
     check = _Check(None if say is None else callback("say", say))

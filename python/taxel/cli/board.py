@@ -142,7 +142,9 @@ def _registers(
         raise ProblemError("--rate-hz and --bits: give both, with the values of the taxel.live.Source that sends")
     if preset is not None or address is not None:
         option = "--preset" if preset is not None else "--remote"
-        raise ProblemError(f"--rate-hz and {option}: both state the board's registers; give one of them")
+        raise ProblemError(
+            f"--rate-hz and {option} are both given, and both state the registers: give only one of them"
+        )
     return Registers._of_source(Array._of(array), rate_hz, bits)[0]
 
 

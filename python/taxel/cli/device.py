@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from taxel._base.arguments import text
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._core import ProblemError
@@ -105,8 +106,7 @@ def apply(
 
     Example: taxel device apply /dev/ttyACM0 "2 kHz"
     """
-    if preset not in PRESETS:
-        raise ProblemError(f"preset {preset!r} is not known; presets: {', '.join(map(repr, PRESETS))}")
+    text("preset", preset, PRESETS)
     with Device(place, baud=baud) as device:
         _print(device, device.apply(preset), as_json)
 

@@ -160,7 +160,7 @@ def _check_options(typed: _EmulateArguments) -> None:
     """Refuse options that do not go together."""
     others = typed.replay is not None or typed.pipe
     if typed.replay is not None and typed.pipe:
-        raise ProblemError("--replay and --pipe: give one of them")
+        raise ProblemError("--replay and --pipe are both given: give only one of them")
     if typed.scene is not None and (others or typed.rest):
         raise ProblemError("--scene: leave out --replay, --pipe and --rest")
     if others and (typed.scenes is not None or typed.labels is not None or typed.rest):

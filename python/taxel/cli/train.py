@@ -142,7 +142,7 @@ def train(
         say(json.dumps({"readout": str(out), **training.to_dict(), **written}))
     else:
         say(*training.lines(), "", f"written to {out}{_next(training, out, rules)}")
-        say(*(f"plain rule of {' and '.join(each)}: written to {path}" for path, each in rules.items()))
+        say(*(f"plain rule for {' and '.join(each)} written to {path}" for path, each in rules.items()))
         say(*(f"warning: {warning}" for warning in training.unreliable()))
     if report is not None:  # last, so that nothing is lost where it fails
         place = taxel.report.write_detections(
@@ -220,7 +220,9 @@ def _next(training: Training, out: Path, rules: Iterable[Path]) -> str:
     """Return what to do next: detect by the readout, or by the rules that are advised instead; or train again."""
     advised, following = training.again(), training.command(str(out))
     if advised is not None:
-        following = f"train again with {advised.option}" if advised.option else "do what may help, then train again"
+        following = (
+            f"train again with {advised.option}" if advised.option else "follow the advice above, then train again"
+        )
         if advised.option == "--rule FILE" and rules:
             following = "; ".join(training.command(str(path), is_rule=True) for path in rules)
     return f"; next: {following}" if following else ""

@@ -43,9 +43,9 @@ class ClassMatches(NamedTuple):
     label: str
     touches: int
     errors_ms: NDArray[np.float64]
-    """Time of the detection minus true time, of those that were found."""
+    """Time of the detection minus the true time, of each touch that was found."""
     delays_ms: NDArray[np.float64]
-    """`known` minus true, likewise."""
+    """Time at which the detection was known minus the true time, of each touch that was found."""
 
     @property
     def found(self) -> int:
@@ -70,9 +70,9 @@ class TouchMatches(NamedTuple):
 
     rows: list[ClassMatches]
     false: dict[str, NDArray[np.int64]]
-    """By label: times of detections that belong to no touch, us."""
+    """Times of the detections that belong to no touch, us, by label."""
     false_within: dict[str, int]
-    """Number of these that are within a touch all the same: a press that was detected more than 50 ms off."""
+    """Number of these detections that are within a touch, but more than 50 ms from its beginning or end, by label."""
 
     def row(self, name: str, label: str) -> ClassMatches:
         """Return one row; its name may be cut short."""

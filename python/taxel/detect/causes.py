@@ -297,7 +297,7 @@ class Mistakes:
         left, rule = self.plain.together[label].rank[0], self.plain.rules[label]
         if 2 * left > wrong:
             return
-        measured = f"leaves {left} missed and false on the same labels, and the neuron {wrong}"
+        measured = f"leaves {left} missed and false on the same labels; the neuron leaves {wrong}"
         lasting = rule is not None and isinstance(rule.age_ms, str)
         measured = (
             f"it {measured}{'; the rule knows how long touches last' * lasting}; taxel detect --readout FILE runs the "

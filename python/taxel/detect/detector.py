@@ -226,7 +226,7 @@ class ReadoutStream:
             return Detections._from_parts(self._begin(x.array).push_events(x._parts()))
         if isinstance(x, Frames):
             return Detections._from_parts(self._begin(x.array).push_frames(x._parts()))
-        raise refused("x", f" is {shown(x)}: a readout reads taxel.Events or taxel.Frames")
+        raise refused("x", f" is {shown(x)}: must be a taxel.Events or taxel.Frames")
 
     def advance(self, t_us: int) -> Detections:
         """Promise that nothing will come any more before a time; an earlier time changes nothing.

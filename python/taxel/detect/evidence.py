@@ -189,7 +189,7 @@ class Evidence:
         tried = FeltLoads([example._replace(tare=tare) for example in self.sound])
         (now, total), then = self._at_edges(self.felt), self._at_edges(tried)[0]
         where = f"{{}} of {counted(total, 'label')} {{}} where a load begins or ends"
-        trial = f"tried with that of {' to '.join(stretch)} s: {where.format(then, are(then))}, now {now}"
+        trial = f"with a tare of {' to '.join(stretch)} s, {where.format(then, are(then))}; now {now}"
         if 2 * (total - then) > total - now or tried.count > _MOST_A_LABEL * total:
             measured = (
                 f"{taxels} taxels read above the tare while nothing touches them, and a tare of such a time does not "
@@ -266,9 +266,8 @@ class Evidence:
         if recipes.knows("touch", label) or not fits or 2 * within <= total or self._loaded.taxels >= TOUCH:
             return
         measured = (
-            f"{within} of {counted(total, 'label')} {are(within)} within touches; {', '.join(fits)} "
-            f"{'fits' if len(fits) == 1 else 'fit'} where touches begin or end; no recipe detects what happens while a "
-            "touch lasts"
+            f"{within} of {counted(total, 'label')} {are(within)} within touches; labels of {', '.join(fits)} are "
+            "where touches begin or end; no recipe detects what happens while a touch lasts"
         )
         yield Cause("label_name", (label,), wrong, measured, "labels where touches begin or end")
 
@@ -353,7 +352,7 @@ class Evidence:
 
     def _of_label(self, label: str, wrong: int) -> Iterator[Cause]:
         if (count := self._counts.get(label, 0)) < TWO_FOLDS:
-            there = f"there {are(count)} {count}"
+            there = f"there {are(count)} only {counted(count, 'label')}"
             folds = f"a score on held-out data needs at least {TWO_FOLDS}, and five folds need {FIVE_FOLDS}"
             yield Cause("few_labels", (label,), wrong, f"{there}; {folds}", "more labels")
         if not self.plan.fit_levels:
@@ -383,7 +382,7 @@ class Evidence:
         if count:
             measured = (
                 f"{count} of {counted(self._counts[label], 'label')} {are(count)} in the first two frames of "
-                "recordings whose sensor is loaded from the first frame: the encoder cannot see this load begin"
+                "recordings whose sensor is loaded from the first frame: the encoder cannot detect its beginning"
             )
             yield Cause("begun_loaded", (label,), min(count, wrong), measured, ZEROS_BEFORE)
 
@@ -393,11 +392,11 @@ class _WeakBurst(NamedTuple):
 
     window_ms: float
     events: float
-    """Most of all taxels in a window near it ..."""
+    """The greatest number of events of all taxels in a window near the label."""
     rest: float
-    """... and at rest."""
+    """The mean number of events of all taxels in a window at rest."""
     by: Mapping[int, float]
-    """How many times the noise at rest the events above it are, in so many windows together."""
+    """By number of joined windows: the events above rest, as a multiple of the noise at rest."""
 
 
 def weak_bursts(examples: Sequence[Example], alignment: Alignment) -> Iterator[_WeakBurst]:

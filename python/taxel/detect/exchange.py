@@ -98,19 +98,19 @@ def lost(readout: Parts) -> list[str]:
     """Return what NIR's nodes cannot hold of a readout, one line each."""
     neurons = [trained.neuron for trained in readout.neurons.values()]
     lines = [
-        "the encoder: the graph's inputs are its spike trains",
-        "labels and trained delays: outputs come in the order of the labels",
+        "the encoder, whose spike trains are the inputs of the graph",
+        "labels and trained delays; the outputs have the order of the labels",
     ]
     if any(neuron.refractory > 0 for neuron in neurons):
-        lines.append("the refractory time: a NIR neuron may fire again at once")
+        lines.append("the refractory time, so a NIR neuron may fire again at once")
     if any(neuron.theta_plus > 0 for neuron in neurons):
         lines.append("the rise of the threshold by a spike")
     lines.append(
-        f'after_spike="{readout.after_spike}": a NIR neuron falls to 0 and keeps its current; its first spike is that '
-        "of taxel's neuron, later spikes may differ"
+        f'after_spike="{readout.after_spike}": after a spike, the potential of a NIR neuron is 0 and its input current '
+        "continues, so spikes after the first may differ from those of taxel's neuron"
     )
     if readout.time == "continuous":
-        lines.append("continuous time: a simulator has a time step, and fires up to one step later")
+        lines.append("continuous time: a simulator has time steps, so its neurons fire up to one step later")
     return lines
 
 
@@ -165,7 +165,7 @@ def _read_graph(file: str | os.PathLike[str]) -> NIRGraph:
     try:
         tree = _tree(file)
         if "node" not in tree:
-            raise FormatError(f"{file}: holds no group 'node'; must be a file that nir.write has made")
+            raise FormatError(f"{file}: the group 'node' is missing; must be a file that nir.write has written")
         graph = nir.dict2NIRNode(tree["node"])
         if not isinstance(graph, nir.NIRGraph) or not isinstance(graph.metadata, dict):
             raise FormatError(f"{file}: a {type(graph).__name__}; must be a NIRGraph with its metadata")
@@ -295,7 +295,7 @@ def _parts(
     """Return a readout's parts from nodes; the rest comes from the caller, the metadata, or by default."""
     encoder = encoder or (stored.encoder if stored is not None else None)
     if encoder is None:
-        raise ProblemError("a NIR file has no encoder: give encoder=")
+        raise ProblemError("a NIR file contains no encoder: give encoder")
     _check_ungraded(encoder)
     weights, delays_ms, nir_neurons = _layers(graph)
     spike_s = None if spike_ms is None else spike_ms / 1000.0
@@ -331,14 +331,12 @@ def _kernel(neurons: Any, k: int, spike_s: float | None) -> tuple[dict[str, Any]
     else:
         tau, tau_syn = value("tau_mem"), value("tau_syn")
         if not (np.isfinite(tau_syn) and 0 < tau_syn <= tau):
-            raise FormatError(
-                f"neurons[{k}]: tau_syn is {tau_syn} s: taxel's kernels need 0 < tau_syn <= tau_mem = {tau}"
-            )
+            raise FormatError(f"neurons[{k}]: tau_syn is {tau_syn} s: must be above 0 and at most tau_mem, {tau} s")
         constants = {"kernel": "double_exponential", "tau_s": 1000.0 * tau_syn}
         if abs(tau_syn - tau) <= 1e-9 * tau:
             constants = {"kernel": "alpha", "tau_s": None}
     if not (np.isfinite(tau) and tau > 0):
-        raise FormatError(f"neurons[{k}]: time constant {tau} s: must be above 0")
+        raise FormatError(f"neurons[{k}]: the time constant is {tau} s: must be above 0")
     constants["tau"] = 1000.0 * tau
     _, ours, gain = _gains(Neuron(**constants), spike_s)
     # `gain` is for taxel's own r and w_in; a graph may split their product otherwise.
@@ -365,7 +363,7 @@ def _layers(graph: NIRGraph) -> tuple[NDArray[np.float64], list[float], Any]:
     def only(kind: str) -> str:
         matches = [name for name, k in kinds.items() if k == kind]
         if len(matches) != 1:
-            raise FormatError(f"{len(matches)} nodes of kind {kind}: a readout has one")
+            raise FormatError(f"the graph has {len(matches)} nodes of kind {kind}; must have one")
         return matches[0]
 
     def alone(name: str) -> str | None:
@@ -374,28 +372,32 @@ def _layers(graph: NIRGraph) -> tuple[NDArray[np.float64], list[float], Any]:
     source, target = only("Input"), only("Output")
     last = into.get(target, [])
     if len(last) != 1 or kinds[last[0]] not in ("LIF", "CubaLIF"):
-        raise FormatError("the output must come from one node of kind LIF or CubaLIF: a readout is a single layer")
+        raise FormatError("the output must come from exactly one node, of kind LIF or CubaLIF")
     branches = []
     for name in into.get(last[0], []):
         node, kind = nodes[name], kinds[name]
         if kind not in ("Linear", "Affine") or np.ndim(node.weight) != 2:
-            raise FormatError(f"{name}: {kind} before the neurons, must be Linear (or Affine without bias)")
+            raise FormatError(f"{name}: the node before the neurons is {kind}; must be Linear, or Affine without bias")
         if kind == "Affine" and np.any(node.bias):
-            raise FormatError(f"{name}: has a bias; a readout has none")
+            raise FormatError(f"{name}: has a bias; must have none")
         before, delay_ms = alone(name), 0.0
         if before is not None and kinds[before] == "Delay":
             delays = np.unique(np.asarray(nodes[before].delay, np.float64))
             if len(delays) != 1:
-                raise FormatError(f"{before}: delays its inputs by different times, must delay all by the same time")
+                raise FormatError(
+                    f"{before}: delays its inputs by different times; must delay all of them by the same time"
+                )
             delay_ms = 1000.0 * float(delays[0])
             before = alone(before)
         if before != source:
-            raise FormatError(f"{name}: does not come from the input, directly or through one Delay")
+            raise FormatError(f"{name}: must come from the input, directly or through one Delay")
         branches.append((delay_ms, np.asarray(node.weight, np.float64)))
     if not branches:
-        raise FormatError("nothing leads to the neurons")
+        raise FormatError("the neurons have no inputs; must have at least one Linear node before them")
     branches.sort(key=lambda branch: branch[0])
     neurons = nodes[last[0]]
     if any(np.shape(w) != (np.size(neurons.v_threshold), np.shape(branches[0][1])[1]) for _, w in branches):
-        raise FormatError("weights and neurons differ in number")
+        raise FormatError(
+            "each matrix of weights must have a row for each neuron, and all must have equally many columns"
+        )
     return np.hstack([w for _, w in branches]), [delay for delay, _ in branches], neurons

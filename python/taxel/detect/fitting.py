@@ -578,9 +578,9 @@ class Fitting:
         for k in np.flatnonzero(np.diff(times) <= to_us(refractory_ms))[:1]:
             before, t = times[k : k + 2].tolist()
             raise ProblemError(
-                f"{self._label}: {name} has a label at {t} us, {t - before} us after the label before; labels must be "
-                f"more than {refractory_ms:g} ms apart, because the neuron fires once in that time. Are times in us, "
-                "and is each there once?"
+                f"{self._label}: {name} has a label at {t} us, {t - before} us after the previous label; labels must "
+                f"be more than {refractory_ms:g} ms apart, because the neuron fires once in that time: are the times "
+                "in us, and is each label listed once?"
             )
 
     def _check_felt(self, trains: Sequence[SpikeTrains]) -> None:
@@ -589,7 +589,9 @@ class Fitting:
             if len(times) and not len(train.times):
                 where = name if len(trains) > 1 else "the recording"
                 events = counted(len(times), "event")
-                error = ProblemError(f"{self._label}: nothing was felt in {where} up to the last of its {events}")
+                error = ProblemError(
+                    f"{self._label}: the sensor felt nothing in {where} up to the last of its {events}"
+                )
                 raise helped(error, "tare", "unfelt")
 
     def fits(self, recipe: Recipe) -> bool:

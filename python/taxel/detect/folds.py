@@ -585,8 +585,8 @@ def _between_events(times: NDArray[np.int64], count: int) -> Iterator[float]:
     if len(times) < 2 * count:
         raise refused(
             "folds",
-            f" is {count}: one recording with {counted(len(times), 'event')} has room for {len(times) // 2}, as "
-            "each holds two events or more",
+            f" is {count}: must be at most {len(times) // 2}, because each fold of a recording needs two events, and "
+            f"there are {len(times)}",
         )
     for n in range(1, count):
         near = np.arange(max(1, n * len(times) // count - reach + 1), min(len(times), n * len(times) // count + reach))

@@ -40,10 +40,10 @@ class Followed(NamedTuple):
     """The quantity that follows the labels, and its onsets and ends in each pattern."""
 
     train: int
-    """Its place among the trains."""
+    """The place of the quantity among the trains."""
     edges: tuple[_Edges, ...]
     score: Score
-    """Of these onsets against all labels, one pattern after the other."""
+    """The score of these onsets against all labels, of one pattern after the other."""
 
 
 def follow(

@@ -39,7 +39,7 @@ class _Readings(NamedTuple):
 
     values: NDArray[np.float64]
     begins: float
-    """From where nine taxels in ten are loaded."""
+    """The reading above which nine taxels in ten are loaded."""
     noisy: bool
     """Whether unloaded taxels have noise."""
 
@@ -49,9 +49,9 @@ class LoadedLevels(NamedTuple):
 
     within: int
     low: float
-    """The 10th percentile of what loaded taxels read, in the sensor's unit ..."""
+    """The 10th percentile of the readings of loaded taxels, in the sensor's unit."""
     high: float
-    """... and the 90th."""
+    """The 90th percentile of these readings."""
     fitted: list[float]
 
 

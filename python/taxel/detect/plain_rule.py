@@ -214,7 +214,10 @@ def _labels(labels: object, age: float | str | None) -> list[str | None]:
     """Return the two labels, of which either may be None."""
     if labels is None:
         if age is not None:
-            raise refused("labels", " are left out: with age_ms give the kinds below the threshold and above it")
+            raise refused(
+                "labels",
+                " are missing: with age_ms, give two kinds, the first below the threshold and the second above it",
+            )
         return list(_USUAL)
     pair = several("labels", labels) if not isinstance(labels, str) else []
     if len(pair) != 2:

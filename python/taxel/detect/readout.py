@@ -442,7 +442,10 @@ def run_counting(
         source = recorded(source)
     if isinstance(source, SpikeTrains):
         if not isinstance(readout, Readout):
-            raise refused("source", f" is {shown(source)}: a plain rule reads a recording, events or frames")
+            raise refused(
+                "source",
+                f" is {shown(source)}: must be a taxel.Recording, taxel.Events or taxel.Frames, for a plain rule",
+            )
         return _run_spikes(readout, source), None
     if isinstance(source, Events | Frames):
         readout._check_unit(unit_of(source))
@@ -500,7 +503,7 @@ def _neuron_of(
     """Return a neuron with weights, delay and inputs, given a learner or a tuple."""
     if isinstance(delay_ms, Mapping):
         if label not in delay_ms:
-            raise refused("delay_ms", f": there is none for {label!r}")
+            raise refused("delay_ms", f": the value for {label!r} is missing")
         delay_ms = delay_ms[label]
     delay, named = delay_ms, () if inputs is None else inputs
     if isinstance(learner, tuple) and len(learner) in (2, 3, 4):

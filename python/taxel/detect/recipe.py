@@ -375,7 +375,7 @@ def _encoder_of(values: Mapping[str, Any]) -> Encoder:
     single, each = values.get("encoder"), values.get("encoders")
     if isinstance(single, Mapping) == isinstance(each, Mapping):
         if single is not None and each is not None:
-            raise refused("recipe", ": states both encoder and encoders: give one of them")
+            raise refused("recipe", ": encoder and encoders are both given: give only one of them")
         raise helped(ProblemError("recipe: states no encoder: add [encoder]"), "encoder", "give")
 
     def stated(encoder: Mapping[str, Any]) -> Encoder:
@@ -441,8 +441,8 @@ def _check_age(location: str, delay_ms: float, encoder: Encoder) -> None:
     if ages is not None and round(to_us(delay_ms)) not in {round(to_us(age)) for age in ages}:
         listed = ", ".join(f"{age:g}" for age in ages)
         raise ProblemError(
-            f"{location}: delay_ms is {delay_ms:g}, but the encoder's ages_ms are {listed}: must be one of them, "
-            "because a neuron is trained to fire where an age begins"
+            f"{location}: delay_ms is {delay_ms:g}: must be one of the encoder's ages_ms, {listed}, because with any "
+            "other delay the neuron fires late or never"
         )
 
 

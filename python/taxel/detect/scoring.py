@@ -336,7 +336,7 @@ def _truth(detections: Detections, truth: Mapping[str, ArrayLike] | ArrayLike) -
     if isinstance(truth, Mapping):
         wrong = [label for label in truth if not isinstance(label, str)]
         if wrong:
-            raise refused("truth", f": {shown(wrong[0])} is not a label, which must be a text")
+            raise refused("truth", f": the label {shown(wrong[0])} must be a text")
         columns = {label: column(f"truth[{label!r}]", times, np.int64, "us") for label, times in truth.items()}
         labels = [label for label, times in columns.items() for _ in range(len(times))]
         return labels, np.concatenate([*columns.values(), np.empty(0, np.int64)])
@@ -352,7 +352,7 @@ def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
     if isinstance(window_ms, Mapping):
         for label in dict.fromkeys(labels):
             if label not in window_ms:
-                raise refused("window_ms", f": there is none for {label!r}")
+                raise refused("window_ms", f": the value for {label!r} is missing")
             of_label = np.array([name == label for name in labels])
             windows[of_label] = _windows([label] * int(of_label.sum()), window_ms[label])
         return windows

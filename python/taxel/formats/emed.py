@@ -105,7 +105,7 @@ def _read(file: Path) -> Trial:
     above, begin = text.before(content, lambda line: _FRAME_LINE.search(line) is not None)
     shape, size, period = _head(file, [*above, *([] if begin is None else [begin])], len(above))
     if begin is None:
-        raise FormatError(f"{file.name}: no page has the number of a frame (Pict-No.: 1)")
+        raise FormatError(f"{file.name}: no page states the number of its frame, for example Pict-No.: 1")
     area, pages = size[0] * size[1], list[_Page]()
     read = Growing(file.name, values=(shape, np.float32))
     for first, lines in _pages(len(above) + 1, begin, content):
@@ -198,8 +198,8 @@ def _indices(
     if wrong.any():
         k = int(np.flatnonzero(wrong)[0])
         raise FormatError(
-            f"{file.name}, line {line + step * k}: {noun} {numbers[k]:g}; must be whole numbers from 1 to "
-            f"{most} that ascend"
+            f"{file.name}, line {line + step * k}: {noun} is {numbers[k]:g}; must be whole numbers from 1 to {most} "
+            "that ascend"
         )
     return np.asarray(numbers.astype(np.int64) - 1)
 

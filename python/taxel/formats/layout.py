@@ -95,7 +95,9 @@ class Table:
         if self.frame_begin is not None and (self.frame_lines is not None or self.frame_end is not None):
             raise refused("frame_begin", " is given together with frame_lines or frame_end: give only one of them")
         if flag("events", self.events) and (self.time_column is None or self.has_lines):
-            raise refused("events", " is true: the table must have a time_column, and no frames of several lines")
+            raise refused(
+                "events", " is true: the table must have a time_column and no frame_lines, frame_end or frame_begin"
+            )
         integer("skip_lines", self.skip_lines, 0)
         if self.time_column is not None:
             _column("time_column", self.time_column)
@@ -493,9 +495,8 @@ def _known(table: str, values: Mapping[str, Any]) -> None:
         hint = f"write it above the line [{table}]"
     elif groups := [f"[{group}]{_FOR.get(group, '')}" for group in _TABLES if unknown in _keys(group)]:
         hint = f"write it in {' or '.join(groups)}"
-    raise ProblemError(
-        f"unknown key {table}{'.' * bool(table)}{unknown}{f'; {hint}' * bool(hint)}; must be one of {', '.join(names)}"
-    )
+    right = hint or f"must be one of {', '.join(names)}"
+    raise ProblemError(f"{table}{'.' * bool(table)}{unknown} is not known: {right}")
 
 
 def as_size(value: object) -> str:

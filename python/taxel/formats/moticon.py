@@ -61,7 +61,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that breaks the format (names file, line and column)
     """
-    paths = files_at(path, files, "Moticon text export (lines of # that name the sensor insoles)")
+    paths = files_at(path, files, "Moticon text export (lines that begin with # and name the sensor insoles)")
     steps = _steps_table(paths[0].parent / "steps.csv")
     for file in paths:
         yield from _read(file, steps.get(file.stem))
@@ -73,8 +73,8 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
     head = len(above)
     if head == 0 or begin is None:
         raise FormatError(
-            f"{file.name}, line {head + 1}: the file must begin with lines of #, the last with the names of "
-            f"columns, followed by rows"
+            f"{file.name}, line {head + 1}: the file must begin with lines that begin with #, of which the last "
+            "contains the names of columns; rows must follow"
         )
     names = above[-1].lstrip("# ").split("\t")
     about = dict(line[2:].split(": ", 1) for line in above[:-1] if ": " in line)
@@ -138,7 +138,7 @@ def _columns(names: list[str], foot: str, file: Path, line: int) -> list[int]:
     """Return which columns are the pressures and, last, the total force of a foot."""
     pressures = [k for k, name in enumerate(names) if re.match(rf"{foot} pressure \d+", name)]
     if not pressures:
-        raise FormatError(f"{file.name}, line {line}: the column '{foot} pressure 1' is missing")
+        raise FormatError(f"{file.name}, line {line}: column '{foot} pressure 1' is missing")
     return [*pressures, _column(names, rf"{foot} total force.*", file, line)]
 
 

@@ -88,7 +88,8 @@ def _read(file: Path) -> Iterator[Trial]:
     if len(far):
         k = int(far[0])
         raise FormatError(
-            f"{file.name}, line {head + 3 + k}: {t[k + 1] - t[k]} us after the line above; must fit {hertz:g} Hz"
+            f"{file.name}, line {head + 3 + k}: the time is {t[k + 1] - t[k]} us after that of the line above; must "
+            f"fit {hertz:g} Hz"
         )
     for foot, total in zip(feet, read.column("totals").T, strict=True):
         frames = contacts(total)

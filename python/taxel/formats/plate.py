@@ -80,7 +80,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
 def _image(h5: H5File, name: str, file: Path) -> NDArray[np.int32]:
     entry = h5.entries[name]
     if not entry.is_numbers or np.dtype(entry.dtype).kind not in "ui" or len(entry.shape) != 3 or 0 in entry.shape:
-        raise FormatError(f"{file.name}, {name}: must be whole numbers, rows x columns x frames")
+        raise FormatError(f"{file.name}, {name}: must contain whole numbers, rows x columns x frames")
     image: NDArray[np.int32] = h5.numbers(name, np.int32)
     if image.min() < 0 or not image.any():
         raise FormatError(f"{file.name}, {name}: {'counts are below 0' if image.min() < 0 else 'no count is above 0'}")
@@ -150,12 +150,12 @@ def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
     first = int(np.flatnonzero(y.any(axis=(1, 2)))[0])
     start = first - (first - phase) % 3
     if start < 0:
-        raise FormatError(f"rows are interpolated from row {start} on, before the first: the image is cut")
+        raise FormatError(f"the interpolated rows begin at row {start}, before the first row: the image is cut")
     count = (rows - start + 2) // 3
     a, b, c, d = (padded[start + k : start + k + 3 * count : 3] for k in range(4))
     off = int(np.count_nonzero(np.abs(3 * (b - c) - (a - d)) > 3))
     if 100 * off > np.count_nonzero(a | b | c | d):
-        raise FormatError(f"rows are not interpolated three from two ({off} cells off the line)")
+        raise FormatError(f"{off} cells do not fit rows that were interpolated, three image rows from two sensor rows")
     between = np.maximum(np.rint((3 * (b + c) - a - d + 2) / 4), 0).astype(np.int32)
     between[(b == 0) | (c == 0)] = 0
     sensors = np.zeros((2 * count, *frames.shape[1:]), np.int32)

@@ -162,7 +162,7 @@ class _Header:
 
     def text(self, key: str) -> str:
         if key not in self.values:
-            raise FormatError(f"{self.file.name}: the header has no line {key}")
+            raise FormatError(f"{self.file.name}: the line {key} is missing in the header")
         return self.values[key]
 
     def positive(self, key: str) -> float:

@@ -17,7 +17,7 @@ from taxel._base import limits
 from taxel._base.arguments import short, shown
 from taxel._base.columns import Growing
 from taxel._base.encodings import as_utf_8
-from taxel._base.errors import helped
+from taxel._base.errors import damaged, helped
 from taxel._base.files import open_file
 from taxel._base.header_table import HeaderTable
 from taxel._base.limits import LINE, TEXT, VALUE, unpacked
@@ -183,9 +183,7 @@ def _open(path: Path) -> Iterator[BinaryIO]:
         try:
             yield as_utf_8(path.name, cast(BinaryIO, gzip.GzipFile(fileobj=raw)) if path.suffix == ".gz" else raw)
         except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-            raise FormatError(
-                f"{path.name}: the gzip file is damaged or not complete ({error}); download or copy it again"
-            ) from None
+            raise damaged(path.name, "gzip file", str(error)) from None
 
 
 def _lines(path: Path, data: bytes, begin: int = 0) -> list[str]:
@@ -337,9 +335,11 @@ def _block(
     except ValueError:
         sound = False
     if not sound:
+        # A name may be a number, as the columns of Pedar are.
+        nouns = [name if name.startswith("column ") else f"column {shown(name)}" for name in names]
         values = np.array(
             [
-                [number(c, path, first_line + k, n, unmarked=unmarked) for c, n in zip(row, names, strict=True)]
+                [number(c, path, first_line + k, n, unmarked=unmarked) for c, n in zip(row, nouns, strict=True)]
                 for k, row in enumerate(rows)
             ]
         ).reshape(len(rows), columns)

@@ -81,8 +81,7 @@ class Trial:
     unread: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if not isinstance(self.recorded, Frames | Events):
-            raise refused("recorded", f" is {arguments.shown(self.recorded)}: must be taxel.Frames or taxel.Events")
+        arguments.instance("recorded", self.recorded, Frames, Events)
         for name in ("name", "person", "source", "foot", "group"):
             arguments.text(name, getattr(self, name))
         arguments.flag("timed", self.timed)

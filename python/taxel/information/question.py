@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import integer, number, several, shown
 from taxel._base.errors import refused
+from taxel._base.messages import are, counted
 from taxel._core import ProblemError
 from taxel.encode import FA1, ChangeEvents, Encoder
 from taxel.frames import Frames
@@ -61,8 +62,7 @@ class Question:
             sizes = " x ".join(map(str, differing.array.shape)), " x ".join(map(str, shape))
             raise ProblemError(
                 f"{differing.name}: the array has {sizes[0]} taxels, but that of {self.trials[0].name} has "
-                f"{sizes[1]}: must "
-                "all have one size"
+                f"{sizes[1]}: all arrays must have the same size"
             )
         self.labels = np.array([trial.label for trial in self.trials])
         groups = [trial.group for trial in self.trials]
@@ -105,7 +105,8 @@ class Question:
         if np.isfinite(reach) and (lengths < self.window_us).any():
             short = int((lengths < self.window_us).sum())
             self.notes.append(
-                f"trials shorter than {to_ms(self.window_us):g} ms: {short}; late events may show their length"
+                f"{counted(short, 'trial')} {are(short)} shorter than the window of {to_ms(self.window_us):g} ms, so "
+                "late events may show the length of a trial; with a shorter window they cannot"
             )
 
     def set_out(

@@ -72,7 +72,7 @@ class NeuronPerClass(Parameters, ABC):
         ProblemError : not fitted, or patterns that are invalid
         """
         if not hasattr(self, "learners_"):
-            raise NotFittedError(f"{type(self).__name__} was not fitted yet; call fit first")
+            raise NotFittedError(f"{type(self).__name__} not fitted yet, call fit first")
         trains = _listed(self, patterns)
         return np.array([[self._potential(learner, s) for learner in self.learners_] for s in trains]).reshape(
             len(trains), len(self.learners_)

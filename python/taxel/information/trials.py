@@ -74,8 +74,7 @@ class LabelledTrial:
     name: str = "trial"
 
     def __post_init__(self) -> None:
-        if not isinstance(self.source, Events | Frames):
-            raise refused("source", f" is {shown(self.source)}: must be taxel.Events or taxel.Frames")
+        instance("source", self.source, Events, Frames)
         text("name", self.name)
         if not text("label", self.label):
             raise ProblemError(f"{self.name}: label is empty")
@@ -279,8 +278,8 @@ def _inside(trial: LabelledTrial, recording: str, span: tuple[int, int] | None, 
     """Refuse a trial outside its recording; silence before its first event may belong to a touch."""
     end = trial.start_us + window_us if trial.stop_us is None else trial.stop_us
     if span is None or trial.start_us > span[1] or end < span[0]:
-        content = "nothing" if span is None else f"{span[0]} to {span[1]} us"
-        raise ProblemError(f"{trial.name}: t_us {trial.start_us} is outside {recording}, which contains {content}")
+        content = "contains nothing" if span is None else f"lasts from {span[0]} to {span[1]} us"
+        raise ProblemError(f"{trial.name}: t_us {trial.start_us} is outside {recording}, which {content}")
 
 
 def _apart(trials: list[LabelledTrial], window_us: int) -> None:

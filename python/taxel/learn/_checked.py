@@ -21,7 +21,7 @@ from taxel.spikes import SpikeTrains
 def fitted(cone: object) -> NDArray[np.float64]:
     """Return the weights of a fit; refuse what is none."""
     if not isinstance(cone, ConeX | ConeR):
-        raise refused("cone", f" is {shown(cone)}: must be a taxel.learn.ConeX or ConeR")
+        raise refused("cone", f" is {shown(cone)}: must be a taxel.learn.ConeX or taxel.learn.ConeR")
     return cone._fitted()
 
 

@@ -139,11 +139,11 @@ def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets
             missed = max(missed, abs(off))
             if fires is False:
                 wrong.append(
-                    f"pattern {p}: does not fire at target {k} ({t:g} ms): its potential is {-off:.1e} mV below "
-                    f"the threshold"
+                    f"pattern {p}: the neuron does not fire at target {k} ({t:g} ms), because its potential is "
+                    f"{-off:.1e} mV below the threshold"
                 )
             elif fires is None:
-                unproven.append(f"pattern {p}: whether it fires at target {k} ({t:g} ms) is not proven")
+                unproven.append(f"pattern {p}: whether the neuron fires at target {k} ({t:g} ms) is not proven")
             if rows.on_grid and not rows.is_point(float(t)):
                 wrong.append(
                     f"pattern {p}: target {k} ({t:g} ms) is between two time steps; a neuron fires only at a time step"

@@ -117,4 +117,6 @@ class StatedOptions:
     readout_events: int = option(
         1048576, "How many events may wait for the readout.", least=0, most=2_147_483_647, commands=""
     )
-    gro: bool = option(True, "Let the kernel hand over trains of datagrams in one piece (`UDP_GRO`).", commands="")
+    gro: bool = option(
+        True, "Let the kernel join several datagrams and hand them over together (`UDP_GRO`).", commands=""
+    )

@@ -116,7 +116,8 @@ class Live:
     readout_events : int, 0 to 2147483647
         How many events may wait for the readout.
     gro : bool
-        Let the kernel hand over trains of datagrams in one piece (`UDP_GRO`). It then counts its drops in trains.
+        Let the kernel join several datagrams and hand them over together (`UDP_GRO`). Then each joined piece that the
+        kernel drops counts as one.
     say : callable, optional
         Called with each `Detection` in the thread that detected it, one at a time; an exception ends the pipeline and
         is raised by `next`. The function must not call `stop`. Where it takes longer than 2 ms another thread continues
@@ -390,7 +391,7 @@ class Live:
         arrival = None if arrived_ns is None else integer("arrived_ns", arrived_ns, 0)
         row = numbers("values", values, np.float64).reshape(-1)
         for k in np.flatnonzero(np.abs(row) > VALUE)[:1]:
-            raise refused("values", f"[{k}] is {shown(row[k].item())}: must fit 32 bits, or be NaN where it is missing")
+            raise refused("values", f"[{k}] is {shown(row[k].item())}: must fit 32 bits, or be NaN if it is missing")
         self._core.sample(text("name", name), row.tolist(), arrival)
 
     def zero(self, x: ArrayLike, y: ArrayLike) -> tuple[Zeroing, ...]:

@@ -59,7 +59,7 @@ class LslInlet:
         if not streams:
             raise ProblemError(f"lsl:{name}: no stream of that name was found within {_LOOK_S:g} s")
         if streams[0].channel_format() == lsl.cf_string:
-            raise ProblemError(f"lsl:{name}: a stream of texts; only numbers are recorded")
+            raise ProblemError(f"lsl:{name}: the stream contains texts; must contain numbers")
         self.name = name
         # Labels arrive with the connection; the time stamps stay the sender's own.
         self._inlet = lsl.StreamInlet(streams[0], processing_flags=lsl.proc_none)

@@ -325,5 +325,5 @@ def _rest_of_held(live: Live) -> Tare:
             "read_out: no values of taxels have arrived yet, so their rest is unknown; wait for the board"
         )
     return Tare.take(
-        Frames([values, values], [0, 1], unit=live.unit, array=live.array), note="held when the readout began"
+        Frames([values, values], [0, 1], unit=live.unit, array=live.array), note="the values when the readout began"
     )

@@ -68,4 +68,6 @@ def receiver_of(address: str) -> Any:
         )
     for point in entry_points(group="taxel.remotes", name=scheme):
         return point.load()
-    raise DeviceError(f"{address}: no installed package receives {scheme}: addresses; zenoh: needs taxel_bridge")
+    raise DeviceError(
+        f"{address}: no installed package receives addresses that begin with {scheme}: (zenoh: needs taxel_bridge)"
+    )

@@ -148,7 +148,7 @@ def _contents(source: object) -> Contents:
     if isinstance(source, Recording):
         return source._contents
     if not isinstance(source, Events | Frames):
-        raise refused("source", f" is {shown(source)}: must be a Recording, Events, Frames or the name of a file")
+        raise refused("source", f" is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or a path")
     return Contents.single(source_from(source))
 
 

@@ -58,7 +58,8 @@ def times_at(number: NDArray[np.int64], rate_hz: float) -> NDArray[np.int64]:
     us = number * (1e6 / rate_hz)
     if len(us) and np.abs(us).max() > TIME_US:
         raise ProblemError(
-            f"{rate_hz:g} Hz: frame {number[-1]} comes at {us[-1] / 1e6:.3g} s; must be within 142 years"
+            f"rate_hz is {rate_hz:g}: the time of frame {number[-1]} would be {us[-1] / 1e6:.3g} s; must be within 142 "
+            "years of 0"
         )
     t: NDArray[np.int64] = np.rint(us).astype(np.int64)
     return t

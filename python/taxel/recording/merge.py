@@ -94,7 +94,7 @@ def merge_contents(recordings: Sequence[Contents], gap: float | None = None, *, 
         differing = next(source for source in sources if source.has_events != sources[0].has_events)
         events, frames = (sources[0], differing) if sources[0].has_events else (differing, sources[0])
         raise ProblemError(
-            f"recordings: {events.origin.name} contains events, {frames.origin.name} contains frames; convert "
+            f"recordings: {events.origin.name} contains events, but {frames.origin.name} contains frames; convert "
             f"one of them first"
         )
     tables = [source.table for source in sources]

@@ -44,8 +44,8 @@ _STRANGERS = {
     b"\x04\x22\x4d\x18": "lz4; unpack it first",
     b"BZh": "bzip2; unpack it first",
     b"\xfd7zXZ": "xz; unpack it first",
-    b"\x89PNG": "a PNG picture, not a recording",
-    b"%PDF": "a PDF document, not a recording",
+    b"\x89PNG": "a PNG picture",
+    b"%PDF": "a PDF document",
     **{
         b"#!AER-DAT%d" % k: f"AEDAT {k}; save it as a file of event cameras that taxel reads: {', '.join(CAMERA)}"
         for k in (1, 2, 3)
@@ -364,16 +364,16 @@ def _by_first_bytes(path: Path) -> TaxelFile | Refusal:
         stranger = f"a .{by_magic} file; rename it"
     starts = f"{path}, byte 0: starts with {begins}"
     if stranger is not None:
-        right = expected[ending] if ending else "a recording"
+        right = f", not with {expected[ending]}" if ending else ": not a recording"
         kind, _, then = stranger.partition("; ")
-        return Refusal(FormatError(f"{starts} ({kind}), not with {right}" + f"; {then}" * bool(then)))
+        return Refusal(FormatError(f"{starts} ({kind}){right}" + f"; {then}" * bool(then)))
     if ending is None:
         describes = advice(path, "describe a table or an array of another program")
         known = f"{', '.join(ENDINGS)}, and of event cameras {', '.join(CAMERA)}"
         wrong = (
             f"{starts}: not a recording; taxel reads {known}; {describes}"
             if head
-            else (f"{path}: is empty: not a recording")
+            else f"{path}: the file is empty; must be a recording"
         )
         return Refusal(FormatError(wrong))
     if ending in {"npz", "h5"}:

@@ -204,7 +204,7 @@ class Losses:
 
     def damage(self) -> list[str]:
         """Return what a file that does not state its damage lacks."""
-        return ["that the end of the recording is missing"] * self.truncated + [
+        return ["the fact that the end of the recording is missing"] * self.truncated + [
             "the remarks on reading the recording"
         ] * self.rebuilt.holds()
 
@@ -242,8 +242,8 @@ class FrameTable:
 
     def losses(self) -> list[str]:
         """Return what a file without this section does not hold, except the frames."""
-        lines = ["that the frames have no times"] * self.untimed
-        lines += [] if self.turned is None else [f"that the readings were inverted (falls = {self.turned:g})"]
+        lines = ["the fact that the frames have no times"] * self.untimed
+        lines += [] if self.turned is None else [f"the fact that the readings were inverted (falls = {self.turned:g})"]
         return lines + (
             [] if self.frame_us is None else [f"the length of a frame that a readout assumed, {self.frame_us:g} us"]
         )

@@ -270,12 +270,11 @@ def _check(held: Any) -> dict[str, Any]:
         or not isinstance(values.get("stretch_of"), str | None)
         or not _are_steps(values.get("steps_back", []))
     ):
-        raise ProblemError("verdict: must be a dict of status, text, lost and others, as to_dict gives it")
+        raise ProblemError("verdict: must be a dict of status, text, lost and others, as to_dict returns it")
     for name, least in (("lost", "lost"), ("damaged", "damaged")):
         if STATUSES.index(values["status"]) < STATUSES.index(least) and any(values.get(name, {}).values()):
             raise ProblemError(
-                f"verdict: its status is {values['status']}, but its {name} is not empty: the status "
-                f"must be {least!r} or worse"
+                f"verdict: status is {values['status']}; must be {least!r} or worse, because {name} is not empty"
             )
     if STATUSES.index(values["status"]) < STATUSES.index("damaged") and values.get(doubtful) is not None:
         raise ProblemError(
@@ -287,7 +286,7 @@ def _check(held: Any) -> dict[str, Any]:
         inner = part["status"]
         if STATUSES.index(inner) > STATUSES.index(values["status"]):
             raise ProblemError(
-                f"verdict: its status is {values['status']}, but that of {name} is {inner}: must not be better"
+                f"verdict: status is {values['status']}; must not be better than that of its part {name}, {inner}"
             )
     for name, totals in zip(_NUMBERS, numbers, strict=True):
         for cause in {cause for part in stated.values() for cause in part[name]}:
@@ -295,8 +294,7 @@ def _check(held: Any) -> dict[str, Any]:
             least = max(part[name].get(cause, 0) for part in stated.values())
             if totals.get(cause, 0) < least:
                 raise ProblemError(
-                    f"verdict: its {name} states {totals.get(cause, 0)} of {cause}, but its parts state {least}: must "
-                    "be at least as many"
+                    f"verdict: {name} states {totals.get(cause, 0)} of {cause}; must be at least {least}, as in a part"
                 )
     fields = {"status": values["status"], "text": values["text"], doubtful: values.get(doubtful)}
     fields |= {"steps_back": [dict(step) for step in values.get("steps_back", [])]}

@@ -303,7 +303,9 @@ def _replaced(
     merged = dict(before)
     for name, change in changes.items():
         if name not in before and name not in more:
-            raise ProblemError(f"{name} is not known: {noun} has {', '.join(dict.fromkeys([*before, *more]))}")
+            raise ProblemError(
+                f"{name} is not known in {noun}: must be one of {', '.join(dict.fromkeys([*before, *more]))}"
+            )
         merged[name] = _merged(merged.get(name), change)
     return merged
 

@@ -286,8 +286,7 @@ def _warn(acts: Sequence[Act], narrow: list[tuple[int, str]]) -> None:
 
 
 def _part(n: int, act: Act, array: Array) -> Any:
-    if not isinstance(act, Silence | Scene | FrameSequence):
-        raise ProblemError(f"act {n} is {shown(act)}: must be a Scene, Silence or FrameSequence")
+    instance(f"act {n}", act, Scene, Silence, FrameSequence)
     if isinstance(act, FrameSequence) and act.values.shape[1:] != array.shape:
         raise ProblemError(
             f"act {n}: the frames have shape {act.values.shape[1:]}; must be that of the array, {array.shape}"

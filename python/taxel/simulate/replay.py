@@ -45,7 +45,7 @@ class Replay:
         if isinstance(source, Recording):
             source = source.events if source.has_events else source.frames()
         if not isinstance(source, Events | Frames):
-            raise refused("source", f" is {shown(source)}: must be a Recording, Events or Frames")
+            raise refused("source", f" is {shown(source)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
         if not len(source):
             raise refused("source", " is empty: must contain events or frames")
         self.source: Events | Frames = source

@@ -67,7 +67,7 @@ class Flaws:
                 finite(name, getattr(self, name), least=0.0, most=1.0 if name in ("dead", "stuck") else math.inf)
         for name, seed in mapping("seeds", {} if self.seeds is None else self.seeds).items():
             if name not in self._names():
-                raise refused("seeds", f": {shown(name)} is unknown: must be one of {', '.join(self._names())}")
+                raise refused("seeds", f": {shown(name)} is not known: must be one of {', '.join(self._names())}")
             integer(f"seeds[{name}]", seed, 0, 2**63 - 1)
 
     @classmethod

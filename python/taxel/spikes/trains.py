@@ -19,7 +19,7 @@ from taxel._base.drawing import draw
 from taxel._base.errors import refused
 from taxel._base.files import write_whole
 from taxel._base.limits import UNIT
-from taxel._base.messages import counted
+from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.spikes.exchange import Kind, read_nwb, write_nwb
 
@@ -560,13 +560,15 @@ class SpikeTrains(FrozenColumns):
         array([1., 5.])
         """
         file = checked_path("path", path)
+        arrays = read_arrays(file, ("times", "offsets", "start", "stop", "values", "kind"), texts={"kind": UNIT})
         try:
-            arrays = read_arrays(file, ("times", "offsets", "start", "stop", "values", "kind"), texts={"kind": UNIT})
             kind = arrays["kind"].item() if "kind" in arrays else None
             start, stop = arrays["start"].item(), arrays["stop"].item()
             return cls(arrays["times"], arrays["offsets"], start, stop, arrays.get("values"), kind=kind)
-        except (ValueError, KeyError, ProblemError, FormatError) as error:
-            raise FormatError(f"{file}: contains no spike trains: {shown(str(error))}") from None
+        except KeyError as missing:
+            raise FormatError(f"{file}: contains no spike trains, because the array {missing} is missing") from None
+        except (ValueError, ProblemError) as error:
+            raise FormatError(f"{file}: contains no spike trains: {first_line(error)}") from None
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the raster: time (ms) to the right, trains upwards, OFF spikes and values below 0 in another colour."""

@@ -45,7 +45,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
-from taxel._base.arguments import mapping, shown
+from taxel._base.arguments import mapping, text
 from taxel._base.files import check_writable
 from taxel._base.messages import collected, escaped
 from taxel._base.progress import Progress
@@ -141,9 +141,7 @@ def run(name: str, request: Mapping[str, Any], progress: Progress) -> dict[str, 
     ------
     ProblemError : no such task, an unknown key or option (named), or what the task raises
     """
-    if name not in _TASKS:
-        raise ProblemError(f"{shown(name)} is not a task; there are {', '.join(_TASKS)}")
-    work, known = _TASKS[name]
+    work, known = _TASKS[text("the task", name, _TASKS)]
     left = mapping("the request", request)
     _refuse_unknown(left, ("recordings", "open", *known, *(["overwrite"] if "out" in known else [])), f"key of {name}")
     overwrite = left.pop("overwrite", False) is True
@@ -187,12 +185,12 @@ def _needed(request: Request, key: str) -> Any:
 def _refuse_unknown(values: Mapping[str, Any], known: Sequence[str], noun: str) -> None:
     unknown = next((key for key in values if key not in known), None)
     if unknown is not None:
-        raise ProblemError(f"{unknown} is no {noun}; there are {', '.join(known)}")
+        raise ProblemError(f"{unknown} is not a {noun}: must be one of {', '.join(known)}")
 
 
 def _one(recordings: Sequence[Recording]) -> Recording:
     if len(recordings) != 1:
-        raise ProblemError(f"recordings hold {len(recordings)} recordings; must be one")
+        raise ProblemError(f"recordings: {len(recordings)} recordings; must be one")
     return recordings[0]
 
 

@@ -192,9 +192,11 @@ def calibrate(
     table = isinstance(loads, str | os.PathLike)
     known = read_loads(checked_path("loads", loads)) if table else several("loads", loads)
     if not known and not options.law and options.table is None:
-        raise helped(ProblemError("there is no law and no table to calibrate by"), "loads", "give")
+        raise helped(
+            ProblemError("law, table and loads are missing, so there is nothing to calibrate by"), "loads", "give"
+        )
     if not known and (options.each or options.exponent is not None):
-        raise helped(ProblemError("each and exponent are only for a fit"), "loads", "give")
+        raise helped(ProblemError("each and exponent are only for a fit to loads"), "loads", "give")
     with collected() as warnings:
         made = _calibrated(recording, [instance("loads", load, KnownLoad) for load in known], options)
     return replace(Calibrated(made), warnings=tuple(warnings))
@@ -207,7 +209,10 @@ def _calibrated(recording: Recording, known: Sequence[KnownLoad], options: Calib
     calibration: Calibration | None = None
     if options.law:
         if frames.unit != "ticks":
-            raise refused("law", f": converts ticks of a board to {options.unit}; {recording.path} holds {frames.unit}")
+            raise refused(
+                "law",
+                f": converts ticks of a board to {options.unit}; the values of {recording.path} are in {frames.unit}",
+            )
         registers = recording.registers
         ramp = 150.0 if registers is None else float(registers.ramp)
         calibration = Calibration.law(recording.array, ramp=ramp, sensor=options.sensor, **how)
@@ -225,7 +230,7 @@ def _read(recording: Recording, tare: GivenTare | None) -> tuple[Frames, NDArray
     """Return the readings, those at rest, and the floor above rest from which a taxel counts as loaded."""
     values = readings(recording, None if tare is None else given_tare(tare, recording))
     if values is None:
-        raise ProblemError(f"{recording.path}: holds events without intensities, so there is nothing to calibrate")
+        raise ProblemError(f"{recording.path}: contains events without intensities, so there is nothing to calibrate")
     frames, rest, floor = values
     if rest.source == "none" and recording.has_events:
         error = ProblemError(
@@ -286,7 +291,7 @@ def read_loads(path: str | os.PathLike[str]) -> list[KnownLoad]:
         unit, stretch = row["unit"].strip(), (value("from_s"), value("to_s"))
         loads.append(KnownLoad(value("load"), unit, *stretch, taxel, location))
     if not loads:
-        raise FormatError(f"{path.name}: no load in it")
+        raise FormatError(f"{path.name}: contains no load")
     return loads
 
 
@@ -311,6 +316,7 @@ def _points(path: Path, array: Array) -> tuple[NDArray[np.float64], NDArray[np.f
     if len(missing):
         point, y, x = missing[0]
         raise FormatError(
-            f"{path.name}: no reading of row {y}, column {x} under {values[point]:g}; each taxel needs each value"
+            f"{path.name}: no reading of row {y}, column {x} at value {values[point]:g}; each taxel must have a "
+            "reading for each value"
         )
     return readings, values

@@ -136,8 +136,8 @@ def information(
         trials = _trials(labels, opened, options.window_ms)
         if labels is None and len({trial.label for trial in trials}) == 1:
             error = ProblemError(
-                f"{trials[0].name}: without a table each recording is a trial and its folder's name the label, "
-                f"here {trials[0].label!r} alone"
+                f"{trials[0].name}: without a table of trials, each recording is a trial, and its label is the name of "
+                f"its folder; must be several folders, but there is only {trials[0].label!r}"
             )
             raise helped(error, "labels", "give")
         _check_folds(trials, str(opened[0].path) if labels in (None, "notes") else str(labels), options)

@@ -115,8 +115,8 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     for table in map(recorded, opened):
         if isinstance(table, Events) and table.intensity is None:
             raise ProblemError(
-                "events without intensities, which the recipe touch and its encoders need: frames of an event camera's "
-                "counts (window_ms=5, --count-ms 5) are trained by event_counts"
+                "the events have no intensities, but the recipe touch and its encoders need them: for an event camera, "
+                "use frames of counts (--count-ms 5; in Python: window_ms=5) and the recipe event_counts"
             )
     unlabelled = sources_without(labels, opened, labelled)
     labelled = [moved(events, each, options.shift_ms) for events, each in zip(labelled, opened, strict=True)]

@@ -217,7 +217,7 @@ class Training:
     def lines(self) -> list[str]:
         """Return the result as lines for people; the first says whether the scores are held out."""
         window, recipe = f"(window {self.options.window_ms:g} ms)", self.options.recipe
-        lines = [f"not held out, on its own training data {window}: {self.why}"]
+        lines = [f"not held out, but scored on its own training data {window}: {self.why}"]
         if self.held_out:
             lines = [f"held out: {self.scored.how} {window}"]
         for label, sources in self.unlabelled.items():
@@ -226,7 +226,7 @@ class Training:
             lines += self._scores(label)
         lines += [*self._advised(), *self._better(), *self._aligned()]
         if self.options.shift_ms:
-            lines.append(f"labels moved by {self.options.shift_ms:+g} ms before, as asked")
+            lines.append(f"labels moved by {self.options.shift_ms:+g} ms before training (--shift-ms)")
         lines += [f"{label}: {chosen}" for label, chosen in self.made.chosen.items()]
         lines += self._kinds()
         if recipe is not None:
@@ -285,9 +285,9 @@ class Training:
         recipe = self.options.recipe
         if recipe is not None and (kinds := recipes.kinds(recipe, self.readout.labels)):
             yield (
-                f"{', '.join(kinds)}: learnt as a kind of touch, detected at an age of the touch; its beginning is "
-                "called "
-                f"{recipes.names_of(recipe, 'contact')}, its end {recipes.names_of(recipe, 'lift')}"
+                f"{', '.join(kinds)}: learnt as a kind of touch, and detected at an age of the touch; a label of the "
+                f"beginning of a touch must be named {recipes.names_of(recipe, 'contact')}; a label of its end, "
+                f"{recipes.names_of(recipe, 'lift')}"
             )
 
     def _levels(self) -> Iterator[str]:
@@ -311,10 +311,10 @@ class Training:
         if not self.tares_us:
             return
         lengths = [to_ms(end - begin) for begin, end, _ in self.tares_us]
-        text = f"a separate one for each of {len(lengths)} recordings, {min(lengths):g} to {max(lengths):g} ms long"
+        text = f"measured separately in each of {len(lengths)} recordings, for {min(lengths):g} to {max(lengths):g} ms"
         if len(lengths) == 1:
-            text = "what the recording holds from {:g} to {:g} ms".format(*map(to_ms, self.tares_us[0][:2]))
-        yield f"tare: {text}; another can be given"
+            text = "measured in the recording from {:g} to {:g} ms".format(*map(to_ms, self.tares_us[0][:2]))
+        yield f"tare: {text}; --tare sets another tare"
 
     def _scores(self, label: str) -> Iterator[str]:
         """Yield how the neuron and the plain rule of a label scored on the same labels."""
@@ -426,8 +426,8 @@ class Training:
                 named = ", ".join(events[:_NAMED]) + more
                 weaker = next((f"; {c.measured}" for c in self.causes if c.kind == "levels" and label in c.labels), "")
                 yield (
-                    f"{label}: no input that {label} is learnt from is within 50 ms of {labels}, not learnt: {named}"
-                    f"{weaker}"
+                    f"{label}: no input that {label} is learnt from is within 50 ms of {labels}, which "
+                    f"{'was' if len(events) == 1 else 'were'} not learnt: {named}{weaker}"
                 )
 
 

@@ -327,5 +327,7 @@ fn nonsense_is_refused() {
     let refused = Board::new(Registers::at_reset(&huge, 64), &huge).unwrap_err().to_string();
     assert!(refused.contains("more than 65536 positions"), "{refused}");
     let small = Array::new(8, 8, 1.0, "small").unwrap();
-    assert!(Board::new(Registers::default(), &small).unwrap_err().to_string().contains("8 columns to drive"));
+    assert!(
+        Board::new(Registers::default(), &small).unwrap_err().to_string().contains("must be at most 8, the number of")
+    );
 }

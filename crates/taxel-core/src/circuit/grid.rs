@@ -75,7 +75,7 @@ impl Crossbar {
         let (n, m) = (self.rows, self.columns);
         if conductance_us.len() != n * m {
             let count = conductance_us.len();
-            return Err(problem!("conductance: {count} values, must be {n} x {m}"));
+            return Err(problem!("conductance: {count} values; must be {n} x {m}"));
         }
         if let Some(k) = conductance_us.iter().position(|g| !(0.0..=1e9).contains(g)) {
             let (x, y, g) = (k % m, k / m, conductance_us[k]);

@@ -102,7 +102,7 @@ impl Channels {
         let held = held.values_mut().as_chunks_mut().0;
         if values.len() != self.grid() {
             let (rows, columns) = (self.rows, self.columns);
-            return Err(problem!("frame at {t} us: {} values, must be {rows} x {columns}", values.len()));
+            return Err(problem!("frame at {t} us: {} values; must be {rows} x {columns}", values.len()));
         }
         let Some(taxels) = &self.taxels else {
             let (full, rest) = values.as_chunks::<BLOCK>();

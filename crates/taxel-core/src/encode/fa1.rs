@@ -86,7 +86,7 @@ impl Encoding for Fa1 {
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.range.is_some() && self.theta_0.is_some() {
-            return Err(problem!("theta_0 and range: give one of them"));
+            return Err(problem!("theta_0 and range are both given: give only one of them"));
         }
         Ok(())
     }

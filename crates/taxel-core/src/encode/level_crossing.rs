@@ -98,7 +98,7 @@ impl Encoding for LevelCrossing {
             micros("hold_ms", self.hold_ms)?;
         }
         if self.release_share.is_some() && self.release_by.is_some() {
-            return Err(problem!("release_share and release_by: give one of them"));
+            return Err(problem!("release_share and release_by are both given: give only one of them"));
         }
         if let Some(share) = self.release_share
             && share < 1.0

@@ -337,7 +337,7 @@ impl<R: Rule> Stream for Sampled<R> {
         if self.steady && self.begun && 2 * (t - self.last - self.period).abs() > self.period {
             let (since, period) = (ms(t - self.last), ms(self.period));
             return Err(problem!(
-                "frame at {t} us, {since} ms after the frame before: frames must come every {period} ms"
+                "frame at {t} us is {since} ms after the previous frame: frames must come every {period} ms"
             )
             .with_hint("period_ms", Hint::Give));
         }

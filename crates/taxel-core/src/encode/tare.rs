@@ -282,7 +282,7 @@ impl TareBuilder {
     /// `Problem` if the frame has another size, contains NaN or is out of order.
     pub fn push_frame(&mut self, t: i64, values: &[f32]) -> Result<()> {
         if values.len() != self.integrals.len() {
-            return Err(problem!("frame at {t} us: {} values, must be {}", values.len(), self.integrals.len()));
+            return Err(problem!("frame at {t} us: {} values; must be {}", values.len(), self.integrals.len()));
         }
         if t < self.present {
             return Err(problem!("frame at {t} us comes after {} us: times must ascend", self.present));

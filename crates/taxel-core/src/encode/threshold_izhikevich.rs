@@ -377,7 +377,7 @@ mod tests {
         let mut neurons = IzhikevichNeurons { v: [v; LANES], u: [u; LANES], input: [model.gain; LANES], still: false };
         let mut spikes = vec![];
         neurons.run(model, (500.0 / dt) as i64, |step, lane| spikes.push((step, lane)));
-        assert!(spikes.len() <= LANES || gain.is_some(), "phasic: one spike per step of the input");
+        assert!(spikes.len() <= LANES || gain.is_some(), "a phasic neuron fires once");
         spikes.first().map(|&(step, _)| (step + 1) as f64 * dt)
     }
 

@@ -77,7 +77,7 @@ impl Smoothing {
         for side in std::iter::once(a).chain(b) {
             if side.trains % taxels != 0 {
                 return Err(problem!(
-                    "{} has {} trains, the array {taxels} taxels: must be one train per taxel (or several for each)",
+                    "{} has {} trains, but the array has {taxels} taxels: must be one train per taxel (or several for each)",
                     side.name,
                     side.trains
                 ));

@@ -66,7 +66,7 @@ impl Registers {
     pub fn preset(name: &str) -> Result<Self> {
         match PRESETS.iter().find(|preset| preset.name == name) {
             Some(preset) => Ok(preset.registers),
-            None => Err(problem!("preset {name:?} is not known; presets: {}", preset_names(&PRESETS))),
+            None => Err(problem!("preset {name:?} is not known: must be one of {}", preset_names(&PRESETS))),
         }
     }
 
@@ -82,7 +82,7 @@ impl Registers {
         if !fitting().any(|preset| preset.name == name) {
             let Array { rows, columns, .. } = array;
             return Err(problem!(
-                "preset {name:?} is not for a board of {rows} x {columns} taxels; presets of that size: {}",
+                "preset {name:?} is not for a board of {rows} x {columns} taxels: must be one of {}",
                 preset_names(fitting())
             ));
         }
@@ -294,7 +294,7 @@ impl Registers {
         target.check(array)?;
         if self.channels != target.channels {
             return Err(Error::device(format!(
-                "the board has {} channels, the registers are for {}",
+                "the board has {} channels, but the registers are for {}",
                 self.channels, target.channels
             )));
         }
@@ -344,7 +344,7 @@ impl Registers {
             }
             let Some(field) = fields().iter().find(|f| f.name == name || f.manual == name) else {
                 let names: Vec<_> = fields().iter().map(|f| f.name).collect();
-                return Err(problem!("register {name:?} is not known; registers: {}, channels", names.join(", ")));
+                return Err(problem!("register {name:?} is not known: must be one of {}, channels", names.join(", ")));
             };
             // The manual's name takes the value as the register holds it; ours takes the number meant, without the
             // register's offset.

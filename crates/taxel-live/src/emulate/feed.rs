@@ -62,7 +62,7 @@ impl Touch for PipedFrames {
             if n == 0 {
                 return Ok(false);
             }
-            let reason = format!("frame {frame}: ends after {n} bytes, must be {wanted}");
+            let reason = format!("frame {frame}: ends after {n} bytes; must have {wanted}");
             return Err(taxel_core::Error::format(format!("standard input, {reason}")).into());
         }
         for (value, bytes) in ticks.iter_mut().zip(self.bytes.chunks_exact(2)) {

@@ -102,7 +102,7 @@ impl FrameInput {
         let InputState { frames, feed, message, .. } = &mut *state;
         if self.place.is_some() {
             return Err(
-                problem!("source {name:?}: reads its own lines, so it accepts no values from the program").into()
+                problem!("source {name:?}: taxel reads its lines itself, so a program cannot give it values").into()
             );
         }
         if feed.is_over() {

@@ -142,9 +142,9 @@ options! {
         queue_bytes: usize = ReceiverOptions::default().queue_bytes, "commands" = "", "maximum" = 2_147_483_647;
         /// How many events may wait for the readout.
         readout_events: usize = 1 << 20, "commands" = "", "maximum" = 2_147_483_647;
-        /// Let the kernel hand over trains of datagrams in one piece (`UDP_GRO`).
+        /// Let the kernel join several datagrams and hand them over together (`UDP_GRO`).
         ///
-        /// It then counts its drops in trains.
+        /// Then each joined piece that the kernel drops counts as one.
         gro: bool = ReceiverOptions::default().gro, "commands" = "";
     }
 }

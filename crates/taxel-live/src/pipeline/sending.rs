@@ -49,7 +49,7 @@ impl FromStr for Destination {
         let found = LinePlace::parse(place, &mut options).map_err(in_text)?;
         match found.filter(|_| options.is_empty() && option.is_none_or(|option| option.contains('='))) {
             Some(place) => Ok(Self(place)),
-            None => Err(problem!("send to {text:?}: must be {FORMS}; ,baud=RATE may follow a serial port").into()),
+            None => Err(problem!("send to {text:?}: must be {FORMS}").into()),
         }
     }
 }

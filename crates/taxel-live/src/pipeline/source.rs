@@ -252,7 +252,7 @@ impl FromStr for SourceText {
             source.rate_hz = number("rate", take("rate"))?;
             source.end = match (take("frame_lines"), take("frame_end")) {
                 (Some(_), Some(_)) => {
-                    return Err(refused("frame_lines and frame_end: give one of them".to_owned()));
+                    return Err(refused("frame_lines and frame_end are both given: give only one of them".to_owned()));
                 }
                 (Some(lines), None) => match lines.parse() {
                     Ok(lines @ 1..=65_535) => Some(FrameEnd::Lines(lines)),
@@ -571,7 +571,7 @@ fn index_of(key: &str, column: &str, columns: &[String]) -> taxel_core::Result<u
     match column.parse::<usize>() {
         Ok(number) if (1..=columns.len()).contains(&number) => Ok(number - 1),
         Ok(_) => Err(problem!("{key}={column}: a line has {} columns", columns.len())),
-        Err(_) => Err(problem!("{key}={column}: no column has this name; the columns are {}", columns.join(", "))),
+        Err(_) => Err(problem!("{key}={column}: this column is missing; the columns are {}", columns.join(", "))),
     }
 }
 

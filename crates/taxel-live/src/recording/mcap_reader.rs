@@ -477,7 +477,7 @@ impl Reader {
     pub fn frames(&self, stop: Stop<'_>) -> Result<Frames> {
         let Header { name, array, frames, .. } = self.header();
         if frames.is_none() {
-            return Err(problem!("source {name}: holds no frames").into());
+            return Err(problem!("source {name}: contains no frames").into());
         }
         let mut all = Frames::default();
         self.messages(stop, |message| {

@@ -56,7 +56,7 @@ impl StreamColumns {
     pub(super) fn check(&self, name: &str) -> taxel_core::Result<()> {
         let refused = |message: String| Err(problem!("source {name}: {message}"));
         if self.columns.len() > limits::COLUMNS {
-            return refused(format!("{} columns; at most {}", self.columns.len(), limits::COLUMNS));
+            return refused(format!("{} columns; must be at most {}", self.columns.len(), limits::COLUMNS));
         }
         for (k, column) in self.columns.iter().enumerate() {
             if column.is_empty() || column.contains(',') {
@@ -70,7 +70,7 @@ impl StreamColumns {
             return refused(format!("time is {time:?}: must be one of the columns {}", self.columns.join(", ")));
         }
         if self.values().next().is_none() {
-            return refused("holds no column of values".to_owned());
+            return refused("contains no column of values".to_owned());
         }
         if !(self.unit_us.is_finite() && self.unit_us > 0.0) {
             return refused(format!("unit of {} us: must be above 0", self.unit_us));

@@ -285,19 +285,19 @@ impl Verdict {
         let counted_by_kernel = counts.dropped_by_kernel.plus(bridged.dropped_by_kernel).are_known();
         let board = [
             (of_board(BOARD_DROPPED), "dropped_by_board", "times that the board dropped events"),
-            (of_board(EVENTS_DROPPED), EVENTS_DROPPED, "events dropped by the board by its own count"),
+            (of_board(EVENTS_DROPPED), EVENTS_DROPPED, "events that the board itself counted as dropped"),
         ];
         let way = if !counted_by_kernel && missing > behind {
             (
                 missing - behind,
                 "lost_on_the_way_or_dropped",
-                "datagrams lost or damaged on the way or dropped uncounted by a kernel",
+                "datagrams lost or damaged on the way, or dropped and not counted by a kernel",
             )
         } else if unclear {
             (
                 missing,
                 "lost_on_the_way_or_dropped",
-                "datagrams lost or damaged on the way or already counted as dropped",
+                "datagrams lost or damaged on the way, or already counted as dropped",
             )
         } else {
             (missing.saturating_sub(behind), "lost_on_the_way", "datagrams lost or damaged on the way")
@@ -328,10 +328,10 @@ impl Verdict {
         let hidden = counts.missing.is_some() && !knows;
         let mut pieces = vec![if !words.is_empty() {
             let but = match (hidden, knows || counted_by_kernel) {
-                (true, true) => ", and unknown losses at resets",
-                (true, false) => ", and unknown losses at resets and in the kernel",
+                (true, true) => ", and losses at resets are unknown",
+                (true, false) => ", and losses at resets and in the kernel are unknown",
                 (false, true) => "",
-                (false, false) => ", and unknown losses in the kernel",
+                (false, false) => ", and losses in the kernel are unknown",
             };
             format!("LOST: {}{but}", words.join(", "))
         } else if knows && of_board(OTHER_BOARD) > 0 {
@@ -339,9 +339,9 @@ impl Verdict {
         } else if knows {
             "nothing lost".to_owned()
         } else if hidden && counted_by_kernel {
-            "nothing lost, except unknown losses at resets".to_owned()
+            "nothing lost, but losses at resets are unknown".to_owned()
         } else if hidden {
-            "nothing lost, except unknown losses at resets and in the kernel".to_owned()
+            "nothing lost, but losses at resets and in the kernel are unknown".to_owned()
         } else if !counted_by_kernel {
             UNCOUNTED.to_owned()
         } else {

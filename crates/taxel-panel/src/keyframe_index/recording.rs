@@ -433,7 +433,7 @@ impl KeyframeIndex for Arc<RecordingIndex> {
     fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn ChangeReader>)> {
         let index = self.keys.partition_point(|key| key.keyframe.latest.is_none_or(|latest| latest <= t)).max(1) - 1;
         let Some(Key { block, position, decoding, keyframe }) = self.keys.get(index) else {
-            return Err(problem!("{}: holds no events", self.path.display()).into());
+            return Err(problem!("{}: contains no events", self.path.display()).into());
         };
         let reader = RecordingChanges {
             index: Arc::clone(self),

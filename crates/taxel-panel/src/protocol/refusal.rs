@@ -46,7 +46,7 @@ pub(crate) fn words(error: &taxel_live::Error) -> String {
         Hint::Give => format!("{text}; give {argument}"),
         Hint::Larger => format!("{text}; a larger {argument} reads more"),
         Hint::LayOut => format!(
-            "{text}; give {argument}, or rows and columns in a layout file, if they are a grid's taxels row by row"
+            "{text}; if the taxels are a grid, row by row, give {argument}, or rows and columns in a layout file"
         ),
         Hint::Pitch => format!("{text}; give {argument} with the pitch in mm, or pitch_mm in a layout file"),
     }

@@ -179,7 +179,7 @@ pub(crate) async fn save_preset(hub: &Hub, name: &str) -> Answer {
     if exists {
         return Err(Refusal::of_field(
             "name",
-            format!("{name} exists already: delete it first, or choose another name"),
+            format!("{name}: exists already; delete it first, or choose another name"),
         ));
     }
     let held = Registers { record: false, ..hub.board().registers };

@@ -138,7 +138,7 @@ impl Viewport {
                 let force = columns.time_columns().greatest_sums(start_us, step_us, events.len(), COLUMN_US);
                 Ok(Message::Overview { source: None, start_us, step_us, events, force })
             }
-            (None, None) => Err("nothing is shown".into()),
+            (None, None) => Err("nothing is shown: open a recording first".into()),
         }
     }
 

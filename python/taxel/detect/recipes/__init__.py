@@ -176,7 +176,7 @@ def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
         file = Path(__file__).parent / f"{recipe}.toml"
     values = read_json(file) if file.suffix.lower() == ".json" else read_toml(file)
     if not isinstance(values, dict):
-        raise FormatError(f"{file}: must hold a recipe (values by name)")
+        raise FormatError(f"{file}: must contain a recipe (values by name)")
     return values
 
 
@@ -214,7 +214,7 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
         neuron = listed.get(label, listed.get(named[label] or (last[label] if alone else None), rest))
         if neuron is None:
             raise ProblemError(
-                f"recipe: it is for {' and '.join(listed)}, not for {shown(label)}: leave that label out, or choose "
+                f"recipe: is for {' and '.join(listed)}, not for {shown(label)}: leave this label out, or choose "
                 f"another recipe; the recipes are {', '.join(names())}"
             )
         neurons[label] = dict(neuron)

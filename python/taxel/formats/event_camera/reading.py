@@ -61,7 +61,7 @@ class _EventFile(ReadingChild):
     """Open an event camera's file as a context manager."""
 
     def __init__(self, path: Path, encoding: str) -> None:
-        super().__init__(_CHILD, path, "a whole file of an event camera", PATIENCE_S)
+        super().__init__(_CHILD, path, "file of an event camera", PATIENCE_S)
         self._encoding = encoding
 
     def read(self, reduction: Reduction) -> Events | Frames:

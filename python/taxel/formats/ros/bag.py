@@ -155,15 +155,13 @@ def open_bag(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
         if isinstance(error, OSError) and error.errno is not None and not is_position:
             error.filename = error.filename or str(path)
             raise
-        why = "more memory than is available" if isinstance(error, MemoryError) else first_line(error)
+        why = "it needs more memory than is available" if isinstance(error, MemoryError) else first_line(error)
         if is_position:
             why = "the bag is damaged: a position in it is beyond the end of any file"
         elif "index" in why.lower() and path.suffix == ".bag":
-            why = (
-                "the index is missing or damaged, as if the recording was interrupted; to repair it, run rosbag reindex"
-            )
+            why = "the index is missing or damaged; to repair it, run rosbag reindex"
         elif "magic" in why.lower() and path.suffix not in (".bag", ".db3"):
-            why = "the end is missing, as if the recording was interrupted; to repair the file, run mcap recover"
+            why = "the end of the file is missing; to repair it, run mcap recover"
         raise FormatError(f"{path}: cannot be read as a ROS bag: {why}") from None
 
 

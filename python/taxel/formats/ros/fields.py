@@ -16,10 +16,10 @@ __all__ = ["IMAGE", "grid", "is_empty", "leaves", "values"]
 IMAGE = "sensor_msgs/msg/Image"
 #: Messages that hold bytes, not numbers, and how they could be read.
 _BYTES = {
-    "sensor_msgs/msg/CompressedImage": "a compressed image, which taxel does not read; record it as "
+    "sensor_msgs/msg/CompressedImage": "the messages are compressed images, which taxel does not read; record them as "
     "sensor_msgs/Image with one channel",
-    "sensor_msgs/msg/PointCloud2": "a cloud of points, which taxel does not read; record its readings as an "
-    "array or an image",
+    "sensor_msgs/msg/PointCloud2": "the messages are clouds of points, which taxel does not read; record the readings "
+    "as an array or an image",
 }
 #: Types whose numbers are no readings: times, shapes, and bytes.
 _WITHOUT_READINGS = (

@@ -285,9 +285,9 @@ class Touches(NamedTuple):
     missed: NDArray[np.uint32]
     """Number of these touches in which the taxel did not change."""
     pressed: NDArray[np.uint32]
-    """Number of bins in which it was touched itself."""
+    """Number of bins in which the taxel was touched itself."""
     changed: NDArray[np.uint32]
-    """Number of bins in which it changed."""
+    """Number of bins in which the taxel changed."""
     by_itself: NDArray[np.uint32]
     """Number of these bins in which hardly any neighbour of the taxel changed."""
 
@@ -306,11 +306,11 @@ class TaxelStatistics(NamedTuple):
     """Number of events that have the same polarity as the taxel's previous event."""
     touches: Touches
     values: NDArray[np.signedinteger] | None = None
-    """Number of different intensities of its events: 0, 1, or 2 for more; None if events have none."""
+    """Number of different intensities of the taxel's events: 0, 1, or 2 for more; None without intensities."""
     least: NDArray[np.signedinteger] | None = None
-    """The least value that it is known to have held, ticks; -1 for a taxel without any event."""
+    """The least value that the taxel is known to have had, ticks; -1 for a taxel without any event."""
     greatest: NDArray[np.signedinteger] | None = None
-    """The greatest value that it is known to have held, ticks; -1 for a taxel without any event."""
+    """The greatest value that the taxel is known to have had, ticks; -1 for a taxel without any event."""
 
 
 def judge(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> Health:

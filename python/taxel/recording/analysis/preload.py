@@ -62,7 +62,7 @@ def standing(frames: Frames) -> str:
 
 def _line(recording: Recording, rest: Rest, *, found: bool) -> str:
     """Return the line on a tare beside a rest with something on the array, where a time without it was found or not."""
-    without = "so the tare is measured at a time when nothing was there"
+    without = "so the tare is measured at a time when nothing was on the sensor"
     lacks = "and no other rest was found, so the tare contains this load; give a file of a tare"
     return f"{recording.path}: the rest is {rest}, {without if found else lacks}"
 

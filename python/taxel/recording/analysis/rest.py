@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.messages import counted
 from taxel._base.times import beginning_us
 from taxel._core import FormatError
 from taxel.formats.event_camera import are_counts
@@ -129,7 +130,7 @@ class Rest:
             text += f"; something was on {self.preload_at} during this stretch" * bool(self.preload_at)
         if self.falls:
             text += f"; {self.fall(path, turned)}"
-        return text + f"; {self.zeroed} zeroed" * bool(self.zeroed)
+        return text + f"; {counted(self.zeroed, 'taxel')} zeroed" * bool(self.zeroed)
 
     @staticmethod
     def fall(path: Path | None = None, turned: float | None = None) -> str:
@@ -138,7 +139,7 @@ class Rest:
         if layout:
             return (
                 f"values fall from their rest after {layout} inverted them: if the values need no inversion, remove "
-                f"the line falls from {layout}"
+                f"the line 'falls = ...' from {layout}"
             )
         return f"values fall from their rest: if smaller values mean more pressure, write {turning}"
 
@@ -151,9 +152,9 @@ class Rest:
         file = None if path is None else Layout.beside(path)
         with suppress(FormatError, OSError):
             if file is not None and Layout.read(file).turned is not None:
-                return file.name, f"no falls in {file.name}"
+                return file.name, f"{file.name} without falls"
         if turned is not None:
-            return "its layout", "no falls in its layout"
+            return "its layout", "its layout without falls"
         return "", "falls = true in a layout file" + ("" if path is None else f", {or_given(path)}")
 
     def described(self) -> dict[str, object]:

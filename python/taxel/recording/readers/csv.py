@@ -279,7 +279,7 @@ def _check_values(path: Path, names: list[str], first: int, body: bytes, table: 
     if len(large):
         k, c = large[0]
         line = first + _line_number(body, k)
-        raise FormatError(f"{path}, line {line}, column {names[c + 1]}: {table[k, c + 1]:g}; must fit 32 bits")
+        raise FormatError(f"{path}, line {line}, column {names[c + 1]}: is {table[k, c + 1]:g}; must fit 32 bits")
 
 
 def _whole(path: Path, first: int, body: bytes, times: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -120,7 +120,8 @@ def _data(path: Path, how: Data) -> Readings:
         stored_names = list(stored_shapes)
         if how.array is None and len(stored_names) != 1:
             raise FormatError(
-                f"{path}: contains {list_arrays(stored_shapes)}; name one array in the layout file: [data] array"
+                f"{path}: contains {list_arrays(stored_shapes)}; name one of these arrays in the layout file: [data] "
+                "array"
             )
         # A path within a .h5 may begin at its root.
         named = [
@@ -152,18 +153,18 @@ def _data(path: Path, how: Data) -> Readings:
     if values.dtype.kind not in "uifb" or values.ndim not in (2, 3) or 0 in values.shape:
         shape = " x ".join(map(str, values.shape))
         raise FormatError(
-            f"{path}, {wanted[0] or 'the array'}: {values.dtype} of shape {shape}; must be numbers of shape "
-            "frames x rows x columns, or frames x taxels"
+            f"{path}, {wanted[0] or 'the array'}: contains {values.dtype} of shape {shape}; must contain numbers of "
+            "shape frames x rows x columns, or frames x taxels"
         )
     large = _too_large(values)
     if large is not None:
         frame, *indices = large
         at = f"row {indices[0]}, column {indices[1]}" if len(indices) == 2 else f"taxel {indices[0]}"
         raise FormatError(
-            f"{path}, {wanted[0] or 'the array'}, frame {frame}, {at}: {values[large]}; must fit 32 "
-            "bits, or be NaN where it is missing"
+            f"{path}, {wanted[0] or 'the array'}, frame {frame}, {at}: the value is {values[large]}; must fit "
+            "32 bits, or be NaN if it is missing"
         )
-    size = f"frames of {' x '.join(map(str, values.shape[1:]))}"
+    size = f"frames of {' x '.join(map(str, values.shape[1:]))} values"
     if len(wanted) == 1:
         return Readings(values, None, size, lost=lost)
     return Readings(values, _times(path, wanted[1], arrays[wanted[1]].reshape(-1), how), size, lost=lost)
@@ -172,7 +173,7 @@ def _data(path: Path, how: Data) -> Readings:
 def _times(path: Path, name: str, times: NDArray[Any], how: Data) -> NDArray[np.int64]:
     """Return times in us; their memory may become that of the result."""
     if times.dtype.kind not in "uif":
-        raise FormatError(f"{path}, {name}: {times.dtype}; must be times as numbers")
+        raise FormatError(f"{path}, {name}: contains {times.dtype}; must contain times as numbers")
     # Nobody else has the times, which take more memory than the readings of a single taxel.
     t = (
         times.view(np.int64)

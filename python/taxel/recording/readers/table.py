@@ -227,7 +227,9 @@ def read_events(path: Path, layout: Layout, array: Array | None) -> RecordedSour
     head = _Head.read(path, how, None)
     columns = [name for k, name in enumerate(head.kept) if k != head.time]
     if sorted(columns) != ["p", "x", "y"]:
-        raise FormatError(f"{path}: the columns beside the time are {', '.join(columns)}; must be x, y, p for events")
+        raise FormatError(
+            f"{path}: the columns other than the time are {', '.join(columns)}; must be x, y, p for events"
+        )
     read = Growing(str(path), t=((), np.int64), x=((), np.uint16), y=((), np.uint16), p=((), np.bool_))
     last = -(1 << 62)
     for line, block in text.blocks(head.rows(), path, head.first, head.kept, frozenset()):
@@ -423,5 +425,5 @@ def _column(path: Path, key: str, column: str | int, names: Sequence[str], named
             else "the columns have no names, so give the number of the column, counted from 1"
         )
         kind = " of times" if key == "time_column" else ""
-        raise FormatError(f"{path.name}: the table has no column {shown(name)}{kind}; {known_names}")
+        raise FormatError(f"{path.name}: column {shown(name)}{kind} is missing; {known_names}")
     return names.index(name)

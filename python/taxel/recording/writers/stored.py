@@ -181,7 +181,7 @@ def _lsa(source: RecordedSource, path: Path) -> _Kept:
         of_wire = wire.losses(with_times=True)
     else:
         of_wire = ["arrival times, and where datagrams begin"] * wire.datagrams.holds()
-    of_wire += ["that intensities are differences"] * wire.differences
+    of_wire += ["the fact that intensities are differences"] * wire.differences
     lost = [_sensor(stated)] * (stated != Array.thesis())
     if payload is None or is_new or wire.version_2():
         times = np.concatenate([events.t, np.array([at for at, _ in events.markers], np.int64)])
@@ -263,7 +263,7 @@ def _wire(board: BoardSource, clock: Clock | None, lost: list[str]) -> sections.
         return replace(wire, datagrams=datagrams, payload=None)
     lost += wire.losses()
     origin_us, encoded, unmarked = encode_events(board.table, board.settings.held(), clock)
-    lost += [f"that {len(unmarked) - _MOST} of the events are repaired"] * (len(unmarked) > _MOST)
+    lost += [f"the fact that {len(unmarked) - _MOST} of the events are repaired"] * (len(unmarked) > _MOST)
     return sections.Wire(
         known(encoded), version_2=known(True), origin_us=origin_us, unmarked=tuple(unmarked[:_MOST].tolist())
     )
@@ -272,6 +272,6 @@ def _wire(board: BoardSource, clock: Clock | None, lost: list[str]) -> sections.
 def _board(source: RecordedSource, path: Path) -> BoardSource:
     if not isinstance(source, BoardSource):
         raise ProblemError(
-            f"{path}: a {path.suffix.lower()} contains events and no frames; write frames to .mcap, .npz, .csv or .h5"
+            f"{path}: a {path.suffix.lower()} can contain only events; write frames to .mcap, .npz, .csv or .h5"
         )
     return source

@@ -107,13 +107,17 @@ impl Exact {
         let worst = self.silence.broken(weights, KEPT_SHARE, self.rounding(weights)).into_iter();
         if let Some(SilencePeak { pattern, t, excess }) = worst.max_by(|a, b| a.excess.total_cmp(&b.excess)) {
             let excess = excess * unit;
-            return Ok(Some(format!("pattern {pattern}: silence is broken by {excess:.1e} mV at {t} ms")));
+            return Ok(Some(format!(
+                "pattern {pattern}: at {t} ms, the potential is {excess:.1e} mV too high for silence"
+            )));
         }
         let misses = self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs());
         let worst = misses.enumerate().filter(|(_, miss)| exceeds(*miss, MET)).max_by(|a, b| a.1.total_cmp(&b.1));
         if let Some((k, miss)) = worst.filter(|_| self.is_grid()) {
             let ((pattern, target), t, miss) = (self.targets.names[k], self.targets.times[k], miss * unit);
-            return Ok(Some(format!("pattern {pattern}: target {target} ({t} ms) is missed by {miss:.1e} mV")));
+            return Ok(Some(format!(
+                "pattern {pattern}: at target {target} ({t} ms), the potential differs from the threshold by {miss:.1e} mV"
+            )));
         }
         if self.can_fire_at_targets() { self.misfire(weights) } else { Ok(None) }
     }
@@ -149,9 +153,9 @@ impl Exact {
                         continue;
                     }
                     (None, None) => continue,
-                    (Some(target), Some(t)) => format!("fires at {t:.7} ms, not at its target {target:.7} ms"),
-                    (Some(target), None) => format!("does not fire at its target {target:.7} ms"),
-                    (None, Some(t)) => format!("fires at {t:.7} ms too"),
+                    (Some(target), Some(t)) => format!("fires at {t:.7} ms, not at the target, {target:.7} ms"),
+                    (Some(target), None) => format!("does not fire at the target, {target:.7} ms"),
+                    (None, Some(t)) => format!("also fires at {t:.7} ms, which is not a target"),
                 };
                 return Ok(Some(format!("pattern {p}: the neuron {reason}")));
             }

@@ -298,7 +298,7 @@ impl Statement {
             Row::Slope { pattern, target } => {
                 if self.neuron.time == Time::Grid {
                     return Err(problem!(
-                        "pattern {pattern}, target {target}: a slope is required only in continuous time"
+                        "pattern {pattern}, target {target}: a row of kind slope needs time \"continuous\""
                     ));
                 }
                 let (example, t) = self.target(pattern, target)?;

@@ -18,7 +18,10 @@ pub(super) fn first_refusal(registers: &Registers, scanned: &Scanned) -> Option<
     let driven_lines = i64::from(scanned.driven_lines);
     let sense_lines = i64::from(scanned.sense_lines);
     if lines > driven_lines {
-        return Some((4, format!("{} lines: the array has {} columns to drive (rule 4)", lines, driven_lines)));
+        return Some((
+            4,
+            format!("lines is {}: must be at most {}, the number of the array's columns (rule 4)", lines, driven_lines),
+        ));
     }
     if line_read > line_period {
         return Some((

@@ -136,7 +136,7 @@ fn every_rule_refuses_with_its_numbers_and_keeps_the_old_value() {
     let small = Array::new(8, 8, 1.0, "small").unwrap();
     let refusal = Registers::default().write(Command { register: 5, value: 8 << 16 }, &small).unwrap_err();
     assert_eq!(refusal.rule, 4);
-    assert!(refusal.text.starts_with("9 lines: the array has 8 columns to drive"));
+    assert!(refusal.text.starts_with("lines is 9: must be at most 8, the number of the array's columns"));
 }
 
 #[test]

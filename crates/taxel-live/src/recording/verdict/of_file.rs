@@ -100,7 +100,7 @@ impl Verdict {
                 format!("{} after the end of the recording not read", counted(rebuilt.bytes_after_end, "byte")),
             ),
             (changed.into(), "changed_since_recorded", "the content was changed after recording".to_owned()),
-            (repeated, "repeated_in_file", format!("{} there twice", counted(repeated, "message"))),
+            (repeated, "repeated_in_file", format!("{} repeated", counted(repeated, "message"))),
             (rebuilt.no_summary.into(), "no_summary", "the summary at the end is missing or damaged".to_owned()),
         ] {
             if n > 0 {
