@@ -220,8 +220,19 @@ def files_in(folder: Path) -> list[Path]:
 
 
 def recorded_by_taxel(files: Iterable[Path], layout: GivenLayout = None) -> list[Path]:
-    """Return the files with an ending that taxel gives; no companion, and no file of others with the same ending."""
-    return [file for file in files if file.suffix.lower() in ENDINGS and file.is_file() and _is_of_taxel(file, layout)]
+    """Return the files with an ending that taxel gives; no companion, and no file of others with the same ending.
+
+    An empty file beside others of its ending has lost its content: opening it says so.
+    """
+    with_ending = [file for file in files if file.suffix.lower() in ENDINGS and file.is_file()]
+    found = {file for file in with_ending if _is_of_taxel(file, layout)}
+    endings = {file.suffix for file in found}
+    return [file for file in with_ending if file in found or (file.suffix in endings and _is_empty(file, layout))]
+
+
+def _is_empty(file: Path, layout: GivenLayout) -> bool:
+    """Return whether a table or a file of arrays that no layout describes is empty; a table of labels may be."""
+    return not file.stat().st_size and recognise(file, layout) == ForeignFile(has_layout=False)
 
 
 def _is_of_taxel(file: Path, layout: GivenLayout) -> bool:
