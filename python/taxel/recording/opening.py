@@ -242,9 +242,9 @@ def _open(path: Path, options: OpenOptions) -> list[Recording]:
     """Open all recordings of a folder, or all trials of a file."""
     with options.within():
         if recognition.is_folder(path):
-            return _open_folder(path, options)
+            return list(map(_labelled, _open_folder(path, options)))
         layout = recognition.layout_of(path, options.layout)
-        return [_named_beside(path, recording) for recording in _open_file(path, options, layout)]
+        return [_labelled(_named_beside(path, recording)) for recording in _open_file(path, options, layout)]
 
 
 def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[Recording]:
@@ -510,19 +510,32 @@ def _named_beside(path: Path, recording: Recording) -> Recording:
     return recording if labels.named(name) in (None, "") else _with_labels(labels, name, recording)
 
 
+def _labelled(recording: Recording) -> Recording:
+    """Add the labels of tables that other programs wrote beside a recording to its notes."""
+    place = recording.path.parent / trial_of(recording.name, recording.label)
+    for table in recognition.label_tables(place):
+        recording = _with_labels(Labels(table), place, recording)
+    return recording
+
+
 def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
     """Add the reference events of a recording, and of each of its sources, to the notes."""
-    contents = recording._contents
+    contents, begin_us = recording._contents, 0
+    if labels._from_beginning:
+        begins = [source.table.t for source in contents.sources.values() if not isinstance(source, Stream)]
+        begin_us = min((int(t.min()) for t in begins if len(t)), default=0)
     if not contents.is_several:
-        return recording.with_notes(_notes(labels, name, contents.main))
+        return recording.with_notes(_notes(labels, name, contents.main, begin_us))
     sources = {
-        label: source if isinstance(source, Stream) else add_notes(source, tuple(_notes(labels, name, source)))
+        label: source
+        if isinstance(source, Stream)
+        else add_notes(source, tuple(_notes(labels, name, source, begin_us)))
         for label, source in contents.sources.items()
     }
     return Recording(Contents(several(sources), sources))
 
 
-def _notes(labels: Labels, name: Path, source: RecordedSource) -> list[Note]:
+def _notes(labels: Labels, name: Path, source: RecordedSource, begin_us: int) -> list[Note]:
     """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
     clock = source.timing.usable()
     times = labels._times(name, lambda: clock, source.origin.label, side=source.sensor.side)
@@ -534,10 +547,10 @@ def _notes(labels: Labels, name: Path, source: RecordedSource) -> list[Note]:
         replaced, labelled = set_here._replaced(*names), {(row.text, row.t) for row in set_here._rows(*names)}
     return sorted(
         (
-            Note(label, int(t), 0 if clock is None else int(clock.host_ns(int(t))), source=of_source.get(label, ""))
+            Note(label, t, 0 if clock is None else int(clock.host_ns(t)), source=of_source.get(label, ""))
             for label, label_times in times.items()
-            for t in label_times
-            if t not in replaced and (label, int(t)) not in labelled
+            for t in (label_times + begin_us).tolist()
+            if t not in replaced and (label, t) not in labelled
         ),
         key=lambda note: note.t or 0,
     )
