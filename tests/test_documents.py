@@ -121,7 +121,7 @@ def test_what_taxel_did_not_write_is_refused_before_it_is_parsed(
         "[" + "1," * 1000 + "1]": "not a JSON object: begins with '\\['",
         " \n\t7": "not a JSON object: begins with '7'",
         "": "not a JSON object: empty",
-        '{"a":[' + "1," * 42_000_000 + "1]}": r"would have \d+ bytes when unpacked; at most 2147483648 are read",
+        '{"a":[' + "1," * 42_000_000 + "1]}": r"would take \d+ bytes of memory; at most 2147483648 are read",
     }.items():
         path.write_text(text)
         with refused(why, FormatError):

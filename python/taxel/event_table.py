@@ -1,4 +1,8 @@
-"""Tables of labels as other programs write them: times with their unit or date, and texts, in columns of any name."""
+"""Tables of labels as other programs write them: times with their unit or date, and texts, in columns of any name.
+
+Two of them count their times from the beginning of their recording: the tables of BIDS, with columns `onset` and
+`duration` in s, and the label tracks of Audacity, lines of begin, end and label between tabs, in s.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +14,18 @@ from dataclasses import replace
 from taxel._base.arguments import shown
 from taxel._base.cells import seconds_of, unit_of
 from taxel._base.header_table import HeaderTable
+from taxel._base.messages import counted, warn
 from taxel._base.number_text import float_of
 from taxel._core import FormatError
 
-__all__ = ["are_of_events", "with_known_columns"]
+__all__ = ["are_of_bids", "are_of_events", "is_of_track", "track", "with_known_columns"]
 
 #: What the column of labels is called, the first that is there; capitals do not matter.
-_LABELS = ("label", "event", "ereignis", "name", "marker", "annotation")
+_LABELS = ("label", "trial_type", "event", "ereignis", "name", "marker", "annotation")
+#: The columns that a table of BIDS has, and what it writes where a value is missing.
+_BIDS, _MISSING = {"onset", "duration"}, "n/a"
+#: What begins a line of a label track that says a range of frequencies.
+_FREQUENCIES = "\\\t"
 #: What the column of the recordings is called, if none is called `recording`; capitals do not matter.
 _RECORDINGS = ("recording", "trial", "versuch", "file", "filename", "datei", "aufnahme")
 #: What the column of the sources is called, if none is called `source`, and what sides are; capitals do not matter.
@@ -68,6 +77,8 @@ def with_known_columns(table: HeaderTable, separator: str) -> HeaderTable:
         return replace(table, header=tuple(header))
     time = header.index("t_us") if "t_us" in header else _time(table)
     rows, name, header[time] = list(table.rows), header[time], "t_us"
+    if "trial_type" in header:
+        rows = [(line, cells) for line, cells in rows if cells[header.index("trial_type")].strip() != _MISSING]
     for k, (line, cells) in enumerate(rows if name != "t_us" else ()):
         us = _us(f"{table.location}, line {line}", name, cells[time].strip(), separator)
         rows[k] = line, (*cells[:time], str(us), *cells[time + 1 :])
@@ -76,18 +87,78 @@ def with_known_columns(table: HeaderTable, separator: str) -> HeaderTable:
     return replace(table, header=tuple(header), lines=tuple(rows))
 
 
-def are_of_events(names: Sequence[str], cells: Sequence[str]) -> bool:
+def are_of_events(names: Sequence[str], cells: Sequence[str], *, named: bool = False) -> bool:
     """Return whether a table is one of labels, by its names and first row: it has times and a text, and nothing else.
+
+    One that the name of its file calls so (`named`) has labels or a text beside anything: recordings are numbers.
 
     Examples
     --------
     >>> are_of_events(["Zeit", "Ereignis"], ["10:15:02", "heel"]), are_of_events(["time", "event"], ["0.5", "0"])
     (True, False)
     """
+    if are_of_bids(names):
+        return True
     kinds = ["time" if unit_of(name) is not None else name.lower() for name in names]
     labels = [k for k, kind in enumerate(kinds) if kind in _LABELS]
+    if named:
+        return bool(labels) or any(map(_is_text, cells))
     known = all(kind == "time" or kind in (*_LABELS, *_OTHERS, *_RECORDINGS, *_SOURCES) for kind in kinds)
     return known and kinds.count("time") == len(labels) == 1 and len(cells) == len(names) and _is_text(cells[labels[0]])
+
+
+def are_of_bids(names: Sequence[str]) -> bool:
+    """Return whether the columns of a table are those of BIDS."""
+    return {name.lower() for name in names} >= _BIDS
+
+
+def is_of_track(line: str) -> bool:
+    r"""Return whether a line is the first one of a label track; those of a table of numbers have no text.
+
+    Examples
+    --------
+    >>> is_of_track("0.5\t0.75\theel\n"), is_of_track("0.5\t0.75\t3\n"), is_of_track("0,5\t0,75\theel strike")
+    (True, False, True)
+    """
+    cells = line.rstrip("\r\n").split("\t")
+    return len(cells) == 3 and not any(map(math.isnan, _ends(cells))) and _is_text(cells[2])
+
+
+def track(location: str, lines: Sequence[str]) -> HeaderTable:
+    r"""Return a label track as a table of labels; the end of a label is its column `stop_us`.
+
+    Labels without a name are left out, with a warning.
+
+    Raises
+    ------
+    FormatError : a line that is not begin, end and label (names it)
+
+    Examples
+    --------
+    >>> list(track("a.txt", ["0.5\t0.75\theel\n"]))
+    [(1, {'t_us': '500000', 'stop_us': '750000', 'label': 'heel'})]
+    """
+    rows, unnamed = [], 0
+    for number, line in enumerate(lines, 1):
+        if not line.strip() or line.startswith(_FREQUENCIES):
+            continue
+        cells = line.rstrip("\r\n").split("\t", 2)
+        times = _ends(cells)
+        if len(cells) < 2 or not all(map(math.isfinite, times)):
+            raise FormatError(
+                f"{location}, line {number}: {shown(line.strip())}; must be begin and end, s, and label, between tabs"
+            )
+        label = "".join(cells[2:]).strip()
+        unnamed += not label
+        rows += [(number, (*(str(round(t * 1e6)) for t in times), label))] * bool(label)
+    if unnamed:
+        warn(f"{location}: left out {counted(unnamed, 'label')} without a name", stacklevel=4)
+    return HeaderTable(location, ("t_us", "stop_us", "label"), tuple(rows))
+
+
+def _ends(cells: Sequence[str]) -> list[float]:
+    """Return begin and end of a line of a label track, s."""
+    return [_number(cell, "\t") for cell in cells[:2]]
 
 
 def _recording(table: HeaderTable, separator: str) -> int | None:
@@ -108,6 +179,8 @@ def _side(table: HeaderTable) -> int | None:
 
 def _time(table: HeaderTable) -> int:
     """Return which column holds the times, by its name."""
+    if are_of_bids(table.header):
+        return [name.lower() for name in table.header].index("onset")
     times = [k for k, name in enumerate(table.header) if name not in _OTHERS and unit_of(name) is not None]
     if len(times) == 1:
         return times[0]
@@ -152,7 +225,7 @@ def _is_text(cell: str, separator: str = ";") -> bool:
 
 def _us(location: str, name: str, cell: str, separator: str) -> int:
     """Return the time of a cell in whole us."""
-    number, unit = _number(cell, separator), unit_of(name) or ""
+    number, unit = _number(cell, separator), "s" if name.lower() == "onset" else unit_of(name) or ""
     if math.isnan(number):
         number, unit = seconds_of(cell), "s"
     elif not unit:

@@ -23,7 +23,7 @@ from taxel._base.messages import counted, escaped
 from taxel._base.number_text import int_of
 from taxel._core import FormatError, ProblemError
 from taxel.clock import Clock
-from taxel.event_table import with_known_columns
+from taxel.event_table import are_of_bids, is_of_track, track, with_known_columns
 from taxel.recorded import Recorded
 
 __all__ = [
@@ -100,7 +100,8 @@ class Labels:
         numbers in the unit that the name states ("Zeit [s]", "t_ms"), or dates, which count from 1970. Without `label`,
         labels are in a column of that name in capitals, in one of the names event, Ereignis, name, marker or
         annotation, or in the only column of texts. Without `recording`, recordings are in a column of texts of the name
-        trial, Versuch, file, filename, Datei or Aufnahme.
+        trial, Versuch, file, filename, Datei or Aufnahme. Times of a table of BIDS (`onset`, `duration`, s) and of a
+        label track of Audacity count from the beginning of the recording; a label is at the begin of its region.
 
     Attributes
     ----------
@@ -126,8 +127,8 @@ class Labels:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         file = Path(checked_path("path", path))
-        #: The names of the columns as the file has them.
-        self._columns, table = _table(file)
+        #: The names of the columns as the file has them, and whether times count from the recording's beginning.
+        self._columns, table, self._from_beginning = _table(file)
         rows = _rows(table)
         self.path, self.rows = file, tuple(row for row in rows if row.text)
         self.removed = tuple(row for row in rows if not row.text)
@@ -296,8 +297,11 @@ def rows_of(location: str | Path, lines: Iterable[str]) -> tuple[tuple[Note, ...
     return _rows(table), table.header
 
 
-def _table(file: Path) -> tuple[tuple[str, ...], HeaderTable]:
-    """Return the columns of a table, and it in columns of taxel; one of another program may be in Windows-1252 too."""
+def _table(file: Path) -> tuple[tuple[str, ...], HeaderTable, bool]:
+    """Return the columns of a table, it in columns of taxel, and whether its times count from the beginning.
+
+    A table of another program may be in Windows-1252 too.
+    """
     try:
         lines = text_of(file)
     except FormatError:
@@ -305,8 +309,11 @@ def _table(file: Path) -> tuple[tuple[str, ...], HeaderTable]:
         if set(_WANTED) <= set(HeaderTable.read(file, lines).header):
             raise
     names = next((line for line in lines if line.strip()), "")
+    if is_of_track(names):
+        table = track(str(file), lines)
+        return table.header, table, True
     table = HeaderTable.read(file, lines)
-    return table.header, with_known_columns(table, separator_of(names))
+    return table.header, with_known_columns(table, separator_of(names)), are_of_bids(table.header)
 
 
 def _rows(table: HeaderTable) -> tuple[Note, ...]:

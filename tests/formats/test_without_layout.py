@@ -82,7 +82,7 @@ def test_the_rate_and_the_unit_that_a_file_of_arrays_states_are_those_of_the_lay
 
     place = tmp_path / f"a{ending}"
     if ending == ".npz":
-        np.savez(place, **{"palm": VALUES, rate: 12.5, unit: "mmHg", "gain": 3.0})
+        np.savez(place, **{"palm": VALUES, "hz": np.array(None), rate: 12.5, unit: "mmHg", "gain": 3.0})
     else:
         with h5py.File(place, "w") as h5:
             palm = h5.create_dataset("run1/palm", data=VALUES)

@@ -310,7 +310,7 @@ def test_what_would_take_more_memory_is_refused_with_both_sizes(tmp_path: Path) 
         (
             "shape",
             {"shape": (1 << 40,), "chunks": (1024,)},
-            "would have 4398046511104 bytes when unpacked; at most 4294967296",
+            "would take 4398046511104 bytes of memory; at most 4294967296",
         ),
     ):
         with h5py.File(tmp_path / f"{name}.h5", "w") as h5:
@@ -330,7 +330,7 @@ def test_data_sets_count_together(tmp_path: Path) -> None:
         h5.create_dataset("huge", (limits.UNPACKED - 5,), "u1", chunks=(1024,))
     with H5File(tmp_path / "a.h5") as file:
         assert len(file.numbers("a")) == len(file.numbers("b")) == 3
-        said = r"a.h5: would have 4294967297 bytes when unpacked; at most 4294967296"
+        said = r"a.h5: would take 4294967297 bytes of memory; at most 4294967296"
         for ask in (lambda: file.check_size(["a", "b", "huge"]), lambda: file.numbers("huge")):
             with refused(said, FormatError):
                 ask()

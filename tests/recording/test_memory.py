@@ -470,7 +470,7 @@ def test_the_largest_sensor_with_a_mask_opens_again(tmp_path: Path, opened: Open
 
 def test_the_memory_of_a_conversion_counts(tmp_path: Path) -> None:
     np.savez_compressed(tmp_path / "a.npz", values=np.zeros((1000, 32, 32), bool), t=np.arange(1000))
-    with refused(r"would have 40\d{5} bytes when unpacked; at most 3000000 are read; a larger limit", FormatError):
+    with refused(r"would take 40\d{5} bytes of memory; at most 3000000 are read; a larger limit", FormatError):
         taxel.open(tmp_path / "a.npz", limit=3_000_000)
 
 
@@ -565,9 +565,9 @@ def test_a_table_of_labels_claims_what_it_takes(tmp_path: Path) -> None:
             files[-1].write_text(f"{head}\n{rows}", encoding="utf-8")
     done = subprocess.run([sys.executable, "-c", LABELS, *files], check=True, capture_output=True, text=True)
     for many, taken in zip(files[1::2], done.stdout.split(), strict=True):
-        with limits.opening(1), pytest.raises(FormatError, match="when unpacked") as refusal:
+        with limits.opening(1), pytest.raises(FormatError, match="bytes of memory") as refusal:
             taxel.Labels(many)
-        claimed = int(re.findall(r"would have (\d+) bytes", str(refusal.value))[0])
+        claimed = int(re.findall(r"would take (\d+) bytes", str(refusal.value))[0])
         assert claimed / 3 <= int(taken) <= 1.05 * claimed, many.read_text()[:50]
 
 
@@ -593,7 +593,7 @@ def test_columns_that_grow_stop_at_the_limit() -> None:
     with limits.opening(1000):
         read = Growing("a.txt", t=((), np.int64))
         read.add(t=np.zeros(125))
-        with refused("a.txt: would have 1008 bytes when unpacked; at most 1000", FormatError):
+        with refused("a.txt: would take 1008 bytes of memory; at most 1000", FormatError):
             read.add(t=[1])
     read.add(t=[1])
     with pytest.raises(ProblemError, match="limit is 0"):
@@ -601,7 +601,7 @@ def test_columns_that_grow_stop_at_the_limit() -> None:
 
 
 def test_what_no_opening_reads_names_no_option_of_one() -> None:
-    with refused(r"a: would have 9 bytes when unpacked; at most 8 are read$", FormatError):
+    with refused(r"a: would take 9 bytes of memory; at most 8 are read$", FormatError):
         limits.unpacked("a", 9, 8)
     with limits.opening(), refused(r"at most 8 are read; a larger limit", FormatError):
         limits.unpacked("a", 9, 8)

@@ -112,7 +112,7 @@ def memory(limit: int | None) -> int:
 
 
 def unpacked(location: str, size: int, most: int = UNPACKED) -> None:
-    """Refuse data that would unpack to more bytes than may be read.
+    """Refuse data that would take more bytes in memory than may be read.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def unpacked(location: str, size: int, most: int = UNPACKED) -> None:
     else:
         bound, why = _most() if room is None else room.most, " (3/4 of the memory that is available)"
     if claimed > bound:
-        error = FormatError(f"{location}: would have {claimed} bytes when unpacked; at most {bound} are read{why}")
+        error = FormatError(f"{location}: would take {claimed} bytes of memory; at most {bound} are read{why}")
         # What is read outside an opening has no such option.
         raise error if room is None else helped(error, "limit", "larger")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,7 +13,7 @@ import typer
 
 import taxel
 from taxel._base.files import check_writable, write_whole
-from taxel._base.messages import of_names
+from taxel._base.messages import collected, of_names
 from taxel._base.times import begun
 from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._opening import FileOptions
@@ -81,8 +82,10 @@ def detect(
     loaded = taxel.detect.load(readout)
     with progress(as_json) as update:
         update(f"reading {paths_text(recordings)}", 0, 0)
-        opened = files.opener.open_sensors(recordings)
+        with collected() as unread:
+            opened = files.opener.open_sensors(recordings)
         found = taxel.tasks.detect(loaded, opened, truth, options, progress=update)
+        found = replace(found, warnings=(*unread, *found.warnings))
     if out is not None:
         write_whole(out, lambda file: file.write(_table(found.outcomes).encode()), overwrite=overwrite)
     say_warnings(found.warnings)

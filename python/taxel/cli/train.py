@@ -130,12 +130,15 @@ def train(
     options = taxel.tasks.TrainOptions(recipe, changes, tare, folds, search, window_ms, shift_ms, labels_as_given)
     with progress(as_json) as update:
         update(f"reading {paths_text(recordings)}", 0, 0)
-        opened = files.opener.open_sensors(recordings)
+        with collected() as unread:
+            opened = files.opener.open_sensors(recordings)
         _try_rules(rule, labels, opened, overwrite=overwrite)
+    say_warnings(unread)  # before the training, which may take long, and again with its result
     training = _trained(opened, labels, options, as_json=as_json)
     training.readout.save(out, overwrite=overwrite)
     rules = _write_rules(training.scored.plain, rule, overwrite=overwrite)
     say_warnings(training.warned)
+    training = replace(training, warned=(*unread, *training.warned))
     if as_json:
         written: dict[str, Any] = {"rules": {str(path): each for path, each in rules.items()}} if rules else {}
         written |= {} if report is None else {"report": str(report / "report.html")}
@@ -143,7 +146,7 @@ def train(
     else:
         say(*training.lines(), "", f"written to {out}{_next(training, out, rules)}")
         say(*(f"plain rule for {' and '.join(each)} written to {path}" for path, each in rules.items()))
-        say(*(f"warning: {warning}" for warning in training.unreliable()))
+        say(*(f"warning: {warning}" for warning in (*unread, *training.unreliable())))
     if report is not None:  # last, so that nothing is lost where it fails
         place = taxel.report.write_detections(
             report,

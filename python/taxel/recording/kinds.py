@@ -10,6 +10,8 @@ ENDINGS = {".mcap": "mcap", ".lsa": "lsa", ".npz": "npz", ".csv": "csv", ".h5": 
 
 #: The table of labels of a folder.
 LABELS = "labels.csv"
+#: What follows the name of a recording in the names of its tables of labels that other programs write.
+TABLES = ("_labels.csv", "_events.csv", "_events.tsv", ".txt")
 
 
 def kind_of_file(kind: str) -> str:

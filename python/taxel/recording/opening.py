@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -210,11 +210,12 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
     -------
     list of Recording
         In the order of the names (2 before 10). A file of another format holds one or more trials: their reference
-        events (contact, foot-off ...) become notes.
+        events (contact, foot-off ...) become notes. Files of a folder that cannot be read are left out, each with a
+        warning.
 
     Raises
     ------
-    FormatError : a folder without a recording; else as for `taxel.open`
+    FormatError : a folder without a recording that can be read; else as for `taxel.open`
     OSError : the file does not exist, or cannot be read
 
     Notes
@@ -241,15 +242,15 @@ def _open(path: Path, options: OpenOptions) -> list[Recording]:
     """Open all recordings of a folder, or all trials of a file."""
     with options.within():
         if recognition.is_folder(path):
-            return _open_folder(path, options)
-        return [_named_beside(path, recording) for recording in _open_file(path, options)]
+            return list(map(_labelled, _open_folder(path, options)))
+        layout = recognition.layout_of(path, options.layout)
+        return [_labelled(_named_beside(path, recording)) for recording in _open_file(path, options, layout)]
 
 
-def _open_file(path: Path, options: OpenOptions) -> list[Recording]:
-    """Open a file or a ROS bag; from a file of another format, open all trials."""
+def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[Recording]:
+    """Open a file or a ROS bag by its layout; from a file of another format, open all trials."""
     text("pairing", options.pairing, ("direct", "taxel"))
     flag("differences", options.differences)
-    layout = recognition.layout_of(path, options.layout)
     try:
         found = recognition.recognise_recording(path, layout)
         match found:
@@ -342,13 +343,21 @@ def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
         recorded = [file for file in files if file in recorded or file in bags]
     names = [] if recorded else [*recognition.formats_of(folder)]
     if len(names) == 1:
-        how = options.how(folder, names[0], recognition.layout_of(folder, options.layout))
-        trials = sorted(
-            _counting_memory(formats.trials(folder, names[0], **how)),
-            key=lambda t: recognition.natural_order(Path(t.name)),
-        )
-        pairs = [(Path(trial.name), _recording_of(trial, folder, names[0], options.layout)) for trial in trials]
-        return _add_labels(folder / LABELS, pairs)
+        (name,) = names
+        how = options.how(folder, name, recognition.layout_of(folder, options.layout))
+
+        def read(place: Path) -> list[Recording]:
+            trials = _counting_memory(formats.trials(place, name, **how))
+            return [_recording_of(trial, folder, name, options.layout) for trial in trials]
+
+        try:
+            of_files, left_out = _each([folder], read)
+        except (FormatError, OSError):
+            # A format may read a table of the folder for each of its files, so that this takes longer.
+            of_files, left_out = _each(formats.FORMATS[name].files(folder), read)
+        pairs = [(Path(recording.name), recording) for _, recording in of_files]
+        pairs.sort(key=lambda pair: recognition.natural_order(pair[0]))
+        return _add_labels(folder / LABELS, pairs, left_out)
     if recorded:
         _warn_of_tables(folder, recorded, files, options)
     found = recorded or ([] if names else recognition.described_tables(files, options.layout))
@@ -356,8 +365,41 @@ def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
         _refuse_folder(folder, files, names)
     if found is not recorded and options.layout is None:
         _warn_of_undescribed(folder, found, files)
-    opened = [(file, _count_memory(recording)) for file in found for recording in _open_file(file, options)]
-    return _add_labels(folder / LABELS, [(file.relative_to(folder), recording) for file, recording in opened])
+    # A layout file that cannot be read is no damage of one recording.
+    layouts = {file: recognition.layout_of(file, options.layout) for file in found}
+    opened, left_out = _each(found, lambda file: list(map(_count_memory, _open_file(file, options, layouts[file]))))
+    pairs = [(file.relative_to(folder), recording) for file, recording in opened]
+    return _add_labels(folder / LABELS, pairs, left_out)
+
+
+def _each(
+    files: Iterable[Path], read: Callable[[Path], list[Recording]]
+) -> tuple[list[tuple[Path, Recording]], list[Path]]:
+    """Return the recordings of files, and the files that cannot be read, which are left out with a warning.
+
+    Raises
+    ------
+    FormatError : as of the first file, if none can be read; more than may be read
+    OSError : as of the first file, if none can be read
+    """
+    opened: list[tuple[Path, Recording]] = []
+    errors: dict[Path, FormatError | OSError] = {}
+    for file in files:
+        try:
+            opened += [(file, recording) for recording in read(file)]
+        except OSError as error:
+            errors[file] = error
+        except FormatError as error:
+            # One that names an argument, as the limit, is no damage of a file.
+            if error.argument is not None:
+                raise
+            errors[file] = error
+    if errors and not opened:
+        raise next(iter(errors.values()))
+    for file, damage in errors.items():
+        why = f"{file}: {damage.strerror}" if isinstance(damage, OSError) else str(damage).partition("\n")[0]
+        warn(f"left out, because it cannot be read: {why}", stacklevel=6)
+    return opened, list(errors)
 
 
 def _refuse_folder(folder: Path, files: Sequence[Path], names: Sequence[str]) -> NoReturn:
@@ -436,18 +478,19 @@ def _warn_of_undescribed(folder: Path, described: Sequence[Path], files: Sequenc
         )
 
 
-def _add_labels(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Recording]:
-    """Add the reference events of a folder to the notes of its recordings."""
+def _add_labels(table: Path, pairs: list[tuple[Path, Recording]], left_out: Sequence[Path]) -> list[Recording]:
+    """Add the reference events of a folder to the notes of its recordings; those of files left out go with them."""
     if not table.exists():
         return [recording for _, recording in pairs]
     labels = Labels(table)
     known = {labels.named(name) for name, _ in pairs}
-    unknown = [name for name in labels.recordings if name not in known]
+    stems = tuple(file.stem for file in left_out)
+    unknown = [name for name in labels.recordings if name not in known and not Path(name).name.startswith(stems)]
     if unknown:
         names = ", ".join(str(name) for name, _ in pairs[:8])
         raise FormatError(f"{table}: {unknown[0]} is not a recording of this folder; must be one of {names}")
     # The feet of one trial are one recording.
-    count = len({trial_of(str(name), recording.label) for name, recording in pairs})
+    count = len({trial_of(str(name), recording.label) for name, recording in pairs}) + len(left_out)
     if count > 1 and any(not row.recording for row in labels.rows):
         raise FormatError(
             f"{table}: does not state the recording of each label, but there are {count} recordings; state it in the "
@@ -467,19 +510,32 @@ def _named_beside(path: Path, recording: Recording) -> Recording:
     return recording if labels.named(name) in (None, "") else _with_labels(labels, name, recording)
 
 
+def _labelled(recording: Recording) -> Recording:
+    """Add the labels of tables that other programs wrote beside a recording to its notes."""
+    place = recording.path.parent / trial_of(recording.name, recording.label)
+    for table in recognition.label_tables(place):
+        recording = _with_labels(Labels(table), place, recording)
+    return recording
+
+
 def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
     """Add the reference events of a recording, and of each of its sources, to the notes."""
-    contents = recording._contents
+    contents, begin_us = recording._contents, 0
+    if labels._from_beginning:
+        begins = [source.table.t for source in contents.sources.values() if not isinstance(source, Stream)]
+        begin_us = min((int(t.min()) for t in begins if len(t)), default=0)
     if not contents.is_several:
-        return recording.with_notes(_notes(labels, name, contents.main))
+        return recording.with_notes(_notes(labels, name, contents.main, begin_us))
     sources = {
-        label: source if isinstance(source, Stream) else add_notes(source, tuple(_notes(labels, name, source)))
+        label: source
+        if isinstance(source, Stream)
+        else add_notes(source, tuple(_notes(labels, name, source, begin_us)))
         for label, source in contents.sources.items()
     }
     return Recording(Contents(several(sources), sources))
 
 
-def _notes(labels: Labels, name: Path, source: RecordedSource) -> list[Note]:
+def _notes(labels: Labels, name: Path, source: RecordedSource, begin_us: int) -> list[Note]:
     """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
     clock = source.timing.usable()
     times = labels._times(name, lambda: clock, source.origin.label, side=source.sensor.side)
@@ -491,10 +547,10 @@ def _notes(labels: Labels, name: Path, source: RecordedSource) -> list[Note]:
         replaced, labelled = set_here._replaced(*names), {(row.text, row.t) for row in set_here._rows(*names)}
     return sorted(
         (
-            Note(label, int(t), 0 if clock is None else int(clock.host_ns(int(t))), source=of_source.get(label, ""))
+            Note(label, t, 0 if clock is None else int(clock.host_ns(t)), source=of_source.get(label, ""))
             for label, label_times in times.items()
-            for t in label_times
-            if t not in replaced and (label, int(t)) not in labelled
+            for t in (label_times + begin_us).tolist()
+            if t not in replaced and (label, t) not in labelled
         ),
         key=lambda note: note.t or 0,
     )

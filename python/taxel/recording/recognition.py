@@ -14,13 +14,13 @@ from taxel._base import limits
 from taxel._base.archive import fields_of, stored_names
 from taxel._base.arguments import checked_path
 from taxel._base.encodings import as_utf_8
-from taxel._base.files import open_file
+from taxel._base.files import beside, named, open_file
 from taxel._core import FormatError
-from taxel.event_table import are_of_events
+from taxel.event_table import are_of_events, is_of_track
 from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.layout import Layout, advice
 from taxel.formats.ros import is_bag
-from taxel.recording.kinds import ENDINGS, LABELS
+from taxel.recording.kinds import ENDINGS, LABELS, TABLES
 from taxel.recording.readers.columns import EVENTS
 from taxel.recording.readers.csv import check_head, names_in
 from taxel.recording.readers.foreign import ARRAYS
@@ -29,6 +29,8 @@ from taxel.recording.readers.without_layout import refuse_without_layout
 
 #: The endings of tables of text, also compressed by gzip.
 _TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc")
+#: The endings of those that may be tables of labels.
+_LABELS = (".csv", ".txt", ".tsv")
 
 #: The magic bytes of taxel's own kinds of files.
 _MAGIC = {
@@ -220,8 +222,19 @@ def files_in(folder: Path) -> list[Path]:
 
 
 def recorded_by_taxel(files: Iterable[Path], layout: GivenLayout = None) -> list[Path]:
-    """Return the files with an ending that taxel gives; no companion, and no file of others with the same ending."""
-    return [file for file in files if file.suffix.lower() in ENDINGS and file.is_file() and _is_of_taxel(file, layout)]
+    """Return the files with an ending that taxel gives; no companion, and no file of others with the same ending.
+
+    An empty file beside others of its ending has lost its content: opening it says so.
+    """
+    with_ending = [file for file in files if file.suffix.lower() in ENDINGS and file.is_file()]
+    found = {file for file in with_ending if _is_of_taxel(file, layout)}
+    endings = {file.suffix for file in found}
+    return [file for file in with_ending if file in found or (file.suffix in endings and _is_empty(file, layout))]
+
+
+def _is_empty(file: Path, layout: GivenLayout) -> bool:
+    """Return whether a table or a file of arrays that no layout describes is empty; a table of labels may be."""
+    return not file.stat().st_size and recognise(file, layout) == ForeignFile(has_layout=False)
 
 
 def _is_of_taxel(file: Path, layout: GivenLayout) -> bool:
@@ -279,10 +292,19 @@ def _describes(given: GivenLayout, path: Path) -> bool:
 
 
 def is_label_table(path: Path) -> bool:
-    """Return whether a .csv is a table of labels (`taxel.Labels`): by its first lines, or empty by its name."""
-    names, cells = _first_lines(path)
-    is_named = path.name == LABELS or path.name.endswith(".notes.csv")
-    return {"label", "t_us"} <= set(names) or (names == [""] and is_named) or are_of_events(names, cells)
+    """Return whether a text is a table of labels (`taxel.Labels`): by its first lines, or empty by its name."""
+    first, second = _first_lines(path)
+    names, cells, is_named = names_in(first), names_in(second), path.name.endswith(TABLES[:-1])
+    if {"label", "t_us"} <= set(names) or is_of_track(first.decode(errors="replace")):
+        return True
+    is_empty = names == [""] and (is_named or path.name == LABELS or path.name.endswith(".notes.csv"))
+    return is_empty or are_of_events(names, cells, named=is_named)
+
+
+def label_tables(recording: Path) -> list[Path]:
+    """Return the tables of labels that other programs wrote beside a recording, by its name: `walk_events.csv` ..."""
+    tables = [beside(recording, f"{named(recording).stem}{ending}") for ending in TABLES]
+    return [table for table in tables if table != recording and table.is_file() and is_label_table(table)]
 
 
 def are_spike_trains(path: Path) -> bool:
@@ -298,7 +320,7 @@ def natural_order(path: Path) -> list[tuple[bool, int, str]]:
 
 def _companion(path: Path, *, has_layout: bool) -> str:
     """Return what a file of taxel is that may be beside recordings, as the end of an error; "" of another file."""
-    if path.suffix.lower() == ".csv" and is_label_table(path):
+    if path.suffix.lower() in _LABELS and path.is_file() and is_label_table(path):
         return ", line 1: a table of labels (docs/command-line.md), not a recording"
     if are_spike_trains(path) and not has_layout:
         return (
@@ -310,19 +332,19 @@ def _companion(path: Path, *, has_layout: bool) -> str:
 
 def _is_table_of_taxel(path: Path) -> bool:
     """Return whether the first line of a .csv begins as taxel's own recordings do."""
-    names, _ = _first_lines(path)
+    names = names_in(_first_lines(path)[0])
     return names[0] == "t_us" and len(names) > 1
 
 
-def _first_lines(path: Path) -> tuple[list[str], list[str]]:
-    """Return the cells of the first line of a table, and of the second, as far as they are within 64 kB."""
+def _first_lines(path: Path) -> tuple[bytes, bytes]:
+    """Return the first line of a table, and the second, as far as they are within 64 kB."""
     with open_file(path) as file:
         try:
             text = as_utf_8(path.name, file)
-            return names_in(text.readline(1 << 16)), names_in(text.readline(1 << 16))
+            return text.readline(1 << 16), text.readline(1 << 16)
         except FormatError:
             # The reader of tables reports what is no text.
-            return [""], [""]
+            return b"", b""
 
 
 def _is_of_another_program(path: Path, layout: GivenLayout) -> bool:
@@ -342,7 +364,8 @@ def _is_of_another_program(path: Path, layout: GivenLayout) -> bool:
         return stated is not None and stated.data is not None and stated.data.array in names
     if ending == ".h5":
         return not is_h5_of_taxel(path)
-    return ending != ".csv" or not (_is_table_of_taxel(path) or is_label_table(path))
+    is_of_taxel = ending == ".csv" and _is_table_of_taxel(path)
+    return not is_of_taxel and (ending not in _LABELS or not is_label_table(path))
 
 
 def _by_first_bytes(path: Path) -> TaxelFile | Refusal:

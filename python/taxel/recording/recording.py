@@ -538,5 +538,11 @@ def with_notes(contents: Contents, more: tuple[Note, ...]) -> Contents:
 
 
 def add_notes(source: S, more: tuple[Note, ...]) -> S:
-    """Return the same source with further notes."""
-    return replace(source, marks=replace(source.marks, notes=Once(lambda: source.marks.notes() + more)))
+    """Return the same source with further notes; one of the same text and time as another is that note."""
+
+    def notes() -> tuple[Note, ...]:
+        there = source.marks.notes()
+        known = {(note.text, note.t) for note in there if note.t is not None}
+        return there + tuple(note for note in more if (note.text, note.t) not in known)
+
+    return replace(source, marks=replace(source.marks, notes=Once(notes)))

@@ -75,7 +75,8 @@ def references(
         names = f"it names {few(table.recordings)}" if table.rows else "it is empty"
         raise refused(argument, f" is {source}: names no event in {titles_of(unnamed)}; {names}")
     _warn_of_strangers(table, recordings)
-    events = _from_beginnings([table.times(recording) for recording in recordings], recordings, str(table.path))
+    times = [table.times(recording) for recording in recordings]
+    events = _from_beginnings(times, recordings, str(table.path), stated=table._from_beginning)
     return [_within(table, each, recording, argument) for each, recording in zip(events, recordings, strict=True)]
 
 
@@ -169,7 +170,8 @@ def of_other_sources(
             for name in sorted({row.source for row in rows} - names):
                 with collected():  # what these warn of concerns the labels of this source too
                     times = table._times(recording.path, clock_of, name, file[1], name)
-                    (counted_anew,) = _from_beginnings([times], [recording], str(table.path))
+                    stated = table._from_beginning
+                    (counted_anew,) = _from_beginnings([times], [recording], str(table.path), stated=stated)
                     labels[name] = moved(counted_anew, recording, shift_ms)
         found[recording.title] = labels
     return found
@@ -327,12 +329,17 @@ def _noted(recording: Recording) -> dict[str, NDArray[np.int64]]:
 
 
 def _from_beginnings(
-    each: Sequence[dict[str, NDArray[np.int64]]], recordings: Sequence[Recording], where: str
+    each: Sequence[dict[str, NDArray[np.int64]]],
+    recordings: Sequence[Recording],
+    where: str,
+    *,
+    stated: bool = False,
 ) -> list[dict[str, NDArray[np.int64]]]:
     """Return events by the times of their recordings, and say of which they are counted from the beginning.
 
     Those are all events of a recording whose times count from 1970, if all are within its duration. Sources of a file
-    count from the first of them; if they begin apart, the labels are refused.
+    count from the first of them; if they begin apart, the labels are refused. Where the table of the events states that
+    its times count from the beginning, they are all events, and nothing is said.
     """
     begins: dict[tuple[Path, str], list[int]] = {}
     labelled = [k for k, events in enumerate(each) if any(map(len, events.values()))]
@@ -343,6 +350,9 @@ def _from_beginnings(
     for k in labelled:
         firsts = begins[recordings[k].path, trial_name(recordings[k])]
         begin, times = min(firsts), np.concatenate(list(each[k].values()))
+        if stated:
+            moved[k] = {label: begin + t for label, t in each[k].items()}
+            continue
         if beginning_us(np.array(firsts)) and max(firsts) - begin <= _NEAR_US and times.min() >= 0:
             if begin + times.max() > spans[k][1]:
                 continue

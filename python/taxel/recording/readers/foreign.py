@@ -242,8 +242,12 @@ def facts_of(path: Path, array: str, named: re.Pattern[str]) -> dict[str, float 
                 for name in h5.attributes(entry):
                     if named.fullmatch(name) and name not in found:
                         found[name] = h5.attribute(name, entry)
-    with contextlib.suppress(FormatError):
-        found = {**arrays_of(path, names), **found} if names else found
+    arrays: dict[str, Any] = {}
+    for name in names:
+        # One that cannot be read, as of Python objects, leaves the others.
+        with contextlib.suppress(FormatError):
+            arrays |= arrays_of(path, [name])
+    found = {**arrays, **found}
     facts = {name: value.item() if isinstance(value, np.ndarray) else value for name, value in found.items()}
     return {name: value for name, value in facts.items() if isinstance(value, float | int | str)}
 

@@ -24,16 +24,22 @@ _PIECE_BYTES = 1 << 20
 
 
 def is_h5_of_taxel(path: Path) -> bool:
-    """Return whether a .h5 has the layout that `taxel convert` writes; false for a file that is not HDF5."""
+    """Return whether a .h5 has the layout that `taxel convert` writes; false for a file that is not HDF5.
+
+    It is true of a damaged one with the name of its mark, which opening it reports.
+    """
     try:
         # The name of an attribute is in the file as it is: without it the library, which begins slowly, is not asked.
         with open_file(path) as file:
             if not _holds(file, MARK.encode()):
                 return False
+    except OSError:
+        return False
+    try:
         with H5File(path) as h5:
             return h5.attribute(MARK) is not None
     except (FormatError, OSError):
-        return False
+        return True
 
 
 def _holds(file: BinaryIO, word: bytes) -> bool:

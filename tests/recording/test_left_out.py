@@ -1,0 +1,121 @@
+"""A file of a folder that cannot be read is left out, with one line that names it; the others are used."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from formats.making import write_pedar
+from shell import call
+from tests.tasks.recordings import mat
+
+import taxel
+from taxel import FormatError
+
+from .making import some_events
+
+
+def cut(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+
+
+def empty(file: Path) -> None:
+    file.write_bytes(b"")
+
+
+def spoilt(file: Path) -> None:
+    lines = file.read_text().splitlines()
+    lines[30] = "here the disk was full"
+    file.write_text("\n".join(lines))
+
+
+DAMAGE: dict[str, tuple[str, Callable[[Path], None], str]] = {
+    "a cut .npz": (".npz", cut, r"b\.npz: the \.npz cannot be unpacked"),
+    "a cut .h5": (".h5", cut, r"b\.h5: not a whole HDF5 file"),
+    "a bad line": (".csv", spoilt, r"b\.csv, line 31: "),
+    **{f"an empty {ending}": (ending, empty, rf"b\{ending}, (byte 0|line 1): ") for ending in (".npz", ".h5", ".csv")},
+    "an empty .mcap": (".mcap", empty, r"b\.mcap"),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGE)
+def test_a_damaged_file_is_left_out_and_the_others_open(tmp_path: Path, name: str) -> None:
+    ending, damage, why = DAMAGE[name]
+    for k, stem in enumerate("abc"):
+        taxel.convert(some_events(40, seed=k), tmp_path / f"{stem}{ending}")
+    damage(tmp_path / f"b{ending}")
+    (tmp_path / "labels.csv").write_text("recording,label,t_us\na,heel,100\nb,heel,100\n")
+    with pytest.warns(UserWarning, match=f"^left out, because it cannot be read: .*{why}") as said:
+        opened = taxel.open_all(tmp_path)
+    assert len(said) == 1
+    assert "\n" not in str(said[0].message)
+    assert [(each.path.stem, len(each.notes)) for each in opened] == [("a", 1), ("c", 0)]
+
+
+def test_labels_without_a_recording_are_not_given_to_the_only_one_that_is_left(tmp_path: Path) -> None:
+    for stem in "ab":
+        taxel.convert(some_events(40), tmp_path / f"{stem}.npz")
+    cut(tmp_path / "b.npz")
+    (tmp_path / "labels.csv").write_text("label,t_us\nheel,100\n")
+    with (
+        pytest.warns(UserWarning, match="left out"),
+        pytest.raises(FormatError, match="does not state the recording of each label, but there are 2 recordings"),
+    ):
+        taxel.open_all(tmp_path)
+
+
+def test_a_damaged_file_of_another_format_or_program_is_left_out(tmp_path: Path) -> None:
+    (tmp_path / "pedar").mkdir()
+    file = write_pedar(tmp_path / "pedar")
+    file.with_name("second.asc").write_bytes(file.read_bytes() + b"0.5 oh\n")
+    with pytest.warns(UserWarning, match=r"^left out, because it cannot be read: second\.asc, line"):
+        assert {each.path.name.split()[0] for each in taxel.open_all(tmp_path / "pedar")} == {file.stem}
+    (tmp_path / "tables").mkdir()
+    (tmp_path / "tables/layout.toml").write_text("rows = 1\ncolumns = 2\nrate_hz = 10\n")
+    for name, content in {"a.txt": "1,2\n3,4\n", "b.txt": "1,2\n3,oh\n", "c.txt": ""}.items():
+        (tmp_path / "tables" / name).write_text(content)
+    with pytest.warns(UserWarning, match="^left out") as said:
+        assert [each.name for each in taxel.open_all(tmp_path / "tables")] == ["a.txt"]
+    assert [name in str(each.message) for name, each in zip(("b.txt", "c.txt"), said, strict=True)] == [True, True]
+
+
+def test_if_no_file_can_be_read_the_error_is_that_of_the_first(tmp_path: Path) -> None:
+    for stem in "ab":
+        (tmp_path / f"{stem}.npz").write_bytes(b"PK\x03\x04")
+    with pytest.raises(FormatError, match=r"a\.npz: the \.npz cannot be unpacked"):
+        taxel.open_all(tmp_path)
+
+
+def test_what_concerns_all_files_stays_an_error(tmp_path: Path) -> None:
+    for stem in "ab":
+        taxel.convert(some_events(4000), tmp_path / f"{stem}.npz")
+    with pytest.raises(FormatError, match="a larger limit reads more"):
+        taxel.open_all(tmp_path, limit=70_000)
+    (tmp_path / "b.layout.toml").write_text("rows = 'eight'\n")
+    with pytest.raises(FormatError, match=r"b\.layout\.toml"):
+        taxel.open_all(tmp_path)
+
+
+def test_commands_use_the_others_and_say_what_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = ["recording,label,t_us"]
+    for seed in range(3):
+        file = mat(tmp_path, seed)
+        file.rename(tmp_path / f"walk{seed}.npz")
+        rows += [f"walk{seed},contact,{10_000 * (100 + 60 * k)}" for k in range(8)]
+    cut(tmp_path / "walk1.npz")
+    (tmp_path / "labels.csv").write_text("\n".join(rows) + "\n")
+    line = f"left out, because it cannot be read: {tmp_path}/walk1.npz: the .npz cannot be unpacked"
+    readout = tmp_path / "readout.json"
+    code, said, warned = call(capsys, "train", tmp_path, "-o", readout)
+    assert code == 0
+    assert f"\nwarning: {line}" in said
+    assert f"taxel: warning: {line}" in warned
+    for command in (("train", tmp_path, "-o", tmp_path / "b.json"), ("detect", tmp_path, "--readout", readout)):
+        code, said, _ = call(capsys, *command, "--json")
+        found = json.loads(said)
+        assert (code, len(found["recordings"])) == (0, 2)
+        assert found["warnings"][0].startswith(line)
+    code, said, warned = call(capsys, "info", tmp_path)
+    assert (code, "2 recordings" in said, line in warned) == (0, True, True)
