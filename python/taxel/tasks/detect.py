@@ -57,6 +57,7 @@ _FEW_HELD = 2
 _OF_LABELS = (
     "exchanged_sources",
     "exchanged_names",
+    "other_rate",
     "shifted_labels",
     "window",
     "gaps",
