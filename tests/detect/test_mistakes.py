@@ -44,6 +44,27 @@ def late_in_part(seed: int) -> Outcome:
     return outcome(frames, {label: t + 210_000 * (t >= middle) for label, t in truth.items()}, truth)
 
 
+def jumped(seed: int) -> Outcome:
+    """Return labels whose clock jumps by 1.5 s beside that of the frames, which are written twice for as long."""
+    frames, truth = touched(seed, 24)
+    middle = truth["contact"][12]
+    return outcome(frames, {label: t - 1_500_000 * (t >= middle) for label, t in truth.items()}, truth)
+
+
+def of_other_rate(seed: int) -> Outcome:
+    """Return labels of two names by frames counted at 49 Hz that were taken at 50 Hz, some of which are not found."""
+    frames, truth = touched(seed, 20)
+    noise = np.random.default_rng(seed)
+    labels = {label: np.rint(t * 50 / 49 + noise.normal(0, 15_000, 20)).astype(int) for label, t in truth.items()}
+    return outcome(frames, labels, {label: t[k::3] for k, (label, t) in enumerate(truth.items())})
+
+
+def of_a_short_trial(seed: int) -> Outcome:
+    """Return two touches, labelled in frames of a video that are counted at 100 Hz and were taken at 120."""
+    frames, truth = touched(seed, 2, begin_s=2.2)
+    return outcome(frames, {label: np.rint(t * 1.2).astype(int) for label, t in truth.items()}, truth)
+
+
 def nearly_late(seed: int) -> Outcome:
     frames, truth = touched(seed, 20)
     return outcome(frames, {label: t - 60_000 for label, t in truth.items()}, truth)
@@ -131,6 +152,25 @@ SITUATIONS: dict[str, tuple[Callable[[int], Outcome], str, str, str]] = {
         "have a false detection 210 ms earlier, all from ",
         " s to the end 210 ms",
     ),
+    "jumped": (
+        jumped,
+        "shifted_labels",
+        "have a false detection 1500 ms later, all from ",
+        " s to the end 1500 ms later",
+    ),
+    "of another rate": (
+        of_other_rate,
+        "other_rate",
+        "labels runs 1.02 times as fast as the recording's: tried with their times divided by 1.02, 1",
+        "to divide the times of the labels by 1.02, as of frames counted at another rate, or, if these are right, a "
+        "rate of 196",
+    ),
+    "a short trial of another rate": (
+        of_a_short_trial,
+        "other_rate",
+        "tried with their times divided by 1.2, 4 of 4 labels have a detection, instead of ",
+        "to divide the times of the labels by 1.2",
+    ),
     "nearly late": (
         nearly_late,
         "shifted_labels",
@@ -164,6 +204,20 @@ def test_what_lies_beside_most_mistakes_is_said_first(name: str, seed: int) -> N
     assert (first.kind, bool(first.advice)) == (kind, bool(advice)), first
     assert measured in first.measured
     assert advice in first.advice
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("sd_ms", [15, 60])
+def test_labels_of_the_right_clock_have_no_other_rate(seed: int, sd_ms: float) -> None:
+    random = np.random.default_rng(seed)
+    frames, truth = touched(seed, [2, 4, 12, 24][seed % 4])
+    labels = {
+        label: np.sort(t + np.rint(1000 * random.normal(0, sd_ms, len(t))).astype(int)) for label, t in truth.items()
+    }
+    found = {label: t[random.random(len(t)) < 0.7] for label, t in truth.items()}
+    exchanged = {"contact": found["lift"], "lift": found["contact"]}
+    for made in (outcome(frames, labels, found), outcome(frames, labels, exchanged)):
+        assert all(cause.kind != "other_rate" for cause in causes_of([made], 50.0))
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -11,6 +11,7 @@ from tests.shell import run
 
 import taxel
 from taxel import Array, Events, Frames
+from taxel.recording.gaps import written_twice
 
 BEGIN_US = 1_764_000_000_000_000
 
@@ -133,3 +134,37 @@ def test_info_of_a_camera_has_its_rates_and_polarities_and_no_untouched_pixels(t
 def board(folder: Path) -> Path:
     taxel.convert(camera(100.0, name="mat"), folder / "board.npz")
     return folder / "board.npz"
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_frames_that_follow_twice_are_named_and_no_others(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    first, count = random.integers(0, 500), int(random.integers(10, 80))
+    touches = 30 * (np.sin(np.arange(700) / 9) > 0.8)[:, None, None]
+    for values in (random.normal(9.0, 0.1, (700, 3, 4)) + touches, random.normal(2.0, 0.1, (700, 1, 1))):
+        twice = np.concatenate([values[: first + count], values[first:]])
+        named = f"frames {first} to {first + count - 1} ("
+        for changed in (twice, *([np.round(100 * twice)] if twice[0].size > 1 else [])):
+            [text] = written_twice(Frames(changed, 10_000 * np.arange(len(changed))))
+            assert text.startswith(named)
+            assert text.endswith(f" may be {10 * count} ms late")
+        # A slow sensor, a simulated one without noise, and readings that rest.
+        still = np.where(touches, 30.0, 0.0) * np.ones_like(values)
+        for right in (
+            values,
+            np.repeat(values, 2, axis=0),
+            still,
+            np.concatenate([still, still]),
+            np.maximum(values, 9),
+        ):
+            assert written_twice(Frames(right, 10_000 * np.arange(len(right)))) == []
+
+
+def test_info_names_frames_that_are_written_twice(tmp_path: Path) -> None:
+    frames = walk()
+    values = np.concatenate([frames.values[:2000], frames.values[1950:]])
+    twice = Frames(values, 10_000 * np.arange(len(values)), unit="counts", array=frames.array)
+    taxel.convert(twice, tmp_path / "a.npz")
+    text = run("info", tmp_path / "a.npz").stdout
+    assert "frames twice" in text
+    assert "frames 1950 to 1999 (19.500 to 19.990 s) are written twice" in text

@@ -366,6 +366,7 @@ def _flaws(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "full scale", f"{readings} {greatest}: larger loads may be cut off"
     if (gaps := facts["gaps"]) is not None and "gaps" not in facts["verdict"].noted:
         yield "gaps", gaps["text"]
+    yield from (("frames twice", text) for text in facts["written_twice"])
 
 
 def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:

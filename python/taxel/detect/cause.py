@@ -11,17 +11,18 @@ from taxel._base.errors import refused
 
 #: The kinds of causes. Where two concern equally many mistakes the earlier comes first: the later may follow from it.
 KINDS = (
-    "falling_values", "exchanged_sources", "exchanged_names", "shifted_labels", "shifted_training", "few_labels",
-    "unlabelled_source", "levels", "overlapping_loads", "standing_load", "foreign_labels", "tare", "begun_loaded",
-    "durations", "recipe", "window", "gaps", "unlabelled_time", "label_name", "other_name", "unlabelled_loads",
-    "unfelt_labels", "unlike_training", "plain_rule", "indistinct_kinds", "overfitting", "many_false", "unknown",
+    "falling_values", "exchanged_sources", "exchanged_names", "other_rate", "shifted_labels", "shifted_training",
+    "few_labels", "unlabelled_source", "levels", "overlapping_loads", "standing_load", "foreign_labels", "tare",
+    "begun_loaded", "durations", "recipe", "window", "gaps", "unlabelled_time", "label_name", "other_name",
+    "unlabelled_loads", "unfelt_labels", "unlike_training", "plain_rule", "indistinct_kinds", "overfitting",
+    "many_false", "unknown",
 )  # fmt: skip
 
 #: Causes in the data: no other recipe helps.
 OF_DATA = (
-    "falling_values", "exchanged_sources", "exchanged_names", "shifted_labels", "few_labels", "unlabelled_source",
-    "overlapping_loads", "standing_load", "foreign_labels", "tare", "begun_loaded", "gaps", "unlabelled_time",
-    "unlabelled_loads",
+    "falling_values", "exchanged_sources", "exchanged_names", "other_rate", "shifted_labels", "few_labels",
+    "unlabelled_source", "overlapping_loads", "standing_load", "foreign_labels", "tare", "begun_loaded", "gaps",
+    "unlabelled_time", "unlabelled_loads",
 )  # fmt: skip
 
 #: Causes whose advice no trial has measured, nor does it undo a fault that was found.
@@ -62,6 +63,8 @@ class Cause:
     - ``falling_values``: values fall when touched. ``falls = true`` in a layout file, or remove it.
     - ``exchanged_sources`` (*): the labels of two sources, as left and right, fit the detections of the other.
     - ``exchanged_names`` (*): the labels of two names, as contact and release, fit the detections of the other.
+    - ``other_rate`` (*): labels fit the detections if their times are divided by a number that was measured, as those
+      of frames counted at another rate. Other times of labels, or the right rate of the recording.
     - ``shifted_labels`` (*): most labels, or those of a part of the recording, are shifted by the same time, more than
       50 ms (another clock, a video, a key press). ``--shift-ms MS``, and ``--window-ms MS`` for labels by hand.
     - ``shifted_training`` (*): labels agree with the felt loads, but all detections are late or early.

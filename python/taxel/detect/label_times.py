@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.progress import reporting
+from taxel._base.times import beginning_us
 from taxel.detect import recipes
 from taxel.detect.alignment import WINDOW_MS
+from taxel.detect.cause import Cause
 from taxel.detect.examples import Example
 from taxel.detect.floors import floor_of
 from taxel.detect.loads import Loads, clock_of, lacks_neighbours
@@ -47,6 +49,16 @@ _NORMAL = 1.4826
 _CHANCE = 0.01
 #: Touches that are so many times as many as the labels are at some distance of them by chance.
 _MOST_A_LABEL = 4
+#: Labels are compared with detections up to this distance, ms, as of a clock that jumped.
+_JUMP_MS = 10_000.0
+#: Another rate of the labels' clock is looked for up to this factor, in steps of half a window at the last label, at
+#: most so many, by so many labels. It finds half of what can be found, this share of that more than without it and than
+#: with a shift, and twice as many, or half of those that are missed then.
+_RATES, _STEPS, _LABELS, _MORE = 2.0, 20_000, 100, 0.2
+#: Clocks often have rates of such a ratio, as 100 and 120 frames/s, with at most this chance if all fit then, and none
+#: without it.
+_SIMPLE = sorted({a / b for a in range(1, 7) for b in range(1, 7) if a != b and 0.5 <= a / b <= _RATES})
+_LIKELY = 0.2
 #: So many labels that are all in the first such share of a recording may be in another unit of time.
 _SEVERAL, _FIRST = 4, 0.01
 
@@ -326,11 +338,14 @@ def same_distance(times: NDArray[np.int64], others: NDArray[np.int64], beyond_ms
 
     None where they are fewer than five, or as many as may have one distance by chance.
     """
-    return _alike([_apart(times, np.sort(others))], [len(times)], beyond_ms)
+    return _alike([_apart(times, np.sort(others), _JUMP_MS)], [len(times)], beyond_ms, _JUMP_MS)
 
 
 def _alike(
-    pairs: Sequence[tuple[NDArray[np.float64], NDArray[np.int64]]], counts: Sequence[int], beyond_ms: float
+    pairs: Sequence[tuple[NDArray[np.float64], NDArray[np.int64]]],
+    counts: Sequence[int],
+    beyond_ms: float,
+    farthest_ms: float = _FARTHEST_MS,
 ) -> Alike | None:
     """Return which of so many times of several kinds are at one distance from others, by the pairs of each kind."""
     first = np.cumsum([0, *counts])
@@ -345,17 +360,21 @@ def _alike(
     counts = [len(np.unique(index[k:stop])) for k, stop in enumerate(stops)]
     most = max(counts, default=0)
     left = int(np.count_nonzero(~is_near))
-    if most < _LEAST or _by_chance(most, left, len(apart), _SAME_MS) > _CHANCE:
+    if most < _LEAST or _by_chance(most, left, len(apart), _SAME_MS, farthest_ms) > _CHANCE:
         return None
-    here = slice(begin := counts.index(most), stops[begin])
+    # Of touches at regular intervals several distances have as many.
+    begin = min((k for k, count in enumerate(counts) if count == most), key=lambda k: abs(apart[k]))
+    here = slice(begin, stops[begin])
     members = np.zeros(first[-1], np.bool_)
     members[index[here]] = True
     return Alike(float(np.median(apart[here])), members)
 
 
-def _apart(times: NDArray[np.int64], felt: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _apart(
+    times: NDArray[np.int64], felt: NDArray[np.int64], farthest_ms: float = _FARTHEST_MS
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return the distances of labels from these times up to the farthest, ms, ascending, and the labels' places."""
-    far = round(to_us(_FARTHEST_MS))
+    far = round(to_us(farthest_ms))
     reach = np.searchsorted(felt, [times - far, times + far])
     label_index = np.repeat(np.arange(len(times)), reach[1] - reach[0])
     beside = np.concatenate([np.empty(0, np.int64), *(np.arange(*span) for span in reach.T)])
@@ -430,9 +449,9 @@ def chance_of(least: int, total: int, share: float) -> float:
         return float(np.exp(ways + k * np.log(share) + (total - k) * np.log1p(-share)).sum())
 
 
-def _by_chance(least: int, labels: int, pairs: int, spread_ms: float) -> float:
+def _by_chance(least: int, labels: int, pairs: int, spread_ms: float, farthest_ms: float = _FARTHEST_MS) -> float:
     """Return how probable it is that so many labels have pairs in one of the stretches of that length by chance."""
-    stretches = 2 * _FARTHEST_MS / max(spread_ms, 1.0)
+    stretches = 2 * farthest_ms / max(spread_ms, 1.0)
     share = min(1.0, pairs / labels / stretches)
     return stretches * chance_of(least, labels, share)
 
@@ -465,6 +484,15 @@ def early(labels: Mapping[str, NDArray[np.int64]], first_us: int, last_us: int) 
     return f"are in the first {latest / 1e6:.3g} s of {lasts / 1e6:.3g} s: are their times in us?"
 
 
+def span_us(example: Example) -> tuple[int, int]:
+    """Return when the first and the last of an example is, us."""
+    source = example.source
+    if isinstance(source, SpikeTrains):
+        return round(float(to_us(source.start))), round(float(to_us(source.stop)))
+    t = source.t  # type: ignore[union-attr]
+    return (int(t[0]), int(t[-1])) if len(t) else (0, 0)
+
+
 def unlabelled_us(examples: Sequence[Example], label: str) -> tuple[int, int]:
     """Return how long recordings last before their first label and after their last, beyond the distance of labels, us.
 
@@ -478,13 +506,96 @@ def unlabelled_us(examples: Sequence[Example], label: str) -> tuple[int, int]:
     outside = total = 0
     for example in examples:
         times = np.sort(example.labels.get(label, np.empty(0, np.int64)))
-        if isinstance(example.source, SpikeTrains):
-            first, last = (round(to_us(edge)) for edge in (example.source.start, example.source.stop))
-        else:
-            t = example.source.t  # type: ignore[union-attr]
-            first, last = (int(t[0]), int(t[-1])) if len(t) else (0, 0)
+        first, last = span_us(example)
         if len(times):
             apart = int(np.diff(times).max(initial=0))
             outside += max(0, int(times[0]) - first - apart) + max(0, last - int(times[-1]) - apart)
             total += last - first
     return outside, total
+
+
+def other_rate(examples: Sequence[Example], found: Sequence[Detections], window_ms: float) -> Cause | None:
+    """Return that the labels' clock runs at another rate than the recording's, where labels then fit the detections.
+
+    Parameters
+    ----------
+    examples : sequence of Example, checked
+        The sources of one recording.
+    found : sequence of Detections
+        What was detected in each.
+    window_ms : float, ms
+    """
+    zero = beginning_us(np.array([span_us(examples[0])[0]]))
+    given = [
+        (labels - zero, detections.t[detections.label == name] - zero)
+        for example, detections in zip(examples, found, strict=True)
+        for name, labels in example.labels.items()
+    ]
+    kinds = [(labels, np.sort(times)) for labels, times in given if len(labels) and len(times)]
+    total, possible = sum(len(labels) for labels, _ in kinds), sum(min(map(len, kind)) for kind in kinds)
+    last, reach = max((int(labels[-1]) for labels, _ in kinds), default=0), to_us(window_ms)
+    if last <= 2 * reach or possible < 2:
+        return None
+    few = [(labels[:: 1 + total // _LABELS], times) for labels, times in kinds]
+    steps = np.arange(-_STEPS, _STEPS + 1) * reach / (2 * last)
+    rates = np.exp(steps[np.abs(steps) <= np.log(_RATES) + reach / last])
+    rate = float(rates[np.argmax(_fitting(few, rates[:, None], reach))])
+    pairs = [
+        (labels[near], times[at[near]])
+        for labels, times in kinds
+        for at, near in [_beside(labels / rate, times, reach)]
+    ]
+    labelled, detected = (np.concatenate(each).astype(np.float64) for each in zip(*pairs, strict=True))
+    rate = float(labelled @ detected / (detected @ detected)) if detected.any() else 1.0
+    simple = min(_SIMPLE, key=lambda each: abs(each - rate))
+    if is_simple := abs(simple - rate) * last <= reach:
+        rate = simple
+    now, fits = _fitting(kinds, np.array([[1.0], [rate]]), reach).tolist()
+    shifts = to_us(np.arange(-_JUMP_MS, _JUMP_MS, window_ms / 2))[:, None]
+    best = max(now, int(_fitting(kinds, np.ones((1, 1)), reach, shifts).max()))
+    is_better = fits >= 2 * best or 2 * (total - fits) <= total - best
+    if 2 * fits < possible or not is_better or fits - best < _MORE * possible:
+        return None
+    share = min(1.0, 2 * reach * sum(len(times) * len(labels) for labels, times in kinds) / total / last)
+    by_chance = chance_of(fits, total, share)
+    is_sure = len(rates) * by_chance <= _CHANCE
+    if not is_sure and not (is_simple and fits == possible and not now and len(_SIMPLE) * by_chance <= _LIKELY):
+        return None
+    side = f"{rate:.4g} times as fast as the recording's"
+    measured = (
+        f"the clock of the labels runs {side}: tried with their times divided by {rate:.4g}, {fits} of {total} labels "
+        f"have a detection, instead of {now}, and at most {best} with a shift"
+    )
+    t = examples[0].source.t  # type: ignore[union-attr]
+    hz = 1e6 / float(np.median(np.diff(t))) if isinstance(examples[0].source, Frames) and len(t) > 1 else 0.0
+    of_recording = (
+        f", or, if these are right, a rate of {hz / rate:.4g} Hz instead of {hz:.4g} Hz in the recording" * bool(hz)
+    )
+    advice = f"to divide the times of the labels by {rate:.4g}, as of frames counted at another rate{of_recording}"
+    names = tuple(dict.fromkeys(name for example in examples for name in example.labels))
+    return Cause("other_rate", names, 2 * (fits - now), measured, advice)
+
+
+_Kinds = Sequence[tuple[NDArray[np.int64], NDArray[np.int64]]]
+
+
+def _beside(
+    labels: NDArray[np.float64], times: NDArray[np.int64], reach: float
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return the places of the times nearest to labels, and which labels have one within reach."""
+    middles = (times[1:] + times[:-1]) / 2
+    at = np.searchsorted(middles, labels)
+    return at, np.abs(labels - times[at]) <= reach
+
+
+def _fitting(
+    kinds: _Kinds, rates: NDArray[np.float64], reach: float, shifts: NDArray[np.float64] | float = 0.0
+) -> NDArray[np.int64]:
+    """Return how many times are within reach of a label of their kind, whose times are divided by each of the rates."""
+    counts: NDArray[np.int64] = np.zeros(max(len(rates), np.size(shifts)), np.int64)
+    for labels, times in kinds:
+        at, near = _beside(labels / rates - shifts, times, reach)
+        # Labels beside one time count once.
+        latest = np.maximum.accumulate(np.where(near, at + 1, 0), axis=1)
+        counts += (np.diff(latest, axis=1, prepend=0) > 0).sum(axis=1)
+    return counts

@@ -15,13 +15,13 @@ from taxel.detect.alignment import WINDOW_MS
 from taxel.detect.cause import Cause, by_option, ordered
 from taxel.detect.examples import Example, Outcome, check_examples
 from taxel.detect.exchanged import exchanged_names
-from taxel.detect.label_times import PEAK, FeltLoads, chance_of, same_distance
+from taxel.detect.label_times import PEAK, FeltLoads, chance_of, other_rate, same_distance, span_us
 from taxel.detect.scoring import APART_US, Mistake, Score, mistakes_of, score, score_together
 from taxel.detections import Detections
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording.gaps import missing_frames
-from taxel.spikes import SpikeTrains, to_us
+from taxel.spikes import to_us
 
 #: From which share of the events on missed or false ones are many.
 MANY = 0.05
@@ -114,6 +114,8 @@ def causes_of(
         return ()
     examples = check_examples([outcome.example for outcome in outcomes])
     found = [example._known(outcome.found) for example, outcome in zip(examples, outcomes, strict=True)]
+    if (rate := other_rate(examples, found, window_ms)) is not None:
+        return (rate,)
     scores = [cast("Score", outcome.score) for outcome in outcomes]
     mistakes = mistakes_of(found, [example.labels for example in examples], scores)
     measured = Measured(examples, mistakes, scored, window_ms, differences=differences, standing=standing)
@@ -194,7 +196,7 @@ class Measured:
         self._examples, self._window_ms = examples, window_ms
         self._scores = scored.by_label or {scored.label: scored}
         self._felt = FeltLoads(examples) if felt is None else felt
-        spans = [_span_us(example) for example in examples]
+        spans = [span_us(example) for example in examples]
         self._lasts_us = sum(last - first for first, last in spans)
         #: What the clock of each example is moved by, so that all are on one.
         self._shifts = [k * APART_US - first for k, (first, _) in enumerate(spans)]
@@ -370,7 +372,7 @@ class Measured:
         """Yield the shifts of names that are at one distance, those of most labels first.
 
         A name of which too few are missed to tell a distance has that of others, if most of its missed or of its false
-        are at it.
+        are at it, or more than by chance.
         """
         shifts = [shift for label, times in left.items() if (shift := self._at_one_distance(label, times)) is not None]
         shifts.sort(key=lambda shift: -len(shift.missed))
@@ -381,7 +383,9 @@ class Measured:
             for label in sorted(few):
                 missed, false = left[label]
                 at = missed[_near(missed - round(to_us(ms)), false)]
-                if len(at) >= _SEVERAL and 2 * len(at) > min(len(missed), len(false)):
+                is_most = 2 * len(at) > min(len(missed), len(false))
+                covered_us = 2 * round(to_us(WINDOW_MS)) * len(false)
+                if len(at) >= _SEVERAL and (is_most or not self._by_chance(len(at), len(missed), covered_us)):
                     del few[label]
                     group.append(self._at_distance(label, left[label], ms, at))
             yield group
@@ -447,14 +451,15 @@ class Measured:
     def _telling(self, names: Sequence[str], ms: float) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Return the labels of some names that tell whether they are at a distance, and which have a detection at it.
 
-        A label that is found tells that it is not, unless a false detection is there too; a missed one without tells
-        nothing.
+        A label that is found tells that it is not, unless a detection is there too; a missed one without tells nothing.
         """
         times, members = [], []
         for name in names:
             labels, false = self._labels(name), self._wrong(name, is_missed=False)
-            at = _near(labels - round(to_us(ms)), false)
-            tells = at | ~np.isin(labels, self._wrong(name, is_missed=True))
+            is_missed, expected = np.isin(labels, self._wrong(name, is_missed=True)), labels - round(to_us(ms))
+            at = _near(expected, false)
+            paired = labels[~is_missed] + np.rint(to_us(self._scores[name].errors_ms)).astype(np.int64)
+            tells = at | ~(is_missed | _near(expected, np.sort(paired)))
             times.append(labels[tells])
             members.append(at[tells])
         order = np.argsort(np.concatenate(times), kind="stable")
@@ -669,7 +674,7 @@ def _example_of(t: NDArray[np.int64] | int) -> NDArray[np.int64]:
 def _seconds(t: int, examples: Sequence[Example]) -> float:
     """Return a time on the one clock as text counts those of its example, s."""
     k = int(_example_of(t))
-    first, _ = _span_us(examples[k])
+    first, _ = span_us(examples[k])
     return float(t - k * APART_US + first - beginning_us(np.array([first]))) / 1e6
 
 
@@ -689,12 +694,3 @@ def _near(times: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.boo
 
 def _at(places: NDArray[np.int64], times: NDArray[np.int64]) -> NDArray[np.bool_]:
     return np.isin(np.arange(len(times)), places)
-
-
-def _span_us(example: Example) -> tuple[int, int]:
-    """Return when the first and the last of an example is, us."""
-    source = example.source
-    if isinstance(source, SpikeTrains):
-        return round(float(to_us(source.start))), round(float(to_us(source.stop)))
-    t = source.t  # type: ignore[union-attr]
-    return (int(t[0]), int(t[-1])) if len(t) else (0, 0)

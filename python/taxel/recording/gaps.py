@@ -1,4 +1,4 @@
-"""Gaps in a recording: where frames are missing by their time stamps, or an event camera was silent."""
+"""Gaps in a recording, where frames are missing or an event camera was silent; and frames that are written twice."""
 
 from __future__ import annotations
 
@@ -23,6 +23,9 @@ _INTERVALS = 2.5
 #: recording. The rate is that of the lower quartile of windows, as touches only add events: a file that is silent for
 #: a quarter of the time, as one without noise is at rest, has no gap.
 _WINDOW_US, _WINDOWS, _DUE, _QUARTILE = 100_000, 5, 50.0, 0.25
+#: Reading: frames are written twice if so many or more follow that equal those before them, and no more, where noise
+#: changes this share of all frames, and in them this share of the taxels.
+_TWICE, _NEW, _CHANGED = 10, 0.4, 0.2
 #: A recording of damaged stamps may last for years: at most so many windows.
 _MOST_WINDOWS = 1_000_000
 
@@ -146,3 +149,41 @@ def _silences(table: Events | Frames) -> tuple[NDArray[np.int64], NDArray[np.int
     silent = ends - begins
     long = (silent >= _WINDOWS * window) & (silent * rate >= _DUE)
     return (begins[long], ends[long]) if long.any() else None
+
+
+def written_twice(frames: Frames) -> list[str]:
+    """Return which frames, counted from 0, the next ones repeat exactly, as noise never does.
+
+    One that equals the frame before it, as of a slow sensor, and readings that rest at one value are none. Whole
+    numbers of a single channel repeat by chance, and are not told.
+
+    Examples
+    --------
+    >>> values = np.random.default_rng(1).normal(0, 1, (60, 2, 2))
+    >>> values = np.concatenate([values[:40], values[20:]])
+    >>> written_twice(Frames(values, 10_000 * np.arange(80)))
+    ['frames 20 to 39 (0.200 to 0.390 s) are written twice: what follows them may be 200 ms late']
+    """
+    keys = np.array([hash(frame.tobytes()) for frame in frames.values], np.int64)
+    new = np.flatnonzero(np.diff(keys, prepend=keys[:1] + 1))
+    if len(new) < _NEW * len(keys):
+        return []
+    keys, order = keys[new], np.argsort(keys[new], kind="stable")
+    same = keys[order][1:] == keys[order][:-1]
+    # How far before each new frame the last one that equals it is.
+    back = np.zeros(len(keys) + 1, np.int64)
+    back[order[1:][same]] = order[1:][same] - order[:-1][same]
+    edges = np.flatnonzero(np.diff(back, prepend=0))
+    texts = []
+    for first, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        lag = int(back[first])
+        if not max(_TWICE, lag) <= end - first < 2 * max(1, lag):
+            continue
+        values = frames.values[new[first - lag : first]]
+        if float(np.mean(values[1:] != values[:-1])) >= _CHANGED:
+            begin, copy = int(new[first - lag]), int(new[first])
+            times = [(int(frames.t[k]) - beginning_us(frames.t[:1])) / 1e6 for k in (begin, copy - 1)]
+            late = _time(int(frames.t[copy] - frames.t[begin]))
+            span = f"frames {begin} to {copy - 1} ({times[0]:.3f} to {times[1]:.3f} s)"
+            texts.append(f"{span} are written twice: what follows them may be {late} late")
+    return texts

@@ -33,6 +33,7 @@ from taxel.recording import Recording
 from taxel.recording.analysis.health import Held, health, unchanging_taxels, whole_lines
 from taxel.recording.analysis.preload import standing
 from taxel.recording.analysis.rest import FORCE_UNITS, of_frames, of_quiet
+from taxel.recording.gaps import written_twice
 from taxel.recording.opening import sensors_of
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
@@ -57,6 +58,7 @@ _FEW_HELD = 2
 _OF_LABELS = (
     "exchanged_sources",
     "exchanged_names",
+    "other_rate",
     "shifted_labels",
     "window",
     "gaps",
@@ -533,6 +535,7 @@ def noise_floors(readout: Readout | PlainRule) -> list[float]:
 def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRule) -> tuple[list[str], Unlike]:
     """Return what may keep detections away or make false ones, and of it in what differs from the training."""
     lines, source, tare = list(_of_gaps(recording, outcome)), recorded(recording, hold=False), outcome.example.tare
+    lines += written_twice(source) if isinstance(source, Frames) else []
     if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
         # What else is measured is measured upside down.
         return [*lines, f"rest: {quiet.text(recording.path, recording._turned)}"], Unlike()

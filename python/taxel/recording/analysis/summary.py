@@ -12,7 +12,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording.analysis.health import health, unchanging_taxels, whole_lines
 from taxel.recording.analysis.pressure import Series
-from taxel.recording.gaps import of_camera
+from taxel.recording.gaps import of_camera, written_twice
 from taxel.recording.recording import Recording
 
 #: The interval over which the highest rate is measured, us.
@@ -71,6 +71,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         facts["frames_per_s"] = (len(table) - 1) / seconds if seconds else None
         facts["missing"] = {"values": table.missing, "of": table.values.size}
         facts["full_scale"] = _full_scale(table)
+        facts["written_twice"] = written_twice(table)
     gaps = recording._gaps()
     facts["gaps"] = None if gaps is None else gaps.to_dict()
     clock = recording.clock
