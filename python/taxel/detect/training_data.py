@@ -41,8 +41,9 @@ _SUM = "total"
 #: Noise and strength differ from these times on. The strength is this quantile of touches, so that a stretch of strong
 #: ones counts.
 _NOISIER, _WEAKER, _STRONGER, _STRONG = 1.5, 0.6, 1.7, 0.75
-#: Touches are weaker where this quantile is, too; a load of a recording that lasts longer than this share of it stays.
-_STRONGEST, _STAYS = 0.95, 0.5
+#: Touches are weaker where this quantile is, too; a load of a recording that lasts longer than this share of it, and than
+#: a step in a short trial, us, stays.
+_STRONGEST, _STAYS, _STAYS_US = 0.95, 0.5, 3_000_000
 #: From so many times the noise on the loads are not compared.
 _MUCH_NOISE = 2.0
 #: Noise is that of the sum at so many moments from so long before a load until as long after it, us; the median
@@ -272,7 +273,7 @@ def _of_touches(
     if larger:
         yield "{} x {} taxels, where the training had {} x {}".format(*measured.loaded.shape, *shape)
     if not touches and strength:
-        yield f"no load reaches {_TOUCH:g} of the strength of the training's touches"
+        yield f"no load reaches {_TOUCH:g} of the strength of the training's touches (is the unit right?)"
     # Much noise makes loads of its own.
     if noisier >= _MUCH_NOISE or not strength:
         return
@@ -343,7 +344,7 @@ def _measured(given: Example) -> _Measured | None:
     loads = Loads([example], [clock_of(given)], floor, reporting(None), sorted({quantity, _SUM}))
     begins, ends = (loads.off(edge, 0).t for edge in loads.edges(quantity, threshold, 1.0, 1))
     begin, end = _touches(begins, ends, int(source.t[-1]))
-    stays = bool((end - begin).max(initial=0) > _STAYS * (source.t[-1] - source.t[0]))
+    stays = bool((end - begin).max(initial=0) > max(_STAYS * (source.t[-1] - source.t[0]), _STAYS_US))
     above, sums = _core.touched_above(floor), loads.changes(_SUM, 0)
     rises = _rises(source, above, sums, begin, end)
     begin, end, rises = begin[rises > 0.0], end[rises > 0.0], rises[rises > 0.0]
