@@ -177,5 +177,5 @@ def test_nonsense_is_refused():
         check_board(seconds=0)
     with pytest.raises(ProblemError, match="preset 'fast'"):
         check_board(preset="fast")
-    with pytest.raises(ProblemError, match="leave it out"):
+    with pytest.raises(ProblemError, match="must be left out with a serial line"):
         check_board("127.0.0.1:1", preset="5.2 kHz")
