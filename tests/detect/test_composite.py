@@ -295,7 +295,7 @@ def test_inputs_are_chosen_among_the_points_and_what_none_uses_is_not_encoded() 
         ({"encoders": {"area": {"name": "areas"}}}, "recipe: encoders.area: encoder areas: must be one of"),
         ({"encoders": {"area": 3}}, "recipe: encoders.area"),
         ({"encoders": 3}, "recipe: states no encoder"),
-        ({"encoder": {"name": "fa1"}}, "both encoder and encoders"),
+        ({"encoder": {"name": "fa1"}}, "encoder and encoders are both given"),
     ],
 )
 def test_recipes_that_make_no_sense_are_refused(changes: dict, text: str) -> None:
