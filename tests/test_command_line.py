@@ -131,7 +131,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
             ("train", "walk.npz", "--labels", "labels.csv", "-o", "there.json"),
             "there.json: exists already; give --overwrite",
         ),
-        (("demo", "--noise", "0.1"), "--noise is 0.1 s: must be 0.5 to 86400"),
+        (("demo", "--noise", "0.1"), "--noise is 0.1 s: must be from 0.5 to 86400"),
         (("study", "fig6.1", "--set", "kappa"), "--set kappa: must be KEY=VALUE"),
     ],
 )

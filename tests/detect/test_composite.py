@@ -295,7 +295,7 @@ def test_inputs_are_chosen_among_the_points_and_what_none_uses_is_not_encoded() 
         ({"encoders": {"area": {"name": "areas"}}}, "recipe: encoders.area: encoder areas: must be one of"),
         ({"encoders": {"area": 3}}, "recipe: encoders.area"),
         ({"encoders": 3}, "recipe: states no encoder"),
-        ({"encoder": {"name": "fa1"}}, "both encoder and encoders"),
+        ({"encoder": {"name": "fa1"}}, "encoder and encoders are both given"),
     ],
 )
 def test_recipes_that_make_no_sense_are_refused(changes: dict, text: str) -> None:
@@ -306,5 +306,5 @@ def test_recipes_that_make_no_sense_are_refused(changes: dict, text: str) -> Non
 def test_a_delay_needs_an_age_of_its_own_inputs_alone() -> None:
     made = recipe(neurons={"a": {"inputs": ["area"], "delay_ms": 3.3}})
     assert made.learner_of("a")[1] == 3.3
-    with refused("there is one encoder, so leave it out"):
+    with refused("must be left out, because there is only one encoder"):
         Recipe(FA1(), {"inputs": ["skin"]}, {"a": {}})

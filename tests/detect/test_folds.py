@@ -181,7 +181,7 @@ def test_the_first_of_equal_points_is_kept() -> None:
 
 
 def test_more_folds_than_there_are_recordings_or_events_are_refused() -> None:
-    with pytest.raises(taxel.ProblemError, match="folds is 3: must be 2 to 2, the number of recordings"):
+    with pytest.raises(taxel.ProblemError, match="folds is 3: must be at most 2, the number of recordings"):
         judge(examples(1, 2), recipe(), 3)
     with pytest.raises(taxel.ProblemError, match="because each fold of a recording needs two events"):
         judge(examples(1), recipe(), 100)

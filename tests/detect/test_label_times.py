@@ -134,7 +134,8 @@ def test_where_nothing_can_be_learnt_the_error_says_by_how_much_labels_are_off(t
     code, _, error = call(capsys, *arguments, "-o", tmp_path / "r.json")
     assert (code, error.count("\n")) == (2, 1)
     assert re.search(
-        r"nothing was felt .*; what may help is --shift-ms -\d+: 12 of 12 are \d+ ms after what the sensor felt", error
+        r"the sensor felt nothing .*; what may help is --shift-ms -\d+: 12 of 12 are \d+ ms after what the sensor felt",
+        error,
     ), error
 
 

@@ -401,7 +401,7 @@ def test_one_loader_reads_both_and_refuses_others(tmp_path: Path):
         (("area", 2, 1, 1, -1), {"labels": ("a", "b")}, "age_ms is -1"),
         (("area", 2, 0.5, 1, 5), {"labels": ("a", "b")}, "release is 0.5 and frames is 1: with age_ms both must be 1"),
         (("area", 2, 1, 5, 5), {"labels": ("a", "b")}, "release is 1 and frames is 5: with age_ms both must be 1"),
-        (("area", 2, 1, 1, 5), {}, "labels are left out"),
+        (("area", 2, 1, 1, 5), {}, "labels are missing"),
         (("area", 2), {"labels": (None, None)}, "labels are both left out"),
         (("area", 2), {"labels": ("a", "a")}, "labels are both a"),
         (("area", 2), {"labels": ("a",)}, "labels is"),

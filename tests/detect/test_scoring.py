@@ -110,7 +110,7 @@ def test_the_spread_is_numpys(values: list[float]) -> None:
         ({"a": [0.5]}, 50, "truth\\['a'\\]\\[0\\] is 0.5: must be a whole number that fits int64"),
         ({"a": [[1]]}, 50, "dimensions"),
         ({"a": ["x"]}, 50, "truth"),
-        ({1: [5]}, 50, "1 is not a label"),
+        ({1: [5]}, 50, "truth: the label 1 must be a text"),
         ({"a": None}, 50, "truth"),
         ([1, 2], 50, "truth has no labels, found has a, b"),
         ({"a": [1]}, -1, "window_ms is -1: must be from 0 to 3600000"),

@@ -335,7 +335,7 @@ def test_what_cannot_be_answered_is_one_clear_error(change, text):
 
 def test_trials_of_two_arrays_are_refused():
     other = taxel.Frames(np.zeros((5, 2, 2)), np.arange(5))
-    with pytest.raises(taxel.ProblemError, match="must all have one"):
+    with pytest.raises(taxel.ProblemError, match="all arrays must have the same size"):
         answer([*trials_of(4), LabelledTrial(other, "left first", 0)], window_ms=20)
 
 

@@ -175,7 +175,7 @@ def test_where_nothing_arrives_the_address_that_is_missing_is_named(monkeypatch)
 def test_nonsense_is_refused():
     with pytest.raises(ProblemError, match="seconds is 0"):
         check_board(seconds=0)
-    with pytest.raises(ProblemError, match="preset 'fast'"):
+    with pytest.raises(ProblemError, match="preset is 'fast'"):
         check_board(preset="fast")
-    with pytest.raises(ProblemError, match="leave it out"):
+    with pytest.raises(ProblemError, match="must be left out with a serial line"):
         check_board("127.0.0.1:1", preset="5.2 kHz")

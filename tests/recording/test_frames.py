@@ -371,7 +371,7 @@ def test_the_feet_of_one_recording_share_a_fold() -> None:
     recipe = Recipe(LevelCrossing([1.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
     found = judge(walks, recipe, 4)
     assert found.how == "whole recordings, 4 folds"
-    with pytest.raises(ProblemError, match="must be 2 to 4, the number of recordings"):
+    with pytest.raises(ProblemError, match="must be at most 4, the number of recordings"):
         judge(walks, recipe, 5)
     for fold in _split(walks, [Part(n) for n in range(6)], 4):
         train, test = ({walks[one.example].group for one in parts} - {""} for parts in (fold.train, fold.test))

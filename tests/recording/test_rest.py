@@ -158,7 +158,7 @@ def test_what_lay_on_the_array_in_its_quiet_stretch_is_said_and_is_no_rest_of_a_
     taxel.convert(source, path, overwrite=True)
     trained = run("train", path, "--recipe", "touch", "--folds", "0", "-o", tmp_path / "r.json", "--overwrite")
     assert "so the tare is measured at a time when nothing was on the sensor" in trained.stderr
-    begin, end = map(float, re.findall(r"holds from ([\d.]+) to ([\d.]+) ms", trained.stdout)[0])
+    begin, end = map(float, re.findall(r"measured in the recording from ([\d.]+) to ([\d.]+) ms", trained.stdout)[0])
     assert 2000 < begin < end
 
 

@@ -122,7 +122,7 @@ def _warnings(values):
 def test_a_field_that_does_not_fit_is_refused_alike():
     with pytest.raises(taxel.DeviceError, match=r"lines 65: |65 lines: the array has 64 columns"):
         Registers(lines=65)
-    with pytest.raises(taxel.DeviceError, match=r"lines 257 does not fit: must be 1 to 256 \(rule 4\)"):
+    with pytest.raises(taxel.DeviceError, match=r"lines is 257: must be from 1 to 256 \(rule 4\)"):
         Registers(lines=257)
-    with pytest.raises(taxel.DeviceError, match=r"wire_version 3 does not fit: must be 1 to 2 \(rule 4\)"):
+    with pytest.raises(taxel.DeviceError, match=r"wire_version is 3: must be from 1 to 2 \(rule 4\)"):
         Registers(wire_version=3)

@@ -70,7 +70,7 @@ export function refused(v) {
   const broken = [];
   for (const { name, least, greatest, unit } of FIELDS) {
     if (unit !== "flag" && (v[name] < least || v[name] > greatest)) {
-      broken.push({ rule: 4, text: `${name} ${v[name]} does not fit: must be ${least} to ${greatest} (rule 4)` });
+      broken.push({ rule: 4, text: `${name} is ${v[name]}: must be from ${least} to ${greatest} (rule 4)` });
     }
   }
   const { random_lines, wire_version, line_period, line_read, step_period, step_read, ramp, lines, channels, steps, driven_lines, sense_lines } = v;

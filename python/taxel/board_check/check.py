@@ -305,7 +305,7 @@ def check_board(
     if preset is not None:
         text("preset", preset, PRESETS)
     if preset is not None and place is not None:
-        raise refused("preset", ": not needed with a serial line, where the board states its registers; leave it out")
+        raise refused("preset", ": must be left out with a serial line, because the board then states its registers")
     check = _Check(None if say is None else callback("say", say))
     receiver = Receiver(text("host", host), where)
     with contextlib.closing(receiver.socket):

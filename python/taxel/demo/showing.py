@@ -66,7 +66,7 @@ def show(
     if noise_s is None:
         noise_s = 60.0 if live else 120.0
     if not 0.5 <= noise_s <= 86_400:
-        raise refused("noise", f" is {noise_s} s: must be 0.5 to 86400")
+        raise refused("noise", f" is {noise_s} s: must be from 0.5 to 86400")
     used = shipped() if readout is None else Readout.load(readout)
     seed = secrets.randbelow(TRAINING_SEED) if seed is None else seed
     if folder is None:

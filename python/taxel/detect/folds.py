@@ -475,7 +475,7 @@ def _folds(examples: Sequence[Example], k: int | Sequence[Fold]) -> tuple[Sequen
     parts = [Part(n) for n in range(len(examples))]
     recordings = len(_group(examples, parts))
     if recordings > 1 and count > recordings:
-        raise refused("folds", f" is {count}: must be 2 to {recordings}, the number of recordings")
+        raise refused("folds", f" is {count}: must be at most {recordings}, the number of recordings")
     how = f"{count} blocks of time" if recordings == 1 else f"whole recordings, {count} folds"
     return _split(examples, parts, count), how
 

@@ -144,7 +144,7 @@ class Recipe:
         if inputs is None:
             return self.encoder
         if not isinstance(self.encoder, Composite):
-            raise refused("inputs", f" is {shown(inputs)}: there is one encoder, so leave it out")
+            raise refused("inputs", f" is {shown(inputs)}: must be left out, because there is only one encoder")
         return self.encoder.only(several("inputs", inputs))
 
     def inputs_of(self, label: str) -> tuple[str, ...]:

@@ -374,7 +374,7 @@ def _by_first_bytes(path: Path) -> TaxelFile | Refusal:
         head = file.read(16)
     ending = ENDINGS.get(path.suffix.lower())
     by_magic = next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), None)
-    begins = " ".join(f"{byte:02X}" for byte in head[:4]) or "nothing"
+    begins = " ".join(f"{byte:02X}" for byte in head[:4])
     if by_magic is not None and ending in (None, by_magic):
         return TaxelFile(by_magic)
     if ending == "lsa":
@@ -390,17 +390,15 @@ def _by_first_bytes(path: Path) -> TaxelFile | Refusal:
         right = f", not with {expected[ending]}" if ending else ": not a recording"
         kind, _, then = stranger.partition("; ")
         return Refusal(FormatError(f"{starts} ({kind}){right}" + f"; {then}" * bool(then)))
-    if ending is None:
+    if not head and ending in (None, "npz", "h5"):
+        wrong = f"{path}: the file is empty; must be a recording"
+    elif ending is None:
         describes = advice(path, "describe a table or an array of another program")
         known = f"{', '.join(ENDINGS)}, and of event cameras {', '.join(CAMERA)}"
-        wrong = (
-            f"{starts}: not a recording; taxel reads {known}; {describes}"
-            if head
-            else f"{path}: the file is empty; must be a recording"
-        )
-        return Refusal(FormatError(wrong))
-    if ending in {"npz", "h5"}:
-        magic = {"npz": "50 4B 03 04", "h5": "89 48 44 46"}[ending]
-        return Refusal(FormatError(f"{starts}, not with {expected[ending]} ({magic})"))
-    # The compiled reader raises the errors of a .mcap, and the reader of tables those of a .csv.
-    return TaxelFile(ending)
+        wrong = f"{starts}: not a recording; taxel reads {known}; {describes}"
+    elif ending in {"npz", "h5"}:
+        wrong = f"{starts}, not with {expected[ending]} ({'50 4B 03 04' if ending == 'npz' else '89 48 44 46'})"
+    else:
+        # The compiled reader raises the errors of a .mcap, and the reader of tables those of a .csv.
+        return TaxelFile(ending)
+    return Refusal(FormatError(wrong))

@@ -92,7 +92,7 @@ impl Flawed {
             ("noise", flaws.noise.size, 65_535.0),
         ] {
             if !(0.0..=most).contains(&size) {
-                return Err(problem!("flaw {name} is {size}: must be 0 to {most}"));
+                return Err(problem!("flaw {name} is {size}: must be from 0 to {most}"));
             }
         }
         let n = array.len();

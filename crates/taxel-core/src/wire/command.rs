@@ -19,7 +19,7 @@ impl Command {
     /// `Problem` if the register is above 7.
     pub fn new(register: u8, value: u32) -> Result<Self> {
         if register > 7 {
-            return Err(problem!("register {register}: must be 0 to 7"));
+            return Err(problem!("register {register}: must be from 0 to 7"));
         }
         Ok(Self { register, value })
     }
@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn nonsense_is_refused_with_its_place() {
-        assert_eq!(Command::new(8, 0).unwrap_err().to_string(), "register 8: must be 0 to 7");
+        assert_eq!(Command::new(8, 0).unwrap_err().to_string(), "register 8: must be from 0 to 7");
         let text = Command::from_bytes([0x80, 0, 0x81, 0, 0]).unwrap_err().to_string();
         assert_eq!(text, "command, byte 2 is 81: must be below 80");
         let text = Command::from_bytes([0; 5]).unwrap_err().to_string();

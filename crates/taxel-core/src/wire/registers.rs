@@ -250,14 +250,8 @@ impl Registers {
         for field in fields() {
             let value = self.get(field);
             if value < field.least || value > field.greatest {
-                let text = if field.least == 1 && field.offset == 0 && value == 0 {
-                    format!("{} is 0: must be 1 or more (rule 4)", field.name)
-                } else {
-                    format!(
-                        "{} {value} does not fit: must be {} to {} (rule 4)",
-                        field.name, field.least, field.greatest
-                    )
-                };
+                let text =
+                    format!("{} is {value}: must be from {} to {} (rule 4)", field.name, field.least, field.greatest);
                 return Err(WriteRefusal { register, rule: 4, text });
             }
         }
@@ -351,9 +345,7 @@ impl Registers {
             let offset = if name == field.name { field.offset } else { 0 };
             let (least, greatest) = (field.least - field.offset + offset, field.greatest - field.offset + offset);
             if value < least || value > greatest {
-                return Err(Error::device(format!(
-                    "{name} {value} does not fit: must be {least} to {greatest} (rule 4)"
-                )));
+                return Err(Error::device(format!("{name} is {value}: must be from {least} to {greatest} (rule 4)")));
             }
             let stored = value - offset;
             let rest = next.word(field.register) & !(field.mask << field.shift);

@@ -309,4 +309,4 @@ def _within(path: Path, first: int, body: bytes, name: str, column: NDArray[Any]
     if len(wrong):
         k = int(wrong[0])
         line = first + _line_number(body, k)
-        raise FormatError(f"{path}, line {line}, column {name}: is {column[k]}; must be {max(0, low)} to {high}")
+        raise FormatError(f"{path}, line {line}, column {name}: is {column[k]}; must be from {max(0, low)} to {high}")

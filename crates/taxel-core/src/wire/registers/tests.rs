@@ -116,7 +116,7 @@ fn every_rule_refuses_with_its_numbers_and_keeps_the_old_value() {
             1,
             "step_read 0.55 us is longer than step_period 0.51 us (rule 1); the board keeps step_period 0.75 us, step_read 0.55 us",
         ),
-        (4, 0, 4, "ramp is 0: must be 1 or more (rule 4); the board keeps ramp 150 ticks"),
+        (4, 0, 4, "ramp is 0: must be from 1 to 65534 (rule 4); the board keeps ramp 150 ticks"),
         (
             0,
             1,
@@ -179,9 +179,9 @@ fn the_manuals_names_are_aliases() {
     a.set("lines", 32, &thesis()).unwrap();
     b.set("nrows", 31, &thesis()).unwrap();
     assert_eq!(a, b);
-    assert!(a.set("lines", 0, &thesis()).unwrap_err().to_string().contains("must be 1 to 256"));
+    assert!(a.set("lines", 0, &thesis()).unwrap_err().to_string().contains("must be from 1 to 256"));
     assert!(a.set("lines", 65, &thesis()).unwrap_err().to_string().contains("the array has 64 columns"));
-    assert!(a.set("nrows", 256, &thesis()).unwrap_err().to_string().contains("must be 0 to 255"));
+    assert!(a.set("nrows", 256, &thesis()).unwrap_err().to_string().contains("must be from 0 to 255"));
     assert!(a.set("speed", 1, &thesis()).unwrap_err().to_string().contains("registers: random_lines, "));
 }
 
