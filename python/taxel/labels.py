@@ -133,6 +133,12 @@ class Labels:
         self.path, self.rows = file, tuple(row for row in rows if row.text)
         self.removed = tuple(row for row in rows if not row.text)
 
+    def _with(self, path: Path, rows: Iterable[Note]) -> Labels:
+        """Return other labels, of several tables, by the times of their recordings; `path` names the tables."""
+        labels = copy(self)
+        labels.path, labels.rows, labels.removed, labels._from_beginning = path, tuple(rows), (), False
+        return labels
+
     def _without_sources(self) -> Labels:
         """Return the labels as those of all sources of their recordings."""
         labels = copy(self)

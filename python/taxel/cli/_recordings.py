@@ -54,6 +54,11 @@ def pairs(option: str, texts: Iterable[str], form: str = "NAME=VALUE") -> Iterat
         yield name, value
 
 
+def one_or_several(texts: list[str]) -> str | list[str]:
+    """Return what an option gives once, or all that it gives."""
+    return texts[0] if len(texts) == 1 else texts
+
+
 def paths_text(paths: Sequence[Path]) -> str:
     """Return the first three paths in words."""
     return ", ".join(map(str, paths[:3])) + " ..." * (len(paths) > 3)

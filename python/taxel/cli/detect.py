@@ -17,7 +17,16 @@ from taxel._base.messages import collected, of_names
 from taxel._base.times import begun
 from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._opening import FileOptions
-from taxel.cli._recordings import READ_HELP, ReportOption, paths_text, progress, say_warnings, tare_option, try_report
+from taxel.cli._recordings import (
+    READ_HELP,
+    ReportOption,
+    one_or_several,
+    paths_text,
+    progress,
+    say_warnings,
+    tare_option,
+    try_report,
+)
 from taxel.cli._say import say
 from taxel.detections import Detections
 from taxel.spikes import to_ms
@@ -45,10 +54,10 @@ def detect(
         typer.Option(help="Length of the board's frame, us. Default: from the registers or the frames, else 192."),
     ] = None,
     truth: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option(
             help="Score against a CSV with the columns label,t_us or recording,label,t_us, or (notes) against the "
-            "recordings' notes."
+            "recordings' notes. May be repeated, as --labels of taxel train.",
         ),
     ] = None,
     window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
@@ -78,18 +87,20 @@ def detect(
         check_writable(out, overwrite=overwrite)
     if report is not None:
         try_report(report, overwrite=overwrite)
+    given = one_or_several(truth) if truth else None
     options = taxel.tasks.DetectOptions(tare, frame_us, window_ms, shift_ms)
     loaded = taxel.detect.load(readout)
     with progress(as_json) as update:
         update(f"reading {paths_text(recordings)}", 0, 0)
         with collected() as unread:
             opened = files.opener.open_sensors(recordings)
-        found = taxel.tasks.detect(loaded, opened, truth, options, progress=update)
+        found = taxel.tasks.detect(loaded, opened, given, options, progress=update)
         found = replace(found, warnings=(*unread, *found.warnings))
     if out is not None:
         write_whole(out, lambda file: file.write(_table(found.outcomes).encode()), overwrite=overwrite)
     say_warnings(found.warnings)
-    printed = list(_lines(found, loaded, recordings, truth, given=tare is not None, lists=lists))
+    against = paths_text(list(map(Path, truth))) if truth else None
+    printed = list(_lines(found, loaded, recordings, against, given=tare is not None, lists=lists))
     if as_json:
         written = {"written": out, "report": None if report is None else report / "report.html"}
         files_written = {name: str(path) for name, path in written.items() if path is not None}

@@ -23,6 +23,7 @@ from taxel.cli._recordings import (
     SET_HELP,
     ReportOption,
     assignments,
+    one_or_several,
     paths_text,
     progress,
     say_warnings,
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from taxel.detect import PlainScore
     from taxel.recording import Recording
     from taxel.tasks import Training, TrainOptions
+    from taxel.tasks.labels import GivenLabels
 
 app = App()
 
@@ -44,12 +46,14 @@ def train(
     recordings: Annotated[list[Path], typer.Argument(help=f"Recordings: {READ_HELP}, or folders of them.")],
     files: FileOptions,
     labels: Annotated[
-        str,
+        list[str] | None,
         typer.Option(
             metavar="FILE",
-            help="Reference events: a CSV with the columns recording,label,t_us, or (notes) the recordings' notes.",
+            help="Reference events: a CSV with the columns recording,label,t_us, or (notes, the default) the "
+            "recordings' notes. May be repeated: a table without a column recording is of the recording that it is "
+            "named after.",
         ),
-    ] = "notes",
+    ] = None,
     recipe: Annotated[
         str | None,
         typer.Option(
@@ -124,6 +128,7 @@ def train(
     check_writable(out, overwrite=overwrite)
     if report is not None:
         try_report(report, overwrite=overwrite)
+    given = one_or_several(labels or ["notes"])
     changes = assignments(values or []) | {
         key: value for key, value in (("encoder.name", encoder), ("align", align)) if value is not None
     }
@@ -132,9 +137,9 @@ def train(
         update(f"reading {paths_text(recordings)}", 0, 0)
         with collected() as unread:
             opened = files.opener.open_sensors(recordings)
-        _try_rules(rule, labels, opened, overwrite=overwrite)
+        _try_rules(rule, given, opened, overwrite=overwrite)
     say_warnings(unread)  # before the training, which may take long, and again with its result
-    training = _trained(opened, labels, options, as_json=as_json)
+    training = _trained(opened, given, options, as_json=as_json)
     training.readout.save(out, overwrite=overwrite)
     rules = _write_rules(training.scored.plain, rule, overwrite=overwrite)
     say_warnings(training.warned)
@@ -164,7 +169,7 @@ def train(
         say(*[] if as_json else [f"report: {place}"])
 
 
-def _trained(opened: Sequence[Recording], labels: str, options: TrainOptions, *, as_json: bool) -> Training:
+def _trained(opened: Sequence[Recording], labels: GivenLabels, options: TrainOptions, *, as_json: bool) -> Training:
     """Train; if almost no label is near anything that the sensor felt, ask first on a terminal."""
     try:
         with progress(as_json) as update:
@@ -187,7 +192,7 @@ def _on_terminal() -> bool:
     return sys.stdin.isatty() and sys.stderr.isatty()
 
 
-def _try_rules(given: Path | None, labels: str, recordings: Sequence[Recording], *, overwrite: bool) -> None:
+def _try_rules(given: Path | None, labels: GivenLabels, recordings: Sequence[Recording], *, overwrite: bool) -> None:
     """Check that plain rules can be written, before the work whose result they hold."""
     from taxel.tasks.labels import references  # noqa: PLC0415
 

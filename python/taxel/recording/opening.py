@@ -161,7 +161,8 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
 
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column for each taxel. The layout of
     a .h5 is described in `taxel.recording.writers.h5`. The reference events of a ``labels.csv`` in a folder
-    (`taxel.Labels`) become notes of the files of frames that the table names.
+    (`taxel.Labels`) become notes of the files of frames that the table names, and so do those of tables beside a
+    recording: ``NAME_labels.csv``, ``NAME_events.csv``, ``NAME_events.tsv``, and a label track ``NAME.txt``.
 
     Examples
     --------
@@ -221,7 +222,8 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
     Notes
     -----
     The reference events of a ``labels.csv`` in the folder (`taxel.Labels`) become notes of the recordings that it
-    names. In a folder with files that taxel writes, all other files are ignored.
+    names, and so do those of tables beside each (`taxel.open`). In a folder with files that taxel writes, all other
+    files are ignored.
 
     Examples
     --------

@@ -39,6 +39,7 @@ from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 from taxel.tasks.labels import (
     GivenLabels,
+    are_tables,
     check_shift,
     few,
     moved,
@@ -46,6 +47,7 @@ from taxel.tasks.labels import (
     references,
     source_name,
     sources_without,
+    table_names,
     titles_of,
 )
 from taxel.tasks.rest import GivenTare, TakenRest, UnknownRestError, check_tare, given_tare, rest, zero_by_unit
@@ -228,7 +230,7 @@ def detect(
         `taxel.detect.load` reads one from its file.
     recordings : Recording or sequence of Recording
         What `taxel.open` or, of a folder, `taxel.open_all` returns.
-    truth : "notes", path or sequence of mapping, optional
+    truth : "notes", path, sequence of path or sequence of mapping, optional
         Labels to score against, as of `taxel.train`.
     options : DetectOptions, optional
     progress : function of (step, done, all), optional
@@ -267,7 +269,8 @@ def detect(
     with collected() as warnings:
         events = [] if truth is None else references(truth, opened, "truth")
         if truth is not None and not any(events):
-            raise refused("truth", f" is {truth}: names no event in {titles_of(opened)}")
+            names = table_names(truth) if are_tables(truth) else truth
+            raise refused("truth", f" is {names}: names no event in {titles_of(opened)}")
         unlabelled = {} if truth is None else sources_without(truth, opened, events)
         named = {label for of_recording in events for label in of_recording}
         if named.intersection(readout.labels):

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +21,15 @@ from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.detect.label_times import early
 from taxel.detect.recipes import spelling
-from taxel.labels import Labels, beside, trial_of
+from taxel.labels import Labels, Note, beside, trial_of
 from taxel.recording import Recording, kind_of_file
 from taxel.recording.cut import span_us
 from taxel.spikes import to_us
 
-#: "notes" (the recordings' own notes), the path of a table, or times (us) by label, a mapping for each recording.
-GivenLabels: TypeAlias = str | os.PathLike[str] | Sequence[Mapping[str, Any]]
+#: A table of labels, or several.
+Tables: TypeAlias = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
+#: "notes" (the recordings' own notes), tables, or times (us) by label, a mapping for each recording.
+GivenLabels: TypeAlias = Tables | Sequence[Mapping[str, Any]]
 
 _SIDES = {"left", "right"}
 #: How long after the last event of a board a label may be, us, as people mark late; and from which distance on, the
@@ -41,7 +45,7 @@ def references(
     A table names recordings by path, file name or stem; in one that it does not name nothing happened, unless the
     table also names a recording that is not there. `argument` is what errors call the source.
     """
-    if not isinstance(source, str | os.PathLike):
+    if not are_tables(source):
         return _mapped(source, recordings, argument)
     if source == "notes":
         noted = _from_beginnings([_noted(recording) for recording in recordings], recordings, "notes")
@@ -54,15 +58,15 @@ def references(
             notes = counted(sum(note.t is not None for note in outside.notes), "note")
             raise ProblemError(f"{outside.title}: has {notes}, none within {_span(outside)}")
         return noted
-    table = _opened(Path(source), recordings)
+    table = _opened(source, recordings)
     # The sources of one file are one recording.
     count = len({(recording.path, trial_name(recording)) for recording in recordings})
     if count > 1 and any(not row.recording for row in table.rows):
         trials = f", with names like {trial_name(recordings[0])}" if are_trials(recordings) else ""
         raise refused(
             argument,
-            f" is {source}: does not state the recording of each label, but there are {count} recordings; state it in "
-            f"the column recording{trials}; the columns are {', '.join(map(shown, table._columns))}",
+            f" is {table.path}: does not state the recording of each label, but there are {count} recordings; state it "
+            f"in the column recording{trials}; the columns are {', '.join(map(shown, table._columns))}",
         )
     _check_sources(table, argument, recordings)
     named = {
@@ -73,7 +77,7 @@ def references(
     others = [name for name in table.recordings if name not in known]
     if unnamed and (others or len(unnamed) == len(recordings)):
         names = f"it names {few(table.recordings)}" if table.rows else "it is empty"
-        raise refused(argument, f" is {source}: names no event in {titles_of(unnamed)}; {names}")
+        raise refused(argument, f" is {table.path}: names no event in {titles_of(unnamed)}; {names}")
     _warn_of_strangers(table, recordings)
     times = [table.times(recording) for recording in recordings]
     events = _from_beginnings(times, recordings, str(table.path), stated=table._from_beginning)
@@ -115,12 +119,10 @@ def sources_without(
     events : sequence of mapping of str to int64, us
         Labels of each recording, as `references` returns them.
     """
-    if not isinstance(source, str | os.PathLike):
+    if not are_tables(source):
         return {}
     rows = (
-        (note for each in recordings for note in each.notes)
-        if source == "notes"
-        else _opened(Path(source), recordings).rows
+        (note for each in recordings for note in each.notes) if source == "notes" else _opened(source, recordings).rows
     )
     titles = {each.label: {each.title, each.name} for each in recordings if each.label}
     of_sources = {row.text for row in rows if row.source or any(row.recording in names for names in titles.values())}
@@ -177,9 +179,20 @@ def of_other_sources(
     return found
 
 
-def _opened(path: Path, recordings: Sequence[Recording]) -> Labels:
-    """Open a table of labels; on grids of no side, such as plates, which have both feet, sides do not name sources."""
-    table = Labels(path)
+def are_tables(source: GivenLabels) -> TypeGuard[Tables]:
+    """Return whether labels are given by "notes" or by tables."""
+    several_tables = isinstance(source, list | tuple) and source and isinstance(source[0], str | os.PathLike)
+    return isinstance(source, str | os.PathLike) or bool(several_tables)
+
+
+def table_names(source: Tables) -> str:
+    """Return the names of tables in a message."""
+    return few([str(source)] if isinstance(source, str | os.PathLike) else map(str, source))
+
+
+def _opened(source: Tables, recordings: Sequence[Recording]) -> Labels:
+    """Open tables of labels; on grids of no side, such as plates, which have both feet, sides do not name sources."""
+    table = Labels(source) if isinstance(source, str | os.PathLike) else _joined(source, recordings)
     sides = {row.source for row in table.rows} - {""}
     files = {(recording.path, trial_name(recording)) for recording in recordings}
     of_both = all(
@@ -188,23 +201,61 @@ def _opened(path: Path, recordings: Sequence[Recording]) -> Labels:
     if not sides or not sides <= _SIDES or not of_both or len(files) < len(recordings):
         return table
     warn(
-        f"{path}: labels of {' and '.join(sorted(sides))} count alike, because no recording states its side "
+        f"{table.path}: labels of {' and '.join(sorted(sides))} count alike, because no recording states its side "
         "(side in a layout file)"
     )
     return table._without_sources()
 
 
+def _joined(paths: Sequence[str | os.PathLike[str]], recordings: Sequence[Recording]) -> Labels:
+    """Return several tables as one; rows that name no recording are of the one that their table is named after.
+
+    Raises
+    ------
+    ProblemError : rows of a table that is named after no recording
+    """
+    tables = [Labels(path) for path in paths]
+    rows: list[Note] = []
+    for table in tables:
+        owners = {table.named(each.path, trial_name(each), each.label): each for each in reversed(recordings)}
+        own = next((each for each in recordings if _is_named_after(table.path, each)), None)
+        for row in table.rows:
+            owner = owners.get(row.recording) if row.recording else own
+            if owner is None and not row.recording:
+                raise ProblemError(
+                    f"{table.path}: does not state the recording of each label; state it in the column recording, or "
+                    f"name the table after its recording, for example {Path(trial_name(recordings[0])).stem}.csv"
+                )
+            begins = [span_us(each)[0] for each in recordings if owner is not None and each.path == owner.path]
+            begin_us = min(begins) if table._from_beginning and begins else 0
+            rows.append(replace(row, recording=row.recording or _name_of(owner), t=(row.t or 0) + begin_us))
+    return tables[0]._with(Path(table_names(paths)), rows)
+
+
+def _is_named_after(table: Path, recording: Recording) -> bool:
+    """Return whether a table has the name of a recording, with or without what tables of labels have behind it."""
+    stem = re.escape(Path(trial_name(recording)).stem)
+    return re.fullmatch(rf"{stem}(_labels|_events|\.notes)?", table.stem) is not None
+
+
+def _name_of(recording: Recording | None) -> str:
+    """Return the name by which labels name a recording: its path, of a trial that of the trial."""
+    if recording is None:
+        return ""
+    trial = trial_name(recording)
+    return str(recording.path) if recording.path.name == trial else trial
+
+
 def _tables(source: GivenLabels, recording: Path, recordings: Sequence[Recording]) -> list[Labels]:
     """Return the table of labels that a recording has, if any."""
-    if not isinstance(source, str | os.PathLike):
+    if not are_tables(source):
         return []
-    table = beside(recording) if source == "notes" else Path(source)
-    return [_opened(table, recordings)] if table.is_file() else []
+    if source != "notes":
+        return [_opened(source, recordings)]
+    return [_opened(beside(recording), recordings)] if beside(recording).is_file() else []
 
 
-def _mapped(
-    source: Sequence[Mapping[str, Any]], recordings: Sequence[Recording], argument: str
-) -> list[dict[str, NDArray[np.int64]]]:
+def _mapped(source: GivenLabels, recordings: Sequence[Recording], argument: str) -> list[dict[str, NDArray[np.int64]]]:
     """Return the events that are given as times by label, a mapping for each recording."""
     each = several(argument, source)
     if len(each) != len(recordings):
@@ -280,21 +331,19 @@ def labelled_trials(source: GivenLabels, recordings: Sequence[Recording]) -> lis
 
     A trial without labels would otherwise count as one in which nothing happened.
     """
-    if not isinstance(source, str | os.PathLike):
+    if not are_tables(source):
         return list(recordings)
     trials: dict[Path, set[str]] = {}
     for recording in recordings:
         trials.setdefault(recording.path, set()).add(trial_name(recording))
-    named: dict[Path, set[str]] = {}
+    with_labels: dict[Path, set[str]] = {}
     for path, names in trials.items():
-        table = beside(path) if source == "notes" else Path(source)
-        named[path] = names & {row.recording for row in Labels(table).rows} if table.is_file() else set()
-        if 0 < len(named[path]) < len(names):
-            warn(
-                f"{path}: left out {len(names) - len(named[path])} of its {len(names)} trials, which have no labels",
-                stacklevel=2,
-            )
-    return [each for each in recordings if not named[each.path] or trial_name(each) in named[each.path]]
+        of_path = {row.recording for table in _tables(source, path, recordings) for row in table.rows}
+        with_labels[path] = names & of_path
+        if 0 < len(with_labels[path]) < len(names):
+            left_out = f"{len(names) - len(with_labels[path])} of its {len(names)} trials, which have no labels"
+            warn(f"{path}: left out {left_out}", stacklevel=2)
+    return [each for each in recordings if not with_labels[each.path] or trial_name(each) in with_labels[each.path]]
 
 
 def _check_sources(table: Labels, argument: str, recordings: Sequence[Recording]) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -39,7 +38,16 @@ from taxel.recording.analysis.rest import BY_UNIT
 from taxel.recording.opening import sensors_of
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
-from taxel.tasks.labels import GivenLabels, labelled_trials, moved, references, sources_without, titles_of
+from taxel.tasks.labels import (
+    GivenLabels,
+    are_tables,
+    labelled_trials,
+    moved,
+    references,
+    sources_without,
+    table_names,
+    titles_of,
+)
 from taxel.tasks.rest import GivenTare, given_tare, has_rest, tare_before, tare_if_any
 from taxel.tasks.train_result import Training, TrainOptions
 
@@ -62,9 +70,9 @@ def train(
     ----------
     recordings : Recording or sequence of Recording
         What `taxel.open` or, of a folder, `taxel.open_all` returns.
-    labels : "notes", path or sequence of mapping
-        The recordings' own notes; a table label,t_us or recording,label,t_us; or times (us) by label, one mapping for
-        each recording.
+    labels : "notes", path, sequence of path or sequence of mapping
+        The recordings' own notes; a table label,t_us or recording,label,t_us; several tables, each of the recording
+        that it is named after, or with a column recording; or times (us) by label, one mapping for each recording.
     options : TrainOptions, optional
     progress : function of (step, done, all), optional
 
@@ -148,7 +156,7 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
 
 
 def _named(labels: GivenLabels) -> str:
-    return str(labels) if isinstance(labels, str | Path) else "given as times"
+    return table_names(labels) if are_tables(labels) else "given as times"
 
 
 def _examples(
