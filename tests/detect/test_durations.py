@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from refusal import refused
 
+import taxel
 from taxel import Array, Frames, Readout, Tare
 from taxel.detect import Example, PlainRule, Recipe, fit, judge, recipes, run, score, tune
 from taxel.detect.floors import floor_alone, measured_floor
@@ -118,6 +122,17 @@ def test_taps_and_presses_are_told_when_they_end(seed: int) -> None:
     lasted = found.known - found.t
     assert (lasted[found.label == "press"] > 1_150_000).all()
     assert (lasted[found.label == "tap"] < 300_000).all()
+
+
+def test_training_says_in_seconds_how_late_what_a_touch_is_is_known(tmp_path: Path) -> None:
+    learnt = touches(1, 8, 5)
+    taxel.convert(learnt.source, tmp_path / "a.npz")
+    result = taxel.train(taxel.open(tmp_path / "a.npz"), [learnt.labels], taxel.tasks.TrainOptions(folds=0))
+    tap, press = (next(line for line in result.lines() if line.startswith(f"{k}, neuron")) for k in ("tap", "press"))
+    assert re.search(r"0 false, known \+\d+ ms after the label \(median\)$", tap)
+    late = re.search(r", known (.*) s after the label \(median; at most (.*) s\), when the touch ends$", press)
+    assert late
+    assert 1.2 < float(late[1]) < float(late[2]) < 2.4
 
 
 def test_held_out_presses_of_one_recording_end_in_the_part_of_their_label() -> None:

@@ -76,6 +76,20 @@ def test_the_command_names_a_drift(tmp_path: Path, capsys) -> None:
         assert not remarks if said is None else remarks[0].startswith(said)
 
 
+def test_no_drift_is_said_where_the_labels_are_found(tmp_path: Path) -> None:
+    taxel.convert(touched(1, 20.0), tmp_path / "drifts.npz")
+    recording, rule = taxel.open(tmp_path / "drifts.npz"), PlainRule("area", 2, noise_floor=FLOOR)
+    options = taxel.tasks.DetectOptions(tare=1.0)
+    [alone] = taxel.tasks.detect(rule, recording, options=options).each
+    found = alone.outcome.found
+    assert len(found) > 2
+    labels = {label: found.t[found.label == label] for label in rule.labels}
+    for by, is_said in ((0, False), (300_000, True)):
+        moved = {label: t + by for label, t in labels.items()}
+        [each] = taxel.tasks.detect(rule, recording, [moved], options).each
+        assert ["this was not tried" in text for text in each.remarks if "drifted" in text] == [True] * is_said
+
+
 def pressed(begins: list[int]) -> np.ndarray:
     """Return 200 frames of 4 x 4 taxels, ten of them pressed from each of these on."""
     values = np.full((200, 4, 4), 50)

@@ -137,6 +137,24 @@ def test_a_training_asks_first_about_labels_within_touches(seed: int) -> None:
     assert "no recipe detects what happens while a touch lasts" in text
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_labels_within_holds_are_asked_about_where_those_of_their_edges_are_by_hand(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    begins = 200 + np.cumsum(random.integers(320, 400, 20))
+    ends = begins + random.integers(150, 250, 20)
+    values = random.normal(50, 0.5, (int(ends[-1]) + 200, 1, 8))
+    for begin, end in zip(begins, ends, strict=True):
+        values[begin:end, 0, :4] += random.uniform(40, 60)
+    t = 10_000 * np.arange(len(values))
+    by_hand = {"grasp": t[begins] - 75_000, "release": t[ends] + 90_000}
+    labels = {k: v + np.rint(random.normal(0, 25_000, 20)).astype(int) for k, v in by_hand.items()}
+    frames = taxel.Frames(values, t, unit="counts", array=taxel.Array(1, 8))
+    slips = t[begins] + random.integers(400_000, 1_100_000, 20)
+    assert asked(frames, labels | {"slip": slips}).startswith("slip: 20 of 20 labels are within touches; ")
+    # What is near the onset is felt there, and may be learnt as a kind of touch.
+    assert asked(frames, labels | {"pinch": t[begins] + random.integers(60_000, 280_000, 20)}) == ""
+
+
 def test_a_training_names_the_part_of_each_recording_whose_labels_are_off(tmp_path: Path, capsys: Any) -> None:
     folder, rows, begins = tmp_path / "days", ["recording,label,t_us\n"], []
     folder.mkdir()

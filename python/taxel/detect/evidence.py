@@ -41,6 +41,8 @@ _NEARLY_NONE = 0.1
 _LEAST_LABELS, _NEARLY_ALL = 4, 0.9
 #: Labels of several names are moved together whose distances from what was felt differ by so many windows at most.
 _TOGETHER = 1.5
+#: Labels are within touches that are farther from where these begin and end, ms, where labels of these are not exact.
+_WITHIN_MS = 300.0
 #: Among so many loads a label many labels are where one begins by chance.
 _MOST_A_LABEL = 4
 #: Five folds need this many labels.
@@ -258,12 +260,21 @@ class Evidence:
         return [*while_lasting, *(shifts or found)]
 
     def _while_lasting(self, label: str, wrong: int) -> Iterator[Cause]:
-        """Yield that most labels of a name are within touches, where most labels of another name are at their edges."""
+        """Yield that most labels of a name are within touches, where those of another name follow their edges."""
         near, at_edge, total = self._near.get(label, (0, 0, 0))
-        fits = [name for name, (_, edges, count) in self._near.items() if name != label and 2 * edges > count]
+        if recipes.knows("touch", label) or not total:
+            return
+        # Labels of edges may be late; what is within touches is then far from these.
+        beside = int(self.felt.felt_at(self.felt.times(label), _WITHIN_MS)[1].sum())
+        is_far = label not in self._distances and 2 * beside < total
+        fits = [
+            name
+            for name, (_, edges, count) in self._near.items()
+            if name != label and (2 * edges > count or (is_far and name in self._distances))
+        ]
         within = near - at_edge
         # A tare that does not fit lets touches seem to last.
-        if recipes.knows("touch", label) or not fits or 2 * within <= total or self._loaded.taxels >= TOUCH:
+        if not fits or 2 * within <= total or self._loaded.taxels >= TOUCH:
             return
         measured = (
             f"{within} of {counted(total, 'label')} {are(within)} within touches; labels of {', '.join(fits)} are "

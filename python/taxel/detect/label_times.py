@@ -158,9 +158,11 @@ class FeltLoads:
         assert self._loads is not None
         return self._loads.truth(label, self._loads.whole_examples)
 
-    def felt_at(self, times: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return which times are within 50 ms of a load, and which within 50 ms of its begin or end."""
-        reach = round(to_us(WINDOW_MS))
+    def felt_at(
+        self, times: NDArray[np.int64], reach_ms: float = WINDOW_MS
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return which times are within 50 ms, or as far as given, of a load, and which of its begin or end."""
+        reach = round(to_us(reach_ms))
         near, at_edge = np.zeros(len(times), np.bool_), np.zeros(len(times), np.bool_)
         for quantity in self._felt:
             begins, ends = self._spans(quantity)

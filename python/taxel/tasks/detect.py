@@ -20,7 +20,7 @@ from taxel.detect.cause import Cause
 from taxel.detect.detector import detector
 from taxel.detect.exchanged import Scored, exchanged
 from taxel.detect.floors import measured_floor
-from taxel.detect.mistakes import Standing, behind_gaps, causes_of, score_of, unreliable
+from taxel.detect.mistakes import Standing, behind_gaps, causes_of, many_wrong, score_of, unreliable
 from taxel.detect.readout import run_counting
 from taxel.detect.tares import count_drifted, count_loaded
 from taxel.detect.training_data import Unlike, unlike
@@ -544,13 +544,16 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
         return [*lines, f"rest: {quiet.text(recording.path, recording._turned)}"], Unlike()
     lines += _of_taxels(source)
     floors = noise_floors(readout)
+    # Labels that are found show that the rest was right.
+    if outcome.score is not None and outcome.score.events and not many_wrong(outcome.score):
+        tare = None
     if tare is not None and floors and not isinstance(source, SpikeTrains):
         count = count_drifted(source, tare, max(floors))
         if count:
             lines.append(
                 f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that touches "
                 "may seem not to end, and other touches may be missed: take a tare between later touches (taxel cut "
-                "RECORDING FILE --from S --to S, then --tare FILE)"
+                "RECORDING FILE --from S --to S, then --tare FILE); this was not tried"
             )
     if tare is not None and isinstance(source, Frames) and (floor := measured_floor([outcome.example])) is not None:
         count = count_loaded(source, tare, floor)
@@ -559,7 +562,7 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
             lines.append(
                 f"rest: the recording begins loaded: {counted(count, 'taxel')} later read less than the rest that was "
                 "taken, so that touches may be missed: take a tare while nothing touches (taxel cut RECORDING FILE "
-                "--from S --to S, --tare FILE)"
+                "--from S --to S, --tare FILE); this was not tried"
             )
             return lines, Unlike()
     differs = unlike(readout, outcome.example, outcome.found)

@@ -20,6 +20,7 @@ from taxel.detect.levels import LEAST_LEVELS
 from taxel.detect.mistakes import unreliable
 from taxel.detect.recipe import change_values, with_floor
 from taxel.detect.scoring import score_rows
+from taxel.encode import TouchEnds
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.spikes import to_ms
@@ -29,6 +30,8 @@ from taxel.tasks.rest import GivenTare, check_tare, rest
 
 #: Largest number of unpaired labels that a warning names.
 _NAMED = 5
+#: Detections are known late that are known so long after their label, ms.
+_LATE_MS = 500.0
 #: Readouts know at other times whose delays differ by more, ms.
 _APART_MS = 1.0
 #: How a user gets the file of a plain rule, and uses it.
@@ -318,7 +321,9 @@ class Training:
 
     def _scores(self, label: str) -> Iterator[str]:
         """Yield how the neuron and the plain rule of a label scored on the same labels."""
-        yield _line(label, "neuron", self.scored.together[label]) + self._written(label)
+        parts = self.readout.encoder_of(label)._each()
+        when = "when the touch ends" if any(isinstance(part, TouchEnds) for part in parts) else ""
+        yield _line(label, "neuron", self.scored.together[label], when) + self._written(label)
         plain = self.scored.plain
         rule = None if plain is None else plain.rules[label]
         if plain is None or plain.together is None:
@@ -440,10 +445,13 @@ def _are_quiet(recordings: Sequence[Recording]) -> bool:
         return False
 
 
-def _line(label: str, by: str, score: Score) -> str:
-    known = (
-        "never known"
-        if not score.found
-        else f"known {three_digits(score.delay.median, '+')} ms after the label (median)"
-    )
+def _line(label: str, by: str, score: Score, when: str = "") -> str:
+    """Return a score; `when` its detections are known, if that is late."""
+    known = "never known"
+    if score.found:
+        median_ms, most_ms = score.delay.median, float(score.delays_ms.max())
+        known = f"known {three_digits(median_ms, '+')} ms after the label (median)"
+        if median_ms >= _LATE_MS:
+            late = f"known {median_ms / 1e3:.1f} s after the label (median; at most {most_ms / 1e3:.1f} s)"
+            known = f"{late}, {when}".removesuffix(", ")
     return f"{label}, {by}: {score.found} of {score.events} found, {score.missed} missed, {score.false} false, {known}"
