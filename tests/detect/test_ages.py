@@ -108,11 +108,12 @@ def test_each_delay_has_one_frame(frame_ms: float) -> None:
     assert in_frames(made, examples, clocks) == made
     period_ms = float(np.median(np.diff(t))) / 1e3
     neuron = made.neurons["small"]
-    *points, place, ends = neuron, *neuron["choose"]
+    *points, ends, lifts, place = neuron, *neuron["choose"]
     delays = [one["delay_ms"] for one in points]
     assert delays == sorted(set(delays))
     assert (place["inputs"], place["delay_ms"]) == (["places"], delays[0])
     assert (ends["inputs"], ends["delay_ms"], ends["step_ms"]) == (["ends"], 0.1, 0.1)
+    assert lifts == {**ends, "inputs": ["lifts"]}
     for part, those in (("moments", delays[:1]), ("later", delays[1:]), ("places", delays[:1])):
         ages = made.encoder.parts[part].ages_ms
         for delay_ms in those:

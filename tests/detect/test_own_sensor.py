@@ -260,16 +260,13 @@ def test_where_only_the_first_touches_have_labels_those_of_the_others_may_help()
     assert helps(12, 12) == ""
 
 
-def test_a_name_that_is_not_known_as_an_end_is_said_where_no_input_follows_it() -> None:
+def test_an_end_of_touches_is_learnt_by_any_name() -> None:
     frames, labels = touched((8, 8), 5, gain=200.0, noise=1.0)
     frames = Frames(frames.values, frames.t, unit="V", array=frames.array)
-    tare = Tare.take(frames, stop_us=900_000)
-    for name, helps in (("drop", "another name of the label"), ("off", "")):
-        times = {"contact": labels["contact"], name: labels["lift"]}
-        example = Example(frames, times, tare)
-        plan = Recipe.load("touch", None, list(times), measured_floor([example]))
-        none = score(taxel.Detections([], [], []), times)
-        assert first_cause(fit_aligned([example], plan, None), [example], none, none, label=name).advice == helps
+    times = {"contact": labels["contact"], "drop": labels["lift"]}
+    example = Example(frames, times, Tare.take(frames, stop_us=900_000))
+    readout = fit_aligned([example], Recipe.load("touch", None, list(times), measured_floor([example])), None).readout
+    assert score(run(readout, frames, tare=example.tare), times).rank[0] == 0
 
 
 def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail(
@@ -287,7 +284,7 @@ def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail
     )
     assert ([one for one in said if one.startswith("encoding")], followed) == (["encoding 1 of 1"] * 2, [])
     # With a floor above every touch area and levels find nothing; two quantities are tried, and followed once; then the
-    # peak.
+    # peak, separate loads, and ends of touches.
     floors = {
         "encoders.area.noise_floor": 90.0,
         "encoders.levels.noise_floor": 9e4,

@@ -86,7 +86,7 @@ class Cause:
       load rises or falls slowly.
     - ``gaps`` (*): missed labels are where frames are missing, false detections at the first frames after a gap.
     - ``unlabelled_time``: a quarter of the time is before or after the labels. Label all events, or ``taxel cut``.
-    - ``label_name``: no input follows a kind's labels, or they are within touches. A name of begin or end; other times.
+    - ``label_name``: labels of a kind are within touches. Labels where touches begin or end.
     - ``other_name`` (*): false detections are at labels of another name.
     - ``unlabelled_loads`` (*): false detections are in loads as strong as labelled loads (label these too), or inside
       a load, as at a partial release.

@@ -114,7 +114,7 @@ class Mistakes:
         # A load that stays holds all labels.
         stays = any(cause.kind == "standing_load" for cause in known)
         where = [c for c in where if label in c.labels and not (stays and c.kind == "overlapping_loads")]
-        causes = [*self._unlabelled_time(evidence.sound, label), *self._name(label, wrong), *where]
+        causes = [*self._unlabelled_time(evidence.sound, label), *where]
         # Labels are far from what is felt where a tare does not fit, and where a load is felt late, too.
         unpaired = ("foreign_labels", "unfelt_labels", "tare", "standing_load")
         if not any(cause.kind in unpaired for cause in known) and label not in evidence.felt_apart:
@@ -239,18 +239,6 @@ class Mistakes:
         measured = f"no input that {label} is learnt from is within {WINDOW_MS:.0f} ms of {counted(unpaired, 'label')}"
         yield Cause("unfelt_labels", (label,), mistakes, measured, "")
 
-    def _name(self, label: str, wrong: int) -> Iterator[Cause]:
-        """Yield that a label without its name may be the end of a touch, where it was learnt as a kind of touch."""
-        alignment = self.trained.alignments.get(label)
-        kinds = self._by_touch and not recipes.knows("touch", label)
-        if not kinds or self.scored[label].found or alignment is None or alignment.train is not None:
-            return
-        measured = (
-            "the recipe touch learns it as a kind of touch, and detects it when a touch begins; names of the end of a "
-            f"touch are {recipes.names_of('touch', 'lift')}"
-        )
-        yield Cause("label_name", (label,), wrong, measured, "another name of the label")
-
     def _of_learning(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield the causes where labels and tares are right: inputs, kinds, too few examples; or that there is none."""
         if rules := list(self._rule(label, wrong)):
@@ -305,11 +293,6 @@ class Mistakes:
         )
         kind = "durations" if lasting else "plain_rule"
         yield Cause(kind, (label,), wrong - left, measured, "the plain rule (--rule FILE)", "--rule FILE")
-
-    @property
-    def _by_touch(self) -> bool:
-        """Whether it was trained by the recipe `touch`."""
-        return self.trained.recipe.about == str(recipes.read("touch")["about"])
 
 
 def by_recipe(name: str, scored: Score, tried: Score, causes: Sequence[Cause]) -> tuple[Cause, ...]:
