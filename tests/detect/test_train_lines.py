@@ -91,7 +91,10 @@ def test_the_last_lines_warn_of_labels_that_are_not_found_and_the_readout_is_wri
     assert taxel.Readout.load(tmp_path / "r.json").labels == ("contact", "lift")
     result = json.loads(call(capsys, *arguments, "--window-ms", 1, "--json")[1])
     assert [f"warning: {one}" for one in result["warnings"]] == out.splitlines()[-2:]
-    assert "contact, lift: what may help is to look where a load begins (taxel view); --shift-ms -7 moves these" in out
+    assert (
+        "contact, lift: what may help is to look where a load begins (taxel view); --shift-ms -7 moves the labels"
+        in out
+    )
     assert "; next: follow the advice above, then train again\n" in out
     request = {"recordings": [str(recording)], "labels": str(labels), "out": str(tmp_path / "p.json")}
     for window_ms, command in ((1, ""), (10, f"taxel detect RECORDING --readout {tmp_path / 'p.json'}")):

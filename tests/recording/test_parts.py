@@ -71,7 +71,7 @@ def test_other_peoples_h5_is_a_list_of_trials_whose_truth_is_notes(tmp_path: Pat
         assert {n.text: n.t for n in rec.notes} == {e: int(t[0]) for e, t in trial.truth.items()}
     with h5py.File(tmp_path / "other.h5", "w") as h5:
         h5["t"] = [1]
-    with pytest.raises(FormatError, match=r"contains t \(1\); must contain arrays t, x, y, p \(events\)"):
+    with pytest.raises(FormatError, match=r"contains t \(1\); must contain the arrays t, x, y and p \(events\)"):
         taxel.open(tmp_path / "other.h5")
 
 

@@ -393,7 +393,7 @@ def test_noise_alone_is_distinguished_from_loads_where_no_half_second_is_quiet(
         code, _, error = call(capsys, "detect", place, "--readout", trained.file)
         assert (code, "no half second is quiet with nothing on it" in error) == (2, not is_noise), error
         said = re.search(
-            r"quiet: only noise moves in \d+ of \d+ half seconds, but its standard deviation is (\d+)", error
+            r"quiet: \d+ of \d+ half seconds contain only noise, but the noise has a standard deviation of (\d+)", error
         )
         assert bool(said) == is_noise, error
         assert ("times that of the training" in error) == is_noise

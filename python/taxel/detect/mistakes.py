@@ -412,10 +412,7 @@ class Measured:
             return Cause(kind, names, count + len(false), measured, advice, option, arguments)
 
         if stretch:
-            advice = (
-                f"to move the labels {stretch} {abs(round(ms, -1)):.0f} ms {side}, "
-                "if the clock of the recording is right"
-            )
+            advice = f"to move the labels {stretch} {abs(round(ms, -1)):.0f} ms {side}, if the clock of the recording is right"
             return cause(f"{measured}, all {stretch}", advice)
         fits = [name for name, part in self._scores.items() if name not in names and 2 * part.found > part.events]
         if fits:
@@ -602,7 +599,7 @@ def _of_clock(cause: Callable[..., Cause], ms: float, measured: str, fits: str) 
         advice = f"to train on labels that are {distance} {back} (taxel train --shift-ms {-shift_ms})"
         return cause(measured, advice, kind="shifted_training")
     measured += f": either these labels are {is_late} or the labels of the training were {was}"
-    advice = f"to look where a load begins (taxel view); --shift-ms {shift_ms} moves these labels"
+    advice = f"to look where a load begins (taxel view); --shift-ms {shift_ms} moves the labels"
     return cause(measured, advice)
 
 

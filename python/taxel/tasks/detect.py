@@ -560,9 +560,9 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
         if count:
             # Touches are measured above the rest.
             lines.append(
-                f"rest: the recording begins loaded: {counted(count, 'taxel')} later read less than the rest that was "
-                "taken, so that touches may be missed: take a tare while nothing touches (taxel cut RECORDING FILE "
-                "--from S --to S, --tare FILE); this was not tried"
+                f"rest: something touches the sensor at the beginning: {counted(count, 'taxel')} read less later, so "
+                "touches may be missed: take a tare while nothing touches the sensor (taxel cut RECORDING FILE --from S "
+                "--to S, then --tare FILE); this was not tried"
             )
             return lines, Unlike()
     differs = unlike(readout, outcome.example, outcome.found)

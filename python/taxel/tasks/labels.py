@@ -409,7 +409,7 @@ def _from_beginnings(
             counted_anew.append((recordings[k].title, begin))
     if counted_anew:
         (title, begin), *others = counted_anew
-        more = f", and so of {len(others)} more" * bool(others)
+        more = f"; for {counted(len(others), 'other recording')} likewise" * bool(others)
         warn(f"{where}: times are counted from the beginning of {title}, {begun(begin)}{more}", stacklevel=3)
     return moved
 

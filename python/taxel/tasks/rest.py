@@ -394,8 +394,8 @@ def _noisy(source: Events | Frames) -> tuple[float, str]:
     if not strong:
         return 0.0, ""
     return strong, (
-        f": only noise moves in {np.count_nonzero(still)} of {counted(len(still), 'half second')}, but its standard "
-        f"deviation is {strong:.3g} {source.unit}, {strong / np.nanmax(np.ptp(values, axis=0)):.1%} of the range"
+        f": {np.count_nonzero(still)} of {counted(len(still), 'half second')} contain only noise, but the noise has a "
+        f"standard deviation of {strong:.3g} {source.unit}, {strong / np.nanmax(np.ptp(values, axis=0)):.1%} of the range"
     )
 
 

@@ -111,8 +111,8 @@ def refuse_without_layout(path: Path) -> None:
         name = next((name for name, shape in shapes.items() if len(shape) in (2, 3)), None)
         if name is None:
             raise FormatError(
-                f"{path}: contains {list_arrays(shapes)}; must contain arrays t, x, y, p (events), or arrays values, t "
-                "(frames), or, with a layout file, one array of frames x rows x columns or frames x taxels "
+                f"{path}: contains {list_arrays(shapes)}; must contain the arrays t, x, y and p (events) or the arrays "
+                "values and t (frames); with a layout file, one array of frames x rows x columns or frames x taxels "
                 "(docs/files.md)"
                 + "; if the data are in a struct, save its fields: save('FILE.mat', '-struct', 'NAME')"
                 * path.name.endswith(".mat")
