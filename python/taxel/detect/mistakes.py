@@ -412,7 +412,8 @@ class Measured:
             return Cause(kind, names, count + len(false), measured, advice, option, arguments)
 
         if stretch:
-            advice = f"to move the labels {stretch} {abs(round(ms, -1)):.0f} ms {side}, if the clock of the recording is right"
+            by = f"{abs(round(ms, -1)):.0f} ms {side}"
+            advice = f"to move the labels {stretch} {by}, if the clock of the recording is right"
             return cause(f"{measured}, all {stretch}", advice)
         fits = [name for name, part in self._scores.items() if name not in names and 2 * part.found > part.events]
         if fits:

@@ -41,8 +41,8 @@ _SUM = "total"
 #: Noise and strength differ from these times on. The strength is this quantile of touches, so that a stretch of strong
 #: ones counts.
 _NOISIER, _WEAKER, _STRONGER, _STRONG = 1.5, 0.6, 1.7, 0.75
-#: Touches are weaker where this quantile is, too; a load that lasts longer than this share of its recording stays, if it
-#: lasts longer than a step in a short trial, us.
+#: Touches are weaker where this quantile is, too; a load that lasts longer than this share of its recording stays, if
+#: it lasts longer than a step in a short trial, us.
 _STRONGEST, _STAYS, _STAYS_US = 0.95, 0.5, 3_000_000
 #: From so many times the noise on the loads are not compared.
 _MUCH_NOISE = 2.0

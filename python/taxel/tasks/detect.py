@@ -561,8 +561,8 @@ def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRul
             # Touches are measured above the rest.
             lines.append(
                 f"rest: something touches the sensor at the beginning: {counted(count, 'taxel')} read less later, so "
-                "touches may be missed: take a tare while nothing touches the sensor (taxel cut RECORDING FILE --from S "
-                "--to S, then --tare FILE); this was not tried"
+                "touches may be missed: take a tare while nothing touches the sensor (taxel cut RECORDING FILE --from "
+                "S --to S, then --tare FILE); this was not tried"
             )
             return lines, Unlike()
     differs = unlike(readout, outcome.example, outcome.found)

@@ -393,9 +393,10 @@ def _noisy(source: Events | Frames) -> tuple[float, str]:
     strong = float(np.median(noise[still])) if still.any() else 0.0
     if not strong:
         return 0.0, ""
+    share = strong / np.nanmax(np.ptp(values, axis=0))
     return strong, (
         f": {np.count_nonzero(still)} of {counted(len(still), 'half second')} contain only noise, but the noise has a "
-        f"standard deviation of {strong:.3g} {source.unit}, {strong / np.nanmax(np.ptp(values, axis=0)):.1%} of the range"
+        f"standard deviation of {strong:.3g} {source.unit}, {share:.1%} of the range"
     )
 
 
