@@ -155,7 +155,7 @@ def written_twice(frames: Frames) -> list[str]:
     """Return which frames, counted from 0, the next ones repeat exactly, as noise never does.
 
     One that equals the frame before it, as of a slow sensor, and readings that rest at one value are none. Whole
-    numbers of a single channel repeat by chance, and are not told.
+    numbers of a single channel repeat by chance, and are not reported.
 
     Examples
     --------

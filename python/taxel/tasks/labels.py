@@ -388,7 +388,7 @@ def _from_beginnings(
 
     Those are all events of a recording whose times count from 1970, if all are within its duration. Sources of a file
     count from the first of them; if they begin apart, the labels are refused. Where the table of the events states that
-    its times count from the beginning, they are all events, and nothing is said.
+    its times count from the beginning, they are all events, without a warning.
     """
     begins: dict[tuple[Path, str], list[int]] = {}
     labelled = [k for k, events in enumerate(each) if any(map(len, events.values()))]
