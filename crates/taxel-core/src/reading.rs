@@ -257,7 +257,7 @@ mod tests {
 
     #[test]
     fn the_name_that_was_meant_is_said() {
-        assert!(message(r#"{"tau": 1, "smal": 2}"#).contains("smal is not known (did you mean small?): there is"));
+        assert!(message(r#"{"tau": 1, "smal": 2}"#).contains("smal is not known (did you mean small?): must be"));
         assert!(!message(r#"{"tau": 1, "wings": 2}"#).contains("mean"));
     }
 

@@ -279,7 +279,7 @@ def learn(examples: EncodedExamples, recipe: Recipe, array: Array | None, report
         if differs := _differing(best.point, recipe._choices_of(label)[0]):
             by, by_first = differs
             chosen[label] = (
-                f"learnt by {by}: {best.wrong} missed and false in the training data, {first_wrong} by {by_first}"
+                f"learnt with {by}: {best.wrong} missed and false in the training data; with {by_first}: {first_wrong}"
             )
         delays[label], ranges[label] = fitting.delay_ms, fitting.seen(learners[label])
         if fitting.alignment is not None:
@@ -310,7 +310,7 @@ def _differing(point: Mapping[str, Any], first: Mapping[str, Any]) -> tuple[str,
 
     def text(values: Mapping[str, Any]) -> str:
         of_key = {key: values.get(key, "as of all") for key in keys}
-        return ", ".join(" and ".join(v) if key == "inputs" else f"{key} {v}" for key, v in of_key.items())
+        return ", ".join(f"input {' and '.join(v)}" if key == "inputs" else f"{key} {v}" for key, v in of_key.items())
 
     return (text(point), text(first)) if keys else None
 

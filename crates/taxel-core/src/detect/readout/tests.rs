@@ -65,7 +65,7 @@ fn files_that_are_no_readout_are_refused_by_name() {
         (&good.replace("\"version\": 1,", ""), "readout: the key \"version\" is missing; must be 1"),
         (&good.replace("\"version\": 1,", "\"version\": 2,"), "readout: version is 2; this taxel reads only version 1"),
         (&good.replace("\"run_threshold\"", "\"threshold\""), "readout: threshold is not known: must be"),
-        (&good.replace("\"neurons\"", "\"neuron\""), "readout: neuron is not known (did you mean neurons?): there is"),
+        (&good.replace("\"neurons\"", "\"neuron\""), "readout: neuron is not known (did you mean neurons?): must be"),
         (&good.replace("contact_area", "contact_are"), "readout: encoder contact_are: must be one of"),
         (&good.replace("\"noise_floor\": 3.0", "\"noise_floor\": -3.0"), "readout: noise_floor is -3"),
         (&good.replace("\"run_threshold\": 0.9", "\"run_threshold\": 0"), "readout: run_threshold is 0"),
