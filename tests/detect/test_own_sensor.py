@@ -293,7 +293,7 @@ def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail
     blind = Recipe.load("touch", floors, LABELS, 3.0)
     said.clear()
     made = fit_aligned([example], blind, lambda step, *_: said.append(step))
-    assert [one for one in said if one.startswith("encoding")] == ["encoding 1 of 1"] * 5
+    assert [one for one in said if one.startswith("encoding")] == ["encoding 1 of 1"] * 6
     assert sorted(followed) == ["contact", "lift"]
     assert {one.inputs for one in made.readout.neurons.values()} <= {("area",), ("load",), ()}
 
@@ -346,7 +346,7 @@ def test_a_row_of_channels_is_told_how_it_is_laid_out_and_array_does_it(tmp_path
     (tmp_path / "flat.layout.toml").write_text("rate_hz = 1000\n")
     taxel.detect.PlainRule("local_load", 3).save(tmp_path / "rule.json")
     detect = ("detect", tmp_path / "flat.npy", "--readout", tmp_path / "rule.json", "--tare", "0.05")
-    assert "1 x 12 channels without a pitch; give --array ROWSxCOLUMNS" in call(capsys, *detect)[2]
+    assert "a pitch; if the taxels are a grid, row by row, give --array ROWSxCOLUMNS" in call(capsys, *detect)[2]
     assert "--array has 4 x 4 taxels; " in call(capsys, *detect, "--array", "4x4")[2]
     status, said, _ = call(capsys, *detect, "--array", "3x4", "--json")
     assert status == 0

@@ -32,10 +32,10 @@ def spoilt(file: Path) -> None:
 
 
 DAMAGE: dict[str, tuple[str, Callable[[Path], None], str]] = {
-    "a cut .npz": (".npz", cut, r"b\.npz: the \.npz cannot be unpacked"),
-    "a cut .h5": (".h5", cut, r"b\.h5: not a whole HDF5 file"),
+    "a cut .npz": (".npz", cut, r"b\.npz: the \.npz file is damaged"),
+    "a cut .h5": (".h5", cut, r"b\.h5: the HDF5 file is damaged"),
     "a bad line": (".csv", spoilt, r"b\.csv, line 31: "),
-    **{f"an empty {ending}": (ending, empty, rf"b\{ending}, (byte 0|line 1): ") for ending in (".npz", ".h5", ".csv")},
+    **{f"an empty {ending}": (ending, empty, rf"b\{ending}.* is empty|b\{ending}, line 1: ") for ending in (".npz", ".h5", ".csv")},
     "an empty .mcap": (".mcap", empty, r"b\.mcap"),
 }
 
@@ -84,7 +84,7 @@ def test_a_damaged_file_of_another_format_or_program_is_left_out(tmp_path: Path)
 def test_if_no_file_can_be_read_the_error_is_that_of_the_first(tmp_path: Path) -> None:
     for stem in "ab":
         (tmp_path / f"{stem}.npz").write_bytes(b"PK\x03\x04")
-    with pytest.raises(FormatError, match=r"a\.npz: the \.npz cannot be unpacked"):
+    with pytest.raises(FormatError, match=r"a\.npz: the \.npz file is damaged"):
         taxel.open_all(tmp_path)
 
 
@@ -106,7 +106,7 @@ def test_commands_use_the_others_and_say_what_is_left_out(tmp_path: Path, capsys
         rows += [f"walk{seed},contact,{10_000 * (100 + 60 * k)}" for k in range(8)]
     cut(tmp_path / "walk1.npz")
     (tmp_path / "labels.csv").write_text("\n".join(rows) + "\n")
-    line = f"left out, because it cannot be read: {tmp_path}/walk1.npz: the .npz cannot be unpacked"
+    line = f"left out, because it cannot be read: {tmp_path}/walk1.npz: the .npz file is damaged"
     readout = tmp_path / "readout.json"
     code, said, warned = call(capsys, "train", tmp_path, "-o", readout)
     assert code == 0

@@ -158,7 +158,7 @@ def test_a_recording_that_is_larger_than_what_is_available_is_refused_with_both_
 ) -> None:
     """A process that may address 2 GiB has less than 1.5 GiB for a recording."""
     said = opened(npz_bomb(tmp_path, 3 << 10), at_most=2048 * MIB)
-    assert "would have 3221225472 bytes" in said["refused"]
+    assert "would take 3221225472 bytes" in said["refused"]
     assert "(3/4 of the memory that is available); a larger limit" in said["refused"]
 
 

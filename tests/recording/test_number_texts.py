@@ -84,7 +84,7 @@ def test_a_name_with_other_digits_is_no_taxel(tmp_path):
 
 @pytest.mark.parametrize("number", STRANGE)
 def test_a_block_of_cells_is_read_as_each_of_them(tmp_path, number):
-    with pytest.raises(FormatError, match="line 3: b"):
+    with pytest.raises(FormatError, match="line 3: column 'b' is"):
         text.numbers([["1", "2"], ["3", "4"], ["5", number]], tmp_path / "a.txt", 1, ["a", "b"])
     read = text.numbers([["1", "-2e3"], [" 3.", ".5\u00a0"]], tmp_path / "a.txt", 1, ["a", "b"])
     assert np.array_equal(read, [[1, -2000], [3, 0.5]])

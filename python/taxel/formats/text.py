@@ -222,7 +222,7 @@ def number(cell: str, path: Path, line: int, noun: str, *, unmarked: bool = Fals
     ------
     FormatError : no finite number (names file, line and column)
     """
-    text, noun = cell.strip(), short(noun)
+    text, noun = cell.strip(), noun if noun.startswith("column ") else short(noun)
     remedy = (
         f"; if this text marks a missing value, write in a layout file: [table] missing = {shown(text)}"
         if unmarked
