@@ -289,6 +289,7 @@ def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail
         "encoders.area.noise_floor": 90.0,
         "encoders.levels.noise_floor": 9e4,
         "encoders.changes.noise_floor": 9e4,
+        "encoders.lifts.noise_floor": 9e4,
     }
     blind = Recipe.load("touch", floors, LABELS, 3.0)
     said.clear()
@@ -356,7 +357,7 @@ def test_a_row_of_channels_is_told_how_it_is_laid_out_and_array_does_it(tmp_path
     example = Example(grid, {"contact": [100_000, 250_000]}, Tare.take(grid, stop_us=50_000))
     taxel.detect.fit([example], recipe).save(tmp_path / "readout.json")
     said = call(capsys, "detect", tmp_path / "flat.npy", "--readout", tmp_path / "readout.json", "--tare", "0.05")[2]
-    assert "12 taxels: the readout was trained on 3 x 4; give --array ROWSxCOLUMNS[xMM], or rows and columns in" in said
+    assert "on 3 x 4; if the taxels are a grid, row by row, give --array ROWSxCOLUMNS[xMM], or rows and columns in" in said
 
 
 def test_ctrl_c_while_a_training_reads_or_learns_ends_it_and_leaves_nothing(tmp_path: Path) -> None:
