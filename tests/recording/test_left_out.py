@@ -35,7 +35,7 @@ DAMAGE: dict[str, tuple[str, Callable[[Path], None], str]] = {
     "a cut .npz": (".npz", cut, r"b\.npz: the \.npz file is damaged"),
     "a cut .h5": (".h5", cut, r"b\.h5: the HDF5 file is damaged"),
     "a bad line": (".csv", spoilt, r"b\.csv, line 31: "),
-    **{f"an empty {ending}": (ending, empty, rf"b\{ending}.* is empty|b\{ending}, line 1: ") for ending in (".npz", ".h5", ".csv")},
+    **{f"an empty {end}": (end, empty, rf"b\{end}.* is empty|b\{end}, line 1: ") for end in (".npz", ".h5", ".csv")},
     "an empty .mcap": (".mcap", empty, r"b\.mcap"),
 }
 

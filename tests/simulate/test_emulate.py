@@ -257,7 +257,7 @@ def test_another_sensors_frames_come_through_a_pipe(listener, tmp_path):
         with path.open("rb") as source, pytest.raises(taxel.FormatError, match="standard input, line 1"):
             Pipe(source)
     path.write_bytes(b'{"rows": 5, "columns": 300, "rate": 100, "bits": 12}\n')
-    with path.open("rb") as source, pytest.raises(taxel.ProblemError, match="line 1: 5 x 300 taxels: lines 300"):
+    with path.open("rb") as source, pytest.raises(taxel.ProblemError, match="line 1: 5 x 300 taxels: lines is 300"):
         Pipe(source)
     with path.open("wb") as sink:
         sink.write(json.dumps(about).encode() + b"\n" + frames.tobytes()[:-3])

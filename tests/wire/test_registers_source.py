@@ -120,7 +120,7 @@ def _warnings(values):
 
 
 def test_a_field_that_does_not_fit_is_refused_alike():
-    with pytest.raises(taxel.DeviceError, match=r"lines 65: |65 lines: the array has 64 columns"):
+    with pytest.raises(taxel.DeviceError, match="lines is 65: "):
         Registers(lines=65)
     with pytest.raises(taxel.DeviceError, match=r"lines is 257: must be from 1 to 256 \(rule 4\)"):
         Registers(lines=257)

@@ -106,17 +106,17 @@ def _stretch_us(recording: Recording, start: float | None, stop: float | None) -
     start_us = -np.inf if start is None else begin_us + start * 1e6
     stop_us = np.inf if stop is None else begin_us + stop * 1e6
     first_s, last_s = ((t - begin_us) / 1e6 for t in (first, last))
-    whole = f"{recording.path}, which lasts from {plain(first_s)} to {plain(last_s)} s"
+    lasting = f"{recording.path}, which lasts from {plain(first_s)} to {plain(last_s)} s"
     if start is not None and start_us > last:
-        raise ProblemError(f"--from {plain(start)}: must not be after the end of {whole}")
+        raise ProblemError(f"--from {plain(start)}: must not be after the end of {lasting}")
     if stop is not None and stop_us <= first:
-        raise ProblemError(f"--to {plain(stop)}: must be after the beginning of {whole}")
+        raise ProblemError(f"--to {plain(stop)}: must be after the beginning of {lasting}")
     options = {"--from": start, "--to": stop}
     given = " ".join(f"{option} {plain(s)}" for option, s in options.items() if s is not None)
     if start_us <= first and stop_us > last:
         raise ProblemError(f"{given}: cuts nothing off {whole}")
     if start_us == stop_us or not (recording.has_events or len(recording.frames().between(start_us, stop_us))):
-        raise ProblemError(f"{given}: contains nothing of {whole}")
+        raise ProblemError(f"{given}: contains nothing of {lasting}")
     return start_us, stop_us
 
 

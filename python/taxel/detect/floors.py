@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel.detect import recipes
 from taxel.detect.examples import Example
 from taxel.frames import Frames
 from taxel.recorded import recorded
@@ -19,8 +20,9 @@ _SHARE_OF_RANGE = 0.01
 _SHARE_OF_ONE_KIND = 0.03
 #: The third quartile of normal noise is so many standard deviations above its median.
 _THIRD_QUARTILE = 0.6745
-#: The noise of channels is looked at until so long before each label, for so long, us, if there are so many frames.
-_BEFORE_US, _LOOK_US, _LEAST_FRAMES = 20_000, 500_000, 8
+#: The noise of channels is looked at until so long before each label but those of ends, for so long, us, if there are
+#: so many frames.
+_BEFORE_US, _LOOK_US, _LEAST_FRAMES = 20_000, 250_000, 8
 
 
 def floor_at_rest(noise: NDArray[np.float64]) -> float:
@@ -81,7 +83,8 @@ def floor_alone(examples: Sequence[Example], floor: float, *, kinds: int) -> flo
             floors.append(_SHARE_OF_ONE_KIND * _reach(source, example.tare))
         if example.tare.note != BY_UNIT:
             continue
-        for t in np.concatenate([*example.labels.values(), np.empty(0, np.int64)]).tolist():
+        begins = [times for label, times in example.labels.items() if recipes.neuron_of("touch", label) != "lift"]
+        for t in np.concatenate([*begins, np.empty(0, np.int64)]).tolist():
             values = source.between(t - _BEFORE_US - _LOOK_US, t - _BEFORE_US).values
             if len(values) >= _LEAST_FRAMES:
                 middle, above = np.nanquantile(values, (0.5, 0.75), axis=0)

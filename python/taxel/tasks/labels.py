@@ -218,9 +218,9 @@ def _joined(paths: Sequence[str | os.PathLike[str]], recordings: Sequence[Record
     rows: list[Note] = []
     for table in tables:
         owners = {table.named(each.path, trial_name(each), each.label): each for each in reversed(recordings)}
-        own = next((each for each in recordings if _is_named_after(table.path, each)), None)
+        namesake = next((each for each in recordings if _is_named_after(table.path, each)), None)
         for row in table.rows:
-            owner = owners.get(row.recording) if row.recording else own
+            owner = owners.get(row.recording) if row.recording else namesake
             if owner is None and not row.recording:
                 raise ProblemError(
                     f"{table.path}: does not state the recording of each label; state it in the column recording, or "

@@ -46,8 +46,10 @@ _OF_STEPS = {"foot", "footfall", "heel", "toe", "step", "stride"}
 #: What gait laboratories call the ends of a step; a recipe without a neuron `foot_off` has it as `lift`, and the other
 #: way round.
 _ENDS = {
-    **dict.fromkeys(("heel_strike", "foot_strike", "foot_contact", "initial_contact", "touch_down"), "contact"),
-    **dict.fromkeys(("erstkontakt", "fersenkontakt", "fersenauftritt", "aufsetzen", "ic", "hs"), "contact"),
+    **dict.fromkeys(
+        ("heel_strike", "foot_strike", "strike", "foot_contact", "initial_contact", "touch_down"), "contact"
+    ),
+    **dict.fromkeys(("erstkontakt", "fersenkontakt", "fersenauftritt", "aufsetzen", "ic", "hs", "fc"), "contact"),
     **dict.fromkeys(("foot_off", "toe_off", "final_contact", "fo", "to"), "foot_off"),
     **dict.fromkeys(("zehenablösung", "zehenabloesung", "zehenabstoß", "zehenabstoss"), "foot_off"),
     **dict.fromkeys(("lift_off", "abheben"), "lift"),
