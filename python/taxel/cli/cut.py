@@ -114,7 +114,7 @@ def _stretch_us(recording: Recording, start: float | None, stop: float | None) -
     options = {"--from": start, "--to": stop}
     given = " ".join(f"{option} {plain(s)}" for option, s in options.items() if s is not None)
     if start_us <= first and stop_us > last:
-        raise ProblemError(f"{given}: cuts nothing off {whole}")
+        raise ProblemError(f"{given}: cuts nothing off {lasting}")
     if start_us == stop_us or not (recording.has_events or len(recording.frames().between(start_us, stop_us))):
         raise ProblemError(f"{given}: contains nothing of {lasting}")
     return start_us, stop_us

@@ -23,7 +23,7 @@ from taxel.detect.scoring import score_rows
 from taxel.encode import TouchEnds
 from taxel.recorded import recorded
 from taxel.recording import Recording
-from taxel.spikes import to_ms
+from taxel.spikes import to_ms, to_us
 from taxel.tare import Tare
 from taxel.tasks.labels import check_shift
 from taxel.tasks.rest import GivenTare, check_tare, rest
@@ -452,6 +452,8 @@ def _line(label: str, by: str, score: Score, when: str = "") -> str:
         median_ms, most_ms = score.delay.median, float(score.delays_ms.max())
         known = f"known {three_digits(median_ms, '+')} ms after the label (median)"
         if median_ms >= _LATE_MS:
-            late = f"known {median_ms / 1e3:.1f} s after the label (median; at most {most_ms / 1e3:.1f} s)"
+            late = (
+                f"known {to_us(median_ms) / 1e6:.1f} s after the label (median; at most {to_us(most_ms) / 1e6:.1f} s)"
+            )
             known = f"{late}, {when}".removesuffix(", ")
     return f"{label}, {by}: {score.found} of {score.events} found, {score.missed} missed, {score.false} false, {known}"

@@ -41,6 +41,8 @@ __all__ = [
 _ANY = "gait_channel"
 #: More channels than these are many.
 _MOST_CHANNELS = 32
+#: Of more taxels the levels of each, 12 trains a taxel, are more inputs than a neuron may have.
+_MOST_BY_TAXEL = 800
 #: A label with one of these words is of a step, which begins and ends otherwise than a touch.
 _OF_STEPS = {"foot", "footfall", "heel", "toe", "step", "stride"}
 #: What gait laboratories call the ends of a step; a recipe without a neuron `foot_off` has it as `lift`, and the other
@@ -94,6 +96,8 @@ def fitting(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool 
     'touch'
     >>> fitting(Frames([[[0.0]]], [0], unit="N")), fitting(Frames([[[0.0]]], [0], unit="V"))
     ('gait_insole', 'gait_channel')
+    >>> [fitting(Frames([[[0.0] * 40] * rows], [0], unit="N"), ["FC", "FO"]) for rows in (20, 21)]
+    ['gait_insole', 'touch']
     >>> [fitting(Frames([[[0.0] * 6] * rows], [0], unit="V"), ["soft", "hard"]) for rows in (1, 6)]
     ['touch', 'touch']
     >>> [fitting(Frames([[[0.0]]], [0], unit=unit), ["tap"]) for unit in ("V", "N")]
@@ -146,7 +150,8 @@ def chosen(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool =
             steps = grids, subject
     many = array.taxels > _MOST_CHANNELS
     for unit in (f"many {source.unit}",) * (many or not array.is_channels) + (source.unit,):
-        if unit in recipe_for:
+        by_taxel = unit == source.unit
+        if unit in recipe_for and not (steps and by_taxel and array.taxels > _MOST_BY_TAXEL):
             return recipe_for[unit], f"frames in {source.unit}"
     if steps is None and grids is not None and many and not known:
         # The levels of `_ANY`, 22 trains a taxel, take minutes.

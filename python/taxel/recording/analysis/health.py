@@ -51,6 +51,8 @@ NOISY_FROM, NOISY_SHARE, NOISY_ON = 10, 0.5, 0.45
 #: the time from then to the end, at least so many ticks above its least value, while its neighbours (median), of
 #: channels the others, are loaded by so many ticks more than their least and released again so many times.
 HOLDS_US, HOLDS_SHARE, HOLDS_FROM = 3_000_000, 0.5, 8
+#: A taxel that holds its rest is stuck if it has changed in that share of the frames before, in so many of them.
+MOVED_SHARE, MOVED_FRAMES = 0.9, 20
 #: At most so many frames are looked at for that.
 _LOOKS = 2000
 #: A row or column is bad as a whole if this share of its taxels is, of so many or more.
@@ -359,18 +361,21 @@ def _with_held(result: Health, frames: Frames, scale: float) -> Health:
     some = frames[:: 1 + len(frames) // _LOOKS]
     t, values = some.t, some.values.reshape(len(some), -1)
     begins, runs = np.zeros((2, values.shape[1]), np.int64)
-    first = begins.copy()
+    first, moves = begins.copy(), np.zeros_like(values, np.int64)
     # The longest run of equal values of each taxel.
     for k in range(1, len(some)):
         first = np.where(values[k] == values[k - 1], first, k)
+        moves[k] = moves[k - 1] + (first == k)
         longer = k - first > runs
         begins, runs = np.where(longer, first, begins), np.maximum(runs, k - first)
     lasts_us = t[begins + runs] - t[begins]
     least = np.fmin.reduce(values, axis=0)
     held = values[begins, np.arange(values.shape[1])]
+    moved = moves[begins, np.arange(values.shape[1])]
+    were_noisy = (moved >= MOVED_FRAMES) & (moved >= MOVED_SHARE * begins)
     is_long = (lasts_us >= HOLDS_US) & (lasts_us >= HOLDS_SHARE * (t[-1] - t[begins]))
     array, found = frames.array, list[Held]()
-    for k in np.flatnonzero(is_long & ((held - least) * scale >= HOLDS_FROM)).tolist():
+    for k in np.flatnonzero(is_long & (were_noisy | ((held - least) * scale >= HOLDS_FROM))).tolist():
         y, x = divmod(k, array.columns)
         if result.noisy[y, x] or not _are_touched(
             values[begins[k] : begins[k] + runs[k] + 1], array.shape, k, least, scale
