@@ -33,7 +33,8 @@ def scipy_loads(frames: Frames, tare: Tare) -> list[Any]:
                 grown = ndimage.maximum_filter(now | before, size=gap, origin=0)
                 load, count = ndimage.label(grown, AROUND)
                 of_now, of_before = (np.bincount(load[state], minlength=count + 1) > 0 for state in (now, before))
-                spikes += [(t, k)] * (of_now & ~of_before).any() + [(t, len(GAPS) + k)] * (of_before & ~of_now).any()
+                edges = ((k, of_now & ~of_before), (len(GAPS) + k, of_before & ~of_now))
+                spikes += [(t, train) for train, begun in edges if begun.any()]
         before = now
     return spikes
 
