@@ -182,7 +182,7 @@ fn the_manuals_names_are_aliases() {
     assert!(a.set("lines", 0, &thesis()).unwrap_err().to_string().contains("must be from 1 to 256"));
     assert!(a.set("lines", 65, &thesis()).unwrap_err().to_string().contains("must be at most 64, the number"));
     assert!(a.set("nrows", 256, &thesis()).unwrap_err().to_string().contains("must be from 0 to 255"));
-    assert!(a.set("speed", 1, &thesis()).unwrap_err().to_string().contains("registers: random_lines, "));
+    assert!(a.set("speed", 1, &thesis()).unwrap_err().to_string().contains("must be one of random_lines, "));
 }
 
 #[test]
