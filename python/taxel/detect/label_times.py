@@ -364,7 +364,7 @@ def _alike(
     left = int(np.count_nonzero(~is_near))
     if most < _LEAST or _by_chance(most, left, len(apart), _SAME_MS, farthest_ms) > _CHANCE:
         return None
-    # Of touches at regular intervals several distances have as many.
+    # Several distances have as many if touches follow one another at regular intervals.
     begin = min((k for k, count in enumerate(counts) if count == most), key=lambda k: abs(apart[k]))
     here = slice(begin, stops[begin])
     members = np.zeros(first[-1], np.bool_)
@@ -578,9 +578,6 @@ def other_rate(examples: Sequence[Example], found: Sequence[Detections], window_
     return Cause("other_rate", names, 2 * (fits - now), measured, advice)
 
 
-_Kinds = Sequence[tuple[NDArray[np.int64], NDArray[np.int64]]]
-
-
 def _beside(
     labels: NDArray[np.float64], times: NDArray[np.int64], reach: float
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
@@ -591,7 +588,10 @@ def _beside(
 
 
 def _fitting(
-    kinds: _Kinds, rates: NDArray[np.float64], reach: float, shifts: NDArray[np.float64] | float = 0.0
+    kinds: Sequence[tuple[NDArray[np.int64], NDArray[np.int64]]],
+    rates: NDArray[np.float64],
+    reach: float,
+    shifts: NDArray[np.float64] | float = 0.0,
 ) -> NDArray[np.int64]:
     """Return how many times are within reach of a label of their kind, whose times are divided by each of the rates."""
     counts: NDArray[np.int64] = np.zeros(max(len(rates), np.size(shifts)), np.int64)

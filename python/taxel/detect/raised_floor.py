@@ -45,7 +45,8 @@ def fit_floor(recipe: Recipe, examples: Sequence[Example], parts: Iterable[Stret
     measured = [part for part in recipe.encoder._each() if getattr(part, "noise_floor", None) == floor]
     if floor is None or not measured or lacks_neighbours(examples) or any(e.tare is None for e in examples):
         return recipe
-    stretches = list(parts)
+    # Where labels are not known, touches lack them.
+    stretches = [part for part in parts if not examples[part[0]].unlabelled]
     labels = sum(np.count_nonzero((t >= a) & (t < b)) for k, a, b in stretches for t in examples[k].labels.values())
     alone = {times: sum(_alone(examples[k], times * floor, a, b) for k, a, b in stretches) for times in (1.0, *_RAISED)}
     best = min(alone, key=lambda times: alone[times])
@@ -67,6 +68,7 @@ def _alone(example: Example, floor: float, start: float, stop: float) -> int:
     curve = _core.LoadCurve.of_frames("area", floor, source._parts(), None, tare_text(example.tare))
     begins, ends = (np.asarray(edge[0], np.int64) for edge in curve.edges(1.0, 0.5, 1))
     labels = np.sort(np.concatenate([*example.labels.values(), np.empty(0, np.int64)]))
+    labels = labels[(labels >= start) & (labels < stop)]
 
     def near(times: NDArray[np.int64], others: NDArray[np.int64]) -> NDArray[np.bool_]:
         window = to_us(WINDOW_MS)
@@ -75,8 +77,7 @@ def _alone(example: Example, floor: float, start: float, stop: float) -> int:
         )
         return found
 
-    known = labels[(labels >= start) & (labels < stop)]
     count = min(len(begins), len(ends))
     begins, edges = begins[:count], np.sort(np.concatenate([begins, ends]))
     strays = ~near(begins, labels) & ~near(ends[:count], labels) & (begins >= start) & (begins < stop)
-    return int(np.count_nonzero(~near(known, edges)) + np.count_nonzero(strays))
+    return int(np.count_nonzero(~near(labels, edges)) + np.count_nonzero(strays))
