@@ -1,7 +1,8 @@
-"""Settings of all tests: random examples are the same each time, and a slow machine is no failure."""
+"""Settings of all tests: random examples are those of the committed tree, and a slow machine is no failure."""
 
 import os
 import signal
+import subprocess
 import sys
 from collections.abc import Iterator
 
@@ -11,7 +12,7 @@ from hypothesis import is_hypothesis_test, settings
 #: Scripts that made kept data: not tests, and they need packages that are not installed.
 collect_ignore = ["rules/tests/data"]
 
-settings.register_profile("slow", deadline=None, derandomize=True)
+settings.register_profile("slow", deadline=None, max_examples=500)
 settings.register_profile("quick", settings.get_profile("slow"), max_examples=20)
 
 # Before NumPy and scikit-learn load: their threads wait for each other by computing, and each worker has one core.
@@ -28,9 +29,23 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 
+def tree_seed() -> int:
+    """Return a seed made of the committed tree: a change draws other examples, and everybody draws the same ones."""
+    command = ["git", "rev-parse", "HEAD^{tree}"]
+    return int(subprocess.run(command, cwd=os.path.dirname(__file__), capture_output=True, check=True).stdout[:8], 16)
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_configure(config: pytest.Config) -> None:
-    """Choose how many random examples a property test runs."""
+    """Choose how many random examples a property test runs, and which, unless a seed is given."""
     settings.load_profile("slow" if config.option.markexpr == "slow" else "quick")
+    if config.option.hypothesis_seed is None:
+        config.option.hypothesis_seed = str(tree_seed())
+
+
+def pytest_report_header(config: pytest.Config) -> str:
+    """Say how the random examples of this run are drawn again."""
+    return f"random examples: --hypothesis-seed={config.option.hypothesis_seed}"
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -89,9 +89,6 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
     ),
 ];
 
-/// Words that name nothing: what is declared has a noun of its field. `other` may be the second of two values of a type.
-const REFUSED: [&str; 11] = ["of", "one", "own", "other", "every", "whole", "mine", "theirs", "its", "what", "which"];
-
 type Name = Vec<String>;
 
 /// The declarations of a file: the origin of names that it re-exports, and what it uses.
@@ -301,74 +298,6 @@ fn a_module_imports_only_from_floors_below() {
             }
         }
     }
-}
-
-/// The refused words that a text declares: modules, functions, parameters, fields and variables.
-fn refused(text: &str) -> Vec<&str> {
-    let declared = |&(before, word, behind): &(&str, &str, &str)| {
-        let line = &before[before.rfind('\n').map_or(0, |end| end + 1)..];
-        let typed = behind.trim_start().starts_with(':') && !behind.trim_start().starts_with("::");
-        let second =
-            word == "other" && [": Self", ": &Self", ": &mut Self"].iter().any(|of_type| behind.starts_with(of_type));
-        let keyword = line.trim_end().rsplit(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
-        let pattern = |keyword: &str, end: &str| {
-            line.rfind(keyword).is_some_and(|begin| !line[begin + keyword.len()..].contains(end))
-        };
-        let parameter = line.replace("||", "").replace("|=", "").matches('|').count() % 2 == 1;
-        let binds = pattern("let ", "=") || pattern("for ", " in ") || parameter;
-        REFUSED.contains(&word)
-            && !before.ends_with(['.', '\''])
-            && (typed && !second || ["fn", "mod"].contains(&keyword) || binds && !typed)
-    };
-    words(text).filter(declared).map(|(_, word, _)| word).collect()
-}
-
-/// A text without what is in its comments and string literals.
-fn bare(text: &str) -> String {
-    let (mut out, mut rest) = (String::new(), text);
-    while let Some(c) = rest.chars().next() {
-        let raw = rest.strip_prefix('r').map(|after| (after.len() - after.trim_start_matches('#').len(), after));
-        let skipped = if rest.starts_with("//") {
-            rest.find('\n').unwrap_or(rest.len())
-        } else if rest.starts_with("'\"'") {
-            3
-        } else if let Some((hashes, _)) = raw.filter(|(hashes, after)| after[*hashes..].starts_with('"')) {
-            let end = format!("\"{}", "#".repeat(hashes));
-            let begin = hashes + 2;
-            rest[begin..].find(&end).map_or(rest.len(), |at| begin + at + end.len())
-        } else if c == '"' {
-            let mut escaped = false;
-            let end = rest[1..].find(|c| {
-                let ends = c == '"' && !escaped;
-                escaped = c == '\\' && !escaped;
-                ends
-            });
-            end.map_or(rest.len(), |at| at + 2)
-        } else {
-            out.push(c);
-            c.len_utf8()
-        };
-        rest = &rest[skipped..];
-    }
-    out
-}
-
-#[test]
-fn what_is_declared_has_a_noun() {
-    let mut found = vec![];
-    for (package, _) in FLOORS {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join(package).join("src");
-        for file in files(&root).into_iter().filter(|file| !file.ends_with("tests.rs")) {
-            let text = bare(&fs::read_to_string(&file).unwrap());
-            let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
-            found.extend(refused(text).into_iter().map(|word| format!("{}: {word}", file.display())));
-        }
-    }
-    assert!(found.is_empty(), "words of REFUSED are declared: {found:#?}");
-    let text =
-        "fn of(a: u8, what: &str, other: &Self) { let (one, two) = a; b.map(|&its| its); for every in x.own {} }";
-    assert_eq!(refused(text), ["of", "what", "one", "its", "every"]);
-    assert!(refused("let second = first.own; call(a, |x| x == other); path::of(a); if a == one {}").is_empty());
 }
 
 #[test]
