@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := Cargo.toml Cargo.lock $(shell find crates rules -name '*.rs' -o -name Cargo.toml)
 
-.PHONY: help check setup build released bridge demo test test-studies slow lint format registers messages bench docs dist platforms clean
+.PHONY: help check setup build released bridge demo browser test test-studies slow lint format registers messages bench docs dist platforms clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
@@ -84,15 +84,19 @@ bridge: $(VENV)/.bridge
 demo: build
 	$(BIN)/taxel demo
 
+# Pages are tested in Chromium; where there is none, it is installed.
+browser: $(VENV)/.for-test
+	@$(BIN)/python tools/chromium.py
+
 # Many tests wait for a board's clock, a page or a process: four at a time keep two cores busy.
-test: released $(VENV)/.for-test
+test: released $(VENV)/.for-test browser
 	cargo test --release --workspace --features taxel-python/test-hooks --quiet --no-fail-fast
 	$(BIN)/python -m pytest -q -n 4 --dist loadfile --no-loadscope-reorder -m "not slow"
 
 test-studies: released $(VENV)/.for-test
 	$(BIN)/python -m pytest -q -n 4 --dist loadfile --no-loadscope-reorder -m "not slow" rules $(BESIDE)
 
-slow: released $(VENV)/.for-test dist bridge
+slow: released $(VENV)/.for-test browser dist bridge
 	cargo test --release --workspace --quiet -- --ignored
 	cargo check --manifest-path fuzz/Cargo.toml --quiet
 	$(BIN)/python -m pytest -q -m slow

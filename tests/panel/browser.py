@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -15,6 +14,8 @@ from pathlib import Path
 from queue import Empty, Queue
 
 import pytest
+from playwright.sync_api import Browser, sync_playwright
+from tools.chromium import LACKING, chromium
 
 #: Timeout for any action on a machine at load 20, s.
 PATIENCE = 90
@@ -26,7 +27,15 @@ FLAGS = [
     "--disable-sync",
     "--autoplay-policy=no-user-gesture-required",
 ]
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+#: The browser's program, found while no Playwright runs.
+CHROMIUM = chromium()
+
+
+def installed() -> str:
+    """Return the browser's program, or fail where there is none."""
+    if CHROMIUM is None:
+        pytest.fail(LACKING, pytrace=False)
+    return CHROMIUM
 
 
 class Process:
@@ -95,14 +104,11 @@ def running(*arguments: str, folder: Path) -> Iterator[Process]:
         process.end()
 
 
-@pytest.fixture(scope="session")
-def chromium():  # type: ignore[no-untyped-def]  # Playwright may be absent
-    """Start the browser once for all tests, with one page for most of them; skip where there is none."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: pip install playwright")
-    if CHROMIUM is None:
-        pytest.skip("no Chromium: on Debian, apt install chromium")
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+@pytest.fixture(scope="session", name="chromium")
+def started_chromium() -> Iterator[Browser]:
+    """Start the browser once for all tests, with one page for most of them."""
+    with sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=installed(), args=FLAGS)
         browser.new_context().new_page()
         yield browser
         browser.close()

@@ -1,11 +1,11 @@
 """A live source and its panel, for the tests of the server; the browser, for those of the page."""
 
 import pytest
-from tests.panel.browser import chromium
+from tests.panel.browser import started_chromium
 
 from taxel.live import Live, Panel
 
-__all__ = ["chromium"]
+__all__ = ["started_chromium"]
 
 
 @pytest.fixture

@@ -127,7 +127,6 @@ def pixel(page: Any, t_s: float) -> float:
 @pytest.fixture(scope="module")
 def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
     """An emulated board with a control line, and a panel that listens to it."""
-    pytest.importorskip("playwright", reason="no Playwright: pip install playwright")
     folder = tmp_path_factory.mktemp("live")
     port = str(free_port())
     with running("emulate", "--port", port, "--seed", "1", "--control", "0", folder=folder) as board:

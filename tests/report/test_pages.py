@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import shutil
 import subprocess
 
 import matplotlib as mpl
@@ -13,6 +12,7 @@ import numpy as np
 import pytest
 from draws import mixed
 from matplotlib.figure import Figure
+from tests.panel.browser import installed
 
 from taxel.report.page import render
 from taxel.report.svg import INK, STYLE, picture
@@ -128,11 +128,10 @@ def opened(text, tmp_path, width=800):
         f"--user-data-dir={tmp_path / 'profile'}",
     ]
     asked += ["--no-sandbox"] * (os.geteuid() == 0)
-    command = [shutil.which("chromium"), *asked, "--dump-dom", place.as_uri()]
+    command = [installed(), *asked, "--dump-dom", place.as_uri()]
     return subprocess.run(command, check=True, capture_output=True, text=True, timeout=120).stdout
 
 
-@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here to open the page")
 @pytest.mark.parametrize("width", [1400, 500])
 def test_a_browser_shows_figures_as_large_as_they_were_drawn_and_no_page_is_too_wide(tmp_path, width):
     measured = (
@@ -149,7 +148,6 @@ def test_a_browser_shows_figures_as_large_as_they_were_drawn_and_no_page_is_too_
     assert (room == least) if width == 500 else (least < room <= 1152)
 
 
-@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here to open the page")
 @pytest.mark.parametrize(
     ("name", "width"), mixed(["pick_test gripper_left_tactile", "a" * 60 + ".mcap", "s.mcap"], [1400, 1100])
 )
