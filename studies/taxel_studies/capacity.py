@@ -1,4 +1,4 @@
-"""How many patterns a neuron can learn (thesis 6.4.4): what figure 6.7, exactness, delays and rivals share.
+"""How many patterns a neuron can learn (thesis 6.4.4): what figure 6.7, delays and rivals share.
 
 A realisation draws its patterns one after the other, and a load takes the first p of them. So what is infeasible at one
 load stays so at every higher one, and the published search (from 0.2 N up while all realisations are feasible, down if

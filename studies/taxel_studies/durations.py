@@ -28,7 +28,6 @@ CPU_SECONDS = {
     "stdp": ("full", 2520),
     "tempotron": ("full", 329),
     "touch": ("full", 795),
-    "which_drop": ("full", 149),
 }
 #: Work that takes longer says so before it begins, s.
 LONG_S = 60.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from taxel.simulate import Act, Scene, Silence
 
-__all__ = ["SLANTS_DEG", "TRAINING_SEED", "Draw", "drawn", "endless", "fall_ms", "left_to_rest", "script"]
+__all__ = ["TRAINING_SEED", "Draw", "drawn", "endless", "left_to_rest", "script"]
 
 #: Function that draws the scene of a seed and an index.
 Draw = Callable[[int, int], Scene]
@@ -18,7 +18,7 @@ Draw = Callable[[int, int], Scene]
 _LEAD_MS = 250.0
 
 #: How far the array is tilted in every other scene, degrees: between these.
-SLANTS_DEG = (10.0, 30.0)
+_SLANTS_DEG = (10.0, 30.0)
 
 #: A ball that glanced off the tilted array is taken away so long after its impact, ms, and so fast, mm/s: before it
 #: comes down again.
@@ -28,7 +28,7 @@ _AWAY_MS, _HAND_MM_S = 60.0, 500.0
 TRAINING_SEED = 2**32
 
 
-def fall_ms(scene: Scene) -> float:
+def _fall_ms(scene: Scene) -> float:
     """Return how long the ball of a drawn scene falls."""
     height_mm = scene.parameters["bodies"][0]["motion"]["dropped"]["height_mm"]
     return float(np.sqrt(2 * height_mm / 9.81e-3))
@@ -43,8 +43,8 @@ def drawn(seed: int, index: int) -> Scene:
     scene = Scene.draw(seed, index).replace(surface="layer")
     if index % 2 == 0:
         return scene
-    ending = {"left_to_rest": {"rest_ms": fall_ms(scene) + _AWAY_MS, "lift_mm_s": _HAND_MM_S}}
-    slant = float(np.random.default_rng([seed, index]).uniform(*SLANTS_DEG))
+    ending = {"left_to_rest": {"rest_ms": _fall_ms(scene) + _AWAY_MS, "lift_mm_s": _HAND_MM_S}}
+    slant = float(np.random.default_rng([seed, index]).uniform(*_SLANTS_DEG))
     return scene.body(motion={"dropped": {"ending": ending}}).replace(slant_deg=slant)
 
 
