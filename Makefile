@@ -41,7 +41,7 @@ $(VENV)/.installed: $(PROJECTS) | check
 	@touch $@
 
 # One place for each group of extras: $(VENV)/.for-test, .for-lint, .for-docs, .for-dist.
-EXTRAS_test := test beside foxglove neo nir nwb cluster bench
+EXTRAS_test := test beside neo nir nwb cluster bench
 EXTRAS_lint := lint
 EXTRAS_docs := docs
 EXTRAS_dist := dist
@@ -131,7 +131,7 @@ format: $(VENV)/.for-lint
 registers: setup
 	$(BIN)/python tools/registers.py
 
-# The types and tables of the panel's messages, from their structs in Rust.
+# The types of the panel's messages, from their structs in Rust.
 messages: build
 	$(BIN)/python tools/messages.py
 

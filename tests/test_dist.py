@@ -156,10 +156,10 @@ def test_the_viewers_install_beside_the_wheel(tmp_path: Path) -> None:
     bare = Bare(tmp_path)
     bare.install("--find-links", str(DIST), str(the("taxel_viewers-*.whl")))
     assert "\n  show  " in bare.run("taxel", "--help").stdout
-    ended = bare.run("taxel", "show", "walk.mcap", "foxglove")
+    ended = bare.run("taxel", "show", "board:127.0.0.1:0", "rerun")
     assert (ended.returncode, ended.stderr) == (
         2,
-        "taxel: foxglove is not installed: pip install 'taxel[foxglove]'\n",
+        "taxel: rerun is not installed: pip install 'taxel[rerun]'\n",
     )
 
 

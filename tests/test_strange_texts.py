@@ -203,7 +203,7 @@ def view(places: dict[str, Path], out: Path) -> Iterator[list[Any]]:
 
 def show(places: dict[str, Path], out: Path) -> Iterator[list[Any]]:
     yield ["show", places[".mcap"], NAME]
-    yield ["show", NAME, "foxglove:0"]
+    yield ["show", NAME, "rerun:127.0.0.1:1"]
 
 
 def demo(places: dict[str, Path], out: Path) -> Iterator[list[Any]]:

@@ -1,4 +1,4 @@
-"""Make the types and the tables of the panel's messages, and the options of `Live`, from the structs in Rust (`make messages`).
+"""Make the types of the page's messages, and the options of `Live`, from the structs in Rust (`make messages`).
 
 Usage: python tools/messages.py [--check]. The built extension gives their schemas (crates/taxel-panel/src/protocol/messages.rs and
 request.rs, crates/taxel-live/src/pipeline/options.rs). With --check no file is written, and the status is 1 where one differs (`make lint`).
@@ -10,7 +10,7 @@ import json
 import re
 import sys
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,30 +18,9 @@ from taxel import _core
 
 ROOT = Path(__file__).resolve().parents[1]
 HEAD = "Made from the structs of crates/taxel-panel by tools/messages.py (`make messages`): edit those."
-PAGE, CLIENT = "crates/taxel-panel/web/messages.d.ts", "python/taxel/live/_messages.py"
-DOCS = "docs/panel-protocol.md"
+PAGE = "crates/taxel-panel/web/messages.d.ts"
 STRUCT = "crates/taxel-live/src/pipeline/options.rs"
 OPTIONS, LIVE = "python/taxel/live/_stated_options.py", "python/taxel/live/live.py"
-#: The keys of messages, and of their parts, that the Python client reads; it ignores others.
-READS = {
-    "ArrayInfo": ("rows", "columns", "name"),
-    "FoundDetection": ("label", "t_us", "known_us"),
-    "Label": ("label", "t_us"),
-    "RecordedNote": ("text", "t_us"),
-    "hello": ("array",),
-    "registers": ("values",),
-    "detection": ("label", "t_us", "known_us", "slope_mv_per_ms", "reported_us"),
-    "spikes": ("encoder", "t_ms", "train", "value", "left_out"),
-    "opened": ("array", "name", "registers", "detections", "notes"),
-    "transport": ("state",),
-    "labels": ("labels",),
-    "done": ("id",),
-    "refused": ("id", "reason"),
-    "warning": ("text",),
-}
-#: The requests that it makes.
-ASKS = ("credit", "encode", "open", "overview", "play")
-
 Schema = dict[str, Any]
 
 
@@ -107,15 +86,6 @@ PYTHON = Language(
     lambda value: f"dict[str, {value}]",
     lambda words: f"Literal[{', '.join(json.dumps(word) for word in words)}]",
 )
-WORDS = Language(
-    {"integer": "whole number", "number": "number", "string": "text", "boolean": "true or false", "null": "null"}
-    | {"anything": "anything", "reference": "`{}`"},
-    " or ",
-    lambda item: f"list of {item}",
-    lambda items: f"[{', '.join(items)}]",
-    lambda value: f"object of {value}",
-    lambda words: ", ".join(f"`{word}`" for word in words),
-)
 
 
 def named(word: str) -> str:
@@ -167,88 +137,10 @@ def page(requests: Schema, messages: Schema) -> str:
     return f"// {HEAD}\n\n" + "\n".join(written + every)
 
 
-def typed_dict(name: str, schema: Schema, read: Sequence[str] | None = None) -> str:
-    """Write an object, or the keys of it that are read, as a class of Python."""
-    kind = schema["properties"].get("type", {}).get("const")
-    lines = [f'    type: Literal["{kind}"]'] if kind else []
-    if name.endswith("Request"):
-        lines.append("    id: NotRequired[int]")
-    for key, one, required in keys(schema):
-        if read is None or key in read:
-            kind = PYTHON.type(one)
-            lines.append(f"    {key}: {kind if required else f'NotRequired[{kind}]'}")
-    return f"class {name}(TypedDict):\n" + "\n".join(lines) + "\n"
-
-
-def client(requests: Schema, messages: Schema) -> str:
-    """Write the types of the Python client."""
-    sent, parts, asked = variants(messages), messages["$defs"], variants(requests)
-    kinds = [kind for kind in READS if kind in sent]
-    written = [typed_dict(name, parts[name], READS[name]) for name in READS if name in parts]
-    written += [typed_dict(named(kind) + "Message", sent[kind], READS[kind]) for kind in kinds]
-    written += [typed_dict(named(kind) + "Request", asked[kind]) for kind in ASKS]
-    every = "\n    | ".join(named(kind) + "Message" for kind in kinds)
-    unions = [
-        f"Message = (\n    {every}\n)\n",
-        f"Request = {' | '.join(named(kind) + 'Request' for kind in ASKS)}\n",
-    ]
-    head = f'"""Types of the panel\'s messages: what the client reads and asks.\n\n{HEAD}\n"""\n\n'
-    imports = "from __future__ import annotations\n\nfrom typing import Any, Literal, NotRequired, TypedDict\n"
-    return "\n\n".join([head + imports, *written, "".join(unions)])
-
-
-def cell(text: str) -> str:
-    """Return a text for a cell of a table."""
-    return text.replace("|", "\\|")
-
-
-def requested(schema: Schema) -> str:
-    """Return the keys of a request, with their limits."""
-    written = []
-    for key, one, required in keys(schema):
-        least, most, letters = one.get("minimum"), one.get("maximum"), one.get("maxLength")
-        limits = f" of 1 to {letters} characters" if letters else ""
-        if most and most <= 1e8:
-            limits = f", {least:g} to {most:g}"
-        kind = WORDS.type(one) if required else WORDS.type(one).removesuffix(" or null")
-        written.append(f"`{key}`: {kind}{limits}{'' if required else ' (may be left out)'}")
-    return "; ".join(written)
-
-
-def table_of_requests(requests: Schema, _messages: Schema) -> str:
-    """Write the table of requests."""
-    every = [*variants(requests).items(), *requests["$defs"].items()]
-    rows = [f"| `{name}` | {cell(requested(one))} | {cell(comment(one))} |" for name, one in every]
-    return "\n".join(["| `type` | keys | |", "|---|---|---|", *rows])
-
-
-def tables_of_messages(_requests: Schema, messages: Schema) -> str:
-    """Write a table for each message, and for each part of several."""
-    written = []
-    for name, one in [*variants(messages).items(), *messages["$defs"].items()]:
-        rows = [f"| `{key}` | {cell(WORDS.type(value))} | {cell(comment(value))} |" for key, value, _ in keys(one)]
-        table = "\n\n" + "\n".join(["| key | | |", "|---|---|---|", *rows]) if rows else ""
-        written.append(f"**{name}**: {comment(one)}{table}")
-    return "\n\n".join(written)
-
-
-#: The parts of the page of the docs that are made, by the marks around them.
-TABLES = {"requests": table_of_requests, "messages": tables_of_messages}
-
-
 def between(text: str, begin: str, end: str, made: str) -> str:
     """Return a text with another part between two marks."""
     before, _, rest = text.partition(begin)
     return f"{before}{begin}{made}{end}{rest.partition(end)[2]}"
-
-
-def docs(requests: Schema, messages: Schema, root: Path = ROOT) -> str:
-    """Return the page of the docs with its tables made anew."""
-    text = (root / DOCS).read_text("utf-8")
-    for name, make in TABLES.items():
-        begin, end = f"<!-- {name}: made by tools/messages.py -->\n", f"<!-- end of {name} -->"
-        text = between(text, begin, end, f"\n{make(requests, messages)}\n\n")
-    return text
 
 
 def in_order(schema: Schema) -> list[tuple[str, Schema]]:
@@ -345,8 +237,7 @@ def live(schema: Schema, root: Path = ROOT) -> str:
 def made(schemas: dict[str, Schema], root: Path = ROOT) -> dict[Path, str]:
     """Return the text of each file that is made."""
     both, of_live = (schemas["requests"], schemas["messages"]), schemas["options"]
-    texts = {PAGE: page(*both), CLIENT: client(*both), DOCS: docs(*both, root)}
-    texts |= {OPTIONS: options(of_live), LIVE: live(of_live, root)}
+    texts = {PAGE: page(*both), OPTIONS: options(of_live), LIVE: live(of_live, root)}
     return {root / name: text for name, text in texts.items()}
 
 

@@ -58,13 +58,19 @@ for k in range(count):
 
 #: Reads the frames of a panel until it ends; prints how many there were.
 WATCH = """
-import sys, time
-from taxel.live import PanelClient
-from taxel.live.client import Frame
-count, until = 0, time.monotonic() + float(sys.argv[2])
-with PanelClient(sys.argv[1], rate_hz=60.0) as client:
-    for _, item in client:
-        count += isinstance(item, Frame)
+import json, sys, time
+from urllib.parse import parse_qs, urlsplit
+from websockets.sync.client import connect
+url, count, until = urlsplit(sys.argv[1]), 0, time.monotonic() + float(sys.argv[2])
+protocols = ["taxel.panel.1", "token." + parse_qs(url.fragment)["token"][0]]
+with connect(
+    f"ws://{url.netloc}/socket", origin=f"http://{url.netloc}", subprotocols=protocols, max_size=None
+) as socket:
+    socket.send(json.dumps({"type": "credit", "n": 2}))
+    for message in socket:
+        if isinstance(message, bytes):
+            count += 1
+            socket.send(json.dumps({"type": "credit", "n": 1}))
         if time.monotonic() > until:
             break
 print(count)

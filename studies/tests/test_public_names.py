@@ -97,7 +97,7 @@ def test_all_distributions_have_one_version_and_want_each_other() -> None:
     assert {f"taxel_studies=={version}", f"taxel_bridge=={version}"} <= {*theirs[1]["dependencies"]}
     assert f"taxel_rules=={version}" in theirs[0]["dependencies"]
     extras = {"studies": "taxel_studies", "cluster": "taxel_studies[cluster]"}
-    extras |= {name: f"taxel_viewers[{name}]" for name in ("rerun", "foxglove")}
+    extras |= {"rerun": "taxel_viewers[rerun]"}
     assert {name: ours["optional-dependencies"][name] for name in extras} == {
         name: [f"{distribution}=={version}"] for name, distribution in extras.items()
     }

@@ -23,7 +23,7 @@ from .marked import TAXEL
 
 CHECKOUT = Path(__file__).parents[2]
 #: Modules that something imports if they are there, beside all that are installed or of Python itself.
-OPTIONAL = ("usercustomize", "zenoh", "taxel_zenoh", "pylsl", "serial", "rerun", "foxglove", "__main__", "_opening")
+OPTIONAL = ("usercustomize", "zenoh", "taxel_zenoh", "pylsl", "serial", "rerun", "__main__", "_opening")
 SCENE = """
 array = { rows = 8, columns = 8 }
 [[bodies]]
@@ -111,7 +111,7 @@ def commands(folder: Path) -> dict[str, list[list[object]]]:
         "export": [["nir", folder / "readout.json", "graph.nir"]],
         "information": [[folder / "a.h5", "--labels", folder / "labels.csv", "--report", "r.html", *few]],
         "bridge": [live],
-        "show": [[folder / "a.h5", "foxglove:0", "--seconds", 0.5]],
+        "show": [[folder / "a.h5", "rerun:127.0.0.1:1"]],
         "bench": [["encode_contact_area", "--quick"]],
         "study": [["fig6.2", "--size", "toy", "--jobs", 2, "--report", "study"]],
     }
@@ -130,8 +130,9 @@ def test_a_command_runs_no_code_of_a_strange_folder(command: str, here: Path, be
         done = subprocess.run(
             [TAXEL, command, *map(str, words)], cwd=here, capture_output=True, text=True, timeout=280, check=False
         )
-        # Nothing was received, or an extra is not installed.
-        assert done.returncode == (3 if command in ("record", "live", "bridge") else 0), done.stderr
+        # Nothing was received; no viewer runs, or its library is not installed.
+        expected = {"record": (3,), "live": (3,), "bridge": (3,), "show": (2, 3)}.get(command, (0,))
+        assert done.returncode in expected, done.stderr
         check_nothing_ran(here, beside)
 
 

@@ -1,4 +1,4 @@
-"""A client of the panel's server, written from docs/panel-protocol.md alone, and what the tests of the server share."""
+"""A client of the panel's server, by crates/taxel-panel/protocol.md alone, and what the tests of the server share."""
 
 from __future__ import annotations
 

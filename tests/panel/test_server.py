@@ -1,4 +1,4 @@
-"""The panel's server, by a client that is written from docs/panel-protocol.md alone."""
+"""The panel's server, by a client that is written from crates/taxel-panel/protocol.md alone."""
 
 from __future__ import annotations
 

@@ -123,6 +123,4 @@ LEFT_OUT: dict[str, str] = {
     "taxel.live.Panel.read_out": "needs a panel each time, 0.25 s; tried in tests/panel/test_windows.py",
     "taxel.live.RemoteBoard": "is a base of classes of such packages; tried in tests/live/test_remote.py",
     "taxel.live.RemoteBoard.begin": "is called by a Live; tried in tests/live/test_remote.py",
-    "taxel.live.PanelClient": "connects to a panel; tried in tests/live/test_client.py",
-    "taxel.live.PanelClient.play": "asks a panel; tried in tests/live/test_client.py",
 }

@@ -1,5 +1,5 @@
-"""Boards and recordings in other programs: Rerun and Foxglove."""
+"""Recordings and running sensors in Rerun."""
 
-from taxel_viewers.viewer import Viewer, Viewing
+from taxel_viewers.rerun import Viewer
 
-__all__ = ["Viewer", "Viewing"]
+__all__ = ["Viewer"]

@@ -1,4 +1,4 @@
-//! The live panel: a server for browsers and other clients that show a board or recordings (docs/panel-protocol.md).
+//! The live panel: a server for the page that shows a board or recordings (protocol.md).
 //!
 //! One thread serves all clients. It works on copies of the events ([`taxel_live::pipeline::ViewerEvents`]) and sends a frame
 //! only when a client has asked for one, so that a client that reads slowly, or never, delays nothing but its own

@@ -1,4 +1,4 @@
-//! The messages of the web socket (docs/panel-protocol.md): requests with their limits and refusals, and what the server sends.
+//! The messages of the web socket (protocol.md): requests with their limits and refusals, and what the server sends.
 
 pub(super) mod limited;
 pub(super) mod limits;

@@ -1,4 +1,4 @@
-//! The requests that do not concern the client's own view, and may take long: docs/panel-protocol.md, *From the client*.
+//! The requests that do not concern the client's own view, and may take long: protocol.md, *From the client*.
 
 pub(super) mod labels;
 pub(super) mod opening;

@@ -1,4 +1,4 @@
-// Frames, the binary messages of the server: docs/panel-protocol.md, version 1. Those that are text are in messages.d.ts.
+// Frames, the binary messages of the server: ../protocol.md, version 1. Those that are text are in messages.d.ts.
 
 export const VERSION = 1;
 

@@ -1,6 +1,5 @@
 """From a board's datagrams to detections, as they arrive, and the panel that shows them in a browser."""
 
-from taxel.live.client import PanelClient
 from taxel.live.live import Live
 from taxel.live.panel import Panel
 from taxel.live.remote import RemoteBoard
@@ -13,7 +12,6 @@ __all__ = [
     "PORT",
     "Live",
     "Panel",
-    "PanelClient",
     "RemoteBoard",
     "Source",
     "Summary",

@@ -32,7 +32,7 @@ class Panel:
     """Serve the live panel until it is stopped; a context manager.
 
     A separate thread serves all clients. A client that reads slowly, or never, delays neither the others nor what is
-    received and recorded. The protocol is documented, so any program may be a client; `PanelClient` is one.
+    received and recorded.
 
     Parameters
     ----------

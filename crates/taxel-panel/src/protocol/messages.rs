@@ -1,5 +1,5 @@
 //! The messages to clients, but for frames. They are described here alone: `tools/messages.py` makes of them the types of the
-//! page and of the Python client, and the tables of docs/panel-protocol.md.
+//! page.
 
 use std::collections::BTreeMap;
 

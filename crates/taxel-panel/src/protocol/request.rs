@@ -1,5 +1,4 @@
-//! The requests of clients. They are described here alone: `tools/messages.py` makes of them the types of the page and of the
-//! Python client, and the table of docs/panel-protocol.md.
+//! The requests of clients. They are described here alone: `tools/messages.py` makes of them the types of the page.
 
 use serde::Deserialize;
 use serde_json::{Map, Value, json};

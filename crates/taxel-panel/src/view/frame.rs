@@ -1,4 +1,4 @@
-//! A frame in the bytes that clients receive: docs/panel-protocol.md, *Frames*.
+//! A frame in the bytes that clients receive: protocol.md, *Frames*.
 
 use std::ops::Range;
 
