@@ -119,6 +119,7 @@ lint: $(VENV)/.for-test $(VENV)/.for-lint
 	$(BIN)/python -m mypy.stubtest taxel._core taxel_rules._rules --allowlist tests/stubtest-allowed.txt
 	$(BIN)/python tools/messages.py --check
 	$(BIN)/python tools/page_types.py
+	$(BIN)/python tools/lines.py --grown
 
 format: $(VENV)/.for-lint
 	cargo fmt --all

@@ -1,33 +1,64 @@
-"""Count the lines of code of the product's parts: `python tools/lines.py`.
+"""Count the lines of code by room, with the goals of this round: `python tools/lines.py`.
 
-A line counts where it holds code: no comment, no docstring, no blank line, no test. Code that a tool
-writes counts too; stubs, declarations and tables (`.pyi`, `.d.ts`, `.toml`) do not.
+A line counts where it holds code: no comment, no docstring, no blank line. Code that a tool writes counts too; stubs,
+declarations and tables (`.pyi`, `.d.ts`, `.toml`), the RTL, tools and documentation do not. The second sum has the
+product and the distributions beside it, so that what only moves out of the product does not lower it.
 """
 
+import argparse
+import json
 import re
+import subprocess
+from collections import Counter
 from pathlib import Path
 
 from pygments.lexers import get_lexer_for_filename
 from pygments.token import Comment, String
 
 ROOT = Path(__file__).parent.parent
-PARTS = {
-    "taxel-core": "crates/taxel-core/src",
-    "taxel-live": "crates/taxel-live/src",
-    "taxel-panel": "crates/taxel-panel/src",
-    "page": "crates/taxel-panel/web",
-    "border": "crates/taxel-python/src",
-    "border, base": "crates/taxel-border/src",
-    "python/taxel": "python/taxel",
+#: What the rooms had when they were last kept.
+KEPT = ROOT / "tools" / "lines.json"
+SUFFIXES = {".rs", ".py", ".js", ".mjs", ".css", ".html", ".j2"}
+MODULES = "python/taxel"
+#: The rooms: the goal of this round, and folders or modules.
+PRODUCT = {
+    "taxel-core": (21_000, "crates/taxel-core/src"),
+    "taxel-live": (7_500, "crates/taxel-live/src"),
+    "taxel-panel": (2_000, "crates/taxel-panel/src"),
+    "page": (3_600, "crates/taxel-panel/web"),
+    "border": (3_400, "crates/taxel-python/src crates/taxel-border/src"),
+    "nouns": (1_600, "__init__ array event_table events frames spikes tare calibration clock plot"),
+    "labels, wire, neuron": (1_100, "labels detections recorded reading wire neuron"),
+    "_base": (900, "_base"),
+    "formats": (1_250, "formats"),
+    "recording": (2_200, "recording"),
+    "encode, metrics": (730, "encode metrics"),
+    "learn": (1_050, "learn"),
+    "detect": (2_400, "detect"),
+    "information": (1_300, "information"),
+    "simulate": (870, "simulate"),
+    "tasks": (1_400, "tasks"),
+    "live, panel": (2_650, "live panel device board_check"),
+    "report, demo": (550, "report demo"),
+    "command line": (2_000, "cli __main__"),
+    "other modules": (0, MODULES),
 }
 BESIDE = {
-    "rules": "rules",
-    "studies": "studies/taxel_studies",
-    "benchmarks": "benchmarks/taxel_benchmarks",
-    "viewers": "viewers/taxel_viewers",
-    "bridge": "bridge",
+    "studies": (7_500, "studies/taxel_studies"),
+    "benchmarks": (3_200, "benchmarks/taxel_benchmarks"),
+    "rules": (2_000, "rules/src rules/taxel_rules"),
+    "viewers": (120, "viewers/taxel_viewers"),
+    "bridge": (150, "bridge/taxel_bridge bridge/zenoh"),
 }
+PLACES = {
+    place if "/" in place else f"{MODULES}/{place}": room
+    for room, (_, places) in (PRODUCT | BESIDE).items()
+    for place in places.split()
+}
+GOALS = {"product": 58_000, "with what stands beside it": 71_000, "tests in Python": 25_000}
 TEST_MODULE = re.compile(r"#\[cfg\(test\)\]\s*(?:pub(?:\(\w+\))?\s+)?mod\s+\w+\s*(;|\{)")
+#: Folders whose code is of others, or none.
+LEFT_OUT = {"vendor", "results", "data", "rtl", "tools", "docs", "fuzz"}
 
 
 def without_tests(rust: str) -> str:
@@ -41,8 +72,8 @@ def without_tests(rust: str) -> str:
     return rust
 
 
-def code_lines(file: Path) -> int:
-    """Return the number of lines of one file that hold code."""
+def code_lines(file: Path) -> tuple[int, int]:
+    """Return the number of lines of one file that hold code, and of tests that stand in a file of Rust."""
     rust = file.suffix == ".rs"
     kept = []
     for kind, text in get_lexer_for_filename(file.name, stripnl=False).get_tokens(file.read_text(encoding="utf-8")):
@@ -50,22 +81,61 @@ def code_lines(file: Path) -> int:
         literal = rust and (kind in String or kind in String.Char)
         kept.append(re.sub(r"[^\n]", "" if comment else "x", text) if comment or literal else text)
     text = "".join(kept)
-    return sum(bool(line.strip()) for line in (without_tests(text) if rust else text).splitlines())
+    lines = [sum(bool(line.strip()) for line in t.splitlines()) for t in (text, without_tests(text) if rust else text)]
+    return lines[1], lines[0] - lines[1]
 
 
-def part_lines(folder: Path) -> int:
-    """Return the lines of code below a folder, without tests and libraries of others."""
-    files = (file for file in folder.rglob("*") if file.suffix in {".rs", ".py", ".js", ".css", ".html"})
-    left_out = {"tests.rs", "tests", "vendor", "results"}
-    return sum(code_lines(file) for file in files if not left_out & set(file.relative_to(folder).parts))
+def room_of(file: Path) -> str | None:
+    """Return the room of a file: that of the nearest folder, or of the module, that has one."""
+    return next((PLACES[str(place)] for place in (file.with_suffix(""), *file.parents) if str(place) in PLACES), None)
+
+
+def counted() -> tuple[Counter[str], Counter[str]]:
+    """Return the lines of each room, and those of the tests in either language."""
+    rooms, tests = Counter[str](), Counter[str]()
+    listed = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    for name in set(listed.stdout.splitlines()):
+        file = Path(name)
+        if file.suffix not in SUFFIXES or LEFT_OUT & set(file.parts) or not (ROOT / file).exists():
+            continue
+        code, inner = code_lines(ROOT / file)
+        language = "tests in Rust" if file.suffix == ".rs" else "tests in Python"
+        if "tests" in file.parts or file.name == "tests.rs":
+            tests[language] += code + inner
+        elif room := room_of(file):
+            rooms[room] += code
+            tests[language] += inner
+    return rooms, tests
 
 
 def main() -> None:
-    """Print a line for each part, the sum of the product, and what stands beside it."""
-    product = {name: part_lines(ROOT / folder) for name, folder in PARTS.items()}
-    beside = {name: part_lines(ROOT / folder) for name, folder in BESIDE.items()}
-    for name, lines in [*product.items(), ("product", sum(product.values())), *beside.items()]:
-        print(f"{name:13} {lines:7}")
+    """Print a row for each room and the sums, or the rooms that grew since the numbers were kept."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--keep", action="store_true", help="keep the numbers in tools/lines.json")
+    parser.add_argument("--grown", action="store_true", help="print only the rooms that grew since they were kept")
+    asked = parser.parse_args()
+    rooms, tests = counted()
+    product, beside = (sum(rooms[name] for name in table) for table in (PRODUCT, BESIDE))
+    goals = {name: goal for name, (goal, _) in (PRODUCT | BESIDE).items()} | GOALS
+    now = {name: rooms[name] for name in PRODUCT} | {"product": product} | {name: rooms[name] for name in BESIDE}
+    now |= {"with what stands beside it": product + beside} | dict(sorted(tests.items()))
+    kept = json.loads(KEPT.read_text(encoding="utf-8"))
+    if asked.keep:
+        KEPT.write_text(json.dumps(now, indent=1) + "\n", encoding="utf-8")
+    elif asked.grown:
+        for name in now:
+            if now[name] > kept.get(name, 0):
+                print(f"lines of code: {name} grew from {kept.get(name, 0)} to {now[name]}")
+        return
+    print(f"{'':27} {'now':>7} {'kept':>7} {'goal':>7}")
+    for name, lines in now.items():
+        print(f"{name:27} {lines:7} {kept.get(name, 0):7} {goals.get(name, ''):>7}")
 
 
 if __name__ == "__main__":
