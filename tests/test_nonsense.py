@@ -203,7 +203,6 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     TICKS.save(folder / "here_events.calibration.json")
     READOUT.save(folder / "here_readout.json")
     RULE.save(folder / "here_rule.json")
-    READOUT.to_nir(folder / "here.nir")
     TRAINS.to_nwb(folder / "here.nwb")
     taxel.convert(EVENTS, folder / "here_events.npz")
     (folder / "here.toml").write_text('[encoder]\nname = "fa1"\n')
@@ -235,7 +234,7 @@ def test_a_result_is_what_a_sound_call_returns(name: str) -> None:
 
 #: Sound calls that take long, as they start processes, play scenes, train, estimate or draw.
 LONG = {
-    *("SpikeTrains.to_nwb", "SpikeTrains.from_nwb", "Readout.to_nir", "Readout.from_nir", "open_all", "train", "cut"),
+    *("SpikeTrains.to_nwb", "SpikeTrains.from_nwb", "Readout.to_nir", "open_all", "train", "cut"),
     *("simulate.emulate", "simulate.play", "simulate.Scene.motion", "simulate.Silence", "information.answer"),
     *("tasks.InformationOptions", "tasks.information", "tasks.CalibrateOptions", "tasks.KnownLoad", "tasks.calibrate"),
     *("tasks.detect", "tasks.encode", "tasks.rest", "tasks.info", "tasks.TrainOptions", "plot.pressure", "Note"),

@@ -178,20 +178,15 @@ def test_nir_holds_what_is_not_graded_and_refuses_what_is(tmp_path: Path) -> Non
     given = {label: one for label, one in neurons(9).items() if label in ("a", "c", "e")}
     readout = Readout(encoder, given, array=ARRAY, delays_ms=DELAYS)
     readout.to_nir(tmp_path / "several.nir")
-    assert Readout.from_nir(tmp_path / "several.nir") == readout
     import nir
 
     graph = nir.read(tmp_path / "several.nir")
-    graph.nodes["weights_1"].weight[:] *= 2.0
-    nir.write(tmp_path / "changed.nir", graph)
-    changed = Readout.from_nir(tmp_path / "changed.nir")
-    for label, one in changed.neurons.items():
-        half = len(one.weights) // 2
-        assert one.inputs == given[label].inputs
-        np.testing.assert_allclose(one.weights[half:], 2 * given[label].weights[half:])
-    graph.nodes["weights_0"].weight[:] += 1e-4
-    nir.write(tmp_path / "more.nir", graph)
-    assert all(one.inputs == () for one in Readout.from_nir(tmp_path / "more.nir").neurons.values())
+    for k, (label, one) in enumerate(given.items()):
+        row = np.concatenate([graph.nodes[f"weights_{copy}"].weight[k] for copy in range(len(DELAYS))])
+        received = np.tile(encoder.places(one.inputs, ARRAY), len(DELAYS))
+        assert not row[~received].any(), label
+        ratio = row[received] / one.weights
+        np.testing.assert_allclose(ratio, ratio[0])
     with refused("graded"):
         composite(1).to_nir(tmp_path / "graded.nir")
 

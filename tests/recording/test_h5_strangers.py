@@ -44,13 +44,6 @@ def foreign(path: Path) -> Callable[[Path], object]:
     return taxel.open
 
 
-def graph(path: Path) -> Callable[[Path], object]:
-    pytest.importorskip("nir")
-    neuron = taxel.Neuron(tau=15.0)
-    taxel.Readout(ENCODER, {"a": (neuron, [0.1] * 8)}, array=taxel.Array(2, 2)).to_nir(path, overwrite=True)
-    return taxel.Readout.from_nir
-
-
 def units(path: Path) -> Callable[[Path], object]:
     pytest.importorskip("pynwb")
     SpikeTrains.from_lists([[1.0, 2.0], [3.0]], stop=9.0).to_nwb(path, overwrite=True)
@@ -62,7 +55,6 @@ READERS: dict[str, tuple[Callable[[Path], Callable[[Path], object]], str, str]] 
     "own": (own, ".h5", "t"),
     "frames": (own_frames, ".h5", "values"),
     "foreign": (foreign, ".h5", "run1/pressure"),
-    "nir": (graph, ".nir", "node/nodes/weights/weight"),
     "nwb": (units, ".nwb", "units/spike_times"),
 }
 

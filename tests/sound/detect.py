@@ -46,9 +46,6 @@ SOUND: dict[str, Sound] = {
     "taxel.Readout.encoder_of": method(READOUT, "encoder_of", label="a"),
     "taxel.Readout.trains_of": method(READOUT, "trains_of", label="a", trains=LEVELS.encode(FRAMES)),
     "taxel.Readout.to_nir": method(READOUT, "to_nir", path="readout.nir", spike_ms=0.1, overwrite=True),
-    "taxel.Readout.from_nir": plain(
-        taxel.Readout.from_nir, path="here.nir", encoder=LEVELS, neuron=taxel.Neuron(), spike_ms=0.1
-    ),
     "taxel.Readout.from_json": plain(taxel.Readout.from_json, text=READOUT.to_json()),
     "taxel.Readout.save": method(READOUT, "save", path="readout.json", overwrite=True),
     "taxel.Readout.load": plain(taxel.Readout.load, path="here_readout.json"),

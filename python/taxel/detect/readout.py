@@ -19,7 +19,7 @@ from taxel._core import NotFittedError, ProblemError
 from taxel.array import Array
 from taxel.detect.ages import EndedTouches, end_train
 from taxel.detect.detector import _Detector, detector, tare_text
-from taxel.detect.exchange import Parts, read_nir, write_nir
+from taxel.detect.exchange import Parts, write_nir
 from taxel.detect.plain_rule import PlainRule
 from taxel.detect.trained import TrainedNeuron
 from taxel.detections import Detections
@@ -271,7 +271,7 @@ class Readout(_Detector):
         Returns
         -------
         list of str
-            A line for each thing that NIR cannot hold. The file's metadata hold it, where `from_nir` finds it again.
+            A line for each thing that NIR cannot hold.
 
         Raises
         ------
@@ -289,10 +289,7 @@ class Readout(_Detector):
     def _exchanged(self) -> Parts:
         """Return the parts that the exchange format is made of; weights of trains that a neuron lacks are 0."""
         neurons = {label: trained._replace(weights=self._spread(trained)) for label, trained in self.neurons.items()}
-        return Parts(
-            self.encoder, neurons, self.array, self.delays_ms, self.unit, self.run_threshold, self.time,
-            self.after_spike, self.to_json(),
-        )  # fmt: skip
+        return Parts(self.encoder, neurons, self.delays_ms, self.run_threshold, self.time, self.after_spike)
 
     def _spread(self, trained: TrainedNeuron) -> NDArray[np.float64]:
         """Return one weight a train of the whole encoder, at each delay."""
@@ -304,58 +301,6 @@ class Readout(_Detector):
         spread = np.zeros(len(received))
         spread[received] = trained.weights
         return spread
-
-    @classmethod
-    def from_nir(
-        cls,
-        path: str | os.PathLike[str],
-        *,
-        encoder: Encoder | None = None,
-        neuron: Neuron | None = None,
-        spike_ms: float | None = None,
-    ) -> Readout:
-        """Read a readout from a NIR graph of one layer.
-
-        One that `to_nir` wrote comes back as it was. Where its nodes were changed since, they hold; what they do not
-        say is taken from the metadata.
-
-        Parameters
-        ----------
-        path : path
-        encoder : Encoder, optional
-            Whose trains the graph's inputs are; needed where the file does not say.
-        neuron : Neuron, optional
-            Everything that NIR does not say: refractory time, threshold rise, what remains after a spike.
-        spike_ms : float, ms, above 0, optional
-            As in `to_nir`; left out, what the file says, else Dirac pulses.
-
-        Returns
-        -------
-        Readout
-
-        Raises
-        ------
-        FormatError : no NIR file; a graph that no readout can stand for (names file and node); a link or a data set
-            that leads to another file (names it)
-        FileNotFoundError : no such file
-        ProblemError : no encoder is known
-        ImportError : nir is not installed (``pip install 'taxel[nir]'``)
-        """
-
-        def build(parts: Parts) -> Readout:
-            if parts.text:
-                return cls.from_json(parts.text)
-            neurons = {label: _gather(parts, trained) for label, trained in parts.neurons.items()}
-            return cls(parts.encoder, neurons, array=parts.array, unit=parts.unit, delays_ms=parts.delays_ms)
-
-        return read_nir(
-            path,
-            lambda text: cls.from_json(text)._exchanged(),
-            build,
-            encoder=encoder,
-            neuron=neuron,
-            spike_ms=spike_ms,
-        )
 
     def __repr__(self) -> str:
         array = self.array
@@ -469,15 +414,6 @@ def _receives(encoder: Encoder, trained: TrainedNeuron, array: Array | None, del
     if not trained.inputs or not isinstance(encoder, Composite):
         return None
     return np.tile(encoder.places(trained.inputs, array or Array(1, 1)), delays)
-
-
-def _gather(parts: Parts, trained: TrainedNeuron) -> TrainedNeuron:
-    """Return a neuron with weights of its inputs alone; with all trains as inputs where others have weights too."""
-    received = _receives(parts.encoder, trained, parts.array, len(parts.delays_ms))
-    if received is None:
-        return trained
-    is_gathered = len(received) == len(trained.weights) and not trained.weights[~received].any()
-    return trained._replace(weights=trained.weights[received]) if is_gathered else trained._replace(inputs=())
 
 
 def _run_spikes(readout: Readout, trains: SpikeTrains) -> Detections:
