@@ -6,7 +6,7 @@ from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 from sklearn.neighbors import KNeighborsClassifier
 
 from taxel import ProblemError
-from taxel.information import folds, nested_predictions, training_curve
+from taxel.information import folds, nested_predictions
 from taxel_studies.discriminants import LDA, FoldSums, GramLDA, fold_predictions
 from taxel_studies.discriminants.moments import ClassMoments
 from taxel_studies.dropped import distances_of, named_by_neighbours
@@ -193,9 +193,6 @@ def test_leaving_folds_out_of_one_inverse_is_training_each_anew():
         assert found.chosen[k] == best
         said = trained(grams[best[0]], sizes[best[0]], best[1], train, test)
         assert np.array_equal(found.responses[test], said)
-    curve = training_curve(grams, sizes, y, found, [1000, 3], seed=1)
-    assert np.array_equal(curve[0], found.responses)
-    assert (curve[1] == y).mean() < (curve[0] == y).mean()
 
 
 @pytest.mark.parametrize(

@@ -210,14 +210,14 @@ def test_order_is_known_at_a_fast_period_and_lost_at_a_slow_one(answered):
     assert {p.period_ms: p.verdict and p.verdict.says for p in answered.by_period} == {1: None, 2: "keeps", 10: "loses"}
     pooled = next(p for p in answered.taxels if p.kind == "pooled")
     assert pooled.found.bits < 0.05  # one large taxel cannot tell left from right
-    assert pooled.verdict.says == "loses"
+    assert {p.verdict for p in answered.taxels} == {p.verdict for p in answered.points if p.window_ms < 60} == {None}
     assert answered.cheapest.found.bits > 0.9
-    assert answered.cheapest.kbps < answered.full.kbps
+    assert answered.cheapest.kbps == min(p.kbps for p in answered.by_period if p.period_ms < 10)
     assert answered.zero.level < 0.15
     assert answered.classifiers["neighbours"].bits > 0.9
 
 
-def test_progress_is_in_proportion_to_the_expected_time_and_settings_are_told_as_they_are_done():
+def test_progress_counts_every_step_and_settings_are_told_as_they_are_done():
     steps, told = [], []
     found = answer(
         trials_of(60),
@@ -233,11 +233,8 @@ def test_progress_is_in_proportion_to_the_expected_time_and_settings_are_told_as
         progress=lambda what, done, of: steps.append((what, done, of)),
         watch=lambda *point: told.append(point),
     )
-    assert steps[0][1] == 0
-    assert len({of for _, _, of in steps}) == 1
-    done = [one for _, one, _ in steps]
-    assert done == sorted(done)
-    assert 0.8 * steps[0][2] < done[-1] <= steps[0][2]  # what is counted beforehand is what is done, but for the last
+    assert [done for _, done, _ in steps] == list(range(len(steps)))
+    assert {of for _, _, of in steps} == {len(steps)}
     assert [point[:2] for point in told] == [(1, 10), (1, 60), (10, 10), (10, 60)] * 3
     assert {point[:2]: point[2] for point in told} == {(p.period_ms, p.window_ms): p.found.bits for p in found.points}
 
@@ -381,7 +378,7 @@ def test_bits_that_shuffled_labels_reach_are_told_from_nothing_nowhere():
     assert found.full.found.bits > 0.2
     assert found.full.found.right < 0.25
     assert found.empty
-    assert [point.verdict.says for point in (*found.by_period[1:], *found.taxels)] == ["nothing"] * 2
+    assert [point.verdict.says for point in found.by_period[1:]] == ["nothing"]
     assert any(text.startswith("the bits cannot be distinguished from 0") for text in found.warnings)
     assert any("guessing gives 50 %" in text for text in found.warnings)
 

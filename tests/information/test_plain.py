@@ -1,6 +1,5 @@
 """What is computed together is what the plain way gives: every fold trained anew, every table counted alone."""
 
-from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 
@@ -8,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused
 from scipy.stats import beta
 
 import taxel
@@ -21,7 +19,6 @@ from taxel.information import (
     nested_predictions,
     panzeri_treves,
     plug_in,
-    training_curve,
 )
 from taxel.information.sampling import HeldValues, contacts, spikes_of
 from taxel.information.wire_rate import kilobits_per_second
@@ -111,33 +108,6 @@ def test_nested_neighbours_are_those_of_every_fold_searched_anew(seed):
     said, chosen = nested(tables, y, ways, groups=None, seed=seed)
     assert found.chosen == {name: (way // 3, counts[way % 3]) for name, way in chosen.items()}
     assert np.array_equal(found.responses, said)
-
-
-def test_a_training_curve_is_of_discriminants_of_the_drawn_trials():
-    tables, y = cloud(60, 3, 4)
-    grams, features = [x @ x.T for x in tables], [6, 6]
-    first = nested_predictions(grams, features, y)
-    found = training_curve(grams, features, y, first, [3, 9], seed=2)
-    random = np.random.default_rng(2)
-    for size, said in zip((3, 9), found, strict=True):
-        expected = np.empty_like(y)
-        for name, (table, ridge) in first.chosen.items():
-            x, test = tables[table], np.flatnonzero(first.folds == name)
-            mixed = random.permutation(np.flatnonzero(first.folds != name))
-            drawn = np.concatenate([mixed[y[mixed] == k][:size] for k in range(3)])
-            expected[test] = discriminant(x[drawn], y[drawn], x[test], level(x, ridge))
-        assert np.array_equal(said, expected)
-
-
-def test_a_training_curve_takes_the_matrices_and_trials_of_its_predictions_alone():
-    tables, y = cloud(60, 3, 4)
-    grams, features = [x @ x.T for x in tables], [6, 6]
-    first = nested_predictions(grams, features, y)
-    one_too_far = replace(first, chosen={**first.chosen, 0: (len(grams), 0.1)})
-    fewer = replace(first, folds=first.folds[:-1])
-    for wrong in (one_too_far, fewer):
-        with refused("^nested was made from other trials or matrices"):
-            training_curve(grams, features, y, wrong, [3])
 
 
 def table_of(row, column, classes):

@@ -72,15 +72,6 @@ SOUND: dict[str, Sound] = {
         neighbours=(),
         seed=1,
     ),
-    "taxel.information.training_curve": plain(
-        taxel.information.training_curve,
-        grams=[CLOUD @ CLOUD.T],
-        features=[2],
-        y=[0, 1] * 4,
-        nested=NESTED,
-        sizes=[2],
-        seed=1,
-    ),
     "taxel.information.ConeRReadout": plain(taxel.information.ConeRReadout, tau=5.0, bound=1.0, max_seconds=1.0),
     "taxel.information.ConeRReadout.fit": method(
         taxel.information.ConeRReadout(tau=5.0, bound=1.0), "fit", patterns=[PLAIN, PLAIN], y=[0, 1]

@@ -15,7 +15,7 @@ from taxel._base.messages import counted
 from taxel._base.number_text import float_of, int_of
 from taxel._core import ProblemError
 from taxel.cli._app import App, JsonOption, OverwriteOption
-from taxel.cli._bar import bar, duration
+from taxel.cli._bar import bar
 from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import SET_HELP, assignments, progress, say_warnings
 from taxel.cli._say import say
@@ -103,7 +103,7 @@ def information(
         seed,
         [name for name in classifiers.split(",") if name],
     )
-    known, trials = _KnownBits(), ""
+    known = _KnownBits()
     try:
         # `progress` prints the warnings; the bar shows the steps.
         with progress(quiet=True), bar(as_json) as update:
@@ -111,19 +111,7 @@ def information(
             for path in recordings:
                 update(f"reading {path}", 0, 0)
                 opened += files.opener.open_sensors([path])
-
-            def show(step: str, done: int, total: int) -> None:
-                nonlocal trials
-                if total and not done and not as_json:
-                    say(
-                        f"{trials}: about {duration(total / 1000)} on an idle processor; Ctrl-C prints the results "
-                        "so far",
-                        err=True,
-                    )
-                trials = trials if total else step
-                update(step, done, total)
-
-            result = taxel.tasks.information(opened, labels, options, progress=show, watch=known.add)
+            result = taxel.tasks.information(opened, labels, options, progress=update, watch=known.add)
             update("drawing", 0, 0)
             taxel.report.write_information(report, result.answer, overwrite=overwrite)
     except KeyboardInterrupt:
@@ -184,49 +172,37 @@ def lines(answer: Answer) -> list[str]:
     text += [f"warning: {warning}" for warning in answer.warnings]
     columns = ("bits", "events", "millibits/event", "kb/s", "silent")
     text += ["", _row("period", *columns, "keeps 95 % of the full bits?")]
-    text += [_point(f"{p.period_ms:g} ms", p, answer) for p in answer.by_period]
+    text += [_row(f"{p.period_ms:g} ms", *_figures(p), _verdict(p, answer)) for p in answer.by_period]
     if answer.taxels:
         text += ["", _row(f"taxels at {answer.taxels[0].period_ms:g} ms", *columns, "")]
-        text += [_point(f"{p.taxels} {p.kind}", p, answer) for p in answer.taxels]
+        text += [_row(f"{p.taxels} {p.kind}", *_figures(p), "") for p in answer.taxels]
     text += [""]
     for window in sorted({p.window_ms for p in answer.points} - {full.window_ms}):
         here = [p for p in answer.points if p.window_ms == window]
-        by_period = "; ".join(
-            f"{p.period_ms:g} ms {p.found.bits:.2f}" + (f" {p.verdict}" if p.verdict is not None else "") for p in here
-        )
+        by_period = "; ".join(f"{p.period_ms:g} ms {p.found.bits:.2f}" for p in here)
         text.append(f"to {window:g} ms after contact: {by_period}")
     for name, points in answer.parameters.items():
         text.append(
             f"{name} ({points[0].found.most:.2f} bits at most): "
             + "; ".join(f"{p.period_ms:g} ms {p.found.bits:.2f}" for p in points)
         )
-    if len(answer.training) > 1:
-        (n, less), (most, bits) = answer.training[-2:]
-        rises, then = (
-            ("still", "more trials would add bits")
-            if bits - less > 0.02
-            else ("hardly", "more trials would add little")
-        )
-        text.append(
-            f"bits {rises} rise with trials: {n} -> {most} training trials per label {bits - less:+.2f}; {then}"
-        )
     text += [f"note: {note}" for note in answer.notes]
     text.append(f"rates are of {answer.wire}")
     return text
 
 
-def _point(name: str, point: Point, answer: Answer) -> str:
+def _verdict(point: Point, answer: Answer) -> str:
     verdict = "the full setting" if point.verdict is None else str(point.verdict)
-    if point is answer.cheapest and not answer.empty:
-        verdict += " <- cheapest"
-    return _row(
-        name,
+    return verdict + " <- cheapest" * (point is answer.cheapest and not answer.empty)
+
+
+def _figures(point: Point) -> tuple[str, ...]:
+    return (
         f"{point.found.bits:.2f}",
         f"{point.events:.4g}",
         f"{point.millibits_per_event:.3g}",
         f"{point.kbps:.3g}",
         f"{100 * point.silent:.0f} %",
-        verdict,
     )
 
 

@@ -14,7 +14,7 @@ from taxel.information.bits import (
 from taxel.information.estimate import Estimate, ZeroTest, estimate, zero_test
 from taxel.information.folds import folds
 from taxel.information.keeping import Keeping, keeps
-from taxel.information.nested import Nested, nested_predictions, training_curve
+from taxel.information.nested import Nested, nested_predictions
 from taxel.information.spiking import ConeRReadout
 from taxel.information.trials import LabelledTrial, notes_as_trials, read_trials, recordings_as_trials
 
@@ -43,6 +43,5 @@ __all__ = [
     "read_trials",
     "recordings_as_trials",
     "relevant_responses",
-    "training_curve",
     "zero_test",
 ]

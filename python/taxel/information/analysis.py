@@ -14,10 +14,9 @@ from taxel.encode import ChangeEvents, Encoder
 from taxel.information._threads import threads
 from taxel.information.answers import Answer, Point, is_above_chance
 from taxel.information.controls import controls
-from taxel.information.estimate import Estimate, bits_of, estimate, zero_test
+from taxel.information.estimate import Estimate, bits_of, zero_test
 from taxel.information.keeping import Keeping, keeps
-from taxel.information.nested import WORTH_THREADS, Matrices, Nested, predictions, training_curve
-from taxel.information.pace import Pace, Work
+from taxel.information.nested import WORTH_THREADS, Matrices, predictions
 from taxel.information.question import Question
 from taxel.information.rasters import frame_grams
 from taxel.information.sampling import (
@@ -85,8 +84,8 @@ def answer(
         entry point of the group ``taxel.classifiers``, such as "tempotron" if taxel_rules is installed.
     seed : int, 0 or more
     progress : function of (what, done, all), optional
-        Called with the next step, and with the expected time of the steps done and of all steps, in ms of one core. The
-        first call is before the work (done is 0); an exception that it raises ends the work.
+        Called before each step with its name, the number of steps done and that of all. An exception that it raises
+        ends the work.
     watch : function of (period_ms, window_ms, bits), optional
         Called after each draw of a setting with all taxels, with the bits by the draws so far.
 
@@ -111,7 +110,7 @@ def answer(
     answering.set_out(periods_ms, windows_ms, taxels, pools, taxels_at_ms)
     # On small matrices several threads are slower than one, and far slower where other processes compute as well.
     with threads(several=len(listed) >= WORTH_THREADS):
-        return answering.answer(also, int(shuffles), Pace(progress), watch)
+        return answering.answer(also, int(shuffles), progress, watch)
 
 
 class _Answering(Question):
@@ -121,55 +120,50 @@ class _Answering(Question):
         self,
         classifiers: list[str],
         shuffles: int,
-        pace: Pace,
+        progress: Callable[[str, int, int], object] | None,
         watch: Callable[[float, float, float], object] | None,
     ) -> Answer:
         """Return the answer for all settings."""
-        self.pace, self.work = pace, Work(self)
-        pace.expect(self.work.all(classifiers, shuffles))
+        settings = [*(("random", n) for n in self.random_taxels), *(("pooled", n) for n in self.pools)]
+        self._progress, self._done = progress, 0
+        self._steps = self.draws * (len(self.periods) + len(settings)) + shuffles + len(classifiers) + 2
         values = isinstance(self.encoder, ChangeEvents) and self.encoder.bits > 1
         responses_at: dict[tuple[int, float], list[Any]] = {}
         about: dict[tuple[int, float], list[tuple[float, float, float]]] = {}
         frames: dict[int, list[Any]] = {}
         by_column: dict[tuple[str, int], list[Any]] = {}
-        reference: tuple[SampledEvents, Matrices, Nested] | None = None
+        reference: tuple[SampledEvents, Matrices] | None = None
         missing: set[str] = set()
         for draw in range(self.draws):
             for period in self.periods:
-                pace.begin(f"{to_ms(period):g} ms, draw {draw + 1}", self.work.rasters(period))
+                self._begin(f"{to_ms(period):g} ms, draw {draw + 1}")
                 spikes = self.spikes(period, draw)
                 for window, matrices in zip(self.windows, self.matrices(spikes, self.windows), strict=True):
-                    at = f"{to_ms(period):g} ms to {to_ms(window):g} ms"
-                    pace.begin(f"{at}, draw {draw + 1}", self.work.prediction(period))
                     nested = self.nested(matrices, draw=draw)
                     responses_at.setdefault((period, window), []).append(nested.responses)
                     about.setdefault((period, window), []).append(_about(spikes, window, values))
                     missing |= {f"fold {fold + 1} has no training trial of {name}" for fold, name in nested.missing}
                     if reference is None and window == self.windows[-1]:
-                        reference = spikes, matrices, nested
+                        reference = spikes, matrices
                     if watch is not None:
                         watch(to_ms(period), to_ms(window), bits_of(self.labels, responses_at[period, window]))
                 for name in self.columns:
-                    pace.begin(f"{to_ms(period):g} ms, {name}", self.work.prediction(period))
                     by_column.setdefault((name, period), []).append(self.nested(matrices, name, draw).responses)
-                pace.begin(f"{to_ms(period):g} ms, frames", self.work.frames(period))
                 of_frames = self._frames(spikes)
                 if of_frames is not None:
                     frames.setdefault(period, []).append(self.nested(of_frames, draw=draw).responses)
         assert reference is not None  # there are a period, a draw and a window at least
-        estimates = {}
-        for key, responses in responses_at.items():
-            pace.begin("intervals", self.work.estimate())
-            estimates[key] = self.estimate(responses)
-        everything = len(self.active)
+        self._begin("intervals")
+        estimates = {key: self.estimate(responses) for key, responses in responses_at.items()}
+        everything, finest, longest = len(self.active), self.periods[0], self.windows[-1]
         points = []
         for (period, window), bits in estimates.items():
             verdict = None
-            if period != self.periods[0]:
-                verdict = keeps(bits, estimates[self.periods[0], window], groups=self.groups)
+            if window == longest and period != finest:
+                verdict = keeps(bits, estimates[finest, longest], groups=self.groups)
             points.append(_point(period, window, everything, "all", bits, about[period, window], verdict))
-        full = next(p for p in points if p.verdict is None and p.window_ms == to_ms(self.windows[-1]))
-        spikes, matrices, first = reference
+        full = next(p for p in points if (p.period_ms, p.window_ms) == (to_ms(finest), to_ms(longest)))
+        spikes, matrices = reference
         zero = zero_test(
             lambda labels: self._shuffled(matrices, labels),
             self.labels,
@@ -179,13 +173,12 @@ class _Answering(Question):
             seed=self.seed,
         )
         self._warn(missing)
-        taxels = self._by_taxels(full, values)
+        taxels = self._by_taxels(settings, values)
         answered = self._columns_answered(by_column, about, everything)
-        pace.begin("controls", self.work.controls())
+        self._begin("controls")
         beside = controls(self)
         if not is_above_chance(full.found, zero):
-            points = [_with_nothing(p) if p.window_ms == full.window_ms else p for p in points]
-            taxels = tuple(map(_with_nothing, taxels))
+            points = [_with_nothing(p) for p in points]
         return Answer(
             labels={str(name): int(n) for name, n in zip(*np.unique(self.labels, return_counts=True), strict=True)},
             groups=0 if self.groups is None else len(np.unique(self.groups)),
@@ -196,7 +189,6 @@ class _Answering(Question):
             frames={to_ms(period): self.estimate(responses) for period, responses in frames.items()},
             controls=beside,
             zero=zero,
-            training=self._training(matrices, first),
             classifiers={name: self._classified(name, spikes, matrices) for name in classifiers},
             parameters=answered,
             notes=tuple(self.notes),
@@ -204,8 +196,14 @@ class _Answering(Question):
             seed=self.seed,
         )
 
+    def _begin(self, step: str) -> None:
+        """Report the step that begins."""
+        if self._progress is not None:
+            self._progress(step, self._done, self._steps)
+        self._done += 1
+
     def _shuffled(self, matrices: Matrices, labels: Any) -> NDArray[np.generic]:
-        self.pace.begin("labels shuffled", self.work.prediction(self.periods[0]))
+        self._begin("labels shuffled")
         return predictions(matrices, self.split(labels)).responses
 
     def _frames(self, spikes: SampledEvents) -> Matrices | None:
@@ -217,11 +215,10 @@ class _Answering(Question):
         values = frames_of(self.trials, self.held, spikes, self.contact, bins)
         return Matrices(frame_grams(values, spikes, [self.window_us]), [bins * active])
 
-    def _by_taxels(self, full: Point, values: bool) -> tuple[Point, ...]:
+    def _by_taxels(self, settings: Sequence[tuple[str, int]], values: bool) -> tuple[Point, ...]:
         """Return the points with fewer or larger taxels."""
         period = self.taxels_at
         window = self.window_us
-        settings = [*(("random", n) for n in self.random_taxels), *(("pooled", n) for n in self.pools)]
         responses: dict[tuple[str, int], list[Any]] = {setting: [] for setting in settings}
         about: dict[tuple[str, int], list[Any]] = {setting: [] for setting in settings}
         taxels = {setting: setting[1] for setting in settings}
@@ -229,7 +226,7 @@ class _Answering(Question):
             all_spikes = self.spikes(period, draw)
             for kind, size in settings:
                 step = f"{size} taxels at random" if kind == "random" else f"taxels of {size} x {size}"
-                self.pace.begin(step, self.work.taxels(kind, size))
+                self._begin(step)
                 if kind == "random":
                     random = np.random.default_rng([self.seed, draw, size, 1])
                     spikes = all_spikes.select(np.sort(random.choice(self.active, size, replace=False)))
@@ -242,22 +239,11 @@ class _Answering(Question):
         points = []
         for kind, size in settings:
             bits, point = self.estimate(responses[kind, size]), (kind, size)
-            verdict = keeps(bits, full.found, groups=self.groups)
-            points.append(_point(period, window, taxels[point], kind, bits, about[point], verdict))
+            points.append(_point(period, window, taxels[point], kind, bits, about[point], None))
         return tuple(points)
 
-    def _training(self, matrices: Matrices, first: Nested) -> tuple[tuple[int, float], ...]:
-        self.pace.begin("by number of training trials", self.work.prediction(self.periods[0]))
-        least = int(np.unique(self.labels, return_counts=True)[1].min())
-        most = least - -(-least // self.folds)
-        steps = sorted({max(2, most // k) for k in (12, 6, 3, 2)} - {most})
-        steps = [n for n in steps if n < most]
-        responses = training_curve(matrices.squares, matrices.features, self.labels, first, steps, seed=self.seed)
-        curve = [(n, estimate(self.labels, counts, redraws=2).bits) for n, counts in zip(steps, responses, strict=True)]
-        return (*curve, (most, estimate(self.labels, first.responses, redraws=2).bits))
-
     def _classified(self, name: str, spikes: SampledEvents, matrices: Matrices) -> Estimate:
-        self.pace.begin(name, self.work.classifier(name))
+        self._begin(name)
         if name == "neighbours":
             return self.estimate(self.nested(matrices, neighbours=NEIGHBOURS).responses)
         return self.estimate(readout_responses(name, spikes, self.window_us, self.labels, self.split(self.labels).fold))
@@ -267,7 +253,6 @@ class _Answering(Question):
     ) -> dict[str, tuple[Point, ...]]:
         by_name: dict[str, list[Point]] = {}
         for (name, period), responses in by_column.items():
-            self.pace.begin(f"intervals, {name}", self.work.estimate())
             bits = self.estimate(responses, self.columns[name])
             by_name.setdefault(name, []).append(
                 _point(period, self.windows[-1], everything, "all", bits, about[period, self.windows[-1]], None)

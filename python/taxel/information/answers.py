@@ -35,7 +35,7 @@ class Point:
     kbps : float, 0 or more
         Kilobits a second on the wire while touched.
     verdict : Keeping, optional
-        Comparison with the finest period and all taxels, to the same window; None for that setting itself.
+        Of a longer period with all taxels and the whole window: comparison with the finest period; else None.
     """
 
     period_ms: float
@@ -116,8 +116,6 @@ class Answer:
         Results by period, ms, of frames instead of events, in the whole window.
     controls : tuple of Control
     zero : ZeroTest
-    training : tuple of (int, float)
-        Number of training trials for each label, and the bits with so many.
     classifiers : dict of str to Estimate
         Results of the further classifiers, at the full setting.
     parameters : dict of str to tuple of Point
@@ -139,7 +137,6 @@ class Answer:
     frames: dict[float, Estimate]
     controls: tuple[Control, ...]
     zero: ZeroTest
-    training: tuple[tuple[int, float], ...]
     classifiers: dict[str, Estimate]
     parameters: dict[str, tuple[Point, ...]]
     notes: tuple[str, ...]
@@ -156,7 +153,7 @@ class Answer:
     def empty(self) -> bool:
         """Whether the full setting's bits are not above 0, so that other settings have nothing to keep."""
         return not is_above_chance(self.full.found, self.zero) or any(
-            p.verdict is not None and p.verdict.says == "nothing" for p in (*self.by_period, *self.taxels)
+            p.verdict is not None and p.verdict.says == "nothing" for p in self.by_period
         )
 
     @property
@@ -187,8 +184,8 @@ class Answer:
 
     @property
     def cheapest(self) -> Point:
-        """The setting of the lowest rate among those that keep 95 % of the full setting's bits, or the full setting."""
-        sufficient = [p for p in (*self.by_period, *self.taxels) if p.verdict is not None and p.verdict.says == "keeps"]
+        """The period of the lowest rate among those that keep 95 % of the full setting's bits, or the full setting."""
+        sufficient = [p for p in self.by_period if p.verdict is not None and p.verdict.says == "keeps"]
         return min([self.full, *sufficient], key=lambda point: point.kbps)
 
     def to_dict(self) -> dict[str, Any]:
@@ -210,7 +207,6 @@ class Answer:
                 "p": round(self.zero.p, 4),
                 "shuffles": len(self.zero.shuffled),
             },
-            "training": [{"trials": n, "bits": round(bits, 4)} for n, bits in self.training],
             "classifiers": {name: estimate.to_dict() for name, estimate in self.classifiers.items()},
             "parameters": {name: [p.to_dict() for p in points] for name, points in self.parameters.items()},
             "cheapest": self.cheapest.to_dict(),

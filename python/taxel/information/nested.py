@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import instance, integer, numbers, several, shown
+from taxel._base.arguments import integer, numbers, several, shown
 from taxel._base.errors import refused
-from taxel.information._labels import labelled
 from taxel.information._threads import threads
 from taxel.information.dual import LARGEST_RIDGE, Regressions, gram_matrix, residual
 from taxel.information.folds import Split, split
@@ -25,7 +24,6 @@ __all__ = [
     "nested_predictions",
     "predictions",
     "squared_distances",
-    "training_curve",
 ]
 
 #: Ridges that are tried, in units of the mean variance.
@@ -154,55 +152,6 @@ def _of_one_size(sets: list[NDArray[np.int64]]) -> Iterator[tuple[NDArray[np.int
     for size in np.unique(sizes):
         cases = np.flatnonzero(sizes == size)
         yield cases, np.stack([sets[case] for case in cases])
-
-
-def training_curve(
-    grams: Sequence[ArrayLike],
-    features: Sequence[int],
-    y: ArrayLike,
-    nested: Nested,
-    sizes: Sequence[int],
-    *,
-    seed: int = 0,
-) -> list[NDArray[np.generic]]:
-    """Predict all trials again, by training on only so many trials a label.
-
-    Parameters
-    ----------
-    grams, features, y
-        As they were given to `nested_predictions`.
-    nested : Nested
-        The result of `nested_predictions`, by discriminants: folds, matrix and ridge stay as they were chosen.
-    sizes : sequence of int
-        Numbers of training trials for each label, drawn within each fold's training set.
-    seed : int, 0 or more
-
-    Returns
-    -------
-    list of arrays, shape (trials,), one a size
-
-    Raises
-    ------
-    ProblemError : matrices and labels that do not fit
-    """
-    matrices = Matrices(grams, features)
-    classes, row = labelled(y, matrices.trials)
-    random, curve = np.random.default_rng(integer("seed", seed, 0)), []
-    used = sorted(set(instance("nested", nested, Nested).chosen.values()))
-    if len(nested.folds) != len(row) or any(matrix >= len(matrices.squares) for matrix, _ in used):
-        raise refused("nested", " was made from other trials or matrices")
-    is_class = np.asarray(row[:, None] == np.arange(len(classes)), np.float64)
-    regressions = Regressions(np.stack([matrices.residual(*way) for way in used]), is_class)
-    for size in several("sizes", sizes):
-        predicted = np.empty(len(row), np.int64)
-        for name, way in nested.chosen.items():
-            test, train = np.flatnonzero(nested.folds == name), np.flatnonzero(nested.folds != name)
-            mixed = random.permutation(train)
-            sample = np.concatenate([mixed[row[mixed] == k][: integer("sizes", size, 1)] for k in range(len(classes))])
-            out = np.concatenate([test, np.setdiff1d(train, sample)])
-            predicted[test] = regressions.left_out(np.array([used.index(way)]), out[None])[0, : len(test)]
-        curve.append(classes[predicted])
-    return curve
 
 
 class Matrices:

@@ -1,4 +1,4 @@
-"""The page of ``taxel information``: bits by period, time, taxels, rate and training, and the confusion matrix."""
+"""The page of ``taxel information``: bits by period, time, taxels and rate, and the confusion matrix."""
 
 from __future__ import annotations
 
@@ -81,27 +81,26 @@ def _curves(answer: Answer) -> Figure:
     axes[0, 1].set(xscale="log", xlabel="time since contact, ms", title="bits over time (one line per period)")
     axes[0, 1].legend(frameon=False)
     _by_taxels(axes[1, 0], answer)
-    for point in (*answer.by_period, *answer.taxels):
+    for point in answer.by_period:
         says = "full" if point.verdict is None else point.verdict.says
-        axes[1, 1].plot(point.kbps, point.found.bits, "o" if point.kind == "all" else "s", color=_COLOURS[says], ms=5)
+        axes[1, 1].plot(point.kbps, point.found.bits, "o", color=_COLOURS[says], ms=5)
+    axes[1, 1].plot([p.kbps for p in answer.taxels], [p.found.bits for p in answer.taxels], "s", color="0.5", ms=5)
     for says, colour in _COLOURS.items():
         if says != "nothing" or answer.empty:
             axes[1, 1].plot([], [], "o", color=colour, label="nothing to keep" if says == "nothing" else says)
     axes[1, 1].set(xscale="log", xlabel="kbit/s while touched", title="cost (squares: fewer or larger taxels)")
     axes[1, 1].axhline(0.95 * answer.full.found.bits, color="0.7", lw=1, ls=":")
     axes[1, 1].legend(frameon=False)
-    n, bits = zip(*answer.training, strict=True)
-    axes[2, 0].plot(n, bits, marker="o", ms=3, color=_COLOURS["keeps"])
-    axes[2, 0].set(xlabel="training trials a label", title="effect of the number of training trials")
     names = [c.name for c in answer.controls if c.found is not None] + ["full"]
     values = [c.found for c in answer.controls if c.found is not None] + [answer.full.found]
-    axes[2, 1].barh(names, [v.bits for v in values], color=[*["0.7"] * (len(names) - 1), _COLOURS["keeps"]])
+    axes[2, 0].barh(names, [v.bits for v in values], color=[*["0.7"] * (len(names) - 1), _COLOURS["keeps"]])
     for k, value in enumerate(values):
-        axes[2, 1].plot(value.interval, [k, k], color="0.2", lw=1)
-    axes[2, 1].axvline(answer.zero.level, color=_COLOURS["loses"], lw=1, ls=":")
-    axes[2, 1].set(xlabel="bits", title="simpler measurements (dotted: labels shuffled)")
-    axes[2, 1].set_xlim(0, most)
-    for ax in axes.ravel()[:5]:
+        axes[2, 0].plot(value.interval, [k, k], color="0.2", lw=1)
+    axes[2, 0].axvline(answer.zero.level, color=_COLOURS["loses"], lw=1, ls=":")
+    axes[2, 0].set(xlabel="bits", title="simpler measurements (dotted: labels shuffled)")
+    axes[2, 0].set_xlim(0, most)
+    axes[2, 1].remove()
+    for ax in axes.ravel()[:4]:
         ax.set_ylabel("bits")
         ax.set_ylim(0, most * 1.03)
         ax.axhline(most, color="0.8", lw=1)
