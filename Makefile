@@ -102,7 +102,8 @@ slow: released $(VENV)/.for-test browser dist bridge
 	$(BIN)/python -m pytest -q -m slow
 	$(BIN)/python -m pytest -q -m slow rules $(BESIDE)
 
-# Either build of the extension does.
+# Either build of the extension does. Of pydoclint's rules those hold that need no second place for types.
+SOURCES_OF_PYTHON := python rules/taxel_rules studies/taxel_studies benchmarks/taxel_benchmarks bridge/taxel_bridge viewers/taxel_viewers
 lint: $(VENV)/.for-test $(VENV)/.for-lint
 	@$(MAKE) --no-print-directory $(if $(wildcard $(VENV)/.released),released,build)
 	cargo fmt --all --check
@@ -112,6 +113,7 @@ lint: $(VENV)/.for-test $(VENV)/.for-lint
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/flake8 --isolated --select DOC104,DOC202,DOC403,DOC501 --style numpy $(SOURCES_OF_PYTHON)
 	$(BIN)/mypy
 	$(BIN)/mypy --platform win32 --cache-dir .mypy_cache/win32
 	$(BIN)/lint-imports --no-cache

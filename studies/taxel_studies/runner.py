@@ -107,6 +107,10 @@ class Results:
         Made at the first result. A last line that a kill cut short is dropped.
     code : str
         Which code runs (`commit.code_version`): results of other code stay in the file, but count no more.
+
+    Raises
+    ------
+    ProblemError : a line is not a result of a study
     """
 
     def __init__(self, path: Path, code: str) -> None:

@@ -64,6 +64,10 @@ class ChildProcess(subprocess.Popen[Any]):
         Variables beside those of this process.
     pass_fds : sequence of int
     options : of `subprocess.Popen`
+
+    Raises
+    ------
+    OSError : the program cannot be started
     """
 
     def __init__(

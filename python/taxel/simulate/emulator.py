@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, instance, integer, mapping, number, parameters, several, shown, text
+from taxel._base.arguments import callback, flag, instance, integer, mapping, number, parameters, several, shown, text
 from taxel._base.errors import refused
 from taxel._base.options import with_options
 from taxel._core import ProblemError
@@ -135,7 +135,7 @@ def play(
     """
     sensed, acts = Array._of(array), several("acts", acts)
     parts, registers = _parts(acts, sensed), fitting(preset, sensed)
-    if wire is not None or asynchronous:
+    if wire is not None or flag("asynchronous", asynchronous):
         registers = registers.replace(wire_version=2 if wire is None else integer("wire", wire, 1, 2))
     played = _core.play(
         sensed._parts(),

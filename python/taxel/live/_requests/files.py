@@ -145,6 +145,10 @@ class FileRequests:
             Rows and columns.
         topic : (str, str), optional
             Of a ROS bag, and its field ("" for none).
+
+        Raises
+        ------
+        ProblemError : the command states it already
         """
         options = self._opening.options_of(path)
         stated = options.given()
