@@ -1,18 +1,48 @@
-"""What is wrong is refused in one clear line."""
+"""What is wrong is refused by class, argument and place; sentences stand in tests/messages alone."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from taxel import Error, ProblemError
+from taxel._base.errors import Place
 
 
 @contextmanager
-def refused(said: str, kind: type[Error] = ProblemError) -> Iterator[pytest.ExceptionInfo[Error]]:
-    """Expect an error of a kind, of one line, in which the regular expression `said` is found."""
+def refused(
+    kind: type[Error] = ProblemError, argument: str | None = None, place: Place | None = None
+) -> Iterator[pytest.ExceptionInfo[Error]]:
+    """Expect an error of this class, argument and place, of one line; a file is compared by its name."""
+    with pytest.raises(kind) as caught:
+        yield caught
+    error = caught.value
+    assert (error.argument, _by_name(error.place)) == (argument, place), error
+    assert "\n" not in str(error)
+
+
+def _by_name(place: Place | None) -> Place | None:
+    return place if place is None or place.file is None else replace(place, file=Path(place.file).name)
+
+
+def messages(calls: dict[str, Callable[[Path], object]], folder: Path) -> dict[str, str]:
+    """Return what is said of each call with something wrong, which may write files into a folder, shown as DIR."""
+    said = {}
+    for name, call in calls.items():
+        with pytest.raises(Error) as caught:
+            call(folder)
+        said[name] = f"{type(caught.value).__name__}: {caught.value}".replace(str(folder), "DIR")
+        assert "\n" not in said[name]
+    return said
+
+
+@contextmanager
+def refused_saying(said: str, kind: type[Error] = ProblemError) -> Iterator[pytest.ExceptionInfo[Error]]:
+    """Expect an error whose sentence contains a regular expression, in rooms whose tests quote sentences yet."""
     with pytest.raises(kind, match=said) as caught:
         yield caught
     assert "\n" not in str(caught.value)

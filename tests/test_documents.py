@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from refusal import refused
+from refusal import refused_saying as refused
 
 import taxel
 from taxel import FormatError, formats

@@ -14,7 +14,7 @@ import pytest
 import taxel
 from taxel import _core
 from taxel._base.arguments import finite, integer
-from taxel._base.errors import helped, refused
+from taxel._base.errors import Place, helped, placed, refused
 from taxel._base.parameters import described
 from taxel.cli import main
 from taxel.cli._commands import OWN, Commands
@@ -40,9 +40,41 @@ def test_an_error_shows_its_argument_once(kind: type[taxel.Error]) -> None:
     assert (str(wrong), wrong.argument) == ("lambdas[2] is -1: must be 0 or more", "lambdas")
     lacking = helped(kind("a.csv: has no times"), "rate_hz", "give")
     assert str(lacking) == "a.csv: has no times; give rate_hz"
-    for error in (plain, wrong, lacking):
+    for error in (plain, wrong, lacking, placed(copy.copy(lacking), "a.csv", line=3)):
         for again in (copy.copy(error), pickle.loads(pickle.dumps(error))):
-            assert (str(again), again.argument, again.hint) == (str(error), error.argument, error.hint)
+            assert type(again) is type(error)
+            assert (str(again), vars(again)) == (str(error), vars(error))
+
+
+def test_the_text_of_an_error_begins_with_its_place() -> None:
+    for error in (taxel.SceneError("is wrong"), refused("rows", " is 0"), helped(taxel.Error("no"), "rate_hz", "give")):
+        said = str(error)
+        of_text = placed(error, line=3)
+        assert str(of_text) == f"line 3: {said}"
+        of_file = placed(of_text, Path("a.csv"), byte=12)
+        assert of_file is error
+        assert of_file.place == Place("a.csv", line=3), "what an error knows of its place stays"
+        assert str(placed(of_file, "b.zip")) == f"a.csv, line 3: {said}"
+
+
+def test_errors_of_files_texts_and_bytes_have_their_place(tmp_path: Path) -> None:
+    file = tmp_path / "a.json"
+    file.write_text('{\n"array": x}')
+    table = tmp_path / "found.csv"
+    table.write_text("label,t_us,known_us,slope_mv_per_ms\na,1,2,soon\n")
+    for call, place in (
+        (lambda: taxel.Tare.load(file), Place(str(file), line=2)),
+        (lambda: taxel.Calibration.load(file), Place(str(file), line=2)),
+        (lambda: taxel.Calibration.from_json(file.read_text()), Place(line=2)),
+        (lambda: taxel.simulate.SceneFile.open(file), Place(str(file), line=1)),
+        (lambda: taxel.Detections.from_csv(table), Place(str(table), line=2)),
+        (lambda: taxel.wire.Command.from_bytes(bytes([0x80, 0, 0x80, 0, 0])), Place(byte=2)),
+        (lambda: taxel.SpikeTrains.load(file), Place(str(file))),
+    ):
+        with pytest.raises(taxel.FormatError) as caught:
+            call()
+        assert caught.value.place == place
+        assert caught.value.argument is None
 
 
 def test_an_unknown_remedy_is_refused_with_those_that_there_are() -> None:
@@ -61,7 +93,7 @@ def test_the_compiled_part_s_errors_have_them_too() -> None:
     assert str(wrong.value).startswith("tau: ")
     with pytest.raises(taxel.FormatError) as larger:
         _core.test_hook("format")
-    assert (larger.value.argument, larger.value.hint) == ("limit", "larger")
+    assert (larger.value.argument, larger.value.hint, larger.value.place) == ("limit", "larger", Place(byte=0))
 
 
 @pytest.fixture(scope="module")

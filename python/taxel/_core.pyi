@@ -8,12 +8,14 @@ from typing import Any, Final, Literal, Protocol, Self, TypeAlias, TypedDict, fi
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.errors import Place
 from taxel.labels import Note
 from taxel.live._label_table import TableRead
 from taxel.live._requests.training import TrainedReadout
 from taxel.live._shown_files import ReadFrames
 
 class Error(Exception):
+    place: Place | None
     argument: str | None
     hint: str | None
 

@@ -17,12 +17,12 @@ from taxel import _core
 from taxel._base.arguments import bare, checked_path, column, fields, instance, nth, several, shown, window
 from taxel._base.columns import FrozenColumns, frozen, frozen_column, frozen_copy
 from taxel._base.drawing import draw
-from taxel._base.errors import refused
+from taxel._base.errors import refused, unreadable
 from taxel._base.files import write_whole
 from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.messages import escaped
 from taxel._base.number_text import float_of, int_of
-from taxel._core import FormatError, ProblemError
+from taxel._core import ProblemError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -373,9 +373,7 @@ class Detections(FrozenColumns):
         header = tuple(_RENAMED.get(name, name) for name in table.header)
         more: dict[str, list[int]] = {name: [] for name in (_REPORTED, _REPAIRED) if name in header}
         if header != (*_CSV, *more):
-            raise FormatError(
-                f"{file}, line 1: contains {','.join(table.header) or 'nothing'}; must be {','.join(_CSV)}"
-            )
+            raise unreadable(f"contains {','.join(table.header) or 'nothing'}; must be {','.join(_CSV)}", file, line=1)
         rows: list[tuple[str, int, int, float]] = []
         for line, row in table.rows:
             try:
@@ -383,7 +381,7 @@ class Detections(FrozenColumns):
                 for name, value in zip(more, row[4:], strict=True):
                     more[name].append(int_of(value))
             except ValueError as error:
-                raise FormatError(f"{file}, line {line}: {error}") from None
+                raise unreadable(f"{error}", file, line=line) from None
         label, t, known, slope = zip(*rows, strict=True) if rows else ((), (), (), ())
         repaired = [value != 0 for value in more[_REPAIRED]] if _REPAIRED in more else None
         return cls._of(label, t, known, slope, more.get(_REPORTED), repaired)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import checked_path, shown, text
-from taxel._base.errors import refused
+from taxel._base.errors import refused, unreadable
 from taxel._base.files import beside as beside_file
 from taxel._base.files import named
 from taxel._base.header_table import HeaderTable, separator_of, text_of
@@ -327,7 +327,7 @@ def _rows(table: HeaderTable) -> tuple[Note, ...]:
         # An editor empties a table before it writes it.
         return ()
     table.has(_WANTED)
-    return tuple(_row(f"{table.location}, line {line}", cells) for line, cells in table)
+    return tuple(_row(table.location, line, cells) for line, cells in table)
 
 
 def text_with(rows: Iterable[Note], columns: Iterable[str] = (), end: str = "\n", separator: str = ",") -> str:
@@ -372,7 +372,7 @@ def text_with(rows: Iterable[Note], columns: Iterable[str] = (), end: str = "\n"
     return text.getvalue()
 
 
-def _row(location: str, cells: Mapping[str, str]) -> Note:
+def _row(location: str, line: int, cells: Mapping[str, str]) -> Note:
     values = {name: cell.strip() for name, cell in cells.items()}
     times: dict[str, int] = {}
     for name in ("t_us", "host_ns", "replaces_us"):
@@ -382,12 +382,12 @@ def _row(location: str, cells: Mapping[str, str]) -> Note:
         try:
             times[name] = int_of(written)
         except ValueError:
-            raise FormatError(f"{location}: {name} is {shown(written)}; must be whole {name[-2:]}") from None
+            raise unreadable(f"{name} is {shown(written)}; must be whole {name[-2:]}", location, line=line) from None
     replaces = times.get("replaces_us")
     if not (values["label"] or replaces is not None) or any(abs(times.get(name, 0)) > 2**52 for name in _TIMES):
-        raise FormatError(f"{location}: must have a label, and a time within 2^52 us")
+        raise unreadable("must have a label, and a time within 2^52 us", location, line=line)
     if not 0 <= times.get("host_ns", 0) < 2**63:
-        raise FormatError(f"{location}: host_ns must be ns since 1970")
+        raise unreadable("host_ns must be ns since 1970", location, line=line)
     source = values.get("source", "")
     named = values.get("recording", ""), source_of(source) if source.startswith("/") else source
     others = tuple((name, cell) for name, cell in cells.items() if name not in (*_WANTED, *_KNOWN))

@@ -6,7 +6,7 @@ import threading
 
 import numpy as np
 import pytest
-from refusal import refused
+from refusal import refused_saying as refused
 from rule_examples import patterns
 
 from taxel import SpikeTrains

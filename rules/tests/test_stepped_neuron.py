@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from making import lists
-from refusal import refused
+from refusal import refused_saying as refused
 from rule_examples import kernel, patterns, peak
 
 from taxel import ProblemError, SpikeTrains

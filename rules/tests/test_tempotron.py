@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sklearn.base
-from refusal import refused
+from refusal import refused_saying as refused
 from rule_examples import kernel, patterns, summed
 
 from taxel import ProblemError, SpikeTrains

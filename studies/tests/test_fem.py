@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.refusal import refused
+from tests.refusal import refused_saying as refused
 
 from taxel import FormatError, ProblemError
 from taxel_studies.fem import (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from refusal import refused
+from refusal import refused_saying as refused
 
 import taxel
 from taxel.detect import Recipe

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from refusal import refused
+from refusal import refused_saying as refused
 
 import taxel
 from taxel import Array, Detections, Events, Frames, Neuron, Readout, Tare

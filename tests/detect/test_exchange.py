@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import mixed
-from refusal import refused
+from refusal import refused_saying as refused
 from test_commands import call
 
 import taxel

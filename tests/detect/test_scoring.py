@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from refusal import refused
+from refusal import refused_saying as refused
 
 import taxel
 from taxel.detect import Score, Spread, score

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from refusal import refused
+from refusal import refused_saying as refused
 from shell import call
 
 import taxel

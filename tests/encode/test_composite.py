@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from refusal import refused
+from refusal import refused_saying as refused
 
 import taxel
 from taxel import Array, Frames, SpikeTrains, Tare

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused
+from refusal import refused_saying as refused
 
 import taxel
 from taxel import Array, Frames, Tare

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused
+from refusal import refused_saying as refused
 from scipy import ndimage
 from scipy.sparse.csgraph import connected_components
 

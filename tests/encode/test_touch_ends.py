@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused
+from refusal import refused_saying as refused
 
 from taxel import Array, Frames, Tare
 from taxel.encode import TouchEnds

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from refusal import refused
+from refusal import refused_saying as refused
 
 from taxel import FormatError, formats
 from taxel.formats import emed

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from refusal import refused
+from refusal import refused_saying as refused
 from tests.draws import mixed
 
 import taxel

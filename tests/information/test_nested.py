@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from refusal import refused
+from refusal import refused_saying as refused
 from sklearn.base import clone
 from sklearn.model_selection import cross_val_score
 

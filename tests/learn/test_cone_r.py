@@ -11,7 +11,7 @@ import stated
 from draws import mixed
 from interrupts import ctrl_c_after
 from making import lists, made
-from refusal import refused
+from refusal import refused_saying as refused
 from simulator import kernel
 
 import taxel

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from draws import seeds
 from making import lists, made
-from refusal import refused
+from refusal import refused_saying as refused
 from test_cone_r import examples, fitted, least, shares, statement, terms
 
 from taxel import Neuron, SpikeTrains

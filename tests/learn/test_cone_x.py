@@ -7,7 +7,7 @@ import pytest
 from draws import mixed, stretches
 from interrupts import ctrl_c_after
 from making import lists, made
-from refusal import refused
+from refusal import refused_saying as refused
 from stated import examples, grid_rows, row, shares, terms, threshold
 
 import taxel

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from refusal import refused
+from refusal import refused_saying as refused
 
 import taxel
 import taxel.plot

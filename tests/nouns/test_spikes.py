@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
-from refusal import refused
+from refusal import refused_saying as refused
 
 from taxel import SpikeTrains
 from taxel._base.arguments import column

@@ -13,7 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from refusal import refused
+from refusal import refused_saying as refused
 
 import taxel
 from taxel import SpikeTrains

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
-from refusal import refused
+from refusal import refused_saying as refused
 
 import taxel
 from taxel import formats

@@ -19,7 +19,7 @@ import psutil
 import pytest
 from draws import mixed
 from formats import bags
-from refusal import refused
+from refusal import refused_saying as refused
 from rosbags import rosbag1, rosbag2
 
 import taxel

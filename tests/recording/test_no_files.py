@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from panel.protocol import Client
-from refusal import refused
+from refusal import refused_saying as refused
 
 import taxel
 from taxel import FormatError, formats

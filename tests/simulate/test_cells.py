@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import mixed
-from refusal import refused
+from refusal import refused_saying as refused
 
 from taxel import Array, ProblemError, SceneError
 from taxel.simulate import Layer, Scene, SceneFile, Silence, play, truth

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused
+from refusal import refused_saying as refused
 from scipy.linalg import expm
 
 from taxel import Array, ProblemError, SceneError

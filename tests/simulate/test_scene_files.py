@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from refusal import refused
+from refusal import refused, refused_saying
 from shell import run
 
 import taxel
 from taxel import FormatError, SceneError
+from taxel._base.errors import Place
 from taxel.simulate import Scene, SceneFile, Silence, play, truth
 
 ROOT = Path(__file__).parents[2]
@@ -181,13 +182,13 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
 )
 def test_what_makes_no_sense_gets_one_line_with_the_place(tmp_path, change, said):
     assert change[0] in BALL
-    with refused(said, SceneError) as caught:
+    with refused_saying(said, SceneError) as caught:
         SceneFile.open(write(tmp_path, BALL.replace(*change)))
     assert str(caught.value).startswith(str(tmp_path / "scene.toml"))
 
 
 def test_what_is_no_toml_gets_one_line_with_the_place(tmp_path):
-    with refused("scene.toml: not TOML", FormatError):
+    with refused(FormatError, place=Place("scene.toml", line=2)):
         SceneFile.open(write(tmp_path, BALL.replace("seed = 5", "seed = ")))
 
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from refusal import refused
+from refusal import refused_saying as refused
 
 from taxel import Array, ProblemError, SceneError
 from taxel.simulate import FrameSequence, Scene, Silence, play, truth

@@ -9,7 +9,7 @@ import pytest
 from draws import seeds
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused
+from refusal import refused_saying as refused
 
 import taxel
 from taxel import wire

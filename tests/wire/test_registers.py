@@ -3,9 +3,11 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel import wire
+from taxel._base.errors import Place
 from taxel.wire import Command, Registers
 
 #: The reference's table: row_change, row_read, col_change, col_read, ramp_time, nrows, frames/s.
@@ -162,7 +164,7 @@ def test_nonsense_is_refused_in_one_line(call, text):
 def test_bytes_that_are_no_command_are_refused_by_place():
     with pytest.raises(taxel.FormatError, match="command of 4 bytes: must be 5"):
         Command.from_bytes(b"abcd")
-    with pytest.raises(taxel.FormatError, match="command, byte 0 is 61: must be 80 or above"):
+    with refused(taxel.FormatError, place=Place(byte=0)):
         Command.from_bytes(b"abcde")
 
 

@@ -5,7 +5,7 @@ use std::ffi::CStr;
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyOSError};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
-use taxel_core::{Error as CoreError, Reason};
+use taxel_core::{Error as CoreError, Place, Reason};
 use taxel_live::Error as LiveError;
 
 // The classes that `register` makes; an extension beside `_core` raises the same ones.
@@ -28,12 +28,16 @@ pub fn core(error: CoreError) -> PyErr {
     }
 }
 
-/// The exception of a reason: its argument and its hint are attributes, of which `taxel._base.errors` makes what is shown.
-fn with_help(raised: fn(String) -> PyErr, Reason { text, argument, hint }: Reason) -> PyErr {
+/// The exception of a reason: its place, argument and hint are attributes, of which `taxel._base.errors` makes what is
+/// shown.
+fn with_help(raised: fn(String) -> PyErr, Reason { text, place, argument, hint }: Reason) -> PyErr {
     let error = raised(text);
     let hint = hint.and_then(|hint| Some(serde_json::to_value(hint).ok()?.as_str()?.to_owned()));
     let set = Python::attach(|py| {
         let value = error.value(py);
+        if let Some(Place { file, line, byte }) = place {
+            value.setattr("place", py.import("taxel._base.errors")?.call_method1("Place", (file, line, byte))?)?;
+        }
         value.setattr("argument", argument)?;
         value.setattr("hint", hint)
     });
@@ -110,6 +114,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
         c"Every error of taxel; its subclasses are the kinds of errors.",
         &py.get_type::<PyException>(),
     )?;
+    error.setattr("place", py.None())?;
     error.setattr("argument", py.None())?;
     error.setattr("hint", py.None())?;
     make(c"taxel.FormatError", c"Bytes or files with wrong content.", &error)?;

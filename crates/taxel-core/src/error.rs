@@ -1,6 +1,7 @@
 //! The error type of the crate, and the flag by which a caller stops a long call.
 
 use std::fmt;
+use std::path::Path;
 
 use serde::Serialize;
 
@@ -30,7 +31,7 @@ impl Error {
     /// The error of bytes or a file. Its text stays as it is: a file's name may hold many digits.
     #[must_use]
     pub fn format(text: impl Into<String>) -> Self {
-        Self::Format(Reason { text: text.into(), argument: None, hint: None })
+        Self::Format(Reason { text: text.into(), place: None, argument: None, hint: None })
     }
 
     /// The error of a board.
@@ -72,6 +73,17 @@ impl Error {
         self.with(|reason| Reason { argument: Some(argument.to_owned()), hint: Some(hint), ..reason })
     }
 
+    /// The same error of a file, or of a line or byte; what it knows of its place already stays.
+    #[must_use]
+    pub fn at(self, place: Place) -> Self {
+        self.with(|reason| {
+            let known = reason.place.unwrap_or_default();
+            let line_or_byte = if known.line.or(known.byte).is_some() { &known } else { &place };
+            let (line, byte) = (line_or_byte.line, line_or_byte.byte);
+            Reason { place: Some(Place { file: known.file.or(place.file), line, byte }), ..reason }
+        })
+    }
+
     /// The same error, with the name of the part that it is of in front of its text.
     #[must_use]
     pub fn in_part(self, part: &str) -> Self {
@@ -94,6 +106,8 @@ impl Error {
 pub struct Reason {
     /// What is wrong. It continues after the name of the parameter unless there is a hint.
     pub text: String,
+    /// Where it is wrong, in a file or in a text or bytes in memory.
+    pub place: Option<Place>,
     /// The parameter that is wrong, or that helps, as the caller writes it.
     pub argument: Option<String>,
     /// The kind of remedy.
@@ -104,15 +118,61 @@ impl Reason {
     /// The parameter is one of the part, so that a caller of the whole has no argument of that name; a remedy stays.
     fn in_part(self, part: &str) -> Self {
         match self.hint {
-            None => Self { text: format!("{part}: {self}"), argument: None, hint: None },
+            None => {
+                let text = format!("{part}: {}{}", self.argument.unwrap_or_default(), self.text);
+                Self { text, argument: None, ..self }
+            }
             Some(_) => Self { text: format!("{part}: {}", self.text), ..self },
         }
+    }
+}
+
+/// A place in a file, or in a text or bytes in memory.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Place {
+    /// The file; `None` in memory.
+    pub file: Option<String>,
+    /// The line, counted from 1.
+    pub line: Option<u64>,
+    /// The byte, counted from 0.
+    pub byte: Option<u64>,
+}
+
+impl Place {
+    /// A whole file.
+    #[must_use]
+    pub fn file(path: &Path) -> Self {
+        Self { file: Some(path.display().to_string()), ..Self::default() }
+    }
+
+    /// A line, counted from 1.
+    #[must_use]
+    pub fn line(line: u64) -> Self {
+        Self { line: Some(line), ..Self::default() }
+    }
+
+    /// A byte, counted from 0.
+    #[must_use]
+    pub fn byte(byte: u64) -> Self {
+        Self { byte: Some(byte), ..Self::default() }
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let line = self.line.map(|line| format!("line {line}"));
+        let byte = self.byte.map(|byte| format!("byte {byte}"));
+        let parts: Vec<String> = [self.file.clone(), line, byte].into_iter().flatten().collect();
+        f.write_str(&parts.join(", "))
     }
 }
 
 /// Without the remedy, which the command line and the page put into words of their own.
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(place) = &self.place {
+            write!(f, "{place}: ")?;
+        }
         if let (None, Some(argument)) = (self.hint, &self.argument) {
             f.write_str(argument)?;
         }
@@ -122,7 +182,7 @@ impl fmt::Display for Reason {
 
 impl From<&str> for Reason {
     fn from(text: &str) -> Self {
-        Self { text: readable(text), argument: None, hint: None }
+        Self { text: readable(text), place: None, argument: None, hint: None }
     }
 }
 
@@ -211,6 +271,19 @@ impl<'a> Stop<'a> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use crate::{Error, Place};
+
+    #[test]
+    fn an_error_of_a_file_keeps_what_it_knows_of_its_place() {
+        let of_text = Error::format("is not a number").at(Place::line(3)).in_part("rest");
+        let of_file = of_text.at(Place::file(Path::new("a.json"))).at(Place::file(Path::new("b.zip")));
+        let place = of_file.reason().unwrap().place.clone().unwrap();
+        assert_eq!((place.file.as_deref(), place.line, place.byte), (Some("a.json"), Some(3), None));
+        assert_eq!(of_file.to_string(), "a.json, line 3: rest: is not a number");
+    }
+
     #[test]
     fn a_number_that_nobody_reads_digit_by_digit_is_in_scientific_notation() {
         let told = |value: f64| problem!("tau"; " is {value} ms: must be below 1.5").to_string();

@@ -41,7 +41,7 @@ pub mod learn;
 pub mod metrics;
 
 pub use array::Array;
-pub use error::{Error, Hint, Reason, Result, Stop};
+pub use error::{Error, Hint, Place, Reason, Result, Stop};
 pub use events::{Events, EventsView, Intensities, IntensitiesView, Marker};
 pub use frames::FramesView;
 pub use spikes::{Spike, SpikeKind, SpikeTrains};

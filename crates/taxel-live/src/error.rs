@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use taxel_core::Place;
+
 /// An error of the core, or an error of files and sockets with its place.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -40,7 +42,7 @@ impl Error {
 
     /// An error about the content of a file.
     pub(crate) fn format(path: &Path, text: &str) -> Self {
-        taxel_core::Error::format(format!("{}: {text}", path.display())).into()
+        taxel_core::Error::format(text).at(Place::file(path)).into()
     }
 
     /// Adds the part of an input that an error of the core is about; other errors name their place.

@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 from taxel._base.arguments import shown
 from taxel._base.encodings import mark_of
+from taxel._base.errors import placed, unreadable
 from taxel._base.files import open_file
 from taxel._base.limits import UNPACKED, unpacked
 from taxel._base.messages import first_line
@@ -32,6 +33,8 @@ _DEPTH = 64
 #: Bytes in memory, at most: of a place in a list; of a number; of a text, beside its characters; of a list; of an
 #: object; of a name in an object, with its place.
 _PLACE, _NUMBER, _TEXT, _LIST, _OBJECT, _NAME = 9, 32, 60, 100, 250, 100
+#: How tomllib ends what it says about a line.
+_AT_LINE = re.compile(r" \(at line (\d+), (column \d+)\)$")
 #: Where a string or a comment of TOML begins, and what ends a key.
 _MARKS = re.compile(r"[\"'#\n,=\[\]{}]")
 
@@ -51,7 +54,7 @@ def read_text(path: str | os.PathLike[str], most: int = BY_HAND, otherwise: str 
     with open_file(path) as file:
         data = file.read(most + 1)
     if len(data) > most:
-        raise FormatError(f"{path}: more than {most} bytes; must have at most {most}")
+        raise unreadable(f"more than {most} bytes; must have at most {most}", path)
     return decoded(path, data, otherwise)
 
 
@@ -73,9 +76,8 @@ def decoded(path: str | os.PathLike[str], data: bytes, otherwise: str = "") -> s
         before = error.object[: error.start].decode(encoding, "replace")
         line = len(before.replace("\r\n", "\n").replace("\r", "\n").split("\n"))
         at, name = len(mark) + error.start, encoding[:6].upper()
-        raise FormatError(
-            f"{path}, line {line}, byte {at}: not text in {name} ({error.reason}); save it as UTF-8"
-        ) from None
+        text = f"not text in {name} ({error.reason}); save it as UTF-8"
+        raise unreadable(text, path, line=line, byte=at) from None
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -95,23 +97,23 @@ def text_of_json(path: str | os.PathLike[str]) -> str:
     return text
 
 
-def object_of_json(location: str, text: str) -> dict[str, Any]:
+def object_of_json(location: str | None, text: str) -> dict[str, Any]:
     """Return the object that taxel wrote in JSON, with numbers of each taxel; errors as of `of_json`."""
     first = text.lstrip(" \t\r\n")[:1] if text[:1].isspace() else text[:1]
     if first != "{":
         begins = f"begins with {shown(first)}" if first else "empty"
-        raise FormatError(f"{location}: not a JSON object: {begins}; must begin with '{{'")
+        raise unreadable(f"not a JSON object: {begins}; must begin with '{{'", location)
     values: dict[str, Any] = of_json(location, text, BY_TAXEL, room=_ROOM)
     return values
 
 
-def of_toml(location: str, text: str) -> dict[str, Any]:
+def of_toml(location: str | None, text: str) -> dict[str, Any]:
     """Return the values of a text in TOML.
 
     Parameters
     ----------
-    location : str
-        For errors.
+    location : str or None
+        The file in errors; None in memory.
     text : str, at most 1 MiB
 
     Raises
@@ -121,13 +123,14 @@ def of_toml(location: str, text: str) -> dict[str, Any]:
     _check_length(location, text, BY_HAND)
     for line, key in _between_marks(text):
         if key.count(".") > _DOTS:
-            raise FormatError(f"{location}, line {line}: a key with {key.count('.')} dots; must have at most {_DOTS}")
+            raise unreadable(f"a key with {key.count('.')} dots; must have at most {_DOTS}", location, line=line)
     try:
         values = tomllib.loads(text)
     except RecursionError:
         raise _too_deep(location) from None
     except ValueError as error:
-        raise NotTomlError(f"{location}: not TOML: {_why(error)}") from None
+        why, at = _why(error)
+        raise placed(NotTomlError(f"not TOML: {why}"), location, line=at) from None
     _check_depth(location, values)
     return values
 
@@ -148,13 +151,13 @@ def memory_of_json(text: str) -> int:
     return characters + _PLACE * values + _NUMBER * numbers + parts
 
 
-def of_json(location: str, text: str, most: int = BY_HAND, *, room: int = UNPACKED) -> Any:
+def of_json(location: str | None, text: str, most: int = BY_HAND, *, room: int = UNPACKED) -> Any:
     """Return the value of a text in JSON.
 
     Parameters
     ----------
-    location : str
-        For errors.
+    location : str or None
+        The file in errors; None in memory.
     text : str
     most : int, characters
     room : int, bytes
@@ -166,45 +169,52 @@ def of_json(location: str, text: str, most: int = BY_HAND, *, room: int = UNPACK
         deeply
     """
     _check_length(location, text, most)
-    unpacked(location, memory_of_json(text), room)
+    unpacked(location or "text", memory_of_json(text), room)
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         values = dict(pairs)
         if len(values) < len(pairs):
             twice = next(name for name, count in Counter(name for name, _ in pairs).items() if count > 1)
-            raise FormatError(f"{location}: not JSON: {shown(twice)} appears twice in one object")
+            raise unreadable(f"not JSON: {shown(twice)} appears twice in one object", location)
         return values
 
     def refuse(constant: str) -> NoReturn:
-        raise FormatError(f"{location}: not JSON: {constant} is not a number in JSON")
+        raise unreadable(f"not JSON: {constant} is not a number in JSON", location)
 
     try:
         value = json.loads(text, object_pairs_hook=once, parse_constant=refuse)
     except RecursionError:
         raise _too_deep(location) from None
     except ValueError as error:
-        raise FormatError(f"{location}: not JSON: {_why(error)}") from None
+        why, at = _why(error)
+        raise unreadable(f"not JSON: {why}", location, line=at) from None
     _check_depth(location, value)
     return value
 
 
-def _check_length(location: str, text: str, most: int) -> None:
+def _check_length(location: str | None, text: str, most: int) -> None:
     if len(text) > most:
-        raise FormatError(f"{location}: {len(text)} characters; must have at most {most}")
+        raise unreadable(f"{len(text)} characters; must have at most {most}", location)
 
 
-def _why(error: ValueError) -> str:
-    """Return in plain words why a text is not read: Python's words for a long number name a function to call."""
+def _why(error: ValueError) -> tuple[str, int | None]:
+    """Return in plain words why a text is not read, and its line where that is known."""
     if "set_int_max_str_digits" in str(error):
-        return f"a whole number has more than {sys.get_int_max_str_digits()} digits"
-    return first_line(error)
+        # Python's words for a long number name a function to call.
+        return f"a whole number has more than {sys.get_int_max_str_digits()} digits", None
+    if isinstance(error, json.JSONDecodeError):
+        return f"{error.msg} (column {error.colno})", error.lineno
+    why = first_line(error)
+    if found := _AT_LINE.search(why):
+        return f"{why[: found.start()]} ({found[2]})", int(found[1])
+    return why, None
 
 
-def _too_deep(location: str) -> FormatError:
-    return FormatError(f"{location}: nested too deeply; must have at most {_DEPTH} levels")
+def _too_deep(location: str | None) -> FormatError:
+    return unreadable(f"nested too deeply; must have at most {_DEPTH} levels", location)
 
 
-def _check_depth(location: str, value: Any) -> None:
+def _check_depth(location: str | None, value: Any) -> None:
     """Refuse values that later steps, which call themselves for each level, could not go through."""
     level = [value]
     for _ in range(_DEPTH + 1):

@@ -1,11 +1,13 @@
-"""Makes errors whose argument and remedy are data, and the line that shows them.
+"""Makes errors whose place, argument and remedy are data, and the line that shows them.
 
-An error that has an argument (`Error.argument`) names it once: before its text, or, with a remedy (`Error.hint`),
-within the remedy. The command line puts its option instead of the argument.
+The line begins with the place (`Error.place`). An error that has an argument (`Error.argument`) names it once: before
+its text, or, with a remedy (`Error.hint`), within the remedy. The command line puts its option instead of the argument.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from os import PathLike, fspath
 from textwrap import dedent
 from typing import TypeVar
 
@@ -29,11 +31,37 @@ _REMEDIES = {
 }
 
 
+@dataclass(frozen=True)
+class Place:
+    """A place in a file, or in a text or bytes in memory.
+
+    Parameters
+    ----------
+    file : str or None
+        None in memory.
+    line : int or None
+        Counted from 1.
+    byte : int or None
+        Counted from 0.
+    """
+
+    file: str | None = None
+    line: int | None = None
+    byte: int | None = None
+
+    def __str__(self) -> str:
+        line = None if self.line is None else f"line {self.line}"
+        byte = None if self.byte is None else f"byte {self.byte}"
+        return ", ".join(part for part in (self.file, line, byte) if part is not None)
+
+
 def _shown(error: Error) -> str:
     """Return the text of an error: one line, and below it the lines that it gives to be copied, if there are any."""
     text, *below = error.args or ("",)
+    place = "" if error.place is None else f"{error.place}: "
     line, argument = escaped(str(text)), error.argument or ""
     line = f"{argument}{line}" if error.hint is None else f"{line}; {_REMEDIES[error.hint].format(argument)}"
+    line = f"{escaped(place)}{line}"
     return "\n".join([line, *map(escaped_lines, below)])
 
 
@@ -44,6 +72,9 @@ Error.__repr__ = lambda error: f"{type(error).__name__}({str(error)!r})"  # type
 _ATTRIBUTES = """
 Attributes
 ----------
+place : Place or None
+    The file (None in memory), and the line (from 1) or byte (from 0) in it, where they are known: `place.file`,
+    `place.line` and `place.byte`; None if the error concerns no file, text or bytes.
 argument : str or None
     The argument that is wrong, or that helps; None if the error concerns no single argument.
 hint : str or None
@@ -129,9 +160,29 @@ def refused(name: str, text: str) -> ProblemError:
     return error
 
 
-def damaged(path: object, kind: str, why: str) -> FormatError:
+def placed(
+    error: _Error, file: str | PathLike[str] | None = None, *, line: int | None = None, byte: int | None = None
+) -> _Error:
+    """Return the same error with its place; what it knows of its place already stays."""
+    known = error.place or Place()
+    if known.line is None and known.byte is None:
+        known = replace(known, line=line, byte=byte)
+    if known.file is None and file is not None:
+        known = replace(known, file=fspath(file))
+    error.place = known
+    return error
+
+
+def unreadable(
+    text: str, file: str | PathLike[str] | None = None, *, line: int | None = None, byte: int | None = None
+) -> FormatError:
+    """Return the error of a file, or of a text or bytes in memory, with the place where it is wrong."""
+    return placed(FormatError(text), file, line=line, byte=byte)
+
+
+def damaged(path: str | PathLike[str], kind: str, why: str) -> FormatError:
     """Return the error of a file that a library cannot read to its end; `kind` names it, as "HDF5 file"."""
-    return FormatError(f"{path}: the {kind} is damaged or not complete ({why}); copy or write it again")
+    return unreadable(f"the {kind} is damaged or not complete ({why}); copy or write it again", path)
 
 
 def helped(error: _Error, argument: str, hint: str) -> _Error:

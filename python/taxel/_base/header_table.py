@@ -12,8 +12,8 @@ from pathlib import Path
 
 from taxel._base.arguments import shown
 from taxel._base.documents import read_text
+from taxel._base.errors import unreadable
 from taxel._base.limits import TEXT, unpacked
-from taxel._core import FormatError
 
 #: Bytes in memory, at most about: of a line with the row that is made of it, and of a cell beside the first.
 _LINE, _CELL = 440, 130
@@ -72,7 +72,7 @@ class HeaderTable:
         header = tuple(name.strip() for name in first)
         repeated = next((name for name, count in Counter(header).items() if name and count > 1), None)
         if repeated is not None:
-            raise FormatError(f"{location}, line {line}: column {shown(repeated)} appears twice")
+            raise unreadable(f"column {shown(repeated)} appears twice", location, line=line)
         return cls(str(location), header, ())
 
     @classmethod
@@ -112,7 +112,7 @@ class HeaderTable:
 
     def _row(self, line: int, cells: tuple[str, ...]) -> tuple[str, ...]:
         if len(cells) != len(self.header):
-            raise FormatError(f"{self.location}, line {line}: {len(cells)} cells; must have {len(self.header)}")
+            raise unreadable(f"{len(cells)} cells; must have {len(self.header)}", self.location, line=line)
         return cells
 
     def has(self, required: Sequence[str]) -> None:
@@ -125,8 +125,8 @@ class HeaderTable:
         missing = [name for name in required if name not in self.header]
         if missing:
             there = f"the columns are {', '.join(map(shown, self.header))}" if self.header else "the line is empty"
-            raise FormatError(
-                f"{self.location}, line 1: column {missing[0]!r} is missing; {there}; must be {','.join(required)} ..."
+            raise unreadable(
+                f"column {missing[0]!r} is missing; {there}; must be {','.join(required)} ...", self.location, line=1
             )
 
     def __iter__(self) -> Iterator[tuple[int, dict[str, str]]]:
@@ -140,8 +140,8 @@ class HeaderTable:
             named = list(zip(self.header, self._row(line, cells), strict=True))
             stray = next((cell for name, cell in named if not name and cell.strip()), None)
             if stray is not None:
-                raise FormatError(
-                    f"{self.location}, line {line}: {shown(stray)} is in a column without a name; name the column"
+                raise unreadable(
+                    f"{shown(stray)} is in a column without a name; name the column", self.location, line=line
                 )
             yield line, {name: cell for name, cell in named if name}
 
@@ -163,7 +163,7 @@ def _rows(location: str | Path, lines: Iterable[str]) -> Iterator[tuple[int, tup
             line = reader.line_num + 1
     except csv.Error as error:
         reason = "a quote is opened and not closed" if "end of data" in str(error) else error
-        raise FormatError(f"{location}, line {line}: {reason}") from None
+        raise unreadable(f"{reason}", location, line=line) from None
 
 
 def separator_of(names: str) -> str:

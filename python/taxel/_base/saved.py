@@ -10,6 +10,7 @@ from typing import ClassVar, Self, TypeVar
 
 from taxel._base.arguments import checked_path
 from taxel._base.documents import text_of_json
+from taxel._base.errors import placed, unreadable
 from taxel._base.files import write_whole
 from taxel._core import Error, FormatError
 
@@ -78,8 +79,11 @@ def read(path: str | os.PathLike[str], noun: str, of_text: Callable[[str], _S]) 
     try:
         text = text_of_json(file)
     except FormatError as error:
-        raise FormatError(f"{error}; must be a {noun} as taxel writes it") from None
+        error.args = (f"{error.args[0]}; must be a {noun} as taxel writes it",)
+        raise
     try:
         return of_text(text)
+    except FormatError as error:
+        raise placed(error, file) from None
     except Error as error:
-        raise FormatError(f"{file}: {error}") from None
+        raise unreadable(str(error), file) from None

@@ -425,7 +425,7 @@ class Calibration(Saved):
             raise refused("calibration", f" is {shown(text)}: must be JSON text")
         entry = "the whole"
         try:
-            document = object_of_json("calibration", text)
+            document = object_of_json(None, text)
             if document.get("taxel") != "calibration":
                 raise ProblemError('must be an object with "taxel": "calibration"')
             entry = "array"

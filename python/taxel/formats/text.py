@@ -17,7 +17,7 @@ from taxel._base import limits
 from taxel._base.arguments import short, shown
 from taxel._base.columns import Growing
 from taxel._base.encodings import as_utf_8
-from taxel._base.errors import damaged, helped
+from taxel._base.errors import damaged, helped, unreadable
 from taxel._base.files import open_file
 from taxel._base.header_table import HeaderTable
 from taxel._base.limits import LINE, TEXT, VALUE, unpacked
@@ -89,13 +89,11 @@ def stream(path: Path) -> Iterator[str]:
         # A carriage return at the end of a piece may be half of a line end.
         end = max(data.rfind(b"\n"), data.rfind(b"\r", 0, len(data) - 1)) + 1
         if len(data) - end > LINE:
-            raise FormatError(
-                f"{path.name}, line {number}: the line has more than {LINE} bytes; must have at most {LINE}"
-            )
+            raise unreadable(f"the line has more than {LINE} bytes; must have at most {LINE}", path.name, line=number)
         found = _lines(path, data[:end], begin)
         empty += found.count("") + sum(map(str.isspace, found))
         if empty > _EMPTY:
-            raise FormatError(f"{path.name}, line {number}: {empty} empty lines so far; must have at most {_EMPTY}")
+            raise unreadable(f"{empty} empty lines so far; must have at most {_EMPTY}", path.name, line=number)
         yield from found
         rest, number, begin = data[end:], number + len(found), begin + end
     yield from _lines(path, rest, begin)
@@ -117,7 +115,7 @@ def _up_to(path: Path, most: int) -> Iterator[bytes]:
         while piece := file.read(_PIECE):
             total += len(piece)
             if total > most:
-                error = FormatError(f"{path.name}: the text has {total} bytes or more; must have at most {most}")
+                error = unreadable(f"the text has {total} bytes or more; must have at most {most}", path.name)
                 raise helped(error, "limit", "larger")
             yield piece
 
@@ -158,7 +156,7 @@ def beginning(path: Path, most: int = _BEGINNING) -> list[str]:
     data = _bytes(path, most)
     ended = data if len(data) < most else data[: max(data.rfind(b"\n"), data.rfind(b"\r", 0, -1)) + 1]
     if not ended and len(data) > LINE:
-        raise FormatError(f"{path.name}, line 1: the line has more than {LINE} bytes; must have at most {LINE}")
+        raise unreadable(f"the line has more than {LINE} bytes; must have at most {LINE}", path.name, line=1)
     return _lines(path, ended.removeprefix(_UTF_8))
 
 
@@ -197,7 +195,7 @@ def _lines(path: Path, data: bytes, begin: int = 0) -> list[str]:
             if is_utf_16
             else "the file is not a text file"
         )
-        raise FormatError(f"{path.name}, byte {begin + data.index(0)}: this byte is zero; {why}")
+        raise unreadable(f"this byte is zero; {why}", path.name, byte=begin + data.index(0))
     ends = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     try:
         content = ends.decode().split("\n")
@@ -237,10 +235,10 @@ def number(cell: str, path: Path, line: int, noun: str, *, unmarked: bool = Fals
         else:
             problem = f"is {shown(text)}, not a number" if text else "is empty, not a number"
             problem += remedy
-        raise FormatError(f"{path.name}, line {line}: {noun} {problem}") from None
+        raise unreadable(f"{noun} {problem}", path.name, line=line) from None
     # Values of frames have 32 bits.
     if not abs(value) <= VALUE:
-        raise FormatError(f"{path.name}, line {line}: {noun} is {shown(text)}, not a finite number{remedy}")
+        raise unreadable(f"{noun} is {shown(text)}, not a finite number{remedy}", path.name, line=line)
     return value
 
 
@@ -306,7 +304,7 @@ def group_rows(
             line, some, characters = line + len(some) + 1, [], 0
             continue
         if len(row) != columns:
-            raise FormatError(f"{path.name}, line {line + len(some)}: {len(row)} cells; must have {columns}")
+            raise unreadable(f"{len(row)} cells; must have {columns}", path.name, line=line + len(some))
         some.append(row)
         characters += sum(map(len, row))
         if len(some) * columns >= _CELLS or characters >= LINE:
@@ -359,6 +357,6 @@ def table(path: Path, columns: Sequence[str], *, optional: bool = False) -> list
         return []
     parsed = HeaderTable.read(path.name, lines(path))
     if not parsed.header:
-        raise FormatError(f"{path.name}: the file is empty; must begin with a line of column names")
+        raise unreadable("the file is empty; must begin with a line of column names", path.name)
     parsed.has(columns)
     return [{**cells, "line": str(line)} for line, cells in parsed]

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from taxel._base.arguments import checked_path, instance, integer, mapping, number, several, shown, text
-from taxel._base.errors import helped, refused
+from taxel._base.errors import helped, placed, refused, unreadable
 from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.number_text import float_of, int_of
-from taxel._core import FormatError, ProblemError
+from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
@@ -152,18 +152,21 @@ def read_trials(
         recording = by_name[row["recording"]]
         source = sources[id(recording)]
         where = f"{file}, line {line}"
-        end, host_ns = (_whole(where, name, row[name]) if row.get(name) else None for name in ("stop_us", "host_ns"))
-        start = _whole(where, "t_us", row["t_us"])
+        times = ("stop_us", "host_ns")
+        end, host_ns = (_whole(file, line, name, row[name]) if row.get(name) else None for name in times)
+        start = _whole(file, line, "t_us", row["t_us"])
         ahead = ahead_us(Note(row["label"], start, host_ns or 0), recording.path, clocks.get(id(recording)), file)
         start, stop = start - ahead, None if end is None else end - ahead
         if stop is None and window_ms is None:
-            error = ProblemError(f"{where}: stop_us is missing, so the length of the trial is not known")
+            error = placed(ProblemError("stop_us is missing, so the length of the trial is not known"), file, line=line)
             raise helped(error, "window_ms", "give")
         if not row["label"]:
-            raise FormatError(f"{where}: label is empty")
+            raise unreadable("label is empty", file, line=line)
         if row["label"].lower() == "nan":
-            raise FormatError(
-                f"{where}: label is {row['label']!r}, which tables use for a missing value; choose another name"
+            raise unreadable(
+                f"label is {row['label']!r}, which tables use for a missing value; choose another name",
+                file,
+                line=line,
             )
         more = {name: cell for name, cell in row.items() if name not in _KNOWN}
         trials.append(LabelledTrial(source, row["label"], start, stop, row.get("group", ""), more, where))
@@ -319,10 +322,10 @@ def _stem(recording: Recording) -> str:
 
 def _rows(file: Path, recordings: Sequence[Recording]) -> list[tuple[int, dict[str, str]]]:
     if file.is_dir():
-        raise FormatError(f"{file}: is a directory; must be a .csv {','.join(_COLUMNS)}")
+        raise unreadable(f"is a directory; must be a .csv {','.join(_COLUMNS)}", file)
     table = HeaderTable.read(file, text_of(file))
     if not table.header:
-        raise FormatError(f"{file}: contains nothing; must be {','.join(_COLUMNS)} ...")
+        raise unreadable(f"contains nothing; must be {','.join(_COLUMNS)} ...", file)
     alone = len(recordings) == 1 and "recording" not in table.header
     only = {"recording": str(recordings[0].path)} if alone else {}
     table.has([name for name in _COLUMNS if name not in only])
@@ -330,11 +333,11 @@ def _rows(file: Path, recordings: Sequence[Recording]) -> list[tuple[int, dict[s
     for line, cells in table:
         rows.append((line, only | {name: cell.strip() for name, cell in cells.items()}))
     if not rows:
-        raise FormatError(f"{file}: names no trial")
+        raise unreadable("names no trial", file)
     return rows
 
 
-def _whole(where: str, column: str, cell: str) -> int:
+def _whole(file: Path, line: int, column: str, cell: str) -> int:
     value: int | None
     try:
         value = int_of(cell)
@@ -345,5 +348,5 @@ def _whole(where: str, column: str, cell: str) -> int:
             real = np.nan
         value = int(real) if np.isfinite(real) and real.is_integer() else None
     if value is None or not abs(value) < 2**62:
-        raise FormatError(f"{where}: {column} is {shown(cell)}; must be whole {column[-2:]}")
+        raise unreadable(f"{column} is {shown(cell)}; must be whole {column[-2:]}", file, line=line)
     return value

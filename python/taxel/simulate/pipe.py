@@ -7,7 +7,7 @@ from typing import IO, Any
 
 from taxel._base.arguments import integer, number, shown
 from taxel._base.documents import of_json
-from taxel._base.errors import refused
+from taxel._base.errors import placed, refused, unreadable
 from taxel._core import DeviceError, FormatError, ProblemError
 from taxel.array import Array
 from taxel.wire import Registers
@@ -16,7 +16,8 @@ __all__ = ["Pipe"]
 
 #: Largest length of the first line, bytes.
 _LONGEST_LINE = 1 << 16
-#: The first line, for errors.
+#: What errors name in place of a file, and what its first line must be like.
+_SOURCE = "standard input"
 _EXPECTED = '{"rows": 16, "columns": 8, "rate": 100, "bits": 12}'
 
 
@@ -48,19 +49,19 @@ class Pipe:
             raise refused("source", f" is {shown(source)}: must be a pipe or a file, opened to read bytes") from None
         line = self._line()
         try:
-            header = of_json("standard input, line 1", line.decode())
+            header = of_json(_SOURCE, line.decode())
             rows, columns, rate, bits = (header[name] for name in ("rows", "columns", "rate", "bits"))
         except FormatError as error:
-            raise FormatError(f"{error}; must be like {_EXPECTED}") from None
+            raise unreadable(f"{error.args[0]}; must be like {_EXPECTED}", _SOURCE, line=1) from None
         except (ValueError, TypeError, KeyError) as error:
             begin = line[:60].decode("utf-8", "replace")
-            raise FormatError(f"standard input, line 1: {begin!r} ({error}); must be like {_EXPECTED}") from None
+            raise unreadable(f"{begin!r} ({error}); must be like {_EXPECTED}", _SOURCE, line=1) from None
         self.array = Array(rows, columns, pitch_mm=header.get("pitch_mm"), name=header.get("name", "pipe"))
         self.rate_hz, floor = number("rate", rate), integer("noise_floor", noise_floor, 0, 255)
         try:
             registers, self.shift = Registers._of_source(self.array, self.rate_hz, integer("bits", bits, 1, 16))
         except DeviceError as error:
-            raise ProblemError(f"standard input, line 1: {rows} x {columns} taxels: {error}") from None
+            raise placed(ProblemError(f"{rows} x {columns} taxels: {error}"), _SOURCE, line=1) from None
         self._registers = registers.replace(noise_floor=floor)
 
     def registers(self, preset: str | None) -> Registers:  # noqa: ARG002  the frames' line has their rate

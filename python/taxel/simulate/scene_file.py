@@ -15,6 +15,7 @@ import numpy as np
 from taxel import _core
 from taxel._base.arguments import checked_path, integer, number, text
 from taxel._base.documents import read_text, read_toml
+from taxel._base.errors import placed
 from taxel._base.limits import DESCRIPTION
 from taxel._core import SceneError
 from taxel.array import Array
@@ -114,7 +115,7 @@ class SceneFile:
         try:
             return cls._of(document, file.parent)
         except _core.Error as error:
-            raise SceneError(f"{file}: {error}") from None
+            raise placed(SceneError(str(error)), file) from None
 
     @classmethod
     def _of(cls, document: Mapping[str, Any], folder: Path) -> SceneFile:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import checked_path, number, shown, text
-from taxel._base.errors import refused
+from taxel._base.errors import refused, unreadable
 from taxel._base.h5_file import H5File
 from taxel._base.h5_writing import write_h5
 from taxel._core import FormatError
@@ -85,9 +85,9 @@ def read_nwb(path: str | os.PathLike[str], start: float | None, stop: float | No
     ]
     with H5File(file) as h5:
         if h5.attribute("nwb_version") is None:
-            raise FormatError(f"{file}: is not an NWB file, because the attribute nwb_version is missing")
+            raise unreadable("is not an NWB file, because the attribute nwb_version is missing", file)
         if "units/spike_times" not in h5.entries:
-            raise FormatError(f"{file}: the NWB file contains no spike times in a table of units")
+            raise unreadable("the NWB file contains no spike times in a table of units", file)
         seconds, offsets = _lists(h5, "spike_times")
         values: NDArray[Any] | None = None
         kind: Kind = "unsigned"
@@ -131,5 +131,5 @@ def _kind_of(h5: H5File) -> Kind:
     kinds = h5.texts("units/value_kind") if "units/value_kind" in h5.entries else np.array([""])
     graded = {kind == "graded" for kind in kinds.flat}
     if graded == {True, False}:
-        raise FormatError(f"{h5.path}: the units have different value_kind: all must have the same")
+        raise unreadable("the units have different value_kind: all must have the same", h5.path)
     return "graded" if graded == {True} else "signed"

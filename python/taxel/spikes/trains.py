@@ -16,7 +16,7 @@ from taxel._base.archive import read_arrays
 from taxel._base.arguments import bare, checked_path, column, floats, instance, nth, number, several, shown, window
 from taxel._base.columns import FrozenColumns, frozen, frozen_column
 from taxel._base.drawing import draw
-from taxel._base.errors import refused
+from taxel._base.errors import refused, unreadable
 from taxel._base.files import write_whole
 from taxel._base.limits import UNIT
 from taxel._base.messages import counted, first_line
@@ -566,9 +566,9 @@ class SpikeTrains(FrozenColumns):
             start, stop = arrays["start"].item(), arrays["stop"].item()
             return cls(arrays["times"], arrays["offsets"], start, stop, arrays.get("values"), kind=kind)
         except KeyError as missing:
-            raise FormatError(f"{file}: contains no spike trains, because the array {missing} is missing") from None
+            raise unreadable(f"contains no spike trains, because the array {missing} is missing", file) from None
         except (ValueError, ProblemError) as error:
-            raise FormatError(f"{file}: contains no spike trains: {first_line(error)}") from None
+            raise unreadable(f"contains no spike trains: {first_line(error)}", file) from None
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the raster: time (ms) to the right, trains upwards, OFF spikes and values below 0 in another colour."""

@@ -1,6 +1,6 @@
 //! Commands from host to board: five bytes that set one register (Table 5.1).
 
-use crate::{Error, Result, problem};
+use crate::{Error, Place, Result, problem};
 
 /// Sets one 32-bit register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,7 +41,8 @@ impl Command {
     pub fn from_bytes(b: [u8; 5]) -> Result<Self> {
         if let Some(k) = (0..5).find(|&k| (b[k] >= 0x80) != (k == 0)) {
             let right = if k == 0 { "80 or above" } else { "below 80" };
-            return Err(Error::format(format!("command, byte {k} is {:02X}: must be {right}", b[k])));
+            let text = format!("a command's byte is {:02X}: must be {right}", b[k]);
+            return Err(Error::format(text).at(Place::byte(k as u64)));
         }
         let byte = |k: usize| b[k] | (b[0] >> (4 - k) & 1) << 7;
         Ok(Self { register: b[0] >> 4 & 7, value: u32::from_be_bytes([byte(1), byte(2), byte(3), byte(4)]) })

@@ -52,7 +52,7 @@ pub(super) fn datagrams(length: u64) -> u64 {
 
 /// The error of more bytes than are read unless the caller allows them.
 pub(super) fn too_large(path: &Path, text: &str) -> Error {
-    taxel_core::Error::format(format!("{}: {text}", path.display())).with_hint("limit", Hint::Larger).into()
+    taxel_core::Error::format(text).at(taxel_core::Place::file(path)).with_hint("limit", Hint::Larger).into()
 }
 
 /// Refuses more bytes in memory than a caller allows.

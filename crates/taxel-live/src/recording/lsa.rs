@@ -166,9 +166,8 @@ pub fn decode_lsa(
     limits::in_memory(path, "raw data", length, memory)?;
     file.take(length).read_to_end(&mut bytes).map_err(Error::file(path))?;
     if wire::v2::begins(&bytes) {
-        let name = path.display();
         let reason = "begins with a datagram of wire version 2; a .lsa file contains only version 1";
-        return Err(taxel_core::Error::format(format!("{name}: {reason}: record version 2 to a .mcap file")).into());
+        return Err(Error::format(path, &format!("{reason}: record version 2 to a .mcap file")));
     }
     let mut decoder = Decoder::new(array.clone()).pairing(pairing).differences(differences);
     let mut events = Events::empty(array);

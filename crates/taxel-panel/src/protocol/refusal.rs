@@ -41,7 +41,8 @@ impl From<taxel_live::Error> for Refusal {
 /// An error as the page shows it, with its remedy.
 pub(crate) fn words(error: &taxel_live::Error) -> String {
     let reason = if let taxel_live::Error::Core(core) = error { core.reason() } else { None };
-    let Some(Reason { text, argument: Some(argument), hint: Some(hint) }) = reason else { return error.to_string() };
+    let Some(Reason { argument: Some(argument), hint: Some(hint), .. }) = reason else { return error.to_string() };
+    let text = error;
     match hint {
         Hint::Give => format!("{text}; give {argument}"),
         Hint::Larger => format!("{text}; a larger {argument} reads more"),
