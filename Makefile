@@ -4,12 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := Cargo.toml Cargo.lock $(shell find crates rules -name '*.rs' -o -name Cargo.toml)
 
-.PHONY: help check setup build released bridge demo browser test test-studies slow lint format registers messages bench docs dist platforms clean
+.PHONY: help check setup build released bridge demo browser test test-studies accept slow lint format registers messages bench docs dist platforms clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
 	@echo "make test   the product's tests but the slow ones      make slow   the slow ones of all"
 	@echo "make test-studies  the tests of the distributions beside it  make rtl-test  those of the FPGA logic"
+	@echo "make accept keep the sentences of errors as they are now, in tests/messages"
 	@echo "make lint   format, lint, types, layers     make bench  ratios against peers, to benchmarks/results/"
 	@echo "make docs   the documentation, without warnings"
 	@echo "make bridge what carries a board to other computers: six minutes of a core, for those who have several"
@@ -96,6 +97,10 @@ test: released $(VENV)/.for-test browser
 test-studies: released $(VENV)/.for-test
 	$(BIN)/python -m pytest -q -n 4 --dist loadfile --no-loadscope-reorder -m "not slow" rules $(BESIDE)
 
+# The sentences of errors as they are now; the commit shows old and new text in its body.
+accept: released $(VENV)/.for-test
+	$(BIN)/python -m pytest -q tests/messages --snapshot-update
+
 slow: released $(VENV)/.for-test browser dist bridge
 	cargo test --release --workspace --quiet -- --ignored
 	cargo check --manifest-path fuzz/Cargo.toml --quiet
@@ -122,6 +127,7 @@ lint: $(VENV)/.for-test $(VENV)/.for-lint
 	$(BIN)/python tools/messages.py --check
 	$(BIN)/python tools/page_types.py
 	$(BIN)/python tools/lines.py --grown
+	$(BIN)/python tools/quotes.py
 
 format: $(VENV)/.for-lint
 	cargo fmt --all

@@ -13,6 +13,7 @@ from typing import Any, get_args, get_type_hints
 
 import numpy as np
 import pytest
+from refusal import refused
 
 import taxel
 from taxel._base.parameters import Parameters, Value
@@ -70,7 +71,7 @@ def test_the_signature_shows_what_the_compiled_part_has(kind):
 
 
 @pytest.mark.parametrize(("kind", "name"), ranged())
-def test_a_value_outside_its_range_is_refused_in_the_table_s_words(kind, name):
+def test_a_value_outside_its_range_is_refused(kind, name):
     rules = kind._described()["ranges"][name]
     wrong = [math.nan]
     if "least" in rules:
@@ -83,13 +84,8 @@ def test_a_value_outside_its_range_is_refused_in_the_table_s_words(kind, name):
     entries = max(1, len(default)) if isinstance(default, list) else int(hint == Sequence[float] | None)
     for value in wrong:
         given = int(value) if whole and math.isfinite(value) else value
-        with pytest.raises(taxel.ProblemError) as error:
+        with refused(argument=name):
             make(kind, **{name: [given] * entries if entries else given})
-        assert error.value.argument == name
-        assert str(error.value).startswith(name)
-        assert "\n" not in str(error.value)
-        if math.isfinite(value) and not (whole and value < 0):
-            assert f"must be {rules['must_be']}" in str(error.value)
 
 
 def documented(kind: Any, name: str) -> str:
@@ -122,7 +118,7 @@ def test_the_words_of_a_choice_are_the_compiled_part_s(kind):
         words = [word for part in (hint, *get_args(hint)) for word in get_args(part) if isinstance(word, str)]
         if not words or name not in inspect.signature(kind).parameters:
             continue
-        with pytest.raises(taxel.ProblemError, match=name) as error:
+        with refused(argument=name) as error:
             make(kind, **{name: "nonsense"})
         listed = str(error.value).partition(f'{name} is "nonsense": must be ')[2]
         assert sorted(re.findall(r'"(.+?)"', listed)) == sorted(words)
@@ -151,7 +147,7 @@ def test_a_wrong_value_changes_nothing(kind):
         with pytest.raises(taxel.ProblemError):
             one.set_params(**nonsense)
         assert all(held is before[key] for key, held in one.get_params(deep=False).items())
-    with pytest.raises(taxel.ProblemError, match="deep is 2"):
+    with refused(argument="deep"):
         one.get_params(deep=2)
 
 

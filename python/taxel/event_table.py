@@ -13,10 +13,10 @@ from dataclasses import replace
 
 from taxel._base.arguments import shown
 from taxel._base.cells import seconds_of, unit_of
+from taxel._base.errors import unreadable
 from taxel._base.header_table import HeaderTable
 from taxel._base.messages import counted, warn
 from taxel._base.number_text import float_of
-from taxel._core import FormatError
 
 __all__ = ["are_of_bids", "are_of_events", "is_of_track", "track", "with_known_columns"]
 
@@ -80,7 +80,7 @@ def with_known_columns(table: HeaderTable, separator: str) -> HeaderTable:
     if "trial_type" in header:
         rows = [(line, cells) for line, cells in rows if cells[header.index("trial_type")].strip() != _MISSING]
     for k, (line, cells) in enumerate(rows if name != "t_us" else ()):
-        us = _us(f"{table.location}, line {line}", name, cells[time].strip(), separator)
+        us = _us(table.location, line, name, cells[time].strip(), separator)
         rows[k] = line, (*cells[:time], str(us), *cells[time + 1 :])
     if "label" not in header:
         header[_label(table, header, [cells for _, cells in rows], separator)] = "label"
@@ -145,8 +145,8 @@ def track(location: str, lines: Sequence[str]) -> HeaderTable:
         cells = line.rstrip("\r\n").split("\t", 2)
         times = _ends(cells)
         if len(cells) < 2 or not all(map(math.isfinite, times)):
-            raise FormatError(
-                f"{location}, line {number}: {shown(line.strip())}; must be begin and end, s, and label, between tabs"
+            raise unreadable(
+                f"{shown(line.strip())}; must be begin and end, s, and label, between tabs", location, line=number
             )
         label = "".join(cells[2:]).strip()
         unnamed += not label
@@ -187,15 +187,16 @@ def _time(table: HeaderTable) -> int:
     there = ", ".join(map(shown, table.header))
     if times:
         names = " and ".join(shown(table.header[k]) for k in times)
-        raise FormatError(
-            f"{table.location}, line 1: {names} all contain times: rename the column with the times of the labels to "
-            "t_us, or remove the others"
+        raise unreadable(
+            f"{names} all contain times: rename the column with the times of the labels to t_us, or remove the others",
+            table.location,
+            line=1,
         )
     missing = "t_us" if any(name.lower() in _LABELS for name in table.header) else "label"
     frames = next((name for name in table.header if _FRAMES.fullmatch(name)), None)
     counts = "" if frames is None else f"; {shown(frames)} contains numbers of frames, not times: {_CONVERT}"
-    raise FormatError(
-        f"{table.location}, line 1: column {missing!r} is missing; the columns are {there}{counts}; {_RIGHT}"
+    raise unreadable(
+        f"column {missing!r} is missing; the columns are {there}{counts}; {_RIGHT}", table.location, line=1
     )
 
 
@@ -216,29 +217,33 @@ def _label(table: HeaderTable, header: Sequence[str], rows: Sequence[Sequence[st
     if texts:
         found = f"{' and '.join(shown(header[k]) for k in texts)} are texts, so the column of the labels is not clear"
     there = ", ".join(map(shown, table.header))
-    raise FormatError(f"{table.location}, line 1: {found}; the columns are {there}; {_RIGHT}")
+    raise unreadable(f"{found}; the columns are {there}; {_RIGHT}", table.location, line=1)
 
 
 def _is_text(cell: str, separator: str = ";") -> bool:
     return bool(cell.strip()) and math.isnan(_number(cell, separator)) and math.isnan(seconds_of(cell.strip()))
 
 
-def _us(location: str, name: str, cell: str, separator: str) -> int:
+def _us(location: str, line: int, name: str, cell: str, separator: str) -> int:
     """Return the time of a cell in whole us."""
     number, unit = _number(cell, separator), "s" if name.lower() == "onset" else unit_of(name) or ""
     if math.isnan(number):
         number, unit = seconds_of(cell), "s"
     elif not unit:
         of_frames = f"; if these are numbers of frames, {_CONVERT}" if number.is_integer() else ""
-        raise FormatError(
-            f"{location}: {name} is {shown(cell)}; its unit is not known; write the unit in the name of the column, "
-            f"for example '{name} [s]' or (ms)" + of_frames
+        raise unreadable(
+            f"{name} is {shown(cell)}; its unit is not known; write the unit in the name of the column, "
+            f"for example '{name} [s]' or (ms){of_frames}",
+            location,
+            line=line,
         )
     us = number * _US[unit]
     if not math.isfinite(us):
-        raise FormatError(
-            f"{location}: {name} is {shown(cell)}; must be a number, or a time like 2024-05-01 10:15:02.25 or "
-            "01.05.2024 10:15:02,25"
+        raise unreadable(
+            f"{name} is {shown(cell)}; must be a number, or a time like 2024-05-01 10:15:02.25 or "
+            "01.05.2024 10:15:02,25",
+            location,
+            line=line,
         )
     return round(us)
 

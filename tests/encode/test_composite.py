@@ -4,9 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from refusal import refused_saying as refused
+from refusal import refused
 
-import taxel
 from taxel import Array, Frames, SpikeTrains, Tare
 from taxel.encode import FA1, FA2, ChangeEvents, Composite, ContactArea, Encoder, Moments, ThresholdIzhikevich
 
@@ -66,7 +65,7 @@ def test_a_part_s_tare_in_seconds_is_taken_at_the_beginning() -> None:
     parts = {"a": ContactArea(tare=0.02), "b": Moments(graded=True, tare=0.01), "c": FA1(period_ms=0.2)}
     given = Tare.take(frames, stop_us=20_000)
     assert Composite(parts).encode(frames) == Composite(parts).with_tare(given).encode(frames)
-    with refused("a: contact area without a tare"):
+    with refused(argument="tare"):
         Composite({"a": ContactArea()}).encode(frames)
 
 
@@ -81,49 +80,49 @@ def test_the_order_in_which_parts_are_given_says_nothing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("parts", "text"),
+    ("parts", "argument"),
     [
-        ({}, "parts is empty"),
-        (None, "parts is None: must be a dict of encoders"),
-        ({"a": 3}, r"parts\['a'\] is 3: must be a taxel.encode.Encoder"),
-        ({" ": FA1()}, "the name of a part is empty"),
-        ({3: FA1()}, "a name in parts is 3"),
-        ({"a": Composite({"b": FA1()})}, "part a is a composite"),
+        ({}, None),
+        (None, "parts"),
+        ({"a": 3}, "parts"),
+        ({" ": FA1()}, None),
+        ({3: FA1()}, None),
+        ({"a": Composite({"b": FA1()})}, None),
     ],
 )
-def test_parts_that_make_no_sense_are_refused(parts: object, text: str) -> None:
-    with pytest.raises(taxel.ProblemError, match=text):
+def test_parts_that_make_no_sense_are_refused(parts: object, argument: str) -> None:
+    with refused(argument=argument):
         Composite(parts)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
-    ("parts", "text"),
+    ("parts", "argument"),
     [
-        ({"area": {"name": "contact_area", "noise_floor": -1.0}}, "area: noise_floor is -1"),
-        ({"area": {"name": "contact_area", "wings": 2}}, "area: wings is not known"),
-        ({"area": {"name": "composed"}}, "area: encoder composed: must be one of"),
-        ({"area": {}}, "area: encoder: the name is missing"),
-        (3, "parts is 3"),
+        ({"area": {"name": "contact_area", "noise_floor": -1.0}}, None),
+        ({"area": {"name": "contact_area", "wings": 2}}, None),
+        ({"area": {"name": "composed"}}, None),
+        ({"area": {}}, None),
+        (3, "parts"),
     ],
 )
-def test_an_error_in_a_part_names_it(parts: object, text: str) -> None:
-    with pytest.raises(taxel.ProblemError, match=text):
+def test_an_error_in_a_part_names_it(parts: object, argument: str) -> None:
+    with refused(argument=argument):
         Encoder.from_json(json.dumps({"name": "composite", "parts": parts}))
 
 
 @pytest.mark.parametrize(
-    ("names", "text"),
+    "names",
     [
-        (["b"], "'b' is not the name of an encoder: must be one of a"),
-        (["a", "a"], "'a' appears twice"),
-        ([], "inputs is empty"),
-        (3, "sequence"),
+        ["b"],
+        ["a", "a"],
+        [],
+        3,
     ],
 )
-def test_parts_are_chosen_by_their_names(names: object, text: str) -> None:
+def test_parts_are_chosen_by_their_names(names: object) -> None:
     for call in (
         lambda: Composite({"a": FA1()}).only(names),
         lambda: Composite({"a": FA1()}).places(names, Array(1, 1)),
     ):
-        with pytest.raises(taxel.ProblemError, match=text):
+        with refused(argument="inputs"):
             call()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 
 from taxel import Array, Events, Frames, Tare
 from taxel.encode import ContactArea
@@ -83,24 +83,24 @@ def test_a_noise_floor_of_0_is_of_whole_numbers_alone():
     encoder = ContactArea(noise_floor=0, levels=[2], tare=Tare.take(frames, stop_us=2000))
     assert len(encoder.encode(frames).times) == 1
     values[3] = 0.4
-    with refused("noise_floor is 0, but the values are in N: must be the noise at rest.*; 0 is only for whole numbers"):
+    with refused(argument="noise_floor"):
         encoder.encode(Frames(values, frames.t, unit="N"))
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "argument"),
     [
-        (lambda: ContactArea(noise_floor=-1), "noise_floor is -1"),
-        (lambda: ContactArea(levels=[]), "levels is empty: must contain"),
-        (lambda: ContactArea(levels=[0, 2]), r"levels are \[0, 2\]"),
-        (lambda: ContactArea(levels=[2, 2]), r"levels are \[2, 2\]"),
-        (lambda: ContactArea(levels=[2.5]), r"levels\[0\] is 2.5: must be a whole number"),
-        (lambda: ContactArea(tare="soon"), "tare is .soon.: must be a taxel.Tare, or a number of seconds"),
-        (lambda: ContactArea().encode(Frames(np.zeros((1, 3, 4)), [0])), "without a tare"),
-        (lambda: ContactArea().stream(ARRAY), "without a tare"),
-        (lambda: ContactArea().with_tare(None), "tare is None"),
+        (lambda: ContactArea(noise_floor=-1), "noise_floor"),
+        (lambda: ContactArea(levels=[]), "levels"),
+        (lambda: ContactArea(levels=[0, 2]), "levels"),
+        (lambda: ContactArea(levels=[2, 2]), "levels"),
+        (lambda: ContactArea(levels=[2.5]), "levels"),
+        (lambda: ContactArea(tare="soon"), "tare"),
+        (lambda: ContactArea().encode(Frames(np.zeros((1, 3, 4)), [0])), "tare"),
+        (lambda: ContactArea().stream(ARRAY), "tare"),
+        (lambda: ContactArea().with_tare(None), "tare"),
     ],
 )
-def test_nonsense_gets_one_clear_line(call, said):
-    with refused(said):
+def test_nonsense_gets_one_clear_line(call, argument):
+    with refused(argument=argument):
         call()

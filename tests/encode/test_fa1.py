@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 
-import taxel
 from taxel.encode import FA1
 
 from . import oracles
@@ -66,27 +65,25 @@ def test_fa1_on_ticks_by_table_equals_fa1_on_the_same_numbers_without_it():
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "argument"),
     [
-        (lambda: FA1(alpha=0), "alpha is 0"),
-        (lambda: FA1(alpha=5), "alpha is 5"),
-        (lambda: FA1(a=-1), "a is -1"),
-        (lambda: FA1(b=-1), "b is -1"),
-        (lambda: FA1(theta_0=-1), "theta_0 is -1"),
-        (lambda: FA1(range=0), "range is 0"),
-        (lambda: FA1(bits=11), "bits is 11"),
-        (lambda: FA1(range=1, theta_0=1), "theta_0 and range are both given"),
-        (lambda: FA1(decay="s"), 'decay is "s": must be "sample" or "ms"'),
+        (lambda: FA1(alpha=0), "alpha"),
+        (lambda: FA1(alpha=5), "alpha"),
+        (lambda: FA1(a=-1), "a"),
+        (lambda: FA1(b=-1), "b"),
+        (lambda: FA1(theta_0=-1), "theta_0"),
+        (lambda: FA1(range=0), "range"),
+        (lambda: FA1(bits=11), "bits"),
+        (lambda: FA1(range=1, theta_0=1), None),
+        (lambda: FA1(decay="s"), "decay"),
     ],
 )
-def test_nonsense_gets_one_clear_line(call, said):
-    with refused(said):
+def test_nonsense_gets_one_clear_line(call, argument):
+    with refused(argument=argument):
         call()
 
 
 def test_fa1_refuses_frames_that_do_not_come_at_its_period():
-    with pytest.raises(
-        taxel.ProblemError, match=r"5 ms after the previous frame: frames must come every 1 ms; give period_ms"
-    ):
+    with refused(argument="period_ms"):
         FA1().encode(frames_of([0, 1000, 6000], np.zeros((3, 1))))
     FA1(period_ms=0.192).encode(frames_of([0, 100, 300, 500, 700], np.zeros((5, 1))))

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 
 import taxel
 from taxel import Array, Events, Frames, _core
@@ -132,7 +132,7 @@ def test_events_out_of_order_are_heard_as_a_stream_hears_them_or_refused(encoder
     wanted = spikes_of(encoder.encode(heard))
     assert sorted(spikes + spikes_of(stream.finish())) == wanted
     if len(far):
-        with pytest.raises(taxel.ProblemError, match=rf"event {far[0]} at .* before event .*Events\.sorted\(\)"):
+        with refused():
             encoder.encode(events)
     else:
         assert spikes_of(encoder.encode(events)) == wanted
@@ -200,7 +200,7 @@ def test_events_backwards_are_refused_by_whoever_takes_a_whole_recording(encoder
     events = touch(np.random.default_rng(18), ARRAY)[::-1]
     readout = taxel.Readout(encoder, {"a": (taxel.Neuron(), np.ones(encoder.trains(ARRAY) * (1 + encoder.signed)))})
     for take in (encoder.encode, taxel.Tare.take, lambda x: taxel.detect.run(readout, x, tare=rest(ARRAY))):
-        with pytest.raises(taxel.ProblemError, match=r"event \d+ at \d+ us: is more than 0.1 s before event"):
+        with refused():
             take(events)
         take(events.sorted())
 
@@ -396,51 +396,51 @@ def test_a_long_silence_costs_no_time_once_nothing_can_come():
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "argument"),
     [
-        (lambda: ENCODERS["area"].encode(Frames(np.zeros((1, 4, 3)), [0])), "tare of 3 x 4 taxels"),
-        (lambda: FA1().with_tare(5), "tare is 5"),
-        (lambda: Encoder.from_json("{"), "encoder: not JSON"),
-        (lambda: Encoder.from_json("[]"), r"encoder is \[\]: must be an object \(names and values\)"),
-        (lambda: Encoder.from_json("{}"), "the name is missing: must be one of change_events"),
-        (lambda: Encoder.from_json('{"name": "sa3"}'), "encoder sa3: must be one of"),
-        (lambda: Encoder.from_json('{"name": "fa1", "tau": 5}'), 'tau is not known: must be "alpha", '),
-        (lambda: Encoder.from_json('{"name": "level_crossing"}'), "levels is missing"),
-        (lambda: Encoder.from_json(None), "must be JSON text"),
-        (lambda: FA1().encode([1, 2]), "list cannot be encoded"),
-        (lambda: FA1().stream(5), "array is 5"),
-        (lambda: FA1().trains(None), "array is None"),
-        (lambda: FA1().stream().push("x"), "str cannot be encoded: must be taxel.Events or taxel.Frames"),
-        (lambda: FA1().stream().advance(1.5), "t_us is 1.5"),
-        (lambda: FA1().stream().advance("x"), "t_us is 'x'"),
-        (lambda: FA1().stream().advance(2**62), "t_us is "),
+        (lambda: ENCODERS["area"].encode(Frames(np.zeros((1, 4, 3)), [0])), None),
+        (lambda: FA1().with_tare(5), "tare"),
+        (lambda: Encoder.from_json("{"), None),
+        (lambda: Encoder.from_json("[]"), None),
+        (lambda: Encoder.from_json("{}"), None),
+        (lambda: Encoder.from_json('{"name": "sa3"}'), None),
+        (lambda: Encoder.from_json('{"name": "fa1", "tau": 5}'), "tau"),
+        (lambda: Encoder.from_json('{"name": "level_crossing"}'), "levels"),
+        (lambda: Encoder.from_json(None), "encoder"),
+        (lambda: FA1().encode([1, 2]), None),
+        (lambda: FA1().stream(5), "array"),
+        (lambda: FA1().trains(None), "array"),
+        (lambda: FA1().stream().push("x"), None),
+        (lambda: FA1().stream().advance(1.5), "t_us"),
+        (lambda: FA1().stream().advance("x"), "t_us"),
+        (lambda: FA1().stream().advance(2**62), "t_us"),
     ],
 )
-def test_nonsense_gets_one_clear_line(call, said):
-    with refused(said):
+def test_nonsense_gets_one_clear_line(call, argument):
+    with refused(argument=argument):
         call()
 
 
 @each_encoder
 def test_what_cannot_be_encoded_is_refused(encoder):
-    def refuses(said, *pieces):
+    def refuses(*pieces):
         stream = encoder.stream(ARRAY)
         for piece in pieces[:-1]:
             stream.push(piece)
-        with pytest.raises(taxel.ProblemError, match=said):
+        with refused():
             stream.push(pieces[-1])
 
     heard = Events([5], [0], [0], [1], array=ARRAY, intensity=[5])
     frame = Frames(np.zeros((1, 3, 4)), [0], array=ARRAY)
-    refuses("without intensities", Events([5], [0], [0], [1], array=ARRAY))
-    refuses("begun with events", heard, frame)
-    refuses("begun with frames", frame, heard)
-    refuses("times must ascend", frame, frame)
-    refuses("begun for .* 3 x 4", Events([5], [0], [0], [1], array=Array(4, 4), intensity=[5]))
-    refuses("begun for 3 x 4", Frames(np.zeros((1, 4, 4)), [0]))
-    refuses("Frames.held replaces missing", Frames(np.full((1, 3, 4), np.nan), [0], array=ARRAY))
-    refuses("too far from 0", Events([2**62], [0], [0], [1], array=ARRAY, intensity=[5]))
-    refuses("too far from 0", Frames(np.zeros((1, 3, 4)), [-(2**62)], array=ARRAY))
+    refuses(Events([5], [0], [0], [1], array=ARRAY))
+    refuses(heard, frame)
+    refuses(frame, heard)
+    refuses(frame, frame)
+    refuses(Events([5], [0], [0], [1], array=Array(4, 4), intensity=[5]))
+    refuses(Frames(np.zeros((1, 4, 4)), [0]))
+    refuses(Frames(np.full((1, 3, 4), np.nan), [0], array=ARRAY))
+    refuses(Events([2**62], [0], [0], [1], array=ARRAY, intensity=[5]))
+    refuses(Frames(np.zeros((1, 3, 4)), [-(2**62)], array=ARRAY))
 
 
 def test_readable_names():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 
 from taxel.encode import LevelCrossing, RunningRange
 
@@ -101,29 +101,29 @@ def test_renewals_go_on_over_a_gap_longer_than_the_window():
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "argument"),
     [
-        (lambda: LevelCrossing([]), "levels is empty: must contain"),
-        (lambda: LevelCrossing(5.0), "levels is 5.0: must be a list"),
-        (lambda: LevelCrossing([1.0, 1.0]), "levels: 1 comes after 1; must ascend"),
-        (lambda: LevelCrossing([2.0, float("inf")]), r"levels\[1\] is inf"),
-        (lambda: LevelCrossing([1e300]), "levels contain"),
-        (lambda: LevelCrossing([1.0], release_share=0), "release_share is 0"),
-        (lambda: LevelCrossing([1.0], release_share=1.01), "release_share is 1.01"),
-        (lambda: LevelCrossing([-1.0, 1.0], release_share=0.7), "use release_by"),
-        (lambda: LevelCrossing([1.0], release_by=-1), "release_by is -1"),
-        (lambda: LevelCrossing([1.0], release_by=1, release_share=1), "are both given: give only one of them"),
-        (lambda: LevelCrossing([1.0], hold_ms=-1), "hold_ms is -1"),
-        (lambda: LevelCrossing([1.0], tonic_ms=0), "tonic_ms is 0"),
-        (lambda: LevelCrossing([1.0], tonic_level=1.0), "without tonic_ms"),
-        (lambda: LevelCrossing([1.0], tonic_ms=5, tonic_level=2.0), "tonic_level is 2: must be one of"),
-        (lambda: LevelCrossing([1.0], running_range=RunningRange(low=95, high=10)), "running_range from 95 to 10"),
-        (lambda: LevelCrossing([1.0], running_range=RunningRange(high=101)), "high is 101 %: must be from 0 to 100"),
-        (lambda: LevelCrossing([1.0], running_range=RunningRange(renew_s=-1)), "renew_s is -1 s"),
-        (lambda: LevelCrossing([1.0], running_range={"low": 1}), "running_range is .*: must be a taxel.encode.Run"),
-        (lambda: LevelCrossing([1.0], running_range=5), "running_range is 5: must be a taxel.encode.RunningRange"),
+        (lambda: LevelCrossing([]), "levels"),
+        (lambda: LevelCrossing(5.0), "levels"),
+        (lambda: LevelCrossing([1.0, 1.0]), "levels"),
+        (lambda: LevelCrossing([2.0, float("inf")]), "levels"),
+        (lambda: LevelCrossing([1e300]), "levels"),
+        (lambda: LevelCrossing([1.0], release_share=0), "release_share"),
+        (lambda: LevelCrossing([1.0], release_share=1.01), "release_share"),
+        (lambda: LevelCrossing([-1.0, 1.0], release_share=0.7), "release_share"),
+        (lambda: LevelCrossing([1.0], release_by=-1), "release_by"),
+        (lambda: LevelCrossing([1.0], release_by=1, release_share=1), None),
+        (lambda: LevelCrossing([1.0], hold_ms=-1), "hold_ms"),
+        (lambda: LevelCrossing([1.0], tonic_ms=0), "tonic_ms"),
+        (lambda: LevelCrossing([1.0], tonic_level=1.0), None),
+        (lambda: LevelCrossing([1.0], tonic_ms=5, tonic_level=2.0), "tonic_level"),
+        (lambda: LevelCrossing([1.0], running_range=RunningRange(low=95, high=10)), None),
+        (lambda: LevelCrossing([1.0], running_range=RunningRange(high=101)), "high"),
+        (lambda: LevelCrossing([1.0], running_range=RunningRange(renew_s=-1)), "renew_s"),
+        (lambda: LevelCrossing([1.0], running_range={"low": 1}), "running_range"),
+        (lambda: LevelCrossing([1.0], running_range=5), "running_range"),
     ],
 )
-def test_nonsense_gets_one_clear_line(call, said):
-    with refused(said):
+def test_nonsense_gets_one_clear_line(call, argument):
+    with refused(argument=argument):
         call()

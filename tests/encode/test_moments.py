@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 
 import taxel
 from taxel import Array, Frames, Tare
@@ -161,22 +161,22 @@ def test_the_options_are_off_by_default_and_leave_json_as_it_was():
 
 
 @pytest.mark.parametrize(
-    ("options", "text"),
+    ("options", "argument"),
     [
-        ({"ages_ms": []}, "ages_ms is empty"),
-        ({"ages_ms": [-1.0]}, r"ages_ms\[0\] is -1"),
-        ({"ages_ms": [1.0, float("nan")]}, r"ages_ms\[1\]"),
-        ({"ages_ms": [2.0, 1.0]}, r"ages_ms\[1\]: must be at least 1 us above the age before"),
-        ({"ages_ms": [1.0, 1.0001]}, r"ages_ms\[1\]: must be at least 1 us"),
+        ({"ages_ms": []}, "ages_ms"),
+        ({"ages_ms": [-1.0]}, "ages_ms"),
+        ({"ages_ms": [1.0, float("nan")]}, "ages_ms"),
+        ({"ages_ms": [2.0, 1.0]}, "ages_ms"),
+        ({"ages_ms": [1.0, 1.0001]}, "ages_ms"),
         ({"ages_ms": 3.0}, "ages_ms"),
         ({"graded": 2}, "graded"),
-        ({"levels": 0}, "levels is 0, and neither graded nor ages_ms is given"),
-        ({"graded": True} | dict.fromkeys(RANGES), "all left out"),
-        ({"graded": True, "ages_ms": [1.0]} | dict.fromkeys(RANGES), "all left out"),
+        ({"levels": 0}, "levels"),
+        ({"graded": True} | dict.fromkeys(RANGES), None),
+        ({"graded": True, "ages_ms": [1.0]} | dict.fromkeys(RANGES), None),
     ],
 )
-def test_options_that_make_no_sense_are_refused(options, text):
-    with refused(text):
+def test_options_that_make_no_sense_are_refused(options, argument):
+    with refused(argument=argument):
         Moments(**options).to_json()
 
 
@@ -255,29 +255,29 @@ def test_it_begins_settled():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "argument"),
     [
-        ({"levels": 1001}, "levels is 1001: must be from 0 to 1000"),
-        ({"levels": 2.5}, "levels is 2.5: must be a whole number"),
-        ({"area": (0, 5)}, r"area\[0\] is 0: must be above 0"),
-        ({"total": (5, 5)}, "total is 5 to 5"),
-        ({"peak": (5, 4)}, "peak is 5 to 4"),
-        ({"peak": (5,)}, r"peak is \[5\]: must be a list of 2"),
-        ({"displacement_mm": (-1, 4)}, r"displacement_mm\[0\] is -1 mm"),
-        (dict.fromkeys(RANGES), "all left out"),
-        ({"centre": True}, "centre is given without graded"),
-        ({"tonic_ms": 0}, "tonic_ms is 0"),
-        ({"period_ms": 0}, "period_ms is 0"),
-        ({"noise_floor": -1}, "noise_floor is -1"),
+        ({"levels": 1001}, "levels"),
+        ({"levels": 2.5}, "levels"),
+        ({"area": (0, 5)}, "area"),
+        ({"total": (5, 5)}, "total"),
+        ({"peak": (5, 4)}, "peak"),
+        ({"peak": (5,)}, "peak"),
+        ({"displacement_mm": (-1, 4)}, "displacement_mm"),
+        (dict.fromkeys(RANGES), None),
+        ({"centre": True}, "centre"),
+        ({"tonic_ms": 0}, "tonic_ms"),
+        ({"period_ms": 0}, "period_ms"),
+        ({"noise_floor": -1}, "noise_floor"),
         ({"tare": "soon"}, "tare"),
     ],
 )
-def test_nonsense_gets_one_clear_line(wrong, said):
-    with refused(said):
+def test_nonsense_gets_one_clear_line(wrong, argument):
+    with refused(argument=argument):
         Moments(**wrong)
 
 
 def test_without_a_tare_nothing_is_encoded():
     for call in (lambda: Moments().stream(ARRAY), lambda: Moments().encode(Frames(np.zeros((1, 3, 4)), [0]))):
-        with pytest.raises(taxel.ProblemError, match="moments without a tare"):
+        with refused(argument="tare"):
             call()

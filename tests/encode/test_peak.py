@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 
 from taxel import Array, Frames, Tare
 from taxel.encode import Peak
@@ -107,10 +107,10 @@ def test_several_loaded_taxels_add():
 
 def test_it_needs_a_tare_and_levels_that_ascend():
     frames = Frames(np.zeros((2, 1, 1)), [0, 1000])
-    with refused("peak without a tare"):
+    with refused(argument="tare"):
         Peak().encode(frames)
-    with refused("must be above the level before"):
+    with refused(argument="levels"):
         Peak(levels=[3.0, 3.0])
-    with refused("must contain one level or more"):
+    with refused(argument="levels"):
         Peak(levels=[])
     assert spikes_of(Peak(tare=Tare.take(frames)).encode(frames)) == []

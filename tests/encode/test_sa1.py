@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel.encode import SA1
@@ -126,14 +127,14 @@ def test_rates_hardly_depend_on_the_sampling_period(depth):
 
 
 @pytest.mark.parametrize(
-    ("more", "said"),
+    ("more", "argument"),
     [
-        ({"range": 0.0}, "range is 0: must be above 0"),
-        ({"loss": 1.1}, "loss is 1.1: must be from 0 to 1"),
-        ({"period_ms": 0.0005}, "period_ms is .* whole number of us"),
-        ({"jump": float("nan")}, "jump is nan: must be finite"),
+        ({"range": 0.0}, "range"),
+        ({"loss": 1.1}, "loss"),
+        ({"period_ms": 0.0005}, "period_ms"),
+        ({"jump": float("nan")}, "jump"),
     ],
 )
-def test_parameters_that_make_no_sense_are_refused(more, said):
-    with pytest.raises(taxel.ProblemError, match=said):
+def test_parameters_that_make_no_sense_are_refused(more, argument):
+    with refused(argument=argument):
         SA1(**more).stream(taxel.Array(1, 1))

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from refusal import refused
 
-import taxel
 from taxel import Array, Frames
 from taxel.encode import FA1, FA2, SA1, SA2, Skin
 
@@ -111,16 +111,16 @@ def test_each_train_is_its_type_s_encoder_on_what_its_field_feels(pitch, masked)
 
 
 @pytest.mark.parametrize(
-    ("more", "array", "said"),
+    ("more", "array", "argument"),
     [
-        ({"sa1_per_cm2": -1.0}, Array(1, 1), "sa1_per_cm2 is -1: must be 0 or more"),
-        ({"fa2_field_mm2": 0.0}, Array(1, 1), "fa2_field_mm2 is 0: must be above 0"),
-        ({"period_ms": 2.0}, Array(1, 1), "period_ms is 2 ms"),
+        ({"sa1_per_cm2": -1.0}, Array(1, 1), "sa1_per_cm2"),
+        ({"fa2_field_mm2": 0.0}, Array(1, 1), "fa2_field_mm2"),
+        ({"period_ms": 2.0}, Array(1, 1), "period_ms"),
         ({"seed": -1}, Array(1, 1), "seed"),
-        ({}, Array(1000, 1000, 100.0), "afferents; must be at most 1000000"),
-        ({}, None, "array is None"),
+        ({}, Array(1000, 1000, 100.0), None),
+        ({}, None, "array"),
     ],
 )
-def test_skins_that_make_no_sense_are_refused(more, array, said):
-    with pytest.raises(taxel.ProblemError, match=said):
+def test_skins_that_make_no_sense_are_refused(more, array, argument):
+    with refused(argument=argument):
         Skin(**more).afferents(array)

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 from typer.testing import CliRunner
 
 import taxel
 from taxel import Array, Events, Frames, Tare
+from taxel._base.errors import Place
 from taxel.cli import app
 from taxel.encode import SA1, SA2, Skin
 
@@ -81,48 +82,48 @@ EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "argument"),
     [
-        (lambda: Tare.take(5), "x is 5: must be a taxel.Events or taxel.Frames"),
-        (lambda: Tare.take(EVENTS, start_us=1.5), "start_us is 1.5"),
-        (lambda: Tare.take(EVENTS, stop_us=True), "stop_us is True"),
-        (lambda: Tare.take(EVENTS, start_us=900, stop_us=900), "start must be before stop"),
-        (lambda: Tare.take(EVENTS, stop_us=-5), "tare to -5 us: no events are before this time; the events are from "),
-        (lambda: Tare.take(EVENTS.between(0, 0)), "tare: there is no event"),
-        (lambda: Tare.take(EVENTS, note=3), "note is 3"),
-        (lambda: Tare.take(Events([0], [0], [0], [1], array=Array(1, 1))), "without intensities"),
+        (lambda: Tare.take(5), "x"),
+        (lambda: Tare.take(EVENTS, start_us=1.5), "start_us"),
+        (lambda: Tare.take(EVENTS, stop_us=True), "stop_us"),
+        (lambda: Tare.take(EVENTS, start_us=900, stop_us=900), None),
+        (lambda: Tare.take(EVENTS, stop_us=-5), None),
+        (lambda: Tare.take(EVENTS.between(0, 0)), "tare"),
+        (lambda: Tare.take(EVENTS, note=3), "note"),
+        (lambda: Tare.take(Events([0], [0], [0], [1], array=Array(1, 1))), None),
         (
             lambda: Tare.take(Frames(np.full((2, 1, 1), np.nan), [0, 1])),
-            "Frames.held replaces missing values",
+            None,
         ),
-        (lambda: Tare.take(Frames(np.ones((1, 1, 1)), [0])), "start must be before stop|nothing has arrived"),
-        (Tare, "measure one by Tare.take"),
-        (lambda: Tare.from_json(5), "must be JSON text"),
-        (lambda: Tare.from_json("[1"), "tare: "),
-        (lambda: Tare.from_json('{"rest": []}'), "tare: array is missing"),
+        (lambda: Tare.take(Frames(np.ones((1, 1, 1)), [0])), None),
+        (Tare, None),
+        (lambda: Tare.from_json(5), "tare"),
+        (lambda: Tare.from_json("[1"), None),
+        (lambda: Tare.from_json('{"rest": []}'), None),
         (
             lambda: Tare.from_json(Tare.take(EVENTS).to_json().replace("[5.0]", "[5.0, 6.0]")),
-            "2 rests for 1 x 1 taxels",
+            None,
         ),
         (
             lambda: Tare.from_json(Tare.take(EVENTS).to_json().replace('"noise":[0.0]', '"noise":[0.0, 6.0]')),
-            "noise of 2 taxels for 1 x 1",
+            None,
         ),
         (
             lambda: Tare.from_json(Tare.take(EVENTS).to_json().replace('"noise":[0.0]', '"noise":[-1.0]')),
-            "noise of the taxel at row 0, column 0 must be 0 or more",
+            None,
         ),
     ],
 )
-def test_nonsense_gets_one_clear_line(call, said):
-    with refused(said, taxel.Error):
+def test_nonsense_gets_one_clear_line(call, argument):
+    with refused(taxel.Error, argument):
         call()
 
 
 def test_a_file_that_is_no_tare_is_named(tmp_path):
     place = tmp_path / "x.json"
     place.write_bytes(b"\xff\xfe")
-    with pytest.raises(taxel.FormatError, match=r"x\.json"):
+    with refused(taxel.FormatError, place=Place("x.json")):
         Tare.load(place)
     with pytest.raises(FileNotFoundError):
         Tare.load(tmp_path / "none.json")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 
 from taxel import Array, Frames, Tare
 from taxel.encode import TouchEnds
@@ -53,7 +53,7 @@ def test_each_touch_is_told_when_it_ends_with_its_duration(seed, rate_hz):
 
 
 def test_it_needs_a_tare():
-    with refused("touch ends without a tare"):
+    with refused(argument="tare"):
         TouchEnds().encode(Frames(np.zeros((2, 2, 2)), [0, 1000]))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from draws import mixed
 from making import made
+from refusal import refused
 from stated import examples, graded
 
 from taxel import Neuron, ProblemError, SpikeTrains, _core
@@ -158,18 +159,12 @@ def test_a_proof_that_needs_its_margin_says_so_and_a_smaller_margin_may_solve_it
 
 def test_a_row_that_the_problem_does_not_have_is_one_clear_error():
     problem = refuted().problem_
-    for row, said in (
-        (("silence", 99, 5.0), "pattern 99: there are only 8"),
-        (("target", 0, 7), "pattern 0, target 7: the pattern has only 1 targets"),
-        (("silence", 0, 1e6), "is outside the training's time"),
-        (("noise", 0, 1.0), 'row of kind "noise"'),
-        (("target", 0, 0.5), "target 0.5: must be a whole number"),
-    ):
-        with pytest.raises(ProblemError, match=said):
+    for row in (("silence", 99, 5.0), ("target", 0, 7), ("silence", 0, 1e6), ("noise", 0, 1.0), ("target", 0, 0.5)):
+        with refused():
             problem.row(row)
-    with pytest.raises(ProblemError, match='a row of kind slope needs time "continuous"'):
+    with refused():
         refuted(time="grid").problem_.slope(0, 0)
-    with pytest.raises(ProblemError, match="not on the grid"):
+    with refused():
         refuted(time="grid").problem_.silence(0, 0.25)
 
 
@@ -319,13 +314,13 @@ def test_the_rows_of_the_check_are_those_of_the_problem(kernel_in_time, after_sp
 
 def test_a_certificate_of_a_row_that_is_not_there_is_one_clear_error():
     cone = refuted()
-    for row, said in (
-        (Row("silence", 99, 5.0), "a row is of pattern 99; must be from 0 to 7"),
-        (Row("target", 0, 7), "the problem has no such row"),
-        (Row("silence", 0, 1e6), "the problem has no such row"),
-        (Row("behind", 0, 0), "the problem has no such row"),
+    for row, argument in (
+        (Row("silence", 99, 5.0), "certificate"),
+        (Row("target", 0, 7), None),
+        (Row("silence", 0, 1e6), None),
+        (Row("behind", 0, 0), None),
     ):
-        with pytest.raises(ProblemError, match=said):
+        with refused(argument=argument):
             check_certificate(cone.problem_, Certificate([row], np.ones(1), 1.0, False, ""))
 
 
@@ -338,15 +333,15 @@ def test_a_certificate_goes_through_json_and_proves_the_same():
     assert again.to_dict() == cone.certificate_.to_dict()
     assert check_certificate(cone.problem_, again)
     held = json.loads(text)
-    for wrong, said in (
-        ([], "must be a dict of rows"),
-        ({**held, "more": 1}, "must be a dict of rows"),
-        ({**held, "multipliers": held["multipliers"][1:]}, "multipliers? for"),
-        ({**held, "rows": [["target", 0]] * len(held["rows"])}, "must be kind, pattern and target or time"),
+    for wrong, argument in (
+        ([], "certificate"),
+        ({**held, "more": 1}, "certificate"),
+        ({**held, "multipliers": held["multipliers"][1:]}, "certificate"),
+        ({**held, "rows": [["target", 0]] * len(held["rows"])}, "row"),
         ({**held, "at_all": "yes"}, "at_all"),
         ({**held, "gap": None}, "gap"),
     ):
-        with pytest.raises(ProblemError, match=said):
+        with refused(argument=argument):
             Certificate.from_dict(wrong)
 
 
@@ -354,7 +349,7 @@ def test_a_certificate_has_one_multiplier_a_row() -> None:
     trains = SpikeTrains.from_lists([[50.0], [60.0]], stop=100.0)
     cone = ConeX().fit([trains], [[40.0]])
     proof = dataclasses.replace(cone.certificate_, multipliers=np.ones(len(cone.certificate_.rows) + 1))
-    with pytest.raises(ProblemError, match=r"certificate: 2 multipliers for 1 row: must be one per row"):
+    with refused(argument="certificate"):
         check_certificate(cone.problem_, proof)
 
 

@@ -10,6 +10,7 @@ import pytest
 from draws import mixed, stretches
 from exact import excess, reaches
 from making import made
+from refusal import refused
 from stated import examples, graded
 from test_raised_targets import beside
 from test_solved_is_true import KINDS
@@ -324,15 +325,15 @@ def test_a_cone_r_holds_where_it_meets_every_target():
 
 def test_what_cannot_be_checked_is_one_clear_error():
     patterns, targets = examples(3, trains=12, patterns=8, targets=1)
-    with pytest.raises(NotFittedError, match="call fit first"):
+    with refused(NotFittedError):
         check_solution(ConeX(), patterns, targets)
     cone = ConeX(lb=-0.1, ub=0.1).fit(patterns, targets)
-    with pytest.raises(ProblemError, match="is infeasible, so it has no weights"):
+    with refused(argument="cone"):
         check_solution(cone, patterns, targets)
-    with pytest.raises(ProblemError, match=r"must be a taxel\.learn\.ConeX"):
+    with refused(argument="cone"):
         check_solution(Neuron(), patterns, targets)
     cone = ConeX(lb=-9, ub=9).fit(patterns[:1], targets[:1])
-    with pytest.raises(ProblemError, match="2 patterns, 1 list of targets"):
+    with refused():
         check_solution(cone, patterns[:2], targets[:1])
 
 

@@ -11,11 +11,11 @@ import stated
 from draws import mixed
 from interrupts import ctrl_c_after
 from making import lists, made
-from refusal import refused_saying as refused
+from refusal import refused
 from simulator import kernel
 
 import taxel
-from taxel import Neuron, ProblemError, SpikeTrains
+from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeR, OnlineConeR
 
 clarabel = pytest.importorskip("clarabel")
@@ -245,7 +245,7 @@ def test_a_fit_to_the_same_rows_hands_on_its_multipliers():
         ConeR(neuron=Neuron(tau=12.0), kappa=1.25), patterns[:3], targets[:3], start=cold
     )  # other rows: weights alone
     assert elsewhere.status_ == "solved"
-    with pytest.raises(ProblemError, match="start: not fitted yet"):
+    with refused():
         rows.fit(warm, start=ConeR())
 
 
@@ -330,7 +330,7 @@ def test_one_layout_serves_many_parameters_and_refuses_those_that_need_other_row
         here = rows.fit(made(ConeR, tau=12.0, **options))
         assert here.objective_ == fitted(made(ConeR, tau=12.0, **options), patterns, targets).objective_
     for options in ({"tau": 13.0}, {"margin": 0.1}, {"delta_t_ms": 3.0}, {"after_spike": "reset"}, {"horizon": 400.0}):
-        with pytest.raises(ProblemError, match="prepare the rows again"):
+        with refused():
             rows.fit(made(ConeR, **{"tau": 12.0, **options}))
 
 
@@ -449,87 +449,85 @@ def test_max_seconds_ends_a_fit_with_the_best_so_far_and_a_warning(long_rows):
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "argument"),
     [
-        ({"tau": 0}, "tau is 0 ms: must be above 0"),
-        ({"tau": float("nan")}, "tau is nan: must be finite"),
-        ({"tau": "long"}, 'tau is "long": must be a number'),
-        ({"theta_0": -1}, "theta_0 is -1"),
-        ({"theta_plus": -0.1}, "theta_plus is -0.1"),
-        ({"tau_rec": 0.0}, "tau_rec is 0"),
-        ({"refractory": -3}, "refractory is -3"),
-        ({"refractory": 0}, "refractory is 0 ms: must be above 0 unless after_spike"),
-        ({"after_spike": "forget"}, 'after_spike is "forget": must be "keep", "ignore" or "reset"'),
-        ({"first_threshold": "none"}, 'first_threshold is "none": must be "theta_0" or "printed"'),
-        ({"step_ms": 0}, "step_ms is 0"),
-        ({"kappa": 0}, "kappa is 0"),
-        ({"delta_t_ms": -1}, "delta_t_ms is -1"),
-        ({"lambdas": (1, 2, 3, 4)}, r"lambdas is \[1,2,3,4\]: must be a list of 5"),
-        ({"lambdas": (1, 2, 3, 4, -5)}, r"lambdas\[4\] is -5"),
-        ({"lambdas": (0, 0, 0, 0, 0)}, "lambdas are all 0"),
-        ({"lb": 0.31, "ub": 0.3}, "lb must not be above ub"),
-        ({"ub": float("inf")}, "ub is inf: must be finite"),
-        ({"divide_b_by": "two"}, 'divide_b_by is "two": must be "B_max" or "targets"'),
-        ({"norm": "max"}, 'norm is "max": must be "norm" or "square"'),
-        ({"margin": -0.1}, "margin is -0.1"),
-        ({"horizon": float("nan")}, "horizon is nan"),
-        ({"tolerance": 0}, "tolerance is 0: must be from 1e-10 to 0.1"),
-        ({"lb": [-1.0, 0.6], "ub": 0.5}, "bounds of synapse 1: 0.6 to 0.5 mV: lb must not be above ub"),
-        ({"lb": [-1.0], "ub": [1.0, 1.0]}, "lb has 1 bounds, ub has 2"),
-        ({"lb": []}, "bounds: the list is empty"),
-        ({"ub": [1.0, float("inf")]}, r"ub\[1\] is inf: must be finite"),
-        ({"ub": "high"}, 'ub is "high": must be a number of mV, or one number per synapse'),
-        ({"engine": "steam"}, 'engine is "steam": must be "native" or "cone solver"'),
-        ({"max_seconds": 0}, "max_seconds is 0 s: must be above 0"),
+        ({"tau": 0}, "tau"),
+        ({"tau": float("nan")}, "tau"),
+        ({"tau": "long"}, "tau"),
+        ({"theta_0": -1}, "theta_0"),
+        ({"theta_plus": -0.1}, "theta_plus"),
+        ({"tau_rec": 0.0}, "tau_rec"),
+        ({"refractory": -3}, "refractory"),
+        ({"refractory": 0}, "refractory"),
+        ({"after_spike": "forget"}, "after_spike"),
+        ({"first_threshold": "none"}, "first_threshold"),
+        ({"step_ms": 0}, "step_ms"),
+        ({"kappa": 0}, "kappa"),
+        ({"delta_t_ms": -1}, "delta_t_ms"),
+        ({"lambdas": (1, 2, 3, 4)}, "lambdas"),
+        ({"lambdas": (1, 2, 3, 4, -5)}, "lambdas"),
+        ({"lambdas": (0, 0, 0, 0, 0)}, "lambdas"),
+        ({"lb": 0.31, "ub": 0.3}, None),
+        ({"ub": float("inf")}, "ub"),
+        ({"divide_b_by": "two"}, "divide_b_by"),
+        ({"norm": "max"}, "norm"),
+        ({"margin": -0.1}, "margin"),
+        ({"horizon": float("nan")}, "horizon"),
+        ({"tolerance": 0}, "tolerance"),
+        ({"lb": [-1.0, 0.6], "ub": 0.5}, None),
+        ({"lb": [-1.0], "ub": [1.0, 1.0]}, "lb"),
+        ({"lb": []}, None),
+        ({"ub": [1.0, float("inf")]}, "ub"),
+        ({"ub": "high"}, "ub"),
+        ({"engine": "steam"}, "engine"),
+        ({"max_seconds": 0}, "max_seconds"),
     ],
 )
-def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
-    with refused(said):
+def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, argument):
+    with refused(argument=argument):
         made(ConeR, **options)
 
 
 @pytest.mark.parametrize(
-    ("patterns", "targets", "said"),
+    ("patterns", "targets", "argument"),
     [
-        ([], [], "patterns is empty"),
-        ([lists([1.0])], [], "targets: 0 lists for 1 patterns"),
-        ([lists()], [[5.0]], "pattern 0: has no train"),
-        ([lists([], [])], [[5.0]], "pattern 0: has no spike"),
-        ([lists([1.0]), lists([1.0], [2.0])], [[5.0], [5.0]], "pattern 1: 2 trains, pattern 0 has 1"),
-        ([lists([1.0])], [[float("nan")]], "pattern 0, target 0: time is NaN"),
-        ([lists([1.0])], [[30.0, 20.0]], "pattern 0, target 1: 20 ms comes after 30 ms"),
+        ([], [], "patterns"),
+        ([lists([1.0])], [], "targets"),
+        ([lists()], [[5.0]], None),
+        ([lists([], [])], [[5.0]], None),
+        ([lists([1.0]), lists([1.0], [2.0])], [[5.0], [5.0]], None),
+        ([lists([1.0])], [[float("nan")]], None),
+        ([lists([1.0])], [[30.0, 20.0]], None),
         (
             [lists([1.0])],
             [[30.0, 31.5]],
-            r"pattern 0, target 1 \(31.5 ms\): 1.5 ms after target 0; must be at least the refractory time, 3",
+            None,
         ),
-        ([lists([1.0])], [[130.0]], "pattern 0, target 0: 130 ms is outside the pattern's window 0 to 100"),
-        ([lists([1.0])], [5.0], "targets of pattern 0 is 5: must be a list of times"),
-        ([lists([1.0])], [["soon"]], "targets of pattern 0: contains <U4; must contain numbers"),
-        (["spikes"], [[5.0]], "pattern 0 is 'spikes': must be a taxel.SpikeTrains"),
-        ([SpikeTrains.from_lists([[1.0]], stop=9.0, values=[[-1.0]])], [[5.0]], "pattern 0: spikes are signed"),
+        ([lists([1.0])], [[130.0]], None),
+        ([lists([1.0])], [5.0], None),
+        ([lists([1.0])], [["soon"]], None),
+        (["spikes"], [[5.0]], None),
+        ([SpikeTrains.from_lists([[1.0]], stop=9.0, values=[[-1.0]])], [[5.0]], None),
     ],
 )
-def test_examples_that_make_no_sense_are_one_clear_error_each(patterns, targets, said):
-    with pytest.raises(ProblemError, match=said):
+def test_examples_that_make_no_sense_are_one_clear_error_each(patterns, targets, argument):
+    with refused(argument=argument):
         ConeR().fit(patterns, targets)
 
 
 def test_a_start_that_does_not_fit_is_one_clear_error():
-    for start, said in (([1.0, 2.0], "weights: 2 for 1 trains"), ([float("nan")], r"weights\[0\] is NaN")):
-        with pytest.raises(ProblemError, match=said):
+    for start, argument in (([1.0, 2.0], "weights"), ([float("nan")], None)):
+        with refused(argument=argument):
             ConeR().fit([lists([1.0])], [[5.0]], start=start)
 
 
 def test_bounds_for_another_number_of_trains_are_one_clear_error():
-    with pytest.raises(ProblemError, match="ub: 2 bounds for 1 trains"):
+    with refused():
         ConeR(ub=[1.0, 1.0]).fit([lists([1.0])], [[5.0]])
 
 
 def test_a_last_target_behind_the_horizon_is_one_clear_error():
-    with pytest.raises(
-        ProblemError, match="pattern 0: the last target is at 60 ms; must not be after the horizon, 50 ms"
-    ):
+    with refused():
         ConeR(horizon=50.0).fit([lists([1.0])], [[60.0]])
 
 
@@ -571,12 +569,12 @@ def test_trains_without_a_spike_have_weight_0_and_count_in_the_normalisers():
     assert among.objective_ == pytest.approx(online.objective_, rel=2e-6)
     again = ConeR(lb=list(-bounds), ub=list(bounds)).fit(many, targets, start=among)
     assert again.objective_ == pytest.approx(among.objective_, rel=1e-5)
-    with pytest.raises(ProblemError, match="weights: 25 weights for 60 trains"):
+    with refused(argument="weights"):
         ConeR().fit(many, targets, start=alone)
     problem = ConeR().prepare(many, targets)
-    with pytest.raises(ProblemError, match="lb: 3 bounds for 60 trains"):
+    with refused(argument="lb"):
         problem.fit(ConeR(lb=[-1.0] * 3))
-    with pytest.raises(ProblemError, match="lb: forbids the weight 0 of a train without spikes"):
+    with refused(argument="lb"):
         problem.fit(ConeR(lb=0.1, ub=0.2))
     held = np.where(np.arange(60) == np.setdiff1d(np.arange(60), spoken)[0], 0.25, 0.3)
     assert ConeR(lb=list(np.where(held == 0.25, 0.25, -0.3)), ub=list(held)).fit(many, targets).weights_.max() >= 0.25
@@ -584,5 +582,5 @@ def test_trains_without_a_spike_have_weight_0_and_count_in_the_normalisers():
 
 def test_more_trains_than_can_be_weighed_are_refused_before_memory_is_asked_for():
     trains = SpikeTrains.from_lists([[1.0 + n % 50] for n in range(10_001)], stop=100)
-    with pytest.raises(ProblemError, match="10001 trains have spikes; must be at most 10000"):
+    with refused(argument="patterns"):
         ConeR().fit([trains], [[60.0]])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from draws import seeds
 from making import lists, made
-from refusal import refused_saying as refused
+from refusal import refused
 from test_cone_r import examples, fitted, least, shares, statement, terms
 
 from taxel import Neuron, SpikeTrains
@@ -191,45 +191,45 @@ def test_a_window_of_patterns_fits_as_from_nothing_and_is_pickled_with_its_windo
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "argument"),
     [
-        ({"divide_c_by": "B_max"}, 'divide_c_by is "B_max": must be "C_max" or "targets"'),
-        ({"divide_d_by": "rows"}, 'divide_d_by is "rows": must be "D_max" or "targets"'),
-        ({"sides_b": "above"}, 'sides_b is "above": must be "both" or "below"'),
+        ({"divide_c_by": "B_max"}, "divide_c_by"),
+        ({"divide_d_by": "rows"}, "divide_d_by"),
+        ({"sides_b": "above"}, "sides_b"),
         ({"sides_c": True}, "sides_c"),
     ],
 )
-def test_an_option_that_is_not_known_is_refused(options, said):
+def test_an_option_that_is_not_known_is_refused(options, argument):
     for kind in (ConeR, OnlineConeR):
-        with refused(said):
+        with refused(argument=argument):
             kind(**options)
 
 
 @pytest.mark.parametrize(
-    ("silence", "said"),
+    ("silence", "argument"),
     [
-        ([[(20.0, 10.0)]], "pattern 0, window 0 of silence: 20 to 10 ms; start must not be after stop"),
-        ([[(0.0, 5.0), (4.0, 9.0)]], "pattern 0, window 1 of silence: begins at 4 ms, but the window before ends"),
-        ([[(0.0, float("nan"))]], "pattern 0, window 0 of silence: 0 to NaN ms"),
-        ([[(0.0, float("inf"))]], "pattern 0, window 0 of silence: 0 to inf ms"),
-        ([[(0.0, 5.0)], []], "silence: 2 lists for 1 patterns; must be one per pattern"),
-        ([], "silence: 0 lists for 1 patterns"),
-        ([[0.0, 5.0]], r"silence of pattern 0 has shape \(2,\): must contain windows"),
-        ([[(0.0, 5.0, 6.0)]], r"silence of pattern 0 has shape \(1, 3\)"),
-        ([[("a", "b")]], "silence of pattern 0: contains"),
-        (5.0, "silence is 5: must be a sequence"),
+        ([[(20.0, 10.0)]], None),
+        ([[(0.0, 5.0), (4.0, 9.0)]], None),
+        ([[(0.0, float("nan"))]], None),
+        ([[(0.0, float("inf"))]], None),
+        ([[(0.0, 5.0)], []], "silence"),
+        ([], "silence"),
+        ([[0.0, 5.0]], None),
+        ([[(0.0, 5.0, 6.0)]], None),
+        ([[("a", "b")]], None),
+        (5.0, "silence"),
     ],
 )
-def test_windows_that_make_no_sense_are_refused(silence, said):
+def test_windows_that_make_no_sense_are_refused(silence, argument):
     for kind in (ConeR, OnlineConeR):
-        with refused(said):
+        with refused(argument=argument):
             kind().fit([lists([1.0])], [[5.0]], silence=silence)
 
 
 def test_a_window_that_makes_no_sense_leaves_the_patterns_as_they_were():
     online = OnlineConeR(window=2).partial_fit(lists([1.0]), [5.0])
-    with refused("pattern 1, window 0 of silence: 9 to 3 ms"):
+    with refused():
         online.partial_fit(lists([1.0]), [5.0], silence=[(9.0, 3.0)])
-    with refused("silence has shape"):
+    with refused(argument="silence"):
         online.partial_fit(lists([1.0]), [5.0], silence=[3.0])
     assert online.patterns_ == 1

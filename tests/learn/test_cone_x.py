@@ -7,11 +7,11 @@ import pytest
 from draws import mixed, stretches
 from interrupts import ctrl_c_after
 from making import lists, made
-from refusal import refused_saying as refused
+from refusal import refused
 from stated import examples, grid_rows, row, shares, terms, threshold
 
 import taxel
-from taxel import Neuron, ProblemError, SpikeTrains
+from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeX, check_certificate
 
 clarabel = pytest.importorskip("clarabel")
@@ -153,7 +153,7 @@ def test_the_problem_states_the_rows_of_the_grid_by_pattern_and_time():
         for t in np.arange(0.0, min(end, 125.0), 7.0):
             fired = [e for e in targets[1] if e < t]
             if any(e - 1e-9 <= t <= e + cone.neuron_.refractory + 1e-9 for e in targets[1]):
-                with pytest.raises(ProblemError, match="lies at a target or in its refractory time"):
+                with refused():
                     problem.silence(1, t)
                 continue
             coefficients, limit = problem.silence(1, t)
@@ -233,7 +233,7 @@ def test_a_start_from_an_earlier_fit_changes_the_way_but_not_the_result():
                 # In continuous time a little of the margin is left open.
                 near = 1e-7 if "time" in options else 1e-5 if "lambdas" not in options else 1e-3
                 assert warm.objective_ == pytest.approx(fresh.objective_, rel=near)
-    with pytest.raises(ProblemError, match="start: not fitted yet, call fit first"):
+    with refused():
         ConeX().fit(patterns, targets, start=ConeX())
 
 
@@ -333,7 +333,7 @@ def test_the_horizon_frees_what_lies_behind_it_in_each_pattern():
     ends = [float(t[-1]) + 5.0 for t in targets]
     whole, short = ConeX(lb=-1, ub=1).fit(patterns, targets), ConeX(lb=-1, ub=1, horizon=ends).fit(patterns, targets)
     assert short.objective_ <= whole.objective_
-    with pytest.raises(ProblemError, match="is outside the training's time"):
+    with refused():
         short.problem_.silence(0, ends[0] + 1.0)
 
 
@@ -377,67 +377,67 @@ def test_progress_is_told_round_by_round():
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "argument"),
     [
-        ({"tau": 0}, "tau is 0 ms: must be above 0"),
+        ({"tau": 0}, "tau"),
         (
             {"kernel": "exponential"},
-            'kernel is "exponential" and time "continuous": its potential changes only in jumps',
+            "kernel",
         ),
-        ({"kernel": "box"}, '^kernel is "box": must be "alpha", '),
-        ({"kappa": 0}, "kappa is 0"),
-        ({"delta_t_ms": -1}, "delta_t_ms is -1"),
-        ({"lambdas": (1, 2)}, r"^lambdas is \[1,2\]: must be a list of 3$"),
-        ({"lambdas": (1, 2, "3")}, r"^lambdas\[2\] is \"3\": must be a number$"),
-        ({"lambdas": (1, 2, -3)}, r"lambdas\[2\] is -3"),
-        ({"ub": float("inf")}, "ub is inf: must be finite"),
-        ({"lb": [0.0, float("nan")]}, r"lb\[1\] is nan: must be finite"),
-        ({"lb": "low"}, 'lb is "low": must be a number of mV, or one number per synapse'),
-        ({"margin": 0.0}, "margin is 0 mV: must be above 0 in continuous time"),
-        ({"slope": -1.0}, "slope is -1 mV/ms"),
-        ({"slope": 0.1, "time": "grid"}, 'slope is 0.1 mV/ms: must be 0 or None with time "grid"'),
-        ({"horizon": float("nan")}, "horizon is nan"),
-        ({"tolerance": 0}, "tolerance is 0: must be from 1e-12 to 0.1"),
-        ({"max_seconds": 0}, "max_seconds is 0 s: must be above 0"),
-        ({"norm": "max"}, 'norm is "max": must be "norm" or "square"'),
-        ({"norm": 2}, 'norm is 2: must be "norm" or "square"$'),
+        ({"kernel": "box"}, "kernel"),
+        ({"kappa": 0}, "kappa"),
+        ({"delta_t_ms": -1}, "delta_t_ms"),
+        ({"lambdas": (1, 2)}, "lambdas"),
+        ({"lambdas": (1, 2, "3")}, "lambdas"),
+        ({"lambdas": (1, 2, -3)}, "lambdas"),
+        ({"ub": float("inf")}, "ub"),
+        ({"lb": [0.0, float("nan")]}, "lb"),
+        ({"lb": "low"}, "lb"),
+        ({"margin": 0.0}, "margin"),
+        ({"slope": -1.0}, "slope"),
+        ({"slope": 0.1, "time": "grid"}, "slope"),
+        ({"horizon": float("nan")}, "horizon"),
+        ({"tolerance": 0}, "tolerance"),
+        ({"max_seconds": 0}, "max_seconds"),
+        ({"norm": "max"}, "norm"),
+        ({"norm": 2}, "norm"),
     ],
 )
-def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
-    with refused(said):
+def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, argument):
+    with refused(argument=argument):
         made(ConeX, **options)
 
 
 @pytest.mark.parametrize(
-    ("options", "patterns", "targets", "said"),
+    ("options", "patterns", "targets", "argument"),
     [
-        ({}, [], [], "patterns is empty"),
-        ({}, [lists([1.0])], [], "targets: 0 lists for 1 patterns"),
-        ({}, [lists([], [])], [[5.0]], "pattern 0: has no spike"),
-        ({}, [lists([1.0]), lists([1.0], [2.0])], [[5.0], [5.0]], "pattern 1: 2 trains, pattern 0 has 1"),
-        ({}, [lists([1.0])], [[float("nan")]], "pattern 0, target 0: time is NaN"),
-        ({}, [lists([1.0])], [[30.0, 20.0]], "pattern 0, target 1: 20 ms comes after 30 ms"),
+        ({}, [], [], "patterns"),
+        ({}, [lists([1.0])], [], "targets"),
+        ({}, [lists([], [])], [[5.0]], None),
+        ({}, [lists([1.0]), lists([1.0], [2.0])], [[5.0], [5.0]], None),
+        ({}, [lists([1.0])], [[float("nan")]], None),
+        ({}, [lists([1.0])], [[30.0, 20.0]], None),
         (
             {},
             [lists([1.0])],
             [[30.0, 31.5]],
-            r"pattern 0, target 1 \(31.5 ms\): 1.5 ms after target 0; must be at least the refr",
+            None,
         ),
-        ({}, [lists([1.0])], [[130.0]], "pattern 0, target 0: 130 ms is outside the pattern's window 0 to 100"),
-        ({}, ["spikes"], [[5.0]], "pattern 0 is 'spikes': must be a taxel.SpikeTrains"),
-        ({"lb": 0.3, "ub": 0.2}, [lists([1.0])], [[5.0]], "0.3 to 0.2 mV|lb is 0.3 mV, above ub"),
-        ({"lb": [0.0, 0.0, 0.0]}, [lists([1.0])], [[5.0]], "lb: 3"),
-        ({"horizon": [9.0, 9.0]}, [lists([1.0])], [[5.0]], "horizon: 2 values"),
+        ({}, [lists([1.0])], [[130.0]], None),
+        ({}, ["spikes"], [[5.0]], None),
+        ({"lb": 0.3, "ub": 0.2}, [lists([1.0])], [[5.0]], None),
+        ({"lb": [0.0, 0.0, 0.0]}, [lists([1.0])], [[5.0]], None),
+        ({"horizon": [9.0, 9.0]}, [lists([1.0])], [[5.0]], "horizon"),
         (
             {"horizon": 50.0},
             [lists([1.0])],
             [[60.0]],
-            "pattern 0: the last target is at 60 ms; must not be after the horizon, 50 ms",
+            None,
         ),
     ],
 )
-def test_examples_that_make_no_sense_are_one_clear_error_each(options, patterns, targets, said):
-    with refused(said):
+def test_examples_that_make_no_sense_are_one_clear_error_each(options, patterns, targets, argument):
+    with refused(argument=argument):
         made(ConeX, **options).fit(patterns, targets)
 
 

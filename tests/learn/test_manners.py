@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusal import refused
 
 import taxel
 from taxel import Events, Neuron, NotFittedError, SpikeTrains, learn
@@ -72,7 +73,7 @@ def test_a_clone_has_the_same_parameters_and_nothing_learnt(name):
     assert other.get_params() == one.get_params()
     assert repr(other) in repr(one)
     assert not hasattr(other, "weights_")
-    with pytest.raises(NotFittedError, match=f"{name}: not fitted yet, call fit first"):
+    with refused(NotFittedError):
         other.predict([])
 
 
@@ -153,10 +154,9 @@ def test_values_are_read_or_graded_trains_are_refused_by_name(name):
             warnings.simplefilter("ignore", UserWarning)
             assert not np.array_equal(make(name).fit(graded, targets).weights_, one.weights_, equal_nan=True)
         return
-    for call, run in calls.items():
-        with pytest.raises(taxel.ProblemError, match=f"(?i)^{name} takes no graded trains") as caught:
+    for run in calls.values():
+        with refused():
             run()
-        assert "\n" not in str(caught.value), call
 
 
 @each_learner
@@ -185,9 +185,9 @@ def test_all_is_checked_again_in_fit(kind):
     patterns, targets = examples()
     learner = kind(neuron=Neuron(tau=10.0))
     learner.neuron.tau = -1.0
-    with pytest.raises(taxel.ProblemError, match="tau is -1 ms: must be above 0"):
+    with refused(argument="tau"):
         learner.fit(patterns, targets)
-    with pytest.raises(taxel.ProblemError, match=r"neuron is 5: must be a taxel\.Neuron"):
+    with refused(argument="neuron"):
         kind(neuron=5)
 
 
@@ -263,8 +263,8 @@ def test_a_tare_in_seconds_is_each_recording_s_own():
     assert np.array_equal(given.times, taken.times)
     assert ContactArea(tare=0.2) == ContactArea(tare=0.2) != ContactArea(tare=0.3)
     assert ContactArea(tare=0.2).to_json() == ContactArea().to_json()
-    for tare, said in ((0.9, "more than half"), (0, "must be a whole number from 1"), ("soon", "tare is 'soon'")):
-        with pytest.raises(taxel.ProblemError, match=said):
+    for tare, argument in ((0.9, "tare"), (0, None), ("soon", "tare")):
+        with refused(argument=argument):
             ContactArea(tare=tare).encode(recording)
 
 
@@ -290,5 +290,5 @@ def test_a_fit_without_weights_says_so_where_it_is_used():
     cone = ConeX().fit([trains], [[5.0]])
     assert cone.status_ == "infeasible"
     for use in (lambda: cone.predict([trains]), lambda: cone.score([trains], [[5.0]])):
-        with pytest.raises(taxel.ProblemError, match="the fit is infeasible"):
+        with refused():
             use()

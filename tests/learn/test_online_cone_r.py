@@ -5,12 +5,14 @@ from __future__ import annotations
 import signal
 import threading
 import warnings
+from unittest.mock import ANY
 
 import numpy as np
 import pytest
 from making import made
+from refusal import refused
 
-from taxel import Neuron, ProblemError, SpikeTrains
+from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeR, OnlineConeR
 
 
@@ -84,33 +86,29 @@ def test_a_fit_at_once_is_the_fit_of_the_last_patterns_and_the_stream_goes_on_fr
 def test_a_pattern_that_makes_no_sense_is_named_and_leaves_the_window_as_it_was():
     online, same = OnlineConeR(neuron=Neuron(tau=12.0), window=3), OnlineConeR(neuron=Neuron(tau=12.0), window=3)
     patterns = list(stream(5, 6))
-    for k, (pattern, targets) in enumerate(patterns):
+    for pattern, targets in patterns:
         online.partial_fit(pattern, targets)
         same.partial_fit(pattern, targets)
-        for bad, at, said in (
-            (SpikeTrains.from_lists([[1.0]], stop=5.0), [2.0], f"pattern {k + 1}: 1 trains, pattern 0 has 20"),
-            (
-                pattern,
-                [30.0, 31.0],
-                rf"pattern {k + 1}, target 1 \(31 ms\): 1 ms after target 0; must be at least the refr",
-            ),
-            (pattern, [float("nan")], f"pattern {k + 1}, target 0: time is NaN"),
-            (SpikeTrains.from_lists([[]] * 20, stop=5.0), [2.0], f"pattern {k + 1}: has no spike"),
+        for bad, at in (
+            (SpikeTrains.from_lists([[1.0]], stop=5.0), [2.0]),
+            (pattern, [30.0, 31.0]),
+            (pattern, [float("nan")]),
+            (SpikeTrains.from_lists([[]] * 20, stop=5.0), [2.0]),
         ):
-            with pytest.raises(ProblemError, match=said):
+            with refused():
                 online.partial_fit(bad, at)
     assert online.objective_ == same.objective_
     assert np.array_equal(online.weights_, same.weights_)
 
 
 def test_an_empty_window_and_a_misspelt_parameter_are_one_clear_error_each():
-    with pytest.raises(ProblemError, match="window is 0"):
+    with refused(argument="window"):
         OnlineConeR(window=0)
-    with pytest.raises(ProblemError, match="no parameter 'lambda'"):
+    with refused():
         OnlineConeR().set_params(**{"lambda": 1})
-    with pytest.raises(ProblemError, match="must be one per pattern"):
+    with refused(argument="targets"):
         OnlineConeR().fit([], [])
-    with pytest.raises(ProblemError, match="start: must be left out, because a window starts from its last fit"):
+    with refused(argument="start"):
         OnlineConeR().fit(*zip(*stream(0, 2), strict=True), start=[0.0])
 
 
@@ -135,7 +133,7 @@ def test_control_c_keeps_the_best_so_far_and_the_pattern():
 @pytest.mark.parametrize("learner", [ConeR(), OnlineConeR(window=2)])
 def test_more_trains_than_memory_holds_are_refused_in_one_line(learner):
     many = SpikeTrains.from_lists([[1.0]] * 10_001, stop=20.0)
-    with pytest.raises(ProblemError, match=r"10001 trains.*; must be at most 10000"):
+    with refused(argument=ANY):
         learner.fit([many], [[10.0]])
     few = SpikeTrains.from_lists([[1.0], [4.0]], stop=20.0)
     assert learner.fit([few], [[10.0]]).weights_.shape == (2,)

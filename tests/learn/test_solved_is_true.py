@@ -9,10 +9,11 @@ import time
 import numpy as np
 import pytest
 from bruteforce import potential
+from refusal import refused
 from sklearn.base import clone
 from stated import examples
 
-from taxel import Neuron, ProblemError, SpikeTrains
+from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeR, ConeX, OnlineConeR, check_certificate, check_solution
 
 #: Further problems are tried by `pytest -m slow`.
@@ -247,7 +248,7 @@ def test_a_pattern_without_a_spike_may_teach_silence_and_may_not_have_a_target(l
     beside = learner(lb=-1.0, ub=1.0).fit([*patterns, empty], [*targets, []])
     assert (alone.status_, beside.status_) == ("solved", "solved")
     assert beside.objective_ == pytest.approx(alone.objective_, rel=1e-6)
-    with pytest.raises(ProblemError, match="pattern 2: has no spike, so weights have no effect at its target"):
+    with refused():
         learner().fit([*patterns, empty], [*targets, [5.0]])
 
 
@@ -270,9 +271,7 @@ def test_a_grid_of_more_points_than_can_be_had_is_one_clear_error_beforehand():
         lambda: neuron.run([1.0] * 3, trains),
         lambda: neuron.run_many([[1.0] * 3], trains),
     ):
-        with pytest.raises(
-            ProblemError, match=r"step_ms is 0.000000001 ms: makes 6.0e10 grid points, more than the limit of"
-        ):
+        with refused(argument="step_ms"):
             call()
 
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from refusal import refused
 
-from taxel import Neuron, ProblemError, SpikeTrains
+from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeR, ConeX, check_gap, check_solution
 
 TRAINS = SpikeTrains.from_lists([[5.0], [12.0], [30.0]], start=2.0, stop=60.0)
@@ -17,10 +18,9 @@ GRADED = SpikeTrains.from_lists([[5.0], [12.0], [30.0]], 2.0, 60.0, [[3e38], [-3
 def test_a_target_outside_its_pattern_is_refused(check, learner, time, target):
     cone = learner(neuron=Neuron(tau=10.0, time=time), lb=-1.0, ub=1.0).fit([TRAINS], [[20.0]])
     for call in (lambda: check(cone, [TRAINS], [[target]]), lambda: cone.fit([TRAINS], [[target]])):
-        with pytest.raises(ProblemError, match="pattern 0, target 0: ") as refused:
+        with refused():
             call()
-        assert len(str(refused.value)) < 120
-    with pytest.raises(ProblemError, match="pattern 0, target 1: "):
+    with refused():
         check(cone, [TRAINS], [[20.0, target]])
 
 
@@ -45,7 +45,7 @@ def test_weights_have_a_potential_or_are_refused(trains, kernel, time, scale):
             lambda: neuron.run(weights, trains),
             lambda: neuron.run_many([[1.0] * 3, weights], trains),
         ):
-            with pytest.raises(ProblemError, match=r"weights\[(1, )?0\] is .*e.*: must be from -1e100 to 1e100"):
+            with refused():
                 call()
     else:
         assert np.isfinite(neuron.potential(weights, trains, times)).all()
@@ -55,5 +55,5 @@ def test_weights_have_a_potential_or_are_refused(trains, kernel, time, scale):
 @pytest.mark.parametrize("name", ["tau", "theta_0", "tau_rec", "step_ms"])
 @pytest.mark.parametrize("value", [5e-324, 1e-308, 1e-300, 1e-101])
 def test_a_parameter_by_which_nothing_can_be_divided_is_refused(name, value):
-    with pytest.raises(ProblemError, match=rf"{name} is .*: must be above 0 and finite, 1e-100 at least"):
+    with refused(argument=name):
         Neuron(**{name: value})

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from drawing import STOP, times
 from hypothesis import example, given
+from refusal import refused
 
-from taxel import ProblemError, SpikeTrains
+from taxel import SpikeTrains
 from taxel.metrics import isi_distance, spike_distance
 
 WINDOW = (0.0, STOP)
@@ -63,11 +64,11 @@ def test_patterns_use_their_widest_window_and_add_up_over_trains():
 
 
 def test_windows_that_make_no_sense_are_one_clear_error_each():
-    for a, window, said in (
-        ([1.0], None, r"window: is missing; with lists of times, give the window as \(start, stop\) in ms"),
-        ([1.0], (2.0, 5.0), "train a, spike 0: 1 ms is outside the window 2 to 5 ms"),
-        ([1.0], (5.0, 2.0), "window is 5 to 2 ms"),
+    for a, window, argument in (
+        ([1.0], None, "window"),
+        ([1.0], (2.0, 5.0), None),
+        ([1.0], (5.0, 2.0), "window"),
     ):
         for metric in (isi_distance, spike_distance):
-            with pytest.raises(ProblemError, match=said):
+            with refused(argument=argument):
                 metric(a, [3.0], window=window)

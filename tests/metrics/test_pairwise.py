@@ -9,6 +9,7 @@ import time
 import numpy as np
 import pytest
 from drawing import pattern, poisson
+from refusal import refused
 
 import taxel.metrics
 from taxel import Array, ProblemError, SpikeTrains, _core
@@ -154,29 +155,29 @@ def test_ctrl_c_ends_a_long_matrix_at_once():
 
 def test_arguments_that_make_no_sense_are_one_clear_error_each():
     trains = [[1.0], [2.0]]
-    for call, said in (
-        (lambda: pairwise("spike_sync", trains), "metric is 'spike_sync': must be one of 'victor_purpura'"),
+    for call, argument in (
+        (lambda: pairwise("spike_sync", trains), "metric"),
         (
             lambda: pairwise("van_rossum", trains, q=1.0),
-            "q is not known: the parameters of van_rossum are tau, normalisation",
+            "q",
         ),
-        (lambda: pairwise("van_rossum", trains), "tau is missing"),
-        (lambda: pairwise("van_rossum", [[1.0], [2.0, 1.0]], tau=1.0), r"train a\[1\], spike 1: 1 ms comes after 2 ms"),
-        (lambda: pairwise("van_rossum", trains, [[np.inf]], tau=1.0), r"train b\[0\], spike 0: time is inf"),
-        (lambda: pairwise("van_rossum", trains, threads=0, tau=1.0), "threads is 0: must be a whole number from 1"),
+        (lambda: pairwise("van_rossum", trains), "tau"),
+        (lambda: pairwise("van_rossum", [[1.0], [2.0, 1.0]], tau=1.0), None),
+        (lambda: pairwise("van_rossum", trains, [[np.inf]], tau=1.0), None),
+        (lambda: pairwise("van_rossum", trains, threads=0, tau=1.0), "threads"),
         (
             lambda: pairwise("van_rossum", [*several(1, 1), [1.0]], tau=1.0),
-            r"a\[1\] is \[1.0\]: must be a taxel.SpikeT",
+            "a",
         ),
         (
             lambda: pairwise("van_rossum", [SpikeTrains.from_lists([[]] * n) for n in (2, 3)], tau=1.0),
-            r"a\[1\] has 3 trains, a\[0\] has 2: must be equally many",
+            "a",
         ),
-        (lambda: pairwise("van_rossum", several(1, 2), trains, tau=1.0), "a has 6 trains, b has 1: must be equally"),
+        (lambda: pairwise("van_rossum", several(1, 2), trains, tau=1.0), None),
         (
             lambda: pairwise("van_rossum_spatial", several(1, 2), array=Array(2, 2, 1.0)),
-            "a has 6 trains, but the array has 4 taxels",
+            None,
         ),
     ):
-        with pytest.raises(ProblemError, match=said):
+        with refused(argument=argument):
             call()

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusal import refused
 
-import taxel
-from taxel import Array, ProblemError, SpikeTrains, _core, metrics
+from taxel import Array, SpikeTrains, _core, metrics
 from taxel._base.parameters import described
 
 ROOT = Path(__file__).parents[2]
@@ -82,14 +82,14 @@ def test_moved_in_time_it_is_the_same(name):
 
 
 @each_metric
-def test_a_wrong_or_unknown_parameter_is_refused_in_the_table_s_words(name):
+def test_a_wrong_or_unknown_parameter_is_refused(name):
     a, b, _ = patterns(3)
-    for key, rules in described(name)["ranges"].items():
-        with pytest.raises(ProblemError, match=rf"{key} is -1.*must be {rules['must_be']}"):
+    for key in described(name)["ranges"]:
+        with refused(argument=key):
             getattr(metrics, name)(a, b, **{**given(name), key: -1.0})
-    with pytest.raises(ProblemError, match=f"nonsense is not known: the parameters of {name} are"):
+    with refused(argument="nonsense"):
         metrics.pairwise(name, [a, b], **given(name), nonsense=1)
-    with pytest.raises(taxel.ProblemError, match="must be one of"):
+    with refused(argument="metric"):
         metrics.pairwise("nonsense", [a, b])
 
 
@@ -104,5 +104,5 @@ def test_graded_trains_are_refused_by_name(name):
         lambda: metrics.pairwise(name, plain, graded, **given(name)),
         lambda: metrics.pairwise(name, graded[0], **given(name)),
     ):
-        with pytest.raises(ProblemError, match=f"^{name} takes no graded trains"):
+        with refused():
             call()

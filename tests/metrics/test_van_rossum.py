@@ -10,8 +10,8 @@ import pytest
 from drawing import STOP, times
 from hypothesis import given
 from hypothesis import strategies as st
+from refusal import refused
 
-from taxel import ProblemError
 from taxel.metrics import van_rossum, van_rossum_absolute
 
 taus = st.floats(0.01, 1000)
@@ -117,20 +117,20 @@ def test_windows_side_by_side_add_up_to_all_time(a, b, tau):
 
 
 def test_parameters_that_make_no_sense_are_one_clear_error_each():
-    for metric, parameters, said in (
-        (van_rossum, {"tau": 0.0}, "tau is 0 ms: must be above 0 and finite"),
-        (van_rossum, {"tau": -1.0}, "tau is -1 ms"),
-        (van_rossum, {"tau": math.nan}, "tau is nan: must be finite"),
+    for metric, parameters, argument in (
+        (van_rossum, {"tau": 0.0}, "tau"),
+        (van_rossum, {"tau": -1.0}, "tau"),
+        (van_rossum, {"tau": math.nan}, "tau"),
         (
             van_rossum,
             {"tau": 1.0, "normalisation": "max"},
-            'normalisation is "max": must be "spike", "tau"',
+            "normalisation",
         ),
-        (van_rossum_absolute, {"tau": 1.0, "step_ms": 0.0}, "step_ms is 0 ms: must be above 0"),
-        (van_rossum_absolute, {"tau": 1.0, "window": (5.0, 1.0)}, "window is 5 to 1 ms: must be finite, with start"),
-        (van_rossum_absolute, {"tau": 1.0, "window": (5.0,)}, "window has 1 entries: must be two, start and stop"),
+        (van_rossum_absolute, {"tau": 1.0, "step_ms": 0.0}, "step_ms"),
+        (van_rossum_absolute, {"tau": 1.0, "window": (5.0, 1.0)}, "window"),
+        (van_rossum_absolute, {"tau": 1.0, "window": (5.0,)}, "window"),
     ):
-        with pytest.raises(ProblemError, match=said):
+        with refused(argument=argument):
             metric([1.0], [2.0], **parameters)
-    with pytest.raises(ProblemError, match="train b, spike 1: 1 ms comes after 2 ms; times must ascend"):
+    with refused():
         van_rossum([], [2.0, 1.0], tau=1.0)

@@ -9,8 +9,9 @@ import pytest
 from drawing import pattern, patterns
 from hypothesis import given
 from hypothesis import strategies as st
+from refusal import refused
 
-from taxel import Array, ProblemError, SpikeTrains
+from taxel import Array, SpikeTrains
 from taxel.metrics import van_rossum, van_rossum_absolute, van_rossum_spatial, van_rossum_spatial_absolute
 
 ARRAY = Array(2, 3, pitch_mm=1.5)
@@ -97,11 +98,11 @@ def test_on_and_off_trains_are_smoothed_apart_and_missing_taxels_do_not_count():
     lacking = Array(1, 2, pitch_mm=1.0, exists=np.array([[True, False]]))
     half = [x.select([0, 1]) for x in (on, silent)]
     assert van_rossum_spatial(*half, array=lacking) == pytest.approx(2.0)
-    with pytest.raises(ProblemError, match="a, train 1: has spikes, but the array has no taxel at this place"):
+    with refused():
         van_rossum_spatial(SpikeTrains.from_lists([[], [1.0]]), half[1], array=lacking)
-    with pytest.raises(ProblemError, match="a has 3 trains, but the array has 2 taxels"):
+    with refused():
         van_rossum_spatial(on.select([0, 1, 2]), on.select([0, 1, 2]), array=one)
-    with pytest.raises(ProblemError, match="sigma is 0 mm"):
+    with refused(argument="sigma"):
         van_rossum_spatial(on, off, array=one, sigma=0.0)
 
 

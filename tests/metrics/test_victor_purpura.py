@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
-from taxel import ProblemError
 from taxel.metrics import victor_purpura
 
 times = st.lists(st.floats(0, 500, allow_nan=False), max_size=12).map(sorted)
@@ -61,13 +61,13 @@ def test_a_dearer_move_never_makes_it_cheaper(a, b, q):
 
 
 def test_trains_and_q_that_make_no_sense_are_one_clear_error_each():
-    for a, b, q, said in (
-        ([2.0, 1.0], [], 1.0, "train a, spike 1: 1 ms comes after 2 ms; times must ascend"),
-        ([], [float("nan")], 1.0, "train b, spike 0: time is NaN; must be finite"),
-        ([1.0], [1.0], -1.0, "q is -1/ms: must be 0 or more"),
-        ([1.0], [1.0], float("nan"), "q is nan: must be a number"),
-        ([[1.0]], [1.0], 1.0, "a has 2 dimensions: must have one"),
-        ([1.0], [1.0], "high", "q is 'high': must be a number"),
+    for a, b, q, argument in (
+        ([2.0, 1.0], [], 1.0, None),
+        ([], [float("nan")], 1.0, None),
+        ([1.0], [1.0], -1.0, "q"),
+        ([1.0], [1.0], float("nan"), "q"),
+        ([[1.0]], [1.0], 1.0, "a"),
+        ([1.0], [1.0], "high", "q"),
     ):
-        with pytest.raises(ProblemError, match=said):
+        with refused(argument=argument):
             victor_purpura(a, b, q=q)

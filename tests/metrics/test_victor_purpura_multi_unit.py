@@ -7,9 +7,10 @@ import pytest
 from drawing import pattern, patterns
 from hypothesis import given
 from hypothesis import strategies as st
+from refusal import refused
 from scipy.optimize import linear_sum_assignment
 
-from taxel import ProblemError, SpikeTrains
+from taxel import SpikeTrains
 from taxel.metrics import victor_purpura, victor_purpura_multi_unit
 
 costs = st.just(0.0) | st.floats(1e-3, 5)
@@ -67,11 +68,11 @@ def test_it_is_a_metric(a, b, c, q, k):
 
 def test_arguments_that_make_no_sense_are_one_clear_error_each():
     a, b = SpikeTrains.from_lists([[1.0], []]), SpikeTrains.from_lists([[1.0]])
-    for parameters, said in (
-        ({"a": a, "b": b, "q": 1.0, "k": 1.0}, "a has 2 trains, b has 1: must be equally many"),
-        ({"a": a, "b": a, "q": -1.0, "k": 1.0}, "q is -1/ms: must be 0 or more"),
-        ({"a": a, "b": a, "q": 1.0, "k": float("nan")}, "k is nan: must be a number"),
-        ({"a": [1.0], "b": a, "q": 1.0, "k": 1.0}, "a is .*: must be a taxel.SpikeTrains"),
+    for parameters, argument in (
+        ({"a": a, "b": b, "q": 1.0, "k": 1.0}, None),
+        ({"a": a, "b": a, "q": -1.0, "k": 1.0}, "q"),
+        ({"a": a, "b": a, "q": 1.0, "k": float("nan")}, "k"),
+        ({"a": [1.0], "b": a, "q": 1.0, "k": 1.0}, "a"),
     ):
-        with pytest.raises(ProblemError, match=said):
+        with refused(argument=argument):
             victor_purpura_multi_unit(**parameters)

@@ -7,10 +7,11 @@ import pytest
 from draws import mixed
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 from scipy.optimize import brentq
 
 import taxel
-from taxel import Neuron, ProblemError, SpikeTrains
+from taxel import Neuron, SpikeTrains
 
 
 def random_trains(seed, trains=20, duration=150.0, whole_ms=False):
@@ -154,13 +155,13 @@ def test_on_a_grid_every_kernel_fires_at_the_first_point_at_or_above_the_thresho
 
 
 def test_the_exponential_kernel_is_refused_in_continuous_time():
-    with pytest.raises(ProblemError, match="changes only in jumps"):
+    with refused(argument="kernel"):
         Neuron(kernel="exponential")
 
 
 @pytest.mark.parametrize("tau_s", [7.0, 8.0, 0.0, -1.0])
 def test_a_synaptic_time_constant_out_of_range_is_refused(tau_s):
-    with pytest.raises(ProblemError, match="tau_s is"):
+    with refused(argument="tau_s"):
         Neuron(kernel="double_exponential", tau=7.0, tau_s=tau_s)
 
 
@@ -253,43 +254,43 @@ def test_keep_fires_again_at_once_while_the_potential_stays_above_the_threshold(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "argument"),
     [
-        (([1.0, 2.0], [[1.0]]), "weights: 2 for 1 trains"),
-        (([float("inf")], [[1.0]]), r"weights\[0\] is inf"),
-        (([[1.0]], [[1.0]]), "weights has 2 dimensions"),
+        (([1.0, 2.0], [[1.0]]), "weights"),
+        (([float("inf")], [[1.0]]), None),
+        (([[1.0]], [[1.0]]), "weights"),
     ],
 )
-def test_weights_that_make_no_sense_are_one_clear_error(arguments, said):
+def test_weights_that_make_no_sense_are_one_clear_error(arguments, argument):
     weights, times = arguments
     trains = SpikeTrains.from_lists(times, stop=10.0)
-    with pytest.raises(ProblemError, match=said):
+    with refused(argument=argument):
         Neuron().run(weights, trains)
-    with pytest.raises(ProblemError, match=said):
+    with refused(argument=argument):
         Neuron().potential(weights, trains, [1.0])
 
 
 def test_other_arguments_that_make_no_sense_are_one_clear_error_each():
     trains = SpikeTrains.from_lists([[1.0]], stop=10.0)
     signed = SpikeTrains.from_lists([[1.0]], stop=10.0, values=[[-1.0]])
-    for call, said in (
-        (lambda: Neuron().run([1.0], "spikes"), "trains is a str: must be SpikeTrains"),
-        (lambda: Neuron().run([1.0], signed), "trains: spikes are signed; split them into ON and OFF trains first"),
-        (lambda: Neuron().potential([1.0], signed, [1.0]), "trains: spikes are signed"),
-        (lambda: Neuron().run([1.0], trains, threshold=0), "threshold factor is 0: must be above 0"),
-        (lambda: Neuron().run([1.0], trains, threshold="high"), "threshold is 'high': must be a number"),
-        (lambda: Neuron().run([1.0], trains, threshold=float("nan")), "threshold is nan: must be a number"),
+    for call, argument in (
+        (lambda: Neuron().run([1.0], "spikes"), "trains"),
+        (lambda: Neuron().run([1.0], signed), "trains"),
+        (lambda: Neuron().potential([1.0], signed, [1.0]), "trains"),
+        (lambda: Neuron().run([1.0], trains, threshold=0), "threshold"),
+        (lambda: Neuron().run([1.0], trains, threshold="high"), "threshold"),
+        (lambda: Neuron().run([1.0], trains, threshold=float("nan")), "threshold"),
         (
             lambda: Neuron().potential([1.0], trains, [2.0, 1.0]),
-            r"times\[1\] is 1 ms and comes after 2 ms: times must ascend",
+            "times",
         ),
-        (lambda: Neuron().potential([1.0], trains, [float("nan")]), r"times\[0\] is NaN: must be finite"),
-        (lambda: Neuron().potential([1.0], trains, [1.0], spikes=[5.0, 3.0]), r"spikes\[1\] is 3 ms and comes after 5"),
-        (lambda: Neuron(tau=-1), "tau is -1 ms: must be above 0 and finite"),
-        (lambda: Neuron(time="often"), 'time is "often": must be "continuous" or "grid"'),
-        (lambda: Neuron(step_ms=None), "step_ms is None: must be a number"),
+        (lambda: Neuron().potential([1.0], trains, [float("nan")]), "times"),
+        (lambda: Neuron().potential([1.0], trains, [1.0], spikes=[5.0, 3.0]), "spikes"),
+        (lambda: Neuron(tau=-1), "tau"),
+        (lambda: Neuron(time="often"), "time"),
+        (lambda: Neuron(step_ms=None), "step_ms"),
     ):
-        with pytest.raises(ProblemError, match=said):
+        with refused(argument=argument):
             call()
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 
-from taxel import Neuron, ProblemError, SpikeTrains
+from taxel import Neuron, SpikeTrains
 
 NEURONS = 70  # more than two blocks
 
@@ -106,27 +106,27 @@ TRAINS = SpikeTrains.from_lists([[1.0], [2.0]], stop=10.0)
 
 
 @pytest.mark.parametrize(
-    ("weights", "said"),
+    ("weights", "argument"),
     [
-        ([1.0, 2.0], "two, neurons and trains"),
-        ([[1.0, 2.0, 3.0]], "3 per neuron for 2 trains"),
-        ([[1.0, 2.0]] * 40 + [[1.0, np.nan]], r"weights\[40, 1\] is NaN"),
-        (np.array([[1.0, 2.0], [np.inf, 0.0]], np.float32), r"weights\[1, 0\] is inf"),
+        ([1.0, 2.0], "weights"),
+        ([[1.0, 2.0, 3.0]], "weights"),
+        ([[1.0, 2.0]] * 40 + [[1.0, np.nan]], None),
+        (np.array([[1.0, 2.0], [np.inf, 0.0]], np.float32), None),
         ([[1.0], [2.0, 3.0]], "weights"),
         (None, "weights"),
     ],
 )
-def test_weights_that_make_no_sense_are_one_error(weights: object, said: str) -> None:
+def test_weights_that_make_no_sense_are_one_error(weights: object, argument: str) -> None:
     for time in ("grid", "continuous"):
-        with refused(said):
+        with refused(argument=argument):
             Neuron(time=time).run_many(weights, TRAINS)
 
 
 def test_other_arguments_that_make_no_sense_are_one_error() -> None:
     for threshold in (0.0, -1.0, float("nan"), "a"):
-        with pytest.raises(ProblemError, match="threshold"):
+        with refused(argument="threshold"):
             Neuron().run_many([[1.0, 2.0]], TRAINS, threshold=threshold)
-    with pytest.raises(ProblemError, match="signed"):
+    with refused(argument="trains"):
         Neuron().run_many([[1.0]], SpikeTrains.from_lists([[1.0]], values=[[1.0]]))
-    with pytest.raises(ProblemError, match="SpikeTrains"):
+    with refused(argument="trains"):
         Neuron().run_many([[1.0]], [[1.0]])

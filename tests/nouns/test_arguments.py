@@ -2,9 +2,11 @@
 
 import itertools
 import time
+from unittest.mock import ANY
 
 import numpy as np
 import pytest
+from refusal import refused
 
 import taxel
 from taxel import Detections, Frames, SpikeTrains
@@ -77,7 +79,7 @@ def test_what_is_no_argument_is_refused_in_one_line(name, value):
 
 @pytest.mark.parametrize("value", ["\ud800", "a\ud800.mcap", "a\0b", "", 5, b"here"])
 def test_what_is_no_path_is_refused(value):
-    with pytest.raises(taxel.ProblemError, match="must be a path"):
+    with refused(argument="path"):
         taxel.open(value)
 
 
@@ -85,7 +87,7 @@ def test_what_is_no_path_is_refused(value):
 def test_a_rate_without_whole_us_is_refused(tmp_path, rate):
     events = taxel.Events([0, 200], [0, 1], [0, 1], [True, False], array=taxel.Array(2, 2), intensity=[5, 6])
     taxel.convert(events, tmp_path / "two.npz")
-    with pytest.raises(taxel.ProblemError, match=r"rate_hz is .*: must be"):
+    with refused(argument="rate_hz"):
         taxel.open(tmp_path / "two.npz").frames(rate)
 
 
@@ -118,7 +120,7 @@ NAN = {
 
 @pytest.mark.parametrize("name", NAN)
 def test_nan_is_refused_by_name(name):
-    with pytest.raises(taxel.ProblemError, match=r"(?i)nan"):
+    with refused(argument=ANY):
         NAN[name](float("nan"))
 
 
@@ -130,9 +132,9 @@ def test_detections_without_a_slope_are_carried_on():
 
 
 def test_faults_are_shares_together_too():
-    with pytest.raises(taxel.ProblemError, match=r"lost is 1\.5: must be from 0 to 1"):
+    with refused(argument="lost"):
         Faults(lost=1.5)
-    with pytest.raises(taxel.ProblemError, match=r"are 1\.2 together: must be at most 1"):
+    with refused():
         Faults(lost=0.6, cut=0.6)
 
 
@@ -142,12 +144,12 @@ def test_arguments_that_a_call_does_not_need_are_checked_too(tmp_path, wrong):
     taxel.convert(events, tmp_path / "two.npz")
     recording = taxel.open(tmp_path / "two.npz")
     for name in ("before_us", "after_us"):
-        with pytest.raises(taxel.ProblemError, match=f"{name} is"):
+        with refused(argument=name):
             taxel.cut(recording, **{name: wrong})
     example = taxel.detect.Example(SpikeTrains.from_lists([[10.0]], stop=90.0), {"a": [10_000]})
     recipe = Recipe(LevelCrossing([0.5]), {"tau": 5.0}, {"a": {"ub": 1.0}})
     for name in ("window_ms", "frame_us"):
-        with pytest.raises(taxel.ProblemError, match=f"{name} is"):
+        with refused(argument=name):
             taxel.detect.choose([example, example], recipe, k=2, **{name: wrong})
 
 

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-import re
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 
 import taxel
-from taxel import Array, Calibration, FormatError, Frames, Load, ProblemError
+from taxel import Array, Calibration, FormatError, Frames, Load
+from taxel._base.errors import Place
 
 ARRAY = Array(3, 4, pitch_mm=5.0, name="small")
 DAY = "2026-11-21"
@@ -196,7 +196,7 @@ def test_a_table_of_each_taxel_is_a_table_by_taxel():
     table = Calibration.table(ARRAY, [5 * own, 20 * own], [1.0, 8.0], unit="kPa", date=DAY)
     assert table.apply(frames(5 * own)).values == pytest.approx(1.0)
     assert table.apply(frames(12.5 * own)).values == pytest.approx(4.5)
-    with pytest.raises(ProblemError, match=r"readings have the shape \(3, 3\): must have that of the array, \(3, 4\)"):
+    with refused(argument="readings"):
         Calibration.table(ARRAY, np.ones((1, 3, 3)), [1.0], unit="N")
 
 
@@ -224,18 +224,16 @@ def test_without_one_nothing_is_called_newton(tmp_path):
     taxel.convert(frames(5.0), tmp_path / "press.npz")
     recording = taxel.open(tmp_path / "press.npz")
     assert recording.calibration is None
-    with pytest.raises(
-        ProblemError, match=r"no calibration was found beside it, .*; to make a calibration, run taxel calibrate"
-    ):
+    with refused():
         recording.calibrated()
 
 
 def test_a_calibration_of_another_array_is_one_clear_error(tmp_path):
     other = Calibration.table(Array(4, 3, pitch_mm=6.0, name="other"), [40.0], [4.0], unit="N", date=DAY)
-    with pytest.raises(ProblemError, match="that of the calibration is"):
+    with refused():
         other.apply(frames(1.0))
     recording = made_beside(tmp_path, other)
-    with refused(r"press\.calibration\.json: the calibration is for counts of Array\(other: .*; press\.npz contains"):
+    with refused():
         recording.calibrated()
 
 
@@ -249,50 +247,50 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "argument"),
     [
-        (Calibration, "make one by Calibration.law"),
-        (lambda: Calibration.fit([]), "loads is empty"),
-        (lambda: Calibration.fit([Load(frames(0.0), 1.0)]), "load 1: no taxel reads more than 0 counts above its rest"),
-        (lambda: Calibration.fit([Load(frames(1.0), -1.0)]), "load 1 is -1: must be above 0"),
-        (lambda: Calibration.fit([Load(frames(1.0), 1.0, "kg")]), "unit is 'kg': must be one of 'N', 'kPa'"),
-        (lambda: Calibration.fit([Load(frames(1.0), 1.0, "N", (9, 0))]), "x reaches from 9 to 9"),
-        (lambda: Calibration.fit([Load(frames(1.0), 1.0)], each=True), "each: no load determines a single taxel"),
+        (Calibration, None),
+        (lambda: Calibration.fit([]), "loads"),
+        (lambda: Calibration.fit([Load(frames(0.0), 1.0)]), None),
+        (lambda: Calibration.fit([Load(frames(1.0), -1.0)]), None),
+        (lambda: Calibration.fit([Load(frames(1.0), 1.0, "kg")]), "unit"),
+        (lambda: Calibration.fit([Load(frames(1.0), 1.0, "N", (9, 0))]), "x"),
+        (lambda: Calibration.fit([Load(frames(1.0), 1.0)], each=True), "each"),
         (
             lambda: Calibration.fit([Load(frames(1.0), 1.0), Load(frames(1.0, "ticks"), 1.0)]),
-            "frames of load 2: the unit is ticks; the calibration needs loads in counts",
+            None,
         ),
         (
             lambda: Calibration.fit([Load(frames(1.0, "N"), 1.0)]),
-            "reading_unit is 'N': must be the unit of the readings",
+            "reading_unit",
         ),
         (
             lambda: Calibration.table(ARRAY, [1.0, 1.0], [1.0, 2.0], unit="N"),
-            r"readings\[1\] is 1: the numbers must begin at 0 or more, and rise",
+            None,
         ),
-        (lambda: Calibration.table(ARRAY, [1.0], [1.0, 2.0], unit="N"), "1 reading and 2 values"),
+        (lambda: Calibration.table(ARRAY, [1.0], [1.0, 2.0], unit="N"), None),
         (
             lambda: Calibration.table(ARRAY, [0.0, 1.0], [1.0, 2.0], unit="N"),
-            "must be 0 where the reading above rest is 0, and only there",
+            None,
         ),
-        (lambda: Calibration.table(ARRAY, [1.0], [1.0], unit="bar"), "unit is 'bar': must be one of 'N', 'kPa'"),
-        (lambda: Calibration.law(ARRAY, sensor={"exponent": 2.0}), "exponent is 2: must be from 0.5 to 1"),
-        (lambda: Calibration.law(ARRAY, sensor={"foam": 1.0}), "foam"),
-        (lambda: Calibration.law(ARRAY, ramp=0.0), "ramp is 0: must be above 0"),
+        (lambda: Calibration.table(ARRAY, [1.0], [1.0], unit="bar"), "unit"),
+        (lambda: Calibration.law(ARRAY, sensor={"exponent": 2.0}), None),
+        (lambda: Calibration.law(ARRAY, sensor={"foam": 1.0}), None),
+        (lambda: Calibration.law(ARRAY, ramp=0.0), "ramp"),
         (
             lambda: Calibration.law(ARRAY, date="yesterday"),
-            "date is 'yesterday': must be a day, for example 2026-11-21",
+            "date",
         ),
-        (lambda: Calibration.law(ARRAY, rest=[[1.0]]), "rest has shape"),
-        (lambda: Calibration.law(ARRAY, gain=0.0), "gain: must be above 0"),
+        (lambda: Calibration.law(ARRAY, rest=[[1.0]]), "rest"),
+        (lambda: Calibration.law(ARRAY, gain=0.0), "gain"),
         (
             lambda: Calibration.law(ARRAY).apply(frames(1.0)),
-            "the frames: the unit is counts; the calibration needs loads in ticks",
+            None,
         ),
     ],
 )
-def test_what_makes_no_sense_is_said(call, said):
-    with refused(said):
+def test_what_makes_no_sense_is_said(call, argument):
+    with refused(argument=argument):
         call()
 
 
@@ -306,6 +304,6 @@ def test_a_spoilt_file_is_one_line(tmp_path, entry, nonsense):
     if (entry, nonsense) in [("rest", None), ("loads", []), ("loads", {}), ("of", "x"), ("date", None)]:
         assert isinstance(Calibration.load(file), Calibration)
         return
-    with pytest.raises(FormatError, match=f"^{re.escape(str(file))}: [^\n]*$") as error:
+    with refused(FormatError, place=Place("calibration.json")) as error:
         Calibration.load(file)
     assert len(str(error.value)) < 500

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from unittest.mock import ANY
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 
 import taxel
 from taxel import Array, Events, Frames
-from taxel._core import ProblemError
 
 mpl.use("Agg")
 GRID = Array(8, 12, 2.0, name="grid")
@@ -81,7 +81,7 @@ def test_a_mask_that_marks_nothing_is_none() -> None:
     a = Events([1], [2], [3], [True], array=GRID)
     assert Events([1], [2], [3], [True], array=GRID, repaired=[False]) == a
     assert Events([1], [2], [3], [True], array=GRID, repaired=[True]) != a
-    with pytest.raises(ProblemError, match="repaired has 2 entries, t has 1"):
+    with refused():
         Events([1], [2], [3], [True], array=GRID, repaired=[True, False])
 
 
@@ -104,7 +104,7 @@ def test_faery_writes_our_events_and_reads_them_back(tmp_path) -> None:
 
 
 def test_faery_times_do_not_start_before_zero() -> None:
-    with pytest.raises(ProblemError, match="event 1: t is -5 us"):
+    with refused():
         Events([3, -5], [0, 0], [0, 0], [1, 1], array=GRID).to_faery()
 
 
@@ -232,42 +232,42 @@ GOOD = {"t": [0, 5], "x": [1, 2], "y": [3, 4], "p": [True, False]}
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "said"),
+    ("name", "value", "argument"),
     [
-        ("t", [0, float("nan")], r"t\[1\] is nan"),
-        ("t", [0, 0.5], r"t\[1\] is 0.5"),
-        ("t", ["0", "5"], "t: contains"),
+        ("t", [0, float("nan")], "t"),
+        ("t", [0, 0.5], "t"),
+        ("t", ["0", "5"], "t"),
         ("t", None, "t"),
-        ("t", [[0, 5]], "t has 2 dimensions"),
+        ("t", [[0, 5]], "t"),
         ("t", [0, 2**63], "t"),
-        ("t", [0], "entries"),
-        ("x", [1, -2], r"x\[1\] is -2"),
-        ("x", [1, 12], "column 12"),
-        ("x", [1, 70_000], r"x\[1\] is 70000"),
-        ("x", [1, 2.5], r"x\[1\] is 2.5"),
+        ("t", [0], None),
+        ("x", [1, -2], "x"),
+        ("x", [1, 12], None),
+        ("x", [1, 70_000], "x"),
+        ("x", [1, 2.5], "x"),
         ("x", "ab", "x"),
-        ("y", [3, 8], "row 8"),
-        ("y", [3, 4, 5], "y has 3 entries"),
+        ("y", [3, 8], None),
+        ("y", [3, 4, 5], None),
         ("y", object(), "y"),
-        ("p", [2, 0], r"p\[0\] is 2"),
-        ("p", [0.5, 0], r"p\[0\] is 0.5"),
-        ("p", ["yes", "no"], "p: contains"),
-        ("p", [True], "p has 1 entries"),
-        ("array", None, "array is None"),
-        ("array", (8, 12), "array is"),
-        ("intensity", [1], "intensity has 1 entries"),
-        ("intensity", [1, -1], r"intensity\[1\] is -1"),
-        ("intensity", [1, 65_536], r"intensity\[1\]"),
-        ("present", [True, False], "present is given without intensity"),
-        ("markers", 3, "markers is 3"),
-        ("markers", [3], "markers is"),
+        ("p", [2, 0], "p"),
+        ("p", [0.5, 0], "p"),
+        ("p", ["yes", "no"], "p"),
+        ("p", [True], None),
+        ("array", None, "array"),
+        ("array", (8, 12), "array"),
+        ("intensity", [1], None),
+        ("intensity", [1, -1], "intensity"),
+        ("intensity", [1, 65_536], "intensity"),
+        ("present", [True, False], None),
+        ("markers", 3, "markers"),
+        ("markers", [3], "markers"),
         ("markers", [(0.5, True)], "markers"),
         ("markers", [("now", True)], "markers"),
     ],
 )
-def test_nonsense_in_a_column_is_one_error_that_names_it(name: str, value: object, said: str) -> None:
+def test_nonsense_in_a_column_is_one_error_that_names_it(name: str, value: object, argument: str) -> None:
     arguments = {**GOOD, "array": GRID, name: value}
-    with refused(said):
+    with refused(argument=argument):
         Events(**arguments)
 
 
@@ -305,14 +305,13 @@ def test_nonsense_in_a_column_is_one_error_that_names_it(name: str, value: objec
 )
 def test_nonsense_in_a_method_is_one_error(call) -> None:
     events = Events(**GOOD, array=GRID, intensity=[1, 2])
-    with pytest.raises(ProblemError) as caught:
+    with refused(argument=ANY):
         call(events)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_taxel_that_tonic_cannot_hold_is_refused() -> None:
     wide = Events([0], [40_000], [0], [True], array=Array(1, 50_000))
-    with pytest.raises(ProblemError, match="32767"):
+    with refused(argument="x"):
         wide.to_tonic()
 
 

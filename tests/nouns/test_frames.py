@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from unittest.mock import ANY
+
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 
 from taxel import Array, Events, Frames
-from taxel._core import ProblemError
 
 mpl.use("Agg")
 
@@ -105,30 +106,30 @@ def test_frames_draw_themselves() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "argument"),
     [
-        ({"values": np.zeros((2, 2))}, "must have three"),
+        ({"values": np.zeros((2, 2))}, "values"),
         ({"values": "abc"}, "values"),
         ({"values": None}, "values"),
         ({"values": [[["a"]]]}, "values"),
-        ({"values": np.zeros((2, 0, 3))}, "rows is 0"),
-        ({"t": [0]}, "t has shape"),
-        ({"t": [0, 0]}, r"t\[1\] is 0 us, not after"),
-        ({"t": [5, 3]}, "not after"),
-        ({"t": [0, 0.5]}, r"t\[1\] is 0.5"),
-        ({"t": [0, np.nan]}, r"t\[1\] is nan"),
+        ({"values": np.zeros((2, 0, 3))}, "rows"),
+        ({"t": [0]}, "t"),
+        ({"t": [0, 0]}, "t"),
+        ({"t": [5, 3]}, "t"),
+        ({"t": [0, 0.5]}, "t"),
+        ({"t": [0, np.nan]}, "t"),
         ({"t": None}, "t"),
-        ({"t": ["a", "b"]}, "t: contains"),
-        ({"unit": 3}, "unit is 3"),
-        ({"unit": None}, "unit is None"),
-        ({"unit": ""}, "unit is ''"),
-        ({"array": 3}, "array is 3"),
-        ({"array": Array(9, 9)}, "the array has"),
+        ({"t": ["a", "b"]}, "t"),
+        ({"unit": 3}, "unit"),
+        ({"unit": None}, "unit"),
+        ({"unit": ""}, "unit"),
+        ({"array": 3}, "array"),
+        ({"array": Array(9, 9)}, None),
     ],
 )
-def test_nonsense_in_an_argument_is_one_error_that_names_it(arguments: dict, said: str) -> None:
+def test_nonsense_in_an_argument_is_one_error_that_names_it(arguments: dict, argument: str) -> None:
     good = {"values": np.zeros((2, 2, 3)), "t": [0, 1]}
-    with refused(said):
+    with refused(argument=argument):
         Frames(**{**good, **arguments})
 
 
@@ -152,6 +153,5 @@ def test_nonsense_in_an_argument_is_one_error_that_names_it(arguments: dict, sai
     ],
 )
 def test_nonsense_in_a_method_is_one_error(call) -> None:
-    with pytest.raises(ProblemError) as caught:
+    with refused(argument=ANY):
         call(Frames(np.zeros((2, 2, 3)), [0, 1]))
-    assert "\n" not in str(caught.value)

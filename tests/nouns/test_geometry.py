@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel import Array, Calibration, Events, Frames, Places, ProblemError, Readout, Tare
@@ -78,23 +79,23 @@ def test_tares_readouts_and_recordings_of_events_keep_all_of_a_sensor(
     "value", [0.0, -1.0, np.nan, np.inf, (1.0,), (1.0, 2.0, 3.0), (1.0, 0.0), "wide", [[1.0, 2.0]]]
 )
 def test_a_pitch_that_makes_no_sense_is_refused(value: Any) -> None:
-    with pytest.raises(ProblemError, match="pitch_mm"):
+    with refused(argument="pitch_mm"):
         Array(2, 2, pitch_mm=value)
 
 
 @pytest.mark.parametrize(
-    ("make", "match"),
+    ("make", "argument"),
     [
-        (lambda: Array(2, 2, 1.0, places=Places(np.zeros(4), np.zeros(4))), "both given"),
-        (lambda: Array(2, 2, places=Places(np.zeros(3), np.zeros(3))), "one per taxel"),
-        (lambda: Places(np.zeros(3), np.zeros(4)), "y has shape"),
+        (lambda: Array(2, 2, 1.0, places=Places(np.zeros(4), np.zeros(4))), None),
+        (lambda: Array(2, 2, places=Places(np.zeros(3), np.zeros(3))), "places"),
+        (lambda: Places(np.zeros(3), np.zeros(4)), "y"),
         (lambda: Places(np.zeros(3), np.zeros(3), unit="inch"), "unit"),
-        (lambda: Array(1, 2, places=Places([0.0, np.nan], [0.0, 0.0])), "x of row 0, column 1 is nan: must be finite"),
-        (lambda: Array(1, 2, places=Places([0.0, 1.0], [0.0, 0.0], [1.0, 0.0])), "area of row 0, column 1 is 0"),
+        (lambda: Array(1, 2, places=Places([0.0, np.nan], [0.0, 0.0])), "places"),
+        (lambda: Array(1, 2, places=Places([0.0, 1.0], [0.0, 0.0], [1.0, 0.0])), "places"),
     ],
 )
-def test_places_that_make_no_sense_are_refused(make: Callable[[], object], match: str) -> None:
-    with pytest.raises(ProblemError, match=match):
+def test_places_that_make_no_sense_are_refused(make: Callable[[], object], argument: str) -> None:
+    with refused(argument=argument):
         make()
 
 
@@ -128,47 +129,29 @@ def test_without_a_pitch_a_grid_counts_in_columns_and_rows_and_channels_refuse()
     assert grid.centre().tolist() == [[1.0, 0.5]]
     assert grid.loaded().tolist() == [2]
     channels = Frames([[[0.0, 2.0]]], [0])
-    for refused, match in ((grid.area, "mm2"), (channels.area, "mm2"), (channels.centre, "positions are not known")):
-        with pytest.raises(ProblemError, match=match):
-            refused()
+    for method in (grid.area, channels.area, channels.centre):
+        with refused():
+            method()
 
 
 @pytest.mark.parametrize(
-    ("work", "match"),
+    "work",
     [
-        (
-            lambda: taxel.encode.Skin(seed=1).afferents(Array(8, 8, name="mat")),
-            "skin needs distances in mm, but the pitch of mat",
-        ),
-        (lambda: taxel.encode.Skin(seed=1).afferents(FOOT), "skin needs one pitch, but foot states the position"),
-        (
-            lambda: _moments(Array(4, 4, name="mat"), displacement_mm=(1.0, 9.0)),
-            "displacement_mm needs distances in mm",
-        ),
-        (
-            lambda: _moments(Array(1, 4, name="foot"), displacement_mm=(1.0, 9.0)),
-            "moments needs taxels that are neighbours on a grid; foot",
-        ),
-        (
-            lambda: _moments(Array(1, 4, name="foot"), area=(1.0, 9.0), graded=True, centre=True),
-            "moments needs taxels that are neighbours on a grid; foot",
-        ),
-        (
-            lambda: _encode(taxel.encode.ContactArea, Array(1, 4, name="foot")),
-            "contact area needs taxels that are neighbours",
-        ),
-        (
-            lambda: _encode(taxel.encode.LocalLoad, Array(1, 4, name="foot")),
-            "local load needs taxels that are neighbours",
-        ),
-        (lambda: taxel.simulate.Layer(array=Array(8, 8, name="mat")), "the pitch of mat is not known"),
-        (lambda: taxel.simulate.Layer(array=Array(8, 8, (2.0, 3.0), name="mat")), "same pitch between rows"),
-        (lambda: taxel.metrics.van_rossum_spatial(_trains(), _trains(), array=Array(2, 2, name="mat")), "pitch of mat"),
-        (lambda: Array(2, 2, name="mat").row_mm, "row_mm needs distances in mm, but the pitch of mat"),
+        lambda: taxel.encode.Skin(seed=1).afferents(Array(8, 8, name="mat")),
+        lambda: taxel.encode.Skin(seed=1).afferents(FOOT),
+        lambda: _moments(Array(4, 4, name="mat"), displacement_mm=(1.0, 9.0)),
+        lambda: _moments(Array(1, 4, name="foot"), displacement_mm=(1.0, 9.0)),
+        lambda: _moments(Array(1, 4, name="foot"), area=(1.0, 9.0), graded=True, centre=True),
+        lambda: _encode(taxel.encode.ContactArea, Array(1, 4, name="foot")),
+        lambda: _encode(taxel.encode.LocalLoad, Array(1, 4, name="foot")),
+        lambda: taxel.simulate.Layer(array=Array(8, 8, name="mat")),
+        lambda: taxel.simulate.Layer(array=Array(8, 8, (2.0, 3.0), name="mat")),
+        lambda: taxel.metrics.van_rossum_spatial(_trains(), _trains(), array=Array(2, 2, name="mat")),
+        lambda: Array(2, 2, name="mat").row_mm,
     ],
 )
-def test_what_needs_mm_or_neighbours_refuses_by_name(work: Callable[[], object], match: str) -> None:
-    with pytest.raises((ProblemError, taxel.SceneError), match=match):
+def test_what_needs_mm_or_neighbours_refuses_by_name(work: Callable[[], object]) -> None:
+    with pytest.raises((ProblemError, taxel.SceneError)):
         work()
 
 
@@ -203,7 +186,7 @@ def test_displacement_is_measured_along_each_axis_s_own_pitch_and_by_places() ->
     many = [spikes(Array(4, 4, pitch)) for pitch in ((7.62, 5.08), (5.08, 7.62), 2.67)]
     assert many[0] > many[1] > many[2] == 0
     assert spikes(Array(4, 4, places=Places(x, y, unit="mm"))) == many[0]
-    with pytest.raises(ProblemError, match="places in mm"):
+    with refused(argument="displacement_mm"):
         spikes(Array(4, 4, places=Places(x, y)))
 
 
@@ -216,7 +199,7 @@ def test_newtons_from_kpa_use_each_taxel_s_area(array: Array, weights: np.ndarra
     fitted = Calibration.fit([Load(Frames(pressed, [0], array=array), load, "N")], unit="kPa", exponent=1.0)
     np.testing.assert_allclose(fitted.apply(Frames(pressed, [0], array=array)).values, 10.0 * pressed, rtol=1e-6)
     without = Array(*array.shape, name="flat")
-    with pytest.raises(ProblemError, match="area of each taxel, which is unknown"):
+    with refused():
         Calibration.fit([Load(Frames(pressed, [0], array=without), load, "N")], unit="kPa")
 
 
@@ -262,7 +245,7 @@ def test_recordings_of_other_pitches_merge_and_the_loss_is_said(tmp_path: Path) 
 
 def test_names_of_taxels_go_with_them_and_are_never_grounds_to_refuse(tmp_path: Path) -> None:
     called, other, nameless = Array(2, 2, names=["a", "b", "c", "d"]), Array(2, 2, names="efgh"), Array(2, 2)
-    with pytest.raises(ProblemError, match="names has 3 entries: must be one per taxel, 4"):
+    with refused(argument="names"):
         Array(2, 2, names=["a", "b", "c"])
     assert called.fits(other)
     assert called.fits(nameless)

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
 from taxel import SpikeTrains
-from taxel._core import FormatError, ProblemError
+from taxel._base.errors import Place
+from taxel._core import FormatError
 
 from .test_spikes import some
 
@@ -43,13 +45,9 @@ def test_files_without_a_kind_are_signed_if_they_have_values(tmp_path: Path) -> 
     np.savez(tmp_path / "e.npz", **columns, kind="graded")
     assert SpikeTrains.load(tmp_path / "a.npz").kind == "unsigned"
     assert SpikeTrains.load(tmp_path / "b.npz").kind == "signed"
-    for name, text in (
-        ("c", "kind is 'wavy'"),
-        ("d", r"values\[1\] is 0"),
-        ("e", "graded trains need one value per spike"),
-    ):
-        with pytest.raises(FormatError, match=text):
-            SpikeTrains.load(tmp_path / f"{name}.npz")
+    for name in ("c.npz", "d.npz", "e.npz"):
+        with refused(FormatError, place=Place(name)):
+            SpikeTrains.load(tmp_path / name)
 
 
 def test_nwb_files_and_neo_trains_without_a_kind_are_signed(tmp_path: Path) -> None:
@@ -62,29 +60,29 @@ def test_nwb_files_and_neo_trains_without_a_kind_are_signed(tmp_path: Path) -> N
     with pynwb.NWBHDF5IO(two.to_nwb(tmp_path / "b.nwb"), "r+") as io:
         assert list(io.read().units["value_kind"][:]) == ["graded", "graded"]
         io.read().units["value_kind"].data[1] = "signed"
-    with pytest.raises(FormatError, match="different value_kind"):
+    with refused(FormatError, place=Place("b.nwb")):
         SpikeTrains.from_nwb(tmp_path / "b.nwb")
 
 
 @pytest.mark.parametrize(
-    ("values", "kind", "text"),
+    ("values", "kind", "argument"),
     [
-        ([1.0, float("nan")], "graded", r"values\[1\] is nan: must be finite"),
-        ([1.0, float("-inf")], "graded", r"values\[1\] is -inf: must be finite"),
-        ([1e39, 1.0], "graded", r"values\[0\]"),
-        ([1.0, 0.0], "graded", r"values\[1\] is 0: a graded value of 0 is not a spike"),
-        ([1.0, -0.0], "graded", r"values\[1\] is 0"),
-        ([1.0, 1e-60], "graded", r"values\[1\]"),
-        ([1.0], "graded", "values: must be one per spike, 2"),
-        (None, "graded", "graded trains need one value per spike"),
-        (None, "signed", "signed trains need one value per spike"),
-        ([1.0, 1.0], "unsigned", "unsigned trains have no values"),
-        ([1.0, 1.0], "loud", "kind is 'loud': must be one of unsigned, signed, graded"),
-        ([1.0, 1.0], 3, "kind is 3"),
+        ([1.0, float("nan")], "graded", "values"),
+        ([1.0, float("-inf")], "graded", "values"),
+        ([1e39, 1.0], "graded", "values"),
+        ([1.0, 0.0], "graded", "values"),
+        ([1.0, -0.0], "graded", "values"),
+        ([1.0, 1e-60], "graded", "values"),
+        ([1.0], "graded", "values"),
+        (None, "graded", None),
+        (None, "signed", None),
+        ([1.0, 1.0], "unsigned", None),
+        ([1.0, 1.0], "loud", "kind"),
+        ([1.0, 1.0], 3, "kind"),
     ],
 )
-def test_values_must_be_those_of_the_kind(values: object, kind: object, text: str) -> None:
-    with pytest.raises(ProblemError, match=text):
+def test_values_must_be_those_of_the_kind(values: object, kind: object, argument: str) -> None:
+    with refused(argument=argument):
         SpikeTrains([1.0, 2.0], [0, 2], 0.0, 5.0, values, kind=kind)
 
 
@@ -103,7 +101,7 @@ def test_trains_side_by_side_have_a_window_that_holds_all() -> None:
     both = SpikeTrains.side_by_side([SpikeTrains.from_lists([[1.0]], -2.0, 3.0), SpikeTrains.from_lists([], 0.0, 9.0)])
     assert (both.start, both.stop) == (-2.0, 9.0)
     for wrong in ([], [3], 3):
-        with pytest.raises(ProblemError, match="parts"):
+        with refused(argument="parts"):
             SpikeTrains.side_by_side(wrong)
 
 
@@ -113,9 +111,9 @@ def test_unsigned_spikes_merged_with_graded_ones_have_the_value_1(trains: SpikeT
     lists = [np.sort(rng.uniform(0, 50, rng.integers(0, 4))) for _ in range(len(trains))]
     other = SpikeTrains.from_lists(lists, 0.0, 50.0)
     if trains.signed:
-        with pytest.raises(ProblemError, match="signed and unsigned"):
+        with refused():
             trains + other
-        with pytest.raises(ProblemError, match="graded and signed"):
+        with refused():
             trains + SpikeTrains.from_lists(lists, 0.0, 50.0, [np.ones(len(t)) for t in lists], kind="graded")
         return
     both = trains + other
@@ -133,5 +131,5 @@ def test_a_graded_train_says_its_kind() -> None:
     assert trains.between(0.5, 2.0).kind == trains.select([0, 0]).kind == trains.lasting(99.0).kind == "graded"
     assert trains.to_pandas()["value"].tolist() == [0.5, -2.0]
     assert [text.get_text() for text in trains.plot().get_legend().get_texts()] == ["above 0", "below 0"]
-    with pytest.raises(ProblemError, match="outside the window"):
+    with refused():
         trains.lasting(0.5)

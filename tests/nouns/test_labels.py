@@ -2,7 +2,6 @@
 
 import csv
 import json
-import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -10,9 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel import _core
+from taxel._base.errors import Place
 from taxel.labels import TURN_US
 from taxel.live._requests.labels import LabelRequests
 from taxel.live._shown_files import Opening
@@ -81,9 +82,9 @@ def test_without_host_time_times_are_taken_as_they_are(tmp_path: Path) -> None:
 def test_labels_of_another_run_are_refused(tmp_path: Path) -> None:
     recording = record(tmp_path / "walk.mcap", 0, 2.0)
     (tmp_path / "labels.csv").write_text(f"label,t_us,host_ns\ntick,100000,{BEGAN_NS + 3_000_000_000}\n")
-    with pytest.raises(taxel.ProblemError, match="is from another run than"):
+    with refused():
         taxel.Labels(tmp_path / "labels.csv").times(recording)
-    with pytest.raises(taxel.ProblemError, match="is from another run than"):
+    with refused():
         taxel.information.read_trials(tmp_path / "labels.csv", [recording], window_ms=5.0)
 
 
@@ -100,18 +101,18 @@ def test_a_table_names_recordings_by_path_name_or_stem(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "line"),
     [
-        ("label,t_us,host_ns\na,5,soon\n", "line 2: host_ns is 'soon'; must be whole ns"),
-        ("label,t_us,host_ns\na,5,-1\n", "line 2: host_ns must be ns since 1970"),
-        ("label,t_us,t_us\na,5,5\n", "line 1: column 't_us' appears twice"),
-        ("label,host_ns\na,5\n", "line 1: column 't_us' is missing"),
+        ("label,t_us,host_ns\na,5,soon\n", 2),
+        ("label,t_us,host_ns\na,5,-1\n", 2),
+        ("label,t_us,t_us\na,5,5\n", 1),
+        ("label,host_ns\na,5\n", 1),
     ],
 )
-def test_a_table_that_makes_no_sense_is_named(tmp_path: Path, text: str, said: str) -> None:
+def test_a_table_that_makes_no_sense_is_named(tmp_path: Path, text: str, line: int) -> None:
     place = tmp_path / "labels.csv"
     place.write_text(text)
-    with pytest.raises(taxel.FormatError, match=said):
+    with refused(taxel.FormatError, place=Place("labels.csv", line=line)):
         taxel.Labels(place)
 
 
@@ -168,10 +169,10 @@ def test_a_replaced_note_is_that_of_its_source_alone(tmp_path: Path) -> None:
     assert (labels._replaced(walk, "left", "", ""), labels._replaced(walk, "right", "", "")) == ({4, 9}, {9})
 
 
-@pytest.mark.parametrize(("cells", "said"), [(",5,", "must have a label"), ("a,5,x", "must be whole us")])
-def test_a_row_that_replaces_nothing_is_refused(tmp_path: Path, cells: str, said: str) -> None:
+@pytest.mark.parametrize("cells", [",5,", "a,5,x"])
+def test_a_row_that_replaces_nothing_is_refused(tmp_path: Path, cells: str) -> None:
     (tmp_path / "walk.notes.csv").write_text(f"label,t_us,replaces_us\n{cells}\n")
-    with pytest.raises(taxel.FormatError, match=f"line 2: .*{said}"):
+    with refused(taxel.FormatError, place=Place("walk.notes.csv", line=2)):
         taxel.Labels(tmp_path / "walk.notes.csv")
 
 
@@ -243,7 +244,7 @@ def test_a_cell_in_a_column_without_a_name_is_refused_and_an_empty_one_is_not(tm
     place.write_text("label,t_us,\nheel,5,\n")
     assert [row.others for row in taxel.Labels(place).rows] == [()]
     place.write_text("label,t_us,,\nheel,5,late,\n")
-    with pytest.raises(taxel.FormatError, match="line 2: 'late' is in a column without a name; name the column"):
+    with refused(taxel.FormatError, place=Place("labels.csv", line=2)):
         taxel.Labels(place)
 
 
@@ -288,56 +289,27 @@ def test_a_table_of_another_program_is_read_by_the_names_of_its_columns(
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "line"),
     [
-        (
-            "Zeit;Ereignis\n0,21;auf\n",
-            r"line 2: Zeit is '0,21'; its unit is not known; write the unit in the name of the column, for example "
-            r"'Zeit \[s\]' or \(ms\)",
-        ),
-        ("t_s,event\n0:0x,auf\n", "line 2: t_s is '0:0x'; must be a number, or a time like 2024-05-01"),
-        ('t_s,event\n"0,21",auf\n', "line 2: t_s is '0,21'; must be a number"),
-        ("t_s,event\n1e308,auf\n", "line 2: t_s is '1e308'; must be a number"),
-        ("t_s,event\nnan,auf\n", "line 2: t_s is 'nan'; must be a number"),
-        (
-            "time,t_s,event\n1,1,auf\n",
-            "line 1: 'time' and 't_s' all contain times: rename the column with the times of the labels to t_us",
-        ),
-        (
-            "t_s,what,comment\n1,auf,late\n",
-            "line 1: 'what' and 'comment' are texts, so .*; the columns are 't_s', 'what', ",
-        ),
-        ("t_s,value\n1,2\n", "line 1: column 'label' is missing; the columns are 't_s', 'value'; must be label,t_us"),
-        *(
-            (
-                f"{name};Ereignis\n250;auf\n",
-                rf"line 1: column 't_us' is missing; the columns are .*; '{re.escape(name)}' contains numbers of "
-                r"frames, not times: "
-                r"write t_us = FRAME \* 1000000 / RATE \(frame 250 at 100 frames/s is at 2500000 us\); "
-                r"must be",
-            )
-            for name in ("frame", "Frames", "frame_number", "Frame #", "frame nr.", "Bild", "Bildnummer", "sample_idx")
-        ),
-        (
-            "time,event\n250,auf\n",
-            r"time is '250'; its unit is not known; .*if these are numbers of frames, write t_us",
-        ),
-        (
-            "time,event\n0.25,auf\n",
-            r"its unit is not known; write the unit in the name of the column, for example 'time \[s\]' or \(ms\)$",
-        ),
-        (
-            "start;Ereignis\n1;auf\n",
-            "line 1: column 't_us' is missing; the columns are 'start', 'Ereignis'; must be label,t_us",
-        ),
-        ("# my labels\nlabel,t_us\n", "line 1: column 'label' is missing"),
-        ("t_s;Ereignis\n1\n", "line 2: 1 cells; must have 2"),
+        ("Zeit;Ereignis\n0,21;auf\n", 2),
+        ("t_s,event\n0:0x,auf\n", 2),
+        ('t_s,event\n"0,21",auf\n', 2),
+        ("t_s,event\n1e308,auf\n", 2),
+        ("t_s,event\nnan,auf\n", 2),
+        ("time,t_s,event\n1,1,auf\n", 1),
+        ("t_s,what,comment\n1,auf,late\n", 1),
+        ("t_s,value\n1,2\n", 1),
+        ("frame nr.;Ereignis\n250;auf\n", 1),
+        ("time,event\n250,auf\n", 2),
+        ("start;Ereignis\n1;auf\n", 1),
+        ("# my labels\nlabel,t_us\n", 1),
+        ("t_s;Ereignis\n1\n", 2),
     ],
 )
-def test_a_table_of_another_program_without_times_or_labels_is_refused(tmp_path: Path, text: str, said: str) -> None:
+def test_a_table_of_another_program_without_times_or_labels_is_refused(tmp_path: Path, text: str, line: int) -> None:
     place = tmp_path / "labels.csv"
     place.write_text(text)
-    with pytest.raises(taxel.FormatError, match=said):
+    with refused(taxel.FormatError, place=Place("labels.csv", line=line)):
         taxel.Labels(place)
 
 
@@ -347,7 +319,7 @@ def test_seconds_that_may_be_numbers_of_frames_are_asked_about(tmp_path: Path) -
     recording, place = taxel.open(tmp_path / "own.npz"), tmp_path / "labels.csv"
     hint = r"\(0.000 to 1.980 s\); if these are numbers of frames, write t_us = FRAME \* 20000$"
     place.write_text("label,t_s\nheel,30\ntoe,99\n")
-    with pytest.warns(UserWarning, match=hint), pytest.raises(taxel.ProblemError, match=f"none within .*{hint}"):
+    with pytest.warns(UserWarning, match=hint), refused():
         references(place, [recording])
     place.write_text("label,t_s\nheel,1\ntoe,99\n")
     with pytest.warns(UserWarning, match=f"1 of the 2 events .*{hint}"):
@@ -364,9 +336,7 @@ def test_the_page_refuses_a_table_of_another_program_and_leaves_it_alone(tmp_pat
     before = place.read_bytes()
     handler = LabelRequests(Opening())
     edit = (None, {"text": "ball", "t": 5})
-    with pytest.raises(
-        taxel.ProblemError, match=r"line 1: column 'label' is missing; .*: correct the table, then try again"
-    ):
+    with refused():
         handler.change(place, "walk.mcap", 1, [[edit]])
     assert place.read_bytes() == before
 
@@ -401,9 +371,7 @@ def test_numbers_of_trials_name_no_recording_and_the_columns_are_said(tmp_path: 
     place = tmp_path / "given" / "labels.csv"
     place.parent.mkdir()
     place.write_text("Trial;Ereignis;Zeit [s]\n1;auf;0,3\n")
-    with pytest.raises(
-        taxel.ProblemError, match="the column recording; the columns are 'Trial', 'Ereignis', 'Zeit \\[s\\]'"
-    ):
+    with refused(argument="labels"):
         references(place, made)
 
 

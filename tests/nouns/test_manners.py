@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel import Array, Detections, Events, Frames, SpikeTrains
@@ -117,16 +118,16 @@ def _values(of: SpikeTrains, k: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("add", "said"),
+    "add",
     [
-        (lambda: drawn(1, 3) + Events([], [], [], [], array=Array(3, 5)), "only events of one array"),
-        (lambda: trains(1, signed=True) + trains(1, signed=False), "only trains of one kind"),
-        (lambda: trains(1, signed=True) + trains(1, signed=True, n=4), "only equal numbers"),
-        (lambda: found(1, 3) + found(1, 3, said=True), "these cannot be merged"),
+        lambda: drawn(1, 3) + Events([], [], [], [], array=Array(3, 5)),
+        lambda: trains(1, signed=True) + trains(1, signed=False),
+        lambda: trains(1, signed=True) + trains(1, signed=True, n=4),
+        lambda: found(1, 3) + found(1, 3, said=True),
     ],
 )
-def test_what_does_not_go_together_is_refused(add: Callable[[], Any], said: str) -> None:
-    with pytest.raises(ProblemError, match=said):
+def test_what_does_not_go_together_is_refused(add: Callable[[], Any]) -> None:
+    with refused():
         add()
 
 

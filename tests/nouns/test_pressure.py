@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from unittest.mock import ANY
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusal import refused
 from scipy import ndimage
 
 from taxel import Array, Frames, Tare
-from taxel._core import ProblemError
 
 
 def drawn(seed: int) -> Frames:
@@ -55,6 +57,5 @@ def test_nonsense_is_one_clear_error() -> None:
         lambda: Tare.take(Frames(np.ones((2, 3, 3)), [0, 1])).off(frames),
         lambda: Tare.take(Frames(np.ones((2, 3, 3)), [0, 1])).off(None),
     ):
-        with pytest.raises(ProblemError) as caught:
+        with refused(argument=ANY):
             call()
-        assert "\n" not in str(caught.value)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from typing import Any, ClassVar
+from unittest.mock import ANY
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 
 import taxel
 from taxel import Array, Detections, Events, Frames, SpikeTrains, Tare
 from taxel._base.arguments import bare, column, floats, integer, number
-from taxel._core import ProblemError
 
 pq = pytest.importorskip("quantities")
 neo = pytest.importorskip("neo")
@@ -151,10 +151,10 @@ def test_a_quantity_is_converted_or_refused_everywhere(place: tuple[Any, Any], u
         Mute(),
         nested(us, lambda _: Mute()),
     ):
-        with refused("a quantity that converts to"):
+        with refused(argument=ANY):
             call(wrong)
     if isinstance(us, list) and len(us) > 1:
-        with pytest.raises(ProblemError, match="mixes quantities and numbers without a unit"):
+        with refused(argument=ANY):
             call([us[0], us[1] / 1e6 * S, *us[2:]])
 
 
@@ -172,7 +172,7 @@ def test_a_quantity_is_converted_or_refused_everywhere(place: tuple[Any, Any], u
     ],
 )
 def test_where_no_unit_is_meant_a_quantity_is_refused(call: Any) -> None:
-    with refused(r"must be a (plain number|number of ms)"):
+    with refused(argument=ANY):
         call(3.0 * V)
 
 
@@ -185,7 +185,7 @@ def test_what_has_no_dimension_is_a_plain_number() -> None:
 def test_whole_us_stay_whole_through_seconds(us: list[int]) -> None:
     assert column("t", np.array(us) / 1e6 * S, np.int64, "us").tolist() == us
     assert integer("t", us[0] / 1e6 * S, unit="us") == us[0]
-    with pytest.raises(ProblemError, match="must be a whole number"):
+    with refused(argument="t"):
         column("t", (np.array(us) + 0.25) / 1e6 * S, np.int64, "us")
 
 
@@ -196,7 +196,7 @@ def test_what_holds_no_quantity_comes_back_as_it_is() -> None:
 
 def test_a_row_of_trains_keeps_what_from_lists_promises() -> None:
     """A place is named by train, also where trains have units."""
-    with pytest.raises(ProblemError, match=r"times\[1\]"):
+    with refused(argument="times"):
         SpikeTrains.from_lists([[1.0] * MS, [1.0] * V])
     lists = [np.array([1.0, 2.0]) * MS, [], [0.003 * S]]
     assert list(map(list, SpikeTrains.from_lists(lists))) == [[1.0, 2.0], [], [3.0]]
@@ -205,5 +205,5 @@ def test_a_row_of_trains_keeps_what_from_lists_promises() -> None:
 def test_a_list_that_holds_itself_is_refused() -> None:
     endless: list[Any] = []
     endless.append(endless)
-    with pytest.raises(ProblemError, match="must have fewer than 65 levels of nesting"):
+    with refused(argument="a"):
         bare("a", endless, "ms")

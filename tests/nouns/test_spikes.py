@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 from pathlib import Path
+from unittest.mock import ANY
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -11,10 +12,11 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 
 from taxel import SpikeTrains
 from taxel._base.arguments import column
+from taxel._base.errors import Place
 from taxel._core import FormatError, ProblemError
 
 mpl.use("Agg")
@@ -122,7 +124,7 @@ def test_nwb_units_of_others_are_read_in_ms(tmp_path: Path) -> None:
     assert (watched.start, watched.stop) == (-500.0, 900.0)
     assert (unwatched.start, unwatched.stop) == (-250.0, 500.0)
     assert SpikeTrains.from_nwb(tmp_path / "unwatched.nwb", start=-300.0, stop=600.0).stop == 600.0
-    with pytest.raises(ProblemError, match="outside the window"):
+    with refused():
         SpikeTrains.from_nwb(tmp_path / "unwatched.nwb", stop=300.0)
 
 
@@ -130,10 +132,10 @@ def test_a_file_without_spike_times_is_one_error(tmp_path: Path) -> None:
     pynwb = pytest.importorskip("pynwb")
     with pynwb.NWBHDF5IO(tmp_path / "a.nwb", "w") as io:
         io.write(pynwb.NWBFile("none", "none", datetime(2020, 1, 1, tzinfo=UTC)))
-    with pytest.raises(FormatError, match=r"a\.nwb: the NWB file contains no spike times"):
+    with refused(FormatError, place=Place("a.nwb")):
         SpikeTrains.from_nwb(tmp_path / "a.nwb")
     (tmp_path / "b.nwb").write_text("nothing of the kind")
-    with pytest.raises(FormatError, match=r"b\.nwb: the HDF5 file is damaged"):
+    with refused(FormatError, place=Place("b.nwb")):
         SpikeTrains.from_nwb(tmp_path / "b.nwb")
     with pytest.raises(FileNotFoundError):
         SpikeTrains.from_nwb(tmp_path / "c.nwb")
@@ -186,7 +188,7 @@ def test_selected_trains_come_in_the_order_given(trains: SpikeTrains) -> None:
 @given(some())
 def test_splitting_by_sign_keeps_every_spike_once(trains: SpikeTrains) -> None:
     if trains.kind == "graded":
-        with pytest.raises(ProblemError, match="never split by sign"):
+        with refused(argument="trains"):
             trains.split_by_sign()
         return
     split = trains.split_by_sign()
@@ -226,29 +228,29 @@ def test_trains_draw_themselves() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "argument"),
     [
-        (([[1.0, float("nan")]],), "train 0, spike 1: time is NaN"),
-        (([[1.0], [float("inf")]],), "train 1, spike 0"),
-        (([[5.0, 3.0]],), "train 0, spike 1"),
-        (([[5.0]], 6.0), "window"),
-        (([[5.0]], 0.0, 4.0), "outside the window"),
-        (([[5.0]], 0.0, float("nan")), "stop is nan"),
-        (([[5.0]], float("-inf"), 9.0), "window"),
-        (([[5.0]], "0"), "start is '0'"),
-        (([[5.0]], 0.0, "9"), "stop is '9'"),
-        (([["a"]],), r"times\[0\]"),
-        (([[[1.0, 2.0]]],), r"times\[0\]"),
-        ((3,), "times is 3"),
-        ((None,), "times is None"),
-        (([None],), r"times\[0\]\[0\] is None: must be a number"),
+        (([[1.0, float("nan")]],), None),
+        (([[1.0], [float("inf")]],), None),
+        (([[5.0, 3.0]],), None),
+        (([[5.0]], 6.0), None),
+        (([[5.0]], 0.0, 4.0), None),
+        (([[5.0]], 0.0, float("nan")), "stop"),
+        (([[5.0]], float("-inf"), 9.0), None),
+        (([[5.0]], "0"), "start"),
+        (([[5.0]], 0.0, "9"), "stop"),
+        (([["a"]],), "times"),
+        (([[[1.0, 2.0]]],), "times"),
+        ((3,), "times"),
+        ((None,), "times"),
+        (([None],), "times"),
         (([[1.0]], 0.0, 2.0, [[1.0, 2.0]]), "values"),
-        (([[1.0]], 0.0, 2.0, 3), "values is 3"),
-        (([[1.0]], 0.0, 2.0, [["a"]]), r"values\[0\]"),
+        (([[1.0]], 0.0, 2.0, 3), "values"),
+        (([[1.0]], 0.0, 2.0, [["a"]]), "values"),
     ],
 )
-def test_nonsense_in_an_argument_is_one_error_with_its_place(arguments: tuple, said: str) -> None:
-    with refused(said):
+def test_nonsense_in_an_argument_is_one_error_with_its_place(arguments: tuple, argument: str) -> None:
+    with refused(argument=argument):
         SpikeTrains.from_lists(*arguments)
 
 
@@ -260,7 +262,7 @@ def test_trains_are_converted_together_and_not_one_by_one(monkeypatch: pytest.Mo
         trains = SpikeTrains.from_lists(lists, stop=3.0, values=[[1.0] * len(entry) for entry in lists])
         assert list(map(list, trains)) == [list(map(float, entry)) for entry in lists]
     assert set(seen) == {"times", "values", "offsets"}
-    with pytest.raises(ProblemError, match=r"times\[700\]\[0\] is 'soon': must be a number"):
+    with refused(argument="times"):
         SpikeTrains.from_lists([[0.5]] * 700 + [["soon"]] + [[0.5]] * 300)
 
 
@@ -299,9 +301,8 @@ def test_offsets_and_values_must_fit(offsets: object, values: object) -> None:
     ],
 )
 def test_nonsense_in_a_method_is_one_error(call) -> None:
-    with pytest.raises(ProblemError) as caught:
+    with refused(argument=ANY):
         call(SpikeTrains.from_lists([[1.0, 2.0], []], stop=5.0))
-    assert "\n" not in str(caught.value)
 
 
 def test_a_train_that_is_not_there_is_an_index_error() -> None:

@@ -28,5 +28,4 @@ STRANGE += [slice(0.0, None), slice(None, None, 0), slice("a"), {}, object(), 10
 def test_a_place_that_is_none_is_refused_in_one_line(noun, asked):
     with pytest.raises((taxel.ProblemError, IndexError)) as refused:
         NOUNS[noun][asked]
-    assert str(refused.value)
-    assert "\n" not in str(refused.value)
+    (_,) = str(refused.value).splitlines()

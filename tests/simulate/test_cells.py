@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import mixed
-from refusal import refused_saying as refused
+from refusal import refused
 
-from taxel import Array, ProblemError, SceneError
+from taxel import Array, SceneError
+from taxel._base.errors import Place
 from taxel.simulate import Layer, Scene, SceneFile, Silence, play, truth
 
 ROOT = Path(__file__).parents[2]
@@ -215,27 +216,26 @@ def test_a_scene_whose_cells_are_too_few_says_so_once(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("cells", "said"),
+    "cells",
     [
-        ("0", r"cells_per_pitch is 0: must be from 1 to 16"),
-        ("17", r"cells_per_pitch is 17: must be from 1 to 16"),
-        ("2.5", r"cells_per_pitch"),
-        ("-1", r"cells_per_pitch"),
-        ('2\nsurface = "columns"', r'cells_per_pitch is 2: must be 1 with surface "columns"'),
-        ("16\narray = { rows = 256, columns = 256 }", r"cells_per_pitch is 16: must be \d or less on 256 x 256 taxels"),
+        "0",
+        "17",
+        "2.5",
+        "-1",
+        '2\nsurface = "columns"',
+        "16\narray = { rows = 256, columns = 256 }",
     ],
 )
-def test_cells_that_make_no_sense_get_one_line_with_the_place(tmp_path, cells, said):
+def test_cells_that_make_no_sense_get_one_line_with_the_place(tmp_path, cells):
     place = tmp_path / "scene.toml"
     place.write_text(NARROW.replace("cells_per_pitch = 1", f"cells_per_pitch = {cells}"))
-    with refused(said, SceneError) as caught:
+    with refused(SceneError, place=Place("scene.toml")):
         SceneFile.open(place)
-    assert str(caught.value).startswith(str(place))
 
 
 def test_a_layer_refuses_cells_and_frames_that_do_not_fit():
     for cells in (0, 17, 1.5, "two"):
-        with pytest.raises(ProblemError, match="cells_per_pitch"):
+        with refused(argument="cells_per_pitch"):
             Layer(cells_per_pitch=cells)
-    with pytest.raises(ProblemError, match=r"shape \(14, 14\): must be \(42, 42\)"):
+    with refused(argument="sunk_mm"):
         Layer(None, SMALL, cells_per_pitch=3).press(np.zeros((14, 14)))

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusal import refused
 
 import taxel
 from taxel.simulate.circuit import AdaptiveRamp, Circuit, Converter, Divider, Fabric, VirtualGround
@@ -328,24 +329,24 @@ def test_the_ramp_turns_steep_where_a_taxel_moves_and_gentle_where_none_does():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "argument"),
     [
-        (lambda: AdaptiveRamp(steepest=600), "steepest is 600: must be at most gentlest, 510"),
-        (lambda: AdaptiveRamp().convert(np.ones((9, 4, 4)), period_us=0.0), "period_us is 0 us: must be above 0"),
-        (lambda: VirtualGround(wire_ohm=1e-5), "wire_ohm is 0.00001 ohm: must be 0, or from 0.001 to 1e9"),
+        (lambda: AdaptiveRamp(steepest=600), "steepest"),
+        (lambda: AdaptiveRamp().convert(np.ones((9, 4, 4)), period_us=0.0), "period_us"),
+        (lambda: VirtualGround(wire_ohm=1e-5), "wire_ohm"),
         (
             lambda: VirtualGround().volts([[1.0, -2.0]]),
-            "conductance at row 0, column 1 is -2 uS: must be from 0 to 1e9",
+            None,
         ),
-        (lambda: VirtualGround().volts([1.0]), r"conductance_us has shape \(1,\)"),
-        (lambda: Divider().volts(np.zeros((2, 0))), r"conductance_us has shape \(2, 0\)"),
-        (lambda: Converter(ramp=200), "step_us is 0.75 us: must be 0.8667 or more"),
-        (lambda: Converter().ticks([[np.nan]]), r"volts\[0, 0\] is nan: must be finite"),
-        (lambda: Converter().ticks([[1.0, -1.1e6]]), "volts: must be from -1e"),
-        (lambda: Converter().trace([1.0]), "voltages: 1 values; must be one per step, 4"),
+        (lambda: VirtualGround().volts([1.0]), "conductance_us"),
+        (lambda: Divider().volts(np.zeros((2, 0))), "conductance_us"),
+        (lambda: Converter(ramp=200), "step_us"),
+        (lambda: Converter().ticks([[np.nan]]), "volts"),
+        (lambda: Converter().ticks([[1.0, -1.1e6]]), "volts"),
+        (lambda: Converter().trace([1.0]), None),
         (lambda: Circuit(readout=Divider()), "readout"),
     ],
 )
-def test_nonsense_is_one_clear_error(wrong, said):
-    with pytest.raises(taxel.ProblemError, match=said):
+def test_nonsense_is_one_clear_error(wrong, argument):
+    with refused(argument=argument):
         wrong()

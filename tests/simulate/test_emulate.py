@@ -12,10 +12,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from refusal import refused
 from shell import run
 
 import taxel
 from taxel import ProblemError, wire
+from taxel._base.errors import Place
 from taxel.cli.emulate import _HELD_S, _TruthTable
 from taxel.demo.script import endless, script
 from taxel.device import Device
@@ -176,7 +178,7 @@ def test_scenes_without_an_end_begin_at_once(listener):
 
 
 def test_what_an_act_is_that_comes_late_is_said(listener):
-    with pytest.raises(ProblemError, match="act 1 is 'ball'"):
+    with refused():
         emulate(f"127.0.0.1:{listener[0]}", iter([Silence(10.0), "ball"]), seed=1, tare_ms=2.0)
 
 
@@ -254,17 +256,14 @@ def test_another_sensors_frames_come_through_a_pipe(listener, tmp_path):
     for bad in (b"rows 5\n", b'{"rows": 5}\n', b""):
         path = tmp_path / "bad"
         path.write_bytes(bad)
-        with path.open("rb") as source, pytest.raises(taxel.FormatError, match="standard input, line 1"):
+        with path.open("rb") as source, refused(taxel.FormatError, place=Place("standard input", line=1)):
             Pipe(source)
     path.write_bytes(b'{"rows": 5, "columns": 300, "rate": 100, "bits": 12}\n')
-    with path.open("rb") as source, pytest.raises(taxel.ProblemError, match="line 1: 5 x 300 taxels: lines is 300"):
+    with path.open("rb") as source, refused(place=Place("standard input", line=1)):
         Pipe(source)
     with path.open("wb") as sink:
         sink.write(json.dumps(about).encode() + b"\n" + frames.tobytes()[:-3])
-    with (
-        path.open("rb") as source,
-        pytest.raises(taxel.FormatError, match="frame 29: ends after 27 bytes; must have 30"),
-    ):
+    with path.open("rb") as source, refused(taxel.FormatError):
         emulate(heard.to, Pipe(source))
 
 
@@ -361,10 +360,10 @@ def test_taxels_have_flaws_by_their_own_seeds(listener):
     held = decoder.held
     assert 250 < (held <= 0).sum() < 600, "dead ones say nothing"
     assert 100 < ((held > 0) & (held != 100)).sum() < 300
-    for nonsense in ({"dead": 2.0}, {"gain": -1.0}):
-        with pytest.raises(ProblemError, match=r"^(dead|gain) is .*: must be"):
-            Flaws(**nonsense)
-    with pytest.raises(ProblemError, match="is not known: must be one of"):
+    for name, nonsense in (("dead", 2.0), ("gain", -1.0)):
+        with refused(argument=name):
+            Flaws(**{name: nonsense})
+    with refused(argument="seeds"):
         Flaws(seeds={"cold": 1})
 
 
@@ -390,9 +389,9 @@ def test_taxels_that_share_a_switch_pull_each_other_down(listener, switch_ohm):
 
 def test_a_circuit_that_is_not_the_sensor_s_is_refused():
     to, still = "127.0.0.1:9", taxel.Frames(np.ones((2, 64, 64)), [0, 1000], unit="ticks")
-    with pytest.raises(ProblemError, match=r"v_trans is 0.5: must be 1.3, as in the sensor"):
+    with refused(argument="circuit"):
         emulate(to, [Silence(60.0)], circuit=Circuit(readout=VirtualGround(v_trans=0.5)))
-    with pytest.raises(ProblemError, match="circuit is 3"):
+    with refused(argument="circuit"):
         emulate(to, Replay(still), circuit=3)
 
 

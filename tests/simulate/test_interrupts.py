@@ -7,6 +7,7 @@ import textwrap
 
 import numpy as np
 import pytest
+from refusal import refused
 
 import taxel
 from taxel.simulate import Scene, Silence, truth
@@ -85,27 +86,27 @@ def test_ctrl_c_ends_a_long_call(name: str) -> None:
 
 @pytest.mark.parametrize("step_us", [5e-324, 1e-300, 1e-3, 0.0, np.nan, np.inf, 1000.1])
 def test_a_step_of_a_scene_that_would_not_end_is_refused(step_us: float) -> None:
-    with pytest.raises(taxel.Error, match=r"step(_us)? is .*: must be "):
+    with pytest.raises(taxel.Error):
         Scene.draw(1).motion(step_us=step_us)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "argument"),
     [
-        ({"every_us": np.inf}, "every_us is inf us: must be above 0 and finite"),
-        ({"every_us": 5e-324}, "every_us is .* us: must be above 0 and finite, with at most 1e7 points"),
-        ({"every_us": 1e300, "stop_us": 1e305}, "stop_us is .* us: must be from 0 to 7500000"),
-        ({"every_us": 1.0, "stop_us": np.inf}, "every_us is 1 us: .* points in inf us"),
-        ({"every_us": np.inf, "stop_us": np.inf}, "every_us is inf us"),
-        ({"stop_us": -1.0}, "stop_us is -1 us: must be from 0"),
+        ({"every_us": np.inf}, "every_us"),
+        ({"every_us": 5e-324}, "every_us"),
+        ({"every_us": 1e300, "stop_us": 1e305}, "stop_us"),
+        ({"every_us": 1.0, "stop_us": np.inf}, "every_us"),
+        ({"every_us": np.inf, "stop_us": np.inf}, "every_us"),
+        ({"stop_us": -1.0}, "stop_us"),
     ],
 )
-def test_a_trace_that_would_not_end_is_refused(arguments: dict[str, float], words: str) -> None:
-    with pytest.raises(taxel.ProblemError, match=words):
+def test_a_trace_that_would_not_end_is_refused(arguments: dict[str, float], argument: str) -> None:
+    with refused(argument=argument):
         Converter().trace([1.4, 1.5, 2.0, 2.5], **arguments)
 
 
 def test_more_forces_than_memory_holds_are_refused() -> None:
     """A day on one taxel, scanned in 3 us: 3e10 frames."""
-    with pytest.raises(taxel.SceneError, match=r"acts last .* frames: must be at most 200000000; split the acts"):
+    with refused(taxel.SceneError):
         truth([Silence(86_400_000.0)] * 10)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 from scipy.linalg import expm
 
 from taxel import Array, ProblemError, SceneError
@@ -177,17 +177,17 @@ def test_a_footprint_of_many_taxels_is_solved_as_one_of_few():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "error", "said"),
+    ("wrong", "error", "argument"),
     [
-        (lambda: Layer({"poisson": 0.5}), SceneError, "poisson"),
-        (lambda: Layer({"colour": 1.0}), SceneError, "colour"),
+        (lambda: Layer({"poisson": 0.5}), SceneError, None),
+        (lambda: Layer({"colour": 1.0}), SceneError, None),
         (lambda: Layer("soft"), ProblemError, "foam"),
         (lambda: Layer(tolerance=0), ProblemError, "tolerance"),
-        (lambda: Layer().press(np.zeros((3, 3))), ProblemError, "shape"),
-        (lambda: Layer().press(np.full((64, 64), np.nan)), ProblemError, "finite"),
-        (lambda: Layer().compliance([-1.0]), ProblemError, "0 or more"),
+        (lambda: Layer().press(np.zeros((3, 3))), ProblemError, "sunk_mm"),
+        (lambda: Layer().press(np.full((64, 64), np.nan)), ProblemError, "sunk_mm"),
+        (lambda: Layer().compliance([-1.0]), ProblemError, "waves"),
     ],
 )
-def test_nonsense_gets_one_clear_line(wrong, error, said):
-    with refused(said, error):
+def test_nonsense_gets_one_clear_line(wrong, error, argument):
+    with refused(error, argument):
         wrong()

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from refusal import refused_saying as refused
+from refusal import refused
 
 from taxel import Array, ProblemError, SceneError
 from taxel.simulate import FrameSequence, Scene, Silence, play, truth
@@ -129,49 +129,49 @@ def test_frames_touch_from_the_empty_one_before_to_the_empty_one_after():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "error", "said"),
+    ("wrong", "error", "argument"),
     [
         (lambda: Scene.draw(-1), ProblemError, "seed"),
         (lambda: Scene.draw(1, 0.5), ProblemError, "index"),
         (lambda: Scene.draw(1, left_to_rest="yes"), ProblemError, "left_to_rest"),
         (lambda: Scene.draw(1, array=64), ProblemError, "array"),
-        (lambda: Scene.draw(1, array=Array(8, 8, 2.67)), SceneError, "too small"),
+        (lambda: Scene.draw(1, array=Array(8, 8, 2.67)), SceneError, None),
         (lambda: Scene("ball"), ProblemError, "parameters"),
-        (lambda: Scene({}).motion(), SceneError, "^scene: bodies is missing$"),
-        (lambda: Scene.draw(1).replace(colour="red"), ProblemError, "colour"),
-        (lambda: Scene.draw(1).body(colour="red"), ProblemError, "colour"),
-        (lambda: Scene.draw(1).body(1, x_mm=5.0), ProblemError, "n is 1"),
-        (lambda: Scene.draw(1).body(motion=high(-5)).motion(), SceneError, "height_mm"),
-        (lambda: Scene.draw(1).body(x_mm=500.0).motion(), SceneError, "off the array"),
-        (lambda: Scene.draw(1).body(mass_g=-1.0).motion(), SceneError, "mass_g is -1 g: must be above 0"),
-        (lambda: Scene.draw(1).body(mass_g=None, material="cheese").motion(), SceneError, "material is .cheese."),
-        (lambda: Scene.draw(1).body(motion={"thrown": {}}).motion(), SceneError, "dropped"),
-        (lambda: Scene.draw(1).replace(slant_deg=5.0).motion(), SceneError, "columns"),
-        (lambda: Scene.draw(1).replace(foam={"poisson": 0.5}).motion(), SceneError, "poisson"),
+        (lambda: Scene({}).motion(), SceneError, None),
+        (lambda: Scene.draw(1).replace(colour="red"), ProblemError, None),
+        (lambda: Scene.draw(1).body(colour="red"), ProblemError, None),
+        (lambda: Scene.draw(1).body(1, x_mm=5.0), ProblemError, "n"),
+        (lambda: Scene.draw(1).body(motion=high(-5)).motion(), SceneError, None),
+        (lambda: Scene.draw(1).body(x_mm=500.0).motion(), SceneError, None),
+        (lambda: Scene.draw(1).body(mass_g=-1.0).motion(), SceneError, None),
+        (lambda: Scene.draw(1).body(mass_g=None, material="cheese").motion(), SceneError, None),
+        (lambda: Scene.draw(1).body(motion={"thrown": {}}).motion(), SceneError, None),
+        (lambda: Scene.draw(1).replace(slant_deg=5.0).motion(), SceneError, None),
+        (lambda: Scene.draw(1).replace(foam={"poisson": 0.5}).motion(), SceneError, None),
         (
             lambda: Scene.draw(1).body(motion=high(800)).replace(foam={"modulus_kpa": 5}).motion(),
             SceneError,
-            "reaches the bottom",
+            None,
         ),
-        (lambda: Scene.draw(1).motion(0), SceneError, "step"),
+        (lambda: Scene.draw(1).motion(0), SceneError, None),
         (lambda: Scene.draw(1).motion("fast"), ProblemError, "step_us"),
-        (lambda: FrameSequence(np.zeros((2, 3)), 2000), ProblemError, "shape"),
-        (lambda: FrameSequence(np.full((1, 2, 2), 1.5), 2000), ProblemError, "0 to 1"),
-        (lambda: FrameSequence(np.full((1, 2, 2), np.nan), 2000), ProblemError, "0 to 1"),
-        (lambda: truth([FrameSequence(np.zeros((1, 64, 64)), 10.0)]), SceneError, "act 0"),
-        (lambda: truth([FrameSequence(np.zeros((1, 8, 8)), 2000)]), ProblemError, "act 0"),
-        (lambda: truth([Silence(1.0), Silence(-1.0)]), SceneError, "act 1"),
-        (lambda: truth(["silence"]), ProblemError, "act 0"),
-        (lambda: truth([], preset="9 kHz"), ProblemError, "preset"),
-        (lambda: play([Silence(10.0)], seed=1), ProblemError, "need"),
-        (lambda: play([Silence(100.0)], seed=1, tare_ms=-1), ProblemError, "tare"),
+        (lambda: FrameSequence(np.zeros((2, 3)), 2000), ProblemError, "values"),
+        (lambda: FrameSequence(np.full((1, 2, 2), 1.5), 2000), ProblemError, "values"),
+        (lambda: FrameSequence(np.full((1, 2, 2), np.nan), 2000), ProblemError, "values"),
+        (lambda: truth([FrameSequence(np.zeros((1, 64, 64)), 10.0)]), SceneError, None),
+        (lambda: truth([FrameSequence(np.zeros((1, 8, 8)), 2000)]), ProblemError, None),
+        (lambda: truth([Silence(1.0), Silence(-1.0)]), SceneError, None),
+        (lambda: truth(["silence"]), ProblemError, None),
+        (lambda: truth([], preset="9 kHz"), ProblemError, None),
+        (lambda: play([Silence(10.0)], seed=1), ProblemError, None),
+        (lambda: play([Silence(100.0)], seed=1, tare_ms=-1), ProblemError, "tare_ms"),
         (lambda: play([Silence(100.0)], seed="x"), ProblemError, "seed"),
-        (lambda: play([Silence(100.0)], seed=1, sensor={"exponent": 2.0}), SceneError, "exponent"),
-        (lambda: play([Silence(100.0)], seed=1, sensor={"colour": 2.0}), SceneError, "colour"),
+        (lambda: play([Silence(100.0)], seed=1, sensor={"exponent": 2.0}), SceneError, None),
+        (lambda: play([Silence(100.0)], seed=1, sensor={"colour": 2.0}), SceneError, None),
     ],
 )
-def test_nonsense_gets_one_clear_line(wrong, error, said):
-    with refused(said, error):
+def test_nonsense_gets_one_clear_line(wrong, error, argument):
+    with refused(error, argument):
         wrong()
 
 

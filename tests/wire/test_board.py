@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel import wire
@@ -95,29 +96,27 @@ def test_read_back_and_damage_on_the_serial_line():
 
 
 @pytest.mark.parametrize(
-    ("call", "text"),
+    ("call", "argument"),
     [
-        (lambda: Board().frame(np.zeros(7, np.uint16)), "frame of 7 trip times: the array has 4096 taxels"),
-        (lambda: Board().frame(np.full(4096, -1)), "ticks[0] is -1: must be a whole number that fits uint16"),
+        (lambda: Board().frame(np.zeros(7, np.uint16)), None),
+        (lambda: Board().frame(np.full(4096, -1)), "ticks"),
         (lambda: Board().frame(None), "ticks"),
-        (lambda: Board().frame(np.zeros(4096), most="all"), "most is 'all'"),
-        (lambda: Board().record("yes"), "start is 'yes': must be True or False"),
-        (lambda: Board().command("text"), "data is 'text': must be bytes"),
-        (lambda: Board(7), "registers is 7: must be a taxel.wire.Registers"),
-        (lambda: Board(array=7), "array is 7: must be a taxel.Array"),
-        (lambda: Board(array=taxel.Array(257, 256)), "array of 257 x 256 taxels: has more than 65536 positions"),
-        (lambda: Board(previous="mean"), "previous is 'mean': must be one of 'last_sent', 'last_sample'"),
-        (lambda: Board(intensity=1), "intensity is 1"),
-        (lambda: Board(queue=-1), "queue is -1"),
+        (lambda: Board().frame(np.zeros(4096), most="all"), "most"),
+        (lambda: Board().record("yes"), "start"),
+        (lambda: Board().command("text"), "data"),
+        (lambda: Board(7), "registers"),
+        (lambda: Board(array=7), "array"),
+        (lambda: Board(array=taxel.Array(257, 256)), None),
+        (lambda: Board(previous="mean"), "previous"),
+        (lambda: Board(intensity=1), "intensity"),
+        (lambda: Board(queue=-1), "queue"),
     ],
 )
-def test_nonsense_is_refused_in_one_line(call, text):
-    with pytest.raises(taxel.ProblemError) as error:
+def test_nonsense_is_refused_in_one_line(call, argument):
+    with refused(argument=argument):
         call()
-    assert text in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_a_preset_for_more_lines_than_the_array_has_is_refused():
-    with pytest.raises(taxel.DeviceError, match="lines is 64: must be at most 8, the number of"):
+    with refused(taxel.DeviceError):
         Board(Registers.preset("5.2 kHz"), taxel.Array(8, 8))

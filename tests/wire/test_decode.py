@@ -9,7 +9,7 @@ import pytest
 from draws import seeds
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
+from refusal import refused
 
 import taxel
 from taxel import wire
@@ -223,7 +223,7 @@ def test_datagrams_one_behind_the_other_are_heard_each_by_itself(data, cuts):
     assert wire.decode(data, pairing="taxel", columns=room) == wire.decode(data, pairing="taxel")
     assert rows(heard) == [row for part in parts for row in rows(part)]
     assert heard.markers == tuple(marker for part in parts for marker in part.markers)
-    with pytest.raises(taxel.ProblemError, match="lengths: each must be 0 or more"):
+    with refused(argument="lengths"):
         wire.decode(data, lengths=[len(data) + 1])
     whole = wire.decode(data, pairing="taxel", lengths=[len(data)])
     assert whole == wire.decode(data, pairing="taxel")
@@ -241,45 +241,45 @@ def test_a_whole_recording_paired_by_taxel_keeps_its_markers():
 
 
 @pytest.mark.parametrize(
-    ("call", "text"),
+    ("call", "argument"),
     [
-        (lambda: wire.decode("text"), "data is 'text': must be bytes, or an object with a contiguous buffer"),
-        (lambda: wire.decode([1, 2]), r"data is \[1, 2\]: must be bytes"),
-        (lambda: wire.decode(None), "data is None: must be bytes"),
-        (lambda: wire.decode(np.zeros(3)), "data is an array of float64: must be bytes or uint8"),
-        (lambda: wire.decode(memoryview(b"abcdef")[::2]), "must be bytes, or an object with a contiguous buffer"),
-        (lambda: wire.decode(b"", array=64), "array is 64: must be a taxel.Array"),
-        (lambda: wire.decode(b"", pairing="near"), "pairing is 'near': must be one of 'direct', 'taxel'"),
-        (lambda: wire.Decoder(pairing=None), "pairing is None"),
-        (lambda: wire.Decoder(differences=1), "differences is 1: must be True or False"),
-        (lambda: wire.Decoder().push(b"", arrived="now"), "arrived is 'now': must be a whole number"),
-        (lambda: wire.Decoder().push(b"", arrived=0.5), "arrived is 0.5: must be a whole number"),
-        (lambda: wire.Decoder().push(b"", arrived=2**63), "arrived is 9223372036854775808: must be a whole number"),
-        (lambda: wire.Decoder().push_into(None, b""), "columns is None: must be a taxel.wire.Columns"),
-        (lambda: wire.Decoder().push_into(wire.Columns(2), bytes(15)), "room for 2 rows: 15 bytes may need 4"),
-        (lambda: wire.Columns(0), "rows is 0: must be a whole number from 1"),
-        (lambda: wire.Columns(2**48), "needs more memory than is available"),
-        (lambda: wire.Columns("many"), "rows is 'many'"),
-        (lambda: wire.encode(b""), "events is b'': must be a taxel.Events"),
+        (lambda: wire.decode("text"), "data"),
+        (lambda: wire.decode([1, 2]), "data"),
+        (lambda: wire.decode(None), "data"),
+        (lambda: wire.decode(np.zeros(3)), "data"),
+        (lambda: wire.decode(memoryview(b"abcdef")[::2]), "data"),
+        (lambda: wire.decode(b"", array=64), "array"),
+        (lambda: wire.decode(b"", pairing="near"), "pairing"),
+        (lambda: wire.Decoder(pairing=None), "pairing"),
+        (lambda: wire.Decoder(differences=1), "differences"),
+        (lambda: wire.Decoder().push(b"", arrived="now"), "arrived"),
+        (lambda: wire.Decoder().push(b"", arrived=0.5), "arrived"),
+        (lambda: wire.Decoder().push(b"", arrived=2**63), "arrived"),
+        (lambda: wire.Decoder().push_into(None, b""), "columns"),
+        (lambda: wire.Decoder().push_into(wire.Columns(2), bytes(15)), None),
+        (lambda: wire.Columns(0), "rows"),
+        (lambda: wire.Columns(2**48), "rows"),
+        (lambda: wire.Columns("many"), "rows"),
+        (lambda: wire.encode(b""), "events"),
         (
             lambda: wire.encode(taxel.Events([0], [64], [0], [True], array=taxel.Array(1, 65))),
-            "event 0: row 0, column 64: version 1 of the wire has only rows and columns 0 to 63",
+            None,
         ),
     ],
 )
-def test_nonsense_is_refused_in_one_line(call, text):
-    with refused(text):
+def test_nonsense_is_refused_in_one_line(call, argument):
+    with refused(argument=argument):
         call()
 
 
 def test_a_column_made_short_or_scattered_is_refused():
     columns = wire.Columns(10)
     columns.x = columns.x[::2]
-    with pytest.raises(taxel.ProblemError, match="columns must be contiguous"):
+    with refused():
         wire.Decoder().push_into(columns, b"")
     columns = wire.Columns(10)
     columns.y = columns.y[:1]
-    with pytest.raises(taxel.ProblemError, match="columns to fill must be equally long"):
+    with refused():
         wire.Decoder().push_into(columns, bytes(10))
 
 

@@ -74,42 +74,6 @@ def test_a_wrong_order_is_refused_half_way():
     assert board.registers == Registers.preset("5.2 kHz")
 
 
-@pytest.mark.parametrize(
-    ("fields", "text"),
-    [
-        ({"line_read": 3.2}, r"line_read 3.20 us is longer than line_period 3.00 us \(rule 1\)"),
-        ({"step_read": 0.03, "ramp": 8}, r"step_read.*\(rule 4\)"),
-        ({"step_read": 0.8}, r"step_read 0.80 us is longer than step_period 0.75 us \(rule 1\)"),
-        ({"col_change_period": 76}, r"4 x step_period 0.76 us is longer than line_read 3.00 us \(rule 2\)"),
-        (
-            {"ramp": 161},
-            r"ramp 161 ticks is too long for step_read 0.55 us = 165 ticks: the ramp must be at least 5 ticks shorter",
-        ),
-        ({"step_read": 0.75, "ramp": 221}, r"ramp 221 ticks is too long for step_read 0.75 us = 225 ticks"),
-        ({"ramp": 0}, r"ramp is 0: must be from 1 to 65534 \(rule 4\)"),
-        ({"lines": 65}, r"lines is 65: must be at most 64, the number of the array's columns \(rule 4\)"),
-        ({"lines": 257}, r"lines is 257: must be from 1 to 256 \(rule 4\)"),
-        (
-            {"random_lines": True, "line_period": 10.23},
-            r"moving to any of 64 lines takes up to 10.24 us, longer than line_period 10.23 us \(rule 5\)",
-        ),
-        ({"step_period": 0.73, "step_read": 0.53, "channels": 64}, r"needs 0.74 us \(rule 7\)"),
-        ({"array": taxel.Array(65, 64), "wire_version": 1}, r"choose version 2 \(rule 8\)"),
-        ({"lines": 0}, r"lines is 0: must be from 1 to 256 \(rule 4\)"),
-        ({"noise_floor": 256}, r"noise_floor is 256: must be from 0 to 255 \(rule 4\)"),
-        ({"line_period": 1e9}, r"line_period 1000000000 us does not fit into the bits of its register \(rule 4\)"),
-        ({"channels": 32}, "32 channels: the converter has 16 or 64"),
-        (
-            {"array": taxel.Array(64, 8), "lines": 64},
-            r"lines is 64: must be at most 8, the number of the array's columns \(rule 4\)",
-        ),
-    ],
-)
-def test_a_broken_rule_is_named_with_its_numbers(fields, text):
-    with pytest.raises(taxel.DeviceError, match=text):
-        Registers(**fields)
-
-
 def test_what_is_hardly_meant_is_warned_of():
     (settling,) = Registers(step_read=0.6).warnings
     assert settling.endswith("(rule 5)")
@@ -126,48 +90,46 @@ def test_the_manuals_names_are_aliases_in_its_own_units():
 
 
 @pytest.mark.parametrize(
-    ("call", "text"),
+    ("call", "argument"),
     [
-        (lambda: Registers(speed=1), 'register "speed" is not known: must be one of random_lines, '),
-        (lambda: Registers(line_period=3.001), "line_period is 3.001 us: must be a whole multiple of 0.01 us"),
-        (lambda: Registers(line_period="slow"), "line_period is 'slow': must be a number"),
-        (lambda: Registers(line_period=float("nan")), "line_period is nan: must be finite"),
-        (lambda: Registers(ramp=1.5), "ramp is 1.5: must be a whole number"),
-        (lambda: Registers(ramp=-1), "ramp is -1: must be a whole number from 1 to 65534"),
-        (lambda: Registers(nrows=0.5), "nrows is 0.5: must be a whole number from 0 to 255"),
-        (lambda: Registers(frame_sync="yes"), "frame_sync is 'yes': must be True or False"),
-        (lambda: Registers(array=3), "array is 3: must be a taxel.Array"),
-        (lambda: Registers.preset("fast"), 'preset "fast" is not known: must be one of "5.2 kHz", "2 kHz", "20.8 kHz"'),
-        (lambda: Registers.preset(5), "preset is 5: must be a text"),
+        (lambda: Registers(speed=1), None),
+        (lambda: Registers(line_period=3.001), "line_period"),
+        (lambda: Registers(line_period="slow"), "line_period"),
+        (lambda: Registers(line_period=float("nan")), "line_period"),
+        (lambda: Registers(ramp=1.5), "ramp"),
+        (lambda: Registers(ramp=-1), "ramp"),
+        (lambda: Registers(nrows=0.5), "nrows"),
+        (lambda: Registers(frame_sync="yes"), "frame_sync"),
+        (lambda: Registers(array=3), "array"),
+        (lambda: Registers.preset("fast"), None),
+        (lambda: Registers.preset(5), "preset"),
         (
             lambda: Registers().with_preset("128 x 128, 1 kHz"),
-            'preset "128 x 128, 1 kHz" is not for a board of 64 x 64 taxels: must be one of "5.2 kHz", "2 kHz"',
+            None,
         ),
         (
             lambda: Registers(array=taxel.Array(128, 128)).with_preset("2 kHz"),
-            'preset "2 kHz" is not for a board of 128 x 128 taxels: must be one of "128 x 128, 1 kHz", ',
+            None,
         ),
-        (lambda: Registers().commands_to(None), "target is None: must be a taxel.wire.Registers"),
-        (lambda: Command(8, 0), "register is 8: must be a whole number from 0 to 7"),
-        (lambda: Command(0, -1), "value is -1"),
-        (lambda: Command(0, 2**32), "value is 4294967296"),
-        (lambda: Command.from_bytes(7), "data is 7: must be bytes"),
+        (lambda: Registers().commands_to(None), "target"),
+        (lambda: Command(8, 0), "register"),
+        (lambda: Command(0, -1), "value"),
+        (lambda: Command(0, 2**32), "value"),
+        (lambda: Command.from_bytes(7), "data"),
     ],
 )
-def test_nonsense_is_refused_in_one_line(call, text):
-    with pytest.raises(taxel.ProblemError) as error:
+def test_nonsense_is_refused_in_one_line(call, argument):
+    with refused(argument=argument):
         call()
-    assert text in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_bytes_that_are_no_command_are_refused_by_place():
-    with pytest.raises(taxel.FormatError, match="command of 4 bytes: must be 5"):
+    with refused(taxel.FormatError):
         Command.from_bytes(b"abcd")
     with refused(taxel.FormatError, place=Place(byte=0)):
         Command.from_bytes(b"abcde")
 
 
 def test_boards_with_other_channels_are_not_led_to():
-    with pytest.raises(taxel.DeviceError, match="the board has 16 channels, but the registers are for 64"):
+    with refused(taxel.DeviceError):
         Registers().commands_to(Registers.preset("20.8 kHz"))

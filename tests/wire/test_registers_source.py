@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from refusal import refused
 
 import taxel
 from taxel.wire import PRESETS, Registers
@@ -105,12 +106,12 @@ def test_the_rules_agree_in_rust_and_in_the_panel(seed, tmp_path):
     (tmp_path / "run.mjs").write_text(script)
     said = subprocess.run([node, tmp_path / "run.mjs"], check=True, capture_output=True, text=True).stdout
     seen = set()
-    for (rows, columns, values), (refused, warned) in zip(drawn, json.loads(said), strict=True):
+    for (rows, columns, values), (errors, warned) in zip(drawn, json.loads(said), strict=True):
         ours = by_rust(rows, columns, values)
-        assert ours == (refused[0] if refused else None), (rows, columns, values)
+        assert ours == (errors[0] if errors else None), (rows, columns, values)
         if ours is None:
             assert _warnings(values) == warned
-        seen.update(re.findall(r"\(rule (\d)\)", " ".join([*refused[:1], *warned])))
+        seen.update(re.findall(r"\(rule (\d)\)", " ".join([*errors[:1], *warned])))
     assert seen == set("12345678"), "every rule was tried on both sides"
 
 
@@ -120,9 +121,9 @@ def _warnings(values):
 
 
 def test_a_field_that_does_not_fit_is_refused_alike():
-    with pytest.raises(taxel.DeviceError, match="lines is 65: "):
+    with refused(taxel.DeviceError):
         Registers(lines=65)
-    with pytest.raises(taxel.DeviceError, match=r"lines is 257: must be from 1 to 256 \(rule 4\)"):
+    with refused(taxel.DeviceError):
         Registers(lines=257)
-    with pytest.raises(taxel.DeviceError, match=r"wire_version is 3: must be from 1 to 2 \(rule 4\)"):
+    with refused(taxel.DeviceError):
         Registers(wire_version=3)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel import _core, wire
@@ -115,7 +116,7 @@ def test_a_whole_stream_says_what_the_slow_reader_hears(seed, valued_from, state
     again = decode(stream, 2, array=array, columns=room)
     assert again == events
     assert np.shares_memory(again.t, room.t) == (len(again) > 0)
-    with pytest.raises(taxel.ProblemError, match=f"bytes may need {len(room)}"):
+    with refused():
         decode(stream, 2, array=array, columns=Columns(len(room) - 1))
 
 
@@ -270,20 +271,20 @@ def test_the_boards_totals_close_the_sums():
 
 
 def test_nonsense_is_one_line():
-    with pytest.raises(taxel.ProblemError, match="data is"):
+    with refused(argument="data"):
         Decoder().push("text")
-    with pytest.raises(taxel.ProblemError, match="array"):
+    with refused(argument="array"):
         Decoder(array=3)
-    with pytest.raises(taxel.ProblemError, match="arrived"):
+    with refused(argument="arrived"):
         Decoder().push(b"", arrived=1.5)
-    with pytest.raises(taxel.ProblemError, match="data is"):
+    with refused(argument="data"):
         StreamReader().push(3)
-    with pytest.raises(taxel.ProblemError, match="version is 3"):
+    with refused(argument="version"):
         wire.Decoder(3)
     for wrong in ({"pairing": "taxel"}, {"differences": True}):
-        with pytest.raises(taxel.ProblemError, match="for version 1"):
+        with refused():
             Decoder(**wrong)
-    with pytest.raises(taxel.ProblemError, match="lengths"):
+    with refused(argument="lengths"):
         decode(b"", 2, lengths=[0])
 
 

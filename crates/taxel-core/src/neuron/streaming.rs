@@ -28,7 +28,7 @@ impl NeuronStream {
     pub(super) fn new(neuron: &Neuron, weights: &[f64], threshold: f64, start: f64) -> Result<Self> {
         neuron.check()?;
         one_weight_a_train(weights, weights.len())?;
-        above_0("threshold factor", threshold, "")?;
+        above_0("threshold", threshold, "")?;
         if !start.is_finite() {
             return Err(problem!("start"; " is {start} ms: must be finite"));
         }

@@ -1,8 +1,9 @@
 """The format of CONTRIBUTING: one force channel."""
 
-import pytest
+from refusal import refused
 
 from taxel import FormatError
+from taxel._base.errors import Place
 from taxel.formats import channel
 
 from .making import write_channel
@@ -13,5 +14,5 @@ def test_a_line_that_is_no_number_is_named(tmp_path):
     (trial,) = channel.trials(file)
     assert trial.frames.values[3, 0, 0] == 3.0
     file.write_text(file.read_text().replace("8000 4", "8000 four"))
-    with pytest.raises(FormatError, match="line 6: column 'force_n'"):
+    with refused(FormatError, place=Place("walk.channel", line=6)):
         list(channel.trials(file))
