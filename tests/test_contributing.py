@@ -85,7 +85,7 @@ def copy(tmp_path: Path) -> Path:
     for package in ("python/taxel", "rules/taxel_rules"):
         for compiled in (ROOT / package).glob("*.so"):
             (tmp_path / package / compiled.name).symlink_to(compiled)
-    for room in ("formats", "learn", "recording", "sound"):
+    for room in ("formats", "learn", "recording"):
         shutil.copytree(ROOT / "tests" / room, tmp_path / "tests" / room, ignore=unneeded)
     for shared in (ROOT / "tests").glob("*.py"):
         shutil.copy(shared, tmp_path / "tests")
@@ -106,7 +106,7 @@ def tried(root: Path, name: str) -> subprocess.CompletedProcess[str]:
     about = {STUDY: "quiet or registry or without_weight", RULE: "echo or Echo or nothing_is_left_out"}
     about[FORMAT] = "test_channel or registry or among_the_large"
     about[ENCODER] = "binary or nothing_is_left_out"
-    about[OPTION] = "live or option"
+    about[OPTION] = "live or option or signature"
     chosen = ["-k", about[name]] if name in about else []
     environment = os.environ | {"PYTHONPATH": ":".join(str(root / name) for name in ("python", "rules", "studies"))}
     return subprocess.run([*command, *chosen], cwd=root, env=environment, capture_output=True, text=True, check=False)

@@ -62,8 +62,8 @@ VALUES |= {
 
 def made(rule: Any) -> Any:
     """Return a rule that has learnt."""
-    required = {name: GIVEN[name] for name in rule._described()["required"]}
-    return rule(**{**required, "epochs": 3}).fit([PLAIN], [[5.0]])
+    given = {name: GIVEN[name] for name in rule._described()["required"]}
+    return rule(**given).fit([PLAIN], [[5.0]])
 
 
 each_rule = pytest.mark.parametrize("name", RULES)
