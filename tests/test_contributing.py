@@ -22,7 +22,7 @@ EXAMPLES = ROOT / "tests" / "contributing"
 FORMAT, STUDY, ENCODER, RULE, PAGE, OPTION = "format", "study", "encoder", "rule", "page", "option"
 #: The tests that check the laws and registries of formats, studies, encoders, learning rules, and parts of the page.
 TESTS = {
-    FORMAT: ["tests/formats/test_registry.py", "tests/formats/test_channel.py", "tests/recording/test_memory.py"],
+    FORMAT: ["tests/formats/test_registry.py", "tests/formats/test_channel.py"],
     STUDY: [
         f"studies/tests/{name}.py"
         for name in ("test_study_registry", "test_quiet", "test_studies", "test_public_names")
@@ -104,7 +104,7 @@ def tried(root: Path, name: str) -> subprocess.CompletedProcess[str]:
     quietly = ["-q", "-p", "no:cacheprovider", "--continue-on-collection-errors"]
     command = [sys.executable, "-m", "pytest", *quietly, *tests]
     about = {STUDY: "quiet or registry or without_weight", RULE: "echo or Echo or nothing_is_left_out"}
-    about[FORMAT] = "test_channel or registry or among_the_large"
+    about[FORMAT] = "test_channel or registry"
     about[ENCODER] = "binary or nothing_is_left_out"
     about[OPTION] = "live or option or signature"
     chosen = ["-k", about[name]] if name in about else []
@@ -120,7 +120,6 @@ def test_an_example_is_files_and_lines() -> None:
             ("tests/formats/test_channel.py", False),
             ("python/taxel/formats/__init__.py", True),
             ("tests/formats/making.py", True),
-            ("tests/recording/large.py", True),
         ],
         STUDY: [
             ("studies/taxel_studies/quiet.py", False),
@@ -178,7 +177,6 @@ def test_what_contributing_says_is_enough(copy: Path, name: str) -> None:
         (FORMAT, "formats/__init__.py", "FORMATS lacks channel"),
         (FORMAT, "making.py", "write_channel"),
         (FORMAT, "test_channel.py", "add tests/formats/test_channel.py"),
-        (FORMAT, "large.py", "Extra items in the left set"),
         (FORMAT, "formats/channel.py", "No module named 'taxel.formats.channel'"),
         (STUDY, "taxel_studies/__init__.py", "STUDIES lacks quiet"),
         (STUDY, "test_quiet.py", "no test of studies/tests imports or names quiet"),

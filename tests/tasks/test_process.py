@@ -111,13 +111,10 @@ def test_a_task_that_is_stopped_ends_soon_without_a_word_and_without_a_file(tmp_
     place = board(tmp_path)
     before = set(tmp_path.iterdir())
     request = {"recordings": [str(place)], "options": {"folds": 6, "search": False}, "out": str(tmp_path / "r.json")}
-    child = ChildProcess(
-        "taxel.tasks", ["train"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    pipe = subprocess.PIPE
+    child = ChildProcess("taxel.tasks", ["train"], line=json.dumps(request), stdout=pipe, stderr=pipe)
     with child:
-        assert child.stdin is not None and child.stdout is not None and child.stderr is not None  # noqa: PT018
-        child.stdin.write(json.dumps(request))
-        child.stdin.close()
+        assert child.stdout is not None and child.stderr is not None  # noqa: PT018
         until(lambda: "fold" in child.stdout.readline(), 60.0)
         if how == "parent":
             child.end()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import column, numbers
-from taxel._base.limits import unpacked
+from taxel._base.limits import check_memory
 
 
 class FrozenColumns:
@@ -48,11 +48,11 @@ class Growing:
 
         Raises
         ------
-        FormatError : more bytes than a file may hold, or than there is memory for
+        FormatError : more than the memory that is available
         """
         parts = {name: np.asarray(part) for name, part in rows.items()}
         (count,) = {len(part) for part in parts.values()}
-        unpacked(self._location, (self._rows + count) * self._row)
+        check_memory(self._location, (self._rows + count) * self._row)
         begin = 0
         while begin < count:
             if self._rows == self._room:

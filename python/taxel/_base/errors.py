@@ -78,7 +78,7 @@ place : Place or None
 argument : str or None
     The argument that is wrong, or that helps; None if the error concerns no single argument.
 hint : str or None
-    The remedy that the text ends with, as one word such as "give" or "larger"; None if there is none.
+    The remedy that the text ends with, as one word such as "give"; None if there is none.
 
 Examples
 --------

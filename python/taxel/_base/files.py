@@ -1,4 +1,4 @@
-"""Opens regular files; writes files atomically, and overwrites existing files only on request."""
+"""Writes files atomically, and overwrites existing files only on request."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import BinaryIO
 
 from taxel._base.arguments import checked_path, flag
-from taxel._core import open_regular
 
 #: What file systems answer that have no hard links.
 _NO_LINK = (errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS)
@@ -32,22 +31,6 @@ def beside(path: Path, name: str) -> Path:
 def named(path: Path) -> Path:
     """Return a path whose last part is a name: "." and ".." as the folder that they stand for."""
     return path if path.name not in ("", "..") else path.resolve()
-
-
-def open_file(path: str | os.PathLike[str]) -> BinaryIO:
-    """Open a regular file, or a link to one, to read bytes.
-
-    Every file that taxel reads is opened here or in the compiled part: a named pipe would wait for its writer, and a
-    device may have no end.
-
-    Raises
-    ------
-    FormatError : a named pipe, a socket or a device
-    OSError : the file is not there, or cannot be read
-    """
-    # Where no file waits for a writer, a file that is open keeps its name.
-    opener = None if sys.platform == "win32" else lambda name, _: open_regular(name)
-    return open(path, "rb", opener=opener)
 
 
 def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object], *, overwrite: bool = False) -> Path:

@@ -13,10 +13,6 @@ from pathlib import Path
 from taxel._base.arguments import shown
 from taxel._base.documents import read_text
 from taxel._base.errors import unreadable
-from taxel._base.limits import TEXT, unpacked
-
-#: Bytes in memory, at most about: of a line with the row that is made of it, and of a cell beside the first.
-_LINE, _CELL = 440, 130
 
 
 @dataclass(frozen=True)
@@ -189,13 +185,7 @@ def text_of(path: Path, *, otherwise: str = "") -> list[str]:
     FormatError : not a text
     OSError : the file is not there, or cannot be read
     """
-    text = read_text(path, TEXT, otherwise)
-    # As in JSON, a character is in the text, in its line and in its cell.
-    characters = len(text) * (6 if text.isascii() else 12)
-    lines = max(text.count("\n"), text.count("\r"))
-    cells = max(map(text.count, ",;\t"))
-    unpacked(str(path), characters + _LINE * lines + _CELL * cells)
-    return lines_of(text)
+    return lines_of(read_text(path, otherwise))
 
 
 def lines_of(text: str) -> list[str]:

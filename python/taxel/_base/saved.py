@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import ClassVar, Self, TypeVar
 
 from taxel._base.arguments import checked_path
-from taxel._base.documents import text_of_json
+from taxel._base.documents import of_json, read_text
 from taxel._base.errors import placed, unreadable
 from taxel._base.files import write_whole
 from taxel._core import Error, FormatError
@@ -77,7 +77,8 @@ def read(path: str | os.PathLike[str], noun: str, of_text: Callable[[str], _S]) 
     """Return what the text of a file stands for; errors name the file."""
     file = Path(checked_path("path", path))
     try:
-        text = text_of_json(file)
+        text = read_text(file)
+        of_json(str(file), text)
     except FormatError as error:
         error.args = (f"{error.args[0]}; must be a {noun} as taxel writes it",)
         raise

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._base.arguments import checked_path, flag, instance, mapping, number, numbers, several, shown
 from taxel._base.arguments import text as checked_text
 from taxel._base.columns import frozen
-from taxel._base.documents import object_of_json
+from taxel._base.documents import of_json
 from taxel._base.errors import refused
 from taxel._base.files import beside, named
 from taxel._base.messages import counted, escaped, first_line
@@ -425,7 +425,7 @@ class Calibration(Saved):
             raise refused("calibration", f" is {shown(text)}: must be JSON text")
         entry = "the whole"
         try:
-            document = object_of_json(None, text)
+            document = mapping("calibration", of_json(None, text))
             if document.get("taxel") != "calibration":
                 raise ProblemError('must be an object with "taxel": "calibration"')
             entry = "array"

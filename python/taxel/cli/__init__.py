@@ -17,7 +17,6 @@ from typing import Any, NoReturn
 import typer
 
 from taxel._base.arguments import finite, integer, shown
-from taxel._base.child_process import make_safe
 from taxel._base.number_text import float_of
 from taxel._base.stopping import leave, stop_on_signals
 from taxel._core import DeviceError, Error, ProblemError
@@ -54,7 +53,8 @@ def _root(version: bool = typer.Option(False, "--version", help="Print the versi
 
 def program() -> NoReturn:
     """Run the command line as the only work of this process: its environment and its signals are the command's."""
-    make_safe(os.environ)
+    # Workers that libraries start import nothing from the current folder either.
+    os.environ["PYTHONSAFEPATH"] = "1"
     # Commands draw into files alone: matplotlib needs no windows, for which a Python may lack a library.
     os.environ.setdefault("MPLBACKEND", "Agg")
     for stream in (sys.stdout, sys.stderr):

@@ -93,14 +93,6 @@ class FileOptions:
         float | None,
         typer.Option(metavar="HZ", help="Frames per second, for recordings whose frames have no times."),
     ] = None
-    limit: Annotated[
-        int | None,
-        typer.Option(
-            metavar="BYTES",
-            help="How much of a recording may be read into memory. Default: 3/4 of the available memory, and at most "
-            "the sizes in docs/files.md.",
-        ),
-    ] = None
 
     @property
     def opener(self) -> TextOptions:

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from taxel._base.arguments import short
-from taxel._base.documents import NotTomlError, of_toml
+from taxel._base.documents import of_toml
 from taxel._base.files import check_writable
 from taxel._base.messages import collected, escaped
 from taxel._base.progress import Forecast, Steps
-from taxel._core import ProblemError
+from taxel._core import FormatError, ProblemError
 from taxel.cli._say import say
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def assignments(settings: list[str]) -> dict[str, Any]:
             raise ProblemError(f"--set {short(setting)}: must be KEY=VALUE")
         try:
             values[key.strip()] = of_toml(f"--set {short(key.strip())}", f"value = {value}")["value"]
-        except NotTomlError:
+        except FormatError:
             values[key.strip()] = value.strip()
     return values
 

@@ -64,10 +64,6 @@ class _EmulateArguments:
     speed: Annotated[
         float | None, typer.Option(help="With --replay: playback speed; 2 takes half the time. Default: 1.")
     ] = None
-    limit: Annotated[
-        int | None,
-        typer.Option(metavar="BYTES", help="With --replay: how much of the recording may be read into memory."),
-    ] = None
     pipe: Annotated[
         bool, typer.Option("--pipe", help="Send events of another sensor, whose frames come on standard input.")
     ] = False
@@ -167,7 +163,6 @@ def _check_options(typed: _EmulateArguments) -> None:
         raise ProblemError("--scenes, --truth and --rest are for scenes: leave them out with --replay or --pipe")
     for name, value, needed, there in (
         ("--speed", typed.speed, "--replay", typed.replay is not None),
-        ("--limit", typed.limit, "--replay", typed.replay is not None),
         ("--noise-floor", typed.noise_floor, "--pipe", typed.pipe),
         ("--baud", typed.baud, "--line", typed.line is not None),
     ):
@@ -211,7 +206,7 @@ def _touch_of(typed: _EmulateArguments) -> tuple[Any, str, dict[str, Any]]:
     options |= {name: getattr(typed, name) for name in ("asynchronous", "line", "sync", "overwrite", "source_port")}
     if typed.replay is not None:
         speed = 1.0 if typed.speed is None else typed.speed
-        return Replay(open_one(typed.replay, limit=typed.limit), speed), f"replay of {typed.replay}", options
+        return Replay(open_one(typed.replay), speed), f"replay of {typed.replay}", options
     if typed.pipe:
         return *_open_pipe(3 if typed.noise_floor is None else typed.noise_floor), options
     if scene_file is not None:

@@ -76,7 +76,7 @@ def play_live(
     # The tare ends where the board marks its start, well before a second is over.
     with Live(0, host="127.0.0.1", readout=readout, tare=1.0, record=recording) as live:
         words = ["emulate", "--json", "--port", live.address[1], "--scenes", scenes, "--seed", seed]
-        board = ChildProcess("taxel", words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        board = ChildProcess("taxel", words, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         try:
             ended = None
             drawn = 0.0

@@ -11,17 +11,17 @@ where an input spike adds ``w_in / tau_syn`` to the current times the spike's ar
 
 from __future__ import annotations
 
+import io
 import os
-import pickle
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import finite
-from taxel._base.h5_writing import write_h5
+from taxel._base.files import write_whole
 from taxel._core import ProblemError
 from taxel.detect.trained import TrainedNeuron
 from taxel.encode import Encoder
@@ -56,16 +56,14 @@ class Parts:
 
 def write_nir(readout: Parts, path: str | os.PathLike[str], *, spike_ms: float | None, overwrite: bool) -> list[str]:
     """Write the graph of a readout to a file; return what NIR cannot hold."""
-    graph = _graph(readout, None if spike_ms is None else finite("spike_ms", spike_ms, least=1e-6, most=1000.0))
-    write_h5(path, _write, lambda pipe: pickle.dump(graph, pipe), overwrite=overwrite)
-    return lost(readout)
-
-
-def _write(file: BinaryIO, source: BinaryIO) -> None:
-    """Write the graph that `write_nir` sends."""
     import nir  # noqa: PLC0415  an extra
 
-    nir.write(file, pickle.load(source))
+    spike_ms = None if spike_ms is None else finite("spike_ms", spike_ms, least=1e-6, most=1000.0)
+    graph, buffer = _graph(readout, spike_ms), io.BytesIO()
+    # In memory: the library crashes some time after a write to a full disk.
+    nir.write(buffer, graph)
+    write_whole(path, lambda file: file.write(buffer.getbuffer()), overwrite=overwrite)
+    return lost(readout)
 
 
 def _check_ungraded(encoder: Encoder) -> None:

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from taxel._base import arguments
 from taxel._base.columns import Growing
 from taxel._base.errors import refused
-from taxel._base.files import open_file
-from taxel._base.limits import unpacked
+from taxel._base.limits import check_memory
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
@@ -183,7 +182,7 @@ def _header(path: Path) -> tuple[float, int, list[tuple[str, int, int]]]:
 
 def _samples(path: Path, samples: int, first: int, checksum: int) -> NDArray[np.int16]:
     try:
-        file = open_file(path)
+        file = path.open("rb")
     except FileNotFoundError:
         raise FormatError(f"{path.name}: the header names this file, but it is missing") from None
     with file:
@@ -193,7 +192,7 @@ def _samples(path: Path, samples: int, first: int, checksum: int) -> NDArray[np.
                 f"{path.name}: {size} bytes; must be {3 * ((samples + 1) // 2)} for {samples} samples of format 212"
             )
         # A frame of one channel has 12 bytes.
-        unpacked(path.name, 12 * samples)
+        check_memory(path.name, 12 * samples)
         read = Growing(path.name, values=((), np.int16))
         while data := file.read(3 * _AT_ONCE):
             read.add(values=format_212(data, path.name))

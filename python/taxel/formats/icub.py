@@ -14,7 +14,6 @@ import numpy as np
 
 from taxel._base.columns import Growing
 from taxel._base.header_table import HeaderTable
-from taxel._base.limits import unpacked
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
@@ -27,8 +26,6 @@ __all__ = ["FINGERS", "files", "trials"]
 #: Rows of the array, twelve taxels each.
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 _TAXELS = tuple(f"{finger}_{k}" for finger in FINGERS for k in range(1, 13))
-#: Bytes in memory of a grasp beside its values, at most.
-_GRASP = 1 << 14
 _JOINTS = tuple(f"joint{k}" for k in range(7, 16))
 
 
@@ -71,7 +68,6 @@ def trials(path: str | Path) -> Iterator[Trial]:
         for line, row in HeaderTable.stream(file.name, text.stream(file), ["trial", "slice", *_JOINTS, *_TAXELS]):
             if row["trial"] not in grasps:
                 grasps[row["trial"]] = Growing(file.name, **shapes)
-                unpacked(file.name, _GRASP * len(grasps))
             grasp = grasps[row["trial"]]
             if text.number(row["slice"], file, line, "slice") != len(grasp):
                 raise FormatError(f"{file.name}, line {line}: slice is {row['slice']}; must be {len(grasp)}")

@@ -10,20 +10,24 @@ import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base import arguments
+from taxel._base.arrays import datasets, hdf5, read_dataset
 from taxel._base.columns import frozen
 from taxel._base.errors import refused
-from taxel._base.h5_file import H5File
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.checks import candidates, files_at
 from taxel.formats.trial import Trial
 from taxel.frames import Frames
+
+if TYPE_CHECKING:
+    import h5py
 
 __all__ = ["COLUMN_MM", "FRAME_US", "ROW_MM", "events", "files", "sensor_rows", "trials"]
 
@@ -68,8 +72,8 @@ def trials(path: str | Path) -> Iterator[Trial]:
     known, about = _events_table(folder / "events.csv"), _trials_table(folder / "trials.csv")
     for file in paths:
         person = file.stem
-        with H5File(file) as h5:
-            for name in sorted(h5.entries):
+        with hdf5(file) as h5:
+            for name in sorted(datasets(h5)):
                 match = re.fullmatch(r"img([0-9]{1,18})", name)
                 if match is None:
                     raise FormatError(f"{file.name}: the data set {name!r} must have a name like imgNNN")
@@ -77,11 +81,11 @@ def trials(path: str | Path) -> Iterator[Trial]:
                 yield _trial(person, number, image, file, known.get((person, number)), about.get((person, number)))
 
 
-def _image(h5: H5File, name: str, file: Path) -> NDArray[np.int32]:
-    entry = h5.entries[name]
-    if not entry.is_numbers or np.dtype(entry.dtype).kind not in "ui" or len(entry.shape) != 3 or 0 in entry.shape:
+def _image(h5: h5py.File, name: str, file: Path) -> NDArray[np.int32]:
+    values = read_dataset(h5, name)
+    if values.dtype.kind not in "ui" or values.ndim != 3 or 0 in values.shape:
         raise FormatError(f"{file.name}, {name}: must contain whole numbers, rows x columns x frames")
-    image: NDArray[np.int32] = h5.numbers(name, np.int32)
+    image: NDArray[np.int32] = arguments.numbers(f"{file.name}: {name}", values, np.int32)
     if image.min() < 0 or not image.any():
         raise FormatError(f"{file.name}, {name}: {'counts are below 0' if image.min() < 0 else 'no count is above 0'}")
     return image

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from taxel._base import arguments
-from taxel._base.archive import read_arrays, stored_names
+from taxel._base.arrays import read_arrays, stored_names
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats.checks import candidates, files_at

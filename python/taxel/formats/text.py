@@ -13,14 +13,12 @@ from typing import BinaryIO, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base import limits
 from taxel._base.arguments import short, shown
 from taxel._base.columns import Growing
 from taxel._base.encodings import as_utf_8
-from taxel._base.errors import damaged, helped, unreadable
-from taxel._base.files import open_file
+from taxel._base.errors import damaged, unreadable
 from taxel._base.header_table import HeaderTable
-from taxel._base.limits import LINE, TEXT, VALUE, unpacked
+from taxel._base.limits import LINE, VALUE
 from taxel._base.number_text import float_of, refuse_digits
 from taxel._core import FormatError
 
@@ -38,16 +36,10 @@ __all__ = [
     "table",
 ]
 
-#: Number of cells of a table, and of lines of a text, that are in memory as texts at once; of cells at most 4 MiB.
-_CELLS, _LINES = 1 << 17, 4096
+#: Number of cells of a table that are in memory as texts at once, at most 4 MiB.
+_CELLS = 1 << 17
 #: Bytes of a text that are read at once.
 _PIECE = 1 << 20
-#: Lines of a text with nothing in them, which take time and say nothing.
-_EMPTY = 10_000_000
-#: Bytes in memory of a line of text, beside its characters.
-_PER_LINE = 64
-#: The most bytes that a byte of a gzip file unpacks to.
-_PACKED = 1032
 #: Characters of the lines before the data of a file.
 _HEAD = 1 << 20
 #: Bytes of the beginning of a text.
@@ -63,15 +55,9 @@ def lines(path: Path) -> list[str]:
 
     Raises
     ------
-    FormatError : not a text, a damaged gzip file, more than may be read, or no file but a pipe, a socket or a device
+    FormatError : not a text, or a damaged gzip file
     """
-    content, size = [], 0
-    for line in stream(path):
-        content.append(line)
-        size += len(line) + _PER_LINE
-        if len(content) % _LINES == 0:
-            unpacked(path.name, size)
-    return content
+    return list(stream(path))
 
 
 def stream(path: Path) -> Iterator[str]:
@@ -81,7 +67,7 @@ def stream(path: Path) -> Iterator[str]:
     ------
     FormatError : as of `lines`, or a line of more than 4 MiB
     """
-    rest, number, begin, empty = b"", 1, 0, 0
+    rest, number, begin = b"", 1, 0
     for piece in _pieces(path):
         if not begin and not rest and piece.startswith(_UTF_8):
             piece, begin = piece[len(_UTF_8) :], len(_UTF_8)  # noqa: PLW2901
@@ -91,32 +77,15 @@ def stream(path: Path) -> Iterator[str]:
         if len(data) - end > LINE:
             raise unreadable(f"the line has more than {LINE} bytes; must have at most {LINE}", path.name, line=number)
         found = _lines(path, data[:end], begin)
-        empty += found.count("") + sum(map(str.isspace, found))
-        if empty > _EMPTY:
-            raise unreadable(f"{empty} empty lines so far; must have at most {_EMPTY}", path.name, line=number)
         yield from found
         rest, number, begin = data[end:], number + len(found), begin + end
     yield from _lines(path, rest, begin)
 
 
 def _pieces(path: Path) -> Iterator[bytes]:
-    """Yield the bytes of a text file, unpacked, as far as they are not too many."""
-    most = max(TEXT, limits.given() or 0)
-    # A file that may unpack to too much is unpacked before any of it is read as numbers, which takes far longer.
-    if path.suffix == ".gz" and path.stat().st_size * _PACKED > most:
-        for _ in _up_to(path, most):
-            pass
-    yield from _up_to(path, most)
-
-
-def _up_to(path: Path, most: int) -> Iterator[bytes]:
-    total = 0
+    """Yield the bytes of a text file, unpacked."""
     with _open(path) as file:
         while piece := file.read(_PIECE):
-            total += len(piece)
-            if total > most:
-                error = unreadable(f"the text has {total} bytes or more; must have at most {most}", path.name)
-                raise helped(error, "limit", "larger")
             yield piece
 
 
@@ -163,7 +132,7 @@ def beginning(path: Path, most: int = _BEGINNING) -> list[str]:
 def first_bytes(path: Path, count: int) -> bytes:
     """Read the beginning of a file; nothing of anything else, as a folder may hold pipes, sockets and folders too."""
     try:
-        with open_file(path) as file:
+        with open(path, "rb") as file:
             return file.read(count)
     except (FormatError, IsADirectoryError):
         return b""
@@ -177,7 +146,7 @@ def _bytes(path: Path, most: int) -> bytes:
 @contextmanager
 def _open(path: Path) -> Iterator[BinaryIO]:
     """Open a text file, to be read unpacked and in UTF-8, or else in Latin-1."""
-    with open_file(path) as raw:
+    with open(path, "rb") as raw:
         try:
             yield as_utf_8(path.name, cast(BinaryIO, gzip.GzipFile(fileobj=raw)) if path.suffix == ".gz" else raw)
         except (gzip.BadGzipFile, EOFError, zlib.error) as error:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.files import open_file
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.frames import Frames
@@ -240,7 +239,7 @@ class ShownFiles:
         size = path.stat().st_size
         if path.suffix.lower() not in _TEXTS or size <= _LARGE:
             return None
-        with open_file(path) as file:
+        with open(path, "rb") as file:
             head = file.read(_BEGINNING)
         part = self._temporary() / path.name
         part.write_bytes(head[: head.rfind(b"\n") + 1])

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.files import open_file
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.recording import sections
@@ -102,7 +101,7 @@ def _verdict(source: RecordedSource, sources: Mapping[str, RecordedSource]) -> V
 
 def _ends(path: Path) -> bytes:
     """Return a file's size and its first and last bytes, which hold times and checksums: a copy has the same."""
-    with open_file(path) as file:
+    with open(path, "rb") as file:
         size = file.seek(0, os.SEEK_END)
         file.seek(max(size - _END, 0))
         last = file.read(_END)

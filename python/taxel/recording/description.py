@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from taxel._base import limits
 from taxel._base.arguments import finite, flag, integer, number, text
-from taxel._base.documents import memory_of_json, of_json
+from taxel._base.documents import of_json
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -31,12 +31,7 @@ from taxel.wire import Registers
 
 
 def json_of(source: RecordedSource) -> str:
-    """Return all fields that are not columns of the table, as the JSON in files.
-
-    Raises
-    ------
-    ProblemError : a description that would not be read again, as it takes too much memory
-    """
+    """Return all fields that are not columns of the table, as the JSON in files."""
     sensor, losses = source.sensor, source.losses
     registers, changes = source.settings.registers(), source.settings.register_changes()
     driven = registers.array if registers is not None else changes[0][1].array if changes else sensor.array
@@ -68,13 +63,7 @@ def json_of(source: RecordedSource) -> str:
         "rebuilt": dict(losses.rebuilt()),
         "lost": losses.lost(),
     }
-    described = json.dumps({name: value for name, value in document.items() if value or isinstance(value, float)})
-    if (size := memory_of_json(described)) > limits.ABOUT:
-        raise ProblemError(
-            f"{source.origin.name}: the description (sensor, notes, registers, detections) takes {size} bytes of "
-            f"memory; must take at most {limits.ABOUT} in a .npz or .h5"
-        )
-    return described
+    return json.dumps({name: value for name, value in document.items() if value or isinstance(value, float)})
 
 
 def about_of(location: str, document: str) -> dict[str, Any]:
@@ -87,7 +76,7 @@ def about_of(location: str, document: str) -> dict[str, Any]:
     entry = "the whole"
     fields: dict[str, Any] = {}
     try:
-        about = of_json(location, document, limits.ABOUT, room=limits.ABOUT)
+        about = of_json(location, document)
         if not isinstance(about, dict):
             raise ProblemError("not an object")
         for entry, read in _ENTRIES.items():
@@ -204,7 +193,7 @@ def counts_of(counts: Any, depth: int = 0) -> dict[str, Any]:
         raise ProblemError("not an object")
     return {
         name: n if n is None else counts_of(n, 1) if isinstance(n, dict) and depth == 0 else integer(name, n, 0)
-        for name, n in ((_OLD_KEYS.get(name, str(name)), n) for name, n in counts.items())
+        for name, n in counts.items()
     }
 
 
@@ -223,9 +212,6 @@ def _texts(texts: Any) -> tuple[str, ...]:
         raise ProblemError("not a list")
     return tuple(text("entry", entry) for entry in texts)
 
-
-#: Keys of files that earlier commits wrote, and what they are called now.
-_OLD_KEYS = {"pictures": "frames", "pictures_that_could_not_be_read": "frames_that_could_not_be_read"}
 
 #: The reader of each entry by name; registers are checked later, as the array that they drive is another entry.
 _ENTRIES: dict[str, Any] = {

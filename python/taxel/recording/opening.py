@@ -3,32 +3,27 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
 from typing import NoReturn
 
-import numpy as np
-
 from taxel import formats
-from taxel._base import arguments, limits
-from taxel._base.arguments import flag, instance, integer, shown, text
-from taxel._base.errors import helped, refused
-from taxel._base.limits import opening
+from taxel._base import arguments
+from taxel._base.arguments import flag, instance, shown, text
+from taxel._base.errors import refused
+from taxel._base.limits import available
 from taxel._base.messages import warn
 from taxel._base.options import with_fields_of
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
-from taxel.events import Events
 from taxel.formats import Trial
 from taxel.formats.event_camera import Reduction, reduced
 from taxel.formats.layout import Layout
-from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, trial_of
 from taxel.recording import recognition, sections
-from taxel.recording.contents import BoardSource, Contents, FrameSource, RecordedSource, Stream, several, source_from
+from taxel.recording.contents import BoardSource, Contents, RecordedSource, Stream, several, source_from
 from taxel.recording.kinds import ENDINGS, LABELS
 from taxel.recording.layout import apply_layout, check_size, on_array
 from taxel.recording.once import known
@@ -60,7 +55,6 @@ class SharedOptions:
     bin: int | None = None
     window_ms: float | None = None
     polarity: str | None = None
-    limit: int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,10 +64,6 @@ class OpenOptions(SharedOptions):
     array: Array | Sequence[Array] | None = None
     pairing: str = "direct"
     differences: bool = False
-
-    def within(self) -> AbstractContextManager[None]:
-        """Return a context in which no more is read than may be."""
-        return opening(None if self.limit is None else integer("limit", self.limit, 1, unit="bytes"))
 
     @property
     def topics(self) -> Topics:
@@ -136,9 +126,6 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
         "100:420,60:300", where the last are not included. `bin`: side of the square of pixels that becomes a taxel.
         `window_ms`: read frames of counts, each over a window of this length, at its beginning. `polarity`: only "on"
         or "off" events, or "both".
-    limit : int, bytes, 1 or more, optional
-        Most bytes that may be read into memory; default: three quarters of the available memory, and at most the sizes
-        in docs/files.md.
     pairing : {"direct", "taxel"}
         The change that an intensity belongs to: the change directly before it, or the latest change of that taxel.
     differences : bool
@@ -150,14 +137,14 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
 
     Raises
     ------
-    FormatError : not a recording, damaged so that nothing can be read, or more than may be read (names the place)
+    FormatError : not a recording, damaged so that nothing can be read, or larger than the available memory (names the
+        place)
     ProblemError : a folder, or a file of another format with several trials
     OSError : the file does not exist, or cannot be read
 
     Notes
     -----
-    Besides the arrays, at most half as much memory as they take, and 256 MiB, is used. Parts of a .mcap are read when
-    they are first used.
+    Parts of a .mcap are read when they are first used.
 
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column for each taxel. The layout of
     a .h5 is described in `taxel.recording.writers.h5`. The reference events of a ``labels.csv`` in a folder
@@ -202,8 +189,6 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
         As in `taxel.open`.
     region, bin, window_ms, polarity : str, int, float (ms) and str, optional
         As in `taxel.open`.
-    limit : int, bytes, 1 or more, optional
-        As in `taxel.open`, for all recordings together.
     pairing, differences
         As in `taxel.open`.
 
@@ -242,11 +227,10 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
 
 def _open(path: Path, options: OpenOptions) -> list[Recording]:
     """Open all recordings of a folder, or all trials of a file."""
-    with options.within():
-        if recognition.is_folder(path):
-            return list(map(_labelled, _open_folder(path, options)))
-        layout = recognition.layout_of(path, options.layout)
-        return [_labelled(_named_beside(path, recording)) for recording in _open_file(path, options, layout)]
+    if recognition.is_folder(path):
+        return list(map(_labelled, _open_folder(path, options)))
+    layout = recognition.layout_of(path, options.layout)
+    return [_labelled(_named_beside(path, recording)) for recording in _open_file(path, options, layout)]
 
 
 def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[Recording]:
@@ -258,8 +242,7 @@ def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[
         match found:
             case recognition.FormatFile(name):
                 how = options.how(path, name, layout)
-                trials = _counting_memory(formats.trials(path, name, **how))
-                return [_recording_of(trial, path, name, options.layout) for trial in trials]
+                return [_recording_of(trial, path, name, options.layout) for trial in formats.trials(path, name, **how)]
             case recognition.RosBag():
                 topics = options.topics.but({} if layout is None else layout.ros)
                 grid = layout.grid() if options.array is None and layout is not None else options.array
@@ -283,11 +266,7 @@ def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[
             contents = apply_layout(contents, layout, given=options.layout is not None)
         return [Recording(with_sidecars(_of_camera(contents, path, options.reduction, layout)))]
     except MemoryError:
-        raise helped(
-            FormatError(f"{path}: needs more memory than is available ({limits.available()} bytes)"),
-            "limit",
-            "larger",
-        ) from None
+        raise FormatError(f"{path}: needs more memory than is available ({available()} bytes)") from None
 
 
 def _of_camera(contents: Contents, path: Path, given: Reduction, layout: Layout | None) -> Contents:
@@ -349,8 +328,7 @@ def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
         how = options.how(folder, name, recognition.layout_of(folder, options.layout))
 
         def read(place: Path) -> list[Recording]:
-            trials = _counting_memory(formats.trials(place, name, **how))
-            return [_recording_of(trial, folder, name, options.layout) for trial in trials]
+            return [_recording_of(trial, folder, name, options.layout) for trial in formats.trials(place, name, **how)]
 
         try:
             of_files, left_out = _each([folder], read)
@@ -369,7 +347,7 @@ def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
         _warn_of_undescribed(folder, found, files)
     # A layout file that cannot be read is no damage of one recording.
     layouts = {file: recognition.layout_of(file, options.layout) for file in found}
-    opened, left_out = _each(found, lambda file: list(map(_count_memory, _open_file(file, options, layouts[file]))))
+    opened, left_out = _each(found, lambda file: _open_file(file, options, layouts[file]))
     pairs = [(file.relative_to(folder), recording) for file, recording in opened]
     return _add_labels(folder / LABELS, pairs, left_out)
 
@@ -381,7 +359,7 @@ def _each(
 
     Raises
     ------
-    FormatError : as of the first file, if none can be read; more than may be read
+    FormatError : as of the first file, if none can be read
     OSError : as of the first file, if none can be read
     """
     opened: list[tuple[Path, Recording]] = []
@@ -392,7 +370,7 @@ def _each(
         except OSError as error:
             errors[file] = error
         except FormatError as error:
-            # One that names an argument, as the limit, is no damage of a file.
+            # One that names an argument is no damage of a file.
             if error.argument is not None:
                 raise
             errors[file] = error
@@ -425,30 +403,6 @@ def _refuse_folder(folder: Path, files: Sequence[Path], names: Sequence[str]) ->
         "with a layout file, arrays and tables, for example .npy and .txt (docs/files.md)"
     )
     raise FormatError(f"{folder}: contains {problem}; {hint or known_kinds}")
-
-
-def _counting_memory(trials: Iterable[Trial]) -> Iterator[Trial]:
-    """Count the arrays of trials, which stay in memory while others are read."""
-    for trial in trials:
-        limits.keep(_size(trial.recorded))
-        yield trial
-
-
-def _count_memory(recording: Recording) -> Recording:
-    """Count the arrays of a recording as far as they are read already."""
-    for source in recording._contents.sources.values():
-        for table in (
-            source.event_table.events if isinstance(source, BoardSource) else None,
-            source.frame_table.frames if isinstance(source, FrameSource) else None,
-        ):
-            limits.keep(0 if table is None or not table.is_read else _size(table()))
-    return recording
-
-
-def _size(table: object) -> int:
-    """Return the bytes of the columns of events or frames; 0 of those that are not read yet."""
-    columns = vars(table).values() if isinstance(table, Events | Frames) else ()
-    return sum(column.nbytes for column in columns if isinstance(column, np.ndarray))
 
 
 def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path], options: OpenOptions) -> None:

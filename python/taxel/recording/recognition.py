@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TypeAlias
 
 from taxel import _core, formats
-from taxel._base import limits
-from taxel._base.archive import fields_of, stored_names
 from taxel._base.arguments import checked_path
+from taxel._base.arrays import fields_of, stored_names
 from taxel._base.encodings import as_utf_8
-from taxel._base.files import beside, named, open_file
+from taxel._base.files import beside, named
+from taxel._base.limits import available
 from taxel._core import FormatError
 from taxel.event_table import are_of_events, is_of_track
 from taxel.formats.event_camera import ENDINGS as CAMERA
@@ -192,7 +192,7 @@ def check_recording(path: Path, layout: GivenLayout = None) -> None:
     """
     match recognise_recording(path, layout_of(path, layout)):
         case TaxelFile("mcap"):
-            _core.RecordingReader(path, limits.memory(None), False)
+            _core.RecordingReader(path, available(), True)
         case TaxelFile("csv"):
             check_head(path)
 
@@ -338,7 +338,7 @@ def _is_table_of_taxel(path: Path) -> bool:
 
 def _first_lines(path: Path) -> tuple[bytes, bytes]:
     """Return the first line of a table, and the second, as far as they are within 64 kB."""
-    with open_file(path) as file:
+    with open(path, "rb") as file:
         try:
             text = as_utf_8(path.name, file)
             return text.readline(1 << 16), text.readline(1 << 16)
@@ -370,7 +370,7 @@ def _is_of_another_program(path: Path, layout: GivenLayout) -> bool:
 
 def _by_first_bytes(path: Path) -> TaxelFile | Refusal:
     """Return the kind of a file by its first bytes and its ending, which must not contradict each other."""
-    with open_file(path) as file:
+    with open(path, "rb") as file:
         head = file.read(16)
     ending = ENDINGS.get(path.suffix.lower())
     by_magic = next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), None)

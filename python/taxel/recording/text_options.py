@@ -32,7 +32,7 @@ class TextOptions(SharedOptions):
     ----------
     array : sequence of str, optional
         Rows, columns and pitch (mm) of the sensor, as "24x20x5"; of a ROS bag one for each topic, or one for all.
-    layout, topic, field, types, ros, region, bin, window_ms, polarity, limit
+    layout, topic, field, types, ros, region, bin, window_ms, polarity
         As in `taxel.open`.
     rate_hz : float, Hz, optional
         Frames a second, for recordings without times.

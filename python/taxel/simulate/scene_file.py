@@ -16,7 +16,6 @@ from taxel import _core
 from taxel._base.arguments import checked_path, integer, number, text
 from taxel._base.documents import read_text, read_toml
 from taxel._base.errors import placed
-from taxel._base.limits import DESCRIPTION
 from taxel._core import SceneError
 from taxel.array import Array
 from taxel.simulate.acts import Act, Scene, Silence
@@ -204,7 +203,7 @@ def _bodies(described: Any, folder: Path) -> Any:
                 raise SceneError(f"{where} has heights_mm and a file: must have only one of them")
             file = folder / text(f"{where}.file", relief["file"])
             try:
-                rows = read_text(file, DESCRIPTION).replace(",", " ").splitlines()
+                rows = read_text(file).replace(",", " ").splitlines()
                 heights = np.loadtxt(rows, ndmin=2).tolist()
             except FileNotFoundError:
                 raise SceneError(f"{where}.file {file}: no such file") from None

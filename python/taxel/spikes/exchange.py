@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import os
-import pickle
 from datetime import datetime
 from pathlib import Path
-from typing import Any, BinaryIO, Literal
+from typing import TYPE_CHECKING, Any, Literal
 from uuid import uuid4
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import checked_path, number, shown, text
+from taxel._base.arrays import datasets, hdf5, read_dataset, write_hdf5
 from taxel._base.errors import refused, unreadable
-from taxel._base.h5_file import H5File
-from taxel._base.h5_writing import write_h5
 from taxel._core import FormatError
+
+if TYPE_CHECKING:
+    import h5py
 
 Kind = Literal["unsigned", "signed", "graded"]
 
@@ -48,18 +49,26 @@ def write_nwb(
         raise refused(
             "description", f" is {shown(description)}: must not contain a zero byte, because NWB does not allow it"
         )
-    sent = (description, str(uuid4()), begun, times, values, kind, np.array([window_ms]) / 1000.0)
-    write_h5(path, _write, lambda pipe: pickle.dump(sent, pipe), overwrite=overwrite)
+    trains = (times, values, kind, np.array([window_ms]) / 1000.0)
+    # pynwb closes the file where this ends.
+    kept: list[object] = []
+    write_hdf5(path, lambda file: kept.append(_write(file, description, begun, *trains)), overwrite=overwrite)
     return Path(path)
 
 
-def _write(file: BinaryIO, source: BinaryIO) -> None:
-    """Write the units that `write_nwb` sends."""
-    import h5py  # noqa: PLC0415  loads slowly
+def _write(
+    file: h5py.File,
+    description: str,
+    begun: datetime,
+    times: list[NDArray[np.float64]],
+    values: list[NDArray[np.float32]] | None,
+    kind: Kind,
+    window_s: NDArray[np.float64],
+) -> object:
+    """Write an open file, and return what has written it."""
     from pynwb import NWBHDF5IO, NWBFile  # noqa: PLC0415  heavy, and an extra
 
-    description, identifier, begun, times, values, kind, window_s = pickle.load(source)
-    session = NWBFile(description, identifier, begun)
+    session = NWBFile(description, str(uuid4()), begun)
     if values is not None:
         meaning = "factor of the weight" if kind == "graded" else "polarity or bits"
         # A list without values has no type to write.
@@ -73,8 +82,9 @@ def _write(file: BinaryIO, source: BinaryIO) -> None:
         if values is not None:
             valued["value"] = values[n]
         session.add_unit(id=n, spike_times=train / 1000.0, obs_intervals=window_s, **valued)
-    with h5py.File(file, "w") as h5, NWBHDF5IO(file=h5, mode="w") as io:
-        io.write(session)
+    io = NWBHDF5IO(file=file, mode="w")
+    io.write(session)
+    return io
 
 
 def read_nwb(path: str | os.PathLike[str], start: float | None, stop: float | None) -> Read:
@@ -83,22 +93,23 @@ def read_nwb(path: str | os.PathLike[str], start: float | None, stop: float | No
     window_ms = [
         None if edge is None else number(name, edge, "ms") for name, edge in (("start", start), ("stop", stop))
     ]
-    with H5File(file) as h5:
-        if h5.attribute("nwb_version") is None:
+    with hdf5(file) as h5:
+        if "nwb_version" not in h5.attrs:
             raise unreadable("is not an NWB file, because the attribute nwb_version is missing", file)
-        if "units/spike_times" not in h5.entries:
+        there = datasets(h5)
+        if "units/spike_times" not in there:
             raise unreadable("the NWB file contains no spike times in a table of units", file)
         seconds, offsets = _lists(h5, "spike_times")
         values: NDArray[Any] | None = None
         kind: Kind = "unsigned"
-        if "units/value" in h5.entries:
+        if "units/value" in there:
             kind = _kind_of(h5)
             values, others = _lists(h5, "value")
             if not np.array_equal(offsets, others):
                 raise FormatError(f"{file}, units/value: must have the lengths of the trains, one value per spike")
         watched = np.empty((0, 2))
-        if "units/obs_intervals" in h5.entries and len(offsets) > 1:
-            watched = 1000.0 * h5.numbers("units/obs_intervals").astype(np.float64)
+        if "units/obs_intervals" in there and len(offsets) > 1:
+            watched = 1000.0 * read_dataset(h5, "units/obs_intervals").astype(np.float64)
             if watched.ndim != 2 or watched.shape[1] != 2:
                 raise FormatError(f"{file}, units/obs_intervals: shape {watched.shape}; must be (intervals, 2)")
     times = 1000.0 * seconds.astype(np.float64, copy=False)
@@ -112,24 +123,25 @@ def read_nwb(path: str | os.PathLike[str], start: float | None, stop: float | No
     return times, offsets, first, last, values, kind
 
 
-def _lists(h5: H5File, name: str) -> tuple[NDArray[Any], NDArray[np.int64]]:
+def _lists(h5: h5py.File, name: str) -> tuple[NDArray[Any], NDArray[np.int64]]:
     """Return a column of the table of units, of which each row is a list: all values, and the offsets of the lists."""
     column, index = f"units/{name}", f"units/{name}_index"
-    if index not in h5.entries:
-        raise FormatError(f"{h5.path}, {column}: must have a list for each unit, but {index} is missing")
-    values, ends = h5.numbers(column), h5.numbers(index)
+    if index not in h5:
+        raise FormatError(f"{h5.filename}, {column}: must have a list for each unit, but {index} is missing")
+    values, ends = read_dataset(h5, column), read_dataset(h5, index)
     if values.ndim != 1 or ends.ndim != 1 or ends.dtype.kind not in "ui":
-        raise FormatError(f"{h5.path}, {column}: {values.dtype} of shape {values.shape}; must be a list for each unit")
+        found = f"{values.dtype} of shape {values.shape}"
+        raise FormatError(f"{h5.filename}, {column}: {found}; must be a list for each unit")
     offsets = np.concatenate([[0], ends.astype(np.int64)])
     if np.any(offsets[1:] < offsets[:-1]) or offsets[-1] > len(values):
-        raise FormatError(f"{h5.path}, {index}: must ascend from 0 to {len(values)}, the number of values")
+        raise FormatError(f"{h5.filename}, {index}: must ascend from 0 to {len(values)}, the number of values")
     return values[: offsets[-1]], offsets
 
 
-def _kind_of(h5: H5File) -> Kind:
+def _kind_of(h5: h5py.File) -> Kind:
     """Return the kind of the values in a table of units: signed, unless all units are graded."""
-    kinds = h5.texts("units/value_kind") if "units/value_kind" in h5.entries else np.array([""])
+    kinds = read_dataset(h5, "units/value_kind", texts=True) if "units/value_kind" in h5 else np.array([""])
     graded = {kind == "graded" for kind in kinds.flat}
     if graded == {True, False}:
-        raise unreadable("the units have different value_kind: all must have the same", h5.path)
+        raise unreadable("the units have different value_kind: all must have the same", h5.filename)
     return "graded" if graded == {True} else "signed"

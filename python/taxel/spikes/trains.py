@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.archive import read_arrays
 from taxel._base.arguments import bare, checked_path, column, floats, instance, nth, number, several, shown, window
+from taxel._base.arrays import read_arrays
 from taxel._base.columns import FrozenColumns, frozen, frozen_column
 from taxel._base.drawing import draw
 from taxel._base.errors import refused, unreadable
 from taxel._base.files import write_whole
-from taxel._base.limits import UNIT
 from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.spikes.exchange import Kind, read_nwb, write_nwb
@@ -560,7 +559,7 @@ class SpikeTrains(FrozenColumns):
         array([1., 5.])
         """
         file = checked_path("path", path)
-        arrays = read_arrays(file, ("times", "offsets", "start", "stop", "values", "kind"), texts={"kind": UNIT})
+        arrays = read_arrays(file, ("times", "offsets", "start", "stop", "values", "kind"))
         try:
             kind = arrays["kind"].item() if "kind" in arrays else None
             start, stop = arrays["start"].item(), arrays["stop"].item()

@@ -36,7 +36,7 @@ def trials(path: str | Path, reduction: Reduction | None = None) -> Iterator[Tri
 
     Raises
     ------
-    FormatError : a file that is damaged, has no header or no event, or is larger than the limit
+    FormatError : a file that is damaged, has no header or no event, or is larger than the memory that is available
     ImportError : faery is not installed (``pip install 'taxel[events]'``)
     ProblemError : a region beyond the sensor
     """

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.columns import frozen, frozen_whole
-from taxel._base.limits import unpacked
+from taxel._base.limits import check_memory
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import sensor
@@ -32,7 +32,7 @@ class CountWindows:
 
     Raises
     ------
-    FormatError : more frames than may be read
+    FormatError : more frames than the memory that is available holds
     """
 
     def __init__(self, name: str, array: Array, first: int, last: int, reduction: Reduction) -> None:
@@ -42,7 +42,7 @@ class CountWindows:
         count = last // self._window_us - self._begin + 1
         size = f"{count} frames of {array.rows} x {array.columns} taxels"
         fewer = "for fewer frames, use --region, a larger --bin or a larger --count-ms (in Python: window_ms)"
-        unpacked(f"{name}, {size} ({fewer})", count * (4 * array.rows * array.columns + 8))
+        check_memory(name, count * (4 * array.rows * array.columns + 8), f"{size} ({fewer}): ")
         self._values = np.zeros((count, *array.shape), np.float32)
 
     def add(self, t: NDArray[np.int64], x: NDArray[np.uint16], y: NDArray[np.uint16]) -> bool:
@@ -65,7 +65,7 @@ def reduced(name: str, events: Events, reduction: Reduction) -> Events | Frames:
 
     Raises
     ------
-    FormatError : more frames than may be read
+    FormatError : more frames than the memory that is available holds
     ProblemError : a region or a taxel beyond the sensor
     """
     sensor_array = events.array

@@ -11,7 +11,6 @@ import struct
 from pathlib import Path
 from typing import BinaryIO
 
-from taxel._base.files import open_file
 from taxel._base.messages import escaped
 from taxel._core import FormatError
 from taxel.formats import text
@@ -48,7 +47,7 @@ def check(path: Path) -> str:
     FormatError : no header, one of another version, or an end within a word
     """
     kind = ENDINGS[path.suffix.lower()]
-    with open_file(path) as file:
+    with open(path, "rb") as file:
         size = file.seek(0, 2)
         file.seek(0)
         if kind == "aedat":

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import bz2
 import errno
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from taxel._base.documents import read_text
 from taxel._base.errors import helped, refused
-from taxel._base.files import open_file
-from taxel._base.limits import CHUNK
 from taxel._base.messages import escaped, first_line, installing
 from taxel._core import Error, FormatError, ProblemError
 
@@ -47,7 +44,7 @@ def is_bag(path: Path) -> bool:
 
 
 def _begins(path: Path, count: int) -> bytes:
-    with open_file(path) as file:
+    with open(path, "rb") as file:
         return file.read(count)
 
 
@@ -139,12 +136,8 @@ def open_bag(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
         ) from None
     try:
         is_ros1 = path.is_file() and _begins(path, len(_ROS1)) == _ROS1
-        for part in path.iterdir() if path.is_dir() else [path]:
-            if not part.is_dir():
-                open_file(part).close()  # rosbags would wait for a named pipe
         reader: Any = (rosbag1 if is_ros1 else rosbag2).Reader(path)
         with reader:
-            _bound(reader, is_ros1)
             yield Bag(path, is_ros1, reader, _store(reader.connections, types, ros))
     except Error:
         raise
@@ -163,58 +156,6 @@ def open_bag(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
         elif "magic" in why.lower() and path.suffix not in (".bag", ".db3"):
             why = "the end of the file is missing; to repair it, run mcap recover"
         raise FormatError(f"{path}: cannot be read as a ROS bag: {why}") from None
-
-
-def _bound(reader: Any, is_ros1: bool) -> None:
-    """Unpack no more of a chunk than it may hold: rosbags itself unpacks whatever there is."""
-    if is_ros1:
-        from rosbags.rosbag1.reader import decompressors  # noqa: PLC0415  an extra
-
-        bounded = {unpack: _bounded_unpacker(name) for name, unpack in decompressors.items() if name in _UNPACKERS}
-        reader.chunks = {
-            at: chunk._replace(decompressor=bounded.get(chunk.decompressor, chunk.decompressor))
-            for at, chunk in reader.chunks.items()
-        }
-    else:
-        from rosbags.rosbag2 import storage_mcap  # noqa: PLC0415  an extra
-
-        storage_mcap.DECOMPRESSORS.update({name: _bounded_unpacker(name) for name in ("lz4", "zstd")})
-
-
-def _bounded_unpacker(name: str) -> Callable[..., bytes]:
-    """Return a function that unpacks a chunk, and as many bytes of it as it says if that is known."""
-
-    def unpack(data: bytes, size: int = CHUNK) -> bytes:
-        if size > CHUNK:
-            raise ValueError(f"an unpacked chunk has {size} bytes; must have at most {CHUNK}")
-        unpacker, parts, left = _UNPACKERS[name](), list[bytes](), min(size, CHUNK) + 1
-        while left > 0 and not unpacker.eof and (part := unpacker.decompress(data, max_length=left)):
-            parts.append(part)
-            left -= len(part)
-            data = b""
-        if left <= 0:
-            raise ValueError(f"an unpacked chunk has more than {size} bytes; must have at most {size}")
-        if not unpacker.eof:
-            raise EOFError("a chunk ends before the end of its content")
-        return b"".join(parts)
-
-    return unpack
-
-
-def _zstd() -> Any:
-    from rosbags.rosbag2 import storage_mcap  # noqa: PLC0415  an extra, which knows where Python has zstd
-
-    return storage_mcap.zstd.ZstdDecompressor()
-
-
-def _lz4() -> Any:
-    from lz4.frame import LZ4FrameDecompressor  # noqa: PLC0415  rosbags needs it
-
-    return LZ4FrameDecompressor()
-
-
-#: What unpacks a chunk by the name of its compression.
-_UNPACKERS: dict[str, Callable[[], Any]] = {"bz2": bz2.BZ2Decompressor, "lz4": _lz4, "zstd": _zstd}
 
 
 def _store(connections: Sequence[Connection], types: Path | None, ros: str | None) -> Typestore:

@@ -12,7 +12,7 @@ from pathlib import Path
 from subprocess import PIPE
 from typing import Any
 
-from taxel._base.child_process import ChildProcess, pipe_may_be_closed
+from taxel._base.child_process import ChildProcess
 from taxel._base.progress import Steps
 from taxel._core import ProblemError
 from taxel.detect import Readout, load
@@ -106,9 +106,11 @@ class TrainingRequests:
                 raise ProblemError("a training runs already: stop it first, or wait for its end")
             self._steps = Steps()
             # A separate process, so that it does not delay receiving.
-            self._training = ChildProcess("taxel.tasks", ["train"], stdin=PIPE, stdout=PIPE, text=True)
+            line = json.dumps(request | {"out": typed(out), "overwrite": True})
+            self._training = ChildProcess("taxel.tasks", ["train"], line=line, stdout=PIPE)
         try:
-            answer = self._answer(self._training, request | {"out": typed(out), "overwrite": True})
+            with self._training:
+                answer = self._answer(self._training)
             code = self._training.returncode
         finally:
             self._training = None
@@ -130,14 +132,10 @@ class TrainingRequests:
             result["options"],
         )
 
-    def _answer(self, training: ChildProcess, request: dict[str, Any]) -> dict[str, Any]:
-        """Ask for a training, wait until it has ended, and return the last line that it wrote."""
-        assert training.stdin is not None
+    def _answer(self, training: ChildProcess) -> dict[str, Any]:
+        """Wait until a training has ended, and return the last line that it wrote."""
         assert training.stdout is not None
         line: dict[str, Any] = {"type": "progress"}
-        # A training that was stopped meanwhile reads nothing.
-        with pipe_may_be_closed(), training.stdin:
-            training.stdin.write(json.dumps(request))
         for written in training.stdout:
             if not written.endswith("\n"):  # it was stopped while it wrote
                 break

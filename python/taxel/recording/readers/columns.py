@@ -14,12 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.limits import ABOUT, UNIT
-
 EVENTS: tuple[str, ...] = ("t", "x", "y", "p")
 COLUMNS = (*EVENTS, "intensity", "present", "repaired", "markers", "values", "unit", "held", "about")
-#: The columns that are a single text, and how many characters they may have; NumPy's have 4 bytes.
-TEXTS = {"about": ABOUT // 6, "unit": UNIT}
+#: The columns that are a single text.
+TEXTS = ("about", "unit")
 #: The entry with the checksum over all columns; a file without it opens unverified.
 DIGEST = "digest"
 #: Bytes of a column that are taken into the checksum at once.

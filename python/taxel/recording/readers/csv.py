@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from taxel._base.arguments import shown
 from taxel._base.columns import Growing
 from taxel._base.encodings import as_utf_8
-from taxel._base.files import open_file
 from taxel._base.header_table import separator_of
 from taxel._base.limits import COLUMNS, LINE, TAXELS, VALUE
 from taxel._base.messages import counted, first_line
@@ -75,7 +74,7 @@ def check_head(path: Path) -> None:
     ------
     FormatError : another header
     """
-    with open_file(path) as file:
+    with open(path, "rb") as file:
         _head(path, as_utf_8(str(path), file))
 
 
@@ -88,7 +87,7 @@ def _head(path: Path, file: BinaryIO) -> tuple[list[str], bytes]:
 
 
 def _table(path: Path, array: Array | None) -> Events | Frames:
-    with open_file(path) as raw:
+    with open(path, "rb") as raw:
         file = as_utf_8(str(path), raw)
         names, separator = _head(path, file)
         if tuple(names[:4]) == EVENTS:

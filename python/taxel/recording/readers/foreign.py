@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.archive import read_array, read_arrays, shapes
+from taxel._base.arrays import hdf5, read_arrays, shapes
 from taxel._base.columns import frozen_whole
-from taxel._base.h5_file import H5File
 from taxel._base.limits import VALUE
-from taxel._base.mat_file import is_mat_in_hdf5, mat_shapes, read_mat
 from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -39,8 +36,8 @@ _PIECE, _TIMES_AT_ONCE = 1 << 22, 1 << 16
 
 def is_lone_array(path: Path) -> bool:
     """Return whether a file of another program holds one array only, of the shape of frames."""
-    shapes = shapes_of(path) if path.suffix.lower() in ARRAYS else {}
-    return len(shapes) == 1 and all(len(shape) in (2, 3) for shape in shapes.values())
+    found = shapes(path) if path.suffix.lower() in ARRAYS else {}
+    return len(found) == 1 and all(len(shape) in (2, 3) for shape in found.values())
 
 
 def read_foreign(path: Path, layout: Layout, array: Array | None = None) -> RecordedSource:
@@ -112,11 +109,10 @@ def _data(path: Path, how: Data) -> Readings:
             raise FormatError(
                 f"{path}: the file has one array, without a name, but the layout states [data] {key}; {right}"
             )
-        arrays = {"": read_array(path, np.float32)}
-        stored_names: list[str] = [""]
+        stored_names = [""]
         wanted = stored_names
     else:
-        stored_shapes = shapes_of(path)
+        stored_shapes = shapes(path)
         stored_names = list(stored_shapes)
         if how.array is None and len(stored_names) != 1:
             raise FormatError(
@@ -130,8 +126,6 @@ def _data(path: Path, how: Data) -> Readings:
         wanted = [stored_names[0], *named] if how.array is None else named
         missing = next((name for name in wanted if name not in stored_names), None)
         if missing is not None:
-            if (why := _left_out_of(path).get(missing)) is not None:
-                raise FormatError(f"{path}, {missing}: {why}")
             size = as_size(missing)
             hint = f"; to state a size, write {size}" if size else ""
             raise FormatError(f"{path}: contains no array {missing}; its arrays are {list_arrays(stored_shapes)}{hint}")
@@ -144,7 +138,7 @@ def _data(path: Path, how: Data) -> Readings:
                 f"{path}, {wanted[1]}: {counted(count, 'time')} for {counted(frames, 'frame')}; must be as many "
                 f"times as frames"
             )
-        arrays = arrays_of(path, wanted, frames=wanted[0])
+    arrays = read_arrays(path, wanted, {wanted[0]: np.float32})
     values = arrays[wanted[0]]
     if how.frames == "last" and values.ndim > 1:
         values = np.ascontiguousarray(np.moveaxis(values, -1, 0))
@@ -198,66 +192,20 @@ def _too_large(values: NDArray[Any]) -> tuple[int, ...] | None:
     return None
 
 
-def shapes_of(path: Path) -> dict[str, tuple[int, ...]]:
-    """Return the shapes of the arrays of numbers by name; the one of a .npy has the name ""."""
-    if path.suffix.lower() in (".npy", ".npz"):
-        return shapes(path)
-    if not _is_hdf5(path):
-        return mat_shapes(path)
-    with H5File(path) as h5:
-        entries = {name: entry.shape for name, entry in h5.entries.items() if entry.is_numbers}
-    # HDF5 has MATLAB's axes in reverse.
-    return {name: shape[::-1] for name, shape in entries.items()} if _is_mat(path) else entries
-
-
-def _is_mat(path: Path) -> bool:
-    return path.suffix.lower() == ".mat"
-
-
-def _is_hdf5(path: Path) -> bool:
-    return is_mat_in_hdf5(path) if _is_mat(path) else path.suffix.lower() in (".h5", ".hdf5")
-
-
-def _left_out_of(path: Path) -> dict[str, str]:
-    """Return the names in a .h5 that lead to no array, and why."""
-    if not _is_hdf5(path):
-        return {}
-    with H5File(path) as h5:
-        return h5.left_out
-
-
 def facts_of(path: Path, array: str, named: re.Pattern[str]) -> dict[str, float | str]:
     """Return the single numbers and short texts of some names that a file states beside an array of frames.
 
     In a .h5 they are attributes of the array, of its groups and of the file, nearest first, or data sets.
     """
-    if path.suffix.lower() == ".npy":
-        return {}
-    names = [name for name, shape in shapes_of(path).items() if math.prod(shape) == 1 and named.fullmatch(name)]
     found: dict[str, Any] = {}
-    if _is_hdf5(path):
-        with H5File(path) as h5:
+    if path.suffix.lower() in (".h5", ".hdf5"):
+        with hdf5(path) as h5:
             groups = [array.rsplit("/", k)[0] for k in range(array.count("/") + 1)]
             for entry in (*groups, "/"):
-                for name in h5.attributes(entry):
-                    if named.fullmatch(name) and name not in found:
-                        found[name] = h5.attribute(name, entry)
-    arrays: dict[str, Any] = {}
-    for name in names:
-        # One that cannot be read, as of Python objects, leaves the others.
-        with contextlib.suppress(FormatError):
-            arrays |= arrays_of(path, [name])
-    found = {**arrays, **found}
-    facts = {name: value.item() if isinstance(value, np.ndarray) else value for name, value in found.items()}
+                for name, value in h5[entry].attrs.items():
+                    if named.fullmatch(name) and np.size(value) == 1:
+                        found.setdefault(name, value)
+    single = [name for name, shape in shapes(path).items() if math.prod(shape) == 1 and named.fullmatch(name)]
+    found = {**read_arrays(path, single), **found}
+    facts = {name: np.asarray(value).item() for name, value in found.items()}
     return {name: value for name, value in facts.items() if isinstance(value, float | int | str)}
-
-
-def arrays_of(path: Path, names: Sequence[str], frames: str | None = None) -> dict[str, NDArray[Any]]:
-    """Read the arrays of these names of a file; of a .h5 that of the frames as float32, without a copy."""
-    if path.suffix.lower() == ".npz":
-        return read_arrays(path, names, dtypes={} if frames is None else {frames: np.float32})
-    if not _is_hdf5(path):
-        return read_mat(path, names)
-    with H5File(path) as h5:
-        read = {name: h5.numbers(name, np.float32 if name == frames else None) for name in names}
-    return {name: values.T for name, values in read.items()} if _is_mat(path) else read

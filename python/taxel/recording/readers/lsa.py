@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from taxel import _core
-from taxel._base import limits
+from taxel._base.limits import available
 from taxel.array import Array
 from taxel.events import Events
 from taxel.recording.contents import BoardSource
@@ -28,11 +28,10 @@ def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Board
 
     Raises
     ------
-    FormatError : more than may be read, or wire version 2
+    FormatError : more than the memory that is available, or wire version 2
     OSError : the file cannot be read
     """
-    memory = limits.memory(limits.given())
-    read = _core.read_lsa(path, array._parts(), pairing, differences, memory)
+    read = _core.read_lsa(path, array._parts(), pairing, differences, available())
     unmarked = None if read.complete else path.with_suffix(".lss").name
     losses = Losses(
         known({"bytes": len(read.payload), "decoder": read.counts}),

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base import limits
 from taxel._base.columns import frozen
+from taxel._base.limits import available
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.clock import Clock
@@ -49,11 +49,10 @@ def read_mcap(path: Path, pairing: str) -> Contents:
     FormatError : not a recording of the live format, or damaged so that nothing can be read
     OSError : the file cannot be read
     """
-    limit = limits.given()
-    reader = _core.RecordingReader(path, limits.memory(limit), limit is not None)
+    reader = _core.RecordingReader(path, available(), True)
     sources: dict[str, RecordedSource] = {}
     for name in reader.sources():
-        channel = _Source(path, reader.of_source(name), limit)
+        channel = _Source(path, reader.of_source(name))
         if channel.header.get("frames") is not None:
             sources[name] = channel.frames()
         else:
@@ -69,8 +68,8 @@ def read_mcap(path: Path, pairing: str) -> Contents:
 class _Source:
     """Reader of one source of a file: its header and trailer, and the values that several fields share."""
 
-    def __init__(self, path: Path, reader: _core.RecordingReader, limit: int | None) -> None:
-        self._reader, self._limit = reader, limit
+    def __init__(self, path: Path, reader: _core.RecordingReader) -> None:
+        self._reader = reader
         self.header, ending, self.opened = reader.about()
         self.ending = ending or {}
         self.array = array_of(self.header["array"])
@@ -96,7 +95,7 @@ class _Source:
 
     def reader(self) -> _core.RecordingReader:
         """Return the reader of this source, which reads as much as the memory that is available now allows."""
-        return self._reader.within(limits.memory(self._limit))
+        return self._reader.within(available())
 
     def board(self, pairing: str) -> BoardSource:
         """Return the contents of a board."""

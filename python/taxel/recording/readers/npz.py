@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.archive import read_array, read_arrays, stored_names
+from taxel._base.arrays import read_arrays, shapes
 from taxel._base.columns import frozen_whole
 from taxel._base.errors import refused
-from taxel._base.limits import MARKERS, TAXELS
+from taxel._base.limits import TAXELS
 from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -43,7 +42,7 @@ def chosen(path: Path, shapes: Mapping[str, tuple[int, ...]]) -> list[str]:
 
     Raises
     ------
-    FormatError : columns that do not fit each other, or too many markers
+    FormatError : columns that do not fit each other
     """
     others = (*_OF_EVENTS[1:], "markers") if {"values", "t"} <= shapes.keys() else ("values", "unit")
     read_shapes = {name: shapes[name] for name in (*COLUMNS, DIGEST) if name in shapes and name not in others}
@@ -62,8 +61,7 @@ def _wrong_shape(name: str, shapes: Mapping[str, tuple[int, ...]]) -> str | None
         # A shorter one is damage, which `contents_of` says.
         return "16 bytes" if math.prod(shape) > 16 else None
     if name == "markers":
-        is_right = len(shape) == 2 and shape[0] <= MARKERS and shape[1] == 2
-        return None if is_right else f"for each of at most {MARKERS} markers its time, and 1 if it is a start"
+        return None if shape[1:] == (2,) else "for each marker its time, and 1 if it is a start"
     if name == "held":
         return f"one value for each taxel, for at most {TAXELS} taxels" if math.prod(shape) > TAXELS else None
     if frames is not None:
@@ -145,12 +143,19 @@ def read_npz(path: Path, array: Array | None) -> RecordedSource:
     ------
     FormatError : damage, or no such columns
     """
+    return source_of_columns(path, "npz", read_columns(path), array)
+
+
+def read_columns(path: Path) -> dict[str, NDArray[Any]]:
+    """Read the columns of a .npz or .h5.
+
+    Raises
+    ------
+    FormatError : damage, or columns that do not fit each other
+    """
+    found = shapes(path, with_texts=True)
     # Other columns are not read, but the error for a missing column lists them.
-    of_file = partial(chosen, path)
-    columns = read_arrays(path, (*COLUMNS, DIGEST), texts=TEXTS, dtypes=DTYPES, chosen=of_file) or {
-        name: np.empty(0) for name in stored_names(path)[:8]
-    }
-    return source_of_columns(path, "npz", columns, array)
+    return read_arrays(path, chosen(path, found), DTYPES) or {name: np.empty(0) for name in list(found)[:8]}
 
 
 def read_records(path: Path, array: Array | None) -> RecordedSource:
@@ -160,7 +165,7 @@ def read_records(path: Path, array: Array | None) -> RecordedSource:
     ------
     FormatError : damage, or a value that no event has
     """
-    records = read_array(path)
+    records = read_arrays(path, [""])[""]
     if records.ndim != 1:
         raise FormatError(f"{path}: records has shape {records.shape}: must have one record for each event")
     names = records.dtype.fields or ()

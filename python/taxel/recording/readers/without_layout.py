@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.arrays import read_arrays, shapes
 from taxel._base.cells import MISSING, are_units, cells, ends_in_separator, seconds_of, times_of, unit_of
 from taxel._base.limits import LINE, TIME_US
 from taxel._base.messages import counted
@@ -20,7 +21,7 @@ from taxel._base.number_text import float_of
 from taxel._core import FormatError
 from taxel.formats import text
 from taxel.formats.layout import ISO, UNITS_US, advice
-from taxel.recording.readers.foreign import ARRAYS, arrays_of, facts_of, list_arrays, shapes_of
+from taxel.recording.readers.foreign import ARRAYS, facts_of, list_arrays
 
 #: A column is one of times, if its name does not say so, if it ascends for so many lines.
 _ASCENDS = 20
@@ -107,18 +108,18 @@ def refuse_without_layout(path: Path) -> None:
         holds, lines = _of_table(found, max(1.0, size / sum(len(line) + 1 for line in lines)), begin)
         says = "describe it"
     else:
-        shapes = shapes_of(path)
-        name = next((name for name, shape in shapes.items() if len(shape) in (2, 3)), None)
+        arrays = shapes(path)
+        name = next((name for name, shape in arrays.items() if len(shape) in (2, 3)), None)
         if name is None:
             raise FormatError(
-                f"{path}: contains {list_arrays(shapes)}; must contain the arrays t, x, y and p (events) or the arrays "
+                f"{path}: contains {list_arrays(arrays)}; must contain the arrays t, x, y and p (events) or the arrays "
                 "values and t (frames); with a layout file, one array of frames x rows x columns or frames x taxels "
                 "(docs/files.md)"
                 + "; if the data are in a struct, save its fields: save('FILE.mat', '-struct', 'NAME')"
                 * path.name.endswith(".mat")
             )
-        holds, lines = list_arrays(shapes), _of_arrays(path, name, shapes)
-        says = "name the array of frames" if len(shapes) > 1 else "give rate_hz, or describe it"
+        holds, lines = list_arrays(arrays), _of_arrays(path, name, arrays)
+        says = "name the array of frames" if len(arrays) > 1 else "give rate_hz, or describe it"
     raise FormatError(f"{path}: contains {holds}, not written by taxel; {advice(path, says)}:", "\n".join(lines))
 
 
@@ -153,7 +154,7 @@ def _of_arrays(path: Path, name: str, shapes: Mapping[str, tuple[int, ...]]) -> 
     time = next((name for name, times in of_times.items() if times == count), None)
     times = []
     if time is not None:
-        times = [f"time = {_quote(time)}", *_unit(time, arrays_of(path, [time])[time].ravel(), count)]
+        times = [f"time = {_quote(time)}", *_unit(time, read_arrays(path, [time])[time].ravel(), count)]
     facts = facts_of(path, name, _FACTS)
     data = [f"array = {_quote(name)}"] * bool(name) + ['frames = "last"'] * is_last + times
     # An array of frames x rows x columns says its size, and others of the folder may have another.

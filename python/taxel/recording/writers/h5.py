@@ -10,69 +10,43 @@ beginning. ``about`` is JSON: the sensor, the source, registers, notes, detectio
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from taxel._base import h5_writing
+from taxel._base.arrays import write_hdf5
 from taxel.recording.contents import RecordedSource
 from taxel.recording.readers.columns import TEXTS
 from taxel.recording.readers.h5 import MARK, VERSION
 from taxel.recording.writers.npz import columns_of
+
+if TYPE_CHECKING:
+    import h5py
 
 #: Size of the chunks of a data set, which are compressed one by one.
 _PIECE_BYTES = 1 << 20
 
 
 def write_h5(path: Path, source: RecordedSource, *, overwrite: bool) -> None:
-    """Write a .h5, column after column in pieces.
+    """Write a .h5.
 
     Raises
     ------
-    As `taxel._base.h5_writing.write_h5`.
+    As `taxel._base.arrays.write_hdf5`.
     """
     columns = columns_of(source)
 
-    def send(pipe: BinaryIO) -> None:
+    def write(h5: h5py.File) -> None:
+        h5.attrs[MARK] = VERSION
         for name, column in columns.items():
             if name in TEXTS:
-                encoded = str(column).encode()
-                pipe.write(json.dumps([name, "text", [len(encoded)]]).encode() + b"\n" + encoded)
-                continue
-            pipe.write(json.dumps([name, column.dtype.str, column.shape]).encode() + b"\n")
-            for piece in _pieces(column.shape, column.itemsize):
-                pipe.write(column[piece].tobytes())
+                h5.create_dataset(name, data=str(column))
+            elif not column.size:
+                h5.create_dataset(name, data=column)
+            else:
+                rows = min(len(column), max(1, _PIECE_BYTES // column[:1].nbytes))
+                chunks = (rows, *column.shape[1:])
+                h5.create_dataset(
+                    name, data=column, chunks=chunks, compression="gzip", compression_opts=4, shuffle=True
+                )
 
-    h5_writing.write_h5(path, _write, send, overwrite=overwrite)
-
-
-def _write(file: BinaryIO, source: BinaryIO) -> None:
-    """Write the columns that `write_h5` sends."""
-    import h5py  # noqa: PLC0415  loads slowly
-
-    with h5py.File(file, "w") as h5:
-        h5.attrs[MARK] = VERSION
-        for line in iter(source.readline, b""):
-            name, dtype, shape = json.loads(line)
-            if dtype == "text":
-                h5.create_dataset(name, data=source.read(*shape).decode())
-                continue
-            itemsize = np.dtype(dtype).itemsize
-            pieces = list(_pieces(shape, itemsize))
-            chunks = (pieces[0].stop, *shape[1:]) if 0 not in shape else None
-            packed = {"chunks": chunks, "compression": "gzip", "compression_opts": 4, "shuffle": True} if chunks else {}
-            column = h5.create_dataset(name, shape, dtype, **packed)
-            for piece in pieces:
-                rows = (piece.stop - piece.start, *shape[1:])
-                column[piece] = np.frombuffer(source.read(itemsize * math.prod(rows)), dtype).reshape(rows)
-
-
-def _pieces(shape: Sequence[int], itemsize: int) -> Iterator[slice]:
-    """Yield the parts of a column that are compressed one by one."""
-    step = max(1, _PIECE_BYTES // max(1, itemsize * math.prod(shape[1:])))
-    for start in range(0, shape[0], step):
-        yield slice(start, min(start + step, shape[0]))
+    write_hdf5(path, write, overwrite=overwrite)

@@ -7,8 +7,6 @@ from typing import Any, BinaryIO, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.limits import MARKERS, UNIT
-from taxel._core import ProblemError
 from taxel.frames import Frames
 from taxel.recording.contents import RecordedSource
 from taxel.recording.description import json_of
@@ -16,19 +14,10 @@ from taxel.recording.readers.columns import DIGEST, digest_of
 
 
 def columns_of(source: RecordedSource) -> dict[str, NDArray[Any]]:
-    """Return a recording as columns by name, with their checksum.
-
-    Raises
-    ------
-    ProblemError : more markers, or a longer description, than are read again
-    """
+    """Return a recording as columns by name, with their checksum."""
     table = source.table
     columns: dict[str, Any]
     if isinstance(table, Frames):
-        if (count := len(table.unit)) > UNIT:
-            raise ProblemError(
-                f"{source.origin.name}: the unit has {count} characters; must have at most {UNIT} in a .npz or .h5"
-            )
         columns = {"values": table.values, "t": table.t, "unit": np.array(table.unit)}
     else:
         columns = {"t": table.t, "x": table.x, "y": table.y, "p": table.p}
@@ -36,10 +25,6 @@ def columns_of(source: RecordedSource) -> dict[str, NDArray[Any]]:
             columns |= {"intensity": table.intensity, "present": table.present}
         if table.repaired is not None:
             columns["repaired"] = table.repaired
-        if len(table.markers) > MARKERS:
-            raise ProblemError(
-                f"{source.origin.name}: {len(table.markers)} markers; must be at most {MARKERS} in a .npz or .h5"
-            )
         columns["markers"] = np.array(table.markers, np.int64).reshape(-1, 2)
     if (held := source.settings.held()) is not None:
         columns["held"] = held
