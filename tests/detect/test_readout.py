@@ -296,7 +296,7 @@ def test_files_that_are_no_readout_are_refused_by_name(readout: Readout, tmp_pat
     good = json.loads(readout.to_json())
     cases = [
         (b"\x80\xff", "not text in UTF-8"),
-        (b"", "not a JSON object: empty"),
+        (b"", "not JSON"),
         (b"{}", 'the key "format" is missing'),
         (json.dumps({**good, "version": 2}).encode(), "version is 2; this taxel reads only version 1"),
         (json.dumps({**good, "wings": 2}).encode(), 'readout: wings is not known: must be "encoder", "array"'),

@@ -48,7 +48,7 @@ def test_no_json_and_another_kind_of_file_are_named(
     kind: Any, name: str, number: str, another: str, tmp_path: Path
 ) -> None:
     (tmp_path / "a.json").write_text("nonsense")
-    with refused(FormatError, place=Place("a.json")):
+    with refused(FormatError, place=Place("a.json", line=1)):
         kind.load(tmp_path / "a.json")
     wrong = next(file for of, file, *_ in KINDS if of is not kind)
     with refused(FormatError, place=Place(wrong)):
