@@ -203,9 +203,10 @@ def facts_of(path: Path, array: str, named: re.Pattern[str]) -> dict[str, float 
             groups = [array.rsplit("/", k)[0] for k in range(array.count("/") + 1)]
             for entry in (*groups, "/"):
                 for name, value in h5[entry].attrs.items():
-                    if named.fullmatch(name) and np.size(value) == 1:
+                    if named.fullmatch(name):
                         found.setdefault(name, value)
-    single = [name for name, shape in shapes(path).items() if math.prod(shape) == 1 and named.fullmatch(name)]
-    found = {**read_arrays(path, single), **found}
-    facts = {name: np.asarray(value).item() for name, value in found.items()}
-    return {name: value for name, value in facts.items() if isinstance(value, float | int | str)}
+    names = [name for name in shapes(path, with_texts=True) if named.fullmatch(name)]
+    found = {**read_arrays(path, names), **found}
+    facts = {name: np.asarray(value).item() for name, value in found.items() if np.size(value) == 1}
+    texts = {name: value.decode(errors="replace") for name, value in facts.items() if isinstance(value, bytes)}
+    return {name: value for name, value in (facts | texts).items() if isinstance(value, float | int | str)}
