@@ -1,7 +1,5 @@
 """What no argument may be: each is refused by name, in one line, at once."""
 
-import itertools
-import time
 from unittest.mock import ANY
 
 import numpy as np
@@ -14,7 +12,7 @@ from taxel._base import arguments
 from taxel.calibration import Calibration
 from taxel.detect import Recipe
 from taxel.encode import LevelCrossing
-from taxel.simulate import Faults, Flaws, Layer
+from taxel.simulate import Faults, Flaws
 
 
 def twisted() -> list[object]:
@@ -24,60 +22,7 @@ def twisted() -> list[object]:
     return own
 
 
-def deep() -> list[object]:
-    own: list[object] = []
-    for _ in range(100_000):
-        own = [own]
-    return own
-
-
-#: A view of a billion equal values with the memory of one.
-REPEATED = np.broadcast_to(np.float64(1.0), 10**9)
-
-WRONG = {
-    "a list that holds itself": twisted(),
-    "a deep list": deep(),
-    "a masked constant": np.ma.masked,
-    "a masked entry": np.ma.masked_array([1.0, 2.0], [False, True]),
-    "a masked entry in a list": [1.0, np.ma.masked],
-    "an array that is repeated": REPEATED,
-    "objects that are repeated": np.broadcast_to(np.array([None]), 10**9),
-    "a span of time": np.timedelta64(5),
-    "a span of time in ms": np.timedelta64(5, "ms"),
-    "a lone surrogate": "\ud800",
-    "no end": itertools.count(),
-}
-
-CLASSES = {
-    "a level": LevelCrossing,
-    "a neuron": lambda value: taxel.Neuron(tau=value),
-    "a bound": lambda value: taxel.learn.ConeR(lb=value),
-    "a foam": lambda value: Layer({"poisson": value}),
-    "a scene": lambda value: taxel.simulate.Scene({"bodies": value}).motion(),
-    "times": SpikeTrains.from_lists,
-    "a column": lambda value: Detections(["a"], value, [1]),
-    "labels": lambda value: Detections(value, [1], [1]),
-    "chosen trains": SpikeTrains.from_lists([[1.0], [2.0]]).select,
-    "an array's pitch": lambda value: taxel.Array(2, 2, pitch_mm=value),
-    "an array's name": lambda value: taxel.Array(2, 2, name=value),
-}
-
-
-@pytest.mark.parametrize("value", WRONG)
-@pytest.mark.parametrize("name", CLASSES)
-def test_what_is_no_argument_is_refused_in_one_line(name, value):
-    begun = time.process_time()
-    with pytest.raises(taxel.Error) as error:
-        CLASSES[name](WRONG[value])
-    said = str(error.value)
-    assert "\n" not in said
-    assert len(said) < 300
-    said.encode()
-    # The refusal must take milliseconds; copying a repeated array took 20 s.
-    assert time.process_time() - begun < 10
-
-
-@pytest.mark.parametrize("value", ["\ud800", "a\ud800.mcap", "a\0b", "", 5, b"here"])
+@pytest.mark.parametrize("value", ["a\ud800.mcap", "a\0b", "", b"here"])
 def test_what_is_no_path_is_refused(value):
     with refused(argument="path"):
         taxel.open(value)
