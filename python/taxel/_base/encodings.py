@@ -6,7 +6,7 @@ import codecs
 import io
 from typing import BinaryIO
 
-from taxel._core import FormatError
+from taxel._base.errors import unreadable
 
 _MARKS = {codecs.BOM_UTF8: "utf-8", codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
 #: Bytes of UTF-16 that are converted at once.
@@ -61,9 +61,8 @@ class _Converted(io.RawIOBase):
             try:
                 text = self._decoder.decode(piece, final=not piece)
             except UnicodeDecodeError as error:
-                raise FormatError(
-                    f"{self._name}, byte {begin + error.start}: not text in UTF-16 ({error.reason}); save it as UTF-8"
-                ) from None
+                text = f"not text in UTF-16 ({error.reason}); save it as UTF-8"
+                raise unreadable(text, self._name, byte=begin + error.start) from None
             # The first character is the mark.
             self._rest = text.removeprefix("\ufeff").encode() if not begin else text.encode()
             if not piece:

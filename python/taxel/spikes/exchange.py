@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from taxel._base.arguments import checked_path, number, shown, text
 from taxel._base.arrays import datasets, hdf5, read_dataset, write_hdf5
 from taxel._base.errors import refused, unreadable
-from taxel._core import FormatError
 
 if TYPE_CHECKING:
     import h5py
@@ -106,12 +105,12 @@ def read_nwb(path: str | os.PathLike[str], start: float | None, stop: float | No
             kind = _kind_of(h5)
             values, others = _lists(h5, "value")
             if not np.array_equal(offsets, others):
-                raise FormatError(f"{file}, units/value: must have the lengths of the trains, one value per spike")
+                raise unreadable("units/value must have the lengths of the trains, one value per spike", file)
         watched = np.empty((0, 2))
         if "units/obs_intervals" in there and len(offsets) > 1:
             watched = 1000.0 * read_dataset(h5, "units/obs_intervals").astype(np.float64)
             if watched.ndim != 2 or watched.shape[1] != 2:
-                raise FormatError(f"{file}, units/obs_intervals: shape {watched.shape}; must be (intervals, 2)")
+                raise unreadable(f"units/obs_intervals has shape {watched.shape}; must be (intervals, 2)", file)
     times = 1000.0 * seconds.astype(np.float64, copy=False)
     if len(watched):
         widest = (watched[:, 0].min(), watched[:, 1].max())
@@ -127,14 +126,14 @@ def _lists(h5: h5py.File, name: str) -> tuple[NDArray[Any], NDArray[np.int64]]:
     """Return a column of the table of units, of which each row is a list: all values, and the offsets of the lists."""
     column, index = f"units/{name}", f"units/{name}_index"
     if index not in h5:
-        raise FormatError(f"{h5.filename}, {column}: must have a list for each unit, but {index} is missing")
+        raise unreadable(f"{column} must have a list for each unit, but {index} is missing", h5.filename)
     values, ends = read_dataset(h5, column), read_dataset(h5, index)
     if values.ndim != 1 or ends.ndim != 1 or ends.dtype.kind not in "ui":
         found = f"{values.dtype} of shape {values.shape}"
-        raise FormatError(f"{h5.filename}, {column}: {found}; must be a list for each unit")
+        raise unreadable(f"{column} is {found}; must be a list for each unit", h5.filename)
     offsets = np.concatenate([[0], ends.astype(np.int64)])
     if np.any(offsets[1:] < offsets[:-1]) or offsets[-1] > len(values):
-        raise FormatError(f"{h5.filename}, {index}: must ascend from 0 to {len(values)}, the number of values")
+        raise unreadable(f"{index} must ascend from 0 to {len(values)}, the number of values", h5.filename)
     return values[: offsets[-1]], offsets
 
 
