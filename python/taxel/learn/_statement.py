@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -257,23 +257,21 @@ class PatternRows:
     def above(self, weights: _Floats) -> _Floats:
         """Return 6.13 for these weights of inputs, the sum of the potential's excess over its limits, and its size."""
         total = np.zeros(2)
-        for t, potential, size in self.potentials(weights):
+        for t, potential, size in self.potentials(weights, self.silent):
             limits = self.limit(t)
             excess = potential - limits
             total += excess[excess > 0].sum(), (size + limits)[excess > 0].sum()
         return total
 
-    def potentials(self, weights: _Floats) -> list[tuple[_Floats, _Floats, _Floats]]:
-        """Return the silent grid points in blocks, with the potential for these weights of inputs, and its size."""
-        found: list[tuple[_Floats, _Floats, _Floats]] = []
-        for begin in range(0, len(self.silent), BLOCK):
-            t: _Floats = self.silent[begin : begin + BLOCK]
+    def potentials(self, weights: _Floats, instants: _Floats) -> Iterator[tuple[_Floats, _Floats, _Floats]]:
+        """Give silent instants in blocks, with the potential for these weights of inputs, and its size."""
+        for begin in range(0, len(instants), BLOCK):
+            t: _Floats = instants[begin : begin + BLOCK]
             near = np.flatnonzero((self.times < t[-1]) & (self.times > t[0] - self.reach))
             counts, age = self.counting(near, t, self.targets)
             kernels = np.where(counts, self.kernel(age), 0.0)
             size = self.largest * ((kernels > 0).astype(np.float64) @ np.abs(weights[near]))
-            found.append((t, kernels @ weights[near], size))
-        return found
+            yield t, kernels @ weights[near], size
 
     @property
     def reach(self) -> float:
@@ -281,17 +279,12 @@ class PatternRows:
         sizes = np.abs(self.values[self.values != 0])
         return (50 + np.log(sizes.max() / sizes.min())) * self.neuron.tau if len(sizes) else 0.0
 
-    def counting(
-        self, inputs: NDArray[np.intp], t: _Floats, fired: _Floats, *, here: bool = False
-    ) -> tuple[NDArray[np.bool_], _Floats]:
-        """Return which of these inputs (a column each) count at these times, given spikes at `fired`, and their ages.
-
-        Inputs and spikes at a time itself come before it if `here` is true.
-        """
+    def counting(self, inputs: NDArray[np.intp], t: _Floats, fired: _Floats) -> tuple[NDArray[np.bool_], _Floats]:
+        """Return which inputs (a column each) count at these times, given spikes at `fired`, and their ages."""
         neuron, s = self.neuron, self.times[inputs]
-        counts = s <= t[:, None] if here else s < t[:, None]
+        counts = s < t[:, None]
         if neuron.after_spike == "reset":
-            last = _last(fired, np.nextafter(t, np.inf) if here else t)
+            last = _last(fired, t)
             counts &= s > (last + neuron.refractory + AT_EDGE)[:, None]
         elif neuron.after_spike == "ignore":
             last = _last(fired, s)
