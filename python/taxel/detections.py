@@ -31,8 +31,6 @@ __all__ = ["Detection", "Detections"]
 
 _CSV = ("label", "t_us", "known_us", "slope_mv_per_ms")
 _REPORTED, _REPAIRED = "reported_us", "repaired"
-#: Names of columns in older files, and what they are called now.
-_RENAMED = {"said_us": _REPORTED}
 
 
 class Detection(NamedTuple):
@@ -370,7 +368,7 @@ class Detections(FrozenColumns):
         """
         file = Path(checked_path("path", path))
         table = HeaderTable.read(file, text_of(file))
-        header = tuple(_RENAMED.get(name, name) for name in table.header)
+        header = tuple(table.header)
         more: dict[str, list[int]] = {name: [] for name in (_REPORTED, _REPAIRED) if name in header}
         if header != (*_CSV, *more):
             raise unreadable(f"contains {','.join(table.header) or 'nothing'}; must be {','.join(_CSV)}", file, line=1)
