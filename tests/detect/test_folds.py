@@ -12,7 +12,7 @@ from test_readout import recipe, tare, touches
 
 import taxel
 from taxel import SpikeTrains
-from taxel.detect import Example, Fold, Part, Score, choose, fit, judge, run, score
+from taxel.detect import Example, Fold, Part, Score, fit, judge, run, score
 from taxel.detect import folds as folds_module
 from taxel.detect.folds import _folds as folds
 from taxel.detect.folds import count_of_folds
@@ -99,9 +99,10 @@ def test_a_point_that_finds_nothing_is_not_chosen() -> None:
     silent = dataclasses.replace(plan, neurons=neurons)
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # readouts that are not chosen must not warn
-        best = choose(examples(1, 2), silent, window_ms=10.0)
-    assert {label: own["ub"] for label, own in best.neurons.items()} == dict.fromkeys(plan.neurons, 3.0)
-    assert judge(examples(1, 9), best, 2, window_ms=10.0).together.missed == 0
+        judged = judge(examples(1, 2), silent, 2, search=True, window_ms=10.0)
+    for made in judged.trained:
+        assert {label: own["ub"] for label, own in made.recipe.neurons.items()} == dict.fromkeys(plan.neurons, 3.0)
+    assert judged.together.missed == 0
 
 
 def test_events_that_cannot_be_learnt_are_named_by_label_time_and_example() -> None:
@@ -163,21 +164,16 @@ def test_a_point_that_the_labels_do_not_allow_is_not_chosen() -> None:
     """Two labels lie within its refractory time."""
     plan = recipe()
     neurons = {label: {**own, "search": [{"refractory": 9000.0}]} for label, own in plan.neurons.items()}
-    best = choose(examples(1, 2), dataclasses.replace(plan, neurons=neurons), window_ms=10.0)
-    assert best.neurons == {label: dict(own) for label, own in plan.neurons.items()}
+    judged = judge(examples(1, 2), dataclasses.replace(plan, neurons=neurons), 2, search=True, window_ms=10.0)
+    for made in judged.trained:
+        for label in plan.neurons:
+            assert made.recipe.learner_of(label)[0].neuron == plan.learner_of(label)[0].neuron, label
     first = {label: {**own, "refractory": 9000.0, "search": [dict(own)]} for label, own in plan.neurons.items()}
     with pytest.raises(
         taxel.ProblemError,
         match=r"contact: .* has a label at \d+ us, \d+ us after .*; labels must be more than 9000 ms",
     ):
-        choose(examples(1, 2), dataclasses.replace(plan, neurons=first))
-
-
-def test_the_first_of_equal_points_is_kept() -> None:
-    plan = recipe()
-    same = {label: {**own, "search": [dict(own)]} for label, own in plan.neurons.items()}
-    best = choose(examples(1, 2), dataclasses.replace(plan, neurons=same))
-    assert best.neurons == {label: dict(own) for label, own in plan.neurons.items()}
+        judge(examples(1, 2), dataclasses.replace(plan, neurons=first), 2, search=True)
 
 
 def test_more_folds_than_there_are_recordings_or_events_are_refused() -> None:
@@ -185,12 +181,6 @@ def test_more_folds_than_there_are_recordings_or_events_are_refused() -> None:
         judge(examples(1, 2), recipe(), 3)
     with pytest.raises(taxel.ProblemError, match="because each fold of a recording needs two events"):
         judge(examples(1), recipe(), 100)
-
-
-def test_every_recipe_lists_points_that_its_learner_knows() -> None:
-    for name in taxel.detect.recipes.names():
-        plan = taxel.detect.Recipe.load(name, labels=["contact"])
-        assert len(plan.points_of("contact")) > 1, name
 
 
 def test_folds_that_are_stated_are_those_that_are_judged() -> None:

@@ -83,7 +83,7 @@ def test_a_training_takes_levels_of_the_local_load_and_with_a_stale_tare_those_o
     for away, inputs in ((0.0, ["levels"]), (10.0, ["changes"])):
         made = fit_aligned([frames(1, away), frames(3, away)], recipe, None)
         assert made.recipe.neurons["contact"]["inputs"] == inputs
-        assert "search" in made.recipe.neurons["contact"]
+        assert "choose" in made.recipe.neurons["contact"]
         unseen = frames(2, away)
         found = score(run(made.readout, unseen.source, tare=unseen.tare), unseen.labels)
         assert (found.missed, found.false) == (0, 0), away

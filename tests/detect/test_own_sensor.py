@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 from shell import call
 
 import taxel
-from taxel import Array, Frames, SpikeTrains, Tare
+from taxel import Array, Frames, Tare
 from taxel._base import progress
 from taxel.cli import _recordings
-from taxel.detect import Example, PlainRule, Recipe, choose, judge, load, recipes, run, score
+from taxel.detect import Example, PlainRule, Recipe, judge, load, recipes, run, score
 from taxel.detect.cause import Cause
 from taxel.detect.causes import Mistakes
 from taxel.detect.evidence import Evidence
@@ -235,9 +235,9 @@ def first_cause(
     plain: PlainScore | None = None,
     label: str = "contact",
 ) -> Cause:
-    """Return the cause of most mistakes of a label, after a search."""
+    """Return the cause of most mistakes of a label."""
     evidence = Evidence(examples, check_examples(examples), made.recipe)
-    causes = Mistakes(made, scored, learnt, searched=True, plain=plain).causes(evidence)
+    causes = Mistakes(made, scored, learnt, plain=plain).causes(evidence)
     return next(cause for cause in causes if label in cause.labels)
 
 
@@ -251,7 +251,7 @@ def test_where_only_the_first_touches_have_labels_those_of_the_others_may_help()
         example, times = Example(frames, first, tare), labels["contact"]
         some = score(taxel.Detections(["contact"] * found, times[:found], times[:found]), {"contact": first["contact"]})
         made = fit_aligned([example], plan, None)
-        causes = Mistakes(made, some, some, searched=True).causes(Evidence([example], check_examples([example]), plan))
+        causes = Mistakes(made, some, some).causes(Evidence([example], check_examples([example]), plan))
         return f"{causes[0].advice}: {causes[0].measured}" if causes else ""
 
     assert helps(5, 12).startswith("labels of all events: 7.2 of 13.0 s are before the first or after the last label")
@@ -331,15 +331,6 @@ def test_without_a_terminal_lines_say_where_it_is_also_within_a_step(
     assert capsys.readouterr().err == ""
 
 
-def test_a_search_has_no_more_folds_than_recordings_of_two_feet_each() -> None:
-    recipe = Recipe(LevelCrossing([1.0]), {"tau": 2.0, "delay_ms": 1.0}, {"contact": {"search": [{"ub": 2.0}]}})
-    examples = [
-        Example(SpikeTrains.from_lists([[t]], stop=90.0), {"contact": [int(1000 * t)]}, group=walk)
-        for t, walk in ((10.0, "a"), (20.0, "a"), (30.0, "b"), (40.0, "b"))
-    ]
-    assert choose(examples, recipe).neurons.keys() == {"contact"}
-
-
 def test_a_row_of_channels_is_told_how_it_is_laid_out_and_array_does_it(tmp_path: Path, capsys) -> None:
     values = np.zeros((400, 3, 4), np.float32)
     values[100:200, 1:, 1:] = values[250:300, 1:, 1:] = 20.0
@@ -370,8 +361,8 @@ def test_ctrl_c_while_a_training_reads_or_learns_ends_it_and_leaves_nothing(tmp_
     (tmp_path / "a.layout.toml").write_text("rate_hz = 500\n")
     (tmp_path / "labels.csv").write_text("\n".join(labels) + "\n")
     words = ["train", tmp_path / "a.npy", "--labels", tmp_path / "labels.csv", "-o", tmp_path / "readout.json"]
-    # Without a search a fast computer ends within the 2 s after which the first line comes.
-    begun = [sys.executable, "-m", "taxel", *map(str, words), "--search"]
+    # With few folds a fast computer ends within the 2 s after which the first line comes.
+    begun = [sys.executable, "-m", "taxel", *map(str, words), "--folds", "40"]
     process = subprocess.Popen(begun, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stderr is not None
     # The first line comes within a step; what follows is interrupted in the middle.

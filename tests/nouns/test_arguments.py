@@ -95,7 +95,7 @@ def test_arguments_that_a_call_does_not_need_are_checked_too(tmp_path, wrong):
     recipe = Recipe(LevelCrossing([0.5]), {"tau": 5.0}, {"a": {"ub": 1.0}})
     for name in ("window_ms", "frame_us"):
         with refused(argument=name):
-            taxel.detect.choose([example, example], recipe, k=2, **{name: wrong})
+            taxel.detect.judge([example, example], recipe, 2, **{name: wrong})
 
 
 def test_a_value_in_an_error_is_one_short_line():

@@ -81,16 +81,16 @@ def test_a_training_that_runs_says_how_far_it_is(chromium: Any, recording: Path)
 
 def test_options_that_the_advice_names_are_given_in_a_shell(chromium: Any, recording: Path) -> None:
     labelled(recording)
-    text = "held out: contact, neuron: 3 of 5\nmore labels help most, else --search (about 60 s) or --recipe gait_plate"
+    text = "held out: contact, neuron: 3 of 5\nmore labels help most, else --folds 9 or --recipe gait_plate"
     trained = {"type": "trained", "name": recording.name, "readout": "walk.readout.json", "text": text}
-    trained |= {"next": "taxel detect RECORDING", "options": ["--search", "--recipe"]}
+    trained |= {"next": "taxel detect RECORDING", "options": ["--folds", "--recipe"]}
     trained |= {"judged_on": "held out", "scores": [], "mistakes": []}
     detections = {"train": [trained, {"type": "done"}], "read_out": [{"type": "done"}]}
     with answered(chromium, recording, detections) as page:
         shows(page, "train-shell", r"^The same in a shell: taxel train")
         page.locator("#train").click()
-        shows(page, "train-text", "--search")
-        shows(page, "train-shell", r"^To set options such as --search, --recipe, run this command .*: taxel train")
+        shows(page, "train-text", "--folds")
+        shows(page, "train-shell", r"^To set options such as --folds, --recipe, run this command .*: taxel train")
         assert "a detection of an event without a label counts as false" in page.locator("#panel-labels").inner_text()
 
 
@@ -145,7 +145,7 @@ while not pathlib.Path({str(end)!r}).exists():
 score = {{"found": 3, "missed": 1, "false": 0, "known_delay_ms": {{"median": 5.0}}}}
 mistake = {{"recording": "walk", "source": "", "label": "contact", "t_us": 7, "missed": True}}
 result = {{"labels": ["contact"], "score": {{"by_label": {{"contact": score}}}}, "plain_rule": None}}
-result |= {{"mistakes": [mistake], "warnings": ["3 are alone"], "options": ["--search"]}}
+result |= {{"mistakes": [mistake], "warnings": ["3 are alone"], "options": ["--folds"]}}
 detects = "taxel detect RECORDING --readout a.json"
 print(json.dumps({{"type": "result", "lines": ["held out: all found"], "result": result, "command": detects}}))
 """
@@ -163,7 +163,7 @@ print(json.dumps({{"type": "result", "lines": ["held out: all found"], "result":
     [trained] = printed
     assert trained.text.splitlines() == ["held out: all found", "warning: 3 are alone"]
     assert trained.next.startswith("taxel detect RECORDING --readout ")
-    assert (trained.judged_on, trained.options) == ("held out: all found", ["--search"])
+    assert (trained.judged_on, trained.options) == ("held out: all found", ["--folds"])
     assert trained.scores == [("contact", False, 3, 1, 0, 5.0)]
     assert trained.mistakes == [("contact", 7, True, "", "walk")]
     assert handler.progress() == ""

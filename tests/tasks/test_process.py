@@ -110,7 +110,7 @@ def test_errors_are_a_line_and_an_exit_code(tmp_path: Path) -> None:
 def test_a_task_that_is_stopped_ends_soon_without_a_word_and_without_a_file(tmp_path: Path, how: str) -> None:
     place = board(tmp_path)
     before = set(tmp_path.iterdir())
-    request = {"recordings": [str(place)], "options": {"folds": 6, "search": False}, "out": str(tmp_path / "r.json")}
+    request = {"recordings": [str(place)], "options": {"folds": 6}, "out": str(tmp_path / "r.json")}
     pipe = subprocess.PIPE
     child = ChildProcess("taxel.tasks", ["train"], line=json.dumps(request), stdout=pipe, stderr=pipe)
     with child:

@@ -93,12 +93,6 @@ def train(
         bool | None,
         typer.Option(help="Move labels to what the sensor felt before they are learnt. Default: as the recipe says."),
     ] = None,
-    search: Annotated[
-        bool,
-        typer.Option(
-            "--search", help="Choose each neuron's parameters among those that the recipe lists, on held-out data."
-        ),
-    ] = False,
     shift_ms: Annotated[
         float,
         typer.Option(help="First move all labels by this many ms, for example if their times are of another clock."),
@@ -132,7 +126,7 @@ def train(
     changes = assignments(values or []) | {
         key: value for key, value in (("encoder.name", encoder), ("align", align)) if value is not None
     }
-    options = taxel.tasks.TrainOptions(recipe, changes, tare, folds, search, window_ms, shift_ms, labels_as_given)
+    options = taxel.tasks.TrainOptions(recipe, changes, tare, folds, window_ms, shift_ms, labels_as_given)
     with progress(as_json) as update:
         update(f"reading {paths_text(recordings)}", 0, 0)
         with collected() as unread:

@@ -9,7 +9,6 @@ from taxel.detect.fitting import fit as fit
 from taxel.detect.folds import Fold as Fold
 from taxel.detect.folds import Judged as Judged
 from taxel.detect.folds import Part as Part
-from taxel.detect.folds import choose as choose
 from taxel.detect.folds import judge as judge
 from taxel.detect.plain_rule import PlainRule as PlainRule
 from taxel.detect.plain_score import PlainScore as PlainScore

@@ -47,8 +47,6 @@ class Mistakes:
         Held out, and on the training data.
     each : sequence of Score
         Held out, of each example.
-    searched : bool
-        Whether its parameters were chosen among those of the recipe.
     plain : PlainScore, optional
         The scores of the plain rules on the labels of `scored`.
     mistakes : sequence of Mistake
@@ -62,7 +60,6 @@ class Mistakes:
     scored: Score
     learnt: Score
     each: Sequence[Score] = ()
-    searched: bool = False
     plain: PlainScore | None = None
     mistakes: Sequence[Mistake] = ()
     window_ms: float = WINDOW_MS
@@ -255,11 +252,7 @@ class Mistakes:
             )
             yield Cause("overfitting", (label,), wrong, measured, "more labels")
             return
-        measured, points = "no cause was found in the data", len(self.trained.recipe.points_of(label))
-        if points > 1:
-            tries = f"--search {'tried' if self.searched else 'tries'} {points} sets of parameters"
-            measured += f", and {tries}" if self.searched else f"; {tries}, which may or may not help"
-        yield Cause("unknown", (label,), wrong, measured, "")
+        yield Cause("unknown", (label,), wrong, "no cause was found in the data", "")
 
     def _indistinct(self, label: str, wrong: int) -> Iterator[Cause]:
         """Yield that neuron and rule tell no more of a kind of touch than chance would."""

@@ -26,7 +26,6 @@ from taxel.detect.fitting import (
     Fitting,
     Known,
     Trained,
-    encode_examples,
     learn,
     possible,
     readout_of,
@@ -42,7 +41,7 @@ from taxel.detect.scoring import Mistake, Score, mistakes_of, score, score_toget
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_ms
 
-__all__ = ["Fold", "Judged", "Part", "choose", "count_of_folds", "judge"]
+__all__ = ["Fold", "Judged", "Part", "count_of_folds", "judge"]
 
 #: Into how many folds the training data of a fold are split for a search, where nothing else is stated.
 INNER = 3
@@ -64,7 +63,7 @@ class Part(NamedTuple):
 
     Raises
     ------
-    ProblemError : values that are invalid, when `judge` or `choose` gets it
+    ProblemError : values that are invalid, when `judge` gets it
 
     Examples
     --------
@@ -88,7 +87,7 @@ class Fold(NamedTuple):
 
     Raises
     ------
-    ProblemError : values that are invalid, when `judge` or `choose` gets it
+    ProblemError : values that are invalid, when `judge` gets it
 
     Examples
     --------
@@ -219,68 +218,6 @@ def _check_arguments(
         finite("frame_us", frame_us, "us", least=1.0, most=3.6e9)
     clocks = [clock_of(example, frame_us) for example in examples] if isinstance(examples, Sequence) else []
     return check_examples(examples), finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6), clocks
-
-
-def choose(
-    examples: Sequence[Example],
-    recipe: Recipe,
-    *,
-    k: int | Sequence[Fold] = INNER,
-    window_ms: float = 50.0,
-    frame_us: float | None = None,
-    progress: Progress | None = None,
-) -> Recipe:
-    """Return the recipe with, for each neuron, the point of those that it lists which is best on held-out data.
-
-    Best is the least `Score.rank`; of equals the first. Points that differ only in what the rows of the learner do not
-    depend on, as `lambdas` and `kappa`, are fitted to the same rows, each from the fit before.
-
-    Parameters
-    ----------
-    examples : sequence of Example
-    recipe : Recipe
-        As in `judge`.
-    k : int, 2 or more; or sequence of Fold
-        How many folds; of fewer recordings than that, as many as there are, and of few events of a label as many as
-        these allow. Or the folds themselves.
-    window_ms : float, ms
-    frame_us : float, us, optional
-    progress : function of a str, optional
-        As in `judge`.
-
-    Returns
-    -------
-    Recipe
-
-    Raises
-    ------
-    ProblemError : as `judge`
-
-    Warns
-    -----
-    UserWarning : a label has too few events for two folds; its first point is taken
-
-    Examples
-    --------
-    >>> from taxel.encode import LevelCrossing
-    >>> search = [{"ub": 2.0}]
-    >>> recipe = Recipe(LevelCrossing([1.0]), {"tau": 2.0, "delay_ms": 1.0}, {"contact": {"ub": 0.1, "search": search}})
-    >>> examples = [Example(SpikeTrains.from_lists([[t]], stop=90.0), {"contact": [1000 * t]}) for t in (10, 20)]
-    >>> choose(examples, recipe, k=2).neurons
-    {'contact': {'ub': 2.0}}
-    """
-    examples, window, clocks = _check_arguments(examples, window_ms, frame_us)
-    unit_of(examples)
-    recipe = in_frames(instance("recipe", recipe, Recipe), examples, clocks)
-    report = reporting(progress)
-    parts = [Part(n) for n in range(len(examples))]
-    recipe = fit_levels(fit_floor(recipe, examples, parts), examples, parts)
-    ways = integer("k", k, 2, 2**31) if isinstance(k, int | np.integer) else _folds(examples, k)[0]
-    narrowed = recipe._narrowed(recipe._labels(examples), search=True)
-    chosen = _choose(
-        examples, encode_examples(examples, narrowed, report), narrowed, ways, parts, window, clocks, report
-    )
-    return replace(chosen, encoder=recipe.encoder)
 
 
 def _choose(

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +14,14 @@ from taxel._base.errors import helped, refused
 from taxel._base.messages import collected, warn
 from taxel._base.progress import Forecast, Progress, reporting
 from taxel._core import ProblemError
-from taxel.detect import Example, Judged, Outcome, Recipe, choose, judge, recipes, score
+from taxel.detect import Example, Judged, Outcome, Recipe, judge, recipes, score
 from taxel.detect.cause import OF_DATA, Cause
 from taxel.detect.causes import Mistakes, by_recipe, with_settings, without_explained
 from taxel.detect.evidence import Evidence
 from taxel.detect.examples import check_examples, sizes_of
 from taxel.detect.fitting import Trained, fit_aligned
 from taxel.detect.floors import measured_floor
-from taxel.detect.folds import INNER, count_of_folds
+from taxel.detect.folds import count_of_folds
 from taxel.detect.loads import clock_of
 from taxel.detect.mistakes import many_wrong
 from taxel.detect.plain_score import plain_score
@@ -142,8 +140,6 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
         options = replace(options, recipe=recipe)
     plan = options._plan(names)
     assert plan is not None
-    if options.search and not any(len(plan.points_of(label)) > 1 for label in plan.neurons):
-        raise refused("search", ": the recipe lists no other points, as [neurons.LABEL] search = [{tau = 20.0}]")
     examples = _examples(opened, labelled, without, options.tare, plan)
     if sizes := sizes_of(examples):
         smallest, largest = ("{} x {}".format(*extreme) for extreme in (sizes[0], np.max(sizes, axis=0)))
@@ -235,20 +231,18 @@ class _Work:
             raise ProblemError(f"{text}; {causes[0]}") from None
 
     def _training(self, plan: Recipe, evidence: Evidence) -> Training:
-        folds, search, window_ms = self.options.folds, self.options.search, self.options.window_ms
+        folds, window_ms = self.options.folds, self.options.window_ms
         count, why = count_of_folds(self.examples) if folds is None else (folds, "" if folds else "folds is 0")
-        begun, given = perf_counter(), plan
-        with collected() if search else nullcontext():  # after a search it is trained again
-            trained = fit_aligned(self.examples, plan, self.update)
-        self._say_how_long(plan, perf_counter() - begun, count)
+        begun = perf_counter()
+        trained = fit_aligned(self.examples, plan, self.update)
+        self._say_how_long(perf_counter() - begun, count)
         registers = self.opened[0].registers
         frame_us = None if registers is None else registers.frame_us
 
         def judged(window_ms: float, shift_ms: float = 0.0) -> Judged:
-            how: dict[str, Any] = {"search": search, "window_ms": window_ms, "frame_us": frame_us}
             pairs = zip(self.examples, self.opened, strict=True)
             examples = [each._replace(labels=moved(each.labels, recording, shift_ms)) for each, recording in pairs]
-            return judge(examples, given, count, **how, progress=self.update)
+            return judge(examples, plan, count, window_ms=window_ms, frame_us=frame_us, progress=self.update)
 
         def tried(window_ms: float, shift_ms: float) -> Judged:
             shift = f", with labels moved by {shift_ms:+g} ms," * bool(shift_ms)
@@ -266,9 +260,6 @@ class _Work:
                 if folds is not None:
                     raise
                 count, why = 0, f"a part of the training data cannot be learnt from: {error}"
-        if search:
-            plan = choose(self.examples, plan, window_ms=window_ms, progress=self.update)
-            trained = fit_aligned(self.examples, plan, self.update)
         outcomes = self._outcomes(trained)
         data = training_data(self.examples, [outcome.found for outcome in outcomes])
         trained = trained._replace(readout=trained.readout._with(training=data))
@@ -283,7 +274,7 @@ class _Work:
             scored = replace(scored, plain=replace(scored.plain, rules=rules))
         scores = scored.together, trained_on.together, scored.scores
         of_window = scored.mistakes, window_ms, tried if count else None
-        causes = Mistakes(trained, *scores, search, scored.plain, *of_window).causes(evidence)
+        causes = Mistakes(trained, *scores, scored.plain, *of_window).causes(evidence)
         if evidence.falls and not causes:
             warn(evidence.falls)
         if count:
@@ -318,16 +309,14 @@ class _Work:
             return causes
         return by_recipe(untried, scored.together, judged.together, causes)
 
-    def _say_how_long(self, plan: Recipe, once_s: float, folds: int) -> None:
+    def _say_how_long(self, once_s: float, folds: int) -> None:
         """Say how long all takes by what one training on all data took, if that is more than a minute."""
         trainings = folds - 1
-        if self.options.search:
-            points = [len(plan.points_of(label)) for label in plan.neurons] or [1]
-            trainings += (folds + 1) * (INNER - 1) * round(sum(points) / len(points))
         if once_s * trainings < _LONG_S:
             return
-        parts = "the search and the folds take" if self.options.search else "the folds take"
-        ground = f"one training on all data took {once_s:.1f} s, and {parts} about as long as {trainings} of them"
+        ground = (
+            f"one training on all data took {once_s:.1f} s, and the folds take about as long as {trainings} of them"
+        )
         sooner = "fewer recordings, or no folds (--folds 0), are a quick trial"
         self.update(Forecast(f"about {once_s * trainings / 60:.0f} min left: {ground}; {sooner}"), 0, 0)
 

@@ -55,8 +55,6 @@ class TrainOptions:
     folds : int, optional
         In how many folds it is scored on held-out data; 0: on the training data. Default: at most 5, as many as the
         recordings and the rarest label allow.
-    search : bool
-        Whether each neuron's parameters are chosen among those that the recipe lists, on held-out data.
     window_ms : float, ms
         Largest distance of a detection from its event.
     shift_ms : float, ms
@@ -79,7 +77,6 @@ class TrainOptions:
     changes: Mapping[str, Any] = field(default_factory=dict)
     tare: GivenTare | None = None
     folds: int | None = None
-    search: bool = False
     window_ms: float = 50.0
     shift_ms: float = 0.0
     labels_as_given: bool = False
@@ -88,7 +85,6 @@ class TrainOptions:
         """Refuse values that no recordings and labels could make valid, before these are read."""
         mapping("changes", self.changes)
         check_tare(self.tare)
-        flag("search", self.search)
         flag("labels_as_given", self.labels_as_given)
         check_shift(self.shift_ms)
         finite("window_ms", self.window_ms, "ms", least=0.0)
@@ -213,8 +209,6 @@ class Training:
             for aligned in result["alignment"].values():
                 unpaired = aligned["unpaired"]
                 aligned["unpaired"] = [{"recording": self.recordings[k].title, "t_us": t} for k, t in unpaired]
-        if self.options.search:
-            result["neurons"] = {label: dict(self.made.recipe.neurons[label]) for label in self.readout.labels}
         return result
 
     def lines(self) -> list[str]:
@@ -236,10 +230,6 @@ class Training:
             about = self.made.recipe.about
             lines += ["", f"recipe {recipe}" + (f": {about}" if about else "")]
         lines += [*self._levels(), *self._tares(), repr(self.readout)]
-        for label in self.readout.labels if self.options.search else ():
-            point = self.made.recipe.neurons[label]
-            chosen = ", ".join(f"{key} {value}" for key, value in point.items() if key not in ("search", "choose"))
-            lines.append(f"{label}, chosen: {chosen}")
         lines += ["", *repr(self.scored.together).split("\n")]
         if len(self.scored.scores) > 1:
             titles = [recording.title for recording in self.recordings]
