@@ -12,7 +12,7 @@ from pathlib import Path
 
 TESTS = Path(__file__).parents[1] / "tests"
 #: Rooms whose tests quote sentences yet.
-YET = {"detect", "formats", "information", "live", "panel", "recording", "tasks"}
+YET = {"detect", "formats", "live", "panel", "recording", "tasks"}
 ERROR = re.compile(r"\bstr\((error|\w+\.value)\)")
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel.encode import FA1, ChangeEvents
@@ -306,19 +307,19 @@ def test_neurons_name_touches_too():
 
 
 @pytest.mark.parametrize(
-    ("change", "text"),
+    ("change", "argument"),
     [
-        ({"periods_ms": [0.5]}, "shorter than the recordings resolve"),
-        ({"window_ms": None}, "has no end"),
-        ({"windows_ms": [80]}, "must be from"),
-        ({"taxels": [7]}, "must be at most 2, because only these taxels send events"),
-        ({"taxels_at_ms": 3}, "one of the periods"),
-        ({"classifiers": ["forest"]}, "must be one of"),
-        ({"encoder": ChangeEvents(noise_floor=1e6)}, "found no event in any trial"),
-        ({"encoder": taxel.encode.LevelCrossing([5.0])}, "must be ChangeEvents or FA1"),
+        ({"periods_ms": [0.5]}, None),
+        ({"window_ms": None}, None),
+        ({"windows_ms": [80]}, "windows_ms"),
+        ({"taxels": [7]}, "taxels"),
+        ({"taxels_at_ms": 3}, "taxels_at_ms"),
+        ({"classifiers": ["forest"]}, "classifiers"),
+        ({"encoder": ChangeEvents(noise_floor=1e6)}, "trials"),
+        ({"encoder": taxel.encode.LevelCrossing([5.0])}, "encoder"),
     ],
 )
-def test_what_cannot_be_answered_is_one_clear_error(change, text):
+def test_what_cannot_be_answered_is_one_clear_error(change, argument):
     values = np.zeros((50, 1, 2))
     values[5::10] = 100
     frames = taxel.Frames(values, np.arange(50) * 1000)
@@ -326,13 +327,13 @@ def test_what_cannot_be_answered_is_one_clear_error(change, text):
     if "periods_ms" in change:
         events = [LabelledTrial(frames, "ab"[k % 2], 1000 * k, 1000 * k + 40_000) for k in range(20)]
     ask = {"encoder": ENCODER, "window_ms": 20, "draws": 1, "shuffles": 1} | change
-    with pytest.raises(taxel.ProblemError, match=text):
+    with refused(argument=argument):
         answer(events, **ask)
 
 
 def test_trials_of_two_arrays_are_refused():
     other = taxel.Frames(np.zeros((5, 2, 2)), np.arange(5))
-    with pytest.raises(taxel.ProblemError, match="all arrays must have the same size"):
+    with refused():
         answer([*trials_of(4), LabelledTrial(other, "left first", 0)], window_ms=20)
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
-import taxel
 from taxel.information import Estimate, estimate, folds, keeps, zero_test
 
 from .test_bits import channel
@@ -202,24 +202,24 @@ def test_the_rule_rarely_takes_a_setting_that_is_too_cheap():
 
 
 @pytest.mark.parametrize(
-    ("call", "text"),
+    ("call", "argument"),
     [
-        (lambda: estimate(["a", "a"], ["a", "b"]), "must be at least two"),
-        (lambda: estimate(["a", "b"], ["a"]), "one per label"),
-        (lambda: estimate(["a", "b"], ["a", "b"], groups=["x"]), "one per trial"),
-        (lambda: estimate(["a", "b"], [1, 2]), "two kinds"),
-        (lambda: estimate(["a", "b"], ["a", "b"], confidence=1.0), "between 0 and 1"),
-        (lambda: folds(["a"] * 5, count=2), "must be at least two"),
-        (lambda: folds(["a", "b"] * 2, count=10), "4 trials for 10 folds"),
+        (lambda: estimate(["a", "a"], ["a", "b"]), "labels"),
+        (lambda: estimate(["a", "b"], ["a"]), "responses"),
+        (lambda: estimate(["a", "b"], ["a", "b"], groups=["x"]), "groups"),
+        (lambda: estimate(["a", "b"], [1, 2]), None),
+        (lambda: estimate(["a", "b"], ["a", "b"], confidence=1.0), "confidence"),
+        (lambda: folds(["a"] * 5, count=2), "labels"),
+        (lambda: folds(["a", "b"] * 2, count=10), None),
         (
             lambda: folds(["a", "a", "b", "b"], count=2, groups=["x", "y", "z", "z"]),
-            "'b': all its trials are in group 'z'",
+            None,
         ),
-        (lambda: folds(["a", "a", "b"], count=2), "label 'b' has one trial"),
+        (lambda: folds(["a", "a", "b"], count=2), None),
     ],
 )
-def test_what_cannot_be_told_is_one_clear_error(call, text):
-    with pytest.raises(taxel.ProblemError, match=text):
+def test_what_cannot_be_told_is_one_clear_error(call, argument):
+    with refused(argument=argument):
         call()
 
 
@@ -240,5 +240,5 @@ def test_estimates_of_other_trials_are_not_compared():
     a = estimate([0, 1, 0, 1], [0, 1, 0, 1], redraws=2)
     b = estimate([0, 1], [0, 1], redraws=2)
     assert isinstance(a, Estimate)
-    with pytest.raises(taxel.ProblemError, match="of the same"):
+    with refused():
         keeps(a, b)

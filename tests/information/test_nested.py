@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from refusal import refused_saying as refused
+from refusal import refused
 from sklearn.base import clone
 from sklearn.model_selection import cross_val_score
 
-from taxel import ProblemError, SpikeTrains
+from taxel import SpikeTrains
 from taxel.information import ConeRReadout, nested_predictions
 
 
@@ -23,8 +23,7 @@ def clouds(trials, features, classes, seed, apart=1.0):
 @pytest.mark.parametrize("ridge", [5e-324, 1e-310, 1e-200, 1e-17])
 def test_a_ridge_that_rounding_loses_is_named(ridge, scale):
     x, y = np.random.default_rng(3).normal(size=(30, 4)), np.repeat([0, 1, 2], 10)
-    lost = r"^ridge: .* in the unit of the inner products is below their rounding error; must be at least"
-    with pytest.raises(ProblemError, match=lost):
+    with refused(argument="ridge"):
         nested_predictions([scale * (x @ x.T)], [4], y, ridges=[1.0, ridge])
 
 
@@ -70,18 +69,18 @@ def test_a_class_that_a_training_set_lacks_is_said():
 
 
 @pytest.mark.parametrize(
-    ("call", "text"),
+    ("call", "argument"),
     [
-        (lambda: nested_predictions([[[1.0, 2.0], [3.0, 1.0]]], [3], [0, 1], count=2), "not symmetric"),
-        (lambda: nested_predictions([np.eye(4)], [4, 4], [0, 1, 0, 1], count=2), "one per matrix"),
-        (lambda: nested_predictions([np.eye(4)], [4], [0, 1, 0, 1], count=2, ridges=[0.0]), "above 0"),
-        (lambda: nested_predictions([np.eye(4)], [4], [0, 0, 0, 0], count=2), "must have at least two"),
-        (lambda: ConeRReadout().predict([]), "not fitted"),
-        (lambda: ConeRReadout().set_params(bounds=1), "no parameter 'bounds'"),
+        (lambda: nested_predictions([[[1.0, 2.0], [3.0, 1.0]]], [3], [0, 1], count=2), "gram"),
+        (lambda: nested_predictions([np.eye(4)], [4, 4], [0, 1, 0, 1], count=2), "features"),
+        (lambda: nested_predictions([np.eye(4)], [4], [0, 1, 0, 1], count=2, ridges=[0.0]), "ridges"),
+        (lambda: nested_predictions([np.eye(4)], [4], [0, 0, 0, 0], count=2), "y"),
+        (lambda: ConeRReadout().predict([]), None),
+        (lambda: ConeRReadout().set_params(bounds=1), None),
     ],
 )
-def test_what_cannot_be_learnt_is_one_clear_error(call, text):
-    with pytest.raises(ProblemError, match=text):
+def test_what_cannot_be_learnt_is_one_clear_error(call, argument):
+    with refused(argument=argument):
         call()
 
 
@@ -99,5 +98,5 @@ def test_a_readout_of_classes_refuses_graded_trains_by_name():
     )
     one = ConeRReadout().fit(plain, [0, 0, 1, 1])
     for call in (lambda: ConeRReadout().fit(graded, [0, 0, 1, 1]), lambda: one.predict(graded)):
-        with refused("^ConeRReadout takes no graded trains"):
+        with refused():
             call()

@@ -1,0 +1,31 @@
+"""What questions about information say that makes no answer possible."""
+
+import numpy as np
+from refusal import messages
+
+import taxel
+from taxel import Frames, SpikeTrains
+from taxel.information import ConeRReadout, LabelledTrial, answer, estimate, folds, nested_predictions
+
+GRADED = [SpikeTrains.from_lists([[1.0]], values=[[2.0]], kind="graded")] * 2
+CALLS = {
+    "classes": lambda _: estimate(["a", "a"], ["a", "b"]),
+    "responses": lambda _: estimate(["a", "b"], ["a"]),
+    "two kinds": lambda _: estimate(["a", "b"], [1, 2]),
+    "confidence": lambda _: estimate(["a", "b"], ["a", "b"], confidence=1.0),
+    "folds": lambda _: folds(["a", "b"] * 2, count=10),
+    "one trial": lambda _: folds(["a", "a", "b"], count=2),
+    "one group": lambda _: folds(["a", "a", "b", "b"], count=2, groups=["x", "y", "z", "z"]),
+    "ridge": lambda _: nested_predictions([np.eye(4)], [4], [0, 1, 0, 1], count=2, ridges=[0.0]),
+    "not symmetric": lambda _: nested_predictions([[[1.0, 2.0], [3.0, 1.0]]], [3], [0, 1], count=2),
+    "not fitted": lambda _: ConeRReadout().predict([]),
+    "graded": lambda _: ConeRReadout().fit(GRADED, [0, 1]),
+    "arrays": lambda _: answer(
+        [LabelledTrial(Frames(np.zeros((5, 1, n)), np.arange(5)), str(n), 0) for n in (2, 3)], window_ms=20
+    ),
+    "table": lambda folder: taxel.information.read_trials(folder, []),
+}
+
+
+def test_messages(tmp_path, snapshot):
+    assert messages(CALLS, tmp_path) == snapshot
