@@ -15,7 +15,7 @@ from loopback import until
 from taxel._base.child_process import ChildProcess
 
 #: What a child may do that makes it hard to end; it says its number first.
-SAYS = "import os, pathlib, time; pathlib.Path('number').write_text(str(os.getpid()))\n"
+SAYS = "import os, pathlib, time\npathlib.Path('half').write_text(str(os.getpid()))\nos.rename('half', 'number')\n"
 STUBBORN = {
     "plain": "time.sleep(600)",
     "ignores signals": "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); time.sleep(600)",
