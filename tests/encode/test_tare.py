@@ -11,7 +11,7 @@ import taxel
 from taxel import Array, Events, Frames, Tare
 from taxel._base.errors import Place
 from taxel.cli import app
-from taxel.encode import SA1, SA2, Skin
+from taxel.encode import SA1, SA2
 
 from .scenes import spikes_of, touch
 
@@ -129,7 +129,7 @@ def test_a_file_that_is_no_tare_is_named(tmp_path):
         Tare.load(tmp_path / "none.json")
 
 
-@pytest.mark.parametrize("encoder", [SA1(period_ms=0.5, threshold=0.01), SA2(threshold=0.01), Skin(period_ms=0.5)])
+@pytest.mark.parametrize("encoder", [SA1(period_ms=0.5, threshold=0.01), SA2(threshold=0.01)])
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_held_pressure_counts_from_rest(encoder, seed):
@@ -154,7 +154,7 @@ def test_held_pressure_counts_from_rest(encoder, seed):
     assert sorted(spike for piece in pieces for spike in spikes_of(piece)) == spikes_of(of_events)
 
 
-@pytest.mark.parametrize("encoder", ["sa1", "sa2", "skin"])
+@pytest.mark.parametrize("encoder", ["sa1", "sa2"])
 def test_the_command_takes_the_rest_from_afferents_that_feel_held_pressure(encoder, tmp_path):
     """Two boards that differ in the rest of their taxels alone fire alike; with nothing on it, SA-1 is silent."""
     t = np.repeat(np.arange(0, 1_000_000, 2000), 4)

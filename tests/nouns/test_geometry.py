@@ -137,8 +137,6 @@ def test_without_a_pitch_a_grid_counts_in_columns_and_rows_and_channels_refuse()
 @pytest.mark.parametrize(
     "work",
     [
-        lambda: taxel.encode.Skin(seed=1).afferents(Array(8, 8, name="mat")),
-        lambda: taxel.encode.Skin(seed=1).afferents(FOOT),
         lambda: _moments(Array(4, 4, name="mat"), displacement_mm=(1.0, 9.0)),
         lambda: _moments(Array(1, 4, name="foot"), displacement_mm=(1.0, 9.0)),
         lambda: _moments(Array(1, 4, name="foot"), area=(1.0, 9.0), graded=True, centre=True),

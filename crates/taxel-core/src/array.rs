@@ -376,10 +376,10 @@ mod tests {
         let channels = Array::unmeasured(1, 8, "foot");
         assert!(
             channels
-                .pitch("skin")
+                .pitch("moments")
                 .unwrap_err()
                 .to_string()
-                .contains("skin needs distances in mm, but the pitch of foot")
+                .contains("moments needs distances in mm, but the pitch of foot")
         );
         assert!(channels.check_neighbours("area").unwrap_err().to_string().contains("area needs taxels"));
         Array::new(1, 8, 5.0, "line").unwrap().check_neighbours("area").unwrap();

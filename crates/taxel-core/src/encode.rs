@@ -5,7 +5,6 @@ mod bracket;
 mod by_stamp;
 mod channels;
 mod encoding;
-mod fields;
 mod loaded;
 mod local_sums;
 mod periods;
@@ -107,8 +106,6 @@ encoders! {
     sa2: Sa2,
     /// The FA-2 afferent, which responds to vibration and to the moment of contact.
     fa2: Fa2,
-    /// Afferents of all four types, each at its own position.
-    skin: Skin,
     /// The number of loaded taxels.
     contact_area: ContactArea,
     /// Quantities of a touch in units of each taxel's own noise.

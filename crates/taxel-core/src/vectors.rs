@@ -11,9 +11,8 @@ mod fetch;
 mod front;
 mod instructions;
 mod products;
-mod windows;
 
-pub(crate) use aligned::{Aligned, OnLine};
+pub(crate) use aligned::Aligned;
 pub(crate) use eight::{LANES, Vector, lines, lines_mut};
 #[cfg(target_arch = "x86_64")]
 pub(crate) use eight::{Ymm, Zmm};
@@ -24,4 +23,3 @@ pub use instructions::Instructions;
 pub(crate) use instructions::{by_width, kernel, wide};
 pub use products::dot;
 pub(crate) use products::{add, add_lines, times};
-pub(crate) use windows::{ROW, WIDE, Windows};

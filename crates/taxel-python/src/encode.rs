@@ -2,7 +2,7 @@
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use taxel_core::encode::{Encoder, LocalLoad, Pieces, Skin, Tare};
+use taxel_core::encode::{Encoder, LocalLoad, Pieces, Tare};
 
 use taxel_core::problem;
 
@@ -10,8 +10,6 @@ use taxel_border::convert::{ArrayParts, EventsIn, FramesIn, SpikesOut, from_spik
 use taxel_border::enter::{Exclusive, enter};
 use taxel_border::errors::core;
 
-/// Types, x and y of a skin's afferents.
-type SkinAfferents = (Vec<&'static str>, Vec<f64>, Vec<f64>);
 
 /// Checks an encoder; gives it back with every default filled in.
 #[pyfunction]
@@ -30,21 +28,6 @@ pub fn encoder_names() -> Vec<&'static str> {
 pub fn encoder_about(encoder: &str, array: ArrayParts) -> PyResult<(usize, &'static str, f64)> {
     let (encoder, array) = (Encoder::from_json(encoder).map_err(core)?, to_array(array)?);
     Ok((encoder.trains(&array), encoder.kind().name(), encoder.latency_ms()))
-}
-
-/// Type and place (x, y in mm) of each afferent of a skin on an array, a train each.
-#[pyfunction]
-pub fn skin_afferents(py: Python<'_>, skin: &str, array: ArrayParts) -> PyResult<SkinAfferents> {
-    let Encoder::Skin(skin) = Encoder::from_json(skin).map_err(core)? else {
-        return Err(core(problem!("skin: must be one")));
-    };
-    let array = to_array(array)?;
-    let placed = enter(py, |_| Skin::afferents(&skin, &array))?;
-    Ok((
-        placed.iter().map(|p| p.kind.name()).collect(),
-        placed.iter().map(|p| p.x_mm).collect(),
-        placed.iter().map(|p| p.y_mm).collect(),
-    ))
 }
 
 /// The parameters of a local load.

@@ -15,8 +15,6 @@ from taxel.encode.peak import Peak as Peak
 from taxel.encode.sa1 import SA1 as SA1
 from taxel.encode.sa2 import SA2 as SA2
 from taxel.encode.separate_loads import SeparateLoads as SeparateLoads
-from taxel.encode.skin import Afferents as Afferents
-from taxel.encode.skin import Skin as Skin
 from taxel.encode.threshold_izhikevich import ThresholdIzhikevich as ThresholdIzhikevich
 from taxel.encode.touch_ends import TouchEnds as TouchEnds
 

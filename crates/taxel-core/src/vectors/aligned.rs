@@ -5,11 +5,6 @@ use super::eight::LANES;
 /// Bytes of a cache line.
 const LINE: usize = 64;
 
-/// A value that is aligned to a cache line.
-#[derive(Debug, Clone, Copy)]
-#[repr(align(64))]
-pub(crate) struct OnLine<T>(pub(crate) T);
-
 /// Numbers aligned to a cache line, so that no vector straddles two lines.
 #[derive(Debug, Default)]
 pub(crate) struct Aligned {
