@@ -18,7 +18,7 @@ from taxel_benchmarks._touch import compare, scene
 
 
 def numpy_fa1(frames: Frames, theta_0: float) -> list[Any]:
-    """Return (t, taxel, polarity) by equations 5.1 to 5.5; T 0.192 ms, the threshold falls by 5 % of theta_0 a sample."""
+    """Return (t, taxel, polarity) by equations 5.1 to 5.5; T 0.192 ms, the threshold falls by 5 % a sample."""
     spikes, shape = [], frames.values[0].shape
     jump, fall = 0.192 * 20 * theta_0, 0.05 * theta_0
     last = np.maximum(frames.values[0], 0).astype(np.float64) ** 0.7

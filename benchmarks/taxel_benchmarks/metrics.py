@@ -1,13 +1,11 @@
-"""Distances between spike trains against elephant's matrices and PySpike's: the cost of a pair, and of a large matrix.
+"""Distances between spike trains against elephant's matrices: the cost of a pair, and of a large matrix.
 
-Trains of 1 s, Victor-Purpura at 50/s, van Rossum at 20 ms. Elephant and PySpike are called for a whole matrix of trains
-(``victor_purpura_distance``, ``van_rossum_distance``, ``isi_distance_matrix``, ``spike_distance_matrix``), as are we
-(``taxel.metrics.pairwise``); elephant's calls on two trains take 2 to 20 times as long a pair as its matrices. Then
-patterns of 256 taxels with about 100 spikes each, as in a matrix of 1800 by 1800: 240 or fewer against each other,
-scaled to all 1 619 100 pairs. One thread.
+Trains of 1 s, Victor-Purpura at 50/s, van Rossum at 20 ms. Elephant is called for a whole matrix of trains
+(``victor_purpura_distance``, ``van_rossum_distance``), as are we (``taxel.metrics.pairwise``); its calls on two trains
+take 2 to 20 times as long a pair as its matrices. Then patterns of 256 taxels with about 100 spikes each, as in a
+matrix of 1800 by 1800: 240 or fewer against each other, scaled to all 1 619 100 pairs. One thread.
 
-Peer: elephant, and PySpike. Unit: CPU seconds a pair; of the large matrix, minutes. Goal: not slower than either, and
-the same distances.
+Peer: elephant. Unit: CPU seconds a pair; of the large matrix, minutes. Goal: not slower, and the same distances.
 """
 
 import os
@@ -28,9 +26,9 @@ from taxel_benchmarks._rounds import compared, measure, stamp
 Q, TAU = 0.05, 20.0
 MATRIX, TAXELS, SPIKES = 1800, 256, 100
 
-#: The modules that each peer needs.
-MEASURED = ("elephant victor_purpura", "elephant van_rossum", "PySpike isi_distance", "PySpike spike_distance")
-PEERS = {"elephant": "elephant neo quantities", "PySpike": "pyspike"}
+MEASURED = ("elephant victor_purpura", "elephant van_rossum")
+#: The modules that the peer needs.
+PEERS = {"elephant": "elephant neo quantities"}
 
 
 def trains(random, count, spikes, stop=1000.0):
@@ -63,22 +61,8 @@ def by_elephant(lists):
     }
 
 
-def by_pyspike(lists):
-    """Return PySpike's matrices of these trains."""
-    import pyspike  # noqa: PLC0415  a peer need not be there
-
-    spy = [pyspike.SpikeTrain(t, (0.0, 1000.0)) for t in lists]
-    return {
-        "PySpike isi_distance": lambda: pyspike.isi_distance_matrix(spy),
-        "PySpike spike_distance": lambda: pyspike.spike_distance_matrix(spy),
-    }
-
-
-CALLS = {"elephant": by_elephant, "PySpike": by_pyspike}
-
-
-def against_peers(spikes, absent, *, quick):
-    """Measure ours and the peers on pairs of trains with this number of spikes."""
+def against_elephant(spikes, absent, *, quick):
+    """Measure ours and elephant on pairs of trains with this number of spikes."""
     random = np.random.default_rng(spikes)
     count = 10 if quick else 60
     lists = trains(random, count, spikes)
@@ -89,10 +73,8 @@ def against_peers(spikes, absent, *, quick):
     repeated = {
         "taxel victor_purpura": lambda: pairwise("victor_purpura", ours, q=Q, threads=1),
         "taxel van_rossum": lambda: pairwise("van_rossum", ours, tau=TAU, threads=1),
-        "taxel isi_distance": lambda: pairwise("isi_distance", ours, threads=1),
-        "taxel spike_distance": lambda: pairwise("spike_distance", ours, threads=1),
     }
-    peers = {name: run for peer in PEERS if peer not in absent for name, run in CALLS[peer](lists).items()}
+    peers = {} if absent else by_elephant(lists)
     mine = {name: (lambda run=run: [run() for _ in range(often)]) for name, run in repeated.items()}
     results = measure({**mine, **peers}, rounds=1 if quick else 5, work=pairs)
     for name in mine:
@@ -146,7 +128,6 @@ def large(*, quick):
     array = {"array": Array(16, 16, pitch_mm=2.67)}
     whole = MATRIX * (MATRIX - 1) / 2
     found = {}
-    least = max(most // 12, 4)
     for name, count, work in (
         ("van Rossum summed over taxels", most, partial(minutes, "van_rossum", patterns, tau=TAU)),
         (
@@ -155,11 +136,6 @@ def large(*, quick):
             partial(minutes, "van_rossum_spatial", patterns, tau=TAU, **array),
         ),
         ("the same, tau 0.4 ms as in the thesis", most, partial(minutes, "van_rossum_spatial", patterns, **array)),
-        (
-            "sum of absolute differences with the spatial kernel",
-            least,
-            partial(minutes, "van_rossum_spatial_absolute", patterns[:least], **array),
-        ),
         *(
             (f"Victor-Purpura summed over taxels, {name}", count, partial(minutes_with, instructions, count))
             for name, instructions, count in (
@@ -200,10 +176,10 @@ def run(*, quick):
     """Measure; quick: few trains, one round."""
     warnings.simplefilter("ignore")
     absent = missing(PEERS)
-    small = {f"{spikes} spikes": against_peers(spikes, absent, quick=quick) for spikes in (20, 200)}
+    small = {f"{spikes} spikes": against_elephant(spikes, absent, quick=quick) for spikes in (20, 200)}
     return {
         "question": __doc__.splitlines()[0],
-        **stamp("elephant", "pyspike", "neo"),
+        **stamp("elephant", "neo"),
         "left out": absent,
         "against peers": small,
         "large matrices": large(quick=quick),

@@ -188,7 +188,7 @@ def neuron_potential(
 
 # metrics: a metric as JSON; patterns as (name, count, trains, times, offsets, window, listed)
 
-_Patterns = tuple[str, int, int, NDArray[np.float64], NDArray[np.int64], tuple[float, float] | None, bool]
+_Patterns = tuple[str, int, int, NDArray[np.float64], NDArray[np.int64], bool]
 
 def distance(metric: str, a: _Patterns, b: _Patterns) -> float: ...
 def instructions() -> str: ...

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.distance import cdist
 
 from taxel import SceneError
 from taxel.array import Array
@@ -37,7 +36,6 @@ __all__ = [
     "Condition",
     "Drops",
     "Rig",
-    "absolute_distances",
     "conditions",
     "distances_of",
     "frames_of",
@@ -382,26 +380,6 @@ def spatial_grams(
 def distances_of(gram: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the Euclidean distances of trials from their inner products."""
     return np.asarray(np.sqrt(np.maximum(squared_distances(gram), 0.0)))
-
-
-def absolute_distances(
-    spikes: NDArray[np.uint8], period_ms: float, tau: float, kernel: NDArray[np.float32]
-) -> NDArray[np.float64]:
-    """Return the distances of all patterns as 5.10 and 5.12 are printed: absolute differences, summed over samples.
-
-    Parameters are those of `spatial_grams`; the distances `taxel.metrics.van_rossum_spatial_absolute` with the period
-    as its step.
-    """
-    count, samples, layers, taxels = spikes.shape
-    state = np.zeros((count, layers, taxels), np.float32)
-    decay = np.float32(np.exp(-period_ms / tau))
-    total = np.zeros((count, count))
-    for k in range(samples):
-        state *= decay
-        state += spikes[:, k]
-        smooth = (state.reshape(-1, taxels) @ kernel).reshape(count, -1)
-        total += cdist(smooth, smooth, "cityblock")
-    return total
 
 
 def named_by_neighbours(distances: NDArray[np.float64], y: NDArray[np.int64], neighbours: int) -> NDArray[np.int64]:

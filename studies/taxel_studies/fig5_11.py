@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 
 from taxel.array import Array
 from taxel.spikes import to_ms
@@ -111,7 +112,7 @@ def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> Any:
         return [_bits(distances_of(gram[0]), y, params)["bits"] for gram in grams]
     kernel = dropped.smoothed(REGION, pitch, params["sigma_mm"])
     if params["ask"] == "absolute":
-        return _bits(dropped.absolute_distances(spikes, period, tau, kernel), y, params)
+        return _bits(absolute_distances(spikes, period, tau, kernel), y, params)
     if params["ask"] == "any phase":
         gram = dropped.spatial_grams(spikes, period, tau, [kernel], [spikes.shape[1]])[0][0]
         return _bits(distances_of(gram), y, params)
@@ -130,6 +131,25 @@ def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> Any:
         "events": round(float(spikes.sum()) / len(spikes), 1),
         "times": [[t, times[end]] for t, end in zip(params["times_ms"], ends, strict=True)],
     }
+
+
+def absolute_distances(
+    spikes: NDArray[np.uint8], period_ms: float, tau: float, kernel: NDArray[np.float32]
+) -> NDArray[np.float64]:
+    """Return the distances of all patterns as 5.10 and 5.12 are printed: absolute differences, summed over samples.
+
+    Parameters are those of `dropped.spatial_grams`.
+    """
+    count, samples, layers, taxels = spikes.shape
+    state = np.zeros((count, layers, taxels), np.float32)
+    decay = np.float32(np.exp(-period_ms / tau))
+    total = np.zeros((count, count))
+    for k in range(samples):
+        state *= decay
+        state += spikes[:, k]
+        smooth = (state.reshape(-1, taxels) @ kernel).reshape(count, -1)
+        total += cdist(smooth, smooth, "cityblock")
+    return total
 
 
 def _samples_before(time_ms: float, period_ms: float, most: int) -> int:

@@ -62,15 +62,17 @@ def test_an_end_leaves_out_what_comes_after_it():
         np.testing.assert_allclose(late, dropped.spatial_grams(spikes, PERIOD_MS, 0.7, [kernel], [12])[0][0], rtol=1e-6)
 
 
-def test_absolute_differences_are_those_of_metrics():
-    spikes, trains = patterns(layers=1)
-    array, samples = Array(SIDE, SIDE, pitch_mm=2.67), spikes.shape[1]
-    found = dropped.absolute_distances(spikes, PERIOD_MS, 0.7, dropped.smoothed(SIDE, array.pitch_mm, 2.0))
-    # Samples at the spikes' own times, up to the last of them.
-    window = (0.0, (samples - 1) * PERIOD_MS)
-    wanted = pairwise(
-        "van_rossum_spatial_absolute", trains, array=array, tau=0.7, sigma=2.0, window=window, step_ms=PERIOD_MS
-    )
+def test_absolute_differences_are_5_10_and_5_12_as_printed():
+    tau, sigma, pitch = 0.7, 2.0, 2.67
+    spikes, _ = patterns()
+    found = fig5_11.absolute_distances(spikes, PERIOD_MS, tau, dropped.smoothed(SIDE, pitch, sigma))
+    past = PERIOD_MS * np.subtract.outer(np.arange(spikes.shape[1]), np.arange(spikes.shape[1]))
+    in_time = np.where(past >= 0, np.exp(-np.maximum(past, 0) / tau), 0)
+    row, column = np.divmod(np.arange(SIDE * SIDE), SIDE)
+    apart = pitch * np.hypot(np.subtract.outer(row, row), np.subtract.outer(column, column))
+    in_space = np.exp(-apart / sigma) + np.eye(SIDE * SIDE)  # a train counts twice at its own taxel
+    g = np.einsum("ts,psln,nm->ptlm", in_time, spikes, in_space)
+    wanted = np.abs(g[:, None] - g[None]).sum((2, 3, 4))
     np.testing.assert_allclose(found, wanted, rtol=1e-4, atol=1e-4)
 
 

@@ -17,16 +17,10 @@ from taxel.metrics import pairwise
 from taxel.metrics._metric import listed, stated
 
 ARRAY = Array(2, 3, pitch_mm=1.0)
-WINDOW = (0.0, 1000.0)
 METRICS = {
     "victor_purpura": {"q": 0.05},
-    "victor_purpura_multi_unit": {"q": 0.05, "k": 0.5},
     "van_rossum": {"tau": 20.0},
-    "van_rossum_absolute": {"tau": 20.0},
     "van_rossum_spatial": {"array": ARRAY, "tau": 5.0},
-    "van_rossum_spatial_absolute": {"array": ARRAY, "tau": 5.0},
-    "isi_distance": {"window": WINDOW},
-    "spike_distance": {"window": WINDOW},
 }
 
 
@@ -115,7 +109,7 @@ def test_trains_may_stand_alone_in_lists_or_in_spike_trains():
     lists = poisson(np.random.default_rng(0), 5, 12)
     together = SpikeTrains.from_lists(lists, 0.0, 1000.0)
     alone = [SpikeTrains.from_lists([t], 0.0, 1000.0) for t in lists]
-    for metric in ("victor_purpura", "van_rossum", "isi_distance"):
+    for metric in ("victor_purpura", "van_rossum"):
         parameters = METRICS[metric]
         expected = pairwise(metric, lists, **parameters)
         assert np.array_equal(pairwise(metric, together, **parameters), expected)

@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 NAMES = _core.metric_names()
 ARRAY = Array(2, 2, pitch_mm=2.0)
 #: Metrics with required parameters.
-GIVEN = {"q": 0.2, "k": 0.5, "tau": 3.0, "array": ARRAY}
+GIVEN = {"q": 0.2, "tau": 3.0, "array": ARRAY}
 each_metric = pytest.mark.parametrize("name", NAMES)
 #: Modules of the package that are not metrics.
 OTHERS = {"matching", "pairwise"}

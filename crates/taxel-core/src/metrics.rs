@@ -1,11 +1,10 @@
 //! Distances between spike trains, and between patterns of many trains.
 //!
 //! A metric is a value of [`Metric`]; [`Metric::distance`] compares two patterns, [`Metric::pairwise`] computes
-//! matrices. A distance between trains is extended to patterns as the sum over trains with the same number; the metrics
-//! with `spatial` or `multi_unit` in their names use other trains as well.
+//! matrices. A distance between trains is extended to patterns as the sum over trains with the same number; the metric
+//! with `spatial` in its name uses other trains as well.
 
 mod distance;
-mod edges;
 pub mod matching;
 mod merged;
 mod pairwise;
@@ -73,20 +72,10 @@ macro_rules! metrics {
 metrics! {
     /// The least cost of turning one train into the other.
     victor_purpura: VictorPurpura,
-    /// The least cost of turning one pattern into the other, if a spike may also change its train.
-    victor_purpura_multi_unit: VictorPurpuraMultiUnit,
     /// Euclidean distance between trains smoothed by an exponential.
     van_rossum: VanRossum,
-    /// Time integral, or sum, of the absolute difference between trains smoothed by an exponential.
-    van_rossum_absolute: VanRossumAbsolute,
     /// Euclidean distance between patterns smoothed in time and over the array.
     van_rossum_spatial: VanRossumSpatial,
-    /// Sum over taxels and time of the absolute difference between patterns smoothed in time and over the array.
-    van_rossum_spatial_absolute: VanRossumSpatialAbsolute,
-    /// The difference between the trains' interspike intervals, averaged over time.
-    isi_distance: IsiDistance,
-    /// The distance of spikes to the nearest spikes of the other train, averaged over time.
-    spike_distance: SpikeDistance,
 }
 
 impl Metric {

@@ -12,9 +12,9 @@ use taxel_border::convert::{array, slice};
 use taxel_border::enter::{enter, enter_with_progress};
 use taxel_border::errors::core;
 
-/// Patterns as Python hands them over: name, count, trains, times, offsets, window, listed.
+/// Patterns as Python hands them over: name, count, trains, times, offsets, listed.
 type PatternsIn<'py> =
-    (String, usize, usize, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, i64>, Option<(f64, f64)>, bool);
+    (String, usize, usize, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, i64>, bool);
 
 /// Patterns with their offsets as the core wants them.
 struct OffsetPatterns<'py> {
@@ -29,14 +29,13 @@ impl<'py> OffsetPatterns<'py> {
     }
 
     fn patterns(&self) -> PyResult<Patterns<'_>> {
-        let (name, count, trains, times, _, window, listed) = &self.parts;
+        let (name, count, trains, times, _, listed) = &self.parts;
         Ok(Patterns {
             name,
             count: *count,
             trains: *trains,
             times: slice("times", times)?,
             offsets: &self.offsets,
-            window: *window,
             listed: *listed,
         })
     }

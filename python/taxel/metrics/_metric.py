@@ -29,11 +29,6 @@ def stated(metric: str, options: Mapping[str, Any]) -> str:
 def _plain(metric: str, name: str, value: Any) -> Any:
     if name == "array":
         return instance(name, value, Array)._geometry()
-    if name == "window" and value is not None:
-        ends = floats(name, value, "ms")
-        if len(ends) != 2:
-            raise refused(name, f" has {len(ends)} entries: must be two, start and stop in ms")
-        return ends.tolist()
     known = ranges(metric).get(name, {})
     if "infinite" in known:
         # JSON has no infinite numbers; for parameters that may be infinite the compiled part reads the text.
@@ -56,9 +51,9 @@ def distance(metric: str, a: Pattern, b: Pattern, options: Mapping[str, Any]) ->
 def _one(metric: str, name: str, x: Pattern) -> tuple[Any, ...]:
     if isinstance(x, SpikeTrains):
         trains = _unvalued(metric, x)
-        return name, 1, len(trains), trains.times, trains.offsets, (x.start, x.stop), False
+        return name, 1, len(trains), trains.times, trains.offsets, False
     times = floats(name, x, "ms")
-    return name, 1, 1, times, np.array([0, len(times)]), None, False
+    return name, 1, 1, times, np.array([0, len(times)]), False
 
 
 def listed(metric: str, name: str, x: SpikeTrains | Sequence[Pattern]) -> tuple[Any, ...]:
@@ -67,13 +62,12 @@ def listed(metric: str, name: str, x: SpikeTrains | Sequence[Pattern]) -> tuple[
         if x.signed:
             raise refused(name, " has signed trains: choose some by split_by_sign(), or give a list of patterns")
         x._ungraded(metric)
-        return name, len(x), 1, x.times, x.offsets, (x.start, x.stop), True
+        return name, len(x), 1, x.times, x.offsets, True
     entries = several(name, x)
     if not any(isinstance(entry, SpikeTrains) for entry in entries):
         times = [floats(f"{name}[{p}]", entry, "ms") for p, entry in enumerate(entries)]
-        return name, len(times), 1, _joined(times), _offsets([len(t) for t in times]), None, True
+        return name, len(times), 1, _joined(times), _offsets([len(t) for t in times]), True
     patterns = [instance(f"{name}[{p}]", entry, SpikeTrains) for p, entry in enumerate(entries)]
-    window = (min(p.start for p in patterns), max(p.stop for p in patterns))
     patterns = [_unvalued(metric, p) for p in patterns]
     trains = len(patterns[0])
     for p, pattern in enumerate(patterns):
@@ -82,7 +76,7 @@ def listed(metric: str, name: str, x: SpikeTrains | Sequence[Pattern]) -> tuple[
                 name, f"[{p}] has {counted(len(pattern), 'train')}, {name}[0] has {trains}: must be equally many"
             )
     offsets = _offsets(np.concatenate([p.counts for p in patterns]))
-    return name, len(patterns), trains, _joined([p.times for p in patterns]), offsets, window, True
+    return name, len(patterns), trains, _joined([p.times for p in patterns]), offsets, True
 
 
 def _unvalued(metric: str, trains: SpikeTrains) -> SpikeTrains:

@@ -15,8 +15,6 @@ pub struct Patterns<'a> {
     pub times: &'a [f64],
     /// The start of each train in `times`, and finally the end of all: `count * trains + 1` entries.
     pub offsets: &'a [usize],
-    /// The widest window of the patterns, ms, if they have one.
-    pub window: Option<(f64, f64)>,
     /// Whether the caller passed a list, so that errors name the entry.
     pub listed: bool,
 }
@@ -27,12 +25,6 @@ impl Patterns<'_> {
     pub fn train(&self, p: usize, n: usize) -> &[f64] {
         let k = p * self.trains + n;
         &self.times[self.offsets[k]..self.offsets[k + 1]]
-    }
-
-    /// All times of pattern `p`, train after train; ms.
-    #[must_use]
-    pub fn all(&self, p: usize) -> &[f64] {
-        &self.times[self.offsets[p * self.trains]..self.offsets[(p + 1) * self.trains]]
     }
 
     /// The name of train `n` of pattern `p` in errors.

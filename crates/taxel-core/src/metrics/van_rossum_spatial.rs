@@ -142,7 +142,7 @@ impl VanRossumSpatial {
     fn square(&self, kernel: &SmoothingKernel, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         let tau = self.smoothing.tau;
         let mut square = 0.0;
-        kernel.walk(tau, a, b, SmoothingState::Squares, stop, |sum, from, to| {
+        kernel.walk(tau, a, b, stop, |sum, from, to| {
             square -= sum * (-2.0 * (to - from) / tau).exp_m1();
         })?;
         Ok(square)
@@ -157,13 +157,6 @@ pub(super) struct SmoothingKernel {
     /// The contributions by offset, from row -(rows - 1) and column -(columns - 1) on: those of taxel n to one row of
     /// the array are consecutive.
     by_offset: Vec<f64>,
-}
-
-/// The quantity that is summed over taxels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum SmoothingState {
-    Squares,
-    Absolutes,
 }
 
 /// Heights are stored in units that grow with time, and rescaled when the power exceeds this.
@@ -200,13 +193,12 @@ impl SmoothingKernel {
     }
 
     /// Traverses the steps of both patterns. For each interval between steps, and for the time after the last one,
-    /// passes on the sum over taxels of the squared or absolute differences at its beginning.
-    pub(super) fn walk(
+    /// passes on the sum over taxels of the squared differences at its beginning.
+    fn walk(
         &self,
         tau: f64,
         (a, p): Pattern<'_>,
         (b, q): Pattern<'_>,
-        gauge: SmoothingState,
         stop: Stop<'_>,
         mut stretch: impl FnMut(f64, f64, f64),
     ) -> Result<()> {
@@ -234,7 +226,7 @@ impl SmoothingKernel {
             for &(_, n, more) in group {
                 self.add(&mut heights, n, more * risen);
             }
-            sum = self.total(&heights, gauge) / if gauge == SmoothingState::Squares { risen * risen } else { risen };
+            sum = self.total(&heights) / (risen * risen);
             last = t;
         }
         if sum > 0.0 {
@@ -254,14 +246,14 @@ impl SmoothingKernel {
         }
     }
 
-    fn total(&self, heights: &[f64], gauge: SmoothingState) -> f64 {
-        let gauged = |h: f64| if gauge == SmoothingState::Squares { h * h } else { h.abs() };
+    /// The sum of the squares of existing taxels.
+    fn total(&self, heights: &[f64]) -> f64 {
         if let Some(exists) = &self.exists {
             return heights
                 .iter()
                 .zip(exists.iter().cycle())
                 .filter(|(_, exists)| **exists)
-                .map(|(&h, _)| gauged(h))
+                .map(|(&h, _)| h * h)
                 .sum();
         }
         // Eight independent sums, because a single sum would wait for each addition.
@@ -269,9 +261,9 @@ impl SmoothingKernel {
         let mut sums = [0.0; 8];
         for eight in eights {
             for (sum, &h) in sums.iter_mut().zip(eight) {
-                *sum += gauged(h);
+                *sum += h * h;
             }
         }
-        sums.iter().sum::<f64>() + rest.iter().map(|&h| gauged(h)).sum::<f64>()
+        sums.iter().sum::<f64>() + rest.iter().map(|&h| h * h).sum::<f64>()
     }
 }
