@@ -171,13 +171,6 @@ def neuron_memory_ms(parameters: str) -> float: ...
 def neuron_run(
     parameters: str, weights: NDArray[np.float64], trains: _Spikes, threshold: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
-def neuron_run_many(
-    parameters: str,
-    weights: NDArray[np.float64] | NDArray[np.float32],
-    neurons: int,
-    trains: _Spikes,
-    threshold: float,
-) -> _Spikes: ...
 def neuron_potential(
     parameters: str,
     weights: NDArray[np.float64],

@@ -135,8 +135,7 @@ class Neuron(Value):
 
         Parameters
         ----------
-        weights : float64 or float32, shape (neurons, trains), mV
-            Single precision is read without a copy, which saves memory; the computation is in double precision.
+        weights : float64, shape (neurons, trains), mV
         trains : SpikeTrains
             As in `run`.
         threshold : float, above 0
@@ -150,11 +149,11 @@ class Neuron(Value):
 
         Raises
         ------
-        ProblemError : not one weight for each neuron and train, or a value that is not finite (names neuron and train)
+        ProblemError : not one weight for each neuron and train, or a value that is not finite (names the train)
 
         Notes
         -----
-        Cost: a few operations an input spike and neuron. Crossings are exact in continuous time too.
+        A loop over `run`.
 
         Examples
         --------
@@ -163,19 +162,15 @@ class Neuron(Value):
         >>> [train.round(3).tolist() for train in fired]
         [[3.366], [], [1.795]]
         """
-        source = np.asarray(weights) if isinstance(weights, np.ndarray) else weights
-        single = isinstance(source, np.ndarray) and source.dtype == np.float32
-        matrix = numbers("weights", source, np.float32 if single else np.float64)
+        matrix = numbers("weights", weights, np.float64)
         if matrix.ndim != 2:
             raise refused("weights", f" has {matrix.ndim} dimensions: must have two, neurons and trains")
         if matrix.shape[1] != len(_trains(trains)):
             raise refused(
                 "weights", f": {matrix.shape[1]} per neuron for {counted(len(trains), 'train')}; must be one per train"
             )
-        factor = number("threshold", threshold)
-        return SpikeTrains._from_parts(
-            _core.neuron_run_many(self._json(), matrix.reshape(-1), len(matrix), trains._parts(), factor)
-        )
+        fired = [self.run(row, trains, threshold=threshold) for row in matrix]
+        return SpikeTrains.from_lists(fired, trains.start, trains.stop)
 
     def potential(
         self,

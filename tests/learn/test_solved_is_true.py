@@ -269,7 +269,6 @@ def test_a_grid_of_more_points_than_can_be_had_is_one_clear_error_beforehand():
         lambda: ConeR(neuron=neuron).fit([trains], [[20.0]]),
         lambda: OnlineConeR(neuron=neuron).partial_fit(trains, [20.0]),
         lambda: neuron.run([1.0] * 3, trains),
-        lambda: neuron.run_many([[1.0] * 3], trains),
     ):
         with refused(argument="step_ms"):
             call()

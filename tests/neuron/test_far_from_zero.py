@@ -43,7 +43,6 @@ def test_a_potential_that_comes_up_to_the_threshold_fires_there(start, step):
             fired = neuron.run(scaled, trains)
             assert len(fired), f"seed {seed}"
             assert fired[0] == at, f"seed {seed}: fires at {fired[0]!r}, its potential is the threshold at {at!r}"
-            assert neuron.run_many(scaled[None], trains)[0].tolist() == fired.tolist(), f"seed {seed}"
 
 
 @pytest.mark.parametrize("start", [-1e5, 1e5, 1e7])

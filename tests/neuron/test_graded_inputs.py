@@ -85,17 +85,6 @@ def test_spikes_are_those_of_the_plain_sums(problem):
 
 
 @settings(max_examples=60, deadline=None)
-@given(problems(decades=3))
-def test_many_neurons_fire_as_each_does_by_itself(problem):
-    neuron, weights, trains = problem
-    matrix = weights * np.linspace(-1, 2, 40)[:, None]
-    for row, fired in zip(matrix, neuron.run_many(matrix, trains), strict=True):
-        alone = neuron.run(row, trains)
-        assert len(fired) == len(alone)
-        assert np.abs(fired - alone).max(initial=0.0) <= (0.0 if neuron.time == "grid" else 1e-9)
-
-
-@settings(max_examples=60, deadline=None)
 @given(problems())
 def test_values_of_1_give_the_bits_of_unsigned_trains(problem):
     neuron, weights, trains = problem
@@ -104,10 +93,8 @@ def test_values_of_1_give_the_bits_of_unsigned_trains(problem):
         trains.times, trains.offsets, trains.start, trains.stop, np.ones(len(trains.times)), kind="graded"
     )
     times = np.linspace(0, 150, 40)
-    matrix = weights * np.linspace(-1, 2, 5)[:, None]
     assert np.array_equal(neuron.run(weights, ones), neuron.run(weights, unsigned))
     assert np.array_equal(neuron.potential(weights, ones, times), neuron.potential(weights, unsigned, times))
-    assert neuron.run_many(matrix, ones) == neuron.run_many(matrix, unsigned)
     # A power of two moves from the values to the weights without rounding.
     halves = SpikeTrains(
         trains.times, trains.offsets, trains.start, trains.stop, np.full(len(trains.times), 0.5), kind="graded"

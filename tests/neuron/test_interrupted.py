@@ -23,7 +23,6 @@ calls = {
     "run": lambda: Neuron().run(weights, given),
     "run on a grid": lambda: Neuron(time="grid").run(weights, given),
     "run_many": lambda: Neuron().run_many(np.full((64, trains), 1e-3), given),
-    "run_many on a grid": lambda: Neuron(time="grid").run_many(np.full((64, trains), 1e-3), given),
     "potential": lambda: Neuron().potential(weights, given, times),
 }
 signal.signal(signal.SIGVTALRM, lambda *_: signal.raise_signal(signal.SIGINT))
@@ -39,7 +38,7 @@ for name in sys.argv[2:]:
     signal.setitimer(signal.ITIMER_VIRTUAL, 0)
 print(json.dumps(late))
 """
-CALLS = ["run", "run on a grid", "run_many", "run_many on a grid", "potential"]
+CALLS = ["run", "run on a grid", "run_many", "potential"]
 
 
 @pytest.mark.parametrize("after", ["0.3", pytest.param("0.6", marks=pytest.mark.slow)])

@@ -238,18 +238,18 @@ pub fn one_weight_a_train(weights: &[f64], trains: usize) -> Result<()> {
     weights
         .iter()
         .position(|&w| !is_weight(w))
-        .map_or(Ok(()), |n| Err(weight_error(&format!("weights[{n}]"), weights[n])))
+        .map_or(Ok(()), |n| Err(weight_error(n, weights[n])))
 }
 
-/// The error of what is no weight.
+/// The error of what is no weight of the train `n`.
 #[must_use]
-pub fn weight_error(name: &str, weight: f64) -> Error {
+pub fn weight_error(n: usize, weight: f64) -> Error {
     let right = if weight.is_finite() {
         format!("from -{LARGEST_WEIGHT:e} to {LARGEST_WEIGHT:e}")
     } else {
         "finite".to_owned()
     };
-    problem!("{name} is {}: must be {right}", number_text(weight))
+    problem!("weights"; "[{n}] is {}: must be {right}", number_text(weight))
 }
 
 #[cfg(test)]

@@ -9,7 +9,6 @@ mod grid;
 mod kernel;
 mod model;
 mod points;
-mod population;
 mod running;
 mod streaming;
 mod threshold;
@@ -19,7 +18,6 @@ pub use kernel::{Kernel, KernelSum, Shape, Step};
 pub(crate) use model::AT_EDGE;
 pub use model::{AfterSpike, FirstThreshold, Neuron, Time};
 pub use points::{Grid, GridTime, MOST_LAID_OUT, check_points, points_between};
-pub use population::Weight;
 pub use streaming::NeuronStream;
 pub use threshold::OutputSpike;
 

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::neuron::Neuron;
 
-use taxel_border::convert::{SpikesIn, SpikesOut, array, from_spikes, slice};
+use taxel_border::convert::{SpikesIn, array, slice};
 use taxel_border::enter::enter;
 use taxel_border::errors::core;
 use taxel_border::parameters::parsed;
@@ -38,37 +38,6 @@ pub fn neuron_run<'py>(
 #[pyfunction]
 pub fn neuron_memory_ms(parameters: &str) -> PyResult<f64> {
     Ok(to_neuron(parameters)?.memory_ms())
-}
-
-/// Weights of many neurons, in the precision that they are held in.
-#[derive(FromPyObject)]
-pub(crate) enum WeightsIn<'py> {
-    Double(PyReadonlyArray1<'py, f64>),
-    Single(PyReadonlyArray1<'py, f32>),
-}
-
-/// The spike trains of many neurons on the same inputs; weights neuron after neuron.
-#[pyfunction]
-pub fn neuron_run_many<'py>(
-    py: Python<'py>,
-    parameters: &str,
-    weights: WeightsIn<'py>,
-    neurons: usize,
-    trains: SpikesIn,
-    threshold: f64,
-) -> PyResult<SpikesOut<'py>> {
-    let (neuron, SpikesIn(trains)) = (to_neuron(parameters)?, trains);
-    let fired = match &weights {
-        WeightsIn::Double(weights) => {
-            let weights = slice("weights", weights)?;
-            enter(py, |stop| neuron.run_many(weights, neurons, &trains, threshold, stop))
-        }
-        WeightsIn::Single(weights) => {
-            let weights = slice("weights", weights)?;
-            enter(py, |stop| neuron.run_many(weights, neurons, &trains, threshold, stop))
-        }
-    };
-    Ok(from_spikes(py, fired?))
 }
 
 /// The potential at these times.

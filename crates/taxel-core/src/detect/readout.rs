@@ -106,7 +106,7 @@ impl Readout {
                 return Err(problem!("{label}: delay_ms is {}: must be from 0 to {LONGEST_DELAY_MS}", cell.delay_ms));
             }
             if let Some(n) = cell.weights.iter().position(|&w| !is_weight(w)) {
-                return Err(weight_error(&format!("{label}: weights[{n}]"), cell.weights[n]));
+                return Err(weight_error(n, cell.weights[n]).in_part(label));
             }
             if let Some(array) = &self.array {
                 self.check_weights(label, cell, array)?;

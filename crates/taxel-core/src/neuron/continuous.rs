@@ -38,42 +38,13 @@ impl ContinuousStream {
         Self { neuron: neuron.clone(), shape, threshold, state, at: start, edge, next: NextCrossing::Never }
     }
 
-    /// Continues from `state` at time `at`, which the caller computed, up to an input or the end at `until`, and
-    /// returns the state at `until`.
-    pub(super) fn resume(
-        &mut self,
-        state: KernelSum,
-        at: f64,
-        until: f64,
-        input: bool,
-        out: &mut Vec<OutputSpike>,
-    ) -> KernelSum {
-        (self.state, self.at, self.next) = (state, at, NextCrossing::Unknown);
-        if input {
-            self.settle_at_input(until, until + AT_EDGE, out);
-        } else {
-            self.settle(until, until, out);
-        }
-        self.shape.after(self.state, until - self.at)
-    }
-
     /// The potential at `t`, which must not be before the state's time, mV.
     pub(super) fn potential(&self, t: f64) -> f64 {
         self.shape.after(self.state, (t - self.at).max(0.0)).b
     }
 
-    /// The end of the refractory time, or the start of the printed first rise, until it has passed.
-    pub(super) fn edge(&self) -> Option<f64> {
-        self.edge
-    }
-
-    /// The remaining rise of the threshold at `t`, mV.
-    pub(super) fn rise(&self, t: f64) -> f64 {
-        self.threshold.rise(t)
-    }
-
     pub(super) fn push(&mut self, t: f64, weight: f64, value: f64, out: &mut Vec<OutputSpike>) {
-        self.settle_at_input(t, f64::INFINITY, out);
+        self.settle_at_input(t, out);
         if self.neuron.loses(t, self.threshold.fired) {
             return;
         }
@@ -82,8 +53,8 @@ impl ContinuousStream {
     }
 
     /// Fires at every crossing up to and including `t`, the time of an input.
-    fn settle_at_input(&mut self, t: f64, horizon: f64, out: &mut Vec<OutputSpike>) {
-        self.settle(t, horizon, out);
+    fn settle_at_input(&mut self, t: f64, out: &mut Vec<OutputSpike>) {
+        self.settle(t, out);
         // A trained potential touches the threshold only to within rounding, so its computed crossing may be shortly
         // after an input that is simultaneous with it. Such an input comes too late to suppress the spike.
         if let NextCrossing::At(crossing) = self.next
@@ -110,13 +81,13 @@ impl ContinuousStream {
         self.next = NextCrossing::Unknown;
     }
 
-    /// Fires at every crossing up to and including `until`. Crossings after `horizon` may be left out.
-    pub(super) fn settle(&mut self, until: f64, horizon: f64, out: &mut Vec<OutputSpike>) {
+    /// Fires at every crossing up to and including `until`.
+    pub(super) fn settle(&mut self, until: f64, out: &mut Vec<OutputSpike>) {
         loop {
             let waiting = self.edge.is_some() && self.threshold.fired.is_some();
             // The potential at the state's own time has been compared before: an input contributes 0 at its own time.
             if !waiting && until > self.at && self.next == NextCrossing::Unknown {
-                self.next = self.crossing(horizon);
+                self.next = self.crossing();
             }
             match (self.next, self.edge) {
                 (NextCrossing::At(t), edge) if !waiting && t <= until && edge.is_none_or(|e| t < e) => {
@@ -126,18 +97,18 @@ impl ContinuousStream {
                     self.move_to(edge);
                     self.edge = None;
                     // If the potential is above the threshold when the refractory time ends, the neuron fires at once.
-                    self.next = self.crossing(horizon);
+                    self.next = self.crossing();
                 }
                 _ => return,
             }
         }
     }
 
-    fn crossing(&self, horizon: f64) -> NextCrossing {
+    fn crossing(&self) -> NextCrossing {
         // The printed first rise is 0 until it starts; its start is an edge, which `settle` handles by itself.
         let rise = if self.edge.is_some() { 0.0 } else { self.threshold.rise(self.at) };
         let Threshold { base, touch, tau_rec, .. } = self.threshold;
-        let found = next_crossing(&self.shape, self.state, (base, touch), rise, tau_rec, horizon - self.at);
+        let found = next_crossing(&self.shape, self.state, (base, touch), rise, tau_rec);
         found.map_or(NextCrossing::Never, |s| NextCrossing::At(self.at + s))
     }
 

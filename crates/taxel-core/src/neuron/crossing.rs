@@ -19,15 +19,13 @@ pub(crate) struct Peak {
 /// The first time at which the potential reaches the threshold, ms from now, if no input follows; `rise` decays with
 /// `tau_rec`.
 ///
-/// A maximum at most `touch` mV below the threshold counts as reaching it. Crossings later than `within` ms from now
-/// may be left out.
+/// A maximum at most `touch` mV below the threshold counts as reaching it.
 pub(super) fn next_crossing(
     shape: &Shape,
     state: KernelSum,
     (theta, touch): (f64, f64),
     rise: f64,
     tau_rec: f64,
-    within: f64,
 ) -> Option<f64> {
     if shape.bound(state) < theta - touch {
         return None;
@@ -41,24 +39,16 @@ pub(super) fn next_crossing(
     if state.b - theta - rise >= 0.0 {
         return Some(0.0);
     }
-    let (mut low, mut high) = (0.0, within);
-    let (at_end, slope) = if within.is_finite() { above(within) } else { (f64::NEG_INFINITY, 0.0) };
-    if at_end < 0.0 {
-        // If `g` is negative at the end, it can have been positive only around its maximum. Without a threshold rise,
-        // `g` has a single extremum, so a `g` that still increases at the end has not passed its maximum.
-        if slope > 0.0 && rise == 0.0 {
-            return None;
-        }
-        let peak = peak(shape, state, rise, tau_rec).filter(|peak| peak.at <= within)?;
-        let (top, _) = above(peak.at);
-        if top < -touch {
-            return None;
-        }
-        if top <= 0.0 {
-            return Some(peak.at);
-        }
-        (low, high) = (peak.from, peak.at);
+    // `g` ends negative, so it can be positive only around its maximum.
+    let peak = peak(shape, state, rise, tau_rec)?;
+    let (top, _) = above(peak.at);
+    if top < -touch {
+        return None;
     }
+    if top <= 0.0 {
+        return Some(peak.at);
+    }
+    let (mut low, mut high) = (peak.from, peak.at);
     // There is exactly one root between `low` and `high`. Newton steps that start on its left stay there where `g` is
     // concave; a step that leaves the bracket is replaced by a bisection.
     let mut s = low;

@@ -153,12 +153,6 @@ impl Shape {
         state.b.max(0.0) + state.a.max(0.0) * largest
     }
 
-    /// The largest value of the kernel up to `age` ms after the input.
-    #[must_use]
-    pub fn largest_within(&self, age: f64) -> f64 {
-        self.after(self.input(), age.min(self.peak())).b
-    }
-
     /// The age of an input, ms, from which on its kernel is smaller than the rounding of its largest value.
     #[must_use]
     pub fn negligible_age(&self) -> f64 {

@@ -109,7 +109,7 @@ impl Neuron {
         potential(self, weights, trains, times, spikes, stop)
     }
 
-    pub(super) fn check_inputs(&self, weights: &[f64], trains: &SpikeTrains) -> Result<()> {
+    fn check_inputs(&self, weights: &[f64], trains: &SpikeTrains) -> Result<()> {
         trains.check()?;
         if trains.kind == SpikeKind::Signed {
             return Err(problem!("trains"; ": spikes are signed; split them into ON and OFF trains first"));

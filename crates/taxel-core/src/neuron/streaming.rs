@@ -69,7 +69,7 @@ impl NeuronStream {
         if t >= self.now {
             self.now = t;
             match &mut self.clock {
-                TimeStream::Continuous(stream) => stream.settle(t, f64::INFINITY, out),
+                TimeStream::Continuous(stream) => stream.settle(t, out),
                 TimeStream::Grid(stream) => stream.settle(t, out),
             }
         }
