@@ -98,7 +98,28 @@ def grid(seed):
     return cone, [SpikeTrains.from_lists(lists, start=start, stop=stop)], [own]
 
 
+def at_targets(seed):
+    """Graded patterns with inputs at targets and up to 1e-8 ms behind them."""
+    random = np.random.default_rng([61, seed])
+    trains, lists, wanted = int(random.integers(8, 60)), [], []
+    largest = float(random.choice([0.1, 0.5]))
+    for _ in range(int(random.integers(1, 4))):
+        own = np.cumsum(random.uniform(12, 40, random.integers(1, 4))) + 10
+        stop = float(own[-1]) + 20
+        times = [list(random.uniform(0, stop - 10, random.integers(1, 4))) for _ in range(trains)]
+        for n in random.choice(trains, random.integers(1, 7), replace=False):
+            times[n].append(float(random.choice(own)) + float(random.choice([0.0, 1e-12, 1e-10, 1e-9, 1e-8])))
+        values = [random.choice([-1, 1], len(one)) * 10 ** random.uniform(-largest, largest, len(one)) for one in times]
+        times = [np.sort(one) for one in times]
+        lists.append(SpikeTrains.from_lists(times, stop=stop, values=values, kind="graded"))
+        wanted.append(own.tolist())
+    bound = float(random.choice([0.3, 2.0, 100.0]))
+    neuron, lambdas = drawn_neuron(random), LAMBDAS[random.integers(4)]
+    return ConeX(neuron=neuron, lambdas=lambdas, lb=-bound, ub=bound), lists, wanted
+
+
 SIMULATED = {
+    "at_targets": at_targets,
     "before_targets": before_targets, "close": close, "far": far, "grid": grid,
     **{kind: KINDS[kind] for kind in ("beside", "just_before", "lifted")},
 }  # fmt: skip

@@ -277,9 +277,7 @@ class ConeX(SpikeLearner):
     -----
     Thesis 6.3.2, equations 6.9 to 6.11. Violations of silence are found over all patterns by recursion; the violated
     rows go to a dual active-set method (Goldfarb and Idnani 1983), which also returns the proof. Cost: about 2.5
-    `trains` steps of O(rows^2). In continuous time the row of a target with an inhibitory input at it, or at most 1e-8
-    ms behind it, is raised by its largest rounding error (page *Exact times*). The page *Readings* lists the choices
-    that the thesis leaves open.
+    `trains` steps of O(rows^2). The page *Readings* lists the choices that the thesis leaves open.
 
     Examples
     --------

@@ -5,7 +5,6 @@ mod cone_r;
 mod cone_x;
 mod exact;
 mod mix;
-mod raised;
 mod shortest;
 
 pub(crate) use cone_r::PatternDemand;

@@ -375,11 +375,11 @@ impl Exact {
             RowGenerationEnd::Infeasible(certificate) => self.infeasible_fit(certificate, rounds),
             RowGenerationEnd::Met if self.objective.l1 > 0.0 || self.objective.b > 0.0 => {
                 let best = self.mix(best, start, progress, stop)?;
-                self.report(best, stop.asked().then_some(ASKED), stop)?
+                self.report(best, stop.asked().then_some(ASKED))?
             }
-            RowGenerationEnd::Met => self.report(best, None, stop)?,
-            RowGenerationEnd::Stopped if stop.asked() => self.report(best, Some(ASKED), stop)?,
-            RowGenerationEnd::Stopped => self.report(best, Some(UNDECIDED), stop)?,
+            RowGenerationEnd::Met => self.report(best, None)?,
+            RowGenerationEnd::Stopped if stop.asked() => self.report(best, Some(ASKED))?,
+            RowGenerationEnd::Stopped => self.report(best, Some(UNDECIDED))?,
         })
     }
 
@@ -406,20 +406,14 @@ impl Exact {
     }
 
     /// Evaluates the weights over all rows, whichever engine found them.
-    fn report(&self, best: BestWeights, cut_short: Option<&str>, stop: Stop<'_>) -> Result<ConeXFit> {
+    fn report(&self, best: BestWeights, cut_short: Option<&str>) -> Result<ConeXFit> {
         let BestWeights { mut weights, least, proof, held, engine, rounds } = best;
         let Bounds { lower, upper } = &self.objective.bounds;
         // Rounding can move a weight across its bound.
         for ((w, &l), &u) in weights.iter_mut().zip(lower).zip(upper) {
             *w = w.clamp(l, u);
         }
-        let unmet = match self.raise(&weights, stop)? {
-            Some(raised) => {
-                weights = raised;
-                None
-            }
-            None => self.find_unmet(&weights)?,
-        };
+        let unmet = self.find_unmet(&weights)?;
         let parts = self.parts(&weights);
         let objective = parts.sum();
         let gap = relative_gap(objective, least);

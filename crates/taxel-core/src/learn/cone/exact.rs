@@ -18,7 +18,7 @@ pub(super) const MET: f64 = 1e-12;
 const BROKEN: f64 = 1e-13;
 const BROKEN_SHARE: f64 = 2e-16;
 /// The share of the margin that weights must keep to count as a solution.
-pub(super) const KEPT_SHARE: f64 = 0.5;
+const KEPT_SHARE: f64 = 0.5;
 /// The largest difference between a spike and its target, in units of the last place of the time.
 const ROUNDINGS: f64 = 4.0;
 /// The number of rounds after which a fit ends without a verdict.

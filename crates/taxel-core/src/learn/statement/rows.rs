@@ -459,21 +459,6 @@ impl Statement {
     /// targets only.
     fn sum(&self, example: &Example, t: f64, earlier: &[f64], part: impl Fn(KernelSum) -> f64, out: &mut [f64]) {
         out.fill(0.0);
-        self.for_inputs(example, t, earlier, part, |input, state| {
-            out[input.train as usize] += f64::from(input.value) * state;
-        });
-    }
-
-    /// Calls `each` with the inputs before `t`, and `part` of their kernels' states at `t`, given spikes at the
-    /// `earlier` targets only.
-    pub(super) fn for_inputs(
-        &self,
-        example: &Example,
-        t: f64,
-        earlier: &[f64],
-        part: impl Fn(KernelSum) -> f64,
-        mut each: impl FnMut(&Spike, f64),
-    ) {
         let inputs = example.before(t);
         let age = self.neuron.ages(example.start, t);
         let from = inputs.partition_point(|i| i.t < t - example.forgotten);
@@ -488,7 +473,7 @@ impl Statement {
                     part(self.shape.after(self.shape.input(), age(at)))
                 };
             }
-            each(input, state);
+            out[input.train as usize] += f64::from(input.value) * state;
         }
     }
 }
