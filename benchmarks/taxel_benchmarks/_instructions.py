@@ -14,7 +14,7 @@ from typing import Any
 def widest() -> str:
     """Return the widest vector instructions that taxel uses here: it refuses to load with any that are wider."""
     named = os.environ.get("TAXEL_INSTRUCTIONS")
-    return named or next(name for name in ("avx512_bytes", "avx512", "avx2", "plain") if _is_there(name))
+    return named or next(name for name in ("avx512", "avx2", "plain") if _is_there(name))
 
 
 def _is_there(instructions: str) -> bool:

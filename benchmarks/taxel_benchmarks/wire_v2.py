@@ -15,7 +15,8 @@ are empty): their numbers are then missing, which costs version 2 something, mos
 beside.
 
 Peer: wire version 1. Unit: bytes an event; events/s. Goal: bytes .21, .75 and 1.05 of version 1 (full, footfall, drop;
-.8 with a hold of 1 ms); of a full array 1.2 times its speed as one stream, of the others 1.5 times that by datagrams.
+.8 with a hold of 1 ms); of a full array ten times what a board sends, 213 million events/s; of the others 1.5 times
+version 1's speed by datagrams.
 """
 
 from __future__ import annotations
@@ -32,7 +33,6 @@ from taxel import wire
 from taxel.simulate import Board, FrameSequence, Scene, Silence, Version2, play
 from taxel.wire import FRAME_US, Registers
 from taxel_benchmarks._goals import Goal, at_least, at_most
-from taxel_benchmarks._instructions import beside_avx2
 from taxel_benchmarks._rounds import compared, measure, stamp
 
 SEED, TARE_MS = 20_261_121, 50.0
@@ -45,11 +45,11 @@ EMPTY = 24
 
 #: Goals at most: bytes an event, of version 1's.
 BYTES = {"full array, at once": 0.21, "footfall, at once": 0.75, "drop, at once": 1.05, "drop, hold 1 ms": 0.80}
-#: Goals at least: events decoded a second, of version 1's.
+#: Goals at least: events decoded a second, in millions, or of version 1's.
 DECODING = {
-    "full array, version 2 / version 1 as one stream": 1.2,
-    "footfall, version 2 / version 1 by datagrams": 1.5,
-    "drop, version 2 / version 1 by datagrams": 1.5,
+    "version 2, full array, million events/s": 213.0,
+    "decoded, footfall, version 2 / version 1 by datagrams": 1.5,
+    "decoded, drop, version 2 / version 1 by datagrams": 1.5,
 }
 
 Frames = list[NDArray[np.uint16]]
@@ -155,17 +155,15 @@ SMALLER = ("bytes an event", "heartbeat")
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals with what a result reached."""
     size = {f"bytes an event, {name} / version 1": limit for name, limit in BYTES.items()}
-    speed = {f"decoded, {name}": limit for name, limit in DECODING.items()}
-    return at_most(size, result["ratios"]) + at_least(speed, result["ratios"])
+    return at_most(size, result["ratios"]) + at_least(DECODING, result["ratios"])
 
 
-@beside_avx2
 def run(*, quick: bool) -> dict[str, Any]:
     scenes = {"full array": full(), "footfall": footfall(), "drop": drop()}
     bytes_an_event = {name: sizes(frames) for name, frames in scenes.items()}
     share, rounds = (20, 3) if quick else (1, 11)
     data = {(name, v): stream(scenes[name], v, DECODED[name] // share) for name in scenes for v in (1, 2)}
-    room = wire.Columns(max(len(two.data) for two in data.values()) // 2 + 32)
+    room = wire.Columns(max(len(two.data) for two in data.values()) // 2 + 8)
     runs: dict[str, Callable[[], Any]] = {}
     for name in scenes:
         one, two = data[name, 1], data[name, 2]

@@ -112,7 +112,7 @@ def test_a_whole_stream_says_what_the_slow_reader_hears(seed, valued_from, state
     assert (events.repaired is None) == (not marked.any())
     with pytest.raises(ValueError, match="read-only"):
         events.t[:] = 0
-    room = Columns(len(stream) // 2 + 32)
+    room = Columns(len(stream) // 2 + 8)
     again = decode(stream, 2, array=array, columns=room)
     assert again == events
     assert np.shares_memory(again.t, room.t) == (len(again) > 0)

@@ -6,7 +6,7 @@ use taxel_core::vectors::Instructions;
 
 use crate::errors::core;
 
-/// The set of vector instructions in use: plain, avx2, avx512 or avx512_bytes.
+/// The set of vector instructions in use: plain, avx2 or avx512.
 #[pyfunction]
 pub fn instructions() -> &'static str {
     Instructions::best().name()

@@ -48,7 +48,7 @@ def decode(
         Version 1: the length of each datagram in bytes, if `data` is consecutive datagrams. Each is then decoded
         separately, so that an intensity never belongs to a change of the datagram before.
     columns : Columns, optional
-        Memory to reuse, with room for ``len(data) // 5 + 2`` events, for version 2 ``len(data) // 2 + 32``: the events
+        Memory to reuse, with room for ``len(data) // 5 + 2`` events, for version 2 ``len(data) // 2 + 8``: the events
         are views of it, valid until it is filled again. By default, and with pairing "taxel", they have separate
         memory.
 
@@ -201,7 +201,7 @@ class Decoder:
         Parameters
         ----------
         columns : Columns
-            With room for ``len(data) // 5 + 2`` events, for version 2 ``len(data) // 2 + 32``.
+            With room for ``len(data) // 5 + 2`` events, for version 2 ``len(data) // 2 + 8``.
         data : bytes, or anything with a contiguous buffer
         arrived : int, us, optional
             As in `push`.

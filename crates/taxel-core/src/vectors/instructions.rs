@@ -16,13 +16,11 @@ pub enum Instructions {
     Avx2,
     /// AVX-512 F, BW, DQ and VL.
     Avx512,
-    /// AVX-512 with permutations of single bytes: VBMI and VBMI2 (and BMI2, LZCNT).
-    Avx512Bytes,
 }
 
 impl Instructions {
     /// All sets, from the narrowest; a machine that has one also has those before it.
-    pub const ALL: [Self; 4] = [Self::Plain, Self::Avx2, Self::Avx512, Self::Avx512Bytes];
+    pub const ALL: [Self; 3] = [Self::Plain, Self::Avx2, Self::Avx512];
 
     /// The widest set that may be used: that of this machine, or a narrower one after [`cap`](Self::cap).
     #[must_use]
@@ -68,7 +66,6 @@ impl Instructions {
             Self::Plain => "plain",
             Self::Avx2 => "avx2",
             Self::Avx512 => "avx512",
-            Self::Avx512Bytes => "avx512_bytes",
         }
     }
 
@@ -105,13 +102,6 @@ impl Instructions {
                     && is_x86_feature_detected!("avx512bw")
                     && is_x86_feature_detected!("avx512dq")
                     && is_x86_feature_detected!("avx512vl")
-            }
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512Bytes => {
-                is_x86_feature_detected!("avx512vbmi")
-                    && is_x86_feature_detected!("avx512vbmi2")
-                    && is_x86_feature_detected!("bmi2")
-                    && is_x86_feature_detected!("lzcnt")
             }
             #[cfg(not(target_arch = "x86_64"))]
             _ => false,
@@ -228,7 +218,7 @@ mod tests {
 
     #[test]
     fn unknown_sets_are_refused_and_a_set_in_use_stays() {
-        assert!(Instructions::cap("avx3").unwrap_err().to_string().contains("plain, avx2, avx512, avx512_bytes"));
+        assert!(Instructions::cap("avx3").unwrap_err().to_string().contains("plain, avx2, avx512"));
         let used = Instructions::best();
         assert!(Instructions::cap(used.name()).is_ok());
         for other in Instructions::ALL.into_iter().filter(|&set| set != used) {

@@ -11,7 +11,7 @@ pub(super) fn lanes(set: Instructions) -> usize {
     match set {
         Instructions::Plain => 1,
         Instructions::Avx2 => 2 * LANES,
-        Instructions::Avx512 | Instructions::Avx512Bytes => 4 * LANES,
+        Instructions::Avx512 => 4 * LANES,
     }
 }
 

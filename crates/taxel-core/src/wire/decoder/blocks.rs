@@ -6,22 +6,18 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
-#[cfg(target_arch = "x86_64")]
-mod avx512;
 mod carried;
 mod scalar;
 
 pub(super) use carried::Carried;
 
-use super::filling::{FilledColumns, STREAMED};
+use super::filling::FilledColumns;
 use crate::vectors::Instructions;
 use crate::wire::v1::WORD_BYTES;
 
-/// Size of a cache line, bytes.
-const LINE_BYTES: usize = 64;
-
-/// Number of words in the longest block.
-const BLOCK_WORDS: usize = 32;
+/// Number of words that are decoded one by one before blocks are tried again: an odd number, so that pairs split by the
+/// edges of blocks are whole in the next block.
+const STRETCH: usize = 31;
 
 /// Decodes plain words from the start of `bytes` into `filling`, up to the first word that is not plain; returns the
 /// number of their bytes.
@@ -34,19 +30,9 @@ pub(super) fn plain(
     filling: &mut FilledColumns<'_>,
 ) -> usize {
     let mut done = 0;
-    if bytes.len() >= STREAMED {
-        // Non-temporal stores need rows that begin at a cache line.
-        let ahead = filling.room.x[filling.rows..].as_ptr().align_offset(LINE_BYTES);
-        let words = scalar::words(bytes, columns, rows, state, filling, ahead);
-        done = words * WORD_BYTES;
-        if words < ahead {
-            return done;
-        }
-    }
     loop {
         done += blocks(set, &bytes[done..], columns, rows, state, filling);
-        // An odd number, so that pairs split by the edges of AVX2's blocks are whole in the next block.
-        let most = if set < Instructions::Avx2 { usize::MAX } else { BLOCK_WORDS - 1 };
+        let most = if set < Instructions::Avx2 { usize::MAX } else { STRETCH };
         let words = scalar::words(&bytes[done..], columns, rows, state, filling, most);
         done += words * WORD_BYTES;
         if words < most {
@@ -79,9 +65,6 @@ fn blocks(
         // guarantees that each column has room for one row per word of `bytes`.
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx2 | Instructions::Avx512 => unsafe { avx2::blocks(bytes, columns, rows, state, filling) },
-        // SAFETY: as above.
-        #[cfg(target_arch = "x86_64")]
-        Instructions::Avx512Bytes => unsafe { avx512::blocks(bytes, columns, rows, state, filling) },
         #[cfg(not(target_arch = "x86_64"))]
         _ => 0,
     }

@@ -2,10 +2,6 @@
 
 use crate::wire::columns::Room;
 
-/// From this many bytes on, rows are written with non-temporal stores, past the caches: they would only evict other
-/// data.
-pub(super) const STREAMED: usize = 4 << 20;
-
 /// A change whose intensity may be the next word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct PendingChange {

@@ -4,7 +4,6 @@ use rand::{Rng, SeedableRng, rngs::StdRng, seq::IndexedRandom};
 
 use super::clock::TURN;
 use super::*;
-use crate::Stop;
 
 fn change(stamp: u16, x: u8, y: u8) -> Word {
     Word::Change { stamp, x, y, p: true }
@@ -288,51 +287,6 @@ fn every_set_of_instructions_decodes_alike() {
         }
     }
     assert!(seen.0 > 300_000 && seen.1 > 60_000, "streams that say little: {seen:?}");
-}
-
-#[test]
-#[cfg_attr(miri, ignore = "takes Miri days")]
-fn long_stretches_into_aligned_columns_decode_alike() {
-    let mut random = StdRng::seed_from_u64(18);
-    let (mut bytes, mut stamp) = (vec![], 0_u16);
-    while bytes.len() < 6 << 20 {
-        stamp = stamp.wrapping_add(u16::from(random.random_bool(0.01)));
-        let (x, y) = (random.random_range(0..64), random.random_range(0..64));
-        bytes.extend(Word::Change { stamp, x, y, p: random.random() }.to_bytes());
-        match random.random_range(0..4000) {
-            0 => bytes.extend(Word::Intensity { ticks: random.random(), x, y, p: true }.to_bytes()),
-            1 => bytes.extend(Word::Marker { stamp, start: true }.to_bytes()),
-            2 => bytes.push(random.random()),
-            _ => {}
-        }
-    }
-    let rows = bytes.len() / WORD_BYTES + 100;
-    /// A column that begins `shift` rows after the start of a cache line.
-    fn behind_edge<T>(column: &mut [T], shift: usize) -> &mut [T] {
-        let edge = column.as_ptr().align_offset(64);
-        let end = column.len() - 64 + edge;
-        &mut column[edge + shift..end]
-    }
-    let fill = |set, shift: usize| {
-        let (mut t, mut x, mut y, mut ticks) = (vec![0; rows], vec![0; rows], vec![0; rows], vec![0; rows]);
-        let (mut p, mut present) = (vec![0; rows], vec![0; rows]);
-        let (t, p, present) =
-            (behind_edge(&mut t, shift), behind_edge(&mut p, shift), behind_edge(&mut present, shift));
-        let [x, y, ticks] = [&mut x, &mut y, &mut ticks].map(|column| behind_edge(column, shift));
-        let room = Room::new(t, [x, y, ticks], [p, present]).unwrap();
-        let mut decoder = Decoder::new(Array::thesis()).instructions(set).unwrap();
-        let crate::wire::Columns { filled, markers, .. } =
-            decoder.fill(&bytes, None, room, true, Stop::never()).unwrap();
-        let n = filled.rows;
-        let columns = (t[..n].to_vec(), [x, y, ticks].map(|column| column[..n].to_vec()));
-        (columns, [p, present].map(|column| column[..n].to_vec()), markers, *decoder.counts())
-    };
-    let plain = fill(Instructions::Plain, 0);
-    for set in Instructions::ALL.into_iter().filter(|set| set.present()) {
-        for shift in [0, 1, 7] {
-            assert!(fill(set, shift) == plain, "{set:?}, {shift} rows behind a line's edge");
-        }
-    }
 }
 
 #[test]

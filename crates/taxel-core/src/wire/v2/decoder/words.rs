@@ -6,8 +6,6 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
-#[cfg(target_arch = "x86_64")]
-mod avx512;
 mod body;
 #[cfg(target_arch = "x86_64")]
 mod eight;
@@ -23,12 +21,10 @@ use crate::wire::columns::Room;
 use crate::wire::v2::counts::Counts;
 
 /// Rows after those of the words that a block may overwrite.
-const MARGIN: usize = 32;
+const MARGIN: usize = 8;
 
 /// Number of words decoded one by one before blocks are tried again.
-const STRETCH: usize = 32;
-/// As [`STRETCH`], for AVX2, whose blocks are shorter.
-const SHORT_STRETCH: usize = 8;
+const STRETCH: usize = 8;
 
 /// Size of the shortest word, bytes.
 const WORD_BYTES: usize = 2;
@@ -62,11 +58,7 @@ pub(super) fn decode(
         if body.left() == 0 {
             break;
         }
-        let most = match set {
-            Instructions::Plain => usize::MAX,
-            Instructions::Avx2 | Instructions::Avx512 => SHORT_STRETCH,
-            Instructions::Avx512Bytes => STRETCH,
-        };
+        let most = if set < Instructions::Avx2 { usize::MAX } else { STRETCH };
         match body.layout.value {
             0 => single::words::<2, 15, 0>(body, held, room, paired, counts, most),
             8 => single::words::<2, 7, 8>(body, held, room, paired, counts, most),
@@ -87,16 +79,13 @@ fn blocks(body: &mut BodyReader<'_>, set: Instructions, held: &mut ValuesByLine,
         && held.values.len() < usize::from(FULL)
     {
         // SAFETY: `Decoder::instructions` and `best` select a set only if the machine has it. `decode` has asserted
-        // that the room after the rows so far holds a row for each word and 32 more, and no word gives more than one
+        // that the room after the rows so far holds a row for each word and 8 more, and no word gives more than one
         // row. The block itself checks the last two conditions.
         unsafe {
-            match (set, body.layout.value) {
-                (Instructions::Avx512Bytes, 0) => avx512::blocks::<0>(body, held, room, paired),
-                (Instructions::Avx512Bytes, 8) => avx512::blocks::<8>(body, held, room, paired),
-                (Instructions::Avx512Bytes, _) => avx512::blocks::<16>(body, held, room, paired),
-                (_, 0) => avx2::blocks::<0>(body, held, room, paired),
-                (_, 8) => avx2::blocks::<8>(body, held, room, paired),
-                (_, _) => avx2::blocks::<16>(body, held, room, paired),
+            match body.layout.value {
+                0 => avx2::blocks::<0>(body, held, room, paired),
+                8 => avx2::blocks::<8>(body, held, room, paired),
+                _ => avx2::blocks::<16>(body, held, room, paired),
             }
         }
     }

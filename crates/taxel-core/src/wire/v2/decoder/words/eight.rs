@@ -246,7 +246,7 @@ impl Eight {
 /// The machine must have SSE 4.1; all eight indices must be in `held`.
 #[inline]
 #[target_feature(enable = "sse4.1")]
-pub(super) unsafe fn store_eight(indices: __m128i, values: __m128i, t: i64, held: &mut ValuesByLine) {
+unsafe fn store_eight(indices: __m128i, values: __m128i, t: i64, held: &mut ValuesByLine) {
     // Extracts the lanes from registers: loads from memory would wait for the store.
     let halves = |lanes| [_mm_cvtsi128_si64(lanes) as u64, _mm_extract_epi64::<1>(lanes) as u64];
     for (indices, values) in halves(indices).into_iter().zip(halves(values)) {
