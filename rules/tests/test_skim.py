@@ -153,7 +153,7 @@ def test_control_c_stops_it_promptly():
     ("options", "said"),
     [
         ({"tau": 0.0}, "tau is 0 ms"),
-        ({"kernel": "box"}, 'kernel is "box": must be "alpha"'),
+        ({"kernel": "box"}, "^kernel: "),
         ({"kernel": "double_exponential", "tau_s": 20.0}, "tau_s is 20 ms: must be below tau, 15 ms"),
         ({"pulse_ms": 0.0}, "pulse_ms is 0 ms"),
         ({"ridge": -1.0}, "ridge is -1: must be 0 or more"),
@@ -162,7 +162,7 @@ def test_control_c_stops_it_promptly():
         ({"branches": 0, "spread": 1.0, "delay_ms": 0.0}, "branches is 0: must be from 1 to 100000"),
         (
             {"branches": 9, "spread": 1.0, "delay_ms": 0.0, "nonlinearity": "relu"},
-            'nonlinearity is "relu": must be "tanh" or "none"',
+            "^nonlinearity: ",
         ),
         ({"thresholds": []}, "thresholds: must contain at least one"),
         ({"within_ms": 0.0}, "within_ms is 0 ms: must be above 0"),

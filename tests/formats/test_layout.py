@@ -576,7 +576,7 @@ def test_the_rate_on_the_command_line_opens_an_array_without_a_layout(tmp_path: 
     ("encoder", "end"),
     [
         ("fa1", "10 ms after the previous frame: frames must come every 1 ms; give --set period_ms=VALUE"),
-        ("level_crossing", "--set levels is missing"),
+        ("level_crossing", "--set levels: missing field `levels`"),
     ],
 )
 def test_an_error_of_an_encoder_names_the_option_that_sets_the_value(tmp_path: Path, encoder: str, end: str) -> None:

@@ -516,7 +516,7 @@ def test_examples_that_make_no_sense_are_one_clear_error_each(patterns, targets,
 
 
 def test_a_start_that_does_not_fit_is_one_clear_error():
-    for start, argument in (([1.0, 2.0], "weights"), ([float("nan")], None)):
+    for start, argument in (([1.0, 2.0], "weights"), ([float("nan")], "weights")):
         with refused(argument=argument):
             ConeR().fit([lists([1.0])], [[5.0]], start=start)
 

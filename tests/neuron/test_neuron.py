@@ -256,7 +256,7 @@ def test_keep_fires_again_at_once_while_the_potential_stays_above_the_threshold(
     ("arguments", "argument"),
     [
         (([1.0, 2.0], [[1.0]]), "weights"),
-        (([float("inf")], [[1.0]]), None),
+        (([float("inf")], [[1.0]]), "weights"),
         (([[1.0]], [[1.0]]), "weights"),
     ],
 )

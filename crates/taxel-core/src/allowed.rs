@@ -235,10 +235,7 @@ pub fn one_weight_a_train(weights: &[f64], trains: usize) -> Result<()> {
     if weights.len() != trains {
         return Err(problem!("weights"; ": {} for {trains} trains; must be one per train", weights.len()));
     }
-    weights
-        .iter()
-        .position(|&w| !is_weight(w))
-        .map_or(Ok(()), |n| Err(weight_error(n, weights[n])))
+    weights.iter().position(|&w| !is_weight(w)).map_or(Ok(()), |n| Err(weight_error(n, weights[n])))
 }
 
 /// The error of what is no weight of the train `n`.

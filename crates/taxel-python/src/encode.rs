@@ -10,7 +10,6 @@ use taxel_border::convert::{ArrayParts, EventsIn, FramesIn, SpikesOut, from_spik
 use taxel_border::enter::{Exclusive, enter};
 use taxel_border::errors::core;
 
-
 /// Checks an encoder; gives it back with every default filled in.
 #[pyfunction]
 pub fn check_encoder(encoder: &str) -> PyResult<String> {

@@ -62,8 +62,7 @@ mod _core {
     #[pymodule_export]
     use crate::encode::{
         EncoderStream, check_encoder, check_tare, encode_events, encode_frames, encoder_about, encoder_names,
-        local_load_of_events, local_load_of_frames, local_load_quantities, pad_tare, tare_of_events,
-        tare_of_frames,
+        local_load_of_events, local_load_of_frames, local_load_quantities, pad_tare, tare_of_events, tare_of_frames,
     };
     #[pymodule_export]
     use crate::held::{

@@ -13,8 +13,7 @@ use taxel_border::enter::{enter, enter_with_progress};
 use taxel_border::errors::core;
 
 /// Patterns as Python hands them over: name, count, trains, times, offsets, listed.
-type PatternsIn<'py> =
-    (String, usize, usize, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, i64>, bool);
+type PatternsIn<'py> = (String, usize, usize, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, i64>, bool);
 
 /// Patterns with their offsets as the core wants them.
 struct OffsetPatterns<'py> {

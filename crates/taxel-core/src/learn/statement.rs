@@ -25,7 +25,7 @@ pub(crate) use objective::{Choice, NOTHING, Objective, relative_gap};
 pub use objective::{Divisor, DivisorC, DivisorD, Norm, Parts, Sides};
 pub(crate) use peak::{SilencePeak, exceeds, largest};
 pub(crate) use relaxed::{Relaxed, RelaxedPoint, RelaxedProof, Tangents};
-pub use rows::{Margin, Row, StatedRow, Statement};
 pub(crate) use rows::end_of;
+pub use rows::{Margin, Row, StatedRow, Statement};
 pub(crate) use silence::Silence;
 pub(crate) use targets::Targets;

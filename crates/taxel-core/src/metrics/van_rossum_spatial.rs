@@ -249,12 +249,7 @@ impl SmoothingKernel {
     /// The sum of the squares of existing taxels.
     fn total(&self, heights: &[f64]) -> f64 {
         if let Some(exists) = &self.exists {
-            return heights
-                .iter()
-                .zip(exists.iter().cycle())
-                .filter(|(_, exists)| **exists)
-                .map(|(&h, _)| h * h)
-                .sum();
+            return heights.iter().zip(exists.iter().cycle()).filter(|(_, exists)| **exists).map(|(&h, _)| h * h).sum();
         }
         // Eight independent sums, because a single sum would wait for each addition.
         let (eights, rest) = heights.as_chunks::<8>();
