@@ -92,7 +92,7 @@ def test_i_learning_goes_by_currents_with_the_sign_of_the_weight(targets):
 
 
 def test_another_rule_is_one_clear_error():
-    with pytest.raises(ProblemError, match=r"^rule: "):
+    with pytest.raises(ProblemError, match=r"^rule is "):
         Chronotron(rule="X", **GIVEN)
     with pytest.raises(ProblemError, match="tau_q is -1 ms"):
         Chronotron(rule="E", tau_q=-1.0, **GIVEN)
