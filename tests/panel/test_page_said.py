@@ -136,7 +136,7 @@ def test_how_far_a_training_is_can_be_read_while_it_runs(monkeypatch: pytest.Mon
     command.write_text(
         f"""#!{sys.executable}
 import json, pathlib, sys, time
-assert json.load(sys.stdin)["overwrite"]
+assert json.loads(sys.stdin.readline())["overwrite"]
 for done in range(2):
     print(json.dumps({{"type": "progress", "step": f"fold {{done + 1}} of 5", "done": done, "of": 5}}), flush=True)
     time.sleep(0.6)
