@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := Cargo.toml Cargo.lock $(shell find crates rules -name '*.rs' -o -name Cargo.toml)
 
-.PHONY: help check setup build released bridge demo browser test test-studies accept slow lint format registers messages bench docs dist platforms clean
+.PHONY: help check setup build released demo browser test test-studies accept slow lint format registers messages bench docs dist platforms clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
@@ -13,7 +13,6 @@ help:
 	@echo "make accept keep the sentences of errors as they are now, in tests/messages"
 	@echo "make lint   format, lint, types, layers     make bench  ratios against peers, to benchmarks/results/"
 	@echo "make docs   the documentation, without warnings"
-	@echo "make bridge what carries a board to other computers: six minutes of a core, for those who have several"
 	@echo "make build  .venv and the extension, after a change in crates/     make format  formats"
 	@echo "make dist   wheels for machines without cargo (Linux on x86-64 and ARM, Windows), and the source package, to dist/"
 	@echo "make platforms  the wheels on emulated ARM and on Windows by wine, in trees of Debian: 90 minutes, as root"
@@ -69,18 +68,9 @@ $(VENV)/.released: $(VENV)/.installed $(SOURCES)
 	@$(install) --no-deps $(BESIDE:%=--editable %)
 	@rm -f $(VENV)/.built && touch $@
 
-# Outside the workspace: 260 crates for those only who have more than one computer.
-BRIDGE := --release --manifest-path bridge/zenoh/Cargo.toml --target-dir target/bridge
-$(VENV)/.bridge: $(VENV)/.installed $(shell find bridge/zenoh -type f)
-	$(BIN)/maturin build $(BRIDGE) --out target/bridge/wheels
-	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir target/bridge/wheels ./bridge
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bridge/wheels/taxel_zenoh-*.whl
-	@touch $@
-
 setup: $(VENV)/.installed
 build: $(VENV)/.built
 released: $(VENV)/.released
-bridge: $(VENV)/.bridge
 
 demo: build
 	$(BIN)/taxel demo
@@ -101,7 +91,7 @@ test-studies: released $(VENV)/.for-test
 accept: released $(VENV)/.for-test
 	$(BIN)/python -m pytest -q tests/messages --snapshot-update
 
-slow: released $(VENV)/.for-test browser dist bridge
+slow: released $(VENV)/.for-test browser dist
 	cargo test --release --workspace --quiet -- --ignored
 	cargo check --manifest-path fuzz/Cargo.toml --quiet
 	$(BIN)/python -m pytest -q -m slow
@@ -112,7 +102,6 @@ SOURCES_OF_PYTHON := python rules/taxel_rules studies/taxel_studies benchmarks/t
 lint: $(VENV)/.for-test $(VENV)/.for-lint
 	@$(MAKE) --no-print-directory $(if $(wildcard $(VENV)/.released),released,build)
 	cargo fmt --all --check
-	cargo fmt --manifest-path bridge/zenoh/Cargo.toml --check
 	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs rules/src/rules/*.rs crates/taxel-core/src/metrics/*.rs  # the registries' macros hide them from cargo
 	cargo clippy --workspace --all-targets --all-features --quiet -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
@@ -131,7 +120,6 @@ lint: $(VENV)/.for-test $(VENV)/.for-lint
 
 format: $(VENV)/.for-lint
 	cargo fmt --all
-	cargo fmt --manifest-path bridge/zenoh/Cargo.toml
 	rustfmt --edition 2024 crates/taxel-core/src/encode/*.rs rules/src/rules/*.rs crates/taxel-core/src/metrics/*.rs
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
@@ -199,9 +187,8 @@ $(PEERS)/.installed: $(PROJECTS) | $(VENV)/.installed
 	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps $(BESIDE:%=--editable %)
 	@touch $@
 
-bench: released bridge $(PEERS)/.installed
+bench: released $(PEERS)/.installed
 	@$(subst $(abspath $(VENV)),$(abspath $(PEERS)),$(call develop))
-	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bridge/wheels/taxel_zenoh-*.whl
 	$(PEERS)/bin/taxel bench all
 
 docs: build $(VENV)/.for-docs

@@ -191,7 +191,6 @@ from dataclasses import KW_ONLY, dataclass
 from taxel._base.options import option
 from taxel.array import Array
 from taxel.detect import PlainRule, Readout
-from taxel.live.remote import RemoteBoard
 from taxel.tare import Tare
 from taxel.wire import Registers
 

@@ -1,6 +1,5 @@
-"""Boards published to other computers, and received from them, over Zenoh."""
+"""A board's datagrams, carried to other computers over Zenoh."""
 
-from taxel_bridge.bridge import Bridge
-from taxel_bridge.remote import Address, Remote
+from taxel_bridge.carrying import PLACE, Bridge
 
-__all__ = ["Address", "Bridge", "Remote"]
+__all__ = ["PLACE", "Bridge"]

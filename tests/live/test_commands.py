@@ -1,24 +1,21 @@
 """The commands `taxel record` and `taxel live`: when they end, what they print and with which exit code."""
 
-import contextlib
 import json
 import re
 import signal
 import socket
 import subprocess
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from loopback import free_port
 from shell import run
-from typer.testing import CliRunner
 
 import taxel
 from taxel import Array, Events, Neuron, Readout, wire
-from taxel.cli import app, main
+from taxel.cli import main
 from taxel.encode import ContactArea
 from taxel.live import Live, send
 from taxel.recording.text_options import TextOptions
@@ -73,7 +70,6 @@ def test_taxel_record_keeps_the_registers_of_a_sensor_of_ones_own(tmp_path: Path
     [
         ([], "--rate-hz and --bits: give both"),
         (["--rate-hz", "500", "--preset", "2 kHz"], "--rate-hz and --preset"),
-        (["--rate-hz", "500", "--remote", "zenoh:127.0.0.1:7447/left"], "--rate-hz and --remote"),
     ],
 )
 def test_a_sensor_of_ones_own_is_stated_by_rate_and_bits_alone(
@@ -289,26 +285,3 @@ def test_a_board_with_more_taxels_than_the_array_is_said_while_it_runs(tmp_path:
     assert "--array" in said
     assert process.returncode == 2
     assert file.exists(), "the bytes are kept"
-
-
-def test_the_link_to_another_computer_stays_until_the_receiver_has_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
-    done: list[str] = []
-
-    @contextlib.contextmanager
-    def remote(*_: object, lossless: bool) -> Iterator[None]:
-        yield
-        done.append("closed")
-
-    class Receiver(Live):
-        def stop(self) -> taxel.live.Summary:
-            done.append("stopped")
-            return super().stop()
-
-    monkeypatch.setattr("taxel.cli.live.remote", remote)
-    monkeypatch.setattr("taxel.cli.live.Live", Receiver)
-    told = CliRunner().invoke(
-        app, ["live", "--panel", "--seconds", "0.5", "--host", LOOPBACK, "--port", f"{free_port()}"]
-    )
-    assert told.exit_code == 3, told.exception
-    assert done[0] == "stopped"
-    assert done[-1] == "closed"

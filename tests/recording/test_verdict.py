@@ -60,8 +60,6 @@ def test_a_verdict_says_whether_anything_was_lost(seed: int) -> None:
     counts = {name: few() for name in ("dropped_by_kernel", "dropped_by_queue", "missing")}
     board = ("times_that_the_board_dropped_events", "resets", "events_repaired")
     counts["decoder"] = {name: few() for name in ("bytes_skipped", "outside_the_array", *board)}
-    names = ("missing", "dropped", "dropped_by_kernel", "silences", "restarts")
-    counts["bridged"] = {name: few() for name in names}
     unrecorded = few()
     counts["recorded"] = 5
     counts["received"] = 5 + counts["dropped_by_queue"] + unrecorded
@@ -70,10 +68,10 @@ def test_a_verdict_says_whether_anything_was_lost(seed: int) -> None:
         (only,) = draw.choice(["dropped_by_kernel", "missing", "board", "none"], 1)
         counts |= {name: 3 * (only == name) for name in ("dropped_by_kernel", "dropped_by_queue", "missing")}
         counts["decoder"][board[0]] = 3 * (only == "board")
-        counts |= {"received": 5, "bridged": {"silences": few()}}
+        counts["received"] = 5
         unrecorded = 0
     lost = unrecorded + sum(counts[name] for name in ("dropped_by_kernel", "dropped_by_queue", "missing"))
-    lost += counts["decoder"][board[0]] + sum(n for name, n in counts["bridged"].items() if name not in names[3:])
+    lost += counts["decoder"][board[0]]
     assert of_counts(counts).startswith("LOST: " if lost else "nothing lost")
     assert ("dropped events" in of_counts(counts)) == (counts["decoder"][board[0]] > 0)
 

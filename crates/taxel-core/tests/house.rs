@@ -33,8 +33,8 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
         "taxel-live",
         &[
             &["error", "kernel_drops", "latency", "locked", "read_at", "readable_file", "system_error", "text_lines"],
-            &["clock", "host_clock", "named_pipe", "regular_file"],
-            &["address", "bridged", "ports"],
+            &["clock", "named_pipe", "regular_file"],
+            &["address", "ports"],
             &["serial_line"],
             &["board_line", "line_place", "recording"],
             &["capture", "frame_lines", "line_input"],
@@ -63,7 +63,7 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
         "taxel-python",
         &[
             &["descriptors", "thread_state", "threaded"],
-            &["bridge", "cone_x"],
+            &["cone_x"],
             &[
                 "calibration",
                 "circuit",

@@ -1,6 +1,5 @@
 //! Receives and counts UDP datagrams: in the caller's thread, or in a separate thread between the socket and a bounded
-//! queue. Datagrams from another computer ([`ParcelFeed`]), and messages that a program makes ([`MessageFeed`]), pass
-//! through the same queue.
+//! queue. Messages that a program makes ([`MessageFeed`]) pass through the same queue.
 //!
 //! By default the caller receives in its own thread, which saves a wake-up and a copy. A caller that may wait for a disk requests a
 //! separate thread ([`Receiver::receive_in_thread`]), which receives in the meantime.
@@ -15,10 +14,8 @@
 //! it was read; on Linux `TAXEL_CAPTURE=portable` selects these calls.
 
 mod counts;
-mod feed;
 mod messages;
 mod options;
-mod parcel;
 mod queue;
 mod sender;
 mod socket;
@@ -30,15 +27,12 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use crate::bridged::Bridged;
 use crate::locked::lock;
 use crate::recording::now_ns;
 use crate::{Error, Result};
 pub use counts::CaptureCounts;
-pub use feed::ParcelFeed;
 pub use messages::MessageFeed;
 pub use options::ReceiverOptions;
-pub use parcel::{LONGEST, ParcelPacker};
 use queue::BatchQueue;
 pub use queue::{Batch, Datagram};
 pub use sender::{SendCounts, Sender};
@@ -63,9 +57,6 @@ pub const FIREWALL: &str = if cfg!(windows) { " (Windows' firewall may block dat
 pub enum Origin {
     /// A board sends to this address.
     Udp(SocketAddr),
-    /// Another computer receives the board's datagrams, and a bridge sends them to this one: its address, and the
-    /// board's name there.
-    Bridge(String),
     /// Frames of numbers are read from this place.
     Frames(String),
 }
@@ -74,12 +65,12 @@ impl std::fmt::Display for Origin {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Udp(address) => write!(f, "UDP {address}"),
-            Self::Bridge(name) | Self::Frames(name) => f.write_str(name),
+            Self::Frames(name) => f.write_str(name),
         }
     }
 }
 
-/// Receives datagrams, from [`Receiver::bind`] or [`Receiver::fed`] until it is dropped.
+/// Receives datagrams, from [`Receiver::bind`] or [`Receiver::of_messages`] until it is dropped.
 #[derive(Debug)]
 pub struct Receiver {
     queue: Arc<BatchQueue>,
@@ -92,8 +83,6 @@ enum Input {
     /// The socket, locked by a caller while it waits for datagrams, or `None` after it was moved into the thread; and
     /// the thread.
     Socket(Mutex<Option<Socket>>, Mutex<Option<JoinHandle<()>>>),
-    /// What another computer receives.
-    Parcels(ParcelFeed),
     /// The messages of a [`MessageFeed`], which may end by itself once it was asked to.
     Messages { ends_itself: bool },
 }
@@ -152,14 +141,6 @@ impl Receiver {
         Ok(())
     }
 
-    /// Receives datagrams of another computer; the caller passes its parcels to the [`ParcelFeed`].
-    #[must_use]
-    pub fn fed(name: &str, options: ReceiverOptions) -> (Self, ParcelFeed) {
-        let queue = Arc::new(BatchQueue::new(options.queue_bytes, CaptureCounts::default()));
-        let feed = ParcelFeed::new(Arc::clone(&queue));
-        (Self { queue, origin: Origin::Bridge(name.to_owned()), input: Input::Parcels(feed.clone()) }, feed)
-    }
-
     /// Receives the messages that the caller passes to the [`MessageFeed`]. The caller may end by itself once the end was
     /// requested, so that nothing is left that it has read: then it calls [`MessageFeed::close`].
     #[must_use]
@@ -180,16 +161,7 @@ impl Receiver {
     pub fn address(&self) -> SocketAddr {
         match self.origin {
             Origin::Udp(address) => address,
-            Origin::Bridge(_) | Origin::Frames(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
-        }
-    }
-
-    /// Counts of the bridge, if datagrams are received over one.
-    #[must_use]
-    pub fn bridged(&self) -> Option<Bridged> {
-        match &self.input {
-            Input::Parcels(feed) => Some(feed.bridged()),
-            Input::Socket(..) | Input::Messages { .. } => None,
+            Origin::Frames(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
         }
     }
 
@@ -198,7 +170,7 @@ impl Receiver {
     pub fn silent_until(&self) -> Option<i64> {
         match &self.input {
             Input::Socket(..) => Some(now_ns()),
-            Input::Parcels(_) | Input::Messages { .. } => self.queue.silent_until(),
+            Input::Messages { .. } => self.queue.silent_until(),
         }
     }
 
@@ -225,7 +197,7 @@ impl Receiver {
                     None => self.queue.pop(batch, timeout),
                 }
             }
-            Input::Parcels(_) | Input::Messages { .. } => self.queue.pop(batch, timeout),
+            Input::Messages { .. } => self.queue.pop(batch, timeout),
         };
         received.map_err(Error::socket(&self.origin))
     }
@@ -262,7 +234,7 @@ impl Receiver {
     /// Requests the end: what has arrived so far is received, then nothing more.
     pub fn stop(&self) {
         self.queue.stop();
-        if let Input::Parcels(_) | Input::Messages { ends_itself: false } = self.input {
+        if let Input::Messages { ends_itself: false } = self.input {
             self.queue.close(None);
         }
     }

@@ -2,11 +2,9 @@
 
 pub mod address;
 pub mod board_line;
-pub mod bridged;
 pub mod clock;
 pub mod error;
 pub mod frame_lines;
-pub mod host_clock;
 mod kernel_drops;
 mod latency;
 pub mod line_input;

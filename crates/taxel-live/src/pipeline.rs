@@ -7,7 +7,6 @@
 //! does not fit is counted where it was lost. Viewers receive copies ([`Live::counters`], [`Live::frame`]) and cannot
 //! slow the pipeline.
 
-mod copies;
 mod counters;
 mod decode_stage;
 mod falling_values;
@@ -53,11 +52,10 @@ use taxel_core::encode::Tare;
 use taxel_core::wire;
 use taxel_core::{Marker, Stop, problem};
 
-use crate::capture::{Origin, Receiver};
+use crate::capture::Origin;
 use crate::frame_lines::FrameLayout;
 use crate::locked::lock;
 use crate::{Error, Result};
-pub use copies::{Copied, Copies};
 pub use counters::{
     Arrival, ArrivalState, BoardState, Counters, DecodingCounts, LiveSummary, ReadoutCounts, SourceCounts,
 };
@@ -119,29 +117,20 @@ pub struct Live {
 }
 
 impl Live {
-    /// Opens the source that the options state (and the file), and starts: what a bridge receives if `fed` is given, else a
-    /// board where a port, a host or a board is stated, or no source is; else the first source, as frames.
+    /// Opens the source that the options state (and the file), and starts: a board where a port, a host or a board is stated,
+    /// or no source is; else the first source, as frames.
     ///
     /// # Errors
     ///
     /// As [`Live::start`]; those of [`SourceText::open`] and [`ReadoutSetup::new`]; of a readout that cannot be read, or is of another unit.
-    pub fn open(
-        options: LiveOptions,
-        fed: Option<Receiver>,
-        sinks: Vec<Box<dyn Sink>>,
-        stop: Stop<'_>,
-    ) -> Result<Self> {
+    pub fn open(options: LiveOptions, sinks: Vec<Box<dyn Sink>>, stop: Stop<'_>) -> Result<Self> {
         let mut texts = options.source_texts()?;
         let is_stated = options.port.is_some() || options.host.is_some() || texts.is_empty();
         let mut options = options;
         let readout = options.readout.as_deref().map(Detector::from_json).transpose()?;
         let unit = readout.as_ref().and_then(Detector::unit);
-        let mut input = match fed {
-            Some(receiver) => Some(PipelineInput::Fed(receiver)),
-            None if is_stated => Some(PipelineInput::Board(options.address()?)),
-            None => None,
-        };
-        if input.is_none() {
+        let mut input = None;
+        if !is_stated {
             let text = texts.remove(texts.iter().position(SourceText::is_board).unwrap_or(0));
             options.name = text.name();
             input = Some(match text.open(Some(&Some(options.array.clone())), options.first_line_wait(stop)?)? {
@@ -194,21 +183,6 @@ impl Live {
     ) -> Result<Self> {
         let others = OtherTexts { texts: options.source_texts()?, unit: None, stop: Stop::never() };
         Self::start_from(PipelineInput::Board(address), options, others, readout, sinks)
-    }
-
-    /// As [`Live::start`], for datagrams that another computer receives ([`Receiver::fed`]).
-    ///
-    /// # Errors
-    ///
-    /// As [`Live::start`], without those of the socket.
-    pub fn start_fed(
-        receiver: Receiver,
-        options: LiveOptions,
-        readout: ReadoutSetup,
-        sinks: Vec<Box<dyn Sink>>,
-    ) -> Result<Self> {
-        let others = OtherTexts { texts: options.source_texts()?, unit: None, stop: Stop::never() };
-        Self::start_from(PipelineInput::Fed(receiver), options, others, readout, sinks)
     }
 
     /// Starts with the further sources of these texts.
@@ -335,7 +309,7 @@ impl Live {
     }
 
     /// The address on which the pipeline receives, with the actual port if 0 was requested; unspecified, with port 0,
-    /// if a bridge feeds it.
+    /// for frames.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.shared.receiver.address()

@@ -6,7 +6,6 @@ use taxel_core::detect::Detection;
 use taxel_core::wire::{self, Registers, v2};
 use taxel_core::{Array, Marker, Stop};
 use taxel_live::KernelDrops;
-use taxel_live::bridged::Bridged;
 use taxel_live::recording::{
     Compression, FileEnding, Header, NOTHING_LOST, Reader, RecordingCounts, RecordingStatus, Topic, Writer,
     WriterOptions, damage,
@@ -336,10 +335,6 @@ fn what_a_kernel_does_not_count_is_unknown_unless_the_board_numbers_what_it_send
     assert_eq!(missing.lost, [("dropped_by_queue".to_owned(), 2), ("lost_on_the_way_or_dropped".to_owned(), 3)].into());
     let dropped = RecordingCounts { dropped_by_queue: 1, recorded: 9, ..uncounted.clone() }.verdict();
     assert_eq!(dropped.text, "LOST: 1 datagram dropped by taxel's queue, and losses in the kernel are unknown");
-    // A kernel of another computer that does not count is no better.
-    let bridged = Bridged { dropped_by_kernel: KernelDrops::UNKNOWN, ..Bridged::default() };
-    let verdict = RecordingCounts { bridged: Some(Box::new(bridged)), ..sound.clone() }.verdict();
-    assert_eq!(verdict.status, RecordingStatus::Unknown);
     // In a file it is null; a file that says nothing of it was written where the kernel counts.
     let json = serde_json::to_value(&uncounted).unwrap();
     assert_eq!(json["dropped_by_kernel"], serde_json::Value::Null);

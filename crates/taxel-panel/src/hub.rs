@@ -244,16 +244,16 @@ impl Hub {
             options: live.map(|live| Box::new(live.handle.options().clone())),
             udp: live.and_then(|live| match live.handle.origin() {
                 Origin::Udp(address) => Some(address.to_string()),
-                Origin::Bridge(_) | Origin::Frames(_) => None,
+                Origin::Frames(_) => None,
             }),
             firewall: FIREWALL,
             lines: live.and_then(|live| match live.handle.origin() {
                 Origin::Frames(place) => Some(place.clone()),
-                Origin::Udp(_) | Origin::Bridge(_) => None,
+                Origin::Udp(_) => None,
             }),
             source: live.and_then(|live| match live.handle.origin() {
                 Origin::Frames(_) => live.handle.options().sources.first().cloned(),
-                Origin::Udp(_) | Origin::Bridge(_) => None,
+                Origin::Udp(_) => None,
             }),
             sources: live.map(|live| live.handle.source_names()).unwrap_or_default(),
             frames: live.and_then(|live| live.frames()),

@@ -83,7 +83,7 @@ function shape(opened, hello) {
  */
 export function showState({ connected, why }, { source, state }, hello, opened, recorder, counters, opening, refused) {
   const recording = recorder?.state === "recording" ? recorder : null;
-  const silent = connected && source === null && hello?.live ? silence(counters, hello.lines ?? (hello.udp ? `UDP ${hello.udp}` : "the bridge's address"), hello.lines === null, hello.udp ? hello.firewall : "") : null;
+  const silent = connected && source === null && hello?.live ? silence(counters, hello.lines ?? `UDP ${hello.udp}`, hello.lines === null, hello.lines === null ? hello.firewall : "") : null;
   const [kind, word] = !connected
     ? ["lost", why ? "No connection" : "Connecting"]
     : source !== null || !hello?.live

@@ -9,7 +9,6 @@ mod test_hooks;
 mod thread_state;
 mod threaded;
 
-mod bridge;
 mod calibration;
 mod circuit;
 mod cone_x;
@@ -39,8 +38,6 @@ mod _core {
     use taxel_live::capture::FIREWALL;
     use taxel_live::serial_line::BAUDS;
 
-    #[pymodule_export]
-    use crate::bridge::{Copies, ParcelFeed};
     #[pymodule_export]
     use crate::calibration::{check_law, law_of, law_rest};
     #[pymodule_export]

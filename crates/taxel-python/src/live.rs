@@ -17,12 +17,11 @@ use taxel_live::pipeline::{
     Handle, LineSink, Live as Pipeline, LiveOptions, LiveSummary, OutputDetection, Record, Sink,
 };
 
-use crate::bridge::{Copies, ParcelFeed};
 use crate::thread_state;
 use crate::threaded::Threaded;
 use taxel_border::convert::array;
 use taxel_border::enter::enter;
-use taxel_border::errors::{ProblemError, core, live};
+use taxel_border::errors::{ProblemError, core};
 use taxel_border::parameters::{Plain, parsed};
 
 /// A detection, by name: `reported` is the time of its report in us of the board's clock, `reported_ns` in ns of the host's.
@@ -101,15 +100,9 @@ impl Live {
     /// Opens the socket, and the file where one is named.
     ///
     /// `options` are those of Rust's `LiveOptions`, as JSON, but for `record`, as the name of a file may be no text. `say` is
-    /// called with each detection in the thread that made it. With a `feed` no socket is opened.
+    /// called with each detection in the thread that made it.
     #[new]
-    fn start(
-        py: Python<'_>,
-        options: &str,
-        record: Option<PathBuf>,
-        say: Option<Py<PyAny>>,
-        feed: Option<PyRef<'_, ParcelFeed>>,
-    ) -> PyResult<Self> {
+    fn start(py: Python<'_>, options: &str, record: Option<PathBuf>, say: Option<Py<PyAny>>) -> PyResult<Self> {
         let options = LiveOptions { record, ..parsed("options", options)? };
         options.array.check().map_err(core)?;
         let mut sinks: Vec<Box<dyn Sink>> = vec![];
@@ -127,8 +120,7 @@ impl Live {
                 .map_err(std::io::Error::other)
             }));
         }
-        let fed = feed.map(|feed| feed.receiver()).transpose().map_err(live)?;
-        let pipeline = enter(py, |stop| Pipeline::open(options, fed, sinks, stop))?;
+        let pipeline = enter(py, |stop| Pipeline::open(options, sinks, stop))?;
         Ok(Self {
             pipeline: Threaded::new("live", "live: has been stopped; begin a new Live", pipeline),
             summary: Mutex::default(),
@@ -144,16 +136,6 @@ impl Live {
     /// Where datagrams come from, in words.
     fn place(&self, py: Python<'_>) -> PyResult<String> {
         self.with(py, |pipeline| Ok(pipeline.origin().to_string()))
-    }
-
-    /// The board's registers, as far as they are known.
-    fn registers(&self, py: Python<'_>) -> PyResult<Plain<Value>> {
-        self.with(py, |pipeline| Ok(Plain(json!(pipeline.handle().registers()))))
-    }
-
-    /// Copies for other computers, from the next batch on.
-    fn copy(&self, py: Python<'_>) -> PyResult<Copies> {
-        self.with(py, |pipeline| pipeline.handle().copy()).map(Copies::new)
     }
 
     /// The next detection; None after `timeout` seconds without one, or when all is over.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import Field, fields
@@ -22,9 +21,8 @@ from taxel.array import Array, of_size
 from taxel.cli._app import OUTSIDE, WRONG_INPUT, as_command
 from taxel.cli.console import Console
 from taxel.detect import load
-from taxel.live import RemoteBoard, Summary, delays
+from taxel.live import Summary, delays
 from taxel.live._stated_options import StatedOptions
-from taxel.live.remote import receiver_of
 from taxel.tare import Tare
 from taxel.wire import Registers
 from taxel.wire.registers import QUOTED_PRESETS
@@ -49,13 +47,6 @@ RateOption = Annotated[
 ]
 BitsOption = Annotated[
     int | None, typer.Option(min=1, max=16, help="With --rate-hz: bits of the sensor's values, as given to the Source.")
-]
-CongestionOption = Annotated[
-    str | None,
-    typer.Option(
-        help="With --remote, if this computer is too slow: block (the bridge waits) or drop (datagrams are lost and "
-        "counted). Default: block with --record or --readout, else drop."
-    ),
 ]
 
 
@@ -114,7 +105,7 @@ def with_live_options(command: str, *names: str) -> Callable[[Callable[..., None
 def for_live(
     options: dict[str, Any], rate_hz: float | None = None, bits: int | None = None, seconds: float | None = None
 ) -> dict[str, Any]:
-    """Return typed options as `Live` takes them: files are read; `remote` stays an address.
+    """Return typed options as `Live` takes them: files are read.
 
     Each source of lines may be silent before its first line for `seconds`, by default as long as it takes.
     """
@@ -123,7 +114,7 @@ def for_live(
     # The wire's pitch is that of the board; a sensor of one's own has the one that is stated, or none.
     array = None if size is None else of_size(size, of_wire=rate_hz is None)
     sensor = trained.array if array is None and trained is not None else array
-    registers = _registers(options["registers"], rate_hz, bits, options.get("remote"), sensor)
+    registers = _registers(options["registers"], rate_hz, bits, sensor)
     read = {"readout": trained, "array": array, "registers": registers, "tare": _rest(options.get("tare"))}
     given = {"send": options.get("send") or ()}
     if "sources" in options:
@@ -133,33 +124,16 @@ def for_live(
 
 
 def _registers(
-    preset: str | None, rate_hz: float | None, bits: int | None, address: str | None, array: Array | None
+    preset: str | None, rate_hz: float | None, bits: int | None, array: Array | None
 ) -> str | Registers | None:
     """Return the registers that the options state, of a sensor of this array; None if they state none."""
     if rate_hz is None and bits is None:
         return preset
     if rate_hz is None or bits is None:
         raise ProblemError("--rate-hz and --bits: give both, with the values of the taxel.live.Source that sends")
-    if preset is not None or address is not None:
-        option = "--preset" if preset is not None else "--remote"
-        raise ProblemError(
-            f"--rate-hz and {option} are both given, and both state the registers: give only one of them"
-        )
+    if preset is not None:
+        raise ProblemError("--rate-hz and --preset are both given, and both state the registers: give only one of them")
     return Registers._of_source(Array._of(array), rate_hz, bits)[0]
-
-
-def remote(
-    address: str | None, congestion: str | None, *, lossless: bool
-) -> contextlib.AbstractContextManager[RemoteBoard | None]:
-    """Return the receiver of another computer's board; `lossless`: it blocks by default, else it drops."""
-    if address is None:
-        if congestion is not None:
-            raise ProblemError("--congestion needs a board of another computer: give --remote ADDRESS")
-        return contextlib.nullcontext()
-    received: contextlib.AbstractContextManager[RemoteBoard] = receiver_of(address)(
-        address, congestion=congestion or ("block" if lossless else "drop")
-    )
-    return received
 
 
 def say_waiting(options: dict[str, Any], console: Console) -> None:
@@ -221,27 +195,6 @@ def exit_code(summary: Summary, array: Array) -> int:
     if summary.nothing_came or summary.lost or summary.counters["events_dropped"] or unsent or _in_no_line(summary):
         return OUTSIDE
     return WRONG_INPUT if outside(summary.counters, array) else 0
-
-
-def _bridge_rows(counts: dict[str, Any] | None) -> list[tuple[str, str, str]]:
-    """Return the rows of the table on the connection to another computer."""
-    if counts is None:
-        return []
-    if counts["ended"]:
-        state = "the bridge has ended; waiting for a new one"
-    elif counts["received"]:
-        state = "connected"
-    else:
-        state = "SILENT: nothing arrives from the other computer; waiting"
-    there = (counts["dropped_by_kernel"] or 0) + counts["dropped"]
-    more = " or more" if counts["dropped_by_kernel"] is None else ""
-    lost = f"{counts['missing']:,} on the way, {there:,}{more} on the other computer"
-    clock = counts["clock"]
-    compared = "not compared yet"
-    if clock is not None:
-        ahead, within = (clock[name] / 1e6 for name in ("ahead_ns", "within_ns"))
-        compared = f"ahead by {ahead:+,.3f} ms (within {within:.3f} ms), drift {clock['drift_ppm']:+.1f} ppm"
-    return [("other computer", state, ""), ("lost between", lost, ""), ("its clock", compared, "")]
 
 
 def received(counters: dict[str, Any]) -> str:
@@ -345,7 +298,6 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
         ("bytes", f"{capture['bytes']:,}", rate(capture["bytes"], earlier["bytes"])),
         ("events", f"{now['events']:,}", rate(now["events"], before["events"])),
         ("lost", lost, ""),
-        *_bridge_rows(now["bridged"]),
         ("damaged", damage, ""),
         ("arrival to decoded", delays(now["decode_latency"]), ""),
         ("board's clock", f"{board}{drift}", ""),

@@ -27,7 +27,6 @@ from taxel.cli._say import say
 from taxel.cli.board import (
     REDRAW_S,
     BitsOption,
-    CongestionOption,
     RateOption,
     counters_table,
     doubts,
@@ -35,7 +34,6 @@ from taxel.cli.board import (
     for_live,
     outside,
     received,
-    remote,
     say_waiting,
     unread,
     with_live_options,
@@ -60,7 +58,6 @@ class _LiveArguments:
 
     rate_hz: RateOption = None
     bits: BitsOption = None
-    congestion: CongestionOption = None
     control: Annotated[
         str | None,
         typer.Option(
@@ -101,25 +98,22 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
     Example: taxel live --readout ball.json --tare 0.05 --send lines+udp:127.0.0.1:9000 --send serial:/dev/ttyACM0
     Example: taxel live --source serial:/dev/ttyACM0,array=16x16 --readout mat.json
     Example: taxel live --panel --control 127.0.0.1:5209
-    Example: taxel live --remote zenoh:192.168.1.5:7447/left --panel
     """
     _check_options(options, typed)
     given_tare = options["tare"]
     options = for_live(options, typed.rate_hz, typed.bits, typed.seconds)
-    trained, rest, record, address, lines = (options[name] for name in ("readout", "tare", "record", "remote", "lines"))
+    trained, rest, record, lines = (options[name] for name in ("readout", "tare", "record", "lines"))
     _check_fresh_tare(typed, rest, overwrite=options["overwrite"])
     if typed.report is not None:
         if record is None or record.suffix != ".mcap":
             raise ProblemError("--report needs a recording: give --record FILE.mcap")
         try_report(typed.report, overwrite=options["overwrite"])
     console = Console(stderr=True)
-    with contextlib.ExitStack() as connected, contextlib.ExitStack() as at_rest:
+    with contextlib.ExitStack() as at_rest:
         if typed.control is not None and isinstance(rest, float):
             at_rest.enter_context(at_rest.enter_context(Cable(typed.control)).floor(0))
-        lossless = record is not None or trained is not None
-        board = connected.enter_context(remote(address, typed.congestion, lossless=lossless))
         is_board = options["port"] is not None or options["host"] is not None or not options["sources"]
-        if trained is not None and options["registers"] is None and board is None and is_board:
+        if trained is not None and options["registers"] is None and is_board:
             sensor = trained.array if options["array"] is None else options["array"]
             frame_us = Registers(array=Array._of(sensor)).frame_us
             console.print(
@@ -127,7 +121,7 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
                 f"other frames, give --preset, or --rate-hz and --bits"
             )
         say_waiting(options, console)
-        with Live(**options | {"remote": board}) as pipeline:
+        with Live(**options) as pipeline:
             if trained is not None and trained.unit is not None and not pipeline._states_unit:
                 console.print(
                     f"values are assumed to be in {pipeline.unit}, the unit of the readout: --source states no unit"

@@ -30,7 +30,6 @@ from taxel.cli.board import (
     left_out,
     outside,
     received,
-    remote,
     say_waiting,
     unread,
     with_live_options,
@@ -93,7 +92,6 @@ def record(
     Example: taxel record --port 5208 walk.mcap
     Example: taxel record walk.mcap --port 5208 --source left=board:0.0.0.0:5209 --source imu=serial:COM3
     Example: taxel record mat.mcap --source serial:/dev/ttyACM0,array=16x16,unit=counts
-    Example: taxel record --remote zenoh:192.168.1.5:7447/left walk.mcap
     """
     if typed.length is None and typed.trials is not None:
         raise ProblemError("--trials needs --length, the length of each trial: give both")
@@ -135,10 +133,7 @@ def _automatic(file: Path, live: dict[str, Any], typed: _RecordArguments, consol
             empty += 1
 
     name = following(0)
-    with (
-        remote(live["remote"], None, lossless=True) as board,
-        Live(record_later=True, **{**live, "remote": board}) as receiver,
-    ):
+    with Live(record_later=True, **live) as receiver:
         notes = noting(receiver.note, console.print) if _takes_notes(file, live["sources"]) else nullcontext("")
         with notes as keys:
             try:
@@ -180,10 +175,7 @@ def _count_down(name: Path, seconds: int, console: Console) -> None:
 
 def _one(file: Path, options: dict[str, Any], typed: _RecordArguments, console: Console) -> tuple[Summary, int]:
     """Record one file until its time is over, the board marks a stop, or Ctrl-C; return summary and exit code."""
-    with (
-        remote(options["remote"], None, lossless=True) as board,
-        Live(record=file, **{**options, "remote": board}) as live,
-    ):
+    with Live(record=file, **options) as live:
         notes = noting(live.note, console.print) if _takes_notes(file, options["sources"]) else nullcontext("")
         with suppress(KeyboardInterrupt), notes as keys:
             _watch(live, file, typed.seconds, typed.markers, console, keys, trial=False)

@@ -2,7 +2,6 @@
 
 from taxel.live.live import Live
 from taxel.live.panel import Panel
-from taxel.live.remote import RemoteBoard
 from taxel.live.sending import PORT, send
 from taxel.live.source import Source
 from taxel.live.summary import Summary
@@ -12,7 +11,6 @@ __all__ = [
     "PORT",
     "Live",
     "Panel",
-    "RemoteBoard",
     "Source",
     "Summary",
     "send",

@@ -12,7 +12,6 @@ from dataclasses import KW_ONLY, dataclass
 from taxel._base.options import option
 from taxel.array import Array
 from taxel.detect import PlainRule, Readout
-from taxel.live.remote import RemoteBoard
 from taxel.tare import Tare
 from taxel.wire import Registers
 
@@ -34,23 +33,17 @@ class StatedOptions:
     host: str | None = option(
         None, "The address of this machine to listen on for a board; 0.0.0.0: all.", commands="live record"
     )
-    remote: RemoteBoard | None = option(
-        None,
-        "Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there.",
-        commands="live record",
-        metavar="ADDRESS",
-    )
     array: Array | None = option(
         None,
-        "Rows, columns and pitch of the sensor. Default: those of the remote board or of the readout, else 64x64x2.67.",
+        "Rows, columns and pitch of the sensor. Default: those of the readout, else 64x64x2.67.",
         commands="live record",
         metavar="ROWSxCOLUMNS[xMM]",
         typed="For example 24x20x5. Default pitch: 2.67 mm, or unknown with --rate-hz.",
     )
     registers: str | Registers | None = option(
         None,
-        "The board's registers, by a preset: one of `taxel.wire.PRESETS`. Default: those of a remote board, else those"
-        " of a board of this array at reset.",
+        "The board's registers, by a preset: one of `taxel.wire.PRESETS`. Default: those of a board of this array at "
+        "reset.",
         commands="live record",
         flag="--preset",
     )

@@ -54,14 +54,11 @@ class Live:
         see `address`.
     host : str, optional
         The address of this machine to listen on for a board; 0.0.0.0: all.
-    remote : RemoteBoard, optional
-        Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there. Stop the
-        `Live` before it.
     array : Array, optional
-        Rows, columns and pitch of the sensor. Default: those of the remote board or of the readout, else 64x64x2.67.
+        Rows, columns and pitch of the sensor. Default: those of the readout, else 64x64x2.67.
     registers : str or Registers, optional
-        The board's registers, by a preset: one of `taxel.wire.PRESETS`. Default: those of a remote board, else those of
-        a board of this array at reset. Or their contents. A smaller array drives fewer lines of a preset.
+        The board's registers, by a preset: one of `taxel.wire.PRESETS`. Default: those of a board of this array at
+        reset. Or their contents. A smaller array drives fewer lines of a preset.
     differences : bool
         The board sends intensity differences. The panel's "delta intensity".
     readout : Readout or PlainRule, optional
@@ -150,9 +147,9 @@ class Live:
     @with_fields_of(LiveOptions)
     def __init__(self, options: LiveOptions) -> None:
         #: Whether the registers were stated; the panel shows no frame rate that is only assumed.
-        self._registers_stated = options.registers is not None or options.remote is not None
+        self._registers_stated = options.registers is not None
         options = options.completed()
-        remote, say = options.remote, options.say
+        say = options.say
         destinations, sources = options.destinations(), options.source_texts()
         outlets = [LslOutlet(to.removeprefix(_LSL)) for to in destinations if to.startswith(_LSL)]
         inlets = {source: LslInlet(found[2]) for source in sources if (found := _LSL_SOURCE.fullmatch(source))}
@@ -163,12 +160,10 @@ class Live:
             send=[to for to in destinations if not to.startswith(_LSL)],
             sources=[_given(source, inlets[source]) if source in inlets else source for source in sources],
         )
-        feed = None if remote is None else _core.ParcelFeed(remote.place, options.queue_bytes)
         self._core = _core.Live(
             stated,
             None if options.record is None else checked_path("record", options.record),
             None if not receivers else lambda values: [receive(Detection(**values)) for receive in receivers],
-            feed,
         )
         array, name = self._core.sensor()
         self.array = Array._from_geometry(array)
@@ -183,55 +178,32 @@ class Live:
         self._states_unit = layout is None or layout[1]
         #: To begin another one on another address.
         self._options = replace(options, array=self.array)
-        self._remote, self._place = remote, self._core.place()
+        self._place = self._core.place()
         #: Where a board is received; nowhere of a source of frames.
         self._listened_on = self._core.address() if self.frame_us is None else (None, None)
-        if remote is not None and feed is not None:
-            remote.begin(feed)
         for source, inlet in inlets.items():
             inlet.begin(partial(self._core.sample, _stream_name(source)))
 
     def _again(self, **changed: Any) -> Live:
         """Return another `Live` that works alike, with other options; by default it receives from the same place."""
         host, port = self._listened_on
-        options = replace(self._options, **{"host": host, "port": port, "remote": None, **changed})
+        options = replace(self._options, **{"host": host, "port": port, **changed})
         return Live(**{field.name: getattr(options, field.name) for field in fields(options)})
 
     @property
     def address(self) -> tuple[str, int]:
-        """Host and port on which it listens.
-
-        Raises
-        ------
-        ProblemError : the board is another computer's
-        """
-        if self._remote is not None:
-            raise refused("live", f": receives from {self.place}, so it has no address on this computer")
+        """Host and port on which it listens."""
         return self._core.address()
 
     @property
     def place(self) -> str:
-        """The origin of the datagrams: "UDP 127.0.0.1:5208", or the address of a remote board."""
+        """The origin of the datagrams: "UDP 127.0.0.1:5208", or the place of frames of numbers."""
         return self._place
-
-    @property
-    def about(self) -> dict[str, Any]:
-        """The description of the sensor as JSON values, for a `RemoteBoard`: array, registers, differences."""
-        registers = self._core.registers()
-        return {"array": self.array._geometry(), "registers": registers, "differences": self._options.differences}
 
     @property
     def is_over(self) -> bool:
         """Whether it has ended, by `stop` or an error."""
         return self._core.is_over()
-
-    def copies(self) -> _core.Copies:
-        """Return an object that copies all data that arrive after this call, for other computers.
-
-        Its ``next(timeout)`` returns the next copy, or None: ("parcel", bytes) for datagrams, ("frame", JSON) ten times
-        a second, ("detection", JSON); ``is_over()`` is true if the pipeline has ended and all copies were taken.
-        """
-        return self._core.copy()
 
     def next(self, timeout: float = 1.0) -> Detection | None:
         """Return the next detection, or None after `timeout` without one, or at once after the end.
@@ -269,7 +241,7 @@ class Live:
         """Counts of what was received, decoded and lost so far, by place.
 
         Keys: `capture` (messages, datagrams, bytes, dropped_by_kernel, dropped_by_queue, waiting, ...;
-        dropped_by_kernel is None where the system does not count it, here and of `bridged`), `decoded` (datagrams),
+        dropped_by_kernel is None where the system does not count it), `decoded` (datagrams),
         `wire` (bytes, words, skipped, changes, ... by cause), `wire_version`, `wire_v2` (as
         `taxel.wire.Counts`), `wire_refused` (bytes of version 1 while the board speaks version 2), `wire_changes`,
         `wire_late` (events of version 2 that arrived after time had passed theirs), `wire_jumps` (of the times of
@@ -279,9 +251,7 @@ class Live:
         `arrived_ns` (when the latest datagram arrived, ns since 1970, or None),
         `heartbeat_us` (the longest interval between heartbeats of a board of version 2, or None), `arrival` (state:
         "nothing", "arriving", "quiet" or "lost"; since_ns, silent_s, heartbeat_us; not of one that has ended),
-        `bridged` (None, or of a board of another computer: parcels, missing, dropped, dropped_by_kernel, repeated,
-        refused, restarts, silences, received, ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`,
-        `read_out`, `events_dropped`,
+        `events`, `read_out`, `events_dropped`,
         `late` (events out of order), `detections`, `wrong` (those output in a
         silence that an event then interrupted, later than the guard), `outside` (those with an input outside the range
         that it had in training; None if that is not known), `detections_dropped`, `sources` (the counts of
@@ -513,9 +483,8 @@ class Live:
 
         Raises
         ------
-        OSError : the disk is full, and what was written before stays readable; or the file was removed, renamed or
-            replaced while it was recorded, which names what is lost
-        ProblemError : called by `say`, in a forked child, or after an end by an error
+        OSError : the disk is full, and what was written before stays readable
+        ProblemError : called by `say`, or after an end by an error
         """
         inlets, self._inlets = self._inlets, []
         for inlet in inlets:

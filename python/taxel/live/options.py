@@ -17,7 +17,6 @@ from taxel.detect import PlainRule, Readout
 from taxel.detect.detector import detector
 from taxel.formats.layout import Layout
 from taxel.live._stated_options import StatedOptions
-from taxel.live.remote import RemoteBoard
 from taxel.tare import Tare
 from taxel.wire import Registers
 
@@ -32,18 +31,10 @@ class LiveOptions(StatedOptions):
     say: Callable[[Detection], object] | None = None
 
     def completed(self) -> LiveOptions:
-        """Return the options with the sensor of the remote board or the readout; refuse options that make no sense."""
-        readout, remote, array, registers, differences = (
-            self.readout, self.remote, self.array, self.registers, self.differences,
-        )  # fmt: skip
+        """Return the options with the sensor of the readout; refuse options that make no sense."""
+        readout, array, registers = self.readout, self.array, self.registers
         if readout is not None:
             detector("readout", readout)
-        if remote is not None:
-            if instance("remote", remote, RemoteBoard).in_use:  # type: ignore[type-abstract]
-                raise refused("remote", ": is in use already; make another remote board")
-            array = remote.array if array is None else array
-            registers = Registers._of(remote.registers, remote.array) if registers is None else registers
-            differences = flag("differences", differences) or remote.differences
         if array is None and readout is not None:
             array = readout.array
         elif readout is not None and readout.array is not None:
@@ -57,7 +48,7 @@ class LiveOptions(StatedOptions):
             registers = Registers(array=array)
         elif not isinstance(registers, Registers):
             registers = Registers._of(_core.registers_preset(text("registers", registers), array._parts()), array)
-        return replace(self, array=array, registers=registers, differences=differences)
+        return replace(self, array=array, registers=registers)
 
     def destinations(self) -> list[str]:
         """Return where detections are sent."""
@@ -103,8 +94,6 @@ def _plain(option: Field[Any], value: object) -> object:
             return json.loads(value._json())
         case Readout() | PlainRule() | Tare():
             return value.to_json()
-        case RemoteBoard():
-            return value.place
     if value is None and "None" in option.type:
         return None
     checks: dict[Any, Callable[[], object]] = {

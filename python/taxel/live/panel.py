@@ -266,11 +266,6 @@ class Panel:
             raise ProblemError(f"{action}: this panel shows recordings only")
         if self._live._options.record is not None:
             raise ProblemError(f"{action}: a recording from this address is running; end it first")
-        if self._live._remote is not None:
-            raise ProblemError(
-                f"{action}: the board is connected to another computer, which sets its address and the meaning of its "
-                f"intensities"
-            )
         return self._live
 
     def stop(self) -> None:

@@ -45,16 +45,11 @@ class Summary:
 
     @property
     def lost(self) -> int:
-        """Number of losses after arrival: messages in the kernel if it counts them, datagrams in the queue.
-
-        For a board of another computer with the losses there and between the two computers.
-        """
+        """Number of losses after arrival: messages in the kernel if it counts them, datagrams in the queue."""
         boards = [self.counters, *(source for source in self.counters["sources"].values() if "capture" in source)]
-        lost: int = sum(
+        return sum(
             (board["capture"]["dropped_by_kernel"] or 0) + board["capture"]["dropped_by_queue"] for board in boards
         )
-        bridged = self.counters["bridged"] or {}
-        return lost + sum(bridged.get(cause) or 0 for cause in ("missing", "dropped", "dropped_by_kernel"))
 
     @property
     def nothing_came(self) -> bool:

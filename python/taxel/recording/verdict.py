@@ -62,7 +62,6 @@ class Verdict(str):
     - ``dropped_by_queue`` ("dropped by taxel's queue"), ``not_recorded`` ("received but not recorded").
     - ``dropped_or_left_out``: arrival numbers that an unfinished file lacks.
     - ``bytes_in_no_line``: after 65 536 bytes of a line; before the first line, bytes that are not text.
-    - ``lost_between_computers``, ``dropped_by_other_computer``, ``dropped_by_other_kernel``: with a bridge.
     - ``lost_on_the_way``, ``lost_on_the_way_or_dropped``: lost or damaged. The second: perhaps counted above too, or
       dropped by a kernel that does not count.
     - ``lost_in_file``: datagrams, lines or frames. ``notes_lost_in_file`` (also zeroed taxels), ``detections_...``,
@@ -100,8 +99,7 @@ class Verdict(str):
     - ``bytes_of_unfinished_lines``: the beginning or the end did not arrive.
     - ``clock_began_anew`` ("restarts of its clock"), ``missing_values``: streams: back by more than a second, then
       times by arrival; ``nan``.
-    - ``silences`` ("no frame arrived for a second or more"), ``silent_ms``: of sources of frames;
-      ``silences_of_other_computer``, ``restarts_of_other_computer``: of a bridge.
+    - ``silences`` ("no frame arrived for a second or more"), ``silent_ms``: of sources of frames.
     - ``gaps``, ``gaps_us``: number and sum.
 
     Examples

@@ -10,7 +10,6 @@ use taxel_core::wire::{self, SenderTotals, StepBack};
 
 use super::frame_input::LineCounts;
 use super::sending::Sent;
-use crate::bridged::Bridged;
 use crate::capture;
 use crate::clock::{Offset, Pace};
 use crate::latency::Quantiles;
@@ -20,13 +19,11 @@ use crate::recording::Verdict;
 ///
 /// Once [`Live::stop`](super::Live::stop) has returned, `capture.datagrams = decoded + capture.dropped_by_queue` and
 /// `wire.bytes = 5 wire.words + wire.skipped`; if there is a readout, `events = read_out + events_dropped`. In JSON, as in
-/// Python, all are fields of one object but for those of the socket, the wire and the bridge.
+/// Python, all are fields of one object but for those of the socket and the wire.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Counters {
     /// Counts of the socket and of the queue behind it.
     pub capture: capture::CaptureCounts,
-    /// Losses between another computer, which receives the board's datagrams, and this one.
-    pub bridged: Option<Bridged>,
     /// Counts of the lines of a source of frames.
     pub lines: Option<LineCounts>,
     /// What was decoded.
@@ -205,7 +202,6 @@ impl Counters {
         Self {
             capture,
             lines: self.lines.as_ref().map(|now| earlier.lines.as_ref().map_or_else(|| now.clone(), |l| now.since(l))),
-            bridged: self.bridged.map(|now| now.since(&earlier.bridged.unwrap_or_default())),
             decoding: self.decoding.since(&earlier.decoding),
             readout: self.readout.since(&earlier.readout),
             board: BoardState { markers: self.board.markers - earlier.board.markers, ..self.board.clone() },

@@ -9,7 +9,6 @@ use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::rest::ValueSteps;
 use taxel_core::wire::Registers;
 
-use super::copies::Copies;
 use super::counters::{Counters, LiveSummary};
 use super::options::{LiveOptions, Record};
 use super::recording_switch::RecordingSwitch;
@@ -19,9 +18,6 @@ use super::viewer_queue::ViewerEvents;
 use crate::Result;
 use crate::capture::Origin;
 use crate::locked::lock;
-
-/// Capacity of the queue of detections for another computer.
-const COPIED_WAITING: usize = 1 << 12;
 
 /// A handle to a [`Live`](super::Live), for other threads, valid while it runs and after.
 #[derive(Clone)]
@@ -44,7 +40,7 @@ impl Handle {
         std::iter::once(&self.shared.options.name).chain(others).cloned().collect()
     }
 
-    /// The address on which it receives; unspecified, with port 0, if a bridge feeds it.
+    /// The address on which it receives; unspecified, with port 0, for frames.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.shared.receiver.address()
@@ -98,18 +94,6 @@ impl Handle {
         let (answer, events) = channel::bounded(1);
         self.shared.request(PipelineRequest::View(answer));
         self.shared.wait(&events)
-    }
-
-    /// Copies what arrives, for other computers, from the next batch on.
-    ///
-    /// # Errors
-    ///
-    /// `Core(Problem)` if the pipeline has ended.
-    pub fn copy(&self) -> Result<Copies> {
-        let (answer, parcels) = channel::bounded(1);
-        let detections = self.detections(COPIED_WAITING);
-        self.shared.request(PipelineRequest::Copy(answer));
-        Ok(Copies::new(Arc::clone(&self.shared), self.shared.wait(&parcels)?, detections))
     }
 
     /// Returns a queue of the detections from now on with capacity `waiting`; a slow receiver misses some.

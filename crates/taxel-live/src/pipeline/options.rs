@@ -53,18 +53,13 @@ options! {
         port: Option<u16> = None, "commands" = "live record";
         /// The address of this machine to listen on for a board; 0.0.0.0: all.
         host: Option<String> = None, "commands" = "live record";
-        /// Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there.
-        ///
-        /// Stop the `Live` before it.
-        remote: Option<String> = None, "commands" = "live record", "metavar" = "ADDRESS",
-            "python" = "RemoteBoard | None";
-        /// Rows, columns and pitch of the sensor. Default: those of the remote board or of the readout, else 64x64x2.67.
+        /// Rows, columns and pitch of the sensor. Default: those of the readout, else 64x64x2.67.
         #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
         #[serde(skip_serializing)]
         array: Array = Array::thesis(), "commands" = "live record", "metavar" = "ROWSxCOLUMNS[xMM]",
             "python" = "Array | None", "typed" = "For example 24x20x5. Default pitch: 2.67 mm, or unknown with --rate-hz.";
-        /// The board's registers, by a preset: one of `taxel.wire.PRESETS`. Default: those of a remote board, else those of a
-        /// board of this array at reset.
+        /// The board's registers, by a preset: one of `taxel.wire.PRESETS`. Default: those of a board of this array
+        /// at reset.
         ///
         /// Or their contents. A smaller array drives fewer lines of a preset.
         #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]

@@ -209,14 +209,14 @@ impl RecordStage {
         if due {
             self.counted = Instant::now();
         }
-        let (capture, bridged) = (self.shared.receiver.counts(), self.shared.receiver.bridged());
+        let capture = self.shared.receiver.counts();
         let lines = self.shared.frames.as_ref().map(|frames| frames.counts());
         self.with(|recording| {
             if let Some(tare) = tare {
                 recording.tare(&tare)?;
             }
             recording.flush()?;
-            if due { recording.counts(&Counters { capture, bridged, lines, ..counters }) } else { Ok(()) }
+            if due { recording.counts(&Counters { capture, lines, ..counters }) } else { Ok(()) }
         })
     }
 }

@@ -156,7 +156,6 @@ fn nothing_arrived(origin: &Origin, seconds: f64) -> String {
             format!("does the board send to this machine, and to port {}?{FIREWALL}", address.port())
         }
         Origin::Frames(_) => "is the sensor connected, and does it send lines of numbers?".to_owned(),
-        Origin::Bridge(_) => "does the board send to the computer that bridges it?".to_owned(),
     };
     format!("nothing arrived at {origin} in {seconds:.1} s: {ask}")
 }

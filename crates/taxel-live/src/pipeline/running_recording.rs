@@ -484,7 +484,6 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
         decoder,
         steps_back: now.decoding.wire_steps.clone(),
         missing: missing.filter(|n| *n > 0 || knows),
-        bridged: now.bridged.map(Box::new),
         ..recording::RecordingCounts::default()
     }
 }

@@ -113,8 +113,6 @@ pub(super) enum PipelineRequest {
     Record(Option<Box<RunningRecording>>, channel::Sender<Result<EndedRecording>>),
     /// Copies the events for a viewer.
     View(channel::Sender<ViewerEvents>),
-    /// Copies the datagrams for another computer.
-    Copy(channel::Sender<channel::Receiver<Vec<u8>>>),
     /// Notes a write of the registers.
     Registers(Registers),
     /// Zeroes these taxels, and returns the zeroings.
@@ -167,7 +165,6 @@ impl PipelineShared {
             if capture.stamped_when_read { Quantiles::default() } else { published.decode_latency.quantiles() };
         Counters {
             capture,
-            bridged: self.receiver.bridged(),
             lines: self.frames.as_ref().map(|frames| frames.counts()),
             decode_latency: decoding,
             report_latency: published.report_latency.quantiles(),
@@ -226,7 +223,7 @@ pub(super) fn header_of(options: &LiveOptions, origin: &Origin, frames: Option<&
     let (array, name) = (options.array.clone(), options.name.clone());
     let source = match origin {
         Origin::Udp(address) => format!("udp {address}"),
-        Origin::Bridge(name) | Origin::Frames(name) => name.clone(),
+        Origin::Frames(name) => name.clone(),
     };
     if let Some(layout) = frames {
         return Ok(Header::of_frames(&name, array, layout.properties(), source, now_ns())?);

@@ -211,8 +211,6 @@ pub(super) fn losses_of_lines(lines: u64, faults: &DamageCounts) -> recording::R
 pub(super) enum PipelineInput {
     /// A board that sends to this address.
     Board(SocketAddr),
-    /// Datagrams that another computer receives.
-    Fed(Receiver),
     /// Frames of numbers, and the lines to read them from.
     Frames(Option<LinePlace>, Box<FrameLayout>, Option<OpenedLines>),
 }
@@ -228,7 +226,7 @@ impl PipelineInput {
     pub(super) fn layout(&self) -> Option<&FrameLayout> {
         match self {
             Self::Frames(_, layout, _) => Some(layout),
-            Self::Board(_) | Self::Fed(_) => None,
+            Self::Board(_) => None,
         }
     }
 
@@ -236,7 +234,6 @@ impl PipelineInput {
     pub(super) fn open(self, options: ReceiverOptions) -> Result<OpenInput> {
         Ok(match self {
             Self::Board(address) => (Receiver::bind(address, options)?, None, None),
-            Self::Fed(receiver) => (receiver, None, None),
             Self::Frames(place, layout, lines) => {
                 let (frames, receiver) = FrameInput::new(place, *layout, options);
                 (receiver, Some(frames), lines)

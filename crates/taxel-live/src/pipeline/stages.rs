@@ -169,19 +169,16 @@ impl Stages {
             self.expect_version(version)?;
         }
         let tick = if self.readout.is_on() { self.source.tick() } else { None };
-        let (batch, received) = self.receive.next(self.observers.longest_wait(tick.unwrap_or(IDLE)))?;
-        let silent_until = if received {
+        let (batch, received) = self.receive.next(tick.unwrap_or(IDLE))?;
+        if received {
             self.process(&batch)?;
             self.record.datagrams(&batch)?;
-            None
         } else {
             let until = self.receive.silent_until();
             if let (true, Some(quiet)) = (self.readout.is_on(), self.source.quiet_until(until)) {
                 self.readout.process_silence(&self.shared, quiet);
             }
-            until
-        };
-        self.observers.datagrams(&batch, silent_until);
+        }
         self.receive.reuse(batch);
         self.observers.tick(self.source.held());
         self.record.previews(self.source.count(), self.source.held(), false)?;
@@ -236,7 +233,7 @@ impl Stages {
             SourceStage::Frames(_) => Some(QuietUntil::Ended),
         };
         self.record.previews(self.source.count(), self.source.held(), true)?;
-        self.observers.finish(self.source.held());
+        self.observers.tick(self.source.held());
         self.readout.close(&self.shared, quiet.filter(|_| self.readout.is_on()));
         self.answer()
     }
@@ -248,7 +245,6 @@ impl Stages {
             match request {
                 PipelineRequest::Record(next, answer) => drop(answer.send(self.switch_recording(next))),
                 PipelineRequest::View(answer) => self.observers.add_viewer(&answer, self.source.held()),
-                PipelineRequest::Copy(answer) => self.observers.add_copier(&answer),
                 PipelineRequest::Zero(taxels, answer) => drop(answer.send(self.zero(&taxels))),
                 PipelineRequest::Registers(registers) => {
                     if let SourceStage::Board(decode) = &mut self.source {

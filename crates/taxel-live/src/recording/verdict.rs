@@ -15,7 +15,6 @@ use super::damage::{
     OVERTAKEN, REPAIRED, REPEATED, SILENCES, SILENT_MS, UNFINISHED_LINES,
 };
 use super::topic::Topic;
-use crate::bridged::Bridged;
 use crate::kernel_drops::KernelDrops;
 
 /// The wording of version 1 when nothing was dropped between the socket and the file.
@@ -114,9 +113,6 @@ pub struct RecordingCounts {
     /// Where times step back.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub steps_back: Vec<StepBack>,
-    /// What was lost between the computer that received the datagrams and this one, if they are different.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bridged: Option<Box<Bridged>>,
     /// For version 2: datagrams that the board sent and that never arrived intact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<u64>,
@@ -254,7 +250,6 @@ impl Verdict {
 
     /// The verdict on counts; `nothing_lost` is the line if they show no loss and do not count what was sent.
     pub(crate) fn of_counts(counts: &RecordingCounts, nothing_lost: &str) -> Self {
-        let bridged = counts.bridged.as_deref().copied().unwrap_or_default();
         let of_board = |cause: &str| counts.decoder.get(cause).copied().unwrap_or(0);
         let dropped = [
             (counts.dropped_by_kernel.known(), "dropped_by_kernel", "messages dropped by the kernel"),
@@ -266,13 +261,6 @@ impl Verdict {
                 "datagrams received but not recorded",
             ),
             (of_board(IN_NO_LINE), IN_NO_LINE, "bytes in no line of numbers"),
-            (bridged.missing, "lost_between_computers", "datagrams lost between the computers"),
-            (bridged.dropped, "dropped_by_other_computer", "datagrams dropped by the other computer"),
-            (
-                bridged.dropped_by_kernel.known(),
-                "dropped_by_other_kernel",
-                "messages dropped by the other computer's kernel",
-            ),
         ];
         // The board's numbers also skip what was dropped after it was sent, which is counted above.
         let not_sent = ["not_recorded", IN_NO_LINE];
@@ -282,7 +270,7 @@ impl Verdict {
         // after the last number), or more datagrams than messages.
         let several = counts.several_a_message && counts.dropped_by_kernel.known() > 0 && missing > behind;
         let unclear = missing.min(behind) > 0 && (several || missing < behind || of_board(REPEATED) > 0);
-        let counted_by_kernel = counts.dropped_by_kernel.plus(bridged.dropped_by_kernel).are_known();
+        let counted_by_kernel = counts.dropped_by_kernel.are_known();
         let board = [
             (of_board(BOARD_DROPPED), "dropped_by_board", "times that the board dropped events"),
             (of_board(EVENTS_DROPPED), EVENTS_DROPPED, "events that the board itself counted as dropped"),
@@ -371,15 +359,6 @@ impl Verdict {
             let times = counted(silences, "time");
             let all = format!("{}.{} s in all", tenths / 10, tenths % 10);
             pieces.push(format!("no frame arrived for a second or more: {times}, {all}"));
-        }
-        if bridged.silences > 0 || bridged.restarts > 0 {
-            verdict.noted.insert("silences_of_other_computer".to_owned(), bridged.silences);
-            verdict.noted.insert("restarts_of_other_computer".to_owned(), bridged.restarts);
-            pieces.push(format!(
-                "the other computer was silent for a second or more {}, and began again {}",
-                counted(bridged.silences, "time"),
-                counted(bridged.restarts, "time")
-            ));
         }
         verdict.text = pieces.join("; ");
         verdict.with_steps(counts.steps_back.clone())

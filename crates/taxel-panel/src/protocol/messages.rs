@@ -81,7 +81,7 @@ pub(crate) enum Message {
         /// held before a reset (a new session of version 2, or its greeting on the serial line), until they are read again, which
         /// is at once.
         known: bool,
-        /// Whether they were stated at the start (`--preset`, or `--rate-hz` with `--bits`, or another computer's bridge).
+        /// Whether they were stated at the start (`--preset`, or `--rate-hz` with `--bits`).
         stated: bool,
         /// Every field of `registers.js` in its unit; those of one bit are true or false.
         #[cfg_attr(feature = "development", schemars(with = "shapes::Registers"))]
