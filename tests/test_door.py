@@ -1,4 +1,4 @@
-"""The boundary between Rust and Python: errors, panics, Ctrl-C, the GIL, threads and forks."""
+"""The boundary between Rust and Python: errors, panics, Ctrl-C, the GIL, and threads."""
 
 import json
 import os
@@ -201,58 +201,6 @@ def test_columns_that_two_threads_share_are_one_clear_error():
 
     together(push)
     assert len({str(error) for error in errors}) == 1
-
-
-def forked(work):
-    """Return what a forked child prints: what `work` raises in it; a child that hangs is killed."""
-    read, write = os.pipe()
-    child = os.fork()
-    if not child:
-        try:
-            work()
-            said = "nothing was raised"
-        except BaseException as error:
-            said = f"{type(error).__name__}: {error}"
-        os.write(write, said.encode())
-        os._exit(0)
-    os.close(write)
-    timer = threading.Timer(20.0, lambda: os.kill(child, signal.SIGKILL))
-    timer.start()
-    with os.fdopen(read) as pipe:
-        said = pipe.read()
-    os.waitpid(child, 0)
-    timer.cancel()
-    return said
-
-
-@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
-@pytest.mark.parametrize("what", ["stop", "counters", "next", "note", "zeroed", "frame"])
-def test_a_forked_child_that_uses_its_parents_live_gets_one_clear_error(what):
-    with taxel.live.Live(0, host="127.0.0.1") as live:
-        calls = {
-            "stop": live.stop,
-            "counters": lambda: live.counters,
-            "next": lambda: live.next(0.1),
-            "note": lambda: live.note("here"),
-            "zeroed": lambda: live.zeroed,
-            "frame": lambda: live.frame,
-        }
-        said = forked(calls[what])
-    assert said == (
-        f"ProblemError: live: belongs to process {os.getpid()}; a forked child does not have its threads: "
-        "begin a new one in the child"
-    )
-    assert live.stop().nothing_came
-
-
-@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
-def test_a_forked_child_neither_writes_its_parents_recording_nor_waits_for_it(tmp_path):
-    header = {"array": taxel.Array.thesis()._geometry(), "source": "test"}
-    writer = _core.RecordingWriter(tmp_path / "one.mcap", json.dumps(header), "none", False)
-    assert forked(lambda: writer.finish("{}")).startswith("ProblemError: recording: belongs to process ")
-    writer.datagram(0, 0, bytes.fromhex("c000050304"))
-    writer.finish(json.dumps({"received": 1, "recorded": 1}))
-    assert len(taxel.open(tmp_path / "one.mcap").events) == 1
 
 
 def test_what_progress_raises_ends_a_fit_that_keeps_its_best():

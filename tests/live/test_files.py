@@ -1,6 +1,5 @@
 """Files of recordings: locked while they are written, whole or not there, never lost without a word."""
 
-import shutil
 import signal
 import time
 from pathlib import Path
@@ -89,50 +88,6 @@ def test_a_lock_dies_with_its_process(tmp_path: Path) -> None:
     with Live(0, host=LOOPBACK, array=SMALL, record=file, overwrite=True) as live:
         wait_for(live, play(presses(1), live.address[1]))
     assert len(taxel.open(file).events) == len(presses(1))
-
-
-@pytest.mark.parametrize("kind", ["mcap", "lsa"])
-@pytest.mark.parametrize("what", ["removed", "renamed", "replaced", "folder"])
-def test_a_recording_whose_file_is_gone_at_its_end_is_said_to_be_lost(tmp_path: Path, kind: str, what: str) -> None:
-    folder = tmp_path / "here"
-    folder.mkdir()
-    file = folder / f"walk.{kind}"
-    live = Live(0, host=LOOPBACK, array=SMALL, record=file)
-    sent = play(presses(2), live.address[1])
-    wait_for(live, sent)
-    if what == "removed":
-        file.unlink()
-    elif what == "renamed":
-        file.rename(folder / "other")
-    elif what == "replaced":
-        (folder / "other").write_text("of another program")
-        (folder / "other").rename(file)
-    else:
-        shutil.rmtree(folder)
-    lost = f"{sent} datagrams and lines" if kind == "mcap" else f"{10 * len(presses(2))} bytes"
-    with pytest.raises(OSError, match=f"was removed, renamed or replaced while it was recorded; LOST: {lost}"):
-        live.stop()
-    if what == "replaced":
-        assert file.read_text() == "of another program"
-    assert not list(folder.glob("*.lss"))
-
-
-@pytest.mark.parametrize("more", [["--seconds", 1.5], ["--length", 1.5, "--countdown", 0, "--trials", 1]])
-def test_taxel_record_says_that_its_file_is_gone(tmp_path: Path, more: list[object]) -> None:
-    (tmp_path / "here").mkdir()
-    port, file = free_port(), tmp_path / "here" / "walk.mcap"
-    with recording(file, port, *more) as process:
-        listening(process)
-        sent = play(presses(2), port)
-        wait_until(lambda: any((tmp_path / "here").iterdir()))
-        time.sleep(0.2)
-        shutil.rmtree(tmp_path / "here")
-        out, err = process.communicate(timeout=60)
-    assert process.returncode == 3
-    assert "nothing lost" not in out
-    assert err.splitlines()[-1].endswith(
-        f"was removed, renamed or replaced while it was recorded; LOST: {sent} datagrams and lines"
-    )
 
 
 def test_two_recordings_of_one_program_do_not_share_a_file(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def test_a_late_line_in_a_table_that_became_a_link_goes_to_its_file(table: Path,
 
 def test_what_is_no_regular_file_is_refused_at_once(table: Path, tables) -> None:
     os.mkfifo(table)
-    with pytest.raises(ProblemError, match="a named pipe; must be a file"):
+    with pytest.raises(ProblemError, match="a pipe, a socket or a device; must be a file"):
         mark(tables, table, "toe", 2)
 
 

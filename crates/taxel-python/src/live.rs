@@ -122,7 +122,7 @@ impl Live {
         }
         let pipeline = enter(py, |stop| Pipeline::open(options, sinks, stop))?;
         Ok(Self {
-            pipeline: Threaded::new("live", "live: has been stopped; begin a new Live", pipeline),
+            pipeline: Threaded::new("live: has been stopped; begin a new Live", pipeline),
             summary: Mutex::default(),
         })
     }
@@ -142,7 +142,6 @@ impl Live {
     fn next(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<DetectionOut>> {
         let timeout = Duration::try_from_secs_f64(timeout)
             .map_err(|_| ProblemError::new_err(format!("timeout is {timeout} s: must be 0 or more")))?;
-        self.pipeline.check()?;
         let output = enter(py, |stop| match self.pipeline.read().as_ref() {
             Some(pipeline) => pipeline.wait(timeout, stop),
             None => Ok(None),
@@ -256,7 +255,6 @@ impl Live {
 
     /// Ends; returns how, the same at every call.
     fn stop(&self, py: Python<'_>) -> PyResult<Ended> {
-        self.pipeline.check()?;
         if IN_CALLBACK.get() {
             let text = "live: `say` must not call `stop`, because `stop` waits for `say`: call `stop` from another \
                         thread";

@@ -211,7 +211,7 @@ impl RecordingWriter {
         let header: Header = parsed("header", header)?;
         let options = WriterOptions { compression: compression.parse().map_err(core)?, overwrite };
         let writer = enter(py, |_| Writer::create(&path, &header, options))?;
-        let writer = Threaded::new("recording", "the recording is finished: begin a new recording", writer);
+        let writer = Threaded::new("the recording is finished: begin a new recording", writer);
         Ok(Self { writer: Arc::new(writer), source: None })
     }
 
@@ -374,7 +374,6 @@ impl RecordingWriter {
     /// Ends the recording; `counts` is JSON.
     fn finish(&self, py: Python<'_>, counts: &str) -> PyResult<()> {
         let counts: RecordingCounts = parsed("counts", counts)?;
-        self.writer.check()?;
         enter(py, |_| match self.writer.take() {
             Some(writer) => writer.finish(counts).map(drop),
             None => Err(self.writer.ended()),

@@ -1,4 +1,4 @@
-//! Objects with threads of their own: used from any Python thread until they are ended, in the process that began them.
+//! Objects with threads of their own: used from any Python thread until they are ended.
 
 use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 
@@ -6,34 +6,19 @@ use pyo3::prelude::*;
 use taxel_core::problem;
 
 use taxel_border::enter::enter;
-use taxel_border::errors::ProblemError;
 
 /// Such an object; `None` once it was ended. Locks are never waited for with the GIL: their holder may be waiting for the GIL to
 /// look for Ctrl-C.
 pub(crate) struct Threaded<T: Send + Sync> {
     value: RwLock<Option<T>>,
-    /// The process whose threads work for it.
-    process: u32,
-    name: &'static str,
     /// The error of a call after the end.
     ended: &'static str,
 }
 
 impl<T: Send + Sync> Threaded<T> {
-    /// An object that errors call `name`; `ended` is the error of a call after its end.
-    pub(crate) fn new(name: &'static str, ended: &'static str, value: T) -> Self {
-        Self { value: RwLock::new(Some(value)), process: std::process::id(), name, ended }
-    }
-
-    /// Refuses a forked child: it has a copy of the object and none of its threads, and locks that no thread will release.
-    pub(crate) fn check(&self) -> PyResult<()> {
-        if std::process::id() == self.process {
-            return Ok(());
-        }
-        Err(ProblemError::new_err(format!(
-            "{}: belongs to process {}; a forked child does not have its threads: begin a new one in the child",
-            self.name, self.process
-        )))
+    /// An object; `ended` is the error of a call after its end.
+    pub(crate) fn new(ended: &'static str, value: T) -> Self {
+        Self { value: RwLock::new(Some(value)), ended }
     }
 
     /// Works with it, without the GIL.
@@ -42,7 +27,6 @@ impl<T: Send + Sync> Threaded<T> {
         py: Python<'_>,
         work: impl FnOnce(&T) -> taxel_live::Result<R> + Send,
     ) -> PyResult<R> {
-        self.check()?;
         enter(py, |_| match self.read().as_ref() {
             Some(value) => work(value),
             None => Err(self.ended()),
@@ -54,12 +38,12 @@ impl<T: Send + Sync> Threaded<T> {
         problem!("{}", self.ended).into()
     }
 
-    /// The object, for a caller without the GIL who has checked the process.
+    /// The object, for a caller without the GIL.
     pub(crate) fn read(&self) -> RwLockReadGuard<'_, Option<T>> {
         self.value.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes it out, to be ended, for a caller without the GIL who has checked the process.
+    /// Takes it out, to be ended, for a caller without the GIL.
     pub(crate) fn take(&self) -> Option<T> {
         self.value.write().unwrap_or_else(PoisonError::into_inner).take()
     }
@@ -68,12 +52,7 @@ impl<T: Send + Sync> Threaded<T> {
 impl<T: Send + Sync> Drop for Threaded<T> {
     fn drop(&mut self) {
         let value = self.value.get_mut().unwrap_or_else(PoisonError::into_inner).take();
-        if std::process::id() == self.process {
-            // Its threads may be about to call a Python function: without the GIL they could not, and would never end.
-            Python::attach(|py| py.detach(|| drop(value)));
-        } else {
-            // Its threads do not exist here, and cannot be waited for.
-            std::mem::forget(value);
-        }
+        // Its threads may be about to call a Python function: without the GIL they could not, and would never end.
+        Python::attach(|py| py.detach(|| drop(value)));
     }
 }

@@ -16,7 +16,6 @@ use crate::{Error, Result, system_error};
 #[derive(Debug)]
 pub struct LsaWriter {
     out: BufWriter<RawFile>,
-    bytes: u64,
 }
 
 /// The file, written through a buffer.
@@ -68,7 +67,7 @@ impl LsaWriter {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(Error::file(&marker)(error)),
             _ => {}
         }
-        Ok(Self { out: BufWriter::new(RawFile(file)), bytes: 0 })
+        Ok(Self { out: BufWriter::new(RawFile(file)) })
     }
 
     fn path(&self) -> &Path {
@@ -81,7 +80,6 @@ impl LsaWriter {
     ///
     /// `File` if the disk is full or not available.
     pub fn bytes(&mut self, bytes: &[u8]) -> Result<()> {
-        self.bytes += bytes.len() as u64;
         let outcome = self.out.write_all(bytes);
         outcome.map_err(|error| Error::file(self.path())(error))
     }
@@ -100,13 +98,11 @@ impl LsaWriter {
     ///
     /// # Errors
     ///
-    /// `File` if the disk is full or not available, or if the file was removed, renamed or replaced while it was
-    /// written.
+    /// `File` if the disk is full or not available.
     pub fn end(&mut self) -> Result<()> {
         self.flush()?;
         let file = &self.out.get_ref().0;
-        file.file().sync_all().map_err(Error::file(file.path()))?;
-        file.check(|| format!("{} bytes", self.bytes))
+        file.file().sync_all().map_err(Error::file(file.path()))
     }
 
     /// Marks the recording as complete: syncs all bytes to the disk, then creates the empty `.lss`.

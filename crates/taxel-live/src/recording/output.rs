@@ -1,9 +1,7 @@
-//! The file of a recording: locked while it is written, and checked at the end.
+//! The file of a recording, locked while it is written.
 //!
 //! A second recorder that should replace the file of a running one is refused by the lock, which the system releases
-//! when the process ends. In Unix other programs do not check the lock: they may remove, rename or replace the file, and
-//! what is written then goes into a file without a name. Therefore the end of a recording checks that the name still refers
-//! to the file that was written. In Windows they cannot.
+//! when the process ends. In Unix other programs do not check the lock.
 
 #[cfg(unix)]
 mod unix;
@@ -40,18 +38,12 @@ impl OutputFile {
         if overwrite {
             replaceable(path)?;
         }
-        loop {
-            let (file, new) = open(path, overwrite).map_err(Error::file(path))?;
-            if !reserved::lock(&file).map_err(Error::file(path))? {
-                let text = "is being recorded by another program; end that first, or name another file";
-                return Err(Error::file(path)(IoError::new(ErrorKind::ResourceBusy, text)));
-            }
-            let output = Self { path: path.to_owned(), file, new };
-            // The previous holder of the lock may have removed the file.
-            if output.is_in_place()? {
-                return Ok(output);
-            }
+        let (file, new) = open(path, overwrite).map_err(Error::file(path))?;
+        if !reserved::lock(&file).map_err(Error::file(path))? {
+            let text = "is being recorded by another program; end that first, or name another file";
+            return Err(Error::file(path)(IoError::new(ErrorKind::ResourceBusy, text)));
         }
+        Ok(Self { path: path.to_owned(), file, new })
     }
 
     /// Path of the file.
@@ -83,32 +75,13 @@ impl OutputFile {
         &self.file
     }
 
-    /// Whether the path still refers to this file.
-    fn is_in_place(&self) -> Result<bool> {
-        reserved::is_in_place(&self.file, &self.path).map_err(Error::file(&self.path))
-    }
-
-    /// Checks at the end of a recording that its path still refers to the file; `written` describes its content in the
-    /// error.
-    ///
-    /// # Errors
-    ///
-    /// `File` if the file was removed, renamed or replaced, so that what was written is lost.
-    pub fn check(&self, written: impl FnOnce() -> String) -> Result<()> {
-        if self.is_in_place()? {
-            return Ok(());
-        }
-        let text = format!("was removed, renamed or replaced while it was recorded; LOST: {}", written());
-        Err(Error::file(&self.path)(IoError::other(text)))
-    }
-
     /// Removes the file where it is new: nothing is to stay in it. An earlier one stays.
     ///
     /// # Errors
     ///
     /// `File` where the system refuses.
     pub fn discard(self) -> Result<()> {
-        if self.new && self.is_in_place()? {
+        if self.new {
             reserved::remove(self.file, &self.path).map_err(Error::file(&self.path))?;
         }
         Ok(())

@@ -1,8 +1,7 @@
 //! A recording's file in Unix: a lock, which other programs may ignore.
 
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{ErrorKind, Result};
-use std::os::unix::fs::MetadataExt;
+use std::io::Result;
 use std::path::Path;
 
 /// Opens the file for one recording.
@@ -20,16 +19,6 @@ pub(super) fn lock(file: &File) -> Result<bool> {
             Ok(true)
         }
         Err(TryLockError::Error(error)) => Err(error),
-    }
-}
-
-/// Whether the path still refers to this file.
-pub(super) fn is_in_place(file: &File, path: &Path) -> Result<bool> {
-    let ours = file.metadata()?;
-    match std::fs::metadata(path) {
-        Ok(named) => Ok((named.dev(), named.ino()) == (ours.dev(), ours.ino())),
-        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(false),
-        Err(error) => Err(error),
     }
 }
 

@@ -27,12 +27,6 @@ pub(super) fn lock(_: &File) -> Result<bool> {
     Ok(true)
 }
 
-/// No program can move an open file that others may only read.
-#[allow(clippy::unnecessary_wraps)]
-pub(super) fn is_in_place(_: &File, _: &Path) -> Result<bool> {
-    Ok(true)
-}
-
 /// Closes the file, as an open one cannot be removed, and removes it.
 pub(super) fn remove(file: File, path: &Path) -> Result<()> {
     drop(file);
