@@ -441,7 +441,7 @@ LEFT_OUT = {
     *("BoardChange", "Clock", "Datagrams", "Detection", "Health", "Recording", "Zeroing", "Certificate", "Checked"),
     *("Margin", "Multipliers", "Row", "Summary", "Matching", "Cause", "TakenRest", "Status", "Received", "Format"),
     *("BoardCheck", "Difference", "Finding", "PatternCheck", "RestCheck", "Greeting", "Port", "Training.command"),
-    *("RemoteBoard", "RemoteBoard.begin", "check_board"),
+    "check_board",
     *("Device.apply", "Device.record", "Live.source_address", "Live.zero", "Live.record", "Live.sample", "Live.note"),
     *(
         "Live.expect_version",
