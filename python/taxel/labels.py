@@ -21,6 +21,7 @@ from taxel._base.files import named
 from taxel._base.header_table import HeaderTable, separator_of, text_of
 from taxel._base.messages import counted, escaped
 from taxel._base.number_text import int_of
+from taxel._base.times import SINCE_1970_US
 from taxel._core import FormatError, ProblemError
 from taxel.clock import Clock
 from taxel.event_table import are_of_bids, is_of_track, track, with_known_columns
@@ -32,6 +33,8 @@ __all__ = [
     "Note",
     "ahead_us",
     "beside",
+    "by_clock",
+    "is_from_beginning",
     "rows_of",
     "source_of",
     "text_with",
@@ -101,7 +104,8 @@ class Labels:
         labels are in a column of that name in capitals, in one of the names event, Ereignis, name, marker or
         annotation, or in the only column of texts. Without `recording`, recordings are in a column of texts of the name
         trial, Versuch, file, filename, Datei or Aufnahme. Times of a table of BIDS (`onset`, `duration`, s) and of a
-        label track of Audacity count from the beginning of the recording; a label is at the begin of its region.
+        label track of Audacity count from the beginning of the recording, and so does a time before 2001 where the
+        clock of the recording counts from 1970; a label is at the begin of its region.
 
     Attributes
     ----------
@@ -197,13 +201,24 @@ class Labels:
         source = getattr(recording, "label", "")
         trial = trial_of(getattr(recording, "name", ""), source)
         side = getattr(recording, "side", "")
-        return self._times(recording.path, lambda: recording.clock, source, trial, side)
+
+        def begin_us() -> int:
+            t = recording.events.t if recording.has_events else recording.frames().t
+            return int(t.min()) if len(t) else 0
+
+        return self._times(recording.path, source, trial, side, begin_us, lambda: recording.clock)
 
     def _times(
-        self, path: Path, clock_of: Callable[[], Clock | None], source: str, trial: str = "", side: str = ""
+        self,
+        path: Path,
+        source: str,
+        trial: str,
+        side: str,
+        begin_us: Callable[[], int],
+        clock_of: Callable[[], Clock | None],
     ) -> dict[str, NDArray[np.int64]]:
-        """Return the events of a source of the recording at this path; its clock is read only if it is needed."""
-        rows = self._rows(path, source, trial, side)
+        """Return the events of a source of the recording at this path; its begin and clock are read if needed."""
+        rows = self._rows(path, source, trial, side, begin_us)
         clock = clock_of() if any(row.at_ns for row in rows) else None
         by_label: dict[str, list[int]] = {}
         for row in rows:
@@ -211,21 +226,34 @@ class Labels:
             by_label.setdefault(row.text, []).append((row.t or 0) - ahead)
         return {label: np.sort(np.array(times, np.int64)) for label, times in by_label.items()}
 
-    def _rows(self, path: Path, source: str, trial: str, side: str, among: Sequence[Note] | None = None) -> list[Note]:
+    def _rows(
+        self,
+        path: Path,
+        source: str,
+        trial: str,
+        side: str,
+        begin_us: Callable[[], int],
+        among: Sequence[Note] | None = None,
+    ) -> list[Note]:
         """Return the labels of a source of a recording, or of its trial: those of all of the file, and its own.
 
-        Labels may name a source by the foot or hand that it is of.
+        Their times are the recording's clock's. Labels may name a source by the foot or hand that it is of.
         """
         rows = self.rows if among is None else among
         is_file = trial in ("", path.name, path.stem)
         names = {self.named(path), self.named(path, "" if is_file else trial, source), None if is_file else trial} - {
             None
         }
-        return [row for row in rows if row.recording in names and row.source in ("", source, side)]
+        found = [row for row in rows if row.recording in names and row.source in ("", source, side)]
+        if not found:
+            return []
+        begin = begin_us()
+        return [by_clock(row, begin, stated=self._from_beginning) for row in found]
 
-    def _replaced(self, path: Path, source: str, trial: str, side: str) -> set[int | None]:
+    def _replaced(self, path: Path, source: str, trial: str, side: str, begin_us: Callable[[], int]) -> set[int | None]:
         """Return the times of the notes of a source of a recording that its labels replace."""
-        return {row.replaces for row in self._rows(path, source, trial, side, (*self.rows, *self.removed))} - {None}
+        rows = self._rows(path, source, trial, side, begin_us, (*self.rows, *self.removed))
+        return {row.replaces for row in rows} - {None}
 
     def __repr__(self) -> str:
         recordings = ", ".join(self.recordings) or "one recording"
@@ -247,6 +275,37 @@ def source_of(topic: str) -> str:
     """
     # Names that a source in a .mcap may have.
     return re.sub("[^A-Za-z0-9_-]", "_", topic.strip("/"))[-64:]
+
+
+def is_from_beginning(t_us: int, begin_us: int, *, stated: bool = False) -> bool:
+    """Return whether a time in a table of labels counts from the beginning of its recording; else it is its clock's.
+
+    A clock that counts from 1970 has no time before 2001: such a time counts from the beginning. With another clock
+    times count from the beginning only where the format of their table states it.
+
+    Parameters
+    ----------
+    t_us : int, us
+    begin_us : int, us
+        The first time of the recording, by its clock.
+    stated : bool
+        Whether the format of the table counts from the beginning (BIDS, label tracks of Audacity).
+
+    Examples
+    --------
+    >>> is_from_beginning(210_000, 1_741_947_667_480_000), is_from_beginning(210_000, 40_000_000)
+    (True, False)
+    """
+    return stated or t_us < SINCE_1970_US <= begin_us
+
+
+def by_clock(row: Note, begin_us: int, *, stated: bool = False) -> Note:
+    """Return a row of a table of labels with its times by the recording's clock (`is_from_beginning`)."""
+
+    def moved(t: int | None) -> int | None:
+        return None if t is None else t + begin_us * is_from_beginning(t, begin_us, stated=stated)
+
+    return replace(row, t=moved(row.t), replaces=moved(row.replaces))
 
 
 def ahead_us(row: Note, recording: Path, clock: Clock | None, table: Path) -> int:

@@ -92,7 +92,7 @@ FUNCTIONS: dict[str, tuple[Callable[[Contents, Path], Contents], set[str]]] = {
         lambda of, _: on_clock(of, "other"),
         {*TABLE, *TIMED, "marks.board_changes", "timing.clock", "timing.clock_of", "losses.verdict"},
     ),
-    "with_notes": (lambda of, _: with_notes(of, (Note("more", 5, 0),)), {"marks.notes"}),
+    "with_notes": (lambda of, _: with_notes(of, known((Note("more", 5, 0),))), {"marks.notes"}),
     "as_frames": (lambda of, _: replace(of, main=as_frames(of.main)), {*TABLE, "settings.held"}),
     "calibrated": (
         lambda of, _: replace(of, main=calibrate(of.main)),

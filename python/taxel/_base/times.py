@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 #: Times from here on are taken to count from 1970, us: it is 2001-09-09. The page of the panel has the same number.
-_SINCE_1970_US = 10**15
+SINCE_1970_US = 10**15
 
 
 def beginning_us(t: NDArray[np.int64]) -> int:
     """Return the time (us) that text counts from: the earliest if times count from 1970, else 0."""
     first = int(t.min()) if len(t) else 0
-    return first if first >= _SINCE_1970_US else 0
+    return first if first >= SINCE_1970_US else 0
 
 
 def begun(begin_us: int) -> str:

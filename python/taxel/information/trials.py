@@ -19,7 +19,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.labels import Note, ahead_us
+from taxel.labels import Note, ahead_us, by_clock
 from taxel.recorded import refuse_numbered
 from taxel.recording import Recording
 from taxel.spikes import to_ms, to_us
@@ -155,8 +155,10 @@ def read_trials(
         times = ("stop_us", "host_ns")
         end, host_ns = (_whole(file, line, name, row[name]) if row.get(name) else None for name in times)
         start = _whole(file, line, "t_us", row["t_us"])
-        ahead = ahead_us(Note(row["label"], start, host_ns or 0), recording.path, clocks.get(id(recording)), file)
-        start, stop = start - ahead, None if end is None else end - ahead
+        span = spans[id(recording)]
+        begin = by_clock(Note(row["label"], start, host_ns or 0), span[0] if span else 0)
+        later = (begin.t or 0) - start - ahead_us(begin, recording.path, clocks.get(id(recording)), file)
+        start, stop = start + later, None if end is None else end + later
         if stop is None and window_ms is None:
             error = placed(ProblemError("stop_us is missing, so the length of the trial is not known"), file, line=line)
             raise helped(error, "window_ms", "give")
@@ -170,7 +172,7 @@ def read_trials(
             )
         more = {name: cell for name, cell in row.items() if name not in _KNOWN}
         trials.append(LabelledTrial(source, row["label"], start, stop, row.get("group", ""), more, where))
-        _inside(trials[-1], recording.name, spans[id(recording)], window_us)
+        _inside(trials[-1], recording.name, span, window_us)
     if any(trial.group for trial in trials) and not all(trial.group for trial in trials):
         nameless = next(trial for trial in trials if not trial.group)
         raise ProblemError(f"{nameless.name}: group is empty; give a group to every trial, or to none")

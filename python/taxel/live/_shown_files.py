@@ -17,7 +17,7 @@ from taxel import _core
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.frames import Frames
-from taxel.labels import Labels, Note, beside
+from taxel.labels import Labels, Note, beside, by_clock
 from taxel.recording import Recording
 from taxel.recording.analysis.health import health
 from taxel.recording.analysis.rest import flickering, loaded_from, of_frames, ticks_by_unit
@@ -289,7 +289,9 @@ def _frames(recording: Recording) -> ReadFrames:
     of_all = set.intersection(*noted.values())
     notes = {(t, text, "") for t, text in of_all}
     notes |= {(t, text, name) for name, of_source in noted.items() for t, text in of_source - of_all}
-    labels = {(row.t, row.text) for row in _labels_beside(recording)}
+    begin_us = min((int(read.t.min()) for read in frames.values() if len(read.t)), default=0)
+    rows = (by_clock(row, begin_us) for row in _labels_beside(recording))
+    labels = {(row.t, row.text) for row in rows}
     notes = {note for note in notes if note[:2] not in labels}
     each = sources.items() if len(sources) > 1 else [("", sensor) for sensor in sources.values()]
     found = [(d.label, d.t, d.known, name) for name, sensor in each for d in sensor.detections]

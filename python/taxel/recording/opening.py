@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from shlex import quote
 from typing import NoReturn
@@ -26,7 +27,7 @@ from taxel.recording import recognition, sections
 from taxel.recording.contents import BoardSource, Contents, RecordedSource, Stream, several, source_from
 from taxel.recording.kinds import ENDINGS, LABELS
 from taxel.recording.layout import apply_layout, check_size, on_array
-from taxel.recording.once import known
+from taxel.recording.once import Once, known
 from taxel.recording.readers.csv import read_csv
 from taxel.recording.readers.foreign import read_foreign
 from taxel.recording.readers.h5 import read_h5
@@ -34,8 +35,8 @@ from taxel.recording.readers.lsa import read_lsa
 from taxel.recording.readers.mcap import read_mcap
 from taxel.recording.readers.npz import read_npz, read_records
 from taxel.recording.readers.ros import Topics, read_ros
-from taxel.recording.recording import Recording, add_notes
-from taxel.recording.sidecars import labels_of, with_sidecars
+from taxel.recording.recording import Recording, add_notes, with_notes
+from taxel.recording.sidecars import begin_of, labels_of, with_sidecars
 
 #: The sources of a trial of both feet.
 FEET = ("left", "right")
@@ -476,40 +477,38 @@ def _labelled(recording: Recording) -> Recording:
 
 def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
     """Add the reference events of a recording, and of each of its sources, to the notes."""
-    contents, begin_us = recording._contents, 0
-    if labels._from_beginning:
-        begins = [source.table.t for source in contents.sources.values() if not isinstance(source, Stream)]
-        begin_us = min((int(t.min()) for t in begins if len(t)), default=0)
+    contents = recording._contents
+    begin_us = begin_of(contents.sources.values(), labels)
     if not contents.is_several:
-        return recording.with_notes(_notes(labels, name, contents.main, begin_us))
+        return Recording(with_notes(contents, Once(partial(_notes, labels, name, contents.main, begin_us))))
     sources = {
         label: source
         if isinstance(source, Stream)
-        else add_notes(source, tuple(_notes(labels, name, source, begin_us)))
+        else add_notes(source, Once(partial(_notes, labels, name, source, begin_us)))
         for label, source in contents.sources.items()
     }
     return Recording(Contents(several(sources), sources))
 
 
-def _notes(labels: Labels, name: Path, source: RecordedSource, begin_us: int) -> list[Note]:
+def _notes(labels: Labels, name: Path, source: RecordedSource, begin_us: Callable[[], int]) -> tuple[Note, ...]:
     """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
     clock = source.timing.usable()
-    times = labels._times(name, lambda: clock, source.origin.label, side=source.sensor.side)
-    rows = labels._rows(name, source.origin.label, "", source.sensor.side)
+    of_labels = name, source.origin.label, "", source.sensor.side
+    times = labels._times(*of_labels, begin_us, lambda: clock)
+    rows = labels._rows(*of_labels, begin_us)
     of_source = {row.text: row.source for row in sorted(rows, key=lambda row: bool(row.source))}
     names, replaced, labelled = labels_of(source), set[int | None](), set[object]()
     if beside(source.origin.path).is_file():
         set_here = Labels(beside(source.origin.path))
-        replaced, labelled = set_here._replaced(*names), {(row.text, row.t) for row in set_here._rows(*names)}
-    return sorted(
-        (
-            Note(label, t, 0 if clock is None else int(clock.host_ns(t)), source=of_source.get(label, ""))
-            for label, label_times in times.items()
-            for t in (label_times + begin_us).tolist()
-            if t not in replaced and (label, t) not in labelled
-        ),
-        key=lambda note: note.t or 0,
+        replaced = set_here._replaced(*names, begin_us)
+        labelled = {(row.text, row.t) for row in set_here._rows(*names, begin_us)}
+    notes = (
+        Note(label, t, 0 if clock is None else int(clock.host_ns(t)), source=of_source.get(label, ""))
+        for label, label_times in times.items()
+        for t in label_times.tolist()
+        if t not in replaced and (label, t) not in labelled
     )
+    return tuple(sorted(notes, key=lambda note: note.t or 0))
 
 
 def _recording_of(trial: Trial, path: Path, kind: str, given_layout: str | os.PathLike[str] | None) -> Recording:

@@ -30,7 +30,7 @@ from taxel.recording.frames import as_frames, at_rate, calibrate
 from taxel.recording.gaps import Gaps, gaps_of, with_gaps
 from taxel.recording.kinds import kind_of_file, verdict_of
 from taxel.recording.on_clock import on_clock
-from taxel.recording.once import UNKNOWN, Once
+from taxel.recording.once import UNKNOWN, Once, known
 from taxel.recording.raw import Datagrams
 from taxel.recording.sections import Wire
 from taxel.recording.verdict import Verdict
@@ -500,7 +500,7 @@ class Recording:
         ProblemError : something that is not a `taxel.Note`
         """
         more = tuple(instance("notes", note, Note) for note in several("notes", notes))
-        return Recording(with_notes(self._contents, more))
+        return Recording(with_notes(self._contents, known(more)))
 
     def plot(self) -> Figure:
         """Draw events (or the sum of pressure) over time, and the activity of each taxel."""
@@ -528,7 +528,7 @@ class Recording:
         return escaped(f"Recording({self.name}: {', '.join([counted(len(table), noun), time, size, *more])})")
 
 
-def with_notes(contents: Contents, more: tuple[Note, ...]) -> Contents:
+def with_notes(contents: Contents, more: Once[tuple[Note, ...]]) -> Contents:
     """Return the same contents with further notes."""
     label, sources = contents.main.origin.label, contents.sources
     if label in sources:
@@ -537,12 +537,12 @@ def with_notes(contents: Contents, more: tuple[Note, ...]) -> Contents:
     return Contents(add_notes(contents.main, more), sources)
 
 
-def add_notes(source: S, more: tuple[Note, ...]) -> S:
+def add_notes(source: S, more: Once[tuple[Note, ...]]) -> S:
     """Return the same source with further notes; one of the same text and time as another is that note."""
 
     def notes() -> tuple[Note, ...]:
         there = source.marks.notes()
-        known = {(note.text, note.t) for note in there if note.t is not None}
-        return there + tuple(note for note in more if (note.text, note.t) not in known)
+        held = {(note.text, note.t) for note in there if note.t is not None}
+        return there + tuple(note for note in more() if (note.text, note.t) not in held)
 
     return replace(source, marks=replace(source.marks, notes=Once(notes)))

@@ -2,43 +2,69 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from taxel._base.times import SINCE_1970_US
 from taxel._core import ProblemError
 from taxel.calibration import Calibration
 from taxel.labels import Labels, Note, beside, trial_of
-from taxel.recording.contents import Contents, FrameSource, RecordedSource, Stream, alone, share_clock
+from taxel.recording.contents import BoardSource, Contents, FrameSource, RecordedSource, Stream, alone, share_clock
 from taxel.recording.frames import calibrate
 from taxel.recording.once import Once, known
 from taxel.recording.recording import Recording
+from taxel.recording.sections import Wire
 
 
 def with_sidecars(contents: Contents) -> Contents:
     """Return the contents of a file with the labels of `NAME.notes.csv` and the calibration in its folder."""
     # Labels are by the clock of the file's first source, or of all.
-    labelled = set(contents.sources) if share_clock(contents.sources) else {*list(contents.sources)[:1]}
-    return alone({name: _with_sidecars(source, labelled=name in labelled) for name, source in contents.sources.items()})
+    sources = contents.sources
+    labelled = sources if share_clock(sources) else dict(list(sources.items())[:1])
+    of_labels = {name: list(labelled.values()) if name in labelled else [] for name in sources}
+    return alone({name: _with_sidecars(source, of_labels[name]) for name, source in sources.items()})
 
 
-def _with_sidecars(source: RecordedSource, *, labelled: bool) -> RecordedSource:
+def _with_sidecars(source: RecordedSource, of_labels: Sequence[RecordedSource]) -> RecordedSource:
+    """Return a source with its sidecars; labels by the clock of `of_labels`, or none."""
     path, marks = source.origin.path, source.marks
-    if labelled and path.exists() and beside(path).is_file():
-        marks = replace(marks, notes=Once(lambda: _notes(source)))
+    if of_labels and path.exists() and beside(path).is_file():
+        marks = replace(marks, notes=Once(lambda: _notes(source, of_labels)))
     return replace(source, sensor=replace(source.sensor, calibration=calibration_beside(path, source)), marks=marks)
 
 
-def _notes(source: RecordedSource) -> tuple[Note, ...]:
+def begin_of(sources: Iterable[RecordedSource], labels: Labels) -> Callable[[], int]:
+    """Return a function that reads from which time (us) a table of labels may count; 0 where it cannot.
+
+    It is the first time of the sources. A board's own clock does not count from 1970, and reading its events may take
+    long.
+    """
+
+    def first(source: RecordedSource) -> list[int]:
+        wire = source.section(Wire)
+        is_own = isinstance(source, BoardSource) and wire.datagrams.holds() and wire.origin_us < SINCE_1970_US
+        if is_own and not labels._from_beginning:
+            return [0]
+        t = source.table.t
+        return [int(t.min())] if len(t) else []
+
+    return lambda: min((t for source in sources if not isinstance(source, Stream) for t in first(source)), default=0)
+
+
+def _notes(source: RecordedSource, sources: Sequence[RecordedSource]) -> tuple[Note, ...]:
     """Return the notes of a recording, and the labels that people set on it: of its trial and source, and those of all.
 
     Notes can be used as labels: one that a label replaces is left out, and a label that says the same at the same time
     is that note.
     """
-    labels, names = Labels(beside(source.origin.path)), labels_of(source)
-    replaced = labels._replaced(*names)
+    labels = Labels(beside(source.origin.path))
+    names, begin_us = labels_of(source), begin_of(sources, labels)
+    replaced = labels._replaced(*names, begin_us)
     notes = tuple(note for note in source.marks.notes() if note.t is None or note.t not in replaced)
     noted = {(note.text, note.t) for note in notes}
-    more = sorted((row for row in labels._rows(*names) if (row.text, row.t) not in noted), key=lambda row: row.t or 0)
+    rows = labels._rows(*names, begin_us)
+    more = sorted((row for row in rows if (row.text, row.t) not in noted), key=lambda row: row.t or 0)
     return notes + tuple(Note(row.text, row.t, row.at_ns, source=row.source) for row in more)
 
 

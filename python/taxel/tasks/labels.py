@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -20,8 +20,7 @@ from taxel._base.messages import are, collected, counted, warn
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.detect.label_times import early
-from taxel.detect.recipes import spelling
-from taxel.labels import Labels, Note, beside, trial_of
+from taxel.labels import Labels, Note, beside, by_clock, trial_of
 from taxel.recording import Recording, kind_of_file
 from taxel.recording.cut import span_us
 from taxel.spikes import to_us
@@ -48,11 +47,7 @@ def references(
     if not are_tables(source):
         return _mapped(source, recordings, argument)
     if source == "notes":
-        noted = _from_beginnings([_noted(recording) for recording in recordings], recordings, "notes")
-        noted = [
-            _inside(events, recording, f"the notes of {recording.title}")
-            for events, recording in zip(noted, recordings, strict=True)
-        ]
+        noted = [_inside(_noted(recording), recording, f"the notes of {recording.title}") for recording in recordings]
         outside = next((each for each in recordings if any(note.t is not None for note in each.notes)), None)
         if outside is not None and not any(noted):
             notes = counted(sum(note.t is not None for note in outside.notes), "note")
@@ -78,10 +73,25 @@ def references(
     if unnamed and (others or len(unnamed) == len(recordings)):
         names = f"it names {few(table.recordings)}" if table.rows else "it is empty"
         raise refused(argument, f" is {table.path}: names no event in {titles_of(unnamed)}; {names}")
-    _warn_of_strangers(table, recordings)
-    times = [table.times(recording) for recording in recordings]
-    events = _from_beginnings(times, recordings, str(table.path), stated=table._from_beginning)
+    events = [
+        _times(table, recording, recording.label, recording.side, _begin_of(recording, recordings))
+        for recording in recordings
+    ]
     return [_within(table, each, recording, argument) for each, recording in zip(events, recordings, strict=True)]
+
+
+def _times(
+    table: Labels, recording: Recording, source: str, side: str, begin_us: Callable[[], int]
+) -> dict[str, NDArray[np.int64]]:
+    """Return the events of a source of a recording, by its clock."""
+    clock_of = partial(getattr, recording, "clock")
+    return table._times(recording.path, source, trial_name(recording), side, begin_us, clock_of)
+
+
+def _begin_of(recording: Recording, recordings: Sequence[Recording]) -> Callable[[], int]:
+    """Return a function that returns the first time (us) of a recording: that of all sources of its file."""
+    file = recording.path, trial_name(recording)
+    return lambda: min(span_us(each)[0] for each in recordings if (each.path, trial_name(each)) == file)
 
 
 def check_shift(shift_ms: float) -> None:
@@ -166,15 +176,12 @@ def of_other_sources(
         beside_it = [k for k, each in enumerate(recordings) if (each.path, trial_name(each)) == file]
         labels = {source_name(recordings[k]): events[k] or {} for k in beside_it if recordings[k] is not recording}
         names = {name for k in beside_it for name in (recordings[k].label, recordings[k].side)} | {""}
-        clock_of = partial(getattr, recording, "clock")
         for table in _tables(source, recording.path, recordings):
             rows = [row for row in table.rows if row.recording in {table.named(*file), ""}]
             for name in sorted({row.source for row in rows} - names):
                 with collected():  # what these warn of concerns the labels of this source too
-                    times = table._times(recording.path, clock_of, name, file[1], name)
-                    stated = table._from_beginning
-                    (counted_anew,) = _from_beginnings([times], [recording], str(table.path), stated=stated)
-                    labels[name] = moved(counted_anew, recording, shift_ms)
+                    times = _times(table, recording, name, name, _begin_of(recording, recordings))
+                    labels[name] = moved(times, recording, shift_ms)
         found[recording.title] = labels
     return found
 
@@ -216,6 +223,7 @@ def _joined(paths: Sequence[str | os.PathLike[str]], recordings: Sequence[Record
     """
     tables = [Labels(path) for path in paths]
     rows: list[Note] = []
+    begins: dict[str, int] = {}
     for table in tables:
         owners = {table.named(each.path, trial_name(each), each.label): each for each in reversed(recordings)}
         namesake = next((each for each in recordings if _is_named_after(table.path, each)), None)
@@ -226,9 +234,11 @@ def _joined(paths: Sequence[str | os.PathLike[str]], recordings: Sequence[Record
                     f"{table.path}: does not state the recording of each label; state it in the column recording, or "
                     f"name the table after its recording, for example {Path(trial_name(recordings[0])).stem}.csv"
                 )
-            begins = [span_us(each)[0] for each in recordings if owner is not None and each.path == owner.path]
-            begin_us = min(begins) if table._from_beginning and begins else 0
-            rows.append(replace(row, recording=row.recording or _name_of(owner), t=(row.t or 0) + begin_us))
+            name = _name_of(owner)
+            if owner is not None and name not in begins:
+                begins[name] = _begin_of(owner, recordings)()
+            by_its_clock = by_clock(row, begins.get(name, 0), stated=table._from_beginning)
+            rows.append(replace(by_its_clock, recording=row.recording or name))
     return tables[0]._with(Path(table_names(paths)), rows)
 
 
@@ -265,27 +275,6 @@ def _mapped(source: GivenLabels, recordings: Sequence[Recording], argument: str)
     return [
         {label: column(f"{argument}[{label!r}]", t, np.int64, "us") for label, t in labels.items()} for labels in named
     ]
-
-
-def _warn_of_strangers(table: Labels, recordings: Sequence[Recording]) -> None:
-    """Warn of events of recordings that are not there, if their names seem to be misspelt ones of those that are."""
-    named = [names for _, names in _named(table, recordings)]
-    known = {name for names in named for name in names}
-    alike = {_letters(name) for names in named for name in names if name}
-    strange = [name for name in table.recordings if name not in known and _letters(name) in alike]
-    if strange:
-        count = counted(sum(row.recording in strange for row in table.rows), "event")
-        there = few(dict.fromkeys(recording.title for recording in recordings))
-        warn(
-            f"{table.path}: left out {count} whose recording is named {few(strange)}; the recordings are named {there}",
-            stacklevel=3,
-        )
-
-
-def _letters(name: str) -> tuple[str, str]:
-    """Return the digits of a recording's name in their order, and its letters in any: misspelt names have the same."""
-    letters = spelling(Path(name).stem)
-    return "".join(filter(str.isdigit, letters)), "".join(sorted(filter(str.isalpha, letters)))
 
 
 def trial_name(recording: Recording) -> str:
@@ -377,43 +366,6 @@ def _noted(recording: Recording) -> dict[str, NDArray[np.int64]]:
     return {label: np.sort(np.array(t, np.int64)) for label, t in times.items()}
 
 
-def _from_beginnings(
-    each: Sequence[dict[str, NDArray[np.int64]]],
-    recordings: Sequence[Recording],
-    where: str,
-    *,
-    stated: bool = False,
-) -> list[dict[str, NDArray[np.int64]]]:
-    """Return events by the times of their recordings, and say of which they are counted from the beginning.
-
-    Those are all events of a recording whose times count from 1970, if all are within its duration. Sources of a file
-    count from the first of them; if they begin apart, the labels are refused. Where the table of the events states that
-    its times count from the beginning, they are all events, without a warning.
-    """
-    begins: dict[tuple[Path, str], list[int]] = {}
-    labelled = [k for k, events in enumerate(each) if any(map(len, events.values()))]
-    spans = {k: span_us(recordings[k]) for k in labelled}
-    for k in labelled:
-        begins.setdefault((recordings[k].path, trial_name(recordings[k])), []).append(spans[k][0])
-    moved, counted_anew = list(each), []
-    for k in labelled:
-        firsts = begins[recordings[k].path, trial_name(recordings[k])]
-        begin, times = min(firsts), np.concatenate(list(each[k].values()))
-        if stated:
-            moved[k] = {label: begin + t for label, t in each[k].items()}
-            continue
-        if beginning_us(np.array(firsts)) and max(firsts) - begin <= _NEAR_US and times.min() >= 0:
-            if begin + times.max() > spans[k][1]:
-                continue
-            moved[k] = {label: begin + t for label, t in each[k].items()}
-            counted_anew.append((recordings[k].title, begin))
-    if counted_anew:
-        (title, begin), *others = counted_anew
-        more = f"; for {counted(len(others), 'other recording')} likewise" * bool(others)
-        warn(f"{where}: times are counted from the beginning of {title}, {begun(begin)}{more}", stacklevel=3)
-    return moved
-
-
 def _within(
     table: Labels, events: dict[str, NDArray[np.int64]], recording: Recording, argument: str
 ) -> dict[str, NDArray[np.int64]]:
@@ -429,16 +381,8 @@ def _within(
         times = np.concatenate(list(events.values()))
         ends = " to ".join(f"{t / 1e6:.3f}" for t in np.unique([times.min(), times.max()]))
         content = f"{argument} is {table.path}: holds {counted(len(times), 'event')} ({ends} s)"
-        raise ProblemError(f"{content}, none within {_span(recording)}{_if_frames(times, recording)}")
+        raise ProblemError(f"{content}, none within {_span(recording)}")
     return inside
-
-
-def _if_frames(times: NDArray[np.int64], recording: Recording) -> str:
-    """Return the end of a message on times that are whole seconds, no more than there are frames; "" of others."""
-    t = recording.frames().t if recording.timed and not recording.has_events else np.empty(0, np.int64)
-    if len(t) < 2 or (times % 1_000_000).any() or times.max() > 1_000_000 * len(t):
-        return ""
-    return f"; if these are numbers of frames, write t_us = FRAME * {np.median(np.diff(t)):.0f}"
 
 
 def _span(recording: Recording) -> str:
@@ -447,8 +391,8 @@ def _span(recording: Recording) -> str:
     begin = beginning_us(np.array([first]))
     if begin:
         more = (
-            f"; it begins {begun(begin)}, {begin} us since 1970: all labels must count from 1970, or all from the "
-            "recording's beginning"
+            f"; it begins {begun(begin)}, {begin} us since 1970: labels must count from 1970, or from the recording's "
+            "beginning"
         )
     return f"{recording.title} ({(first - begin) / 1e6:.3f} to {(last - begin) / 1e6:.3f} s){more}"
 
@@ -487,6 +431,5 @@ def _inside(events: Mapping[str, NDArray[np.int64]], recording: Recording, where
         )
     outside = total - sum(map(len, inside.values()))
     if outside:
-        hint = _if_frames(np.concatenate(list(events.values())), recording)
-        warn(f"{outside} of the {total} events of {where} left out: outside {_span(recording)}{hint}", stacklevel=2)
+        warn(f"{outside} of the {total} events of {where} left out: outside {_span(recording)}", stacklevel=2)
     return {label: t for label, t in inside.items() if len(t) or not len(events[label])}
