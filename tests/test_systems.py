@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from live.label_tables import held, mark
 from loopback import free_port, until
 from recording.making import some_events
 from refusal import refused
@@ -29,7 +28,7 @@ from taxel._base.windows_names import name_fault
 from taxel.demo import report
 from taxel.encode import LevelCrossing
 from taxel.live import Live
-from taxel.live._label_table import LabelTables
+from taxel.live._label_file import LabelFile
 
 on_windows = pytest.mark.skipif(sys.platform != "win32", reason="a matter of Windows alone")
 
@@ -70,13 +69,10 @@ def test_a_board_is_recorded_and_labelled_in_any_folder(folder: Path) -> None:
         until(lambda: live.counters["capture"]["datagrams"] == 1)
         live.stop()
     assert len(taxel.open(path).events) == 20
-    tables, table = LabelTables(), folder / "a walk é.notes.csv"
-    try:
-        for t in (7, 9):
-            mark(tables, table, "heel ł", t)
-    finally:
-        tables.close()
-    assert held(table) == {("heel ł", 7): 1, ("heel ł", 9): 1}
+    table = folder / "a walk é.notes.csv"
+    for t in (7, 9):
+        LabelFile(table, frozenset({""})).change([[(None, taxel.Note("heel ł", t))]])
+    assert [(row.text, row.t) for row in taxel.Labels(table).rows] == [("heel ł", 7), ("heel ł", 9)]
 
 
 def test_a_readout_is_saved_in_any_folder(folder: Path) -> None:

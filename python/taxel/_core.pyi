@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from taxel._base.errors import Place
 from taxel.labels import Note
-from taxel.live._label_table import TableRead
+from taxel.live._requests.labels import TableRead
 from taxel.live._requests.training import TrainedReadout
 from taxel.live._shown_files import ReadFrames
 
@@ -783,12 +783,6 @@ class _Note(TypedDict):
     replaces: int | None
 
 @type_check_only
-class _Conflict(TypedDict):
-    missing: list[_Note]
-    returned: list[_Note]
-    new: list[_Note]
-
-@type_check_only
 class BoardRequests(Protocol):
     def command(self, register: int, value: int) -> int: ...
     def channels(self) -> int: ...
@@ -828,13 +822,16 @@ class FileRequests(Protocol):
 
 @type_check_only
 class LabelRequests(Protocol):
-    def stamp(self, table: Path) -> str: ...
-    def read(self, table: Path, recording: str, us: int) -> TableRead: ...
+    def read(self, table: Path, recording: str, us: int, begin_us: int) -> TableRead: ...
     def change(
-        self, table: Path, recording: str, us: int, requests: list[list[tuple[_Note | None, _Note | None]]]
+        self,
+        table: Path,
+        recording: str,
+        us: int,
+        begin_us: int,
+        requests: list[list[tuple[_Note | None, _Note | None]]],
     ) -> tuple[list[str | list[Note | None]], TableRead]: ...
-    def settle(self, table: Path, recording: str, us: int, conflict: _Conflict, restore: bool) -> TableRead: ...
-    def undo(self, table: Path, recording: str, us: int, change: int) -> TableRead: ...
+    def undo(self, table: Path, recording: str, us: int, begin_us: int, change: int) -> TableRead: ...
 
 @type_check_only
 class TrainingRequests(Protocol):

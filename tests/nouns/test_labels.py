@@ -166,7 +166,8 @@ def test_a_replaced_note_is_that_of_its_source_alone(tmp_path: Path) -> None:
     assert [(row.text, row.t, row.replaces) for row in labels.rows] == [("heel", 5, 4), ("toe", 7, None)]
     assert [row.replaces for row in labels.removed] == [9]
     walk = tmp_path / "walk.mcap"
-    assert (labels._replaced(walk, "left", "", ""), labels._replaced(walk, "right", "", "")) == ({4, 9}, {9})
+    replaced = [labels._replaced(walk, side, "", "", lambda: 0) for side in ("left", "right")]
+    assert replaced == [{4, 9}, {9}]
 
 
 @pytest.mark.parametrize("cells", [",5,", "a,5,x"])
@@ -194,7 +195,7 @@ def test_columns_that_taxel_does_not_know_stay_with_their_labels_on_the_page(row
             table = csv.writer(file)
             table.writerows([("label", "t_us", "source", "recording", "comment", "sure"), *rows])
         handler = LabelRequests(Opening())
-        assert len(handler.read(place, "walk.mcap", 1).rows) == len(rows)
+        assert len(handler.read(place, "walk.mcap", 1, 0).rows) == len(rows)
         at = random.randrange(len(rows))
         left = [row if row[3] != "walk" else (*row[:3], "", *row[4:]) for row in rows]
         label, t, source, trial, *said = left[at]
@@ -209,7 +210,7 @@ def test_columns_that_taxel_does_not_know_stay_with_their_labels_on_the_page(row
             del left[at]
         else:
             left[at] = (*changed, source, trial, *said)
-        outcomes, written = handler.change(place, "walk.mcap", 1, [] if change == "none" else [[edit]])
+        outcomes, written = handler.change(place, "walk.mcap", 1, 0, [] if change == "none" else [[edit]])
         assert not any(isinstance(outcome, str) for outcome in outcomes)
         assert sorted((row.text, row.t, row.source, row.recording) for row in written.rows) == sorted(
             row[:4] for row in left
@@ -311,34 +312,6 @@ def test_a_table_of_another_program_without_times_or_labels_is_refused(tmp_path:
     place.write_text(text)
     with refused(taxel.FormatError, place=Place("labels.csv", line=line)):
         taxel.Labels(place)
-
-
-def test_seconds_that_may_be_numbers_of_frames_are_asked_about(tmp_path: Path) -> None:
-    frames = taxel.Frames(np.zeros((100, 1, 2)), np.arange(100) * 20_000, unit="N")
-    taxel.convert(frames, tmp_path / "own.npz")
-    recording, place = taxel.open(tmp_path / "own.npz"), tmp_path / "labels.csv"
-    hint = r"\(0.000 to 1.980 s\); if these are numbers of frames, write t_us = FRAME \* 20000$"
-    place.write_text("label,t_s\nheel,30\ntoe,99\n")
-    with pytest.warns(UserWarning, match=hint), refused():
-        references(place, [recording])
-    place.write_text("label,t_s\nheel,1\ntoe,99\n")
-    with pytest.warns(UserWarning, match=f"1 of the 2 events .*{hint}"):
-        references(place, [recording])
-    for other in ("0.5", "101"):
-        place.write_text(f"label,t_s\nheel,1\ntoe,99\nheel,{other}\n")
-        with pytest.warns(UserWarning, match=r"left out: outside .* s\)$"):
-            references(place, [recording])
-
-
-def test_the_page_refuses_a_table_of_another_program_and_leaves_it_alone(tmp_path: Path) -> None:
-    place = tmp_path / "walk.notes.csv"
-    place.write_text("Zeit [s];Ereignis\n0,21;auf\n")
-    before = place.read_bytes()
-    handler = LabelRequests(Opening())
-    edit = (None, {"text": "ball", "t": 5})
-    with refused():
-        handler.change(place, "walk.mcap", 1, [[edit]])
-    assert place.read_bytes() == before
 
 
 @pytest.mark.parametrize("name", ["Versuch", "Trial", "DATEI", "Aufnahme", "file", "Filename", "Recording"])

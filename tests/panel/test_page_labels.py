@@ -38,10 +38,9 @@ def table(recording: Path, replay: Any) -> Path:
 
 
 def unlabelled(recording: Path) -> Path:
-    """Return the table of a recording, without it and without what was acknowledged of it."""
+    """Return the table of a recording, without it."""
     path = recording.with_suffix(".notes.csv")
     path.unlink(missing_ok=True)
-    path.with_name(f".{path.name}.acknowledged").unlink(missing_ok=True)
     return path
 
 
@@ -196,56 +195,6 @@ def test_on_a_phone_detections_are_not_below_a_long_list_of_labels(chromium: Any
         list_, found = (page.locator(name).bounding_box() for name in ("#label-list", ".detections-block"))
         assert list_["height"] < 844 / 2
         assert found["y"] < list_["y"] + 844, "within a screen, notes between them"
-
-
-@pytest.mark.parametrize(("width", "height"), [(1400, 900), (390, 844)])
-@pytest.mark.parametrize("restore", [True, False])
-def test_both_versions_of_labels_are_shown_until_one_is_chosen(
-    width: int, height: int, restore: bool, chromium: Any, recording: Path
-) -> None:
-    table = unlabelled(recording)
-    with shown(chromium, recording, width=width, height=height) as page:
-        still(page)
-        page.locator("#label-name").fill("heel")
-        press(page, "m")
-        shows(page, "label-count", "^1 label$")
-        older = table.read_text()
-        moved = page.locator("#label-list li input").nth(1)
-        moved.fill("3")
-        moved.press("Enter")
-        until(lambda: rows(table) == [{"label": "heel", "t_us": "3000000"}], "it is moved")
-        assert page.locator("#label-conflict").is_hidden()
-        table.write_text(older + "toe,4000000\n")
-        shows(page, "label-conflict", "lacks 1 label that was set on the page")
-        shows(page, "notice-text", r"^Another program saved walk\.notes\.csv: the file lacks 1 label")
-        page.locator("#notice-offer").click()
-        bar = page.locator("footer").bounding_box()
-        for name in ("#conflict-restore", "#conflict-accept"):
-            button = page.locator(name).bounding_box()
-            assert width > 860 or button["y"] + button["height"] <= bar["y"], "it is above the bar"
-        versions = page.locator("#conflict-rows tr").all_inner_texts()
-        assert [version.split("\t") for version in versions] == [
-            ["heel, 3.000 s", "missing"],
-            ["deleted or changed", f"heel, {page.locator('#label-list li input').nth(1).input_value()} s"],
-            ["–", "toe, 4.000 s (new)"],
-        ]
-        block = page.locator("#label-conflict").bounding_box()
-        for name in ("#conflict-restore", "#conflict-accept"):
-            button = page.locator(name).bounding_box()
-            assert block["x"] <= button["x"]
-            assert button["x"] + button["width"] <= block["x"] + block["width"] <= width
-            assert page.locator(name).evaluate("e => e.scrollWidth <= e.clientWidth")
-        # It lasts over a reload, and a label that is set in the meantime.
-        page.reload()
-        shows(page, "label-conflict", "Two versions of the labels")
-        table.write_text(older + "toe,4000000\nball,5000000\n")
-        shows(page, "conflict-rows", "ball")
-        shows(page, "notice-text", r"^Another program saved walk\.notes\.csv: the file lacks 1 label")
-        page.locator("#conflict-restore" if restore else "#conflict-accept").click()
-        until(lambda: page.locator("#label-conflict").is_hidden(), "it is settled")
-        assert page.locator("#notice").is_hidden()
-        kept = [*([3_000_000, 4_000_000] if restore else [int(older.split(",")[-1]), 4_000_000]), 5_000_000]
-        assert [int(row["t_us"]) for row in rows(table)] == kept
 
 
 def test_the_page_asks_before_it_closes_while_a_label_is_being_saved(replay: Any, table: Path) -> None:

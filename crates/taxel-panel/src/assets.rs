@@ -39,7 +39,7 @@ macro_rules! assets {
 pub const ASSETS: &[Asset] = assets! {
     "text/html; charset=utf-8": "index.html";
     "text/javascript; charset=utf-8":
-        "actions.js" "board.js" "channels.js" "clusters.js" "colours.js" "conflict.js" "connection.js" "counters.js" "cursor.js" "description.js" "detections.js" "dom.js" "geometry.js" "image.js" "keys.js" "labels.js" "lanes.js" "layout.js" "main.js" "maps.js" "mistakes.js" "notes.js" "notice.js" "player.js"
+        "actions.js" "board.js" "channels.js" "clusters.js" "colours.js" "connection.js" "counters.js" "cursor.js" "description.js" "detections.js" "dom.js" "geometry.js" "image.js" "keys.js" "labels.js" "lanes.js" "layout.js" "main.js" "maps.js" "mistakes.js" "notes.js" "notice.js" "player.js"
         "protocol.js" "raster.js" "recorder.js" "registers.js" "server.js" "settings.js" "state.js" "strip.js" "tabs.js" "timeline.js"
         "tones.js" "training.js" "view.js" "vendor/uPlot.js" "window.js" "words.js";
     "text/css; charset=utf-8": "style.css" "vendor/uPlot.css";

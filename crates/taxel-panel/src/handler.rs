@@ -171,22 +171,18 @@ pub struct LabelEdit {
     pub new: Option<LabelRow>,
 }
 
-/// Where a table lacks what was acknowledged, because another program has written it since.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct LabelConflict {
-    /// Acknowledged, and not in the table.
-    pub missing: Vec<LabelRow>,
-    /// Deleted, moved or renamed, which was acknowledged, and in the table again.
-    pub returned: Vec<LabelRow>,
-    /// The other rows that the table has since, which are in no conflict.
-    pub new: Vec<LabelRow>,
+/// How times of a table of labels become those of the view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LabelTimes {
+    /// How long one us of the file is in the view: above 1 where frames are numbered.
+    pub us: i64,
+    /// The first time of the recording in the view, us, from which tables may count.
+    pub begin_us: i64,
 }
 
-impl LabelConflict {
-    /// Whether there is none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.missing.is_empty() && self.returned.is_empty()
+impl Default for LabelTimes {
+    fn default() -> Self {
+        Self { us: 1, begin_us: 0 }
     }
 }
 
@@ -195,8 +191,6 @@ impl LabelConflict {
 pub struct LabelTable {
     /// The labels of the recording, and the rows without a label that remove a note.
     pub rows: Vec<LabelRow>,
-    /// Where it lacks what was acknowledged.
-    pub conflict: LabelConflict,
     /// The number of each request that was written, by which it can be undone; `None` where it changed nothing.
     pub changes: Vec<Option<u64>>,
 }
@@ -325,37 +319,24 @@ pub trait FileRequests: Send + Sync {
     fn save_layout(&self, source: &str, out: &Path) -> Reply<String>;
 }
 
-/// Requests about the tables of labels beside recordings. Times are those of the view, in which one us of the file is `us`.
+/// Requests about the tables of labels beside recordings. Times are those of the view.
 #[allow(clippy::missing_errors_doc)]
 pub trait LabelRequests: Send + Sync {
-    /// Returns a text that changes when a table of labels may have changed, or what was acknowledged of it.
-    fn stamp(&self, table: &Path) -> Reply<String>;
-
     /// Reads the labels of a recording from a table, which need not exist.
-    fn read(&self, table: &Path, recording: &str, us: i64) -> Reply<LabelTable>;
+    fn read(&self, table: &Path, recording: &str, times: LabelTimes) -> Reply<LabelTable>;
 
     /// Carries out requests in one write of the table as it is now, each of them whole or not at all. Returns when the table
-    /// is on the disk.
+    /// was renamed into its place.
     fn change(
         &self,
         table: &Path,
         recording: &str,
-        us: i64,
+        times: LabelTimes,
         requests: &[Vec<LabelEdit>],
     ) -> Reply<(Vec<EditOutcome>, LabelTable)>;
 
     /// Takes back a change by its number in [`LabelTable::changes`].
-    fn undo(&self, table: &Path, recording: &str, us: i64, change: u64) -> Reply<LabelTable>;
-
-    /// Ends a conflict: restores what was acknowledged, or accepts the table as it is.
-    fn settle(
-        &self,
-        table: &Path,
-        recording: &str,
-        us: i64,
-        conflict: &LabelConflict,
-        restore: bool,
-    ) -> Reply<LabelTable>;
+    fn undo(&self, table: &Path, recording: &str, times: LabelTimes, change: u64) -> Reply<LabelTable>;
 }
 
 /// Requests about readouts: training one on a recording, and running it on another.

@@ -64,9 +64,6 @@ pub(super) async fn carry_out(
         }
         Request::Move { label_id, t_us } => change(LabelChange::Move { id: number(label_id), t_us: t_us.0 }).await?,
         Request::Delete { label_id } => change(LabelChange::Delete { id: number(label_id) }).await?,
-        Request::Settle { conflict_id, keep } => {
-            labels::settle(&hub, history, shown, number(conflict_id), keep).await?;
-        }
         Request::Undo {} => labels::undo(&hub, history, shown).await?,
         Request::Health {} => return health(&hub, shown).await.map(Some),
         Request::Cut { start_us, stop_us, name } => {

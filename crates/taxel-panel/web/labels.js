@@ -1,7 +1,6 @@
 // Labels by click: mark, name, move and delete events on the time line.
 
 import { collapsed } from "./clusters.js";
-import { LabelConflict } from "./conflict.js";
 import { entitle, make, part, write } from "./dom.js";
 import { notify, silence } from "./notice.js";
 import { counted, integer, listedTime, readTime, seconds, timeUnit } from "./words.js";
@@ -45,7 +44,6 @@ export class Labels {
     this.shown = shown;
     this.closer = closer;
     this.counted = counted;
-    this.conflict = new LabelConflict(server, failed, shown);
     /** @type {Map<string, LabelsMessage>} by recording */
     this.files = new Map();
     /** The recording whose labels are shown. @type {string | null} */
@@ -233,7 +231,6 @@ export class Labels {
   show() {
     const { labels } = this;
     this.offerName();
-    this.conflict.show(this.file ? this.files.get(this.file) : undefined);
     write(part("label-count", HTMLElement), this.file ? counted(labels.length, "label") : "");
     this.lane.dataset.hint = this.file ? "Labels: click here to add a label" : "Labels: open or start a recording first";
     this.showPlace();

@@ -49,17 +49,6 @@ export interface BagTopic {
   trouble: string;
 }
 
-/** How a table that another program saved differs from what was acknowledged. A row without a `label` says that the note at `replaces_us` no longer counts. */
-export interface Conflict {
-  conflict_id: number;
-  /** Acknowledged by `done`, and not in it. */
-  missing: LabelRow[];
-  /** Deleted, moved or renamed, which was acknowledged, and in it again. */
-  returned: LabelRow[];
-  /** The other labels that it has since; they are not in conflict, and in `labels` as well. */
-  new: LabelRow[];
-}
-
 /** A recording of the folder. */
 export interface FileInfo {
   name: string;
@@ -126,20 +115,6 @@ export interface InterfaceAddress {
 export interface Label {
   /** Valid as long as the server runs. */
   label_id: number;
-  /** Its text; empty where a note of the recording is to count no more, and no label does in its place. */
-  label: string;
-  /** Board time, us. */
-  t_us: number;
-  /** The source that it is of; empty for all of them. */
-  source: string;
-  /** The trial that it is of, where the file holds several; empty for all of them. */
-  trial: string;
-  /** Time of the recording's own note that it replaces, us. */
-  replaces_us: number | null;
-}
-
-/** A label of a recording. */
-export interface LabelRow {
   /** Its text; empty where a note of the recording is to count no more, and no label does in its place. */
   label: string;
   /** Board time, us. */
@@ -625,8 +600,6 @@ export interface Labels {
   /** The table beside the recording. */
   path: string;
   labels: Label[];
-  /** How another program's text of the table differs from what was acknowledged. */
-  conflict: Conflict | null;
 }
 
 /** By the rules of `taxel.Recording` health (`taxel info`). A taxel is reported dead or stuck only where its neighbours were touched three times or more, or are known to rest above 0 and it is known to hold 0; or stuck where it holds the greatest value of all while its neighbours move. */
@@ -879,15 +852,6 @@ export interface DeleteRequest {
   label_id: number;
 }
 
-/** End the conflict of `labels`: with `acknowledged` the table gets the labels that it lacks, and loses those that returned; with `file` it stays as it is. Refused where the conflict is another by now, or is over. */
-export interface SettleRequest {
-  type: "settle";
-  id?: number;
-  conflict_id: number;
-  /** What a conflict of labels ends with. */
-  keep: "acknowledged" | "file";
-}
-
 /** Take back the last change of labels that this client made in the recording that it shows or that is recorded, whole or not at all; refused where there is none, or where another window or program has changed such a label since. */
 export interface UndoRequest {
   type: "undo";
@@ -1063,7 +1027,6 @@ export type Request =
   | RenameRequest
   | MoveRequest
   | DeleteRequest
-  | SettleRequest
   | UndoRequest
   | HealthRequest
   | TrainRequest

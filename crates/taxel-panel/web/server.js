@@ -11,7 +11,7 @@ import { size } from "./words.js";
 const RECONNECT_MS = 2000;
 
 /** Requests that save labels. */
-const SAVES = new Set(["mark", "marks", "rename", "move", "delete", "settle", "undo"]);
+const SAVES = new Set(["mark", "marks", "rename", "move", "delete", "undo"]);
 
 /** The reason why a request was refused. */
 export class RefusedError extends Error {

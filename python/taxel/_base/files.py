@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import stat
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -63,6 +64,8 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object
 def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iterator[Path]:
     """Yield a temporary path in the same folder; move the file to `path` if the block ends without an error.
 
+    A file that is replaced keeps its permissions.
+
     Raises
     ------
     FileExistsError : the file is there already and `overwrite` is false
@@ -90,7 +93,7 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
     os.close(handle)
     try:
         yield Path(name)
-        os.chmod(name, 0o666 & ~_umask())
+        os.chmod(name, stat.S_IMODE(target.stat().st_mode) if target.exists() else 0o666 & ~_umask())
         if overwrite:
             os.replace(name, target)
         else:

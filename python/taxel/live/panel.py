@@ -13,6 +13,7 @@ import numpy as np
 from taxel import _core
 from taxel._base.arguments import callback, checked_path, flag, instance, integer, text
 from taxel._base.errors import refused
+from taxel._base.files import named
 from taxel._core import ProblemError
 from taxel.detect import load
 from taxel.device import Cable
@@ -304,7 +305,9 @@ def _folder_and_name(path: Path, options: TextOptions) -> tuple[Path, str]:
     if not path.exists():
         raise FileNotFoundError(2, "no such recording", str(path))
     check_recording(path, options.layout_of(path))
-    path = path.resolve()
+    # A link is a recording of the folder in which it is, as elsewhere: its labels are beside it.
+    path = named(path)
+    path = path.parent.resolve() / path.name
     try:
         path.name.encode()
     except UnicodeEncodeError:

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::array_state::RestSource;
+use crate::handler::LabelTimes;
 use crate::keyframe_index::KeyframeIndex;
 use crate::keyframe_index::frames::{FrameArea, FrameIndex};
 use crate::keyframe_index::recording::RecordingIndex;
@@ -54,6 +55,12 @@ impl Indexed {
             Self::Events(_) => 1,
             Self::Frames(index) => index.file.number_us.unwrap_or(1),
         }
+    }
+
+    /// How times of its labels become those of the index.
+    pub(crate) fn label_times(&self) -> LabelTimes {
+        let begin_us = self.index().range().map_or(0, |(first, _)| first);
+        LabelTimes { us: self.us(), begin_us }
     }
 
     /// Refuses a label outside the recording: a late label of its last touch may lie a little after the last event.

@@ -2,12 +2,13 @@
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
+use std::time::SystemTime;
 
 use taxel_live::locked::lock;
 use tokio::sync::{OwnedMutexGuard, oneshot};
 
-use crate::handler::{LabelConflict, LabelEdit, LabelRow, LabelTable};
-use crate::protocol::messages::{Conflict, Label, Message};
+use crate::handler::{LabelEdit, LabelRow, LabelTable, LabelTimes};
+use crate::protocol::messages::{Label, Message};
 use crate::protocol::refusal::Answer;
 
 /// Maximum number of changes that a client can take back.
@@ -120,7 +121,6 @@ pub(crate) struct LabelTables(Mutex<Tables>);
 struct Tables {
     tables: HashMap<String, KnownTable>,
     last_id: u64,
-    last_conflict: u64,
 }
 
 /// A table as it was read last.
@@ -128,15 +128,16 @@ struct Tables {
 struct KnownTable {
     /// `None` where there is no table, or none was read.
     labels: Option<Vec<Label>>,
-    conflict: LabelConflict,
-    conflict_id: u64,
-    /// What [`LabelRequests::stamp`](crate::LabelRequests::stamp) returned, or its reason, before it was read.
-    stamp: String,
-    /// One us of the file in the view.
-    us: i64,
+    /// That of the file before it was read.
+    stamp: Option<Stamp>,
+    /// Those of the view that opened it last; `None` where none has.
+    times: Option<LabelTimes>,
     waiting: Vec<WaitingChanges>,
     turn: Arc<tokio::sync::Mutex<()>>,
 }
+
+/// What changes with a file: its last change, and its size.
+pub(crate) type Stamp = (SystemTime, u64);
 
 /// Name of the file that holds the labels of a recording.
 pub(crate) fn file_of(recording: &str) -> String {
@@ -155,10 +156,10 @@ impl LabelTables {
         lock(&self.0).tables.get(recording)?.labels.as_ref().map(counted)
     }
 
-    /// The recordings whose tables were opened, with one us of their files in the view.
-    pub(crate) fn opened(&self) -> Vec<(String, i64)> {
+    /// The recordings whose tables were opened.
+    pub(crate) fn opened(&self) -> Vec<(String, LabelTimes)> {
         let known = lock(&self.0);
-        known.tables.iter().filter(|(_, table)| table.us > 0).map(|(name, table)| (name.clone(), table.us)).collect()
+        known.tables.iter().filter_map(|(name, table)| Some((name.clone(), table.times?))).collect()
     }
 
     /// Waits until no other request reads or writes the table of a recording.
@@ -167,18 +168,18 @@ impl LabelTables {
         turn.lock_owned().await
     }
 
-    pub(crate) fn stamp(&self, recording: &str) -> String {
-        self.with(recording, |table| table.stamp.clone())
+    pub(crate) fn stamp(&self, recording: &str) -> Option<Stamp> {
+        self.with(recording, |table| table.stamp)
     }
 
     /// Notes that a table is read now, with its stamp.
-    pub(crate) fn opens(&self, recording: &str, stamp: String, us: i64) {
-        self.with(recording, |table| (table.stamp, table.us) = (stamp, us));
+    pub(crate) fn opens(&self, recording: &str, stamp: Option<Stamp>, times: LabelTimes) {
+        self.with(recording, |table| (table.stamp, table.times) = (stamp, Some(times)));
     }
 
     /// Notes that a table that was written is followed from now on, as of a recording that runs.
-    pub(crate) fn follows(&self, recording: &str, us: i64) {
-        self.with(recording, |table| table.us = us);
+    pub(crate) fn follows(&self, recording: &str, times: LabelTimes) {
+        self.with(recording, |table| table.times = Some(times));
     }
 
     /// Adds changes to those that are written next.
@@ -216,9 +217,8 @@ impl LabelTables {
     /// Returns whether anything has changed.
     pub(crate) fn replace(&self, recording: &str, read: Option<LabelTable>) -> bool {
         let mut known = lock(&self.0);
-        let Tables { tables, last_id, last_conflict } = &mut *known;
+        let Tables { tables, last_id } = &mut *known;
         let table = tables.entry(recording.to_owned()).or_default();
-        let (rows, conflict) = read.map(|read| (Some(read.rows), read.conflict)).unwrap_or_default();
         let mut before = table.labels.clone().unwrap_or_default();
         let mut number = |row: LabelRow| {
             let same = before.iter().position(|label| label.row == row);
@@ -228,36 +228,17 @@ impl LabelTables {
             });
             Label { label_id: id, row }
         };
-        let labels: Option<Vec<Label>> = rows.map(|rows| rows.into_iter().map(&mut number).collect());
-        let same = table.labels == labels && table.conflict == conflict;
-        if table.conflict != conflict {
-            *last_conflict += 1;
-            table.conflict_id = *last_conflict;
-        }
-        (table.labels, table.conflict) = (labels, conflict);
+        let labels: Option<Vec<Label>> = read.map(|read| read.rows.into_iter().map(&mut number).collect());
+        let same = table.labels == labels;
+        table.labels = labels;
         !same
-    }
-
-    /// The conflict of this number; `None` if it is over or is another by now.
-    pub(crate) fn conflict(&self, recording: &str, conflict_id: u64) -> Option<LabelConflict> {
-        self.with(recording, |table| {
-            let holds = table.conflict_id == conflict_id && !table.conflict.is_empty();
-            holds.then(|| table.conflict.clone())
-        })
     }
 
     /// The `labels` message.
     pub(crate) fn message(&self, recording: &str) -> Message {
         self.with(recording, |table| {
             let shown = table.labels.iter().flatten().filter(|label| !label.row.is_removal());
-            let LabelConflict { missing, returned, new } = table.conflict.clone();
-            let conflict_id = table.conflict_id;
-            Message::Labels {
-                name: recording.to_owned(),
-                path: file_of(recording),
-                labels: shown.cloned().collect(),
-                conflict: (!table.conflict.is_empty()).then_some(Conflict { conflict_id, missing, returned, new }),
-            }
+            Message::Labels { name: recording.to_owned(), path: file_of(recording), labels: shown.cloned().collect() }
         })
     }
 }

@@ -302,8 +302,6 @@ pub(crate) enum Message {
         /// The table beside the recording.
         path: String,
         labels: Vec<Label>,
-        /// How another program's text of the table differs from what was acknowledged.
-        conflict: Option<Conflict>,
     },
     /// By the rules of `taxel.Recording` health (`taxel info`). A taxel is reported dead or stuck only where its neighbours were
     /// touched three times or more, or are known to rest above 0 and it is known to hold 0; or stuck where it holds the greatest
@@ -582,20 +580,6 @@ pub(crate) struct Label {
     pub(crate) label_id: u64,
     #[serde(flatten)]
     pub(crate) row: LabelRow,
-}
-
-/// How a table that another program saved differs from what was acknowledged. A row without a `label` says that the note at
-/// `replaces_us` no longer counts.
-#[derive(Debug, Clone, Serialize)]
-#[cfg_attr(feature = "development", derive(schemars::JsonSchema))]
-pub(crate) struct Conflict {
-    pub(crate) conflict_id: u64,
-    /// Acknowledged by `done`, and not in it.
-    pub(crate) missing: Vec<LabelRow>,
-    /// Deleted, moved or renamed, which was acknowledged, and in it again.
-    pub(crate) returned: Vec<LabelRow>,
-    /// The other labels that it has since; they are not in conflict, and in `labels` as well.
-    pub(crate) new: Vec<LabelRow>,
 }
 
 /// What types of the core look like as JSON.

@@ -8,7 +8,7 @@ use super::limited::{BoardTime, Number, OneOrMore, Text, Whole};
 use super::limits::MOST_CREDITS;
 use super::refusal::{Answer, Refusal};
 
-/// Number of a label or of a conflict.
+/// Number of a label.
 pub(crate) type Id = Whole<1, { i64::MAX }>;
 
 /// A taxel, column and row.
@@ -98,9 +98,6 @@ pub(crate) enum Request {
     Move { label_id: Id, t_us: BoardTime },
     /// If the label replaces a note, that note no longer counts either, until a `mark` with the same `replaces_us`.
     Delete { label_id: Id },
-    /// End the conflict of `labels`: with `acknowledged` the table gets the labels that it lacks, and loses those that returned;
-    /// with `file` it stays as it is. Refused where the conflict is another by now, or is over.
-    Settle { conflict_id: Id, keep: Keep },
     /// Take back the last change of labels that this client made in the recording that it shows or that is recorded, whole or not
     /// at all; refused where there is none, or where another window or program has changed such a label since.
     Undo {},
@@ -154,15 +151,6 @@ pub(crate) enum Request {
 pub(crate) enum RestHow {
     Now,
     Lowest,
-}
-
-/// What a conflict of labels ends with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-#[cfg_attr(feature = "development", derive(schemars::JsonSchema), schemars(inline))]
-pub(crate) enum Keep {
-    Acknowledged,
-    File,
 }
 
 /// What is to be recorded.
@@ -225,7 +213,6 @@ impl Request {
                 | Self::Rename { .. }
                 | Self::Move { .. }
                 | Self::Delete { .. }
-                | Self::Settle { .. }
                 | Self::Undo { .. }
         )
     }

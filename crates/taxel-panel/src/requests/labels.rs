@@ -6,65 +6,60 @@ use std::time::Duration;
 
 use tokio::sync::oneshot;
 
-use crate::handler::{EditOutcome, LabelRow, LabelTable};
+use crate::handler::{EditOutcome, LabelRow, LabelTable, LabelTimes};
 use crate::hub::Hub;
 use crate::hub::clients::Broadcast;
 use crate::hub::indexed::OpenRecording;
-use crate::hub::labels::{LabelChange, LabelHistory, NumberedEdit, WaitingChanges, file_of};
+use crate::hub::labels::{LabelChange, LabelHistory, NumberedEdit, Stamp, WaitingChanges, file_of};
 use crate::protocol::limited::{OneOrMore, Text};
 use crate::protocol::limits::MOST_MARKS;
 use crate::protocol::messages::Message;
 use crate::protocol::refusal::{Answer, Refusal};
-use crate::protocol::request::{Keep, MarkedTimes};
+use crate::protocol::request::MarkedTimes;
 
 /// How often the tables that were opened are checked for changes of other programs.
 const FOLLOW_EVERY: Duration = Duration::from_millis(300);
 
 // ---------------------------------------------------------------------------------------------- reading
 
-/// Reads the labels of a recording from their file; one us of the file is `us` in the view
-/// ([`Indexed::us`](crate::hub::indexed::Indexed::us)).
-pub(crate) async fn read(hub: &Hub, recording: &str, us: i64) -> Answer {
-    let stamp = stamp(hub, recording).await;
+/// Reads the labels of a recording from their file.
+pub(crate) async fn read(hub: &Hub, recording: &str, times: LabelTimes) -> Answer {
     let known = hub.labels.count(recording).is_some();
-    if reread(hub, recording, stamp, us).await? && known {
+    if reread(hub, recording, stamp(hub, recording), times).await? && known {
         // The other clients that show it have an older list.
         hub.clients.send(Broadcast::Labels(recording.to_owned()));
     }
     Ok(())
 }
 
-/// What changes with the table; the reason where that cannot be determined.
-async fn stamp(hub: &Hub, recording: &str) -> String {
-    match hub.folder.file(&file_of(recording)) {
-        Ok(table) => hub.ask(move |handlers| handlers.labels.stamp(&table)).await.unwrap_or_else(|reason| reason),
-        Err(error) => error.to_string(),
-    }
+/// What changes with the table; `None` where there is none.
+fn stamp(hub: &Hub, recording: &str) -> Option<Stamp> {
+    let about = hub.folder.file(&file_of(recording)).ok()?.metadata().ok()?;
+    Some((about.modified().ok()?, about.len()))
 }
 
-/// Returns whether the labels or their conflict have changed.
-async fn reread(hub: &Hub, recording: &str, stamp: String, us: i64) -> Answer<bool> {
+/// Returns whether the labels have changed.
+async fn reread(hub: &Hub, recording: &str, stamp: Option<Stamp>, times: LabelTimes) -> Answer<bool> {
     let _turn = hub.labels.turn(recording).await;
     // Also where it cannot be read now: it is read again when it has changed.
-    hub.labels.opens(recording, stamp, us);
+    hub.labels.opens(recording, stamp, times);
     let table = hub.folder.file(&file_of(recording))?;
     let name = recording.to_owned();
     let (read, exists) =
-        hub.ask(move |handlers| Ok((handlers.labels.read(&table, &name, us)?, table.exists()))).await?;
-    let there = exists || !read.conflict.is_empty();
-    Ok(hub.labels.replace(recording, there.then_some(read)))
+        hub.ask(move |handlers| Ok((handlers.labels.read(&table, &name, times)?, table.exists()))).await?;
+    Ok(hub.labels.replace(recording, exists.then_some(read)))
 }
 
 /// Reads tables again that have changed; never returns.
 pub(crate) async fn follow(hub: Arc<Hub>) {
     loop {
         tokio::time::sleep(FOLLOW_EVERY).await;
-        for (recording, us) in hub.labels.opened() {
-            let stamp = stamp(&hub, &recording).await;
+        for (recording, times) in hub.labels.opened() {
+            let stamp = stamp(&hub, &recording);
             if hub.labels.stamp(&recording) == stamp {
                 continue;
             }
-            match reread(&hub, &recording, stamp, us).await {
+            match reread(&hub, &recording, stamp, times).await {
                 Ok(true) => hub.clients.send(Broadcast::Labels(recording)),
                 Ok(false) => {}
                 Err(refusal) => hub.clients.send_message(&Message::warning(refusal.reason)),
@@ -101,22 +96,22 @@ pub(crate) fn marks(shown: Option<&OpenRecording>, labels: Vec<MarkedTimes>) -> 
     Ok(changes)
 }
 
-/// The recording that is shown or being recorded, and one us of its file in the view.
-fn recording_of(hub: &Hub, shown: Option<&OpenRecording>) -> Answer<(String, i64)> {
+/// The recording that is shown or being recorded.
+fn recording_of(hub: &Hub, shown: Option<&OpenRecording>) -> Answer<(String, LabelTimes)> {
     let name = shown.map(|shown| shown.name.clone()).or_else(|| hub.recorder.file());
     let name = name.ok_or("a label needs a recording: open a recording, or start one")?;
-    Ok((name, shown.map_or(1, |shown| shown.indexed.us())))
+    Ok((name, shown.map(|shown| shown.indexed.label_times()).unwrap_or_default()))
 }
 
-/// Changes labels of the recording that is shown or being recorded; returns when the table with all of the changes is on the disk.
+/// Changes labels of the recording that is shown or being recorded; returns when the table with all of the changes is in its place.
 pub(crate) async fn change(
     hub: &Hub,
     history: &LabelHistory,
     shown: Option<&OpenRecording>,
     changes: Vec<LabelChange>,
 ) -> Answer {
-    let (name, us) = recording_of(hub, shown)?;
-    let changes: Vec<_> = changes.into_iter().map(|change| change.at_whole(us)).collect();
+    let (name, times) = recording_of(hub, shown)?;
+    let changes: Vec<_> = changes.into_iter().map(|change| change.at_whole(times.us)).collect();
     for (shown, t_us) in changes.iter().filter_map(|change| shown.zip(change.t_us())) {
         let outside = |reason| Refusal { reason, field: Some("t_us".to_owned()) };
         shown.indexed.check_label(&name, t_us).map_err(outside)?;
@@ -125,7 +120,7 @@ pub(crate) async fn change(
     hub.labels.wait(&name, WaitingChanges { changes, answer });
     {
         let _turn = hub.labels.turn(&name).await;
-        write_waiting(hub, &name, us).await;
+        write_waiting(hub, &name, times).await;
     }
     let change = written.await.unwrap_or_else(|_| Err(Refusal::bug("labels:")))?;
     change.into_iter().for_each(|change| history.add(&name, change));
@@ -133,14 +128,14 @@ pub(crate) async fn change(
 }
 
 /// Writes all changes that wait for a table, and answers them.
-async fn write_waiting(hub: &Hub, name: &str, us: i64) {
+async fn write_waiting(hub: &Hub, name: &str, times: LabelTimes) {
     let waiting = hub.labels.take_waiting(name);
     // Another request may have written them with its own.
     if waiting.is_empty() {
         return;
     }
     let edits = hub.labels.edits(name, &waiting);
-    let answers = match write(hub, name, us, edits).await {
+    let answers = match write(hub, name, times, edits).await {
         Ok(answers) => answers,
         Err(refusal) => vec![Err(refusal); waiting.len()],
     };
@@ -153,7 +148,7 @@ async fn write_waiting(hub: &Hub, name: &str, us: i64) {
 async fn write(
     hub: &Hub,
     name: &str,
-    us: i64,
+    times: LabelTimes,
     edits: Vec<Result<Vec<NumberedEdit>, String>>,
 ) -> Answer<Vec<Answer<Option<u64>>>> {
     let table = hub.folder.file(&file_of(name))?;
@@ -161,7 +156,7 @@ async fn write(
     let requests: Vec<Vec<_>> = edits.iter().flatten().map(of_request).collect();
     let recording = name.to_owned();
     let (outcomes, read): (Vec<EditOutcome>, LabelTable) =
-        hub.ask(move |handlers| handlers.labels.change(&table, &recording, us, &requests)).await?;
+        hub.ask(move |handlers| handlers.labels.change(&table, &recording, times, &requests)).await?;
     let mut outcomes = outcomes.into_iter().zip(read.changes.clone());
     let mut answers = vec![];
     for request in edits {
@@ -176,51 +171,26 @@ async fn write(
             Ok((_, (Err(reason), _))) | Err(reason) => Err(reason.into()),
         });
     }
-    take(hub, name, us, read);
+    take(hub, name, times, read);
     Ok(answers)
 }
 
 /// Shows a table as it was written.
-fn take(hub: &Hub, name: &str, us: i64, read: LabelTable) {
+fn take(hub: &Hub, name: &str, times: LabelTimes, read: LabelTable) {
     hub.labels.replace(name, Some(read));
-    hub.labels.follows(name, us);
+    hub.labels.follows(name, times);
     hub.clients.send(Broadcast::Labels(name.to_owned()));
 }
 
 /// Takes back the last change of labels that a client made in the recording that is shown or being recorded.
 pub(crate) async fn undo(hub: &Hub, history: &LabelHistory, shown: Option<&OpenRecording>) -> Answer {
-    let (name, us) = recording_of(hub, shown)?;
+    let (name, times) = recording_of(hub, shown)?;
     let change =
         history.take_last(&name).ok_or("nothing to undo: no label of this recording was changed in this window")?;
     let table = hub.folder.file(&file_of(&name))?;
     let _turn = hub.labels.turn(&name).await;
     let recording = name.clone();
-    let read = hub.ask(move |handlers| handlers.labels.undo(&table, &recording, us, change)).await?;
-    take(hub, &name, us, read);
-    Ok(())
-}
-
-/// Ends the conflict of this number as the client chose.
-pub(crate) async fn settle(
-    hub: &Hub,
-    history: &LabelHistory,
-    shown: Option<&OpenRecording>,
-    id: u64,
-    keep: Keep,
-) -> Answer {
-    let (name, us) = recording_of(hub, shown)?;
-    let restore = keep == Keep::Acknowledged;
-    let table = hub.folder.file(&file_of(&name))?;
-    let _turn = hub.labels.turn(&name).await;
-    let conflict = hub.labels.conflict(&name, id).ok_or_else(|| {
-        Refusal::of_field(
-            "conflict_id",
-            "this conflict was already settled, or the file has changed since: check both versions again",
-        )
-    })?;
-    let recording = name.clone();
-    let read = hub.ask(move |handlers| handlers.labels.settle(&table, &recording, us, &conflict, restore)).await?;
-    read.changes.iter().flatten().for_each(|&change| history.add(&name, change));
-    take(hub, &name, us, read);
+    let read = hub.ask(move |handlers| handlers.labels.undo(&table, &recording, times, change)).await?;
+    take(hub, &name, times, read);
     Ok(())
 }

@@ -539,7 +539,7 @@ impl Viewport {
         // The reason names the file.
         let refused = |error: taxel_live::Error| Refusal { reason: words(&error), field: Some("name".to_owned()) };
         let indexed = opening::index(hub, &name, trial.as_deref()).await.map_err(refused)?;
-        let labels = labels::read(hub, &name, indexed.us()).await;
+        let labels = labels::read(hub, &name, indexed.label_times()).await;
         let bytes = size(&hub.folder.file(&name).map_err(refused)?).map_err(refused)?;
         let (file, out) =
             (hub.folder.file(&name).map_err(refused)?, hub.folder.file(&readout_of(&name)).map_err(refused)?);

@@ -14,8 +14,8 @@ use taxel_core::wire::Command;
 use taxel_live::recording::{self, Remarks};
 use taxel_panel::{
     Activity, BagTopic, BoardLines, BoardRequests, Cut, Description, Detected, EditOutcome, FileRequests, FrameArea,
-    FrameFile, FrameIndex, FrameRest, FrameSource, FramesRead, LabelConflict, LabelEdit, LabelRequests, LabelRow,
-    LabelScore, LabelTable, Mistake, Opening, PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers,
+    FrameFile, FrameIndex, FrameRest, FrameSource, FramesRead, LabelEdit, LabelRequests, LabelRow, LabelScore,
+    LabelTable, LabelTimes, Mistake, Opening, PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers,
     RestSource, TrainingReply, TrainingRequests, TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
 };
 
@@ -149,12 +149,9 @@ impl FileRequests for PythonHandler {
 }
 
 impl LabelRequests for PythonHandler {
-    fn stamp(&self, table: &Path) -> Reply<String> {
-        self.call(|handler| handler.call_method1("stamp", (table,))?.extract())
-    }
-
-    fn read(&self, table: &Path, recording: &str, us: i64) -> Reply<LabelTable> {
-        let read: TableRead = self.call(|handler| handler.call_method1("read", (table, recording, us))?.extract())?;
+    fn read(&self, table: &Path, recording: &str, times: LabelTimes) -> Reply<LabelTable> {
+        let arguments = (table, recording, times.us, times.begin_us);
+        let read: TableRead = self.call(|handler| handler.call_method1("read", arguments)?.extract())?;
         Ok(read.into())
     }
 
@@ -162,13 +159,14 @@ impl LabelRequests for PythonHandler {
         &self,
         table: &Path,
         recording: &str,
-        us: i64,
+        times: LabelTimes,
         requests: &[Vec<LabelEdit>],
     ) -> Reply<(Vec<EditOutcome>, LabelTable)> {
         let edit = |edit: &LabelEdit| (edit.old.clone().map(Note::from), edit.new.clone().map(Note::from));
         let requests: Vec<Vec<_>> = requests.iter().map(|request| request.iter().map(edit).collect()).collect();
+        let arguments = (table, recording, times.us, times.begin_us, requests);
         let (outcomes, read): (Vec<Outcome>, TableRead) =
-            self.call(|handler| handler.call_method1("change", (table, recording, us, requests))?.extract())?;
+            self.call(|handler| handler.call_method1("change", arguments)?.extract())?;
         let outcome = |outcome| match outcome {
             Outcome::Refused(reason) => Err(reason),
             Outcome::Written(notes) => Ok(notes.into_iter().map(|note| note.map(LabelRow::from)).collect()),
@@ -176,23 +174,9 @@ impl LabelRequests for PythonHandler {
         Ok((outcomes.into_iter().map(outcome).collect(), read.into()))
     }
 
-    fn undo(&self, table: &Path, recording: &str, us: i64, change: u64) -> Reply<LabelTable> {
-        let arguments = (table, recording, us, change);
+    fn undo(&self, table: &Path, recording: &str, times: LabelTimes, change: u64) -> Reply<LabelTable> {
+        let arguments = (table, recording, times.us, times.begin_us, change);
         let read: TableRead = self.call(|handler| handler.call_method1("undo", arguments)?.extract())?;
-        Ok(read.into())
-    }
-
-    fn settle(
-        &self,
-        table: &Path,
-        recording: &str,
-        us: i64,
-        conflict: &LabelConflict,
-        restore: bool,
-    ) -> Reply<LabelTable> {
-        let conflict = Conflict::from(conflict.clone());
-        let arguments = (table, recording, us, conflict, restore);
-        let read: TableRead = self.call(|handler| handler.call_method1("settle", arguments)?.extract())?;
         Ok(read.into())
     }
 }
@@ -302,32 +286,16 @@ impl From<LabelRow> for Note {
     }
 }
 
-/// `Conflict` of Python.
-#[derive(FromPyObject, IntoPyObject)]
-struct Conflict {
-    missing: Vec<Note>,
-    returned: Vec<Note>,
-    new: Vec<Note>,
-}
-
-impl From<LabelConflict> for Conflict {
-    fn from(LabelConflict { missing, returned, new }: LabelConflict) -> Self {
-        Self { missing: all(missing), returned: all(returned), new: all(new) }
-    }
-}
-
 /// `TableRead` of Python.
 #[derive(FromPyObject)]
 struct TableRead {
     rows: Vec<Note>,
-    conflict: Conflict,
     changes: Vec<Option<u64>>,
 }
 
 impl From<TableRead> for LabelTable {
-    fn from(TableRead { rows, conflict: Conflict { missing, returned, new }, changes }: TableRead) -> Self {
-        let conflict = LabelConflict { missing: all(missing), returned: all(returned), new: all(new) };
-        Self { rows: all(rows), conflict, changes }
+    fn from(TableRead { rows, changes }: TableRead) -> Self {
+        Self { rows: rows.into_iter().map(LabelRow::from).collect(), changes }
     }
 }
 
@@ -348,10 +316,6 @@ struct Trained {
 enum Training {
     Question(String),
     Trained(Trained),
-}
-
-fn all<T, U: From<T>>(rows: Vec<T>) -> Vec<U> {
-    rows.into_iter().map(U::from).collect()
 }
 
 /// What became of a request: the rows that were written, or why it was refused.

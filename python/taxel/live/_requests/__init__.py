@@ -36,6 +36,5 @@ class Requests:
     def close(self) -> None:
         """Close the serial line, end a training that runs, and remove temporary files."""
         self.training.close()
-        self.labels.close()
         self._files.close()
         self.board.close()

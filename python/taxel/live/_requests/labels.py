@@ -2,39 +2,46 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from taxel._core import ProblemError
 from taxel.labels import Note
-from taxel.live._label_join import Conflict, Edit
-from taxel.live._label_table import LabelTables, TableRead
+from taxel.live._label_file import Edit, LabelFile, Outcome
 from taxel.live._requests.reasons import reasons
 from taxel.live._shown_files import Opening
+
+#: How many changes of tables can be taken back.
+_MOST_CHANGES = 1000
 
 #: The fields of a `Note` but `others`, with times in us of the view.
 _Fields = Mapping[str, Any]
 
 
-def _own_names(recording: str) -> frozenset[str]:
-    """Return the names that a table beside a recording may have for it: none, its file name, and its stem."""
-    return frozenset({"", recording, Path(recording).stem})
+@dataclass(frozen=True)
+class TableRead:
+    """Hold a table as it was read or written.
 
+    Parameters
+    ----------
+    rows : tuple of Note
+        Those of the recording itself have no name of a recording.
+    changes : tuple of int or None
+        The number of each request, by which `LabelRequests.undo` takes it back; None where it changed nothing.
+    """
 
-def _in_file(fields: _Fields, unit_us: float) -> Note:
-    note = Note(**fields)
-    replaced = None if note.replaces is None else round(note.replaces / unit_us)
-    return replace(note, text=note.text.strip(), t=round((note.t or 0) / unit_us), replaces=replaced)
-
-
-def _in_view(note: Note, unit_us: float) -> Note:
-    replaced = None if note.replaces is None else round(note.replaces * unit_us)
-    return replace(note, t=round((note.t or 0) * unit_us), replaces=replaced)
+    rows: tuple[Note, ...]
+    changes: tuple[int | None, ...] = ()
 
 
 class LabelRequests:
-    """Read and change tables of labels.
+    """Read and change tables of labels; methods may be called from several threads at a time.
+
+    A recording is given by its file name, the length of a us of its file in the view, which is above 1 where frames
+    are numbered, and its first time in the view, us.
 
     Parameters
     ----------
@@ -43,38 +50,30 @@ class LabelRequests:
     """
 
     def __init__(self, opening: Opening) -> None:
-        self._opening, self._labels = opening, LabelTables()
+        self._opening = opening
+        #: What takes the newest changes back, by their numbers.
+        self._inverses: dict[int, tuple[Edit, ...]] = {}
+        self._numbers = itertools.count(1)
 
-    def close(self) -> None:
-        """Close the tables."""
-        self._labels.close()
-
-    def stamp(self, table: Path) -> str:
-        """Return a text that changes when a table of labels, or what was acknowledged of it, may have changed."""
+    def read(self, table: Path, recording: str, us: int, begin_us: int) -> TableRead:
+        """Return the labels of a recording from a table."""
         with reasons():
-            return self._labels.stamp(table)
-
-    def read(self, table: Path, recording: str, us: int) -> TableRead:
-        """Return the labels of a recording from a table, and where the table lacks what was acknowledged."""
-        with reasons():
-            return self._to_view(table, us, self._labels.read(table, _own_names(recording)))
+            return TableRead(self._file(table, recording, us, begin_us).read())
 
     def change(
         self,
         table: Path,
         recording: str,
         us: int,
+        begin_us: int,
         requests: Sequence[Sequence[tuple[_Fields | None, _Fields | None]]],
     ) -> tuple[list[str | list[Note | None]], TableRead]:
-        """Carry out requests in one write of a table as it is now, and return when it is on the disk.
+        """Carry out requests in one write of a table as it is now, and return when it is in its place.
 
         Parameters
         ----------
         table : Path
-        recording : str
-            Its file name.
-        us : int
-            One us of the file in the view: above 1 where frames are numbered.
+        recording, us, begin_us : str, int, int
         requests : sequence of sequence of (fields or None, fields or None)
             The edits of each request, the old note and the new one. A request is carried out whole or not at all.
 
@@ -83,45 +82,41 @@ class LabelRequests:
         list
             For each request the new notes as they were written, or why it was not carried out.
         table
-            As `read` returns it.
+            As it is then.
         """
-        unit_us = self._unit_us(table, us)
+        edits = [[(_note(old), _note(new)) for old, new in request] for request in requests]
+        return self._change(self._file(table, recording, us, begin_us), edits)
 
-        def note(fields: _Fields | None) -> Note | None:
-            return None if fields is None else _in_file(fields, unit_us)
+    def undo(self, table: Path, recording: str, us: int, begin_us: int, change: int) -> TableRead:
+        """Take back a change by its number, in `changes` of the table that it was written in, whole or not at all."""
+        inverse = self._inverses.pop(change, None)
+        if inverse is None:
+            raise ProblemError("undo: this change is too long ago")
+        (outcome,), read = self._change(self._file(table, recording, us, begin_us), [inverse])
+        if isinstance(outcome, str):
+            raise ProblemError(f"undo: {outcome}")
+        return read
 
-        edits = [[Edit(note(old), note(new)) for old, new in request] for request in requests]
+    def _change(
+        self, file: LabelFile, requests: Sequence[Sequence[Edit]]
+    ) -> tuple[list[str | list[Note | None]], TableRead]:
         with reasons():
-            outcomes, read = self._labels.change(table, _own_names(recording), edits)
-        written: list[str | list[Note | None]] = [
-            outcome
-            if isinstance(outcome, str)
-            else [None if note is None else _in_view(note, unit_us) for note in outcome]
-            for outcome in outcomes
-        ]
-        return written, self._to_view(table, us, read)
+            outcomes, rows = file.change(requests)
+        changes = tuple(
+            next(self._numbers) if isinstance(outcome, Outcome) and outcome.inverse else None for outcome in outcomes
+        )
+        for number, outcome in zip(changes, outcomes, strict=True):
+            if number is not None and isinstance(outcome, Outcome):
+                self._inverses[number] = outcome.inverse
+        for oldest in sorted(self._inverses)[:-_MOST_CHANGES]:
+            self._inverses.pop(oldest, None)
+        written = [outcome if isinstance(outcome, str) else list(outcome.rows) for outcome in outcomes]
+        return written, TableRead(rows, changes)
 
-    def settle(self, table: Path, recording: str, us: int, conflict: Mapping[str, Any], restore: bool) -> TableRead:
-        """End a conflict: restore what was acknowledged, or accept the table as it is."""
-        unit_us = self._unit_us(table, us)
-        seen = Conflict(**{kind: tuple(_in_file(note, unit_us) for note in notes) for kind, notes in conflict.items()})
-        with reasons():
-            return self._to_view(table, us, self._labels.settle(table, _own_names(recording), seen, restore=restore))
+    def _file(self, table: Path, recording: str, us: int, begin_us: int) -> LabelFile:
+        names = frozenset({"", recording, Path(recording).stem})
+        return LabelFile(table, names, begin_us, us * self._opening.unit_us(table))
 
-    def undo(self, table: Path, recording: str, us: int, change: int) -> TableRead:
-        """Take back a change by its number, in `changes` of the table that it was written in."""
-        with reasons():
-            return self._to_view(table, us, self._labels.undo(table, _own_names(recording), change))
 
-    def _unit_us(self, table: Path, us: int) -> float:
-        """Return how long one us of a table is in the view."""
-        return us * self._opening.unit_us(table)
-
-    def _to_view(self, table: Path, us: int, read: TableRead) -> TableRead:
-        unit_us = self._unit_us(table, us)
-
-        def in_view(notes: tuple[Note, ...]) -> tuple[Note, ...]:
-            return tuple(_in_view(note, unit_us) for note in notes)
-
-        conflict = Conflict(*map(in_view, (read.conflict.missing, read.conflict.returned, read.conflict.new)))
-        return TableRead(tuple(sorted(in_view(read.rows), key=lambda note: note.t or 0)), conflict, read.changes)
+def _note(fields: _Fields | None) -> Note | None:
+    return None if fields is None else Note(**{**fields, "text": fields["text"].strip()})

@@ -1,0 +1,240 @@
+"""A table of labels that several windows and other programs write: each change is made on the table as it is now."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import BinaryIO, TypeAlias
+
+from filelock import FileLock, Timeout
+
+from taxel._base.documents import decoded
+from taxel._base.encodings import mark_of
+from taxel._base.files import write_whole
+from taxel._base.header_table import lines_of, separator_of
+from taxel._core import FormatError, ProblemError
+from taxel.labels import Note, by_clock, is_from_beginning, rows_of, text_with
+
+#: The lock of all tables of a folder.
+LOCK = ".taxel-labels.lock"
+
+#: How long the lock is waited for, and a table that other programs write without a pause, s.
+_LOCKED_S, _WRITTEN_S = 20.0, 5.0
+
+#: A table that does not end with a line and was written within this time is being written, s.
+_UNENDED_S = 1.0
+
+#: Replace the first row by the second; without the first mark the second, without the second delete the first.
+Edit: TypeAlias = tuple[Note | None, Note | None]
+
+#: A row in the view, and as it is in the file; None for one that was changed.
+_Row: TypeAlias = tuple[Note, Note | None]
+
+
+class _Changed(Exception):  # noqa: N818  no error
+    """Another program has written the table since it was read, or is writing it."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Hold what a request has changed.
+
+    Parameters
+    ----------
+    rows : tuple of (Note or None)
+        For each edit the row as it is in the table; None where it was deleted.
+    inverse : tuple of Edit
+        What takes the request back; empty where it changed nothing.
+    """
+
+    rows: tuple[Note | None, ...]
+    inverse: tuple[Edit, ...]
+
+
+class LabelFile:
+    """A table of labels; its rows have the times of the view of the recording.
+
+    A change is acknowledged when the table was renamed into place under the lock of its folder: of the windows and
+    servers that change tables here, none loses a change of another. A program that saves an older table wins.
+
+    Parameters
+    ----------
+    table : path
+        It need not exist. A link stays one: the file that it leads to is written.
+    names : set of str
+        The names that the table may have for the recording; its rows are given without one.
+    begin_us : int, us
+        The first time of the recording in the view.
+    unit_us : float, us
+        How long one us of the table is in the view: above 1 where frames are numbered.
+    """
+
+    def __init__(self, table: Path, names: frozenset[str], begin_us: int = 0, unit_us: float = 1.0) -> None:
+        self.path = Path(os.path.realpath(table))
+        self._names, self._begin_us, self._unit_us = names, begin_us, unit_us
+
+    def read(self) -> tuple[Note, ...]:
+        """Return the rows, also those without a label, in the order of time.
+
+        Raises
+        ------
+        FormatError : no table of labels (names the line)
+        OSError : it cannot be read
+        """
+        rows, _ = rows_of(self.path, lines_of(decoded(self.path, self._text() or b"")))
+        return _in_order(map(self._in_view, rows))
+
+    def change(self, requests: Sequence[Sequence[Edit]]) -> tuple[list[Outcome | str], tuple[Note, ...]]:
+        """Carry out requests in one write of the table as it is now; return what became of each, and the rows.
+
+        Each is carried out whole or not at all: not where a row that it replaces or deletes is no longer there, which
+        its text says then. A row that is there already is not marked again.
+
+        Raises
+        ------
+        ProblemError : it is no table of labels or cannot be written, or another program holds the lock
+        """
+        lock = self.path.with_name(LOCK)
+        try:
+            with FileLock(lock, timeout=_LOCKED_S, poll_interval=0.01):
+                until = time.monotonic() + _WRITTEN_S
+                while True:
+                    try:
+                        return self._try_to_change(requests)
+                    except _Changed:
+                        if time.monotonic() > until:
+                            raise ProblemError(f"{self.path.name} cannot be saved: other programs write it") from None
+                    time.sleep(0.01)
+        except Timeout:
+            raise ProblemError(f"{lock}: another program holds this lock; nothing was saved") from None
+        except OSError as error:
+            reason = (error.strerror or str(error)).removeprefix("is ").lower()
+            raise ProblemError(f"{self.path.name} cannot be saved: {reason}") from error
+
+    def _try_to_change(self, requests: Sequence[Sequence[Edit]]) -> tuple[list[Outcome | str], tuple[Note, ...]]:
+        text = self._text()
+        if text is not None and self._is_being_written(text):
+            raise _Changed
+        try:
+            lines = lines_of(decoded(self.path, text or b""))
+            found, columns = rows_of(self.path, lines)
+        except FormatError as error:
+            self._check_unchanged(text)
+            again = ProblemError(f"{error.args[0]}; nothing was saved: correct the table, then try again")
+            again.place = error.place
+            raise again from None
+        counts_from_beginning = any(is_from_beginning(row.t or 0, self._begin_us) for row in found)
+        rows = _Rows(zip(map(self._in_view, found), found, strict=True))
+        outcomes = [rows.carry_out(request) for request in requests]
+        if any(isinstance(outcome, Outcome) and outcome.inverse for outcome in outcomes):
+            end = next((end for end in ("\r\n", "\r") if lines and lines[0].endswith(end)), "\n")
+            separator = separator_of(next((line for line in lines if line.strip()), ""))
+            mark, encoding = mark_of(text or b"")
+            in_file = rows.in_file(lambda row: self._in_file(row, counts_from_beginning))
+            new = mark + text_with(in_file, columns, end, separator).encode(encoding)
+
+            def write(file: BinaryIO) -> None:
+                file.write(new)
+                # As late as can be: what another program writes between this and the rename is lost.
+                self._check_unchanged(text)
+
+            write_whole(self.path, write, overwrite=True)
+        return outcomes, _in_order(rows.shown())
+
+    def _text(self) -> bytes | None:
+        """Return the text of the table; None where there is none."""
+        try:
+            return self.path.read_bytes()
+        except FileNotFoundError:
+            return None
+
+    def _check_unchanged(self, text: bytes | None) -> None:
+        if self._text() != text:
+            raise _Changed
+
+    def _is_being_written(self, text: bytes) -> bool:
+        """Return whether a program that writes into the table itself has not come to the end of a line."""
+        mark, encoding = mark_of(text)
+        if text[len(mark) :].endswith(("\n".encode(encoding), "\r".encode(encoding))):
+            return False
+        # A time in the future is none at which it was written.
+        return 0 <= time.time() - os.stat(self.path).st_mtime <= _UNENDED_S
+
+    def _in_view(self, row: Note) -> Note:
+        shown = by_clock(_times_by(row, lambda t: round(t * self._unit_us)), self._begin_us)
+        return replace(shown, recording="" if row.recording in self._names else row.recording)
+
+    def _in_file(self, row: Note, counts_from_beginning: bool) -> Note:
+        begin_us = self._begin_us if counts_from_beginning else 0
+        return _times_by(row, lambda t: round((t - begin_us) / self._unit_us))
+
+
+def _times_by(row: Note, convert: Callable[[int], int]) -> Note:
+    return replace(row, t=convert(row.t or 0), replaces=None if row.replaces is None else convert(row.replaces))
+
+
+class _Rows:
+    """Hold the rows of a table while requests are carried out: in the view, with those that the file has."""
+
+    def __init__(self, rows: Iterable[tuple[Note, Note]]) -> None:
+        self._of: dict[tuple[object, ...], list[_Row]] = {}
+        for shown, in_file in rows:
+            self._add(shown, in_file)
+
+    def shown(self) -> Iterator[Note]:
+        """Return the rows in the view."""
+        return (shown for rows in self._of.values() for shown, _ in rows)
+
+    def in_file(self, convert: Callable[[Note], Note]) -> list[Note]:
+        """Return the rows for the file; those that were not changed stay as they are."""
+        rows = (row for rows in self._of.values() for row in rows)
+        return [convert(shown) if in_file is None else in_file for shown, in_file in rows]
+
+    def carry_out(self, request: Sequence[Edit]) -> Outcome | str:
+        """Carry out the edits of a request, or none of them, and say why."""
+        gone: list[_Row] = []
+        added: list[Note] = []
+        rows: list[Note | None] = []
+        for old, wanted in request:
+            if old is not None and not self._of.get(_key(old)):
+                for row in added:
+                    self._of[_key(row)].pop()
+                for shown, in_file in gone:
+                    self._add(shown, in_file)
+                return f"{old.text} at {old.t} us is no longer in the table: another window or program changed it"
+            if old is not None:
+                gone.append(self._take(old))
+            elif wanted is not None and wanted.replaces is not None:
+                # A label for a note that counted no more.
+                removal = replace(wanted, text="")
+                while self._of.get(_key(removal)):
+                    gone.append(self._take(removal))
+            new = wanted if wanted is None or old is None else replace(wanted, others=gone[-1][0].others)
+            stays = old is not None and new is not None and _key(new) == _key(old)
+            # A label that is moved or renamed onto an equal one is one with it.
+            if new is not None and (stays or not self._of.get(_key(new))):
+                self._add(new, None)
+                added.append(new)
+            rows.append(new)
+        before, after = Counter(row for row, _ in gone), Counter(added)
+        undone, restored = (after - before).elements(), (before - after).elements()
+        return Outcome(tuple(rows), (*((row, None) for row in undone), *((None, row) for row in restored)))
+
+    def _add(self, shown: Note, in_file: Note | None) -> None:
+        self._of.setdefault(_key(shown), []).append((shown, in_file))
+
+    def _take(self, row: Note) -> _Row:
+        return self._of[_key(row)].pop(0)
+
+
+def _key(row: Note) -> tuple[object, ...]:
+    """Return what makes a row another one: where it has no label, it removes a note, whatever its own time."""
+    return row.text, row.t if row.text else None, row.source, row.recording, row.replaces
+
+
+def _in_order(rows: Iterable[Note]) -> tuple[Note, ...]:
+    return tuple(sorted(rows, key=lambda row: row.t or 0))
