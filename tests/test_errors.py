@@ -81,7 +81,7 @@ def test_an_unknown_remedy_is_refused_with_those_that_there_are() -> None:
     with pytest.raises(taxel.ProblemError) as caught:
         helped(taxel.ProblemError("text"), "tare", "pray")
     assert caught.value.argument == "hint"
-    for hint in ("give", "larger", "lay_out", "pitch", "unfelt"):
+    for hint in ("give", "lay_out", "pitch", "unfelt"):
         assert str(helped(taxel.ProblemError("text"), "THERE", hint)).count("THERE") == 1
 
 
@@ -92,7 +92,7 @@ def test_the_compiled_part_s_errors_have_them_too() -> None:
     assert str(wrong.value).startswith("tau: ")
     with pytest.raises(taxel.FormatError) as lacking:
         _core.test_hook("format")
-    assert (lacking.value.argument, lacking.value.hint, lacking.value.place) == ("limit", "larger", Place(byte=0))
+    assert (lacking.value.argument, lacking.value.hint, lacking.value.place) == ("array", "give", Place(byte=0))
 
 
 @pytest.fixture(scope="module")

@@ -198,8 +198,6 @@ impl From<String> for Reason {
 pub enum Hint {
     /// Give the parameter, which is left out.
     Give,
-    /// Give the limit, or a larger one.
-    Larger,
     /// Give the grid of which a row of channels are the taxels.
     LayOut,
     /// Give the distance of the taxels.

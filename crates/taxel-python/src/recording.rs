@@ -97,8 +97,8 @@ pub struct RecordingReader {
 #[pymethods]
 impl RecordingReader {
     #[new]
-    fn open(py: Python<'_>, path: PathBuf, memory: u64, allowed: bool) -> PyResult<Self> {
-        Ok(Self { reader: enter(py, |_| Reader::open_within(&path, memory, allowed))? })
+    fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        Ok(Self { reader: enter(py, |_| Reader::open(&path))? })
     }
 
     /// The same reader, which returns at most so many bytes.

@@ -13,7 +13,7 @@ use taxel_border::errors::ProblemError;
 #[pyfunction]
 pub fn test_hook(py: Python<'_>, hook: &str) -> PyResult<()> {
     let error = match hook {
-        "format" => Error::format("raised by a test hook").at(Place::byte(0)).with_hint("limit", Hint::Larger),
+        "format" => Error::format("raised by a test hook").at(Place::byte(0)).with_hint("array", Hint::Give),
         "problem" => Error::argument("tau", ": raised by a test hook"),
         "device" => Error::device("register: raised by a test hook"),
         "scene" => Error::scene("ball: raised by a test hook"),

@@ -20,7 +20,6 @@ _Error = TypeVar("_Error", bound=Error)
 _REMEDIES = {
     "give": "give {}",
     "go_on": "to continue anyway, give {}",
-    "larger": "a larger {} reads more",
     "lay_out": "if the taxels are a grid, row by row, give {}, or rows and columns in a layout file",
     "pitch": "give {} with the pitch in mm, or pitch_mm in a layout file",
     "unfelt": (

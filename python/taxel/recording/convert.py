@@ -15,7 +15,6 @@ from taxel import _core
 from taxel._base.arguments import checked_path, flag, shown, text
 from taxel._base.errors import refused
 from taxel._base.files import whole_file, write_whole
-from taxel._base.limits import available
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.events import Events
@@ -178,7 +177,7 @@ def _read_otherwise(path: Path, source: RecordedSource) -> list[str]:
     if not isinstance(source, BoardSource) or needs_new_bytes(source):
         return []
     events = source.table
-    again = Events._from_parts(_core.RecordingReader(path, available(), True).decode("direct").events, events.array)
+    again = Events._from_parts(_core.RecordingReader(path).decode("direct").events, events.array)
     if (len(again), again.intensity is None) != (len(events), events.intensity is None):
         return [f"the pairing of intensities ({counted(len(again), 'event')} when paired directly)"]
     return ["the order of times that step back by more than 0.1 s"] * (not np.array_equal(again.t, events.t))

@@ -14,7 +14,6 @@ from taxel._base.arguments import checked_path
 from taxel._base.arrays import fields_of, stored_names
 from taxel._base.encodings import as_utf_8
 from taxel._base.files import beside, named
-from taxel._base.limits import available
 from taxel._core import FormatError
 from taxel.event_table import are_of_events, is_of_track
 from taxel.formats.event_camera import ENDINGS as CAMERA
@@ -192,7 +191,7 @@ def check_recording(path: Path, layout: GivenLayout = None) -> None:
     """
     match recognise_recording(path, layout_of(path, layout)):
         case TaxelFile("mcap"):
-            _core.RecordingReader(path, available(), True)
+            _core.RecordingReader(path)
         case TaxelFile("csv"):
             check_head(path)
 

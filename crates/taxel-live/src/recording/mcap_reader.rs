@@ -43,8 +43,6 @@ pub struct Reader {
     rebuilt: Rebuilt,
     /// How many bytes of a source may be in memory at once.
     memory: u64,
-    /// Whether a user stated it.
-    allowed: bool,
 }
 
 /// State between blocks: the file's channels, and the last arrival number.
@@ -52,7 +50,6 @@ pub struct Reader {
 pub struct ReadPosition {
     topics: BTreeMap<u16, Option<Topic>>,
     last: u64,
-    in_datagrams: u64,
     bytes: Vec<u8>,
 }
 
@@ -151,19 +148,9 @@ impl Reader {
     ///
     /// `File` if it cannot be read; `Core` (format) if it is not an MCAP file, or not one of ours.
     pub fn open(path: &Path) -> Result<Self> {
-        Self::open_within(path, limits::MEMORY, false)
-    }
-
-    /// As [`Reader::open`], where a function that returns all of a source may return at most `memory` bytes; if a user
-    /// `allowed` as much, the datagrams may unpack to that too.
-    ///
-    /// # Errors
-    ///
-    /// As [`Reader::open`].
-    pub fn open_within(path: &Path, memory: u64, allowed: bool) -> Result<Self> {
         let file = open_regular(path)?;
         let length = file.metadata().map_err(Error::file(path))?.len();
-        let mut walk = FileWalk::new(path, &file, length, memory);
+        let mut walk = FileWalk::new(path, &file, length);
         walk.magic()?;
         walk.records()?;
         let FileWalk { begin, end, ending, ends, blocks, skipped, summary, rebuilt, .. } = walk;
@@ -177,7 +164,7 @@ impl Reader {
         };
         header.check().map_err(|error| Error::format(path, &format!("header: {error}")))?;
         let (blocks, header, ends) = (Arc::new(blocks), Arc::new(header), Arc::new(ends));
-        Ok(Self { blocks, header, source: 0, ending, ends, rebuilt, memory, allowed })
+        Ok(Self { blocks, header, source: 0, ending, ends, rebuilt, memory: u64::MAX })
     }
 
     /// The names of the sources; the reader starts with the first.
@@ -355,9 +342,8 @@ impl Reader {
         mut take: impl FnMut(Message<'_>) -> Result<()>,
     ) -> Result<Unread> {
         let skipped = self.blocks.skipped.binary_search_by_key(&(block + 1), |(before, _)| *before);
-        let allowed = if self.allowed { self.memory } else { 0 };
-        let (block, most) = (self.blocks.blocks[block], limits::datagrams(self.blocks.length).max(allowed));
-        let ReadPosition { topics, last, in_datagrams, bytes } = position;
+        let block = self.blocks.blocks[block];
+        let ReadPosition { topics, last, bytes } = position;
         let (mut wrong, mut read) = (None, IndexedChunks::new());
         let sound = self.blocks.records(block, bytes, |record| {
             match record {
@@ -374,18 +360,6 @@ impl Reader {
                         if matches!(topic, Topic::Datagrams | Topic::Samples) {
                             number = unwrap(*last, header.sequence);
                             *last = number;
-                            *in_datagrams += data.len() as u64;
-                            if *in_datagrams > most {
-                                wrong = Some(limits::too_large(
-                                    &self.blocks.path,
-                                    &format!(
-                                        "the datagrams up to byte {} unpack to {in_datagrams} bytes; at most {most} \
-                                         are read (100 times the file and 64 MiB)",
-                                        block.offset
-                                    ),
-                                ));
-                                return false;
-                            }
                         }
                         let at_ns = i64::try_from(header.log_time).unwrap_or(i64::MAX);
                         wrong = take(Message { topic, number, at_ns, data: &data }).err();

@@ -45,7 +45,6 @@ pub(crate) fn words(error: &taxel_live::Error) -> String {
     let text = error;
     match hint {
         Hint::Give => format!("{text}; give {argument}"),
-        Hint::Larger => format!("{text}; a larger {argument} reads more"),
         Hint::LayOut => format!(
             "{text}; if the taxels are a grid, row by row, give {argument}, or rows and columns in a layout file"
         ),
@@ -63,7 +62,7 @@ mod tests {
 
     #[test]
     fn a_remedy_names_its_argument_once_also_in_a_part() {
-        for hint in [Hint::Give, Hint::Larger, Hint::LayOut, Hint::Pitch] {
+        for hint in [Hint::Give, Hint::LayOut, Hint::Pitch] {
             let error: Error = problem!("it needs a grid").with_hint("array", hint).in_part("encoder fa1");
             let text = words(&error.into());
             assert!(text.starts_with("encoder fa1: it needs a grid; "), "{text}");

@@ -49,7 +49,7 @@ def read_mcap(path: Path, pairing: str) -> Contents:
     FormatError : not a recording of the live format, or damaged so that nothing can be read
     OSError : the file cannot be read
     """
-    reader = _core.RecordingReader(path, available(), True)
+    reader = _core.RecordingReader(path)
     sources: dict[str, RecordedSource] = {}
     for name in reader.sources():
         channel = _Source(path, reader.of_source(name))

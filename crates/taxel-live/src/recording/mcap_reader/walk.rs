@@ -36,8 +36,6 @@ pub(super) struct FileWalk<'a> {
     path: &'a Path,
     file: &'a File,
     length: u64,
-    /// How many bytes may be read into memory.
-    memory: u64,
     pub(super) begin: Option<Header>,
     pub(super) end: Option<Header>,
     pub(super) ending: Option<FileEnding>,
@@ -50,19 +48,16 @@ pub(super) struct FileWalk<'a> {
     /// What message indexes list since the last block, and what was skipped since.
     since: (IndexedChunks, Skipped),
     pub(super) summary: Option<FileSummary>,
-    /// Unpacked size of the chunks so far, as they state it, bytes.
-    unpacked: u64,
     pub(super) rebuilt: Rebuilt,
 }
 
 impl<'a> FileWalk<'a> {
-    pub(super) fn new(path: &'a Path, file: &'a File, length: u64, memory: u64) -> Self {
+    pub(super) fn new(path: &'a Path, file: &'a File, length: u64) -> Self {
         let rebuilt = Rebuilt { unfinished: true, ..Rebuilt::default() };
         Self {
             path,
             file,
             length,
-            memory,
             begin: None,
             end: None,
             ending: None,
@@ -71,7 +66,6 @@ impl<'a> FileWalk<'a> {
             skipped: vec![],
             since: (IndexedChunks::new(), Skipped::Nothing),
             summary: None,
-            unpacked: 0,
             rebuilt,
         }
     }
@@ -192,16 +186,6 @@ impl<'a> FileWalk<'a> {
                 }
                 op::CHUNK => {
                     self.next_block();
-                    self.unpacked += size;
-                    let most = limits::most_unpacked(self.length, self.memory);
-                    if self.unpacked > most {
-                        let claim = format!("the chunks up to byte {at} state an unpacked size of {}", self.unpacked);
-                        let right = "(1000 times the file and 256 MiB)";
-                        return Err(limits::too_large(
-                            self.path,
-                            &format!("{claim} bytes; at most {most} are read {right}"),
-                        ));
-                    }
                     self.blocks.push(FileBlock { offset: at, length: RECORD_HEAD + length, bare: false });
                 }
                 // Next to chunks such a record is another one, damaged.
