@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 
 import pytest
 from filelock import FileLock
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import taxel
@@ -118,6 +118,7 @@ NOTES = st.builds(
     source=st.sampled_from(["", "left"]),
     others=st.sampled_from([(("comment", ""),), (("comment", "late"),)]),
 )
+LATE = Note("heel", 0, others=(("comment", "late"),))
 REQUESTS = st.lists(st.tuples(st.none() | NOTES, st.none() | NOTES).filter(any), min_size=1, max_size=3)
 
 
@@ -144,6 +145,7 @@ def carried_out(rows: list[Note], request: list[Edit]) -> list[Note] | None:
     st.lists(REQUESTS, max_size=5),
     st.sampled_from([(0, 1.0), (BEGIN, 1.0), (0, 10_000.0)]),
 )
+@example([], [[(None, LATE), (LATE, None), (replace(LATE, t=3), None)]], (0, 1.0))
 def test_a_change_is_made_on_the_table_as_it_is_now_whole_or_not_at_all_and_taken_back(before, requests, times) -> None:
     begin_us, unit_us = times
     with TemporaryDirectory() as folder:

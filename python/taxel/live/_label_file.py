@@ -196,15 +196,14 @@ class _Rows:
 
     def carry_out(self, request: Sequence[Edit]) -> Outcome | str:
         """Carry out the edits of a request, or none of them, and say why."""
+        # A single edit changes nothing before it fails.
+        before = {key: list(rows) for key, rows in self._of.items()} if len(request) > 1 else self._of
         gone: list[_Row] = []
         added: list[Note] = []
         rows: list[Note | None] = []
         for old, wanted in request:
             if old is not None and not self._of.get(_key(old)):
-                for row in added:
-                    self._of[_key(row)].pop()
-                for shown, in_file in gone:
-                    self._add(shown, in_file)
+                self._of = before
                 return f"{old.text} at {old.t} us is no longer in the table: another window or program changed it"
             if old is not None:
                 gone.append(self._take(old))
