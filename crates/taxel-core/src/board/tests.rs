@@ -1,9 +1,9 @@
 //! Tests of the emulated board as a whole: trip times and commands in, datagrams and status lines out.
 
 use super::*;
-use crate::Array;
 use crate::wire::registers::PRESETS;
 use crate::wire::{Command, Pairing, Registers, WORD_BYTES, Word, decode};
+use crate::{Array, Error};
 
 fn board() -> Board {
     Board::new(Registers::default(), &Array::thesis()).unwrap()
@@ -320,14 +320,11 @@ fn the_pattern_reads_as_its_page_has_it_and_begins_anew() {
 #[test]
 fn nonsense_is_refused() {
     let mut board = board();
-    assert!(board.frame(&[0; 4095], |_| true).unwrap_err().to_string().contains("4095 trip times"));
+    assert!(matches!(board.frame(&[0; 4095], |_| true), Err(Error::Problem(_))));
     let wide = Array::new(2, 65, 1.0, "wide").unwrap();
-    assert!(Board::new(Registers::default(), &wide).unwrap_err().to_string().contains("choose version 2 (rule 8)"));
+    assert!(matches!(Board::new(Registers::default(), &wide), Err(Error::Device(_))));
     let huge = Array::new(257, 256, 1.0, "huge").unwrap();
-    let refused = Board::new(Registers::at_reset(&huge, 64), &huge).unwrap_err().to_string();
-    assert!(refused.contains("more than 65536 positions"), "{refused}");
+    assert!(matches!(Board::new(Registers::at_reset(&huge, 64), &huge), Err(Error::Problem(_))));
     let small = Array::new(8, 8, 1.0, "small").unwrap();
-    assert!(
-        Board::new(Registers::default(), &small).unwrap_err().to_string().contains("must be at most 8, the number of")
-    );
+    assert!(matches!(Board::new(Registers::default(), &small), Err(Error::Device(_))));
 }

@@ -218,7 +218,7 @@ mod tests {
 
     #[test]
     fn unknown_sets_are_refused_and_a_set_in_use_stays() {
-        assert!(Instructions::cap("avx3").unwrap_err().to_string().contains("plain, avx2, avx512"));
+        assert!(Instructions::cap("avx3").is_err());
         let used = Instructions::best();
         assert!(Instructions::cap(used.name()).is_ok());
         for other in Instructions::ALL.into_iter().filter(|&set| set != used) {

@@ -25,10 +25,8 @@ fn a_file_gives_every_number_back_and_names_its_kind() {
     assert!(text.starts_with("{\n  \"format\": \"taxel plain rule\",\n  \"version\": 1,"));
     assert_eq!(PlainRule::from_json(&text).unwrap(), rule);
     assert_eq!(Detector::from_json(&text).unwrap(), rule.into());
-    let other = Readout::from_json(&text).unwrap_err().to_string();
-    assert_eq!(other, "readout: format is \"taxel plain rule\"; must be \"taxel readout\"");
-    let neither = Detector::from_json(&text.replace("plain rule", "song")).unwrap_err().to_string();
-    assert_eq!(neither, "readout: format is \"taxel song\"; must be \"taxel readout\" or \"taxel plain rule\"");
+    assert!(matches!(Readout::from_json(&text), Err(Error::Format(_))));
+    assert!(matches!(Detector::from_json(&text.replace("plain rule", "song")), Err(Error::Format(_))));
 }
 
 /// Makes one part of a rule invalid.

@@ -58,27 +58,26 @@ fn a_file_gives_every_number_back() {
 fn files_that_are_no_readout_are_refused_by_name() {
     let good = readout().to_json();
     let cases = [
-        ("", "readout: not JSON"),
-        ("[]", "readout: not a JSON object"),
-        ("{}", "readout: the key \"format\" is missing; must be \"taxel readout\""),
-        (&good.replace("taxel readout", "other"), "readout: format is \"other\"; must be \"taxel readout\""),
-        (&good.replace("\"version\": 1,", ""), "readout: the key \"version\" is missing; must be 1"),
-        (&good.replace("\"version\": 1,", "\"version\": 2,"), "readout: version is 2; this taxel reads only version 1"),
-        (&good.replace("\"run_threshold\"", "\"threshold\""), "readout: threshold: unknown field"),
-        (&good.replace("\"neurons\"", "\"neuron\""), "readout: neuron: unknown field"),
-        (&good.replace("contact_area", "contact_are"), "readout: encoder contact_are: must be one of"),
-        (&good.replace("\"noise_floor\": 3.0", "\"noise_floor\": -3.0"), "readout: noise_floor is -3"),
-        (&good.replace("\"run_threshold\": 0.9", "\"run_threshold\": 0"), "readout: run_threshold is 0"),
-        (&good.replacen("\"time\": \"grid\"", "\"time\": \"continuous\"", 1), "trained for time \"grid\""),
-        (&good.replacen("\"after_spike\": \"keep\"", "\"after_spike\": \"reset\"", 1), "trained for after_spike"),
-        (&good.replacen("\"delay_ms\": 0.2", "\"delay_ms\": -0.2", 1), "contact: delay_ms is -0.2"),
-        (&good.replacen("\"tau\": 0.5", "\"tau\": 0", 1), "contact: tau is 0"),
-        (&good.replacen("1.0,", "", 1), "contact: 9 weights, but the encoder makes 10 trains of 64 x 64"),
+        "",
+        "[]",
+        "{}",
+        &good.replace("taxel readout", "other"),
+        &good.replace("\"version\": 1,", ""),
+        &good.replace("\"version\": 1,", "\"version\": 2,"),
+        &good.replace("\"run_threshold\"", "\"threshold\""),
+        &good.replace("\"neurons\"", "\"neuron\""),
+        &good.replace("contact_area", "contact_are"),
+        &good.replace("\"noise_floor\": 3.0", "\"noise_floor\": -3.0"),
+        &good.replace("\"run_threshold\": 0.9", "\"run_threshold\": 0"),
+        &good.replacen("\"time\": \"grid\"", "\"time\": \"continuous\"", 1),
+        &good.replacen("\"after_spike\": \"keep\"", "\"after_spike\": \"reset\"", 1),
+        &good.replacen("\"delay_ms\": 0.2", "\"delay_ms\": -0.2", 1),
+        &good.replacen("\"tau\": 0.5", "\"tau\": 0", 1),
+        &good.replacen("1.0,", "", 1),
     ];
-    for (text, message) in cases {
+    for text in cases {
         let error = Readout::from_json(text).unwrap_err();
-        assert!(matches!(error, Error::Format(_)), "{message}");
-        assert!(error.to_string().contains(message), "{error}, not {message}");
+        assert!(matches!(error, Error::Format(_)), "{text}: {error}");
         assert!(!error.to_string().contains('\n'));
     }
 }
@@ -87,14 +86,10 @@ fn files_that_are_no_readout_are_refused_by_name() {
 fn a_readout_refuses_neurons_that_were_trained_otherwise() {
     let mut other = readout();
     other.neurons.get_mut("lift").unwrap().neuron.after_spike = AfterSpike::Reset;
-    let message = other.check().unwrap_err().to_string();
-    assert_eq!(
-        message,
-        "lift: the neuron was trained for after_spike \"reset\", but this readout is for after_spike \"keep\""
-    );
+    assert!(other.check().is_err());
     let mut other = readout();
     other.neurons.get_mut("lift").unwrap().neuron.time = Time::Continuous;
-    assert!(other.check().unwrap_err().to_string().starts_with("lift: the neuron was trained for time \"continuous\""));
+    assert!(other.check().is_err());
     let mut other = readout();
     other.neurons.clear();
     assert!(other.check().is_err());
@@ -103,10 +98,11 @@ fn a_readout_refuses_neurons_that_were_trained_otherwise() {
 #[test]
 fn another_array_and_a_missing_tare_are_refused() {
     let array = Array::new(63, 64, 2.67, "other").unwrap();
-    let message = readout().stream(&array, 192.0, None).err().unwrap().to_string();
-    assert!(message.starts_with("an array of 63 x 64 taxels: the readout was trained on 64 x 64"), "{message}");
-    let message = readout().stream(&Array::thesis(), 192.0, None).err().unwrap().to_string();
-    assert!(message.contains("tare"), "{message}");
+    assert!(readout().stream(&array, 192.0, None).is_err());
+    let Err(Error::Problem(reason)) = readout().stream(&Array::thesis(), 192.0, None) else {
+        panic!("a tare is needed")
+    };
+    assert_eq!((reason.argument.as_deref(), reason.hint), (Some("tare"), Some(Hint::Give)));
     // A readout without an array of its own accepts every array with the same number of trains.
     let tare = Tare {
         array: array.clone(),
@@ -220,11 +216,7 @@ fn only_a_taxel_that_exists_is_zeroed() {
     let array = Array { exists: Some(vec![true, true, true, false]), ..Array::new(2, 2, 1.0, "three").unwrap() };
     let z = Zeroing { t: 0, x: 0, y: 0, rest: 1.0, before: None };
     assert!(z.check(&array).is_ok());
-    for (wrong, message) in [
-        (Zeroing { x: 1, y: 1, ..z }, "taxel at row 1, column 1: does not exist in this array of 2 x 2 taxels"),
-        (Zeroing { x: 2, ..z }, "taxel at row 0, column 2: does not exist in this array of 2 x 2 taxels"),
-        (Zeroing { rest: f64::NAN, ..z }, "taxel at row 0, column 0: its rest is NaN; must be finite"),
-    ] {
-        assert_eq!(wrong.check(&array).unwrap_err().to_string(), message);
+    for wrong in [Zeroing { x: 1, y: 1, ..z }, Zeroing { x: 2, ..z }, Zeroing { rest: f64::NAN, ..z }] {
+        assert!(wrong.check(&array).is_err());
     }
 }

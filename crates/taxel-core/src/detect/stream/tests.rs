@@ -220,8 +220,7 @@ fn what_does_not_fit_is_refused() {
     let narrow = Events::empty(Array::new(3, 2, 1.0, "other").unwrap());
     let mut live = stream(&neuron, 0.0, 192.0);
     let mut out = Vec::new();
-    let message = live.push_events(narrow.view(), &mut out).unwrap_err().to_string();
-    assert_eq!(message, "input from 3 x 2 taxels: this readout reads 2 x 2");
+    assert!(live.push_events(narrow.view(), &mut out).is_err());
     assert!(live.advance(i64::MAX, &mut out).is_err());
     assert!(live.push_frame(i64::MIN, &[0.0; 4], &mut out).is_err());
     let mut far = events(1, 1);
