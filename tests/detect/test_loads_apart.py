@@ -8,7 +8,6 @@ import pytest
 from taxel import Array, Frames, Readout, Tare
 from taxel.detect import Example, Recipe, fit, judge, recipes, run, score
 from taxel.detect.floors import measured_floor
-from taxel.detect.training_data import training_data
 from taxel.encode import SeparateLoads, TouchEnds
 
 SKIN, HZ = (8, 16), 50
@@ -129,7 +128,3 @@ def test_steps_that_overlap_on_one_plate_are_loads_of_their_own() -> None:
     for example in unseen:
         found = run(Readout.from_json(readout.to_json()), example.source, tare=example.tare)
         assert score(found, example.labels, 50.0).rank[0] == 0
-    # Steps that last for half of a short trial are touches, with which unseen ones are compared.
-    data = training_data(learnt, [run(readout, example.source, tare=example.tare) for example in learnt])
-    assert data is not None
-    assert data["detected"] == 1.0

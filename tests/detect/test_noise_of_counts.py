@@ -9,9 +9,7 @@ import pytest
 
 import taxel
 from taxel import Array, Events, Frames, Neuron, ProblemError, Readout, Tare
-from taxel.detect import Example, PlainRule, run
-from taxel.detect.alignment import Alignment
-from taxel.detect.evidence import weak_bursts
+from taxel.detect import PlainRule, run
 from taxel.encode import LocalLoad
 from taxel.tasks.detect import detect
 
@@ -62,26 +60,6 @@ def test_floors_are_raised_for_counts_alone_and_never_lowered() -> None:
     for unit in ("counts", None):
         other = PlainRule("area", 2, noise_floor=1.0, unit=unit)
         assert other._at_noise_of(tare) is other
-
-
-@pytest.mark.parametrize("strength", [0, 20])
-def test_labels_without_an_input_near_are_weak_bursts_where_a_file_holds_some(strength: int) -> None:
-    random = np.random.default_rng(5)
-    values = random.poisson(0.1, (2000, 10, 12)).astype(float)
-    given = np.arange(300, 1900, 100)
-    for frame in given:
-        values[frame : frame + 4, 3:6, 3:6] += random.poisson(strength, (4, 3, 3))
-    frames = Frames(values, 5000 * np.arange(2000), unit="events/5 ms", array=Array(10, 12))
-    tare = Tare.take(frames, stop_us=1_400_000)
-    nowhere = Alignment("burst", 0, np.zeros(len(given), np.int64), 5000 * given, np.full(len(given), np.nan))
-    weak = list(weak_bursts([Example(frames, {"burst": 5000 * given}, tare)], nowhere))
-    assert len(weak) == (len(given) if strength else 0)
-    for burst in weak:
-        assert burst.window_ms == 5.0
-        assert burst.rest == pytest.approx(12, rel=0.1)
-        assert burst.events == pytest.approx(12 + 9 * strength, rel=0.3)
-        # The burst fills four windows: their noise grows by half as much.
-        assert burst.by[4] == pytest.approx(2 * burst.by[1], rel=0.3)
 
 
 def test_what_is_no_count_of_the_training_is_refused_before_its_rest(tmp_path: Path) -> None:

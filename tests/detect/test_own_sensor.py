@@ -20,15 +20,10 @@ import taxel
 from taxel import Array, Frames, Tare
 from taxel._base import progress
 from taxel.cli import _recordings
-from taxel.detect import Example, PlainRule, Recipe, judge, load, recipes, run, score
-from taxel.detect.cause import Cause
-from taxel.detect.causes import Mistakes
-from taxel.detect.evidence import Evidence
-from taxel.detect.examples import check_examples
-from taxel.detect.fitting import Trained, fit_aligned
+from taxel.detect import Example, Recipe, judge, load, recipes, run, score
+from taxel.detect.fitting import fit_aligned
 from taxel.detect.floors import measured_floor
 from taxel.detect.followed import follow
-from taxel.detect.plain_score import PlainScore
 from taxel.encode import ContactArea, LevelCrossing, LocalLoad
 
 LABELS = ("contact", "lift")
@@ -206,58 +201,6 @@ def test_a_training_that_is_ended_while_its_report_is_drawn_leaves_no_folder(
     monkeypatch.setattr("taxel.report.detections.picture", ended)
     assert call(capsys, *arguments, "--folds", 0, "--report", tmp_path / "a" / "b")[0] != 0
     assert not (tmp_path / "a").exists()
-
-
-def test_advice_names_the_rule_that_won() -> None:
-    frames, labels = touched((8, 8), 5, gain=200.0, noise=1.0)
-    example = Example(frames, labels, Tare.take(frames, stop_us=900_000))
-    every = np.sort(labels["contact"])
-
-    def scored(found: int) -> taxel.detect.Score:
-        times = every[:found]
-        return score(taxel.Detections(["contact"] * found, times, times), {"contact": every})
-
-    rule = PlainScore({"contact": PlainRule("area", 2)}, scored(12))
-    floor = measured_floor([example])
-    of_area = fit_aligned([example], Recipe.load("touch", None, LABELS, floor), None)
-    for made in (of_area, of_area._replace(recipe=Recipe(LevelCrossing([40.0])))):
-        cause = first_cause(made, [example], scored(6), scored(12), rule)
-        assert cause.advice == "the plain rule (--rule FILE)"
-        assert "leaves 0 missed and false on the same labels; the neuron leaves 6" in cause.measured
-        assert first_cause(made, [example], scored(6), scored(12)).advice == "more labels"
-
-
-def first_cause(
-    made: Trained,
-    examples: list[Example],
-    scored: taxel.detect.Score,
-    learnt: taxel.detect.Score,
-    plain: PlainScore | None = None,
-    label: str = "contact",
-) -> Cause:
-    """Return the cause of most mistakes of a label."""
-    evidence = Evidence(examples, check_examples(examples), made.recipe)
-    causes = Mistakes(made, scored, learnt, plain=plain).causes(evidence)
-    return next(cause for cause in causes if label in cause.labels)
-
-
-def test_where_only_the_first_touches_have_labels_those_of_the_others_may_help() -> None:
-    frames, labels = touched((8, 8), 5, gain=200.0, noise=1.0)
-    tare = Tare.take(frames, stop_us=900_000)
-    plan = Recipe.load("touch", None, LABELS, measured_floor([Example(frames, labels, tare)]))
-
-    def helps(count: int, found: int) -> str:
-        first = {label: times[:count] for label, times in labels.items()}
-        example, times = Example(frames, first, tare), labels["contact"]
-        some = score(taxel.Detections(["contact"] * found, times[:found], times[:found]), {"contact": first["contact"]})
-        made = fit_aligned([example], plan, None)
-        causes = Mistakes(made, some, some).causes(Evidence([example], check_examples([example]), plan))
-        return f"{causes[0].advice}: {causes[0].measured}" if causes else ""
-
-    assert helps(5, 12).startswith("labels of all events: 7.2 of 13.0 s are before the first or after the last label")
-    assert helps(5, 3).startswith(": no cause was found in the data")
-    assert helps(12, 9).startswith(": no cause was found in the data")
-    assert helps(12, 12) == ""
 
 
 def test_an_end_of_touches_is_learnt_by_any_name() -> None:
@@ -486,26 +429,6 @@ def test_where_the_first_inputs_feel_nothing_others_are_tried() -> None:
     plan = Recipe.load("touch", labels=LABELS, noise_floor=measured_floor([example]))
     judged = judge([example], plan, 2)
     assert {label: one.missed for label, one in judged.together.by_label.items()} == dict.fromkeys(LABELS, 0)
-
-
-@pytest.mark.filterwarnings("ignore:.* (cannot be learnt|come too late)")
-@settings(max_examples=settings.default.max_examples // 6)
-@given(st.integers(0, 1000))
-def test_labels_of_which_nothing_was_felt_are_doubted_before_parameters_are(seed: int) -> None:
-    frames, labels = squares([4, 3, 5, 4] * 3)
-    apart = np.random.default_rng(seed).uniform(0.55, 0.9, 12)
-    labels = {"contact": [t + round(1e6 * by) for t, by in zip(labels["contact"], apart, strict=True)]}
-    example = Example(frames, labels, Tare.take(frames.between(0, 900_000)))
-    made = fit_aligned(
-        [example], Recipe.load("touch", labels=list(labels), noise_floor=measured_floor([example])), None
-    )
-    none = score(taxel.Detections([], [], []), labels)
-    cause = first_cause(made, [example], none, none)
-    assert cause.kind == "foreign_labels"
-    assert re.match(
-        r"\d of 12 labels (is|are) within 50 ms of the beginning or end of a load, no more than by chance",
-        cause.measured,
-    )
 
 
 @pytest.mark.parametrize(("sides", "count"), [((2, 1), 24), pytest.param((1, 3), 60, marks=pytest.mark.slow)])

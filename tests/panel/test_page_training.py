@@ -185,25 +185,3 @@ def test_what_a_training_missed_is_in_a_table_and_in_the_lanes(chromium: Any, tm
         until(lambda: page.locator("#train-result").is_hidden(), "they go")
         page.locator("#train").click()
         shows(page, "train-text", "stopped")
-
-
-def test_labels_far_from_anything_felt_are_a_question_with_a_button_to_go_on(chromium: Any, tmp_path: Path) -> None:
-    frames, truth = frames_of_mat()
-    taxel.convert(frames, tmp_path / "mat.npz")
-    # Between touches: nothing begins or ends there, and they are as far from one as from the next.
-    rows = [f"contact,{t - 125_000}" for t in truth["contact"]]
-    (tmp_path / "mat.notes.csv").write_text("\n".join(["label,t_us", *rows]) + "\n")
-    with Panel(tmp_path / "mat.npz") as panel, opened(chromium, panel.url) as page:
-        shows(page, "label-count", "^8 labels$")
-        button = page.locator("#train-nonetheless")
-        assert button.is_hidden()
-        page.locator("#train").click()
-        shows(page, "train-text", "^labels: ")
-        until(button.is_visible, "the question has its answer")
-        assert "labels_as_given" not in page.locator("#train-text").inner_text()
-        assert not (tmp_path / "mat.readout.json").exists()
-        button.click()
-        until(button.is_hidden, "it is answered")
-        until(lambda: page.locator("#train").inner_text() == "Train on these labels", "the training has ended")
-        assert button.is_hidden(), page.locator("#train-text").inner_text()
-        assert (tmp_path / "mat.readout.json").exists()

@@ -7,7 +7,7 @@ import pytest
 
 from taxel import Array, Frames, Tare
 from taxel.detect.examples import Example
-from taxel.detect.tares import TOUCH, held_by_tare
+from taxel.detect.floors import TOUCH, held_by_tare
 from taxel.recording.analysis.rest import of_quiet
 
 SHAPES = [(1, 1), (1, 4), (1, 16), (4, 4), (10, 12), (60, 80)]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib import pyplot as plt
-from tests.detect.test_label_times import touched
+from touching import touched
 
 import taxel
 from taxel.detect import Example, Outcome, PlainRule, Readout, score

@@ -86,7 +86,8 @@ def page(*figures):
         warnings=[],
         printed=[],
         held_out=[],
-        causes=[],
+        nearest=None,
+        beside_training=None,
         worst=[],
         unclaimed=[],
         viewed=["'a walk.mcap'"],
@@ -175,7 +176,8 @@ def test_no_table_of_a_report_is_cut(tmp_path, name, width):
         warnings=[f"{name}: rest: 4 taxels drifted above the tare by more than the noise floor"],
         printed=["all  12  12"],
         viewed=[],
-        causes=[],
+        nearest=None,
+        beside_training=None,
         beside=[("contact", "neuron", score), ("contact", "the area above 12 taxels for 3 ms", score)],
     )
     measured = (

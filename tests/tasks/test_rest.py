@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from tests.recording.test_rest import preloaded
 from tests.shell import run
+from touching import pressed
 
 import taxel
 from taxel import Array, Frames, ProblemError, Tare
@@ -22,7 +23,6 @@ from taxel.tasks import detect, rest
 from taxel.tasks.rest import UnknownRestError, tare_before, tare_if_any
 
 from .recordings import board, mat, trials
-from .test_causes import pressed
 
 
 def test_forces_rest_at_0_and_other_values_at_their_first_quiet_stretch(tmp_path: Path) -> None:
@@ -252,3 +252,17 @@ def test_units_of_force_and_pressure_rest_at_0(tmp_path: Path, unit: str) -> Non
     taxel.convert(Frames(np.full((100, 1, 2), 5.0), 10_000 * np.arange(100), unit=unit), tmp_path / "a.npz")
     taken = rest(taxel.open(tmp_path / "a.npz"))
     assert (taken.source, taken.tare.rest.any()) == ("unit", np.False_)
+
+
+@pytest.mark.parametrize("unit", ["counts", "kPa"])
+def test_the_quiet_stretch_is_found_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unit: str) -> None:
+    from taxel.recording.analysis import rest
+
+    frames, labels = pressed(20, 25)
+    values = frames.values - (50 if unit == "kPa" else 0)
+    taxel.convert(taxel.Frames(values, frames.t, unit=unit, array=frames.array), tmp_path / "a.npz")
+    recording, found, find = taxel.open(tmp_path / "a.npz"), [], rest.find_rest
+    monkeypatch.setattr(rest, "find_rest", lambda *words, **named: found.append(1) or find(*words, **named))
+    rule = taxel.detect.PlainRule("area", 2, noise_floor=20.0, unit=unit)
+    assert len(taxel.tasks.detect(rule, recording, [labels]).outcomes[0].found) == 50
+    assert len(found) == 1

@@ -58,7 +58,6 @@ def test_readouts_and_detections_are_the_same_from_python_the_shell_a_process_an
         texts.add((tmp_path / "page.json").read_text())
         assert made.text.splitlines() == [*training.lines(), *(f"warning: {text}" for text in training.warnings)]
         assert made.next == f"taxel detect RECORDING --readout {tmp_path / 'page.json'}"
-        assert made.options == list(training.to_dict()["options"])
     assert len(texts) == 1
     assert json.loads(shell.stdout) == {"readout": str(tmp_path / "shell.json"), **training.to_dict()}
     assert process == json.loads(json.dumps(training.to_dict()))

@@ -21,7 +21,7 @@ pub use running_rule::Decision;
 pub use score::{Spread, Tally, WIDEST_WINDOW_US, score};
 pub use stream::ReadoutStream;
 pub use trained::{Seen, TrainedNeuron};
-pub use training_data::TrainingData;
+pub use training_data::{Quantiles, TrainingData};
 
 use serde::{Deserialize, Serialize};
 

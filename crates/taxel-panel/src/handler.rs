@@ -77,16 +77,6 @@ pub struct Mistake {
     pub trial: String,
 }
 
-/// What a training returns.
-#[derive(Debug, Clone, PartialEq)]
-pub enum TrainingReply {
-    /// Its result.
-    Trained(TrainingResult),
-    /// It has not begun: nearly no label is near anything felt, or nearly all are off by the same time, and a person must
-    /// confirm that these are the labels.
-    Question(String),
-}
-
 /// What a training has made.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TrainingResult {
@@ -100,8 +90,6 @@ pub struct TrainingResult {
     pub mistakes: Vec<Mistake>,
     /// The command that detects by it in a shell; empty if it cannot be relied on.
     pub next: String,
-    /// Options of the command that trains that may help.
-    pub options: Vec<String>,
 }
 
 /// A field of a topic of a ROS bag that holds numbers.
@@ -342,8 +330,8 @@ pub trait LabelRequests: Send + Sync {
 /// Requests about readouts: training one on a recording, and running it on another.
 #[allow(clippy::missing_errors_doc)]
 pub trait TrainingRequests: Send + Sync {
-    /// Trains a readout on the labels of a recording, and writes it to `out`. With `labels_as_given` it asks no question.
-    fn train(&self, recording: &Path, out: &Path, labels_as_given: bool) -> Reply<TrainingReply>;
+    /// Trains a readout on the labels of a recording, and writes it to `out`.
+    fn train(&self, recording: &Path, out: &Path) -> Reply<TrainingResult>;
 
     /// Returns what does the same in a shell.
     fn command(&self, recording: &Path, out: &Path) -> Reply<String>;

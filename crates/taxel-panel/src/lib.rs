@@ -37,8 +37,7 @@ pub use array_state::RestSource;
 pub use handler::{
     BagTopic, BoardLines, BoardRequests, Cut, Description, Detected, EditOutcome, FileRequests, FramesRead, LabelEdit,
     LabelRequests, LabelRow, LabelScore, LabelTable, LabelTimes, Mistake, Opening, PresetRequests, PresetValue,
-    ReadFile, Reply, RequestHandlers, TrainingReply, TrainingRequests, TrainingResult, UnhealthyTaxels, UserPreset,
-    UserPresets,
+    ReadFile, Reply, RequestHandlers, TrainingRequests, TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
 };
 pub use keyframe_index::Activity;
 pub use keyframe_index::frames::{FrameArea, FrameFile, FrameIndex, FrameRest, FrameSource};

@@ -15,7 +15,7 @@ use taxel_live::locked::lock;
 use taxel_live::pipeline::{SourcePreview, SourceText};
 use taxel_live::ports::ports;
 
-use super::handler::{Cut, Description, Detected, LabelRow, Mistake, TrainingReply, TrainingResult};
+use super::handler::{Cut, Description, Detected, LabelRow, Mistake, TrainingResult};
 use super::hub::Hub;
 use super::hub::clients::Broadcast;
 use super::hub::indexed::{Indexed, OpenRecording};
@@ -69,9 +69,7 @@ pub(super) async fn carry_out(
         Request::Cut { start_us, stop_us, name } => {
             return cut(&hub, shown, (start_us.0, stop_us.0), &name.0).await.map(Some);
         }
-        Request::Train { labels_as_given } => {
-            return train(&hub, shown, labels_as_given.unwrap_or_default()).await.map(Some);
-        }
+        Request::Train {} => return train(&hub, shown).await.map(Some),
         Request::Training {} => {
             let text = hub.ask(|handlers| handlers.training.progress()).await?;
             return Ok(Some(Message::Training { text }));
@@ -237,22 +235,17 @@ fn record(hub: &Arc<Hub>, request: RecordRequest) -> Answer {
 // ---------------------------------------------------------------------------------------------- training
 
 /// Trains a readout on the labels of the recording that is shown.
-async fn train(hub: &Hub, shown: Option<&OpenRecording>, labels_as_given: bool) -> Answer<Message> {
+async fn train(hub: &Hub, shown: Option<&OpenRecording>) -> Answer<Message> {
     let shown = shown.ok_or("train: open a recording with labels first")?;
     let (name, us) = (shown.name.clone(), shown.indexed.us());
     let readout = readout_of(&name);
     let (recording, out) = (hub.folder.file(&name)?, hub.folder.file(&readout)?);
-    let reply = hub.ask(move |handlers| handlers.training.train(&recording, &out, labels_as_given)).await?;
-    let TrainingResult { text, judged_on, scores, mistakes, next, options } = match reply {
-        TrainingReply::Trained(result) => result,
-        TrainingReply::Question(reason) => {
-            return Err(Refusal { reason, field: Some("labels_as_given".to_owned()) });
-        }
-    };
+    let TrainingResult { text, judged_on, scores, mistakes, next } =
+        hub.ask(move |handlers| handlers.training.train(&recording, &out)).await?;
     hub.clients.send_message(&hub.recordings_message().await);
     let in_view = |mistake: Mistake| Mistake { t_us: mistake.t_us * us, ..mistake };
     let mistakes = mistakes.into_iter().map(in_view).collect();
-    Ok(Message::Trained { name, readout, text, judged_on, scores, mistakes, next, options })
+    Ok(Message::Trained { name, readout, text, judged_on, scores, mistakes, next })
 }
 
 /// The name of the readout that is trained on a recording.

@@ -507,8 +507,6 @@ export interface Trained {
   mistakes: Mistake[];
   /** The command that detects by it in a shell; empty if it cannot be relied on. */
   next: string;
-  /** Options of `taxel train` that may help. */
-  options: string[];
 }
 
 /** When asked: the latest progress of the training that runs, first after 2 s; empty before, and where none runs. */
@@ -864,11 +862,10 @@ export interface HealthRequest {
   id?: number;
 }
 
-/** Train a readout on the labels of the recording shown, as `taxel train --labels notes` does; of a file with several trials, on the trials that have labels. The readout replaces `NAME.readout.json` beside the recording. Answered when the training has ended; `trained` comes before. One training runs at a time. If nearly no label is near anything felt, or nearly all labels are off by the same time, the request is refused with the field `labels_as_given`, unless that is true. */
+/** Train a readout on the labels of the recording shown, as `taxel train --labels notes` does; of a file with several trials, on the trials that have labels. The readout replaces `NAME.readout.json` beside the recording. Answered when the training has ended; `trained` comes before. One training runs at a time. */
 export interface TrainRequest {
   type: "train";
   id?: number;
-  labels_as_given?: boolean | null;
 }
 
 /** Requests `training`: how far the training that runs is. */

@@ -2,7 +2,6 @@
 
 import { make, part, write } from "./dom.js";
 import { failed, notify } from "./notice.js";
-import { RefusedError } from "./server.js";
 
 /** @typedef {import("./messages.js").Recordings} Recordings */
 /** @typedef {import("./messages.js").Trained} Trained */
@@ -30,28 +29,23 @@ export class Training {
     this.source = null;
     this.button = part("train", HTMLButtonElement);
     this.button.onclick = () => (this.since === null ? this.begin() : this.end());
-    /** Trains although nearly no label is near anything felt, or nearly all are off by the same time. */
-    this.nonetheless = part("train-nonetheless", HTMLButtonElement);
-    this.nonetheless.onclick = () => this.begin(true);
     /** The readout that reads what is shown; "" without one. */
     this.reads = "";
     this.readout = part("readout", HTMLSelectElement);
     this.readout.onchange = () => this.read(this.readout.value);
   }
 
-  /** @param {boolean} [labelsAsGiven] whether a question about the labels was answered */
-  async begin(labelsAsGiven = false) {
+  async begin() {
     this.since = performance.now();
     this.text("");
     this.mistakes.clear();
     const asking = setInterval(() => this.server.send({ type: "training" }), ASKED_MS);
     this.write();
     try {
-      await this.server.request({ type: "train", labels_as_given: labelsAsGiven });
+      await this.server.request({ type: "train" });
     } catch (error) {
       this.text(error instanceof Error ? error.message : String(error));
       part("train-text", HTMLElement).classList.add("bad");
-      this.nonetheless.hidden = !(error instanceof RefusedError && error.field === "labels_as_given");
     }
     clearInterval(asking);
     this.since = null;
@@ -62,17 +56,14 @@ export class Training {
     this.server.request({ type: "train_stop" }).catch(failed);
   }
 
-  /** @param {string} text how far the training is, or its result @param {string} [next] the command that detects @param {string[]} [options] of the command that trains */
-  text(text, next = "", options = []) {
+  /** @param {string} text how far the training is, or its result @param {string} [next] the command that detects */
+  text(text, next = "") {
     const output = part("train-text", HTMLElement);
     output.hidden = !text;
     output.classList.remove("bad");
-    this.nonetheless.hidden = true;
     write(output, ...text.split("\n"));
     part("train-next", HTMLElement).hidden = !next;
     write(part("train-detect", HTMLElement), next);
-    // The page has no options of the command line.
-    write(part("train-how", HTMLElement), options.length ? `To set options such as ${options.join(", ")}, run this command in a shell and add them:` : "The same in a shell:");
   }
 
   /** Shows how far the training that runs is. @param {string} text as the command says it */
@@ -82,8 +73,8 @@ export class Training {
 
   /** @param {Trained} trained */
   take(trained) {
-    const { name, readout, text, next, options } = trained;
-    this.text(text, next, options);
+    const { name, readout, text, next } = trained;
+    this.text(text, next);
     if (name !== this.source) return;
     this.mistakes.take(trained);
     this.read(readout).then(() => this.mistakes.look());

@@ -19,7 +19,6 @@ _Error = TypeVar("_Error", bound=Error)
 #: What each remedy says, with the reader's name of the argument that helps.
 _REMEDIES = {
     "give": "give {}",
-    "go_on": "to continue anyway, give {}",
     "lay_out": "if the taxels are a grid, row by row, give {}, or rows and columns in a layout file",
     "pitch": "give {} with the pitch in mm, or pitch_mm in a layout file",
     "unfelt": (

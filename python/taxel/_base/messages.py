@@ -99,17 +99,6 @@ _NUMBER = r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)"
 _RANGE, _SECONDS = re.compile(f"{_NUMBER}(?: to {_NUMBER})?"), re.compile(r"\d s\b")
 
 
-def ranged(least: float, most: float) -> str:
-    """Return whole numbers from the least to the largest as text, or their only one.
-
-    Examples
-    --------
-    >>> ranged(51.2, 52.9), ranged(51.8, 52.3)
-    ('51 to 53', '52')
-    """
-    return " to ".join(dict.fromkeys((f"{least:.0f}", f"{most:.0f}")))
-
-
 def of_names(named: Sequence[tuple[str, str]], total: int) -> list[str]:
     """Return texts with their names before them; a text that several names share is returned once.
 

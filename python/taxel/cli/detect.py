@@ -134,8 +134,6 @@ def _lines(
     if found.score is not None:
         yield from found.unreliable
         yield from _score_lines(found, readout.labels, truth, several=several)
-    from taxel.detect.examples import causes_text  # noqa: PLC0415  a command loads what it needs
-
     remarks = _remarks(found)
     if isinstance(readout, taxel.Readout):
         outside = [(outcome.name, text) for outcome in found.outcomes if (text := outcome.outside_text)]
@@ -148,7 +146,6 @@ def _lines(
             )
     if len(found.each) > 1:
         yield from remarks
-    yield from causes_text(found.outcomes)
     if found.score is not None and not lists:
         yield "--list prints the detections"
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,7 +14,6 @@ import typer
 import taxel
 from taxel._base.files import check_writable
 from taxel._base.messages import collected
-from taxel._core import ProblemError
 from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._opening import FileOptions
 from taxel.cli._recordings import (
@@ -35,7 +33,6 @@ from taxel.cli._say import say
 if TYPE_CHECKING:
     from taxel.detect import PlainScore
     from taxel.recording import Recording
-    from taxel.tasks import Training, TrainOptions
     from taxel.tasks.labels import GivenLabels
 
 app = App()
@@ -97,14 +94,6 @@ def train(
         float,
         typer.Option(help="First move all labels by this many ms, for example if their times are of another clock."),
     ] = 0.0,
-    labels_as_given: Annotated[
-        bool,
-        typer.Option(
-            "--labels-as-given",
-            help="Train, without a question, even if almost no label is near anything that the sensor felt, or "
-            "almost all are off by the same time.",
-        ),
-    ] = False,
     report: ReportOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -126,14 +115,15 @@ def train(
     changes = assignments(values or []) | {
         key: value for key, value in (("encoder.name", encoder), ("align", align)) if value is not None
     }
-    options = taxel.tasks.TrainOptions(recipe, changes, tare, folds, window_ms, shift_ms, labels_as_given)
+    options = taxel.tasks.TrainOptions(recipe, changes, tare, folds, window_ms, shift_ms)
     with progress(as_json) as update:
         update(f"reading {paths_text(recordings)}", 0, 0)
         with collected() as unread:
             opened = files.opener.open_sensors(recordings)
         _try_rules(rule, given, opened, overwrite=overwrite)
     say_warnings(unread)  # before the training, which may take long, and again with its result
-    training = _trained(opened, given, options, as_json=as_json)
+    with progress(as_json) as update:
+        training = taxel.train(opened, given, options, progress=update)
     training.readout.save(out, overwrite=overwrite)
     rules = _write_rules(training.scored.plain, rule, overwrite=overwrite)
     say_warnings(training.warned)
@@ -143,7 +133,8 @@ def train(
         written |= {} if report is None else {"report": str(report / "report.html")}
         say(json.dumps({"readout": str(out), **training.to_dict(), **written}))
     else:
-        say(*training.lines(), "", f"written to {out}{_next(training, out, rules)}")
+        following = training.command(str(out))
+        say(*training.lines(), "", f"written to {out}" + f"; next: {following}" * bool(following))
         say(*(f"plain rule for {' and '.join(each)} written to {path}" for path, each in rules.items()))
         say(*(f"warning: {warning}" for warning in (*unread, *training.unreliable())))
     if report is not None:  # last, so that nothing is lost where it fails
@@ -161,29 +152,6 @@ def train(
             overwrite=overwrite,
         )
         say(*[] if as_json else [f"report: {place}"])
-
-
-def _trained(opened: Sequence[Recording], labels: GivenLabels, options: TrainOptions, *, as_json: bool) -> Training:
-    """Train; if almost no label is near anything that the sensor felt, ask first on a terminal."""
-    try:
-        with progress(as_json) as update:
-            return taxel.train(opened, labels, options, progress=update)
-    except ProblemError as error:
-        if error.argument != "labels_as_given" or as_json or not _confirmed(error):
-            raise
-    return _trained(opened, labels, replace(options, labels_as_given=True), as_json=as_json)
-
-
-def _confirmed(error: ProblemError) -> bool:
-    """Return whether a user on a terminal wants to train anyway; elsewhere false."""
-    if not _on_terminal():
-        return False
-    say(f"taxel: {error.args[0]}", err=True)
-    return typer.confirm("Train on these labels anyway?", err=True)
-
-
-def _on_terminal() -> bool:
-    return sys.stdin.isatty() and sys.stderr.isatty()
 
 
 def _try_rules(given: Path | None, labels: GivenLabels, recordings: Sequence[Recording], *, overwrite: bool) -> None:
@@ -216,15 +184,3 @@ def _of_label(path: Path, label: str) -> Path:
     """Return the file of the rule of one of several labels."""
     name = re.sub(r"[^\w-]", "_", label)
     return path.parent / f"{path.stem}.{name}{path.suffix}"
-
-
-def _next(training: Training, out: Path, rules: Iterable[Path]) -> str:
-    """Return what to do next: detect by the readout, or by the rules that are advised instead; or train again."""
-    advised, following = training.again(), training.command(str(out))
-    if advised is not None:
-        following = (
-            f"train again with {advised.option}" if advised.option else "follow the advice above, then train again"
-        )
-        if advised.option == "--rule FILE" and rules:
-            following = "; ".join(training.command(str(path), is_rule=True) for path in rules)
-    return f"; next: {following}" if following else ""

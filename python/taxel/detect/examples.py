@@ -10,14 +10,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from taxel._base.arguments import column, instance, several, shown, text
 from taxel._base.errors import refused
-from taxel._base.messages import of_names
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect.cause import Cause
 from taxel.detect.scoring import Score
 from taxel.detections import Detections
 from taxel.events import Events
@@ -27,8 +26,8 @@ from taxel.recorded import unit_of as recorded_unit
 from taxel.spikes import SpikeTrains, to_us
 from taxel.tare import Tare
 
-#: So many causes are said in lines.
-_LINES = 2
+#: So many labels that are all in the first such share of a recording may be in another unit of time.
+_SEVERAL, _FIRST = 4, 0.01
 
 
 class Example(NamedTuple):
@@ -93,8 +92,6 @@ class Outcome(NamedTuple):
         None of an example without labels.
     outside : int, 0 or more, optional
         How many detections have an input outside the range that it had in training; None if that is not known.
-    causes : sequence of Cause
-        What concerns most of what is missed and false, where that is much.
     """
 
     name: str
@@ -102,7 +99,6 @@ class Outcome(NamedTuple):
     found: Detections
     score: Score | None = None
     outside: int | None = None
-    causes: Sequence[Cause] = ()
 
     @property
     def begin_us(self) -> int:
@@ -119,18 +115,6 @@ class Outcome(NamedTuple):
         if self.outside is None:
             return f"detections {noun}: unknown, because the readout's file does not state the range"
         return f"detections {noun}: {self.outside} of {len(self.found)} ({self.outside / len(self.found):.0%})"
-
-    @property
-    def causes_lines(self) -> list[str]:
-        """The first causes of what is missed and false, a line each: two at most."""
-        return [f"{', '.join(cause.labels)}: {cause}" for cause in self.causes[:_LINES]]
-
-
-def causes_text(outcomes: Sequence[Outcome]) -> list[str]:
-    """Return the first causes of what is missed and false as lines, those of the sources of a recording once."""
-    titles = [outcome.example.group.strip() or outcome.name for outcome in outcomes]
-    lines = [(title, line) for title, each in zip(titles, outcomes, strict=True) for line in each.causes_lines]
-    return of_names(lines, len(set(titles)))
 
 
 def check_examples(examples: Sequence[Example]) -> list[Example]:
@@ -237,3 +221,43 @@ def unit_of(examples: Sequence[Example]) -> str | None:
             difference = f"{name_of(k, examples[k])} is in {unit}, {name_of(0, examples[0])} in {units[0]}"
             raise ProblemError(f"{difference}: must be in one unit, because a readout learns values of one unit only")
     return units[0]
+
+
+def unreliable(label: str, scored: Score, labels: str, on: str = "this readout") -> str:
+    """Return that a score of a label is too bad to rely on; "" where it is not.
+
+    Parameters
+    ----------
+    label : str
+    scored : Score
+    labels : str
+        What its events are called.
+    on : str
+        What is not to be relied on.
+    """
+    if (
+        not scored.events
+        or not scored.rank[0]
+        or (scored.rank[0] < scored.events and 2 * scored.missed <= scored.events)
+    ):
+        return ""
+    worth = ", no better than to detect nothing" if scored.rank[0] >= scored.events else ""
+    return (
+        f"{label}: do not rely on {on}: {scored.found} of {scored.events} {labels} found, {scored.false} false{worth}"
+    )
+
+
+def early(labels: Mapping[str, NDArray[np.int64]], first_us: int, last_us: int) -> str:
+    """Return that all labels of a recording are in its first hundredth, as times in another unit are; else "".
+
+    Examples
+    --------
+    >>> early({"contact": np.array([1200, 2400, 3100, 4000])}, 0, 5_000_000)
+    'are in the first 0.004 s of 5 s: are their times in us?'
+    """
+    times = np.concatenate([*labels.values(), np.empty(0, np.int64)])
+    lasts = last_us - first_us
+    latest = int(times.max(initial=first_us)) - first_us
+    if len(times) < _SEVERAL or not 0 < latest < _FIRST * lasts:
+        return ""
+    return f"are in the first {latest / 1e6:.3g} s of {lasts / 1e6:.3g} s: are their times in us?"

@@ -1,4 +1,4 @@
-"""The noise floor of a sensor that is not a board: from the noise of its taxels at rest, in its own unit."""
+"""The noise floor of a sensor that is not a board, from the noise of its taxels at rest; and a touch in that rest."""
 
 from __future__ import annotations
 
@@ -7,13 +7,22 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._core import ProblemError
 from taxel.detect import recipes
 from taxel.detect.examples import Example
+from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording.analysis.rest import BY_UNIT, NOISE_FLOOR, SHARE, TIMES_NOISE
+from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
+#: The number of loaded taxels of the smallest touch.
+TOUCH = 2.0
+#: This share of a tare, at its beginning, holds no touch.
+_EARLY = 0.25
+#: A taxel varies more than its noise at the beginning from so many times that on, and this part of the noise floor.
+_VARIES, _OF_FLOOR = 3.0, 6.0
 #: At least this share of the range above rest: taxels without noise drift and creep.
 _SHARE_OF_RANGE = 0.01
 #: The same with one kind of touch, where any load is one: so a drift of several times a small noise is none.
@@ -101,3 +110,48 @@ def floor_of(examples: Sequence[Example]) -> float:
         As of `measured_floor`.
     """
     return measured_floor(examples) or NOISE_FLOOR
+
+
+def held_by_tare(examples: Sequence[Example]) -> int:
+    """Return how many taxels vary far more in the tare of an example than at its beginning, as a touch is in it.
+
+    If there are several examples, it is the largest number. A tare of another recording says nothing: 0.
+
+    Parameters
+    ----------
+    examples : sequence of Example, checked
+    """
+    return max((_held(example) for example in examples), default=0)
+
+
+def _held(example: Example) -> int:
+    """Return how many taxels vary far more in a tare than at its beginning."""
+    early, tare = early_part(example), example.tare
+    if early is None or tare is None:
+        return 0
+    floor = floor_of([example._replace(tare=early)])
+    noise, more = early.noise, floor / _OF_FLOOR
+    source = example.source
+    if isinstance(source, Frames) and are_counts(source.unit):
+        # Few events show neither their noise nor that one more is chance.
+        first, last = (len(source.between(each.start_us, each.stop_us)) for each in (early, tare))
+        noise = np.maximum(noise, (np.nanmean(early.rest) + 1.0 / (first * noise.size)) ** 0.5)
+        more = max(more, last**-0.5)
+    return int(np.count_nonzero(tare.noise > _VARIES * noise + more))
+
+
+def early_part(example: Example) -> Tare | None:
+    """Return the beginning of an example's tare, as a touch may end it; None if the tare is of another recording."""
+    tare, source = example.tare, example.source
+    if tare is None or isinstance(source, SpikeTrains):
+        return None
+    try:
+        tare_again = Tare.take(source, start_us=tare.start_us, stop_us=tare.stop_us)
+        early = tare.start_us + round(_EARLY * (tare.stop_us - tare.start_us))
+        return (
+            Tare.take(source, start_us=tare.start_us, stop_us=early)
+            if np.array_equal(tare_again.rest, tare.rest, equal_nan=True)
+            else None
+        )
+    except ProblemError:
+        return None

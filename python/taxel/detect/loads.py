@@ -18,6 +18,9 @@ from taxel.recording import Recording
 from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.wire import FRAME_US
 
+#: The peak that noise does not reach.
+PEAK = 6.0
+
 #: How long a frame lasts (us; None: as the source says), and the wire's version.
 Clock: TypeAlias = tuple[float | None, int]
 #: An example, by its place, and from when to when, us; as `taxel.detect.Part`.
@@ -122,16 +125,6 @@ class Loads:
         if quantity not in self._changes:
             self._changes[quantity] = [curve.changes() for curve in self._curves[quantity]]
         return self._changes[quantity][k]
-
-    def values_at(self, quantity: str, times: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return what a quantity is at times on the one clock, in their shape; 0 before it is known."""
-        values, example = np.zeros(times.shape), np.rint(times / APART_US).astype(np.int64)
-        for k in np.unique(example).tolist():
-            t, of_example = self.changes(quantity, k)
-            here = example == k
-            index = np.searchsorted(t, times[here] - self._shift[k], side="right")
-            values[here] = np.concatenate([[0.0], of_example])[index]
-        return values
 
     def largest(self, quantity: str, begins: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the largest value of a quantity between pairs of times on the one clock, each in one example."""

@@ -23,6 +23,8 @@ from taxel.spikes import to_ms, to_us
 _MOST, _SAME_MS = 0.8, 50.0
 #: Distance between recordings that are scored together, us: no detection pairs with an event of another recording.
 APART_US = 10**12
+#: From which share of the events on missed or false ones are many.
+_MANY = 0.05
 
 
 class Spread(NamedTuple):
@@ -380,3 +382,9 @@ def score_rows(named: Iterable[tuple[str, Score | None]]) -> list[str]:
             rows.append((name, label, *map(str, (score.events, score.found, score.missed, score.false))))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  ".join([*map(str.ljust, row[:2], widths), *map(str.rjust, row[2:], widths[2:])]) for row in rows]
+
+
+def many_wrong(scored: Score) -> dict[str, int]:
+    """Return how many events are missed and false of each label of which more than 5 % are."""
+    scores = (scored.by_label or {scored.label: scored}).items()
+    return {label: part.rank[0] for label, part in scores if max(part.missed, part.false) > _MANY * part.events}

@@ -26,7 +26,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import Alignment, Judged, Outcome, PlainRule, Readout, Score
 from taxel.detect.detector import detector
-from taxel.detect.examples import array_of, causes_text, padded_to
+from taxel.detect.examples import array_of, padded_to
 from taxel.encode import Composite, ContactArea, Encoder, LocalLoad, Peak
 from taxel.frames import Frames
 from taxel.recorded import recorded
@@ -34,6 +34,7 @@ from taxel.recording import Recording
 from taxel.recording.analysis.pressure import series
 from taxel.recording.contents import Contents, source_from
 from taxel.recording.sections import Origin
+from taxel.report import compared
 from taxel.report.page import render
 from taxel.report.svg import INK, STYLE, picture
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -142,9 +143,13 @@ def write_detections(
             for label in readout.labels
         }
         felt = _picture(_sums(listened, readout.labels))
+        nearest = _picture(compared.nearest(listened, readout.labels))
+        beside_training = _picture(compared.beside_training(readout, listened))
     text = render(
         "report/listening.html.j2",
         felt=felt,
+        nearest=nearest,
+        beside_training=beside_training,
         title=title,
         judged=judged,
         readout=repr(readout),
@@ -175,7 +180,6 @@ def write_detections(
         printed=printed,
         viewed=[quote(outcome.name) for outcome in listened if outcome.name.endswith(_VIEWED)][:_MOST_VIEWED],
         beside=_beside(readout.labels, scored),
-        causes=causes_text(listened),
         scored=any(outcome.score is not None for outcome in listened),
     )
     target.mkdir(parents=True, exist_ok=True)  # so late that nothing is left of one that is ended

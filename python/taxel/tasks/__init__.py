@@ -6,7 +6,6 @@ by its own methods. The command line and the page call these functions; ``python
 separate process (`taxel.tasks.__main__`).
 """
 
-from taxel.detect.cause import Cause as Cause
 from taxel.tasks.calibrate import Calibrated as Calibrated
 from taxel.tasks.calibrate import CalibrateOptions as CalibrateOptions
 from taxel.tasks.calibrate import KnownLoad as KnownLoad

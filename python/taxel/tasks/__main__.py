@@ -28,9 +28,7 @@ Progress is reported before each step: `done` of `of` parts are done, `of` is 0 
 is either the result, as of its `to_dict()`, with `lines` for people where a result has them, and of a training with
 the `command` that detects by its readout (empty if the readout cannot be relied on); or an error::
 
-    {"type": "error", "kind": "ProblemError", "text": "walk.mcap: ...", "question": null}
-
-`question` is the same without a remedy where the task continues if someone confirms it, as `labels_as_given` does.
+    {"type": "error", "kind": "ProblemError", "text": "walk.mcap: ..."}
 
 Exit codes are those of the command line: 0 done, 2 the request or its recordings are wrong, 3 the system (a disk that
 is full), 130 stopped by Ctrl-C, SIGTERM or SIGHUP. A task that is stopped writes no last line and leaves no file.
@@ -217,8 +215,7 @@ def _main() -> NoReturn:
         outside = isinstance(error, OSError | MemoryError) and not isinstance(
             error, FileNotFoundError | FileExistsError
         )
-        question = escaped(error.args[0]) if isinstance(error, Error) and error.hint == "go_on" else None
-        _say({"type": "error", "kind": type(error).__name__, "text": _text(error), "question": question})
+        _say({"type": "error", "kind": type(error).__name__, "text": _text(error)})
         leave(3 if outside else 2)
     leave(0)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import isnan
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -15,65 +15,38 @@ from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
-from taxel.detect import Example, Outcome, PlainRule, Readout, Score, recipes, score
-from taxel.detect.cause import Cause
+from taxel.detect import Example, Outcome, PlainRule, Readout, Score, drift, recipes, score
+from taxel.detect.clock import off_detections
 from taxel.detect.detector import detector
-from taxel.detect.exchanged import Scored, exchanged
-from taxel.detect.floors import measured_floor
-from taxel.detect.mistakes import Standing, behind_gaps, causes_of, many_wrong, score_of, unreliable
+from taxel.detect.examples import check_examples, unreliable
 from taxel.detect.readout import run_counting
-from taxel.detect.tares import count_drifted, count_loaded
-from taxel.detect.training_data import Unlike, unlike
-from taxel.encode import ContactArea, Moments
+from taxel.detect.scoring import many_wrong, score_together
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import recorded, unit_of
 from taxel.recording import Recording
-from taxel.recording.analysis.health import Held, health, unchanging_taxels, whole_lines
-from taxel.recording.analysis.preload import standing
-from taxel.recording.analysis.rest import FORCE_UNITS, of_frames, of_quiet
+from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
 from taxel.recording.gaps import written_twice
 from taxel.recording.opening import sensors_of
-from taxel.spikes import SpikeTrains
-from taxel.tare import Tare
+from taxel.tasks.info import sensor_line
 from taxel.tasks.labels import (
     GivenLabels,
     are_tables,
     check_shift,
     few,
     moved,
-    of_other_sources,
     references,
-    source_name,
     sources_without,
     table_names,
     titles_of,
 )
-from taxel.tasks.rest import GivenTare, TakenRest, UnknownRestError, check_tare, given_tare, rest, zero_by_unit
+from taxel.tasks.rest import GivenTare, TakenRest, UnknownRestError, check_tare, rest, zero_by_unit
 
-#: At most so many frames are looked at for dead and stuck taxels.
-_LOOKS = 2000
-#: So many taxels that stick are all named.
-_FEW_HELD = 2
-#: Causes of a bad score that are of labels or of the recording, not of the readout.
-_OF_LABELS = (
-    "exchanged_sources",
-    "exchanged_names",
-    "other_rate",
-    "shifted_labels",
-    "window",
-    "gaps",
-    "unlabelled_loads",
-    "overlapping_loads",
-    "standing_load",
-)
-#: Those of them that need no advice.
-_WITHOUT_ADVICE = ("exchanged_sources", "exchanged_names", "window", "gaps", "standing_load")
+#: So many lines, beside that of each sensor, say what was measured.
+_LINES = 3
 #: So many recordings of several are few.
 _FEW_BAD = 2
-#: The noise is compared with that of the training from so many times that.
-_NOISIER = 1.5
 #: No event.
 _NONE = np.empty(0, np.int64)
 
@@ -129,8 +102,8 @@ class Detected:
     rest : TakenRest, optional
         Which rest was taken; None where the readout needs none.
     remarks : tuple of str
-        What may keep detections away or make false ones: gaps, values that fall from their rest, a drifted rest, and in
-        what the recording differs from the training.
+        What may keep detections away or make false ones: gaps, dead, stuck and noisy taxels, values that fall from
+        their rest; none where at most 5 % of the labels are missed or false.
     """
 
     recording: Recording
@@ -158,7 +131,7 @@ class Detected:
                 }
                 for d in self.outcome.found
             ],
-        } | ({} if found is None else {"score": found.to_dict(), "causes": [c.to_dict() for c in self.outcome.causes]})
+        } | ({} if found is None else {"score": found.to_dict()})
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,7 +253,7 @@ def detect(
             for k, recording in enumerate(opened)
         ]
         left_out = _of_other_arrays(readout, opened)
-        found: list[_Found] = []
+        found: list[Detected] = []
         unknown_rests: dict[str, UnknownRestError] = {}
         for recording, labelled in zip(opened, each_labelled, strict=True):
             if left_out and not readout._accepts(recording.array):
@@ -290,19 +263,20 @@ def detect(
             try:
                 found.append(_detected(readout, recording, labelled, without, options))
             except UnknownRestError as error:
-                of_training = (readout._parts.get("training") or {}).get("noise", 0.0)
-                if of_training and error.noise >= _NOISIER * of_training:
-                    noisier = f"{error.noise / of_training:.2g} times that of the training"
-                    error.args = (f"{error.args[0]}, {noisier}", *error.args[1:])
                 unknown_rests[recording.title] = error
         if not found and unknown_rests:
             raise next(iter(unknown_rests.values()))
         for unknown_rest in unknown_rests.values():
             warn(f"left out: {unknown_rest}", stacklevel=2)
-        others = {} if truth is None else of_other_sources(truth, opened, each_labelled, options.shift_ms)
-        each = tuple(_with_causes(found, others, options.window_ms))
-    scored = [outcome for detected in each if (outcome := detected.outcome).score is not None]
-    together = score_of(scored, options.window_ms) if scored else None
+        each = tuple(found)
+        scored = [outcome for detected in each if (outcome := detected.outcome).score is not None]
+        together = _score_of(scored, options.window_ms) if scored else None
+        if together is not None and together.events and many_wrong(together):
+            data = readout._parts.get("training") or {}
+            sound = check_examples([outcome.example for outcome in scored])
+            drifted = drift.lines(data, drift.of_loads(sound, data.get("noise_floor", 0.0)))
+            for line in (off_detections(scored, data.get("error_ms", {})) + drifted)[:_LINES]:
+                warn(line, stacklevel=2)
     unknown = sorted({label for labels_of in events for label in labels_of} - set(readout.labels))
     for label in unknown:
         if alike := [name for name in readout.labels if recipes.spelling(name) == recipes.spelling(label)]:
@@ -312,7 +286,7 @@ def detect(
     names = (*(recording.title for recording in left_out), *unknown_rests)
     with_labels = [outcome for outcome in scored if outcome.score is not None and outcome.score.events]
     bad = (
-        tuple(_unreliable(with_labels, score_of(with_labels, options.window_ms), options.window_ms))
+        tuple(_unreliable(with_labels, _score_of(with_labels, options.window_ms), options.window_ms))
         if with_labels
         else ()
     )
@@ -320,32 +294,10 @@ def detect(
     return Detecting(each, together, tuple(unknown), unlabelled, *how, bad, tuple(warnings), names)
 
 
-def _with_causes(
-    each: Sequence[_Found], others: Mapping[str, Mapping[str, Any]], window_ms: float
-) -> Iterator[Detected]:
-    """Yield what was detected with the causes of what is missed and false: sources of a recording have the same.
-
-    `others`: the labels of the other sources of each recording, by its title.
-    """
-    known: dict[str, tuple[Cause, ...]] = {}
-    for detected, felt, *_ in each:
-        group = felt.example.group
-        if group not in known:
-            sources = [source for source in each if source.felt.example.group == group]
-            scored = [source for source in sources if source.felt.score is not None and source.felt.score.events]
-            of_sources = [
-                Scored(source.felt, source_name(source.detected.recording), others.get(source.felt.name, {}))
-                for source in scored
-            ]
-            pairs = list(exchanged(of_sources, window_ms))
-            mixed_up = {place for _, places in pairs for place in places}
-            # All else is measured on the others.
-            rest = [source for k, source in enumerate(scored) if k not in mixed_up]
-            outcomes, differences = [source.felt for source in rest], [source.differences for source in rest]
-            stays = next((source.standing for source in rest if source.standing is not None), None)
-            found = causes_of(outcomes, window_ms, differences, stays) if rest else ()
-            known[group] = (*(cause for cause, _ in pairs), *found)
-        yield replace(detected, outcome=detected.outcome._replace(causes=known[group]))
+def _score_of(outcomes: Sequence[Outcome], window_ms: float) -> Score:
+    """Return the score of the detections in several examples as one."""
+    found = [outcome.example._known(outcome.found) for outcome in outcomes]
+    return score_together(found, [outcome.example.labels for outcome in outcomes], window_ms)
 
 
 def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) -> Iterator[str]:
@@ -353,18 +305,16 @@ def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) 
     groups: dict[str, list[Outcome]] = {}
     for outcome in outcomes:
         groups.setdefault(outcome.example.group, []).append(outcome)
-    scores = {group: score_of(members, window_ms).by_label for group, members in groups.items()}
+    scores = {group: _score_of(members, window_ms).by_label for group, members in groups.items()}
     for label, of_all in together.by_label.items():
-        causes = [cause for members in groups.values() for cause in members[0].causes]
-        text = unreliable(label, of_all, "labels", f"this {_at_fault(label, of_all, causes)} here")
+        text = unreliable(label, of_all, "labels", "this readout here")
         if text and not _in_few(label, groups, scores, window_ms):
             yield text
             continue
-        for group, members in groups.items() if len(groups) > 1 else ():
+        for group in groups if len(groups) > 1 else ():
             of_group = scores[group].get(label)
             if of_group is not None:
-                fault = _at_fault(label, of_group, members[0].causes)
-                text = unreliable(label, of_group, "labels", f"this {fault} in {group.strip()}")
+                text = unreliable(label, of_group, "labels", f"this readout in {group.strip()}")
                 # By how much the labels of a recording are off, the score of all does not say.
                 yield from ["; ".join(filter(None, (text, of_group.missed_text)))] if text else []
 
@@ -380,17 +330,8 @@ def _in_few(
     rest = [outcome for group, members in groups.items() if group not in bad for outcome in members]
     if not bad or len(bad) > _FEW_BAD or 2 * len(bad) > len(groups):
         return False
-    of_rest = score_of(rest, window_ms).by_label.get(label)
+    of_rest = _score_of(rest, window_ms).by_label.get(label)
     return of_rest is not None and not unreliable(label, of_rest, "")
-
-
-def _at_fault(label: str, scored: Score, causes: Sequence[Cause]) -> str:
-    """Return whether a bad score is one of the readout, or by labels and recording, as its causes say, of the score."""
-    of_labels = (cause for cause in causes if label in cause.labels and cause.kind in _OF_LABELS)
-    count = sum(
-        cause.mistakes / len(cause.labels) for cause in of_labels if cause.advice or cause.kind in _WITHOUT_ADVICE
-    )
-    return "score" if 2 * count >= scored.rank[0] else "readout"
 
 
 def _of_other_arrays(readout: Readout | PlainRule, recordings: Sequence[Recording]) -> list[Recording]:
@@ -407,22 +348,13 @@ def _of_other_arrays(readout: Readout | PlainRule, recordings: Sequence[Recordin
     return others
 
 
-class _Found(NamedTuple):
-    """The detections in a recording, the same with a rest for what was felt, in what the sensor differs, what stays."""
-
-    detected: Detected
-    felt: Outcome
-    differences: Sequence[str]
-    standing: Standing | None
-
-
 def _detected(
     readout: Readout | PlainRule,
     recording: Recording,
     labels: Mapping[str, Any] | None,
     without: Collection[str],
     options: DetectOptions,
-) -> _Found:
+) -> Detected:
     if recording.verdict.status in ("damaged", "unfinished", "lost", "nothing arrived"):
         # Detections may lack or have wrong times.
         warn(f"{recording.title}: {recording.verdict}", stacklevel=3)
@@ -440,54 +372,14 @@ def _detected(
     example = Example(recording, true, tare, title.removesuffix(recording.label), title, tuple(without))
     scored = score(example._known(found), true, options.window_ms) if true else None
     outcome = Outcome(title, example, found, scored, outside)
-    felt = outcome if tare is not None else outcome._replace(example=example._replace(tare=_quiet(recording)))
-    remarks, differs = _remarks(recording, felt, readout)
+    remarks = [] if scored is not None and scored.events and not many_wrong(scored) else list(_remarks(recording))
     if scored is not None and not scored.events:
         remarks.insert(
             0,
             f"0 labels: {counted(scored.false, 'detection')} {'counts' if scored.false == 1 else 'count'} as false, so "
             "the score does not show whether detections are right",
         )
-    stays = None if scored is None or not scored.rank[0] else _standing(readout, recording, felt, options)
-    return _Found(Detected(recording, outcome, taken, tuple(remarks)), felt, differs.sensor, stays)
-
-
-def _standing(
-    readout: Readout | PlainRule, recording: Recording, outcome: Outcome, options: DetectOptions
-) -> Standing | None:
-    """Return a load of frames that stays, of a stuck taxel or an object, with the tare that a trial shows to help."""
-    source, now = recorded(recording, hold=False), outcome.score
-    assert now is not None
-    if not isinstance(source, Frames) or are_counts(source.unit):
-        return None
-    if held := health(source[:: 1 + len(source) // _LOOKS]).held:
-        return Standing("; ".join(each.text(source) for each in held))
-    where = "" if options.tare is not None else standing(source)
-    if not where:
-        return None
-    text, quiet = f"an object is on the sensor from beginning to end, at {where}", of_quiet(source).quiet_us
-    if quiet is None or quiet[0] > source.t[0]:
-        return Standing(text)
-    seconds = float(np.floor((quiet[1] - quiet[0]) / 1e4) / 100)
-    with collected():  # no option states this tare
-        tare = given_tare(seconds, recording)
-        found, _ = run_counting(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=tare.stop_us)
-    tried = score(outcome.example._known(found), outcome.example.labels, options.window_ms)
-    if 2 * tried.rank[0] > now.rank[0]:
-        return Standing(text)
-    trial = f"{tried.found} found and {tried.false} false, instead of {now.found} found and {now.false} false"
-    return Standing(f"{text}; tried with it: {trial}", f"--tare {seconds:g}", {"tare": seconds})
-
-
-def _quiet(recording: Recording) -> Tare | None:
-    """Return the rest of frames whose readout needs none, to measure what was felt; None where it is not known."""
-    if recording.has_events or not recording.timed:
-        return None
-    try:
-        with collected():
-            return rest(recording).tare
-    except ProblemError:
-        return None
+    return Detected(recording, outcome, taken, tuple(remarks))
 
 
 def _check_unit(readout: Readout | PlainRule, recording: Recording) -> None:
@@ -527,87 +419,12 @@ def _naming(recording: str) -> Iterator[None]:
         raise
 
 
-def noise_floors(readout: Readout | PlainRule) -> list[float]:
-    """Return the noise floors above the tare of what a readout reads, in the sensor's unit."""
-    if isinstance(readout, PlainRule):
-        # The local load tracks the rest.
-        return [readout.noise_floor] if readout.quantity != "local_load" else []
-    return [float(part.noise_floor) for part in readout.encoder._each() if isinstance(part, ContactArea | Moments)]
-
-
-def _remarks(recording: Recording, outcome: Outcome, readout: Readout | PlainRule) -> tuple[list[str], Unlike]:
-    """Return what may keep detections away or make false ones, and of it in what differs from the training."""
-    lines, source, tare = list(_of_gaps(recording, outcome)), recorded(recording, hold=False), outcome.example.tare
-    lines += written_twice(source) if isinstance(source, Frames) else []
-    if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
-        # What else is measured is measured upside down.
-        return [*lines, f"rest: {quiet.text(recording.path, recording._turned)}"], Unlike()
-    lines += _of_taxels(source)
-    floors = noise_floors(readout)
-    # Labels that are found show that the rest was right.
-    if outcome.score is not None and outcome.score.events and not many_wrong(outcome.score):
-        tare = None
-    if tare is not None and floors and not isinstance(source, SpikeTrains):
-        count = count_drifted(source, tare, max(floors))
-        if count:
-            lines.append(
-                f"rest: {counted(count, 'taxel')} drifted above the tare by more than the noise floor, so that touches "
-                "may seem not to end, and other touches may be missed: take a tare between later touches (taxel cut "
-                "RECORDING FILE --from S --to S, then --tare FILE); this was not tried"
-            )
-    if tare is not None and isinstance(source, Frames) and (floor := measured_floor([outcome.example])) is not None:
-        count = count_loaded(source, tare, floor)
-        if count:
-            # Touches are measured above the rest.
-            lines.append(
-                f"rest: something touches the sensor at the beginning: {counted(count, 'taxel')} read less later, so "
-                "touches may be missed: take a tare while nothing touches the sensor (taxel cut RECORDING FILE --from "
-                "S --to S, then --tare FILE); this was not tried"
-            )
-            return lines, Unlike()
-    differs = unlike(readout, outcome.example, outcome.found)
-    return [*lines, *differs.lines()], differs
-
-
-def _held(held: Sequence[Held], source: Events | Frames) -> Iterator[str]:
-    """Yield which taxels stick at a value after some time: the first of many, and the row or column of all."""
-    if len(held) <= _FEW_HELD:
-        yield from (f"stuck taxel: {each.text(source)}" for each in held)
-        return
-    rows, columns = {each.y for each in held}, {each.x for each in held}
-    line = f" in row {rows.pop()}" if len(rows) == 1 else f" in column {columns.pop()}" if len(columns) == 1 else ""
-    yield f"{len(held)} stuck taxels{line}, for example {held[0].text(source)}"
-
-
-def _of_taxels(source: Events | Frames | SpikeTrains) -> Iterator[str]:
-    """Yield how many taxels are dead, and how many are stuck; nothing of counts, of which pixels may have no event."""
-    if isinstance(source, SpikeTrains) or (isinstance(source, Frames) and are_counts(source.unit)):
-        return
+def _remarks(recording: Recording) -> Iterator[str]:
+    """Yield what may keep detections away or make false ones, as ``taxel info`` finds it."""
+    source = recorded(recording, hold=False)
     if isinstance(source, Frames):
-        # What is dead or stuck is so in some of many frames too.
-        source = source[:: 1 + len(source) // _LOOKS]
-    of_taxels = health(source)
-    masks = {"dead": of_taxels.dead, "stuck": of_taxels.stuck, "unchanging": unchanging_taxels(of_taxels, source)}
-    lines, within = whole_lines(masks, source.array)
-    yield from (f"{line} (taxel info lists them)" for line in lines)
-    yield from _held(of_taxels.held, source)
-    for held in of_taxels.held:
-        within[held.y, held.x] = True
-    for word, mask in masks.items():
-        if (rest := mask & ~within).any():
-            y, x = np.argwhere(rest)[0]
-            faulty = counted(int(rest.sum()), f"{word} taxel")
-            yield f"{faulty}, for example column {x}, row {y} (taxel info lists them)"
-
-
-def _of_gaps(recording: Recording, outcome: Outcome) -> Iterator[str]:
-    """Yield where the recording has gaps, and which detections may have happened in one."""
-    if gaps := recording._gaps():
-        yield f"{gaps}: nothing is detected there"
-        behind = outcome.found[behind_gaps(outcome.example, outcome.found)]
-        if len(behind):
-            at = [
-                f"{label} at {(t - outcome.begin_us) / 1e6:.3f} s"
-                for label, t in zip(behind.label, behind.t, strict=True)
-            ]
-            yield f"may have happened in a gap that ends just before them: {few(at)}"
+        yield from written_twice(source)
+        if (quiet := of_frames(source)).falls:
+            yield f"rest: {quiet.text(recording.path, recording._turned)}"
+    if line := sensor_line(recording):
+        yield line

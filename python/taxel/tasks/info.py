@@ -5,13 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from taxel._base.arguments import instance
-from taxel._base.messages import collected
+from taxel._base.messages import collected, counted
+from taxel.formats.event_camera import are_counts
+from taxel.frames import Frames
+from taxel.recorded import recorded
 from taxel.recording import Recording
+from taxel.recording.analysis.health import health, unchanging_taxels
 from taxel.recording.analysis.pressure import Series, series
 from taxel.recording.analysis.summary import summary
+from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 from taxel.tasks.rest import GivenTare, given_tare, zero_by_unit
+
+#: At most so many frames are looked at for dead, stuck and noisy taxels.
+_LOOKS = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +84,25 @@ def info(recording: Recording, tare: GivenTare | None = None) -> Info:
             pressed = series(recording, rest)
             found = Info(summary(recording, pressed), pressed, rest)
     return Info(found.facts, found.pressed, found.tare, tuple(warnings))
+
+
+def sensor_line(recording: Recording) -> str:
+    """Return how many taxels are dead, stuck or noisy, and how many gaps there are, as one line; "" of none."""
+    source, parts = recorded(recording, hold=False), []
+    # Pixels of counts may have no event.
+    if not isinstance(source, SpikeTrains) and not (isinstance(source, Frames) and are_counts(source.unit)):
+        if isinstance(source, Frames):
+            # What is dead or stuck is so in some of many frames too.
+            source = source[:: 1 + len(source) // _LOOKS]
+        of_taxels = health(source)
+        masks = {"dead": of_taxels.dead, "stuck": of_taxels.stuck, "noisy": of_taxels.noisy}
+        masks["unchanging"] = unchanging_taxels(of_taxels, source)
+        counts = {word: int(np.count_nonzero(mask)) for word, mask in masks.items()}
+        named = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+        parts = [f"{named} of {counted(source.array.taxels, 'taxel')}"] if named else []
+    if gaps := recording._gaps():
+        parts.append(str(gaps))
+    return f"sensor: {'; '.join(parts)} (taxel info lists them)" if parts else ""
 
 
 def _rest(recording: Recording, tare: GivenTare | None) -> Tare | None:

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import column, finite, mapping, several, shown
 from taxel._base.errors import refused
-from taxel._base.messages import are, collected, counted, warn
+from taxel._base.messages import are, counted, warn
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
-from taxel.detect.label_times import early
+from taxel.detect.examples import early
 from taxel.labels import Labels, Note, beside, by_clock, trial_of
 from taxel.recording import Recording, kind_of_file
 from taxel.recording.cut import span_us
@@ -144,46 +144,6 @@ def sources_without(
             dict.fromkeys(each.label for each in recordings if each.label and each.label not in named)
         )
     return {label: sources for label, sources in without.items() if sources}
-
-
-def source_name(recording: Recording) -> str:
-    """Return the name by which labels name the source that a recording is: its side, else its own."""
-    return recording.side or recording.label
-
-
-def of_other_sources(
-    source: GivenLabels,
-    recordings: Sequence[Recording],
-    events: Sequence[Mapping[str, NDArray[np.int64]] | None],
-    shift_ms: float,
-) -> dict[str, dict[str, Mapping[str, NDArray[np.int64]]]]:
-    """Return the labels of the other sources of each recording, by its title and the name of the source.
-
-    Those are the other recordings of the same file, and the sources that only its labels name.
-
-    Parameters
-    ----------
-    source : "notes", path or sequence of mapping
-    recordings : sequence of Recording
-    events : sequence of mapping of str to int64, us
-        Labels of each recording, as `moved` returns them.
-    shift_ms : float, ms
-        By how much they are moved.
-    """
-    found: dict[str, dict[str, Mapping[str, NDArray[np.int64]]]] = {}
-    for recording in recordings:
-        file = recording.path, trial_name(recording)
-        beside_it = [k for k, each in enumerate(recordings) if (each.path, trial_name(each)) == file]
-        labels = {source_name(recordings[k]): events[k] or {} for k in beside_it if recordings[k] is not recording}
-        names = {name for k in beside_it for name in (recordings[k].label, recordings[k].side)} | {""}
-        for table in _tables(source, recording.path, recordings):
-            rows = [row for row in table.rows if row.recording in {table.named(*file), ""}]
-            for name in sorted({row.source for row in rows} - names):
-                with collected():  # what these warn of concerns the labels of this source too
-                    times = _times(table, recording, name, name, _begin_of(recording, recordings))
-                    labels[name] = moved(times, recording, shift_ms)
-        found[recording.title] = labels
-    return found
 
 
 def are_tables(source: GivenLabels) -> TypeGuard[Tables]:

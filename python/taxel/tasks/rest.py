@@ -20,7 +20,7 @@ from taxel._base.number_text import float_of
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.detect import Example
-from taxel.detect.tares import TOUCH, held_by_tare
+from taxel.detect.floors import TOUCH, held_by_tare
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
@@ -58,14 +58,7 @@ class UnknownRestError(ProblemError):
     """Say that the rest of a recording's taxels is not known, as nothing in it is quiet: a tare must be given.
 
     The others of several recordings can still be detected.
-
-    Attributes
-    ----------
-    noise : float, in the sensor's unit
-        The noise of its taxels, if only that is why; else 0.
     """
-
-    noise: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,13 +145,11 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
         warn(warning, stacklevel=2)
     if span is None:
         loaded = _begun_loaded(source)
-        noise, because = (0.0, "") if loaded else _noisy(source)
-        because = because or f" with nothing on it{_slow(source) or loaded}"
+        because = ("" if loaded else _noisy(source)) or f" with nothing on it{_slow(source) or loaded}"
         error = UnknownRestError(
             f"{recording.path}: the values of its taxels at rest are not known, because no half second is "
             f"quiet{because}"
         )
-        error.noise = noise
         raise helped(error, "tare", "give")
     return TakenRest("quiet", _measured(recording, recorded(recording), span[1], span[0]), begin_us)
 
@@ -379,22 +370,22 @@ def _before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Ta
     return _measured(recording, source, min(ends))
 
 
-def _noisy(source: Events | Frames) -> tuple[float, str]:
-    """Return the noise if only that is why no half second is quiet, and that it is; else 0 and ""."""
+def _noisy(source: Events | Frames) -> str:
+    """Return that only noise is why no half second is quiet, and how strong it is; else ""."""
     if not isinstance(source, Frames) or len(source) < 2:
-        return 0.0, ""
+        return ""
     lasts, values = int(np.ceil(_QUIET_US / np.median(np.diff(source.t)))), source.values.reshape(len(source), -1)
     begins = np.arange(0, len(source) - lasts, lasts)[:: 1 + len(source) // (lasts * _STRETCHES)]
     if lasts < _LEAST_FRAMES or not len(begins):
-        return 0.0, ""
+        return ""
     spread, noise = np.array([_spread(values[begin : begin + lasts]) for begin in begins.tolist()]).transpose(1, 0, 2)
     moves = np.nan_to_num(spread / np.maximum(noise, np.finfo(np.float32).tiny))
     still = np.sort(moves, axis=1)[:, -min(_THIRD, moves.shape[1])] < _BY_NOISE
     strong = float(np.median(noise[still])) if still.any() else 0.0
     if not strong:
-        return 0.0, ""
+        return ""
     share = strong / np.nanmax(np.ptp(values, axis=0))
-    return strong, (
+    return (
         f": {np.count_nonzero(still)} of {counted(len(still), 'half second')} contain only noise, but the noise has a "
         f"standard deviation of {strong:.3g} {source.unit}, {share:.1%} of the range"
     )

@@ -15,19 +15,16 @@ from taxel._base.messages import collected, warn
 from taxel._base.progress import Forecast, Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Judged, Outcome, Recipe, judge, recipes, score
-from taxel.detect.cause import OF_DATA, Cause
-from taxel.detect.causes import Mistakes, by_recipe, with_settings, without_explained
-from taxel.detect.evidence import Evidence
+from taxel.detect.clock import off_loads
+from taxel.detect.drift import error_ms, training_data
 from taxel.detect.examples import check_examples, sizes_of
 from taxel.detect.fitting import Trained, fit_aligned
 from taxel.detect.floors import measured_floor
 from taxel.detect.folds import count_of_folds
 from taxel.detect.loads import clock_of
-from taxel.detect.mistakes import many_wrong
 from taxel.detect.plain_score import plain_score
 from taxel.detect.readout import run_counting
-from taxel.detect.scoring import mistakes_of, score_together
-from taxel.detect.training_data import training_data
+from taxel.detect.scoring import many_wrong, mistakes_of, score_together
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import recorded
@@ -36,6 +33,7 @@ from taxel.recording.analysis.rest import BY_UNIT
 from taxel.recording.opening import sensors_of
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
+from taxel.tasks.info import sensor_line
 from taxel.tasks.labels import (
     GivenLabels,
     are_tables,
@@ -51,6 +49,8 @@ from taxel.tasks.train_result import Training, TrainOptions
 
 #: Work that takes longer says so before it begins, s.
 _LONG_S = 60.0
+#: So many lines say what was measured of labels and sensor.
+_LINES = 4
 
 
 def train(
@@ -106,8 +106,7 @@ def train(
     update = reporting(progress)
     with collected() as warnings:
         training = _train(sensors_of(recordings), labels, options, update)
-    warned = with_settings(without_explained(warnings, training.causes), options.changes)
-    return replace(training, warned=warned)
+    return replace(training, warned=tuple(warnings))
 
 
 def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainOptions, update: Progress) -> Training:
@@ -214,23 +213,22 @@ class _Work:
     def training(self, plan: Recipe) -> Training:
         """Return the readout with its scores, held out where that can be, and its outcomes on the training data.
 
-        Labels of which nearly none is near anything felt, or nearly all are off, are refused first. An error says what
-        may help, where the data show it.
+        Where many labels are missed or false, or none can be learnt, it is said by how much they are off what was felt.
         """
-        self.update("looking for what was felt at the labels", 0, 0)
-        evidence = Evidence(self.examples, check_examples(self.examples), plan)
-        if not self.options.labels_as_given and (doubt := evidence.question()):
-            raise helped(ProblemError(f"labels: {doubt}"), "labels_as_given", "go_on")
         try:
-            return self._training(plan, evidence)
+            training = self._training(plan)
         except ProblemError as error:
-            causes = evidence.refused()
-            if not causes:
-                raise
-            text = error.args[0] if error.hint == "unfelt" else str(error)
-            raise ProblemError(f"{text}; {causes[0]}") from None
+            off = off_loads(check_examples(self.examples))
+            if off:
+                error.args = (f"{error.args[0]}; {off[0]}", *error.args[1:])
+            raise
+        if many_wrong(training.score):
+            lines = off_loads(check_examples(self.examples)) + [sensor_line(recording) for recording in self.opened]
+            for line in list(filter(None, lines))[:_LINES]:
+                warn(line)
+        return training
 
-    def _training(self, plan: Recipe, evidence: Evidence) -> Training:
+    def _training(self, plan: Recipe) -> Training:
         folds, window_ms = self.options.folds, self.options.window_ms
         count, why = count_of_folds(self.examples) if folds is None else (folds, "" if folds else "folds is 0")
         begun = perf_counter()
@@ -239,75 +237,31 @@ class _Work:
         registers = self.opened[0].registers
         frame_us = None if registers is None else registers.frame_us
 
-        def judged(window_ms: float, shift_ms: float = 0.0) -> Judged:
-            pairs = zip(self.examples, self.opened, strict=True)
-            examples = [each._replace(labels=moved(each.labels, recording, shift_ms)) for each, recording in pairs]
-            return judge(examples, plan, count, window_ms=window_ms, frame_us=frame_us, progress=self.update)
-
-        def tried(window_ms: float, shift_ms: float) -> Judged:
-            shift = f", with labels moved by {shift_ms:+g} ms," * bool(shift_ms)
-            window = f"a window of {window_ms:g} ms{shift}"
-            self.update(f"many labels are missed beyond the window, so that {window} is tried too", 0, 0)
-            with collected():
-                return judged(window_ms, shift_ms)
-
         scored = None
         if count:
             try:
-                scored = judged(window_ms)
+                scored = judge(self.examples, plan, count, window_ms=window_ms, frame_us=frame_us, progress=self.update)
             except ProblemError as error:
                 # These folds are the default, not a request, and all of the data may still be learnt from.
                 if folds is not None:
                     raise
                 count, why = 0, f"a part of the training data cannot be learnt from: {error}"
         outcomes = self._outcomes(trained)
-        data = training_data(self.examples, [outcome.found for outcome in outcomes])
-        trained = trained._replace(readout=trained.readout._with(training=data))
         trained_on = _own(outcomes, window_ms)
+        sound = check_examples(self.examples)
         if scored is None:
-            truths, sound = [outcome.example.labels for outcome in outcomes], check_examples(self.examples)
+            truths = [outcome.example.labels for outcome in outcomes]
             loads = sound, list(truths[0]), [clock_of(example) for example in self.examples]
             scored = replace(trained_on, plain=plain_score(*loads, [], truths, window_ms, self.update))
+        data = training_data(sound, scored.together)
+        trained = trained._replace(readout=trained.readout._with(training=data))
         if scored.plain is not None:
-            # The share of touches with a detection is that of the neurons.
+            late = scored.plain.together or scored.together
+            data = data | {"error_ms": error_ms(late)}
             rules = {label: rule and rule._with(training=data) for label, rule in scored.plain.rules.items()}
             scored = replace(scored, plain=replace(scored.plain, rules=rules))
-        scores = scored.together, trained_on.together, scored.scores
-        of_window = scored.mistakes, window_ms, tried if count else None
-        causes = Mistakes(trained, *scores, scored.plain, *of_window).causes(evidence)
-        if evidence.falls and not causes:
-            warn(evidence.falls)
-        if count:
-            causes = self._tried(plan, count, scored, causes)
         taken = _taken(self.examples) if self.options.tare is None else ()
-        return Training(self.options, self.opened, trained, scored, why, causes, outcomes, taken)
-
-    def _tried(self, plan: Recipe, folds: int, scored: Judged, causes: tuple[Cause, ...]) -> tuple[Cause, ...]:
-        """Return causes with that another recipe makes at most half the mistakes, which is tried where many are left.
-
-        It is not where the data explain them, nor where values of the recipe were changed, which are not another's.
-        """
-        open_labels = [
-            label
-            for label in many_wrong(scored.together)
-            if next((cause.kind for cause in causes if label in cause.labels), "") not in OF_DATA
-        ]
-        source, name, labels = recorded(self.examples[0].source), self.options.recipe, list(plan.neurons)
-        if not open_labels or self.options.changes or isinstance(source, SpikeTrains) or name not in recipes.names():
-            return causes
-        ends = [recipes.neuron_of("touch", label) for label in labels]
-        candidates = [recipes.fitting(source, labels), *["touch"] * (None not in ends and len(set(ends)) == len(ends))]
-        untried = next((recipe for recipe in candidates if recipe != name), None)
-        if untried is None:
-            return causes
-        self.update(f"{', '.join(open_labels)}: many are missed or false, so that recipe {untried} is tried too", 0, 0)
-        try:
-            with collected():
-                tried = Recipe.load(untried, None, labels, measured_floor(self.examples))
-                judged = judge(self.examples, tried, folds, window_ms=self.options.window_ms, progress=self.update)
-        except ProblemError:  # as of a tare that only the other recipe needs
-            return causes
-        return by_recipe(untried, scored.together, judged.together, causes)
+        return Training(self.options, self.opened, trained, scored, why, outcomes, taken)
 
     def _say_how_long(self, once_s: float, folds: int) -> None:
         """Say how long all takes by what one training on all data took, if that is more than a minute."""

@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from taxel._base.arguments import finite, flag, integer, mapping, text
+from taxel._base.arguments import finite, integer, mapping, text
 from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, three_digits
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained, recipes
-from taxel.detect.cause import OF_DATA, Cause
+from taxel.detect.examples import unreliable
 from taxel.detect.levels import LEAST_LEVELS
-from taxel.detect.mistakes import unreliable
 from taxel.detect.recipe import change_values, with_floor
 from taxel.detect.scoring import score_rows
 from taxel.encode import TouchEnds
@@ -59,9 +58,6 @@ class TrainOptions:
         Largest distance of a detection from its event.
     shift_ms : float, ms
         By how much labels are moved before all else, as those of another clock; later is positive.
-    labels_as_given : bool
-        Whether it trains also where nearly no label is near anything that the sensor felt, or nearly all are off by the
-        same time, which is refused else.
 
     Raises
     ------
@@ -79,13 +75,11 @@ class TrainOptions:
     folds: int | None = None
     window_ms: float = 50.0
     shift_ms: float = 0.0
-    labels_as_given: bool = False
 
     def __post_init__(self) -> None:
         """Refuse values that no recordings and labels could make valid, before these are read."""
         mapping("changes", self.changes)
         check_tare(self.tare)
-        flag("labels_as_given", self.labels_as_given)
         check_shift(self.shift_ms)
         finite("window_ms", self.window_ms, "ms", least=0.0)
         if self.folds is not None and integer("folds", self.folds, 0) == 1:
@@ -102,7 +96,7 @@ class TrainOptions:
 
 @dataclass(frozen=True, eq=False)
 class Training:
-    """Hold what a training made, how it scored, and what may help it.
+    """Hold what a training made, and how it scored.
 
     Attributes
     ----------
@@ -116,14 +110,13 @@ class Training:
         The scores of each recording and of all, and of the plain rules beside them.
     why : str
         Why the scores are those on the training data; empty where they are held out.
-    causes : sequence of Cause
-        Why more than 5 % of the labels of a name are missed or false, and what helps; those of most mistakes first.
     outcomes : sequence of taxel.detect.Outcome
         What the readout detects in its own training data.
     tares_us : sequence of (int, int, int), us
         From when to when the tare of each recording was taken from it, and how long it lasts; none of given tares.
     warned : tuple of str
-        The warnings of the training.
+        The warnings of the training, and, where more than 5 % of the labels of a name are missed or false, by how much
+        labels are off what was felt, and what is the matter with the sensor.
     unlabelled : mapping of str to tuple of str
         The sources that no row of the labels names, by label, where rows name sources: they are neither trained nor
         scored for it.
@@ -134,7 +127,6 @@ class Training:
     made: Trained
     scored: Judged
     why: str
-    causes: Sequence[Cause]
     outcomes: Sequence[Outcome]
     tares_us: Sequence[tuple[int, int, int]]
     warned: tuple[str, ...] = ()
@@ -197,8 +189,6 @@ class Training:
                 for k, label, t, is_missed in self.scored.mistakes
             ],
             "plain_rule": None if self.scored.plain is None else self.scored.plain.to_dict(self.scored.together),
-            "causes": [cause.to_dict() for cause in self.causes],
-            "options": list(dict.fromkeys(cause.option for cause in self._first_causes() if cause.option)),
             "shift_ms": self.options.shift_ms,
             "fitted_levels": list(self.fitted_levels),
             "warnings": list(self.warnings),
@@ -221,7 +211,7 @@ class Training:
             lines.append(f"{label}: neither trained nor scored on {', '.join(sources)}, which no row of labels names")
         for label in self.readout.labels:
             lines += self._scores(label)
-        lines += [*self._advised(), *self._better(), *self._aligned()]
+        lines += [*self._better(), *self._aligned()]
         if self.options.shift_ms:
             lines.append(f"labels moved by {self.options.shift_ms:+g} ms before training (--shift-ms)")
         lines += [f"{label}: {chosen}" for label, chosen in self.made.chosen.items()]
@@ -236,7 +226,7 @@ class Training:
             lines += ["", *score_rows(zip(titles, self.scored.scores, strict=True))]
         return lines
 
-    def command(self, readout: str, *, is_rule: bool = False) -> str:
+    def command(self, readout: str) -> str:
         """Return the command that detects by the readout in a file, with the tare, if any, of the training.
 
         "" if the readout cannot be relied on.
@@ -245,20 +235,18 @@ class Training:
         ----------
         readout : str
             The file's name, as the command gives it.
-        is_rule : bool
-            Whether the file holds a plain rule that is better than the readout.
 
         Raises
         ------
-        ProblemError : no text, or neither true nor false
+        ProblemError : no text
         """
         readout = text("readout", readout)
-        if not flag("is_rule", is_rule) and any(self.unreliable()):
+        if any(self.unreliable()):
             return ""
         tare = "FILE" if isinstance(self.options.tare, Tare) else self.options.tare
         if tare is None:
             tare = "" if _are_quiet(self.recordings) else self._beginning()
-        option = f" --tare {quote(str(tare))}" if tare and (is_rule or self.readout._needs_tare) else ""
+        option = f" --tare {quote(str(tare))}" if tare and self.readout._needs_tare else ""
         return f"taxel detect RECORDING --readout {quote(readout)}{option}"
 
     def _beginning(self) -> str:
@@ -342,17 +330,7 @@ class Training:
         plain = self.scored.plain
         if plain is None or plain.together is None:
             return
-        # Rules that learnt wrong labels, or that are advised already, are no news.
-        known = {
-            label
-            for cause in self._first_causes()
-            if cause.kind in OF_DATA or "--rule" in cause.option
-            for label in cause.labels
-        }
-        better, sooner = (
-            [label for label in of_rule(self.scored.together) if label not in known]
-            for of_rule in (plain.better, plain.sooner)
-        )
+        better, sooner = plain.better(self.scored.together), plain.sooner(self.scored.together)
         for label in better:
             rule_score, score = (scores[label] for scores in (plain.together, self.scored.together))
             rule, neuron = (f"{each.rank[0]} missed and false" for each in (rule_score, score))
@@ -373,32 +351,12 @@ class Training:
         if plain.lacks:
             yield plain.lacks
 
-    def _first_causes(self) -> list[Cause]:
-        """Return the first cause of each label, in their order."""
-        known: set[str] = set()
-        first = []
-        for cause in self.causes:
-            if not known.issuperset(cause.labels):
-                first.append(cause)
-                known.update(cause.labels)
-        return first
-
-    def _advised(self) -> Iterator[str]:
-        """Yield what may help the labels of which many are missed or false."""
-        for cause in self._first_causes():
-            yield f"{', '.join(cause.labels)}: {cause}"
-
     def unreliable(self) -> Iterator[str]:
         """Yield the labels of which the readout misses most, or detects no more than one of nothing."""
         labels = "labels that it was trained on" if self.why else "held-out labels"
         for label in self.readout.labels:
             if text := unreliable(label, self.scored.together[label], labels):
                 yield text
-
-    def again(self) -> Cause | None:
-        """Return the first cause with advice that concerns all labels of which the readout cannot be relied on."""
-        labels = {label for label in self.readout.labels if unreliable(label, self.scored.together[label], "")}
-        return next((c for c in self._first_causes() if labels and c.advice and labels.issubset(c.labels)), None)
 
     def _aligned(self) -> Iterator[str]:
         """Yield by how much labels were moved to what the sensor felt, and which found no pair."""
@@ -419,10 +377,9 @@ class Training:
                 more = f" and {len(events) - _NAMED} more" if len(events) > _NAMED else ""
                 labels = counted(len(events), "label")
                 named = ", ".join(events[:_NAMED]) + more
-                weaker = next((f"; {c.measured}" for c in self.causes if c.kind == "levels" and label in c.labels), "")
                 yield (
                     f"{label}: no input that {label} is learnt from is within 50 ms of {labels}, which "
-                    f"{'was' if len(events) == 1 else 'were'} not learnt: {named}{weaker}"
+                    f"{'was' if len(events) == 1 else 'were'} not learnt: {named}"
                 )
 
 

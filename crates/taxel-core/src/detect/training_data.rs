@@ -1,4 +1,4 @@
-//! What the data of a training were like: a recording that differs may not be detected in as the scores say.
+//! What the data of a training were like, beside which a recording is drawn and compared.
 
 use std::collections::BTreeMap;
 
@@ -10,37 +10,44 @@ use crate::{Result, problem};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainingData {
-    /// Rows and columns of the sensor.
-    pub shape: [u16; 2],
-    /// For each taxel, row by row, whether touches loaded it: 1 or 0.
-    pub touched: String,
-    /// The noise of a taxel while nothing touched, in the unit of the values.
-    pub noise: f64,
-    /// The largest sum of all taxels above rest in a touch, in the unit of the values: their median.
-    pub strength: f64,
-    /// The share of the touches with a detection.
-    pub detected: f64,
-    /// The shortest time between two labels of a name, ms.
-    pub apart_ms: BTreeMap<String, f64>,
+    /// The noise floor by which loads were measured, in the unit of the values.
+    pub noise_floor: f64,
+    /// By how much detections are later than labels, ms: the median of each label with detections.
+    pub error_ms: BTreeMap<String, f64>,
+    /// What was measured of loads, by feature.
+    pub loads: BTreeMap<String, Quantiles>,
+}
+
+/// The distribution of a feature of loads.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Quantiles {
+    /// How many values there were.
+    pub count: usize,
+    /// Their quantiles at equal steps from 0 to 1, which ascend.
+    pub values: Vec<f64>,
 }
 
 impl TrainingData {
-    /// Checks that the numbers are in their ranges, and that there is one mark for each taxel.
+    /// Checks that the numbers are in their ranges.
     ///
     /// # Errors
     ///
     /// `Problem`, naming the part.
     pub fn check(&self) -> Result<()> {
-        let named = [("noise", self.noise), ("strength", self.strength), ("detected", self.detected)];
-        let apart = self.apart_ms.values().map(|&apart| ("apart_ms", apart));
-        if let Some((name, value)) =
-            named.into_iter().chain(apart).find(|(_, value)| !(*value >= 0.0 && value.is_finite()))
-        {
-            return Err(problem!("training: {name} is {value}: must be 0 or more, and finite"));
+        if !(self.noise_floor >= 0.0 && self.noise_floor.is_finite()) {
+            return Err(problem!("training: noise_floor is {}: must be 0 or more, and finite", self.noise_floor));
         }
-        let taxels = usize::from(self.shape[0]) * usize::from(self.shape[1]);
-        if self.touched.len() != taxels || self.touched.bytes().any(|mark| !matches!(mark, b'0' | b'1')) {
-            return Err(problem!("training: touched must contain 0 or 1 for each of {taxels} taxels"));
+        if let Some((label, ms)) = self.error_ms.iter().find(|(_, ms)| !ms.is_finite()) {
+            return Err(problem!("training: error_ms of {label} is {ms}: must be finite"));
+        }
+        for (feature, Quantiles { count, values }) in &self.loads {
+            let finite = values.iter().all(|value| value.is_finite());
+            if *count == 0 || values.len() < 2 || !finite || !values.is_sorted() {
+                return Err(problem!(
+                    "training: {feature} must have a count, and two finite values or more that ascend"
+                ));
+            }
         }
         Ok(())
     }
@@ -51,8 +58,12 @@ mod tests {
     use super::*;
 
     fn data() -> TrainingData {
-        let apart_ms = BTreeMap::from([("contact".to_owned(), 700.0)]);
-        TrainingData { shape: [2, 2], touched: "0110".to_owned(), noise: 0.5, strength: 90.0, detected: 1.0, apart_ms }
+        let peak = Quantiles { count: 9, values: vec![1.0, 2.0, 2.0] };
+        TrainingData {
+            noise_floor: 0.5,
+            error_ms: BTreeMap::from([("contact".to_owned(), -3.0)]),
+            loads: BTreeMap::from([("peak".to_owned(), peak)]),
+        }
     }
 
     #[test]
@@ -60,14 +71,16 @@ mod tests {
         let text = serde_json::to_string(&data()).unwrap();
         assert_eq!(serde_json::from_str::<TrainingData>(&text).unwrap(), data());
         assert!(data().check().is_ok());
+        let of = |count, values| BTreeMap::from([("peak".to_owned(), Quantiles { count, values })]);
         for wrong in [
-            TrainingData { touched: "011".to_owned(), ..data() },
-            TrainingData { touched: "0121".to_owned(), ..data() },
-            TrainingData { noise: -1.0, ..data() },
-            TrainingData { strength: f64::NAN, ..data() },
-            TrainingData { apart_ms: BTreeMap::from([("lift".to_owned(), f64::INFINITY)]), ..data() },
+            TrainingData { noise_floor: -1.0, ..data() },
+            TrainingData { error_ms: BTreeMap::from([("lift".to_owned(), f64::INFINITY)]), ..data() },
+            TrainingData { loads: of(0, vec![1.0, 2.0]), ..data() },
+            TrainingData { loads: of(3, vec![1.0]), ..data() },
+            TrainingData { loads: of(3, vec![2.0, 1.0]), ..data() },
+            TrainingData { loads: of(3, vec![1.0, f64::NAN]), ..data() },
         ] {
-            assert!(wrong.check().unwrap_err().to_string().starts_with("training: "));
+            assert!(wrong.check().is_err());
         }
     }
 }

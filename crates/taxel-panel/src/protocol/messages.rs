@@ -231,8 +231,6 @@ pub(crate) enum Message {
         mistakes: Vec<Mistake>,
         /// The command that detects by it in a shell; empty if it cannot be relied on.
         next: String,
-        /// Options of `taxel train` that may help.
-        options: Vec<String>,
     },
     /// When asked: the latest progress of the training that runs, first after 2 s; empty before, and where none
     /// runs.

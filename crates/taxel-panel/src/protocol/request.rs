@@ -105,9 +105,8 @@ pub(crate) enum Request {
     Health {},
     /// Train a readout on the labels of the recording shown, as `taxel train --labels notes` does; of a file with several trials,
     /// on the trials that have labels. The readout replaces `NAME.readout.json` beside the recording. Answered when the training
-    /// has ended; `trained` comes before. One training runs at a time. If nearly no label is near anything felt, or nearly all
-    /// labels are off by the same time, the request is refused with the field `labels_as_given`, unless that is true.
-    Train { labels_as_given: Option<bool> },
+    /// has ended; `trained` comes before. One training runs at a time.
+    Train {},
     /// Requests `training`: how far the training that runs is.
     Training {},
     /// End the training that runs: it is refused, and writes nothing.

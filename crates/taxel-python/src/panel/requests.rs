@@ -16,7 +16,7 @@ use taxel_panel::{
     Activity, BagTopic, BoardLines, BoardRequests, Cut, Description, Detected, EditOutcome, FileRequests, FrameArea,
     FrameFile, FrameIndex, FrameRest, FrameSource, FramesRead, LabelEdit, LabelRequests, LabelRow, LabelScore,
     LabelTable, LabelTimes, Mistake, Opening, PresetRequests, PresetValue, ReadFile, Reply, RequestHandlers,
-    RestSource, TrainingReply, TrainingRequests, TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
+    RestSource, TrainingRequests, TrainingResult, UnhealthyTaxels, UserPreset, UserPresets,
 };
 
 use crate::held::from_touches;
@@ -182,13 +182,10 @@ impl LabelRequests for PythonHandler {
 }
 
 impl TrainingRequests for PythonHandler {
-    fn train(&self, recording: &Path, out: &Path, labels_as_given: bool) -> Reply<TrainingReply> {
-        let arguments = (recording, out, labels_as_given);
-        let reply: Training = self.call(|handler| handler.call_method1("train", arguments)?.extract())?;
-        let Trained { text, judged_on, scores, mistakes, next, options } = match reply {
-            Training::Trained(trained) => trained,
-            Training::Question(text) => return Ok(TrainingReply::Question(text)),
-        };
+    fn train(&self, recording: &Path, out: &Path) -> Reply<TrainingResult> {
+        let arguments = (recording, out);
+        let Trained { text, judged_on, scores, mistakes, next } =
+            self.call(|handler| handler.call_method1("train", arguments)?.extract())?;
         let scores = scores.into_iter().map(|(label, is_plain_rule, found, missed, wrong, delay_ms)| LabelScore {
             label,
             is_plain_rule,
@@ -205,7 +202,7 @@ impl TrainingRequests for PythonHandler {
             trial,
         });
         let (scores, mistakes) = (scores.collect(), mistakes.collect());
-        Ok(TrainingReply::Trained(TrainingResult { text, judged_on, scores, mistakes, next, options }))
+        Ok(TrainingResult { text, judged_on, scores, mistakes, next })
     }
 
     fn command(&self, recording: &Path, out: &Path) -> Reply<String> {
@@ -308,14 +305,6 @@ struct Trained {
     scores: Vec<(String, bool, u64, u64, u64, Option<f64>)>,
     mistakes: Vec<(String, i64, bool, String, String)>,
     next: String,
-    options: Vec<String>,
-}
-
-/// What a training returns: its result, or what must be confirmed first.
-#[derive(FromPyObject)]
-enum Training {
-    Question(String),
-    Trained(Trained),
 }
 
 /// What became of a request: the rows that were written, or why it was refused.

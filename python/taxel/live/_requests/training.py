@@ -44,8 +44,6 @@ class TrainedReadout:
         Label, time (us), whether a label was missed, the sensor where there are several, and the trial.
     next : str
         The command that detects by the readout; empty if it cannot be relied on.
-    options : list of str
-        Which options of ``taxel train`` may help.
     """
 
     text: str
@@ -53,7 +51,6 @@ class TrainedReadout:
     scores: list[tuple[str, bool, int, int, int, float | None]]
     mistakes: list[tuple[str, int, bool, str, str]]
     next: str
-    options: list[str]
 
 
 def _scores(result: dict[str, Any]) -> Iterator[tuple[str, bool, int, int, int, float | None]]:
@@ -92,12 +89,11 @@ class TrainingRequests:
             self._closed = True
         self.end()
 
-    def train(self, recording: Path, out: Path, labels_as_given: bool = False) -> TrainedReadout | str:
-        """Train on the labels of a recording; return a question instead where someone must confirm the labels first."""
+    def train(self, recording: Path, out: Path) -> TrainedReadout:
+        """Train on the labels of a recording."""
         request = {
             "recordings": [str(recording)],
             "open": self._opening.options_of(recording).given(),
-            "options": {"labels_as_given": labels_as_given},
         }
         with self._lock:
             if self._closed:
@@ -115,8 +111,6 @@ class TrainingRequests:
         finally:
             self._training = None
         if answer["type"] == "error":
-            if answer["question"] is not None:
-                return str(answer["question"])
             raise ProblemError(answer["text"])
         if answer["type"] != "result":
             stopped = code < 0 or code == _INTERRUPTED
@@ -129,7 +123,6 @@ class TrainingRequests:
             list(_scores(result)),
             [(m["label"], m["t_us"], m["missed"], m["source"], m["recording"]) for m in result["mistakes"]],
             answer["command"],
-            result["options"],
         )
 
     def _answer(self, training: ChildProcess) -> dict[str, Any]:

@@ -1,0 +1,172 @@
+"""One fit of a clock, repeated on what is left, names what labels are off by, and is silent on right ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from touching import pressed, touched
+
+import taxel
+from taxel import Detections, Tare
+from taxel.detect import Example, Outcome, PlainRule, score
+from taxel.detect.clock import ClockFit, explain, off_detections, off_loads
+from taxel.detect.examples import check_examples
+
+Times = NDArray[np.float64]
+Kinds = dict[str, tuple[Times, Times]]
+
+
+def edges(random: np.random.Generator, count: int = 20, hold_ms: tuple[float, float] = (100.0, 300.0)) -> list[Times]:
+    """Return when irregular touches begin and end, ms."""
+    begins = 2500.0 + np.cumsum(random.uniform(500.0, 1500.0, count))
+    return [begins, begins + random.uniform(*hold_ms, count)]
+
+
+def both(labels: list[Times], found: list[Times]) -> Kinds:
+    return dict(zip(("contact", "lift"), zip(labels, found, strict=True), strict=True))
+
+
+def late(random: np.random.Generator) -> tuple[Kinds, list[tuple[float, float, int]]]:
+    true = edges(random)
+    return both([t + 320.0 for t in true], true), [(320.0, 1.0, 40)]
+
+
+def early(random: np.random.Generator) -> tuple[Kinds, list[tuple[float, float, int]]]:
+    true = edges(random)
+    return both([t - 60.0 for t in true], true), [(-60.0, 1.0, 40)]
+
+
+def late_in_part(random: np.random.Generator) -> tuple[Kinds, list[tuple[float, float, int]]]:
+    true = edges(random, hold_ms=(300.0, 450.0))
+    return both([t + 210.0 * (t >= true[0][8]) for t in true], true), [(210.0, 1.0, 24)]
+
+
+def jumped(random: np.random.Generator) -> tuple[Kinds, list[tuple[float, float, int]]]:
+    true = edges(random, 24)
+    return both([t - 1500.0 * (t >= true[0][14]) for t in true], true), [(-1500.0, 1.0, 20)]
+
+
+def of_one_name(random: np.random.Generator) -> tuple[Kinds, list[tuple[float, float, int]]]:
+    begins, ends = edges(random)
+    return both([begins, ends], [begins + 170.0, ends]), [(-170.0, 1.0, 20)]
+
+
+def of_other_rate(random: np.random.Generator) -> tuple[Kinds, list[tuple[float, float, int]]]:
+    """Some touches are detected, and labels are 15 ms off."""
+    true = edges(random, 30)
+    rate = float(random.choice([50 / 49, 0.96, 1.2]))
+    labels = [np.sort(t * rate + random.normal(0.0, 15.0, len(t))) for t in true]
+    return both(labels, [t[random.random(len(t)) < 0.6] for t in true]), [(0.0, rate, 20)]
+
+
+def by_hand(random: np.random.Generator) -> tuple[Kinds, list[tuple[float, float, int]]]:
+    begins, _ = edges(random, 30)
+    by = random.normal(0.0, 40.0, 30)
+    return {"contact": (np.sort(begins + 250.0 + by - np.median(by)), begins)}, [(250.0, 1.0, 20)]
+
+
+def in_recordings(random: np.random.Generator) -> tuple[Kinds, list[tuple[float, float, int]]]:
+    """Trials of one step each, whose labels have one offset."""
+    true = random.uniform(300.0, 1500.0, 30)
+    return {f"{k}": (np.array([t + 130.0]), np.array([t])) for k, t in enumerate(true)}, [(130.0, 1.0, 30)]
+
+
+SITUATIONS = (late, early, late_in_part, jumped, of_one_name, of_other_rate, by_hand, in_recordings)
+
+
+def off(kinds: Kinds) -> list[ClockFit]:
+    return [fit for fit in explain(kinds) if fit.is_off]
+
+
+@pytest.mark.parametrize("situation", SITUATIONS)
+@settings(max_examples=2)
+@given(seed=st.integers(0, 10_000))
+def test_the_offset_or_the_rate_of_labels_is_found(
+    situation: Callable[[np.random.Generator], tuple[Kinds, list[tuple[float, float, int]]]], seed: int
+) -> None:
+    """In eight of ten recordings, and nearly always in more."""
+    named = 0
+    for k in range(10):
+        kinds, [(shift_ms, rate, count)] = situation(np.random.default_rng([seed, k]))
+        for fit in off(kinds)[:1]:
+            is_shift = rate == 1.0 and fit.rate == 1.0 and abs(fit.shift_ms - shift_ms) <= 10.0
+            is_rate = rate != 1.0 and abs(fit.rate / rate - 1.0) <= 0.002
+            named += (is_shift or is_rate) and fit.explained >= 0.25 * count
+    assert named >= 8
+
+
+@given(seed=st.integers(0, 10_000), count=st.sampled_from([4, 12, 24]), share=st.floats(0.3, 1.0))
+def test_nothing_is_said_of_labels_that_are_in_place(seed: int, count: int, share: float) -> None:
+    random = np.random.default_rng(seed)
+    true = edges(random, count)
+    labels = [np.sort(t + random.normal(0.0, 20.0, count)) for t in true]
+    assert off(both(labels, [t[random.random(count) < share] for t in true])) == []
+
+
+def test_nothing_is_said_of_labels_of_another_recording_nor_beside_many_detections() -> None:
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        true, others = edges(random), edges(random)
+        assert off(both(others, true)) == []
+        anywhere = np.sort(random.uniform(0.0, true[0][-1], 300))
+        assert off({"contact": (true[0][:12], anywhere)}) == []
+
+
+def outcome(late_us: int) -> Outcome:
+    frames, truth = touched(3, 20)
+    labels = {label: t + late_us for label, t in truth.items()}
+    times = np.concatenate(list(truth.values()))
+    found = Detections(["contact"] * 20 + ["lift"] * 20, times.tolist(), times.tolist())
+    return Outcome("a.npz", Example(frames, labels, name="a.npz"), found, score(found, labels))
+
+
+def test_an_offset_is_that_beside_the_training() -> None:
+    """Detections that are 12 ms late in the training are so here."""
+    for error_ms, shift_ms in ((0.0, -200), (12.0, -212)):
+        [line] = off_detections([outcome(200_000)], dict.fromkeys(("contact", "lift"), error_ms))
+        assert f"--shift-ms {shift_ms}" in line
+        assert len(line) <= 160
+    assert off_detections([outcome(10_000)], {}) == []
+
+
+@pytest.mark.parametrize("shift_ms", [300, -150])
+def test_labels_are_compared_with_loads_where_nothing_was_detected_yet(shift_ms: int) -> None:
+    frames, truth = pressed(4, 20)
+    for by, lines in ((1000 * shift_ms, 1), (0, 0)):
+        labels = {label: t + by for label, t in truth.items()}
+        example = Example(frames, labels, Tare.take(frames, stop_us=900_000), name="a.npz")
+        said = off_loads(check_examples([example]))
+        assert len(said) == lines
+        assert all(f"--shift-ms {-shift_ms}" in line for line in said)
+
+
+def test_a_training_and_a_detection_warn_of_it(tmp_path: Path) -> None:
+    frames, truth = pressed(4, 20)
+    taxel.convert(frames, tmp_path / "a.npz")
+    recording, rule = taxel.open(tmp_path / "a.npz"), PlainRule("area", 2, noise_floor=5.0)
+    late = [{label: t + 300_000 for label, t in truth.items()}]
+    training = taxel.train(recording, late, taxel.tasks.TrainOptions(folds=0))
+    detected = taxel.tasks.detect(rule, recording, late)
+    for warnings in (training.warnings, detected.warnings):
+        [line] = [each for each in warnings if "--shift-ms" in each]
+        assert int(line.rpartition("--shift-ms ")[2].rstrip(")")) == pytest.approx(-300, abs=10)
+    for warnings in (taxel.train(recording, [truth]).warnings, taxel.tasks.detect(rule, recording, [truth]).warnings):
+        assert warnings == ()
+
+
+def test_one_of_several_recordings_is_named(tmp_path: Path) -> None:
+    labels = []
+    for k, late_us in enumerate((0, 0, 90_000, 0)):
+        frames, truth = pressed(30 + k, 20)
+        taxel.convert(frames, tmp_path / f"{k}.npz")
+        labels.append({label: t + late_us for label, t in truth.items()})
+    opened = [taxel.open(tmp_path / f"{k}.npz") for k in range(4)]
+    [line] = taxel.tasks.detect(PlainRule("area", 2, noise_floor=5.0), opened, labels).warnings
+    assert "40 of 160 labels" in line
+    assert "2.npz" in line

@@ -1,0 +1,42 @@
+"""Drawn touches on grids of taxels, and when each begins and ends."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taxel import Array, Frames
+
+ARRAY = Array(6, 6, pitch_mm=5.0)
+
+
+def touched(
+    seed: int, count: int = 12, begin_s: float = 2.5, hold_s: tuple[float, float] = (0.1, 0.3)
+) -> tuple[Frames, dict[str, np.ndarray]]:
+    """Return frames at 200 Hz of touches that follow each other irregularly, and when each began and ended, us."""
+    random = np.random.default_rng(seed)
+    begins = begin_s + np.cumsum(random.uniform(0.5, 1.5, count))
+    ends = begins + random.uniform(*hold_s, count)
+    t = np.arange(0, round(1e6 * (ends[-1] + 2)), 5000)
+    values = random.normal(0, 0.002, (len(t), 6, 6))
+    for begin, end in zip(begins, ends, strict=True):
+        y, x = random.integers(1, 4, 2)
+        here = (t >= 1e6 * begin) & (t < 1e6 * end)
+        values[here, y : y + 2, x : x + 2] += random.uniform(0.5, 1.0)
+    labels = {"contact": np.rint(1e6 * begins).astype(np.int64), "lift": np.rint(1e6 * ends).astype(np.int64)}
+    return Frames(values, t, unit="V", array=ARRAY), labels
+
+
+def pressed(
+    seed: int, count: int = 10, *, begin_s: float = 1.0, kinds: float = 0.0, still: bool = False
+) -> tuple[Frames, dict[str, np.ndarray]]:
+    """Return presses on 6 x 6 taxels at 100 Hz, `still` at one place; hard ones are harder by the share `kinds`."""
+    random = np.random.default_rng(seed)
+    begins = np.rint(100 * (begin_s + np.cumsum(random.uniform(0.6, 1.4, count)))).astype(int)
+    ends, values = begins + random.integers(12, 35, count), random.normal(50, 0.5, (int(begins[-1]) + 150, 6, 6))
+    hard = np.arange(count) % 2 == 1
+    for begin, end, more in zip(begins, ends, kinds * hard, strict=True):
+        y, x = (2, 2) if still else random.integers(0, 5, 2)
+        values[begin:end, y : y + 2, x : x + 2] += random.uniform(40, 50) * (1 + more)
+    t = 10_000 * np.arange(len(values))
+    labels = {"soft": t[begins[~hard]], "hard": t[begins[hard]]} if kinds else {"contact": t[begins], "lift": t[ends]}
+    return Frames(values, t, unit="counts", array=Array(6, 6)), labels
