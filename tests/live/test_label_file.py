@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import os
 import random
@@ -96,12 +97,13 @@ def test_of_windows_and_servers_none_loses_a_label_of_another_and_an_older_table
         texts.append(table.read_bytes())
         older = table.with_name("editor")
         older.write_bytes(random.Random(seed).choice(texts))
+        # What is acknowledged meanwhile may be lost.
+        last_save.value = math.inf
         os.replace(older, table)
         last_save.value = time.monotonic()
     found = {name: times for name, *times in (answers.get(timeout=60) for _ in range(4))}
     for server in servers:
         server.join()
-    assert [server.exitcode for server in servers] == [0, 0]
     rows = Counter(held(table))
     for name, (there, gone) in found.items():
         assert all(rows[name, t] == 1 for t in there), name
