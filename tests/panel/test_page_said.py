@@ -79,28 +79,13 @@ def test_a_training_that_runs_says_how_far_it_is(chromium: Any, recording: Path)
         shows(page, "train", "^Stop the training")
 
 
-def test_options_that_the_advice_names_are_given_in_a_shell(chromium: Any, recording: Path) -> None:
-    labelled(recording)
-    text = "held out: contact, neuron: 3 of 5\nmore labels help most, else --folds 9 or --recipe gait_plate"
-    trained = {"type": "trained", "name": recording.name, "readout": "walk.readout.json", "text": text}
-    trained |= {"next": "taxel detect RECORDING", "options": ["--folds", "--recipe"]}
-    trained |= {"judged_on": "held out", "scores": [], "mistakes": []}
-    detections = {"train": [trained, {"type": "done"}], "read_out": [{"type": "done"}]}
-    with answered(chromium, recording, detections) as page:
-        shows(page, "train-shell", r"^The same in a shell: taxel train")
-        page.locator("#train").click()
-        shows(page, "train-text", "--folds")
-        shows(page, "train-shell", r"^To set options such as --folds, --recipe, run this command .*: taxel train")
-        assert "a detection of an event without a label counts as false" in page.locator("#panel-labels").inner_text()
-
-
 @pytest.mark.parametrize("count", [1, 3, 40])
 def test_labels_and_what_a_training_printed_are_in_sight_together(count: int, chromium: Any, recording: Path) -> None:
     table = recording.with_suffix("").with_suffix(".notes.csv")
     table.write_text("label,t_us\n" + "".join(f"contact,{200_000 * k}\n" for k in range(1, count + 1)))
     printed = "\n".join(f"held out: contact, neuron: {k} of 5 found, 0 missed, 0 false" for k in range(30))
     trained = {"type": "trained", "name": recording.name, "readout": "walk.readout.json", "text": printed}
-    trained |= {"next": "taxel detect RECORDING", "options": [], "judged_on": "held out", "mistakes": []}
+    trained |= {"next": "taxel detect RECORDING", "judged_on": "held out", "mistakes": []}
     score = {"label": "contact", "is_plain_rule": False, "found": 5, "missed": 0, "false": 0, "delay_ms": 4.5}
     trained |= {"scores": [score, score | {"is_plain_rule": True, "delay_ms": None}]}
     found = [{"label": "contact", "t_us": 10**5 * k, "known_us": 10**5 * k} for k in range(40)]
@@ -145,7 +130,7 @@ while not pathlib.Path({str(end)!r}).exists():
 score = {{"found": 3, "missed": 1, "false": 0, "known_delay_ms": {{"median": 5.0}}}}
 mistake = {{"recording": "walk", "source": "", "label": "contact", "t_us": 7, "missed": True}}
 result = {{"labels": ["contact"], "score": {{"by_label": {{"contact": score}}}}, "plain_rule": None}}
-result |= {{"mistakes": [mistake], "warnings": ["3 are alone"], "options": ["--folds"]}}
+result |= {{"mistakes": [mistake], "warnings": ["3 are alone"]}}
 detects = "taxel detect RECORDING --readout a.json"
 print(json.dumps({{"type": "result", "lines": ["held out: all found"], "result": result, "command": detects}}))
 """
@@ -163,7 +148,7 @@ print(json.dumps({{"type": "result", "lines": ["held out: all found"], "result":
     [trained] = printed
     assert trained.text.splitlines() == ["held out: all found", "warning: 3 are alone"]
     assert trained.next.startswith("taxel detect RECORDING --readout ")
-    assert (trained.judged_on, trained.options) == ("held out: all found", ["--folds"])
+    assert trained.judged_on == "held out: all found"
     assert trained.scores == [("contact", False, 3, 1, 0, 5.0)]
     assert trained.mistakes == [("contact", 7, True, "", "walk")]
     assert handler.progress() == ""
