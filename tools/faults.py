@@ -214,7 +214,7 @@ def run(clone: Path, fault: Fault, number: int, command: list[str], limit_s: flo
         put(clone / fault.file, lines)
     shutil.rmtree(clone / ".hypothesis", ignore_errors=True)  # examples that another fault failed
     done = subprocess.run(
-        ["timeout", "--signal=KILL", str(limit_s), *command],
+        ["timeout", "--signal=KILL", str(max(1.0, limit_s)), *command],
         cwd=clone if command[0] == sys.executable else clone / "crates/taxel-core",
         env={**os.environ, "TAXEL_FAULT": str(number), "PYTHONPATH": f"{clone / 'python'}:{clone / 'rules'}"},
         capture_output=True,
@@ -231,22 +231,15 @@ def catching(clone: Path, programs: dict[str, str], fault: Fault, number: int) -
     for program, _, beginning in (test.partition(":") for test in room["rust"] if fault.file.endswith(".rs")):
         if program not in programs:
             continue
-        said, code = run(clone, fault, number, [programs[program], beginning], CARGO_S)
-        if code:
-            failed = re.search(r"^test (\S+) .*FAILED", said, re.MULTILINE)
-            return f"{program}: {failed[1] if failed else f'returned {code}'}"
+        (said, code), (sound, _) = (run(clone, fault, n, [programs[program], beginning], CARGO_S) for n in (number, 0))
+        failed, left_out = (re.findall(r"^test (\S+) .*FAILED", text, re.MULTILINE) for text in (said, sound))
+        found = [test for test in failed if test not in left_out]
+        if found or (code and not failed):
+            return f"{program}: {found[0] if found else f'returned {code}'}"
     pytest = [
         sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "--timeout",
-        "100",
-        "-m",
+        *["-m", "pytest", "-q", "-p", "no:cacheprovider", "--timeout", "100", "-x", "-m"],
         "not slow",
-        "-x",
     ]
     for test in filter(None, fault.caught.values()):  # what caught it in another revision, before the whole room
         if "::test_" in test and [run(clone, fault, n, [*pytest, test], PYTEST_S)[1] for n in (number, 0)] == [1, 0]:
