@@ -82,7 +82,7 @@ pub struct Receiver {
 enum Input {
     /// The socket, locked by a caller while it waits for datagrams, or `None` after it was moved into the thread; and
     /// the thread.
-    Socket(Mutex<Option<Socket>>, Mutex<Option<JoinHandle<()>>>),
+    Socket(Box<Mutex<Option<Socket>>>, Mutex<Option<JoinHandle<()>>>),
     /// The messages of a [`MessageFeed`], which may end by itself once it was asked to.
     Messages { ends_itself: bool },
 }
@@ -114,7 +114,7 @@ impl Receiver {
             ..CaptureCounts::default()
         };
         let queue = Arc::new(BatchQueue::new(options.queue_bytes, counts));
-        let input = Input::Socket(Mutex::new(Some(socket)), Mutex::default());
+        let input = Input::Socket(Box::new(Mutex::new(Some(socket))), Mutex::default());
         Ok(Self { queue, origin: Origin::Udp(address), input })
     }
 

@@ -212,14 +212,14 @@ pub(super) enum PipelineInput {
     /// A board that sends to this address.
     Board(SocketAddr),
     /// Frames of numbers, and the lines to read them from.
-    Frames(Option<LinePlace>, Box<FrameLayout>, Option<OpenedLines>),
+    Frames(Option<LinePlace>, Box<FrameLayout>, Option<Box<OpenedLines>>),
 }
 
 impl PipelineInput {
     /// Frames of a place that may be open already, or of a program.
     pub(super) fn frames(place: &Option<LinePlace>, layout: &FrameLayout, opened: &Opened) -> Result<Self> {
         let lines = place.as_ref().map(|place| opened.take_or_open(place)).transpose()?;
-        Ok(Self::Frames(place.clone(), Box::new(layout.clone()), lines))
+        Ok(Self::Frames(place.clone(), Box::new(layout.clone()), lines.map(Box::new)))
     }
 
     /// The layout of its frames, if it has any.
@@ -236,7 +236,7 @@ impl PipelineInput {
             Self::Board(address) => (Receiver::bind(address, options)?, None, None),
             Self::Frames(place, layout, lines) => {
                 let (frames, receiver) = FrameInput::new(place, *layout, options);
-                (receiver, Some(frames), lines)
+                (receiver, Some(frames), lines.map(|lines| *lines))
             }
         })
     }
