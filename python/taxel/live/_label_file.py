@@ -219,8 +219,8 @@ class _Rows:
                 self._add(new, None)
                 added.append(new)
             rows.append(new)
-        before, after = Counter(row for row, _ in gone), Counter(added)
-        undone, restored = (after - before).elements(), (before - after).elements()
+        removed, made = Counter(row for row, _ in gone), Counter(added)
+        undone, restored = (made - removed).elements(), (removed - made).elements()
         return Outcome(tuple(rows), (*((row, None) for row in undone), *((None, row) for row in restored)))
 
     def _add(self, shown: Note, in_file: Note | None) -> None:
