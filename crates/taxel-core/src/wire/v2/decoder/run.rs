@@ -16,9 +16,6 @@ use crate::wire::v2::{BodyKind, DatagramHeader, HEADER_BYTES, TRAILER_BYTES};
 /// Longest datagram of a run, bytes: all but the checksum fits the buffer of [`EVEN`] bytes.
 const LONGEST: usize = EVEN + 4;
 
-/// Most rows that the stores for a datagram may touch: eight for each group of eight words, whole or not.
-const ROWS: usize = ((LONGEST - HEADER_BYTES - TRAILER_BYTES) / 2).next_multiple_of(EIGHT);
-
 /// The state of a decoder during a run.
 pub(super) struct RunDecoder<'a> {
     /// The part that is equal for all datagrams of the run: [`DatagramHeader::common`] of plain changes.
@@ -35,6 +32,12 @@ pub(super) struct RunDecoder<'a> {
 #[inline(always)]
 fn short(datagram: &[u8]) -> bool {
     (HEADER_BYTES + TRAILER_BYTES..=LONGEST).contains(&datagram.len())
+}
+
+/// Most rows that the stores for a body may touch: eight for each group of eight words, whole or not.
+#[inline(always)]
+fn rows_touched<const VALUE: u32>(body: &[u8]) -> usize {
+    (body.len() / if VALUE == 16 { 4 } else { 2 }).next_multiple_of(EIGHT)
 }
 
 impl<'a> RunDecoder<'a> {
@@ -89,7 +92,7 @@ impl<'a> RunDecoder<'a> {
                 && start < u32::from(FULL)
                 && (VALUE == 0 || t >= self.held.newest)
                 && body.len().is_multiple_of(if VALUE == 16 { 4 } else { 2 })
-                && room.len() - row >= ROWS;
+                && room.len() - row >= rows_touched::<VALUE>(body);
             let (content, checksum) = split_checksum(datagram);
             // SAFETY: `short` has checked that there are 20 to 64 bytes.
             if !plain || unsafe { even(content) } != checksum {
@@ -120,7 +123,7 @@ impl<'a> RunDecoder<'a> {
     ///
     /// # Safety
     ///
-    /// As for [`Self::take`]; [`ROWS`] rows must fit after `first`.
+    /// As for [`Self::take`]; [`rows_touched`] rows must fit after `first`.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,popcnt,sse4.2")]
     unsafe fn words<const VALUE: u32>(
