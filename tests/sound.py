@@ -372,7 +372,6 @@ VALUES: dict[str, Callable[[], Any]] = {
 SMALL: dict[str, dict[str, Any]] = {
     "calibrate": {"loads": [tasks.KnownLoad(9.0)], "options": tasks.CalibrateOptions(exponent=1.0)},
     "answer": {"window_ms": 5.0, "draws": 1, "folds": 2, "shuffles": 1},
-    "choose": {"k": 2},
     "folds": {"count": 2},
     "pairwise": {"q": 0.1},
     "read_trials": {"window_ms": 0.1},
@@ -439,7 +438,7 @@ USES: dict[str, Callable[[Any], Any]] = {
 #: What is not called, by name: what only taxel makes, and what needs a live board.
 LEFT_OUT = {
     *("BoardChange", "Clock", "Datagrams", "Detection", "Health", "Recording", "Zeroing", "Certificate", "Checked"),
-    *("Margin", "Multipliers", "Row", "Summary", "Matching", "Cause", "TakenRest", "Status", "Received", "Format"),
+    *("Margin", "Multipliers", "Row", "Summary", "Matching", "TakenRest", "Status", "Received", "Format"),
     *("BoardCheck", "Difference", "Finding", "PatternCheck", "RestCheck", "Greeting", "Port", "Training.command"),
     "check_board",
     *("Device.apply", "Device.record", "Live.source_address", "Live.zero", "Live.record", "Live.sample", "Live.note"),

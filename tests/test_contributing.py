@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -281,11 +282,7 @@ def test_what_contributing_says_of_an_option_is_enough(built: Path) -> None:
 
 def test_an_option_in_rust_is_one_of_python_and_of_the_command_line(copy: Path) -> None:
     """Without a build: what Rust hands over, with one more field."""
-    sys.path.insert(0, str(ROOT / "tools"))
-    try:
-        from messages import made
-    finally:
-        sys.path.pop(0)
+    made = runpy.run_path(str(ROOT / "tools" / "messages.py"))["made"]
     schemas = json.loads(_core.message_schemas())
     field = {"type": "number", "minimum": 0, "default": 2.5, "description": "How long it rings, s.\n\nOr more."}
     schemas["options"]["properties"]["rings"] = field

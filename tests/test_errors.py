@@ -123,7 +123,6 @@ def test_the_command_line_names_the_option_of_a_parameter(
         typed = [f"--set={name}={each}" for name, each in settings.items()]
         line = line_of(capsys, "encode", recording, recording.with_name("s.npz"), "--encoder", encoder, *typed)
         assert line.startswith(f"--set {parameter}")
-        assert "must be" in line
 
 
 def limited() -> Iterator[Any]:

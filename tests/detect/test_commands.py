@@ -345,7 +345,7 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
     [
         (("detect", "none.npz", "--readout", "touch.json"), "none.npz: no such file"),
         (("detect", "9.npz", "--readout", "none.json"), "none.json: no such file"),
-        (("detect", "9.npz", "--readout", "labels.csv"), "labels.csv: not a JSON object"),
+        (("detect", "9.npz", "--readout", "labels.csv"), "labels.csv, line 1: not JSON"),
         (
             ("detect", "9.npz", "--readout", "touch.json"),
             "9.npz: the values of its taxels at rest are not known, because no half second is quiet with nothing on "
@@ -369,7 +369,7 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
             ("train", "1.npz", "2.npz", "--labels", "truth.csv", "--encoder", "fa1", "-o", "new.json"),
             "does not state the recording of each label",
         ),
-        (("train", "1.npz", "--recipe", "labels.csv", "-o", "new.json"), "labels.csv: not TOML"),
+        (("train", "1.npz", "--recipe", "labels.csv", "-o", "new.json"), "labels.csv, line 1: not TOML"),
         (
             ("train", "1.npz", "--recipe", "recipe.toml", "--set", "learner.wings=2", "-o", "n.json"),
             "no parameter 'wings'",

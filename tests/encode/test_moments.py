@@ -219,8 +219,9 @@ def test_what_moves_by_a_taxel_moves_by_the_pitch():
 @settings(max_examples=30, deadline=None)
 @given(dx=st.integers(-4, 8), dy=st.integers(-3, 4), seed=st.integers(0, 1000))
 def test_the_same_touch_elsewhere_gives_the_same_spikes(dx, dy, seed):
-    way = np.cumsum(np.random.default_rng(seed).choice([-0.25, 0.0, 0.25], (40, 2)), axis=0).clip(-2, 2)
-    heights = np.abs(np.random.default_rng(seed).normal(50, 30, 40))
+    # A touch that is near its middle and not high stays within the array wherever it is moved.
+    way = np.cumsum(np.random.default_rng(seed).choice([-0.25, 0.0, 0.25], (40, 2)), axis=0).clip(-1, 1)
+    heights = np.abs(np.random.default_rng(seed).normal(50, 30, 40)).clip(0, 100)
     here = [bump(9 + x, 7 + y, h) for (x, y), h in zip(way, heights, strict=True)]
     there = [bump(9 + x + dx, 7 + y + dy, h) for (x, y), h in zip(way, heights, strict=True)]
     assert all(np.roll(a, (dy, dx), (0, 1)).tolist() == b.tolist() for a, b in zip(here, there, strict=True))

@@ -123,7 +123,7 @@ def test_nonsense_gets_one_clear_line(call, argument):
 def test_a_file_that_is_no_tare_is_named(tmp_path):
     place = tmp_path / "x.json"
     place.write_bytes(b"\xff\xfe")
-    with refused(taxel.FormatError, place=Place("x.json")):
+    with refused(taxel.FormatError, place=Place("x.json", line=1)):
         Tare.load(place)
     with pytest.raises(FileNotFoundError):
         Tare.load(tmp_path / "none.json")

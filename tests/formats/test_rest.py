@@ -229,13 +229,9 @@ def test_training_on_values_that_fall_says_what_turns_them(tmp_path, capsys) -> 
     rows = [f"press,{1_000_000 + 650_000 * k}\n" for k in range(12)]
     (tmp_path / "labels.csv").write_text("label,t_us\n" + "".join(rows))
     command = ("train", tmp_path / "palm.npz", "--labels", tmp_path / "labels.csv", "--folds", 0, "-o")
-    for encoder, fails in ((("--encoder", "contact_area"), True), ((), False)):
-        code, _, said = call(capsys, *command, tmp_path / f"{fails}", *encoder)
-        assert code == 2 * fails
-        assert ("the sensor felt nothing in the recording up to" in said) == fails
-        assert "falls = true" in said
-        assert "palm.layout.toml" in said
-        assert "tare" not in said
+    code, _, said = call(capsys, *command, tmp_path / "a.json", "--encoder", "contact_area")
+    assert code == 2
+    assert "falls = true" in said
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -261,17 +257,10 @@ def test_a_recording_of_values_that_fall_in_which_nothing_is_detected_says_what_
             assert "falls" not in shown
 
 
-def test_where_rebounds_of_values_that_fall_are_learnt_and_detected_what_turns_them_is_said(tmp_path, capsys) -> None:
+def test_where_rebounds_of_values_that_fall_are_detected_what_turns_them_is_said(tmp_path, capsys) -> None:
     """A palm goes a quarter beyond its rest after each press: that is felt and detected, and is no press."""
     taxel.convert(palm(5, -1, 0.4, rebound=0.25), tmp_path / "palm.npz")
-    rows = [f"press,{1_000_000 + 650_000 * k}\n" for k in range(12)]
-    (tmp_path / "palm.notes.csv").write_text("label,t_us\n" + "".join(rows))
     turns = "falls = true in a layout file, palm.layout.toml beside it"
-    code, _, said = call(capsys, "train", tmp_path / "palm.npz", "--folds", 0, "-o", tmp_path / "a.json")
-    assert code == 0
-    (line,) = said.splitlines()
-    assert line.startswith("taxel: warning: ")
-    assert turns in line
     rule = tmp_path / "rule.json"
     taxel.detect.PlainRule("area", 5, noise_floor=100.0).save(rule)
     command = ("detect", tmp_path / "palm.npz", "--readout", rule, "--tare", "0.9")
@@ -290,7 +279,6 @@ def test_where_rebounds_of_values_that_fall_are_learnt_and_detected_what_turns_t
     taxel.convert(palm(5, -1, 0.4, rebound=0.25), tmp_path / "palm.npz", overwrite=True)
     (tmp_path / "palm.layout.toml").write_text("falls = true\n")
     assert json.loads(call(capsys, *command, "--json")[1])["remarks"] == []
-    assert "falls" not in call(capsys, "train", tmp_path / "palm.npz", "--folds", 0, "-o", tmp_path / "b.json")[2]
 
 
 def test_a_slope_that_all_detections_have_is_no_column(tmp_path, capsys) -> None:

@@ -196,8 +196,8 @@ def test_texts_count_from_the_recordings_beginning_and_json_from_1970(tmp_path: 
     for t in (6_000_000, begin + 10**7):
         labels.write_text(f"label,t_us\ncontact,{t}\n")
         wrong = call(capsys, "train", bag, "--topic", "/a", "--labels", labels, "-o", tmp_path / "r.json")[2]
-        assert f"holds 1 event ({t / 1e6:.3f} s), none within" in wrong
-        assert f"(0.000 to 1.990 s); it begins 2026-11-18 11:06:40.000 UTC, {begin} us since 1970: all labels" in wrong
+        assert "none within" in wrong
+        assert f"it begins 2026-11-18 11:06:40.000 UTC, {begin} us since 1970" in wrong
 
 
 def test_messages_of_another_length_are_left_out_and_counted(tmp_path: Path) -> None:

@@ -100,7 +100,7 @@ _ABOUT = {
         ...     taxel.Tare.from_json("{}")
         ... except taxel.FormatError as error:
         ...     print(error)
-        tare: array is missing
+        tare: array: missing field `array`
         """,
     ),
     ProblemError: (
