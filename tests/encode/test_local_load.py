@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from refusal import refused
 
@@ -142,6 +142,7 @@ def some_tare(rng, array, noise, holes):
 def test_quantities_are_those_of_numpy(seed, shape, noise, floor, least, rest_is, local_ms, missing, pause):
     rng = np.random.default_rng(seed)
     array = Array(*shape, exists=rng.random(shape) >= missing)
+    assume(array.exists.any())
     n = 80
     tare = some_tare(rng, array, noise, rng.choice([0.0, 0.2]))
     t = 5 + np.cumsum(rng.choice([100, 192, 2500, pause], n, p=[0.2, 0.7, 0.05, 0.05]))
