@@ -473,7 +473,7 @@ def test_clean_taxels_that_drift_are_not_noisy(unit: str, seed: int, rows: int, 
 
 
 @pytest.mark.parametrize("unit", ["N", "as sent"])
-@given(st.integers(0, 10_000), st.integers(2, 16), st.integers(2, 16))
+@given(st.integers(0, 10_000), st.integers(3, 16), st.integers(3, 16))
 def test_a_taxel_with_six_times_the_noise_of_the_others_is_noisy(unit: str, seed: int, rows: int, columns: int) -> None:
     random = np.random.default_rng(seed)
     values, t = drifting(seed, (rows, columns))
