@@ -2,8 +2,9 @@
 
 `tests/encode/test_NAME.py` has the examples of the encoder NAME, `EXAMPLES`, with the options that hold time back; and
 either `trains_of(encoder, taxels, of)`, the numbers of the trains of some of so many taxels, or, where no train belongs
-to one taxel, `turned(encoder)`, the trains as they stand when the array is turned by half a turn. `REPAIRED` states what the encoder does with
-an event that a state repaired: "read" (as any other), "silent" (its reference moves, without a spike) or "both".
+to one taxel, `turned(encoder)`, the trains as they stand when the array is turned by half a turn. `REPAIRED` states
+what the encoder does with an event that a state repaired: "read" (as any other), "silent" (its reference moves, without
+a spike) or "both".
 """
 
 import json
