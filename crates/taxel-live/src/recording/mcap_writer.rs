@@ -139,8 +139,7 @@ impl Writer {
     ///
     /// # Errors
     ///
-    /// `File` if the disk is full or not available, in which case the file keeps everything that was written before; or
-    /// if the file was removed, renamed or replaced while it was written, with a description of what is lost.
+    /// `File` if the disk is full or not available, in which case the file keeps everything that was written before.
     pub fn finish(self, counts: RecordingCounts) -> Result<RecordingCounts> {
         self.begin(self.header.decoding.origin_us)?;
         self.track.queue.finish(Some(counts.clone()))?;
