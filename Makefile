@@ -4,20 +4,22 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := Cargo.toml Cargo.lock $(shell find crates rules -name '*.rs' -o -name Cargo.toml)
 
-.PHONY: help check setup build released demo browser test test-studies accept slow lint format registers messages bench docs dist platforms clean
+.PHONY: help prerequisites setup build released demo browser check test test-studies accept slow lint format registers messages lock bench docs dist platforms clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
+	@echo "make check  format, lint, types and laws: for every edit"
 	@echo "make test   the product's tests but the slow ones      make slow   the slow ones of all"
 	@echo "make test-studies  the tests of the distributions beside it  make rtl-test  those of the FPGA logic"
 	@echo "make accept keep the sentences of errors as they are now, in tests/messages"
 	@echo "make lint   format, lint, types, layers     make bench  ratios against peers, to benchmarks/results/"
 	@echo "make docs   the documentation, without warnings"
 	@echo "make build  .venv and the extension, after a change in crates/     make format  formats"
+	@echo "make lock   requirements.lock, the versions of Python packages that make installs; UPGRADE=--upgrade takes the newest"
 	@echo "make dist   wheels for machines without cargo (Linux on x86-64 and ARM, Windows), and the source package, to dist/"
 	@echo "make platforms  the wheels on emulated ARM and on Windows by wine, in trees of Debian: 90 minutes, as root"
 
-check:
+prerequisites:
 	@command -v $(PYTHON) >/dev/null || { echo "taxel needs Python 3.11 or later: install it, or say make PYTHON=/path/to/python3"; exit 1; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "taxel needs Python 3.11 or later, this is $$($(PYTHON) -V): say make PYTHON=/path/to/python3.11"; exit 1; }
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "taxel needs Python's venv: on Debian, apt install python3-venv"; exit 1; }
@@ -31,9 +33,9 @@ PROJECTS := pyproject.toml $(BESIDE:%=%/pyproject.toml) rules/pyproject.toml
 wanted = $(BIN)/python -c 'import sys, tomllib; projects = [tomllib.load(open(f, "rb"))["project"] for f in "$(PROJECTS)".split()]; extras = {"beside": [x for p in projects[1:] for x in p["dependencies"]]} | {k: v for p in projects for k, v in p.get("optional-dependencies", {}).items()}; print("\n".join(x for x in sum((extras[x] for x in sys.argv[1:]), projects[0]["dependencies"]) if not x.startswith("taxel")))'
 # Python compiles a module when it is first imported; compiling all of them at once takes ten seconds of the first minutes.
 # Where it may not store what it compiled, each start would compile them all again.
-install = $(BIN)/python -m pip install --quiet --disable-pip-version-check $(if $(PYTHONDONTWRITEBYTECODE),,--no-compile)
+install = $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint requirements.lock $(if $(PYTHONDONTWRITEBYTECODE),,--no-compile)
 
-$(VENV)/.installed: $(PROJECTS) | check
+$(VENV)/.installed: $(PROJECTS) requirements.lock | prerequisites
 	@echo "taxel: installing what it needs into $(VENV)"
 	@$(PYTHON) -m venv $(VENV)
 	@$(wanted) > $(VENV)/wanted.txt
@@ -45,7 +47,7 @@ EXTRAS_test := test beside neo nir nwb cluster bench
 EXTRAS_lint := lint
 EXTRAS_docs := docs
 EXTRAS_dist := dist
-$(VENV)/.for-%: $(PROJECTS) | $(VENV)/.installed
+$(VENV)/.for-%: $(PROJECTS) requirements.lock | $(VENV)/.installed
 	@echo "taxel: installing what make $* needs"
 	@$(wanted) $(EXTRAS_$*) > $(VENV)/wanted-$*.txt
 	@$(install) -r $(VENV)/wanted-$*.txt
@@ -78,6 +80,13 @@ demo: build
 # Pages are tested in Chromium; where there is none, it is installed.
 browser: $(VENV)/.for-test
 	@$(BIN)/python tools/chromium.py
+
+# For every edit. The laws compute in this process: no board, page or clock.
+check: build $(VENV)/.for-test $(VENV)/.for-lint
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -q -n 2 -m "hypothesis and not slow" tests
 
 # Many tests wait for a board's clock, a page or a process: four at a time keep two cores busy.
 test: released $(VENV)/.for-test browser
@@ -117,6 +126,8 @@ lint: $(VENV)/.for-test $(VENV)/.for-lint
 	$(BIN)/python tools/page_types.py
 	$(BIN)/python tools/lines.py --grown
 	$(BIN)/python tools/quotes.py
+	$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/tests.yml
+	$(BIN)/check-jsonschema --builtin-schema vendor.github-issue-forms .github/ISSUE_TEMPLATE/defect.yml .github/ISSUE_TEMPLATE/file.yml
 
 format: $(VENV)/.for-lint
 	cargo fmt --all
@@ -176,6 +187,10 @@ slow: rtl-timing
 # The bitstream of the Colorlight i9, to rtl/build/colorlight_i9.bit.
 rtl-bitstream: $(RTL)/.installed
 	$(RTL)/bin/python rtl/tools/bitstream.py
+
+# Versions that fit all systems and all Pythons that taxel supports; benchmarks' peers, of which one wants an older NumPy, are not among them.
+lock: $(VENV)/.for-dist
+	@$(wanted) $(EXTRAS_test) $(EXTRAS_lint) $(EXTRAS_docs) $(EXTRAS_dist) | $(BIN)/uv pip compile - --universal --python-version 3.11 --no-annotate --no-header --quiet $(UPGRADE) --output-file requirements.lock
 
 # Benchmarks have an environment of their own, taxel beside its peers: these are large, and one wants an older NumPy.
 PEERS := .venv-peers
