@@ -241,13 +241,8 @@ class Detections(FrozenColumns):
         return Detections._of(**columns)
 
     def to_pandas(self) -> Any:
-        """Return a table ``label t_us known_us slope_mv_per_ms``; ``reported_us`` if known, ``repaired`` if any is.
-
-        Raises
-        ------
-        ImportError : pandas is not installed (``pip install 'taxel[pandas]'``)
-        """
-        import pandas  # noqa: PLC0415  heavy, and an extra
+        """Return a table ``label t_us known_us slope_mv_per_ms``; ``reported_us`` if known, ``repaired`` if any is."""
+        import pandas  # noqa: PLC0415  heavy
 
         columns: list[NDArray[Any]] = [self.label.astype(object), self.t, self.known, self.slope]
         names = list(_CSV)
@@ -391,7 +386,7 @@ class Detections(FrozenColumns):
         ------
         ImportError : neo is not installed (``pip install 'taxel[neo]'``)
         """
-        from neo import Event  # noqa: PLC0415  heavy, and an extra
+        from neo import Event  # noqa: PLC0415  heavy
 
         notes: dict[str, NDArray[Any]] = {"known": self.known, "slope": self.slope}
         if self.reported is not None:

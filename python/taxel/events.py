@@ -260,13 +260,8 @@ class Events(FrozenColumns):
         return self._unchecked(t, x, y, p, self.array, ticks, present, repaired, self.markers + other.markers).sorted()
 
     def to_pandas(self) -> Any:
-        """Return a table ``t_us x y p``, with ``intensity`` (missing if absent) and ``repaired`` if there are any.
-
-        Raises
-        ------
-        ImportError : pandas is not installed (``pip install 'taxel[pandas]'``)
-        """
-        import pandas  # noqa: PLC0415  heavy, and an extra
+        """Return a table ``t_us x y p``, with ``intensity`` (missing if absent) and ``repaired`` if there are any."""
+        import pandas  # noqa: PLC0415  heavy
 
         table = pandas.DataFrame({"t_us": self.t, "x": self.x, "y": self.y, "p": self.p})
         if self.intensity is not None and self.present is not None:

@@ -348,13 +348,8 @@ class Frames(FrozenColumns):
         return np.asarray(self.values > np.float64(finite("above", above)))
 
     def to_pandas(self) -> Any:
-        """Return a table: a row for each frame, indexed by ``t_us``, and a column for each taxel, ``(row, column)``.
-
-        Raises
-        ------
-        ImportError : pandas is not installed (``pip install 'taxel[pandas]'``)
-        """
-        import pandas  # noqa: PLC0415  heavy, and an extra
+        """Return a table: a row for each frame, indexed by ``t_us``, and a column for each taxel, ``(row, column)``."""
+        import pandas  # noqa: PLC0415  heavy
 
         taxels = pandas.MultiIndex.from_product([range(n) for n in self.array.shape], names=["row", "column"])
         index = pandas.Index(self.t, name="t_us")

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import checked_path
 from taxel._base.limits import TAXELS, TIME_US
-from taxel._core import FormatError
+from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["ascending", "candidates", "files_at", "in_s", "sensor", "table", "whole_us"]
+__all__ = ["around", "ascending", "candidates", "files_at", "in_s", "sensor", "table", "whole_us"]
 
 #: Times that are converted at once, so that little memory is taken beside them.
 _PIECE = 1 << 16
@@ -116,6 +117,17 @@ def ascending(location: str, t: NDArray[np.int64], first_line: int | Callable[[i
             f"{location}, line {line}: time {in_s(t[k])} s is not after {in_s(t[k - 1])} s, the time before it{hint}"
         )
     return t
+
+
+def around(x: NDArray[Any], y: NDArray[Any]) -> Array:
+    """Return the thesis' array, or a larger array if events are outside it."""
+    thesis = Array.thesis()
+    if not len(x):
+        return thesis
+    if min(x.min(), y.min()) < 0 or max(x.max(), y.max()) >= 65_535:
+        raise ProblemError("x and y: must be from 0 to 65534")
+    rows, columns = max(thesis.rows, int(y.max()) + 1), max(thesis.columns, int(x.max()) + 1)
+    return thesis if (rows, columns) == thesis.shape else Array(rows, columns)
 
 
 def in_s(us: int | np.int64) -> str:

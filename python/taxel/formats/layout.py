@@ -22,14 +22,12 @@ from taxel._base.limits import VALUE
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array, Places
+from taxel.formats.column_names import AXES
 from taxel.formats.event_camera.reduction import Reduction
+from taxel.formats.lines import KINDS
+from taxel.formats.times import ISO, UNITS_US
 
 __all__ = ["Data", "Layout", "PrintedFrames", "Table", "advice", "load_packaged"]
-
-#: Times of a table in units of these, us.
-UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
-#: The unit of times of a table that are texts.
-ISO = "iso"
 
 
 @dataclass(frozen=True)
@@ -52,15 +50,26 @@ class Table:
         "iso": texts as of ISO 8601, dates with times, of UTC where they state no zone, or times of a day;
         days with points (01.05.2024 10:15:02,010) too.
     missing : str, optional
-        A cell without a value; default: every cell is a number.
+        A further cell without a value, beside those of `taxel.formats.lines.MISSING`.
     leave_out : list of str or int
         The columns that are not taxels, by name or number from 1, which may hold texts. All others are taxels.
+    keep : str, optional
+        A pattern of the names of the columns that are taxels, as "l*_z"; default: all that are not left out.
+    label_column : str or int, optional
+        A column whose value becomes a label where it changes; it is no taxel.
+    by : str or int, optional
+        A column that says which sensor a line is of: each of its values is a source; it is no taxel.
+    lines : {"plain", "marked", "json", "hex"}
+        "marked": brackets, quotes, arrows and ``NAME:`` are between cells too; "json": a line is an object or a list
+        of JSON, whose columns have the names of its keys; "hex": cells are hexadecimal numbers.
     frame_lines : int, 1 or more, optional
         Number of lines of a frame, whose first line has its time; default: 1.
     frame_end : {"blank"}, optional
         An empty line ends a frame.
     frame_begin : str, optional
         Beginning of the line of text above each frame, for example "Frame"; empty lines may then be between frames too.
+    frame_time : {"s", "ms", "us", "ns"}, optional
+        The last number in the line above each frame is its time, in this unit.
     events : bool
         Whether each line is an event, in the columns x, y and p (the polarity: 1 for more pressure, 0 or -1 for less).
 
@@ -77,9 +86,14 @@ class Table:
     time_unit: str = "s"
     missing: str | None = None
     leave_out: Sequence[str | int] = ()
+    keep: str | None = None
+    label_column: str | int | None = None
+    by: str | int | None = None
+    lines: str = "plain"
     frame_lines: int | None = None
     frame_end: str | None = None
     frame_begin: str | None = None
+    frame_time: str | None = None
     events: bool = False
 
     def __post_init__(self) -> None:
@@ -90,17 +104,18 @@ class Table:
         for column in several("columns", self.columns):
             text("columns", column)
         _check_end(self)
-        if self.frame_begin is not None and not text("frame_begin", self.frame_begin).strip():
-            raise refused("frame_begin", f" is {shown(self.frame_begin)}: must be a text")
-        if self.frame_begin is not None and (self.frame_lines is not None or self.frame_end is not None):
-            raise refused("frame_begin", " is given together with frame_lines or frame_end: give only one of them")
         if flag("events", self.events) and (self.time_column is None or self.has_lines):
             raise refused(
                 "events", " is true: the table must have a time_column and no frame_lines, frame_end or frame_begin"
             )
         integer("skip_lines", self.skip_lines, 0)
-        if self.time_column is not None:
-            _column("time_column", self.time_column)
+        for name in ("time_column", "label_column", "by"):
+            if getattr(self, name) is not None:
+                _column(name, getattr(self, name))
+        text("lines", self.lines, KINDS)
+        if self.keep is not None:
+            text("keep", self.keep)
+        self._check_begin()
         if isinstance(self.leave_out, str):
             raise refused("leave_out", f" is {shown(self.leave_out)}: must be a list of columns")
         for column in several("leave_out", self.leave_out):
@@ -108,6 +123,17 @@ class Table:
         text("time_unit", self.time_unit, (*UNITS_US, ISO))
         if self.missing is not None:
             text("missing", self.missing)
+
+    def _check_begin(self) -> None:
+        """Refuse a line above each frame that is no text, or is given with another end of frames."""
+        if self.frame_time is not None and text("frame_time", self.frame_time, UNITS_US) and self.frame_begin is None:
+            raise refused("frame_time", " is given without frame_begin, the line that states it")
+        if self.frame_begin is None:
+            return
+        if not text("frame_begin", self.frame_begin).strip():
+            raise refused("frame_begin", f" is {shown(self.frame_begin)}: must be a text")
+        if self.frame_lines is not None or self.frame_end is not None:
+            raise refused("frame_begin", " is given together with frame_lines or frame_end: give only one of them")
 
     @property
     def has_lines(self) -> bool:
@@ -150,6 +176,9 @@ class Data:
     time_unit : {"s", "ms", "us", "ns"}
     frames : {"first", "last"}
         Which axis of the array counts frames; MATLAB's are often (rows, columns, frames) or (taxels, frames).
+    axes : str, optional
+        What each axis counts, in their order, instead of `frames`: "time", and of "trial", "row", "column", "taxel"
+        and "axis" (x, y, z) those that there are, as "row time column".
 
     Raises
     ------
@@ -160,6 +189,7 @@ class Data:
     time: str | None = None
     time_unit: str = "s"
     frames: str = "first"
+    axes: str | None = None
 
     def __post_init__(self) -> None:
         for name in ("array", "time"):
@@ -167,6 +197,12 @@ class Data:
                 text(name, getattr(self, name))
         text("time_unit", self.time_unit, UNITS_US)
         text("frames", self.frames, ("first", "last"))
+        if self.axes is not None:
+            named = text("axes", self.axes).split()
+            if len(set(named)) < len(named) or "time" not in named or not set(named) <= set(_AXES_OF_ARRAYS):
+                raise refused(
+                    "axes", f" is {shown(self.axes)}: must be time and others of {', '.join(_AXES_OF_ARRAYS)}"
+                )
 
 
 @dataclass(frozen=True)
@@ -249,6 +285,8 @@ class Layout:
         Unit of the readings, turned or not.
     rate_hz : float, Hz, above 0, optional
         Frames per second, if the recording has no times.
+    axis : {"x", "y", "z", "shear", "all"}, optional
+        Of taxels with three axes: the axis that is read, the length of x and y, or each axis as a source.
     zeros_before_s : float, s, above 0, at most 60, optional
         Time that the sensor read 0 before recordings whose first frame is loaded, for example if a contact starts a
         trial.
@@ -276,6 +314,7 @@ class Layout:
     falls: bool | float | None = None
     unit: str | None = None
     rate_hz: float | None = None
+    axis: str | None = None
     zeros_before_s: float | None = None
     table: Table | None = None
     data: Data | None = None
@@ -297,6 +336,8 @@ class Layout:
             raise refused("unit", " is '': must be the unit of the readings")
         if self.rate_hz is not None:
             finite("rate_hz", self.rate_hz, "Hz", least=1e-9, most=1e6)
+        if self.axis is not None:
+            text("axis", self.axis, (*AXES, "shear", "all"))
         if self.zeros_before_s is not None:
             finite("zeros_before_s", self.zeros_before_s, "s", least=1e-6, most=60.0)
         # Refuses a pitch beside places, and places of another number than rows x columns.
@@ -468,6 +509,8 @@ _TABLES: dict[str, type[Any]] = {
 }
 
 
+#: What axes of an array may count.
+_AXES_OF_ARRAYS = ("time", "trial", "row", "column", "taxel", "axis")
 #: Keys of a live source (`taxel live --source`) that a layout states otherwise.
 _OTHERWISE = {"array": "rows and columns", "rate": "rate_hz"}
 #: What the tables are for that have keys alike.

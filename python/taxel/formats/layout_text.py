@@ -6,22 +6,64 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
 from taxel._base.arguments import shown
 from taxel._base.errors import refused
 from taxel._core import FormatError, ProblemError
-from taxel.array import of_size
+from taxel.array import Places, of_size
 from taxel.formats.layout import Layout
 
-__all__ = ["of_source", "with_keys"]
+__all__ = ["of_layout", "of_source", "with_keys"]
 
 #: Keys of a source that are whole numbers, and those that are lists.
 _WHOLE, _LISTS = ("baud", "frame_lines"), ("columns", "leave_out")
 
 #: The line that begins a table of TOML.
 _TABLE = re.compile(r"^[ \t]*\[", re.MULTILINE)
+
+
+def of_layout(layout: Layout) -> str:
+    r"""Return the text of a layout file: the keys that differ from their defaults.
+
+    Examples
+    --------
+    >>> from taxel.formats.layout import Table
+    >>> print(of_layout(Layout(Path("a.layout.toml"), unit="N", table=Table(separator=";", time_column=1))), end="")
+    unit = "N"
+    <BLANKLINE>
+    [table]
+    separator = ";"
+    time_column = 1
+    """
+    own, tables = list[str](), list[str]()
+    for key in fields(layout):
+        value = getattr(layout, key.name)
+        if key.name == "path" or value in (None, "") or value == {}:
+            continue
+        if is_dataclass(value) or isinstance(value, Mapping):
+            tables += ["", f"[{key.name}]", *_lines(value)]
+        else:
+            own.append(f"{key.name} = {_written(value)}")
+    return "\n".join([*own, *tables] if own else tables[1:]) + "\n"
+
+
+def _lines(values: Any) -> list[str]:
+    """Return the lines of a table of TOML."""
+    if isinstance(values, Mapping):
+        return [f"{key} = {_written(value)}" for key, value in values.items()]
+    if isinstance(values, Places):
+        columns = {"x": values.x, "y": values.y, "area": values.area}
+        lines = [
+            f"{key} = {_written(column.ravel().tolist())}" for key, column in columns.items() if column is not None
+        ]
+        return lines + ([] if values.unit is None else [f"unit = {_written(values.unit)}"])
+    stated = ((key.name, getattr(values, key.name), key.default) for key in fields(values))
+    return [
+        f"{name} = {_written(value)}" for name, value, default in stated if value != default and value not in ([], ())
+    ]
 
 
 def of_source(text: str) -> str:

@@ -384,7 +384,7 @@ class SpikeTrains(FrozenColumns):
         ------
         ImportError : neo is not installed (``pip install 'taxel[neo]'``)
         """
-        from neo import SpikeTrain  # noqa: PLC0415  heavy, and an extra
+        from neo import SpikeTrain  # noqa: PLC0415  heavy
 
         trains = []
         for n in range(len(self)):
@@ -431,13 +431,8 @@ class SpikeTrains(FrozenColumns):
         return cls.from_lists(times, start, stop, values, kind=kind)
 
     def to_pandas(self) -> Any:
-        """Return a table, train after train: a row for each spike, ``train t_ms``, and ``value`` if there are values.
-
-        Raises
-        ------
-        ImportError : pandas is not installed (``pip install 'taxel[pandas]'``)
-        """
-        import pandas  # noqa: PLC0415  heavy, and an extra
+        """Return a table, train after train: a row a spike, ``train t_ms``, and ``value`` if there are values."""
+        import pandas  # noqa: PLC0415  heavy
 
         columns: dict[str, Any] = {"train": np.repeat(np.arange(len(self)), self.counts), "t_ms": self.times}
         return pandas.DataFrame(columns if self.values is None else columns | {"value": self.values})

@@ -19,7 +19,8 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats.checks import ascending, whole_us
 from taxel.formats.checks import table as limited
-from taxel.formats.layout import UNITS_US, Data, Layout, as_size
+from taxel.formats.layout import Data, Layout, as_size
+from taxel.formats.times import UNITS_US
 from taxel.frames import Frames
 from taxel.recording.contents import RecordedSource, source_from
 from taxel.recording.once import known

@@ -34,7 +34,8 @@ from taxel.events import Events
 from taxel.formats import text
 from taxel.formats.checks import in_s, whole_us
 from taxel.formats.checks import table as limited
-from taxel.formats.layout import ISO, UNITS_US, Layout, Table
+from taxel.formats.layout import Layout, Table
+from taxel.formats.times import ISO, UNITS_US
 from taxel.recording.contents import RecordedSource, source_from
 from taxel.recording.once import known
 from taxel.recording.readers.npz import around

@@ -20,7 +20,8 @@ from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._core import FormatError
 from taxel.formats import text
-from taxel.formats.layout import ISO, UNITS_US, advice
+from taxel.formats.layout import advice
+from taxel.formats.times import ISO, UNITS_US
 from taxel.recording.readers.foreign import ARRAYS, facts_of, list_arrays
 
 #: A column is one of times, if its name does not say so, if it ascends for so many lines.

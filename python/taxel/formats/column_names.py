@@ -1,0 +1,193 @@
+"""What the names of columns say: times and their unit, counters, labels, other quantities, units, sides and axes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+__all__ = [
+    "AXES",
+    "are_units",
+    "axes_of",
+    "is_counter",
+    "is_key",
+    "is_label",
+    "is_other",
+    "places_of",
+    "time_unit",
+    "unit_of",
+]
+
+AXES = ("x", "y", "z")
+
+#: Units of time as people write them.
+_UNITS_OF_TIME = {
+    "s": ("s", "sec", "secs", "second", "seconds", "sek", "sekunden"),
+    "ms": ("ms", "msec", "millis", "milliseconds", "millisekunden"),
+    "us": ("us", "µs", "μs", "usec", "micros", "microseconds"),
+    "ns": ("ns", "nsec", "nanos", "nanoseconds", "nsecs"),
+}
+_UNIT_OF_TIME = "|".join(word for words in _UNITS_OF_TIME.values() for word in words)
+#: What people call times, in some languages.
+_TIME = (
+    r"t|ts|(?:%|rel|abs|host|device|sample|frame|recv|unix|epoch|system|header)?[ ._]*(?:time|stamp|time[ _]?stamp)s?"
+    r"|elapsed(?:[ _]time)?|(?:mess|uhr|system)?zeit(?:stempel|punkt)?|temps|tiempo|tempo|tijd|tid"
+    r"|datetime|date[ _]time|clock|millis|micros"
+)
+#: Names of columns that hold times, with or without a unit: time, timestamp_us, Time (ms), t [s].
+_TIMES = re.compile(
+    rf"(?:{_TIME})"
+    rf"(?:[ _.]*[\[(/] *(?P<within>{_UNIT_OF_TIME}) *[\])]?|(?:, *(?:in )?| in |[ _.]+)(?P<after>{_UNIT_OF_TIME}))?",
+    re.IGNORECASE,
+)
+_COUNTERS = re.compile(
+    r"(?:frame|sample|record|packet|line|row|msg|message)?[ ._]*"
+    r"(?:seq(?:uence)?|frames?|index|idx|samples?|records?|id|no|nr|num|number|count(?:er)?|#|bild|lfd)[ ._]*"
+    r"(?:nr|no|num|number|id|#|count(?:er)?|index)?\.?",
+    re.IGNORECASE,
+)
+_LABELS = re.compile(
+    r"(?:.*[ ._])?(?:labels?|class(?:es)?|slip|slipped|slipping|contact|in_contact|touch(?:ed)?|state|status|flags?|"
+    r"targets?|events?|phase|annotations?|markers?|trigger|ground[ _]?truth|gt|activity|gesture|grasp(?:ed)?)"
+    r"(?:[ ._](?:id|label|class|code))?",
+    re.IGNORECASE,
+)
+_KEYS = re.compile(
+    r"(?:hand|foot|side|finger|sensor|device|board|insole|limb|topic|channel|source|node|module)"
+    r"(?:[ ._]?(?:id|name|no|nr))?",
+    re.IGNORECASE,
+)
+_OTHERS = re.compile(
+    r"(?:.*[ ._])?(?:acc(?:el(?:eration)?)?|gyro?(?:scope)?|mag(?:netometer)?|imu|temp(?:erature)?|temperatur|"
+    r"batt?(?:ery)?|akku|vbat|hum(?:idity)?|lat(?:itude)?|lon(?:gitude)?|quat(?:ernion)?|roll|pitch|yaw|crc|checksum|cop)"
+    r"(?:[ ._\[(]*(?:x|y|z|w|\d+)[\])]?)?(?:[ ._]?[\[(][^\])]*[\])])?",
+    re.IGNORECASE,
+)
+#: A cell that says a unit, as N, [kPa] or (m/s^2).
+_UNITS = re.compile(r"[\[(]?[^\d\s\[\]()]{0,8}[²³2]?[\])]?")
+#: A unit of a force, a pressure or a voltage that ends a name behind a low line or alone: thumb_mN, mV.
+_BARE_UNIT = re.compile(r"(?:^|(?<=_))([mk]?N|kgf?|gf|[hkM]?Pa|m?bar|psi|mmHg|[mµu]?V)$")
+_IN_BRACKETS = re.compile(r"[\[(]\s*([^\s\d\[\]()][^\s\[\]()]{0,7})\s*[\])]$")
+_FORCES = re.compile(r"[mk]?N|kgf?|gf?|[hkM]?Pa|m?bar|psi|N/(?:cm|mm|m)[²2]|mmHg|counts|raw|adc", re.IGNORECASE)
+_AXIS = re.compile(r"(.+?)[ _.\-]?[\[(]?([xyzXYZ])[\])]?(?: *[\[(][^\])]*[\])])?")
+_AXIS_OF_LIST = re.compile(r"(.+)\[([012])\]")
+_PLACE = re.compile(r"\D*?(\d+)\D+(\d+)\D*")
+
+
+def time_unit(name: str) -> str | None:
+    """Return the unit of time that the name of a column or an array states, "" if none; None of another name.
+
+    Examples
+    --------
+    >>> time_unit("Time (ms)"), time_unit("run1/time"), time_unit("Time[secs]"), time_unit("palm"), time_unit("%time")
+    ('ms', '', 's', None, '')
+    """
+    found = _TIMES.fullmatch(_last(name))
+    if found is None:
+        return None
+    word = (found["within"] or found["after"] or "").lower()
+    alone = {"millis": "ms", "micros": "us"}.get(name.strip("\"' ").lower(), "")
+    return next((unit for unit, words in _UNITS_OF_TIME.items() if word in words), alone)
+
+
+def _last(name: str) -> str:
+    """Return the last part of a path within a file or a message: header.seq, run1/time."""
+    return re.split(r"[/.](?=[^\W\d])", name.strip("\"' "))[-1]
+
+
+def is_counter(name: str) -> bool:
+    """Return whether a column numbers the lines: seq, frame, Index, sample_no."""
+    return _COUNTERS.fullmatch(_last(name)) is not None
+
+
+def is_label(name: str) -> bool:
+    """Return whether a column holds labels or states: label, slipped, contact state."""
+    return _LABELS.fullmatch(_last(name)) is not None
+
+
+def is_key(name: str) -> bool:
+    """Return whether a column says which sensor a line is of: hand, sensor_id."""
+    return _KEYS.fullmatch(_last(name)) is not None
+
+
+def is_other(name: str) -> bool:
+    """Return whether a column is of another quantity than force or pressure: acc_x, Battery [%]."""
+    return _OTHERS.fullmatch(_last(name)) is not None
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of readings that the name of a column states; "" if none.
+
+    Examples
+    --------
+    >>> unit_of("Heel [N]"), unit_of("thumb_mN"), unit_of("acc (m/s2)"), unit_of("p[0]"), unit_of("thumb")
+    ('N', 'mN', 'm/s2', '', '')
+    """
+    found = _IN_BRACKETS.search(name) or _BARE_UNIT.search(name)
+    return "" if found is None or found[1].lower() in AXES else found[1]
+
+
+def is_force(unit: str) -> bool:
+    """Return whether a unit is one of force or pressure, or of counts."""
+    return _FORCES.fullmatch(unit) is not None
+
+
+def are_units(names: Sequence[str], below: Sequence[str]) -> bool:
+    """Return whether the cells below names say units: each of a name, none a number or the name of times.
+
+    Examples
+    --------
+    >>> are_units(["time", "thumb"], ["[ms]", "N"]), are_units(["time", "thumb"], ["2024-05-01", "0.5"])
+    (True, False)
+    >>> are_units(["Trial 1", ""], ["time", "thumb"])
+    False
+    """
+    are_texts = any(below) and all(_UNITS.fullmatch(cell) for cell in below)
+    pairs = list(zip(names, below, strict=False))
+    return are_texts and all(name for name, cell in pairs if cell) and not any(map(time_unit, below[1:]))
+
+
+def axes_of(names: Sequence[str]) -> dict[str, dict[str, int]] | None:
+    """Return the columns of each taxel by their axis, if all names are of taxels with three axes; else None.
+
+    Examples
+    --------
+    >>> axes_of(["l0_x", "l0_y", "l0_z"])
+    {'l0': {'x': 0, 'y': 1, 'z': 2}}
+    >>> axes_of(["left[0][0]", "left[0][1]", "left[0][2]"]), axes_of(["x", "y", "z"]), axes_of(["p[0]", "p[1]", "p[2]"])
+    ({'left[0]': {'x': 0, 'y': 1, 'z': 2}}, {'': {'x': 0, 'y': 1, 'z': 2}}, None)
+    """
+    found: dict[str, dict[str, int]] = {}
+    for k, name in enumerate(names):
+        if of_list := _AXIS_OF_LIST.fullmatch(name):
+            stem, axis = of_list[1], AXES[int(of_list[2])]
+        elif name.lower() in AXES:
+            stem, axis = "", name.lower()
+        elif of_name := _AXIS.fullmatch(name):
+            stem, axis = of_name[1], of_name[2].lower()
+        else:
+            return None
+        if axis in found.setdefault(stem, {}):
+            return None
+        found[stem][axis] = k
+    # A single list of three numbers is one of three taxels.
+    is_list = len(found) == 1 and all(map(_AXIS_OF_LIST.fullmatch, names)) and not next(iter(found)).endswith("]")
+    return found if found and not is_list and all(len(axes) == len(AXES) for axes in found.values()) else None
+
+
+def places_of(names: Sequence[str]) -> tuple[int, int] | None:
+    """Return the rows and columns of names with two numbers each that run row by row; else None.
+
+    Examples
+    --------
+    >>> places_of(["r0c0", "r0c1", "r1c0", "r1c1"]), places_of(["p[0][0]", "p[0][1]"]), places_of(["a1", "a2"])
+    ((2, 2), (1, 2), None)
+    """
+    found = [_PLACE.fullmatch(name) for name in names]
+    pairs = [(int(place[1]), int(place[2])) for place in found if place is not None]
+    if not pairs or len(pairs) != len(names):
+        return None
+    (top, left), (bottom, right) = pairs[0], pairs[-1]
+    rows, columns = bottom - top + 1, right - left + 1
+    expected = [(row, column) for row in range(top, bottom + 1) for column in range(left, right + 1)]
+    return (rows, columns) if pairs == expected else None

@@ -1,0 +1,166 @@
+"""Lines of numbers as programs print them, of files and live sources: cells, their names, and lines that are odd.
+
+Brackets, quotes, arrows and ``NAME:`` separate cells; a line of JSON has the names of its keys; hex has no names.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections import Counter
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+from taxel._base.messages import counted
+
+__all__ = ["KINDS", "MISSING", "Line", "OddLines", "is_number", "read_line"]
+
+#: How the cells of a line are found: between separators; where marks and names are between them too; JSON; hex.
+KINDS = ("plain", "marked", "json", "hex")
+#: Cells that tables hold where a value is missing.
+MISSING = ("", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "-", "--", "null", "NULL", "None")
+
+_NUMBERS = {
+    ".": re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII),
+    ",": re.compile(r"[+-]?(?:\d+(?:,\d+)?|,\d+)(?:[eE][+-]?\d+)?", re.ASCII),
+}
+_ARROW = re.compile(r"[-=~]+>|:=")
+_MARKS = str.maketrans(dict.fromkeys("[](){}<>|\"'", " "))
+_BETWEEN = {".": re.compile(r"[\s,;]+"), ",": re.compile(r"[\s;]+")}
+#: A name before a number or a bracket, which a colon or an equals sign ends.
+_NAME = re.compile(r"(?<![\w.])[\"']?([^\W\d][\w.%/-]*(?:\[\d+\])*)[\"']?\s*[:=]\s*(?=[-+.\d\[({\"'])")
+#: The blank between a day and a time, which separates no cells.
+_DAY = re.compile(r"(\d{4}-\d\d-\d\d|\d\d?\.\d\d?\.\d{4}) +(?=\d\d?:\d\d)")
+
+
+@dataclass(frozen=True)
+class Line:
+    """Hold the cells of a line, and the name of each, "" without one."""
+
+    cells: tuple[str, ...]
+    names: tuple[str, ...]
+
+    def in_order(self, names: tuple[str, ...]) -> Line:
+        """Return the same cells in the order of names, if it has just these; else the line itself.
+
+        Examples
+        --------
+        >>> read_line("b:4,a:3").in_order(("a", "b")).cells
+        ('3', '4')
+        """
+        if self.names == names or len(self.names) != len(names) or {*self.names} != {*names}:
+            return self
+        by_name = dict(zip(self.names, self.cells, strict=True))
+        return Line(tuple(by_name[name] for name in names), names)
+
+
+@dataclass
+class OddLines:
+    """Count lines that are no frame, by kind, with the number of the first of each kind."""
+
+    counts: Counter[str] = field(default_factory=Counter)
+    first: dict[str, int] = field(default_factory=dict)
+
+    def add(self, kind: str, number: int, count: int = 1) -> None:
+        """Add lines of a kind; `number` is that of the first of them."""
+        self.counts[kind] += count
+        self.first.setdefault(kind, number)
+
+    @property
+    def total(self) -> int:
+        """Number of odd lines."""
+        return self.counts.total()
+
+    def said(self) -> list[str]:
+        """Return a text for each kind."""
+        return [
+            f"{counted(count, 'line')} {kind} ({'line' if count == 1 else 'first: line'} {self.first[kind]})"
+            for kind, count in self.counts.items()
+        ]
+
+
+def is_number(cell: str, decimal: str = ".") -> bool:
+    """Return whether a cell states a number.
+
+    Examples
+    --------
+    >>> is_number("-1.5e3"), is_number("1,5"), is_number("1,5", ","), is_number("1,", ","), is_number("1_000")
+    (True, False, True, False, False)
+    """
+    return _NUMBERS[decimal].fullmatch(cell) is not None
+
+
+def read_line(line: str, kind: str = "marked", separator: str = ",", decimal: str = ".") -> Line | None:
+    """Return the cells of a line; None of one that is not of this kind.
+
+    Parameters
+    ----------
+    line : str
+    kind : str
+        One of `KINDS`.
+    separator, decimal : str
+        As of `taxel.formats.layout.Table`.
+
+    Examples
+    --------
+    >>> read_line('0.01,"[3, 9]"').cells, read_line("12:30:00.5 -> 3,4").cells
+    (('0.01', '3', '9'), ('12:30:00.5', '3', '4'))
+    >>> read_line("a:3,b:4")
+    Line(cells=('3', '4'), names=('a', 'b'))
+    >>> read_line('{"t": 0, "p": [[1, 2], [3, 4]]}', "json")
+    Line(cells=('0', '1', '2', '3', '4'), names=('t', 'p[0][0]', 'p[0][1]', 'p[1][0]', 'p[1][1]'))
+    >>> read_line("01 1E 0A", "hex", " ").cells
+    ('1', '30', '10')
+    """
+    if kind == "plain":
+        found = _split(line, separator)
+        return Line(found, ("",) * len(found))
+    if kind == "json":
+        return _of_json(line)
+    if kind == "hex":
+        digits = _split(line, separator)
+        try:
+            numbers = tuple(str(int(cell, 16)) for cell in digits)
+        except ValueError:
+            return None
+        return Line(numbers, ("",) * len(numbers)) if len({len(cell) for cell in digits}) == 1 else None
+    cells, names = list[str](), list[str]()
+    first, *pairs = _NAME.split(_DAY.sub(r"\1T", _ARROW.sub(" ", line)))
+    for name, text in zip(["", *pairs[::2]], [first, *pairs[1::2]], strict=True):
+        found = tuple(filter(None, _BETWEEN[decimal].split(text.translate(_MARKS))))
+        cells += found
+        names += [f"{name}[{k}]" if name and len(found) > 1 else name for k in range(len(found))]
+    return Line(tuple(cells), tuple(names))
+
+
+def _split(line: str, separator: str) -> tuple[str, ...]:
+    """Return the cells between separators; by " " any number of blanks is between."""
+    if separator == " ":
+        return tuple(line.split())
+    if '"' in line:
+        with suppress(csv.Error, StopIteration):
+            return tuple(map(str.strip, next(csv.reader([line], delimiter=separator, skipinitialspace=True))))
+    return tuple(map(str.strip, line.split(separator)))
+
+
+def _of_json(line: str) -> Line | None:
+    """Return the leaves of an object or a list of JSON by their paths."""
+    try:
+        content = json.loads(line, parse_float=str, parse_int=str, parse_constant=str)
+    except ValueError:
+        return None
+    if not isinstance(content, dict | list):
+        return None
+    cells, names = list[str](), list[str]()
+    waiting: list[tuple[str, object]] = [("", content)]
+    while waiting:
+        name, value = waiting.pop()
+        if isinstance(value, dict):
+            waiting += reversed([(f"{name}.{key}".lstrip("."), inner) for key, inner in value.items()])
+        elif isinstance(value, list):
+            waiting += reversed([(f"{name}[{k}]", inner) for k, inner in enumerate(value)])
+        else:
+            cells.append("" if value is None else str(value).replace("\t", " ").replace("\n", " "))
+            names.append(name)
+    return Line(tuple(cells), tuple(names))

@@ -1,0 +1,155 @@
+"""The text of a table: of a file in any usual encoding, compressed or not, or of a spreadsheet or Parquet."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import IO, Any, cast
+
+from taxel._base.errors import damaged, unreadable
+from taxel._base.messages import first_line, installing
+
+__all__ = ["SHEETS", "TEXTS", "Text"]
+
+#: The endings of tables of text, also compressed by gzip, and of tables that pandas reads as a whole.
+TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".json", ".jsonl", ".ndjson")
+SHEETS = (".xlsx", ".xlsm", ".ods", ".parquet")
+#: Characters of the beginning that are looked at, and more if these are few lines.
+_HEAD, _MORE = 1 << 16, 1 << 22
+_FEW_LINES = 24
+
+
+class Text:
+    """The lines of a table.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    FormatError : damaged, no text, or a spreadsheet that cannot be read
+    ImportError : the extra ``tables`` is not installed
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.is_file = path.suffix.lower() not in SHEETS
+        self._encoding = ""
+
+    @property
+    def source(self) -> Any:
+        """What pandas reads: the path, or a text in memory."""
+        return self.path if self.is_file else io.StringIO(self._sheet)
+
+    @property
+    def encoding(self) -> str:
+        """The encoding: by a byte-order mark, else UTF-8, else Latin-1 if the beginning is not UTF-8."""
+        if not self._encoding:
+            with self._bytes() as file:
+                head = file.read(_HEAD)
+            self._encoding = _encoding(self.path, head)
+        return self._encoding
+
+    def as_latin_1(self) -> None:
+        """Read the text as Latin-1, as a later part of it is not UTF-8."""
+        self._encoding = "latin-1"
+
+    def lines(self) -> Iterator[str]:
+        """Yield all lines without their ends."""
+        if not self.is_file:
+            yield from self._sheet.splitlines()
+            return
+        with self._bytes() as file, io.TextIOWrapper(file, self.encoding) as text:
+            try:
+                for line in text:
+                    yield line.rstrip("\n")
+            except UnicodeDecodeError as error:
+                why = f"not text in {self.encoding.upper()} ({error.reason}); save it as UTF-8"
+                raise unreadable(why, self.path) from None
+
+    @cached_property
+    def head(self) -> list[str]:
+        """The first lines; the last of them is whole, if the text goes on."""
+        lines, count = list[str](), 0
+        for line in self._until_damage():
+            if count > _MORE or (count > _HEAD and len(lines) >= _FEW_LINES):
+                break
+            lines.append(line)
+            count += len(line) + 1
+        return lines
+
+    @cached_property
+    def ends_in_line(self) -> bool:
+        """Whether the last line has an end."""
+        if not self.is_file:
+            return True
+        last = b"\n"
+        with self._bytes() as file:
+            if self.path.suffix.lower() != ".gz" and self.encoding != "utf-16":
+                file.seek(max(0, file.seek(0, io.SEEK_END) - 1))
+                return file.read(1) in b"\r\n"
+            for block in iter(lambda: file.read(1 << 20), b""):
+                last = block[-2:]
+        return last.strip(b"\0") in (b"\n", b"\r\n", b"\r")
+
+    def _until_damage(self) -> Iterator[str]:
+        try:
+            yield from self.lines()
+        except UnicodeError:
+            self.as_latin_1()
+
+    @contextmanager
+    def _bytes(self) -> Iterator[IO[bytes]]:
+        try:
+            if self.path.suffix.lower() == ".gz":
+                with gzip.open(self.path, "rb") as unpacked:
+                    yield cast("IO[bytes]", unpacked)
+            else:
+                with open(self.path, "rb") as file:
+                    yield file
+        except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+            raise damaged(self.path, "gzip file", first_line(error)) from None
+
+    @cached_property
+    def _sheet(self) -> str:
+        """The first sheet with numbers of a spreadsheet, or a table of Parquet, as lines of cells between tabs."""
+        import pandas as pd  # noqa: PLC0415  takes long
+
+        try:
+            if self.path.suffix.lower() == ".parquet":
+                table = pd.read_parquet(self.path)
+                named = table.reset_index() if table.index.name or table.index.nlevels > 1 else table
+                return str(named.to_csv(sep="\t", index=False))
+            sheets = pd.read_excel(self.path, sheet_name=None, header=None, dtype=object)
+        except ImportError:
+            text = f"to read it, taxel needs pandas with openpyxl and pyarrow: {installing('tables')}"
+            raise ImportError(f"{self.path}: {text}") from None
+        except Exception as error:  # of zipfile, of XML, of pyarrow
+            raise damaged(self.path, f"{self.path.suffix} file", first_line(error)) from None
+        largest = max(sheets.values(), key=lambda sheet: sheet.notna().to_numpy().sum(), default=pd.DataFrame())
+        return str(largest.map(_cell).to_csv(sep="\t", index=False, header=False))
+
+
+def _cell(value: Any) -> Any:
+    """Return the cell of a sheet as tables of text have it: dates with times as of ISO 8601."""
+    return value.isoformat(sep=" ") if hasattr(value, "isoformat") and hasattr(value, "hour") else value
+
+
+def _encoding(path: Path, head: bytes) -> str:
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    if (zero := head.find(b"\0")) >= 0:
+        why = "this byte is zero; if the file is UTF-16 without a byte-order mark, save it as UTF-8"
+        raise unreadable(why, path, byte=zero)
+    try:
+        head.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        # The beginning may end within a character.
+        return "utf-8-sig" if error.start >= len(head) - 3 and len(head) == _HEAD else "latin-1"
+    return "utf-8-sig"

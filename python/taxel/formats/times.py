@@ -1,0 +1,201 @@
+"""Times of files: cells of tables as whole us, and one repair of times that repeat, swap, wrap or begin again."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.limits import TIME_US
+from taxel._base.messages import counted
+
+__all__ = ["ISO", "UNITS_US", "Repaired", "is_day", "is_time", "repaired", "us_of"]
+
+#: Times in units of these, us.
+UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
+#: The unit of times that are texts: dates with times, or times of a day.
+ISO = "iso"
+
+_CLOCK = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?"
+_DATE = r"(?:\d{4}-\d\d-\d\d|\d{1,2}\.\d{1,2}\.\d{4})"
+_IS_TIME = re.compile(rf"(?:{_DATE}[T ])?{_CLOCK}(?:Z|[+-]\d\d:?\d\d)?")
+_IS_DAY = re.compile(_DATE)
+_DAY_US = 86_400_000_000
+#: A counter of times that is full begins at 0 again: its values, in the unit of the file.
+_WRAPS = (1 << 16, 1 << 32)
+#: A step over a wrap, or to a line out of order, is at most so many usual ones.
+_NEAR = 64
+#: So many lines one after the other that are earlier than the line before them begin the times again.
+_AGAIN = 3
+
+
+def is_time(cell: str) -> bool:
+    """Return whether a text is a date with a time, or a time of a day.
+
+    Examples
+    --------
+    >>> is_time("2024-05-01T10:00:00.25"), is_time("01.05.2024 10:00:00,25"), is_time("10:00:00"), is_time("10.5")
+    (True, True, True, False)
+    """
+    return _IS_TIME.fullmatch(cell) is not None
+
+
+def is_day(cell: str) -> bool:
+    """Return whether a text is a date without a time."""
+    return _IS_DAY.fullmatch(cell) is not None
+
+
+def us_of(column: Any, unit: str) -> NDArray[Any]:
+    """Return a column of times (a pandas Series) as us; NaN for a cell that is no time, and whole us if all are.
+
+    Parameters
+    ----------
+    column : Series
+    unit : str
+        One of `UNITS_US`, or `ISO`: dates are of UTC where they state no zone; times of a day count from midnight.
+    """
+    import pandas as pd  # noqa: PLC0415  takes long
+
+    if unit == ISO:
+        texts = column.astype(str).str.strip().str.replace(",", ".", regex=False)
+        of_day = texts.str.fullmatch(_CLOCK)
+        if bool(of_day.mean() > 0.5):
+            short = texts.where(texts.str.count(":") != 1, texts + ":00")
+            us = pd.to_timedelta(short, errors="coerce").to_numpy("timedelta64[us]")
+        else:
+            german = bool(texts.str.match(r"\d{1,2}\.\d{1,2}\.\d{4}").mean() > 0.5)
+            stamps = pd.to_datetime(texts, format="mixed", dayfirst=german, utc=True, errors="coerce")
+            us = stamps.dt.tz_localize(None).to_numpy("datetime64[us]")
+        numbers: NDArray[np.int64] = us.astype(np.int64)
+        return np.where(np.isnat(us), np.nan, numbers.astype(np.float64)) if np.isnat(us).any() else numbers
+    values = column.to_numpy()
+    if values.dtype.kind in "iu" and unit in ("us", "ns"):
+        exact: NDArray[np.int64] = values.astype(np.int64)
+        return exact if unit == "us" else exact // 1000
+    times = pd.to_numeric(column, errors="coerce").to_numpy(np.float64) * UNITS_US[unit]
+    sound = np.abs(times) <= TIME_US
+    return np.rint(times).astype(np.int64) if sound.all() else np.where(sound, np.rint(times), np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class Repaired:
+    """Hold times that ascend, the line of each, and what was repaired, a text for each kind of repair."""
+
+    t: NDArray[np.int64]
+    order: NDArray[np.intp] | None
+    said: tuple[str, ...]
+    #: How many times were wrong, of those that repeat apart.
+    wrong: int = 0
+
+
+def repaired(t: NDArray[np.int64], unit_us: float = 1.0, *, of_day: bool = False) -> Repaired:
+    """Return times in us that ascend.
+
+    A counter of 16 or 32 bits that was full, and midnight of times of a day, go on; times that begin again follow one
+    usual step after the line before; lines that were swapped are sorted; single wrong times lie evenly between their
+    neighbours; times that repeat, as rounded ones do, are spread evenly up to the next.
+
+    Parameters
+    ----------
+    t : int64, us
+    unit_us : float, us
+        The unit of the file, for counters that wrap.
+    of_day : bool
+        Whether they are times of a day.
+
+    Examples
+    --------
+    >>> repaired(np.array([0, 10, 10, 30])).t.tolist(), repaired(np.array([65530, 65535, 4, 9])).t.tolist()
+    ([0, 10, 20, 30], [65530, 65535, 65540, 65545])
+    >>> again = repaired(np.array([0, 10, 20, 0, 10, 20]))
+    >>> again.t.tolist(), again.said
+    ([0, 10, 20, 30, 40, 50], ('times begin again 1 time',))
+    """
+    if len(t) < 2 or bool((t[1:] > t[:-1]).all()):
+        return Repaired(t, None, ())
+    t, said = t.copy(), list[str]()
+    steps = np.diff(t)
+    usual = int(np.median(steps[steps > 0])) if (steps > 0).any() else 1
+    turns = [round(turn * unit_us) for turn in _WRAPS] + [_DAY_US] * of_day
+    wraps = restarts = 0
+    for k in (np.flatnonzero(steps < 0) + 1).tolist():
+        if t[k] >= t[k - 1]:
+            continue
+        turn = next((turn for turn in turns if 0 < t[k] + turn - t[k - 1] <= _NEAR * usual), None)
+        if turn is not None and _begins_again(t, k):
+            t[k:] += turn
+            wraps += 1
+        elif _begins_again(t, k):
+            t[k:] += t[k - 1] + usual - t[k]
+            restarts += 1
+    said += [f"times wrap {counted(wraps, 'time')}"] * (wraps > 0)
+    said += [f"times begin again {counted(restarts, 'time')}"] * (restarts > 0)
+    order, wrong = None, 0
+    if (np.diff(t) < 0).any():
+        order, t, swapped, replaced = _in_order(t, usual)
+        said += [f"{counted(swapped, 'line')} out of order, sorted by time"] * (swapped > 0)
+        said += [f"{counted(replaced, 'time')} replaced, which did not fit those around"] * (replaced > 0)
+        wrong = swapped + replaced
+    repeats = int(np.count_nonzero(np.diff(t) == 0))
+    if repeats:
+        t = _spread(t, usual)
+        said.append(f"{counted(repeats, 'time')} repeated, spread evenly")
+    return Repaired(t, order, tuple(said), wrong)
+
+
+def _begins_again(t: NDArray[np.int64], k: int) -> bool:
+    """Return whether times go on from an earlier one, for some lines or to the end; a single line is a swapped one."""
+    after = t[k : k + _AGAIN]
+    to_end = k + len(after) == len(t)
+    from_start = t[k] <= t[0]
+    ascends = bool((np.diff(after) >= 0).all() and (after <= t[k - 1]).all())
+    return ascends and (len(after) == _AGAIN or (to_end and from_start))
+
+
+def _in_order(t: NDArray[np.int64], usual: int) -> tuple[NDArray[np.intp], NDArray[np.int64], int, int]:
+    """Return the order of lines by time, their times, and how many were swapped or had a wrong time."""
+    sound = np.zeros(len(t), bool)
+    sound[_ascending(t.tolist())] = True
+    places = np.flatnonzero(sound)
+    odd = np.flatnonzero(~sound)
+    # A line that was swapped has a time near those around it.
+    near = np.abs(t[odd] - np.interp(odd, places, t[places])) <= _NEAR * usual
+    replaced = odd[~near]
+    t = t.copy()
+    t[replaced] = np.rint(np.interp(replaced, np.setdiff1d(np.arange(len(t)), replaced), np.delete(t, replaced)))
+    order = np.argsort(t, kind="stable")
+    return order, t[order], int(near.sum()), len(replaced)
+
+
+def _ascending(times: Sequence[int]) -> list[int]:
+    """Return the places of the most times that never fall; of several such choices the one of the latest times."""
+    # From the end, as in patience sorting: for each length the place where the best choice of that length begins.
+    begins: list[int] = []
+    falling: list[int] = []
+    after = [-1] * len(times)
+    for k in reversed(range(len(times))):
+        at = bisect_right(falling, -times[k])
+        after[k] = begins[at - 1] if at else -1
+        begins[at : at + 1], falling[at : at + 1] = [k], [-times[k]]
+    chosen = begins[-1:]
+    while chosen and after[chosen[-1]] >= 0:
+        chosen.append(after[chosen[-1]])
+    return chosen
+
+
+def _spread(t: NDArray[np.int64], usual: int) -> NDArray[np.int64]:
+    """Return times in which those that repeat are spread evenly up to the next one."""
+    begins = np.flatnonzero(np.diff(t, prepend=t[0] - 1))
+    counts = np.diff(begins, append=len(t))
+    nexts = np.append(t[begins[1:]], t[-1] + usual * counts[-1])
+    within = np.arange(len(t)) - np.repeat(begins, counts)
+    gaps = np.repeat((nexts - t[begins]) / counts, counts)
+    spread = t + np.floor(within * gaps).astype(np.int64)
+    # Fewer us than lines between two times.
+    steps = np.arange(len(t))
+    return np.maximum.accumulate(spread - steps) + steps

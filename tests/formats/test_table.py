@@ -1,0 +1,426 @@
+"""Tables of other programs open as they look, by one line that says how; the printed layout opens them again."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import re
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from refusal import refused
+
+from taxel import Array, Events, FormatError, Frames
+from taxel._base.errors import Place
+from taxel.formats.layout import Layout
+from taxel.formats.layout_text import of_layout
+from taxel.formats.lines import KINDS, read_line
+from taxel.formats.table import Opened, read_table
+from taxel.formats.times import repaired
+
+
+def opened(folder: Path, text: str | bytes, layout: str | None = None, name: str = "a.csv") -> Opened:
+    """Open a table; the layout that is printed of it, pasted, must give the same."""
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    if layout is not None:
+        return read_table(path, Layout.of_text(folder / "a.layout.toml", layout))
+    found = read_table(path, Layout(path))
+    assert found.said.startswith(f"{name}: read as ")
+    assert "\n" not in found.said
+    again = read_table(path, Layout.of_text(folder / "a.layout.toml", of_layout(found.layout)))
+    assert again.sources == found.sources
+    assert (again.timed, again.said) == (found.timed, "")
+    return found
+
+
+def layouts(folder: Path, text: str, name: str = "a.csv") -> list[str]:
+    """Return the layouts of a table that can be read in several ways; each must open it."""
+    path = folder / name
+    path.write_text(text)
+    with pytest.raises(FormatError) as caught:
+        read_table(path, Layout(path))
+    assert caught.value.place == Place(str(path))
+    printed = str(caught.value).partition("\n")[2]
+    found = [part.partition("\n")[2] for part in re.split(r"(?m)^# \d+\. ", printed)[1:]]
+    for layout in found:
+        opened(folder, text, layout, name)
+    return found
+
+
+def frames(found: Opened, source: str = "") -> tuple[list[int], list[Any]]:
+    table = found.sources[source]
+    assert isinstance(table, Frames)
+    return table.t.tolist(), table.values.reshape(len(table), -1).tolist()
+
+
+JSON_AXES = '{"ts": 0.1, "left": [[1, 2, 30], [4, 5, 60]]}\n{"ts": 0.2, "left": [[1, 2, 31], [4, 5, 61]]}\n'
+SIDES = (
+    "x\n,L::heel,L,,R::heel,R,,\nTime[secs],Force[N],Force[N],Time[secs],Force[N],Force[N],\n"
+    "0.0,1,1,0.0,2,2,,\n0.1,1,1,0.1,-1,-,,\n"
+)
+ROWS: dict[str, tuple[str, list[int], list[list[float]]]] = {
+    "torn": ("t_ms,a,b\n0,1,2\n10,1,2\n20,1,2\n30,5", [0, 10_000, 20_000], [[1, 2]] * 3),
+    "odd": ("t_ms,a,b\n0,1,2\n10,1\n20,1,2\nSensor ready\n30,1,3\n", [0, 20_000, 30_000], [[1, 2], [1, 2], [1, 3]]),
+    "again": (
+        "t_ms,a\n0,1\n10,2\n20,3\nt_ms,a\n0,4\n10,5\n20,6\n",
+        [*range(0, 60_000, 10_000)],
+        [[k] for k in range(1, 7)],
+    ),
+    "brackets": ('t,p\n0.00,"[3, 4, 5, 6]"\n0.01,"[3, 9, 5, 6]"\n', [0, 10_000], [[3, 4, 5, 6], [3, 9, 5, 6]]),
+    "arrow": (
+        "12:30:00.000 -> 3,4,5\n12:30:00.010 -> 3,9,5\n",
+        [45_000_000_000, 45_000_010_000],
+        [[3, 4, 5], [3, 9, 5]],
+    ),
+    "json": ('{"t":0,"p":[3,4,5]}\n{"p":[3,4,6],"t":0.1}\n', [0, 100_000], [[3, 4, 5], [3, 4, 6]]),
+    "names": ("t:0,a:3,b:4\nt:10,a:5,b:6\n", [0, 10_000], [[3, 4], [5, 6]]),
+    "swapped": ("time_ms,a\n0,1\n10,2\n30,4\n20,3\n40,5\n", [*range(0, 50_000, 10_000)], [[1], [2], [3], [4], [5]]),
+    "rounded": ("time_ms,a\n0,1\n10,2\n10,3\n20,4\n", [0, 10_000, 15_000, 20_000], [[1], [2], [3], [4]]),
+    "wrap": ("time_us,a\n4294957296,1\n0,2\n10000,3\n", [4_294_957_296, 4_294_967_296, 4_294_977_296], [[1], [2], [3]]),
+    "16 bits": (
+        "time_ms,a\n65516,1\n65526,2\n0,3\n10,4\n",
+        [65_516_000, 65_526_000, 65_536_000, 65_546_000],
+        [[1], [2], [3], [4]],
+    ),
+    "midnight": (
+        "Uhrzeit,a\n23:59:59.9,1\n00:00:00.0,2\n00:00:00.1,3\n",
+        [86_399_900_000, 86_400_000_000, 86_400_100_000],
+        [[1], [2], [3]],
+    ),
+    "time last": (
+        "5 1624904203.26\n6 1624904203.27\n9 1624904203.28\n",
+        [1_624_904_203_260_000, 1_624_904_203_270_000, 1_624_904_203_280_000],
+        [[5], [6], [9]],
+    ),
+    "rostopic": (
+        "%time,field.header.seq,field.header.stamp,field.data0,field.data1\n"
+        "1600000000000000000,1,1600000000000000001,3,4\n1600000000010000000,2,1600000000010000001,3,5\n",
+        [1_600_000_000_000_000, 1_600_000_000_010_000],
+        [[3, 4], [3, 5]],
+    ),
+    "states": (
+        "time_ms,s0,s1,slipped\n0,3,4,0\n10,3,5,100\n20,3,4,100\n",
+        [0, 10_000, 20_000],
+        [[3, 4], [3, 5], [3, 4]],
+    ),
+    "sides": (SIDES, [0, 100_000], [[1, 1, 2, 2], [1, 1, -1, np.nan]]),
+    "Frame N": (
+        "name\n3\nFrame 0 (0.00 ms),,\n0,1,2\n0,1,3\n,,\nFrame 1 (2.00 ms),,\n0,1,2\n0,1,4\n",
+        [0, 2000],
+        [[0, 1, 2, 0, 1, 3], [0, 1, 2, 0, 1, 4]],
+    ),
+    "empty column": ("t_ms,a,b,c\n0,1,,3\n10,1,,3\n20,2,,4\n", [0, 10_000, 20_000], [[1, 3], [1, 3], [2, 4]]),
+    "German": (
+        "Messung 1\nEinheit;kPa\n\nZeit [s];T1;T2;T3\n0,00;1,5;2;3\n0,01;;4;7\n",
+        [0, 10_000],
+        [[1.5, 2, 3], [np.nan, 4, 7]],
+    ),
+    "German, 1 Hz, one taxel": (
+        "Zeit [s];Kraft [N]\n0;1,5\n1;2,5\n2;3,5\n",
+        [0, 1_000_000, 2_000_000],
+        [[1.5], [2.5], [3.5]],
+    ),
+    "dates": (
+        "Zeit;a;b\n01.05.2024 10:00:00,25;1;2\n01.05.2024 10:00:00,26;3,5;4\n",
+        [1_714_557_600_250_000, 1_714_557_600_260_000],
+        [[1, 2], [3.5, 4]],
+    ),
+    "another unit": ("t [s]\tleft (N)\tright (N)\tA [g]\n0\t1\t2\t.5\n.01\t1\t3\t.5\n", [0, 10_000], [[1, 2], [1, 3]]),
+    "units below": ("time,a,b,c\n[ms],N,N,degC\n0,1,2,20\n10,3,4,20\n", [0, 10_000], [[1, 2], [3, 4]]),
+    "separators at the end": ("t_s,a,b\n0,1,2,\n1,3,4,\n", [0, 1_000_000], [[1, 2], [3, 4]]),
+}
+
+
+@pytest.mark.parametrize("kind", ROWS)
+def test_a_table_opens_without_a_layout(tmp_path: Path, kind: str) -> None:
+    text, t, values = ROWS[kind]
+    found = frames(opened(tmp_path, text))
+    assert found[0] == t
+    np.testing.assert_array_equal(found[1], values)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (ROWS["torn"][0], ["separated by commas", "'t_ms' in ms", "1 line cut off at the end (line 5)"]),
+        (ROWS["odd"][0], ["1 line with too few cells (line 3)", "1 line of text (line 5)"]),
+        (ROWS["rounded"][0], ["1 time repeated, spread evenly"]),
+        (ROWS["swapped"][0], ["1 line out of order, sorted by time"]),
+        (ROWS["wrap"][0], ["times wrap 1 time"]),
+        (ROWS["again"][0], ["times begin again 1 time"]),
+        (ROWS["states"][0], ["slipped left out: labels; label_column = 'slipped' reads them"]),
+        (ROWS["sides"][0], ["unit N", "Time[secs] left out: another time"]),
+        (ROWS["empty column"][0], ["b left out: empty"]),
+        (ROWS["German"][0], ["2 frames of 1 x 3 taxels", "semicolons", "decimal commas", "'Zeit [s]' in s"]),
+        (ROWS["rostopic"][0], ["field.header.seq left out: a counter", "field.header.stamp left out: another time"]),
+        (ROWS["another unit"][0], ["A [g] left out: in g"]),
+    ],
+)
+def test_one_line_says_how_it_was_read_and_what_was_left_out(tmp_path: Path, text: str, words: list[str]) -> None:
+    said = opened(tmp_path, text).said
+    for word in words:
+        assert word in said
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("time,a\n0,1\n1,2\n2,3\n", ["time_unit = ", ""]),
+        ("0,5\n0,7\n0,9\n", ["", 'decimal = ","']),
+        ("7,5,1\n2,9,4\n4,4,2\n", ["", "frame_lines = 3"]),
+        ("01 10 20\n02 11 21\n", ["", 'lines = "hex"']),
+        ("0,0,left,1,2\n5,1,right,8,9\n10,0,left,1,2\n", ["by = 3", "leave_out = [2, 3]"]),
+        ("t_ms,hand,a\n0,1,5\n10,2,7\n20,1,5\n", ['by = "hand"', 'leave_out = ["hand"]']),
+        ("t,l0_x,l0_y,l0_z,l1_x,l1_y,l1_z\n0,1,2,30,4,5,60\n", ['axis = "z"', 'axis = "all"', 'axis = "shear"']),
+        (JSON_AXES, ['axis = "z"', 'axis = "all"', 'axis = "shear"']),
+        ("t_ms,a [N],b [V]\n0,1,2\n10,3,4\n", None),
+        ("t_ms,a [N],b [kPa]\n0,1,2\n10,3,4\n", ['unit = "N"', 'unit = "kPa"']),
+        ("t_ms,a\n" + "0,1\n0,2\n10,3\n10,4\n20,5\n20,6\n30,7\n30,8\n", ["", "frame_lines = 2"]),
+    ],
+)
+def test_two_readings_that_fit_about_equally_are_printed(tmp_path: Path, text: str, expected: list[str] | None) -> None:
+    if expected is None:
+        opened(tmp_path, text)
+        return
+    found = layouts(tmp_path, text)
+    if expected == ["time_unit = ", ""]:
+        assert {'time_unit = "ms"' in layout for layout in found} == {True, False}
+        return
+    assert len(found) == len(expected)
+    for layout, words in zip(found, expected, strict=True):
+        assert words in layout
+
+
+def test_numbers_in_hex_are_decimals_of_no_reading(tmp_path: Path) -> None:
+    first, second = layouts(tmp_path, "01 1E 0A\n02 1F 0B\n")
+    assert frames(opened(tmp_path, "01 1E 0A\n02 1F 0B\n", first))[1] == [[1, 30, 10], [2, 31, 11]]
+    assert frames(opened(tmp_path, "01 1E 0A\n02 1F 0B\n", second))[1] == [[1, 30, 10, 2, 31, 11]]
+    # A letter far below decides for all lines.
+    late = "01 10 20\n" * 40_000 + "02 1F 0B\n"
+    assert all('lines = "hex"' in layout for layout in layouts(tmp_path, late))
+
+
+def test_rows_of_one_frame_are_asked(tmp_path: Path) -> None:
+    matrix = np.random.default_rng(1).integers(0, 255, (28, 56))
+    np.savetxt(tmp_path / "m.csv", matrix, "%03d", ",")
+    text = (tmp_path / "m.csv").read_text()
+    each, together = layouts(tmp_path, text)
+    assert frames(opened(tmp_path, text, each))[1] == matrix.tolist()
+    one = opened(tmp_path, text, together).sources[""]
+    assert isinstance(one, Frames)
+    assert one.values.tolist() == [matrix.tolist()]
+
+
+AXES = {"x": [[1, 4]], "y": [[2, 5]], "z": [[30, 60]], "shear": [[np.hypot(1, 2), np.hypot(4, 5)]]}
+
+
+@pytest.mark.parametrize("axis", [*AXES, "all"])
+def test_one_axis_of_taxels_with_three_or_each_as_a_source(tmp_path: Path, axis: str) -> None:
+    text = "t,l0_x,l0_y,l0_z,l1_x,l1_y,l1_z\n0,1,2,30,4,5,60\n"
+    found = opened(tmp_path, text, f'axis = "{axis}"\n[table]\ntime_column = "t"\n')
+    assert list(found.sources) == (["x", "y", "z"] if axis == "all" else [""])
+    for name in found.sources:
+        np.testing.assert_allclose(frames(found, name)[1], AXES[name or axis])
+        assert found.sources[name].array.names == ("l0", "l1")
+
+
+def test_columns_of_a_pattern_are_kept(tmp_path: Path) -> None:
+    found = opened(tmp_path, "t,l0_x,l0_z,l1_z\n0,1,30,60\n", '[table]\ntime_column = "t"\nkeep = "l*_z"\n')
+    assert frames(found) == ([0], [[30, 60]])
+    assert found.lost == ("columns that are not taxels: l0_x",)
+
+
+def test_a_column_splits_lines_into_sources(tmp_path: Path) -> None:
+    text = "0,0,left,1,2\n5,1,right,8,9\n10,0,left,1,3\n"
+    found = opened(tmp_path, text, '[table]\ntime_column = 1\ntime_unit = "ms"\nby = 3\nleave_out = [2]\n')
+    assert frames(found, "left") == ([0, 10_000], [[1, 2], [1, 3]])
+    assert frames(found, "right") == ([5000], [[8, 9]])
+
+
+def test_a_column_becomes_labels_where_its_value_changes(tmp_path: Path) -> None:
+    text = "t_ms,a,slipped,phase\n0,3,0,rest\n10,4,0,touch\n20,5,1,touch\n30,5,0,\n"
+    for column, labels in (
+        ("slipped", (("slipped 1", 20_000), ("slipped 0", 30_000))),
+        ("phase", (("touch", 10_000),)),
+    ):
+        other = ({"slipped", "phase"} - {column}).pop()
+        layout = f'[table]\ntime_column = 1\ntime_unit = "ms"\nlabel_column = "{column}"\nleave_out = ["{other}"]\n'
+        found = opened(tmp_path, text, layout)
+        assert found.labels == labels
+        assert frames(found)[1] == [[3], [4], [5], [5]]
+
+
+@pytest.mark.parametrize(
+    ("text", "layout", "line"),
+    [
+        ("t_ms,a,b\n0,1,2\n10\n20\n30\n40,1,2\n50,1,3\n60,1,3\n", None, 3),
+        ("t_ms,a\n0,1\n10,x\n20,y\n30,z\n40,1\n", "[table]\ntime_column = 1\n", 3),
+        ("a,b\n1,2\n", "[table]\ncolumns = ['a', 'b', 'c']", 1),
+        ("a b c\nd e f\n", None, None),
+        ("", None, None),
+        ("1,2\n3,4\n", "[table]\nskip_lines = 9", None),
+        ("1,2\n3,4\n", "[table]\ntime_column = 3", None),
+        ("t,a\n0,1\n", "[table]\nleave_out = ['b']", None),
+        ("t,a\n0,1\n", "[table]\nseparator = ';'", 1),
+        ("time,a\n0,1\n1,2\n", "[table]\nlines = 'plain'", 1),
+        ("t_s,a\n0,1e39\n1,2\n", None, 2),
+        ("t_s,a\n0,1\n9e99,2\n", None, None),
+        ("1,2\n3,4\n\n5,6\n", "[table]\nframe_lines = 3", 4),
+    ],
+)
+def test_what_is_no_table_or_another_one_than_its_layout_says_is_refused(
+    tmp_path: Path, text: str, layout: str | None, line: int | None
+) -> None:
+    with refused(FormatError, place=Place("a.csv", line)):
+        opened(tmp_path, text, layout)
+
+
+def test_half_a_frame_is_never_read(tmp_path: Path) -> None:
+    text = "".join(f"Frame {k} ({k} ms)\n1 2\n3 {k}\n" for k in range(30))
+    found = opened(tmp_path, text.replace("3 5\n", "3\n") + "Frame 30 (30 ms)\n1 2\n")
+    assert "2 frames left out: not 2 lines" in found.said
+    assert frames(found)[0] == [1000 * k for k in range(30) if k != 5]
+    assert frames(found)[1] == [[1, 2, 3, k] for k in range(30) if k != 5]
+
+
+@pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "latin-1", "utf-16"])
+@pytest.mark.parametrize("name", ["a.csv", "a.txt.gz"])
+def test_a_table_in_any_usual_encoding(tmp_path: Path, code: str, name: str) -> None:
+    rows = "".join(f"{k / 100:.2f}\t{k % 7}\t{k % 5 / 4}\n".replace(".", ",") for k in range(30))
+    content = f"Zeit [s]\tFerse [N]\tMittelfuß [N]\n{rows}".encode(code)
+    found = opened(tmp_path, gzip.compress(content) if name.endswith(".gz") else content, name=name)
+    assert frames(found) == ([10_000 * k for k in range(30)], [[k % 7, k % 5 / 4] for k in range(30)])
+    assert (found.layout.unit, found.sources[""].array.names) == ("N", ("Ferse [N]", "Mittelfuß [N]"))
+
+
+def test_a_letter_in_latin_1_far_below(tmp_path: Path) -> None:
+    rows = "".join(f"{k},{k % 9},ok\n" for k in range(0, 200_000, 10))
+    found = opened(tmp_path, f"t_ms,a,note\n{rows}200000,3,müde\n".encode("latin-1"))
+    assert len(found.sources[""]) == 20_001
+
+
+@pytest.mark.parametrize("code", ["utf-16-le", "utf-16-be"])
+def test_utf_16_without_its_mark_and_damaged_gzip_are_refused(tmp_path: Path, code: str) -> None:
+    with refused(FormatError, place=Place("a.csv", byte=0 if code.endswith("be") else 1)):
+        opened(tmp_path, "time,a\n0,1\n".encode(code))
+    with refused(FormatError, place=Place("b.csv.gz")):
+        opened(tmp_path, gzip.compress(b"t_s,a\n" + b"0,1\n" * 9999)[:40], name="b.csv.gz")
+
+
+@pytest.mark.parametrize("ending", [".xlsx", ".parquet"])
+@pytest.mark.parametrize("dates", [False, True])
+def test_spreadsheets_and_parquet_open(tmp_path: Path, ending: str, dates: bool) -> None:
+    begin = datetime(2024, 5, 1, 10, 0, 0)
+    times = [begin + timedelta(milliseconds=10 * k) if dates else k / 100 for k in range(12)]
+    table = pd.DataFrame({"time": times, "Ferse [N]": np.arange(12) / 4, "b [N]": range(12), "note": "ok"})
+    pytest.importorskip({".xlsx": "openpyxl", ".parquet": "pyarrow"}[ending])
+    path = tmp_path / f"a{ending}"
+    table.to_excel(path, index=False) if ending == ".xlsx" else table.to_parquet(path)
+    found = read_table(path, Layout(path))
+    t, values = frames(found)
+    assert np.diff(t).tolist() == [10_000] * 11
+    assert t[0] == (1_714_557_600_000_000 if dates else 0)
+    assert values == [[k / 4, k] for k in range(12)]
+    assert "note left out: texts" in found.said
+    again = read_table(path, Layout.of_text(tmp_path / "a.layout.toml", of_layout(found.layout)))
+    assert again.sources == found.sources
+
+
+def test_a_table_of_events_opens_as_events(tmp_path: Path) -> None:
+    found = opened(tmp_path, "x,y,p,t_us\n1,2,1,10\n3,4,0,10\n5,6,1,30\n")
+    expected = Events([10, 10, 30], [1, 3, 5], [2, 4, 6], [True, False, True], array=Array.thesis())
+    assert found.sources == {"": expected}
+
+
+NUMBERS = st.floats(-1e6, 1e6, width=32).map(lambda value: round(value, 3))
+WRITERS: dict[str, Callable[[list[str], list[float], list[list[float]]], str]] = {
+    "json": lambda names, t, rows: "".join(
+        json.dumps({"t": a, "p": row} if len(row) > 1 else {"t": a, names[0]: row[0]}) + "\n"
+        for a, row in zip(t, rows, strict=True)
+    ),
+    "brackets": lambda names, t, rows: "".join(f"{a} -> {row}\n" for a, row in zip(t, rows, strict=True)),
+    "names": lambda names, t, rows: "".join(
+        f"t:{a} " + " ".join(f"{name}={value}" for name, value in zip(names, row, strict=True)) + "\n"
+        for a, row in zip(t, rows, strict=True)
+    ),
+}
+
+
+@given(
+    data=st.data(),
+    form=st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), *WRITERS]),
+    taxels=st.integers(1, 6),
+    count=st.integers(8, 30),
+    step_ms=st.sampled_from([5, 10, 20, 100]),
+    unit=st.sampled_from(["s", "ms"]),
+    odd=st.sampled_from(["", "Sensor ready", "again", "torn"]),
+    code=st.sampled_from(["utf-8", "utf-16", "latin-1"]),
+)
+def test_what_was_written_is_read_and_the_printed_layout_reads_it_again(
+    tmp_path_factory: pytest.TempPathFactory,
+    data: st.DataObject,
+    form: Any,
+    taxels: int,
+    count: int,
+    step_ms: int,
+    unit: str,
+    odd: str,
+    code: str,
+) -> None:
+    rows = data.draw(st.lists(st.lists(NUMBERS, min_size=taxels, max_size=taxels), min_size=count, max_size=count))
+    t = [step_ms * k / (1000 if unit == "s" else 1) for k in range(count)]
+    names = [f"Zehe{k}ß" for k in range(taxels)]
+    if isinstance(form, str):
+        head, lines = "", WRITERS[form](names, t, rows).splitlines()
+    else:
+        separator, decimal = form
+        head = separator.join([f"Zeit [{unit}]", *names]) + "\n"
+        lines = [
+            separator.join(f"{v}".replace(".", decimal) for v in (a, *row)) for a, row in zip(t, rows, strict=True)
+        ]
+    if odd:
+        at = data.draw(st.integers(2, count - 1))
+        lines.insert(at, head.rstrip("\n") or odd if odd == "again" else odd)
+        lines = [*lines[:at], *lines[at + 1 :], lines[0][:1]] if odd == "torn" else lines
+    text = (head + "\n".join(lines) + "\n" * (odd != "torn")).encode(code)
+    found = opened(tmp_path_factory.mktemp("drawn"), text)
+    times, values = frames(found)
+    assert times == [1000 * step_ms * k for k in range(count)]
+    np.testing.assert_array_equal(values, np.array(rows, np.float32))
+
+
+@given(
+    steps=st.lists(st.integers(1, 1000), min_size=3, max_size=40),
+    begin=st.integers(0, 2**32),
+    bits=st.sampled_from([16, 32]),
+)
+def test_a_counter_that_was_full_goes_on(steps: list[int], begin: int, bits: int) -> None:
+    steps = [max(steps)] * len(steps)
+    t = begin % 2**bits + np.cumsum([0, *steps])
+    found = repaired(t % 2**bits)
+    assert (found.t - t).tolist() == [0] * len(t)
+
+
+@given(t=st.lists(st.integers(-(2**40), 2**40), max_size=30))
+def test_repaired_times_ascend_and_sound_ones_stay(t: list[int]) -> None:
+    times = np.array(t, np.int64)
+    found = repaired(times)
+    assert (np.diff(found.t) > 0).all()
+    assert len(found.t) == len(t)
+    ascending = np.unique(times)
+    assert repaired(ascending).t.tolist() == ascending.tolist()
+    assert repaired(ascending).said == ()
+
+
+@given(line=st.text(max_size=60), kind=st.sampled_from(KINDS), decimal=st.sampled_from(".,"))
+def test_any_line_has_cells_with_a_name_each_or_is_none(line: str, kind: str, decimal: str) -> None:
+    found = read_line(line, kind, ";", decimal)
+    assert found is None or len(found.cells) == len(found.names)
