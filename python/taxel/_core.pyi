@@ -179,7 +179,7 @@ def neuron_potential(
     spikes: NDArray[np.float64],
 ) -> NDArray[np.float64]: ...
 
-# metrics: a metric as JSON; patterns as (name, count, trains, times, offsets, window, listed)
+# metrics: a metric as JSON; patterns as (name, count, trains, times, offsets, listed)
 
 _Patterns = tuple[str, int, int, NDArray[np.float64], NDArray[np.int64], bool]
 
@@ -194,7 +194,6 @@ def pairwise(
     a: _Patterns,
     b: _Patterns | None,
     threads: int | None,
-    vectors: str | None,
     progress: Callable[[int, int], object] | None,
 ) -> NDArray[np.float64]: ...
 

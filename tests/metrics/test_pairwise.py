@@ -1,4 +1,4 @@
-"""Matrices: each entry is its function's value, whatever the threads, the instructions and the order."""
+"""Matrices: each entry is its function's value, whatever the threads and the order."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ from drawing import pattern, poisson
 from refusal import refused
 
 import taxel.metrics
-from taxel import Array, ProblemError, SpikeTrains, _core
+from taxel import Array, SpikeTrains
 from taxel.metrics import pairwise
-from taxel.metrics._metric import listed, stated
 
 ARRAY = Array(2, 3, pitch_mm=1.0)
 METRICS = {
@@ -49,26 +48,8 @@ def test_threads_change_no_bit(metric):
         assert np.array_equal(pairwise(metric, a, threads=threads, **METRICS[metric]), one)
 
 
-@pytest.mark.parametrize("vectors", ["avx2", "avx512"])
-@pytest.mark.parametrize("q", [0.003, 0.05, 2.0])
-def test_lanes_give_the_bits_of_one_pair_after_the_other(vectors, q):
-    random = np.random.default_rng(17)
-    trains = [t for spikes in (0.3, 5, 40, 41, 200) for t in poisson(random, 15, spikes)]
-    trains += [trains[20], np.repeat(trains[30], 2), np.round(trains[40]), np.round(trains[41])]
-    a, b = (listed("victor_purpura", name, of) for name, of in (("a", trains), ("b", trains[3:40])))
-    metric = stated("victor_purpura", {"q": q})
-    try:
-        wide = [_core.pairwise(metric, a, other, 1, vectors, None) for other in (None, b)]
-    except ProblemError as error:
-        pytest.skip(str(error))
-    plain = [_core.pairwise(metric, a, other, 1, "plain", None) for other in (None, b)]
-    assert np.array_equal(wide[0], plain[0])
-    assert np.array_equal(wide[1], plain[1])
-    assert wide[0].reshape(79, 79)[0, 5] == taxel.metrics.victor_purpura(trains[0], trains[5], q=q)
-
-
 @pytest.mark.parametrize("tau", [0.05, 0.4, 20.0, 5000.0])
-def test_stored_exponentials_give_the_value_of_one_pair(tau):
+def test_a_matrix_of_van_rossum_gives_the_value_of_one_pair(tau):
     """Trains of many spikes and of none, of other lengths, long beside tau, equal ones, near ones, with ties."""
     random = np.random.default_rng(23)
     trains = [t for spikes in (0.3, 5, 60) for t in poisson(random, 8, spikes, stop=700.0)]
@@ -79,30 +60,6 @@ def test_stored_exponentials_give_the_value_of_one_pair(tau):
     assert found[12, 24] == 0
     across = pairwise("van_rossum", trains[:7], trains[5:], tau=tau)
     assert np.allclose(across, np.asarray(expected)[:7, 5:], rtol=1e-9, atol=0)
-
-
-@pytest.mark.parametrize("tau", [0.05, 0.4, 20.0])
-@pytest.mark.parametrize("exists", [None, np.array([[True, True, False], [True, False, True]])])
-def test_a_spatial_matrix_gives_the_value_of_one_pair(tau, exists):
-    array = Array(2, 3, pitch_mm=1.0, exists=exists)
-    patterns = several(5, 40, 12.0)
-    if exists is not None:
-        patterns = [
-            SpikeTrains.from_lists([t if e else [] for t, e in zip(x, exists.ravel(), strict=True)], 0.0, 100.0)
-            for x in patterns
-        ]
-    patterns = [*patterns, patterns[3], SpikeTrains.from_lists([np.round(t) for t in patterns[4]], 0.0, 100.0)]
-    layered = [
-        SpikeTrains.from_lists([*x, *y], 0.0, 100.0) for x, y in zip(patterns, patterns[1:] + patterns[:1], strict=True)
-    ]
-    for several_layers in (patterns, layered):
-        found = pairwise("van_rossum_spatial", several_layers, array=array, tau=tau)
-        for i, j in ((0, 1), (3, 40), (4, 41), (17, 33), (39, 2)):
-            x, y = several_layers[i], several_layers[j]
-            expected = taxel.metrics.van_rossum_spatial(x, y, array=array, tau=tau)
-            assert found[i, j] == pytest.approx(expected, rel=1e-9, abs=0)
-        across = pairwise("van_rossum_spatial", several_layers[:20], several_layers[10:], array=array, tau=tau)
-        assert np.allclose(across, found[:20, 10:], rtol=1e-9, atol=0)
 
 
 def test_trains_may_stand_alone_in_lists_or_in_spike_trains():

@@ -4,81 +4,60 @@
 //! matrices. A distance between trains is extended to patterns as the sum over trains with the same number; the metric
 //! with `spatial` in its name uses other trains as well.
 
-mod distance;
 pub mod matching;
 mod merged;
-mod pairwise;
 mod patterns;
-mod stored;
+mod van_rossum;
+mod van_rossum_spatial;
+mod victor_purpura;
+mod work;
 
-use serde::{Deserialize, Serialize};
+use std::sync::atomic::Ordering::Relaxed;
+
+use rayon::prelude::*;
 use serde_json::{Map, Value};
 
-pub use pairwise::Work;
 pub use patterns::Patterns;
-pub use van_rossum::Normalisation;
-pub use van_rossum_spatial::{OwnTrain, Smoothing};
+pub use van_rossum::{Normalisation, VanRossum};
+pub use van_rossum_spatial::{OwnTrain, VanRossumSpatial};
+pub use victor_purpura::VictorPurpura;
+pub use work::Work;
 
-use distance::{Distance, Ready};
-use pairwise::DistanceMatrix;
+use patterns::{Pattern, Two};
+use work::Running;
 
 use crate::parameters::Described;
-use crate::reading::{self, Unfit};
-use crate::{Result, Stop, problem};
+use crate::{Error, Result, Stop, problem, reading};
 
-/// The registry: one line for each metric, `NAME: Kind`, with its file `metrics/NAME.rs` and `NAME` as its name in
-/// JSON.
-macro_rules! metrics {
-    ($($(#[$about:meta])* $name:ident: $Kind:ident,)*) => {
-        $(mod $name;)*
-        $(pub use $name::$Kind;)*
+/// The names of all metrics in JSON; each has its file `metrics/NAME.rs`.
+pub const NAMES: [&str; 3] = ["victor_purpura", "van_rossum", "van_rossum_spatial"];
 
-        /// A metric with its parameters.
-        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-        #[serde(tag = "name", rename_all = "snake_case")]
-        pub enum Metric {
-            $($(#[$about])* $Kind($Kind),)*
-        }
-
-        /// The names of all metrics in JSON.
-        pub const NAMES: &[&str] = &[$(stringify!($name)),*];
-
-        impl Metric {
-            fn kind(&self) -> &dyn Distance {
-                match self { $(Self::$Kind(metric) => metric,)* }
-            }
-
-            /// Reads the parameters of the metric with this name; `None` if there is no such metric.
-            fn read(name: &str, parameters: Value) -> Option<std::result::Result<Self, Unfit>> {
-                $(if name == stringify!($name) {
-                    return Some(reading::from_value(parameters).map(Self::$Kind));
-                })*
-                None
-            }
-
-            /// The parameters of a metric with their defaults and ranges, by the metric's name.
-            #[must_use]
-            pub fn described(name: &str) -> Option<Described> {
-                $(if name == stringify!($name) {
-                    return Some($Kind::described());
-                })*
-                None
-            }
-        }
-    };
-}
-
-// Rustfmt does not find modules declared in a macro, so the Makefile lists their files for it.
-metrics! {
+/// A metric with its parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Metric {
     /// The least cost of turning one train into the other.
-    victor_purpura: VictorPurpura,
+    VictorPurpura(VictorPurpura),
     /// Euclidean distance between trains smoothed by an exponential.
-    van_rossum: VanRossum,
+    VanRossum(VanRossum),
     /// Euclidean distance between patterns smoothed in time and over the array.
-    van_rossum_spatial: VanRossumSpatial,
+    VanRossumSpatial(VanRossumSpatial),
 }
+
+/// The distance between two patterns, with what all pairs share computed.
+type Between<'m> = Box<dyn Fn(Pattern<'_>, Pattern<'_>, Stop<'_>) -> Result<f64> + Sync + 'm>;
 
 impl Metric {
+    /// The parameters of a metric with their defaults and ranges, by the metric's name.
+    #[must_use]
+    pub fn described(name: &str) -> Option<Described> {
+        match name {
+            "victor_purpura" => Some(VictorPurpura::described()),
+            "van_rossum" => Some(VanRossum::described()),
+            "van_rossum_spatial" => Some(VanRossumSpatial::described()),
+            _ => None,
+        }
+    }
+
     /// Reads a metric from JSON: an object with the metric's `name`.
     ///
     /// # Errors
@@ -88,19 +67,17 @@ impl Metric {
         let mut parameters: Map<String, Value> = reading::from_text(json).map_err(|unfit| unfit.problem("metric"))?;
         let name = parameters.remove("name").unwrap_or_default();
         let name = name.as_str().unwrap_or_default();
-        let Some(Described { defaults, required, .. }) = Self::described(name) else {
-            let names: Vec<String> = NAMES.iter().map(|name| format!("'{name}'")).collect();
-            return Err(problem!("metric"; " is '{name}': must be one of {}", names.join(", ")));
-        };
-        // A metric may contain the parameters of another type, whose reader ignores unknown keys, so all keys are
-        // checked here.
-        let known: Vec<&str> = required.iter().copied().chain(defaults.keys().map(String::as_str)).collect();
-        if let Some(unknown) = parameters.keys().find(|key| !known.contains(&key.as_str())) {
-            return Err(problem!(unknown.as_str(); " is not known: the parameters of {name} are {}", known.join(", ")));
+        let parameters = Value::from(parameters);
+        match name {
+            "victor_purpura" => reading::from_value(parameters).map(Self::VictorPurpura),
+            "van_rossum" => reading::from_value(parameters).map(Self::VanRossum),
+            "van_rossum_spatial" => reading::from_value(parameters).map(Self::VanRossumSpatial),
+            _ => {
+                let names = NAMES.map(|name| format!("'{name}'")).join(", ");
+                return Err(problem!("metric"; " is '{name}': must be one of {names}"));
+            }
         }
-        Self::read(name, parameters.into())
-            .ok_or_else(|| problem!("metric {name}: cannot be read"))?
-            .map_err(|unfit| unfit.problem(name))
+        .map_err(|unfit| unfit.problem(name))
     }
 
     /// Checks every parameter.
@@ -109,7 +86,11 @@ impl Metric {
     ///
     /// `Problem`, naming the parameter.
     pub fn check(&self) -> Result<()> {
-        self.kind().check()
+        match self {
+            Self::VictorPurpura(metric) => metric.check(),
+            Self::VanRossum(metric) => metric.check(),
+            Self::VanRossumSpatial(metric) => metric.check(),
+        }
     }
 
     /// The distance between two patterns (the first of each side).
@@ -118,39 +99,69 @@ impl Metric {
     ///
     /// `Problem` for parameters or times that are not valid, or different numbers of trains; `Interrupted`.
     pub fn distance(&self, a: &Patterns<'_>, b: &Patterns<'_>, stop: Stop<'_>) -> Result<f64> {
-        self.prepare(a, Some(b))?.between((a, 0), (b, 0), stop)
+        self.prepare(&Two::new(a, Some(b)))?((a, 0), (b, 0), stop)
     }
 
     /// The distances of all patterns of `a` to all of `b`, row by row; without `b`, among the patterns of `a`.
     ///
     /// # Errors
     ///
-    /// Those of [`Self::distance`].
+    /// Those of [`Self::distance`]; `Problem` if the threads cannot be started.
     pub fn pairwise(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<Vec<f64>> {
-        let ready = self.prepare(a, b)?;
-        let matrix = DistanceMatrix::new(a.count, b.map(|b| b.count));
-        if !ready.fill(&matrix, a, b, work)? {
-            matrix.each_pair(work, |i, j, stop| ready.between((a, i), (b.unwrap_or(a), j), stop))?;
-        }
-        Ok(matrix.finish())
+        let two = Two::new(a, b);
+        let between = self.prepare(&two)?;
+        let mut distances = work.run(two.pairs(), |running| match self {
+            Self::VanRossum(metric) => metric.matrix(&two, running),
+            _ => pair_by_pair(&between, &two, running),
+        })?;
+        two.mirror(&mut distances);
+        Ok(distances)
     }
 
     /// Checks parameters and patterns, and computes what all pairs share.
-    fn prepare(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + '_>> {
+    fn prepare(&self, two: &Two<'_>) -> Result<Between<'_>> {
         self.check()?;
-        a.check()?;
-        if let Some(b) = b {
-            b.check()?;
-            if b.trains != a.trains {
-                return Err(problem!(
-                    "{} has {} trains, {} has {}: must be equally many",
-                    a.name,
-                    a.trains,
-                    b.name,
-                    b.trains
-                ));
+        two.check()?;
+        Ok(match self {
+            Self::VictorPurpura(metric) => {
+                Box::new(|a, b, stop| sum_over_trains(a, b, stop, |a, b| metric.between(a, b, stop)))
             }
-        }
-        self.kind().ready(a, b)
+            Self::VanRossum(metric) => {
+                Box::new(|a, b, stop| sum_over_trains(a, b, stop, |a, b| Ok(metric.between(a, b))))
+            }
+            Self::VanRossumSpatial(metric) => {
+                let kernel = metric.kernel(two)?;
+                Box::new(move |a, b, stop| metric.between(&kernel, a, b, stop))
+            }
+        })
     }
+}
+
+/// A matrix, one pair after the other.
+fn pair_by_pair(between: &Between<'_>, two: &Two<'_>, running: &Running<'_>) -> Result<Vec<f64>> {
+    let mut distances = two.zeros();
+    distances.par_chunks_mut(two.width()).enumerate().try_for_each(|(i, row)| {
+        for (j, cell) in row.iter_mut().enumerate().skip(two.first(i)) {
+            running.stop.check()?;
+            *cell = between((two.rows, i), (two.columns, j), running.stop)?;
+            running.done.fetch_add(1, Relaxed);
+        }
+        Ok::<(), Error>(())
+    })?;
+    Ok(distances)
+}
+
+/// The sum over trains of a distance between trains.
+fn sum_over_trains(
+    (a, p): Pattern<'_>,
+    (b, q): Pattern<'_>,
+    stop: Stop<'_>,
+    between: impl Fn(&[f64], &[f64]) -> Result<f64>,
+) -> Result<f64> {
+    let mut sum = 0.0;
+    for n in 0..a.trains {
+        stop.check()?;
+        sum += between(a.train(p, n), b.train(q, n))?;
+    }
+    Ok(sum)
 }

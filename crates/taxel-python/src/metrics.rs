@@ -5,8 +5,6 @@ use std::num::NonZero;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::metrics::{Metric, NAMES, Patterns, Work, matching};
-use taxel_core::problem;
-use taxel_core::vectors::Instructions;
 
 use taxel_border::convert::{array, slice};
 use taxel_border::enter::{enter, enter_with_progress};
@@ -78,15 +76,6 @@ pub fn distance<'py>(py: Python<'py>, metric: &str, a: PatternsIn<'py>, b: Patte
     enter(py, |stop| metric.distance(&a, &b, stop))
 }
 
-/// Vector instructions by their names; the widest that may be used where none is named.
-fn to_instructions(name: Option<&str>) -> PyResult<Instructions> {
-    let Some(name) = name else { return Ok(Instructions::best()) };
-    let names = Instructions::ALL.map(Instructions::name).join(", ");
-    let named =
-        Instructions::named(name).ok_or_else(|| core(problem!("vectors is {name:?}: must be one of {names}")))?;
-    named.checked().map_err(core)
-}
-
 /// The distances of all patterns from all others, row by row.
 #[pyfunction]
 pub fn pairwise<'py>(
@@ -95,19 +84,15 @@ pub fn pairwise<'py>(
     a: PatternsIn<'py>,
     b: Option<PatternsIn<'py>>,
     threads: Option<NonZero<usize>>,
-    vectors: Option<&str>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (metric, a, b) = (to_metric(metric)?, OffsetPatterns::new(a)?, b.map(OffsetPatterns::new).transpose()?);
     let (a, b) = (a.patterns()?, b.as_ref().map(OffsetPatterns::patterns).transpose()?);
-    let instructions = to_instructions(vectors)?;
     let distances = enter_with_progress(py, |stop, caller| {
         let mut report = |done: usize, all: usize| {
             caller.call(progress.as_ref(), |py, function| function.call1(py, (done, all)));
         };
-        let mut work = Work::new(threads, stop, &mut report);
-        work.instructions = instructions;
-        metric.pairwise(&a, b.as_ref(), &mut work)
+        metric.pairwise(&a, b.as_ref(), &mut Work { threads, stop, progress: &mut report })
     })?;
     Ok(array(py, distances))
 }

@@ -60,5 +60,5 @@ def pairwise(
     count = None if threads is None else integer("threads", threads, 1, 4096)
     if progress is not None:
         callback("progress", progress)
-    distances = _core.pairwise(stating, rows, columns, count, None, progress)
+    distances = _core.pairwise(stating, rows, columns, count, progress)
     return distances.reshape(rows[1], (rows if columns is None else columns)[1])

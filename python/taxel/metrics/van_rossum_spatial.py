@@ -54,8 +54,7 @@ def van_rossum_spatial(
     Notes
     -----
     Thesis 5.8 to 5.12. *Reading*: 5.12 prints ``sum over n of sqrt(g_n(a) - g_n(b))``, without time or square; this is
-    the Euclidean norm over taxels and time that its left side denotes. Time O(spikes x taxels); `pairwise` is much
-    faster.
+    the Euclidean norm over taxels and time that its left side denotes. Time O(spikes x taxels).
 
     Examples
     --------

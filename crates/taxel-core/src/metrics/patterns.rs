@@ -70,3 +70,70 @@ impl Patterns<'_> {
         problem!("{name}, spike {}: {} ms comes after {} ms; times must ascend", k + 1, train[k + 1], train[k])
     }
 }
+
+/// One of several patterns, by its index.
+pub(super) type Pattern<'p> = (&'p Patterns<'p>, usize);
+
+/// The patterns of a matrix: its rows and its columns.
+pub(super) struct Two<'p> {
+    pub(super) rows: &'p Patterns<'p>,
+    pub(super) columns: &'p Patterns<'p>,
+    /// Whether rows and columns are the same patterns: then only cells above the diagonal are computed, and mirrored.
+    pub(super) symmetric: bool,
+}
+
+impl<'p> Two<'p> {
+    /// The patterns `a` against `b`, or against each other.
+    pub(super) fn new(a: &'p Patterns<'p>, b: Option<&'p Patterns<'p>>) -> Self {
+        Self { rows: a, columns: b.unwrap_or(a), symmetric: b.is_none() }
+    }
+
+    /// Checks both sides, and that their patterns have equally many trains.
+    pub(super) fn check(&self) -> Result<()> {
+        self.rows.check()?;
+        self.columns.check()?;
+        let (a, b) = (self.rows, self.columns);
+        if b.trains != a.trains {
+            return Err(problem!(
+                "{} has {} trains, {} has {}: must be equally many",
+                a.name,
+                a.trains,
+                b.name,
+                b.trains
+            ));
+        }
+        Ok(())
+    }
+
+    /// The number of pairs, without mirrored ones and the diagonal.
+    pub(super) fn pairs(&self) -> usize {
+        let (rows, columns) = (self.rows.count, self.columns.count);
+        if self.symmetric { rows * rows.saturating_sub(1) / 2 } else { rows * columns }
+    }
+
+    /// The first column of row `i` to be computed.
+    pub(super) fn first(&self, i: usize) -> usize {
+        if self.symmetric { i + 1 } else { 0 }
+    }
+
+    /// The number of cells in a row, at least 1 so that a matrix can be divided into rows.
+    pub(super) fn width(&self) -> usize {
+        self.columns.count.max(1)
+    }
+
+    /// A matrix of zeros.
+    pub(super) fn zeros(&self) -> Vec<f64> {
+        vec![0.0; self.rows.count * self.columns.count]
+    }
+
+    /// Copies what is above the diagonal below it.
+    pub(super) fn mirror(&self, distances: &mut [f64]) {
+        if self.symmetric {
+            for i in 0..self.rows.count {
+                for j in 0..i {
+                    distances[i * self.width() + j] = distances[j * self.width() + i];
+                }
+            }
+        }
+    }
+}

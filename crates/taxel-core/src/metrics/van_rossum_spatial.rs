@@ -1,23 +1,23 @@
 //! The thesis' distance between patterns of an array: smoothed by an exponential in time and in the distance of taxels.
 
-mod matrix;
-
 use serde::{Deserialize, Serialize};
 
-use super::distance::{Distance, Pattern, Ready};
-use super::patterns::Patterns;
+use super::merged::merge_spikes;
+use super::patterns::{Pattern, Two};
 use super::van_rossum::Normalisation;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Array, Result, Stop, problem};
 
-/// Smoothing in time and over the array (5.8, 5.11).
+/// The Euclidean distance between two patterns smoothed in time and over the array: 5.12 as the norm that 5.10 names.
 ///
-/// `g_m = f_m + sum over n of f_n exp(-d_mn / sigma)`, where `f_n` is train n smoothed as in 5.8 and `d_mn` the
+/// `g_m = f_m + sum over n of f_n exp(-d_mn / sigma)` (5.11), where `f_n` is train n smoothed as in 5.8 and `d_mn` the
 /// distance of taxels m and n. Train n belongs to taxel n of the array; with several layers of trains (ON and OFF) each
-/// is smoothed alone.
+/// is smoothed alone. The distance is the root of the sum over taxels of the integral over all time of
+/// `(g_m(a) - g_m(b))^2`, in closed form: between spikes all differences are one exponential. Time O(spikes x taxels).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Smoothing {
+#[serde(deny_unknown_fields)]
+pub struct VanRossumSpatial {
     /// Time constant, ms; 0.4 in the thesis.
     #[serde(default = "thesis_tau")]
     pub tau: f64,
@@ -29,6 +29,9 @@ pub struct Smoothing {
     /// The number of times that a train counts at its own taxel.
     #[serde(default)]
     pub own_train: OwnTrain,
+    /// The divisor of the integral.
+    #[serde(default)]
+    pub normalisation: Normalisation,
 }
 
 fn thesis_tau() -> f64 {
@@ -50,7 +53,7 @@ pub enum OwnTrain {
     Once,
 }
 
-impl Smoothing {
+impl VanRossumSpatial {
     ranges! {
         tau: "ms", Range::ABOVE_0;
         sigma: "mm", Range::ABOVE_0;
@@ -60,7 +63,10 @@ impl Smoothing {
     #[must_use]
     pub fn described() -> Described {
         let defaults = serde_json::json!({
-            "tau": thesis_tau(), "sigma": thesis_sigma(), "own_train": OwnTrain::default()
+            "tau": thesis_tau(),
+            "sigma": thesis_sigma(),
+            "own_train": OwnTrain::default(),
+            "normalisation": Normalisation::default(),
         });
         Described { required: vec!["array"], ..Described::by(&defaults, &[], Self::RANGES) }
     }
@@ -72,9 +78,9 @@ impl Smoothing {
     }
 
     /// The kernel for these patterns; each train must have a taxel in the array.
-    pub(super) fn smoothing_kernel(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<SmoothingKernel> {
+    pub(super) fn kernel(&self, two: &Two<'_>) -> Result<SmoothingKernel> {
         let taxels = self.array.len();
-        for side in std::iter::once(a).chain(b) {
+        for side in [two.rows, two.columns] {
             if side.trains % taxels != 0 {
                 return Err(problem!(
                     "{} has {} trains, but the array has {taxels} taxels: must be one train per taxel (or several for each)",
@@ -94,39 +100,7 @@ impl Smoothing {
         }
         SmoothingKernel::new(self)
     }
-}
 
-/// The Euclidean distance between two patterns smoothed in time and over the array: 5.12 as the norm that 5.10 names.
-///
-/// The root of the sum over taxels of the integral over all time of `(g_m(a) - g_m(b))^2`, in closed form: between spikes
-/// all differences are one exponential. Time O(spikes x taxels).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct VanRossumSpatial {
-    /// Smoothing in time and over the array.
-    #[serde(flatten)]
-    pub smoothing: Smoothing,
-    /// The divisor of the integral.
-    #[serde(default)]
-    pub normalisation: Normalisation,
-}
-
-impl Distance for VanRossumSpatial {
-    fn described() -> Described {
-        Smoothing::described().or("normalisation", serde_json::json!(Normalisation::default()))
-    }
-
-    fn check(&self) -> Result<()> {
-        self.smoothing.check()
-    }
-
-    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
-        Ok(Box::new(SmoothedDistance(self, self.smoothing.smoothing_kernel(a, b)?)))
-    }
-}
-
-struct SmoothedDistance<'m>(&'m VanRossumSpatial, SmoothingKernel);
-
-impl VanRossumSpatial {
     /// The distance between two patterns.
     pub(super) fn between(
         &self,
@@ -135,17 +109,7 @@ impl VanRossumSpatial {
         b: Pattern<'_>,
         stop: Stop<'_>,
     ) -> Result<f64> {
-        Ok(self.normalisation.root(self.square(kernel, a, b, stop)?, self.smoothing.tau))
-    }
-
-    /// The squared distance between two patterns, in units of tau / 2.
-    fn square(&self, kernel: &SmoothingKernel, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
-        let tau = self.smoothing.tau;
-        let mut square = 0.0;
-        kernel.walk(tau, a, b, stop, |sum, from, to| {
-            square -= sum * (-2.0 * (to - from) / tau).exp_m1();
-        })?;
-        Ok(square)
+        Ok(self.normalisation.root(kernel.square(self.tau, a, b, stop)?, self.tau))
     }
 }
 
@@ -163,7 +127,7 @@ pub(super) struct SmoothingKernel {
 const HIGHEST: f64 = 200.0;
 
 impl SmoothingKernel {
-    fn new(smoothing: &Smoothing) -> Result<Self> {
+    fn new(smoothing: &VanRossumSpatial) -> Result<Self> {
         let array = &smoothing.array;
         let pitch = array.pitch("the distance over the array")?;
         // In units of the columns' pitch.
@@ -192,31 +156,22 @@ impl SmoothingKernel {
         &self.by_offset[start..start + self.columns]
     }
 
-    /// Traverses the steps of both patterns. For each interval between steps, and for the time after the last one,
-    /// passes on the sum over taxels of the squared differences at its beginning.
-    fn walk(
-        &self,
-        tau: f64,
-        (a, p): Pattern<'_>,
-        (b, q): Pattern<'_>,
-        stop: Stop<'_>,
-        mut stretch: impl FnMut(f64, f64, f64),
-    ) -> Result<()> {
+    /// The squared distance between two patterns, in units of tau / 2: the sum over taxels of the squared differences at
+    /// the beginning of each interval between steps, and of the time after the last one, by what the interval takes off.
+    fn square(&self, tau: f64, (a, p): Pattern<'_>, (b, q): Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
         let mut steps: Vec<(f64, usize, f64)> = Vec::new();
         for n in 0..a.trains {
-            steps.extend(super::merged::merge_spikes(a.train(p, n), b.train(q, n)).map(|(t, more)| (t, n, more)));
+            steps.extend(merge_spikes(a.train(p, n), b.train(q, n)).map(|(t, more)| (t, n, more)));
         }
         steps.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-        let Some(&(first, ..)) = steps.first() else { return Ok(()) };
         // The difference at taxel m is `heights[m] exp(-(t - since) / tau)`.
         let mut heights = vec![0.0; a.trains];
-        let (mut since, mut sum, mut last) = (first, 0.0, first);
+        let mut since = steps.first().map_or(0.0, |&(t, ..)| t);
+        let (mut square, mut sum, mut last) = (0.0, 0.0, since);
         for group in steps.chunk_by(|x, y| x.0 == y.0) {
             stop.check()?;
             let t = group[0].0;
-            if sum > 0.0 {
-                stretch(sum, last, t);
-            }
+            square -= sum * (-2.0 * (t - last) / tau).exp_m1();
             if (t - since) / tau > HIGHEST {
                 let fallen = (-(t - since) / tau).exp();
                 heights.iter_mut().for_each(|h| *h *= fallen);
@@ -229,10 +184,7 @@ impl SmoothingKernel {
             sum = self.total(&heights) / (risen * risen);
             last = t;
         }
-        if sum > 0.0 {
-            stretch(sum, last, f64::INFINITY);
-        }
-        Ok(())
+        Ok(square + sum)
     }
 
     fn add(&self, heights: &mut [f64], n: usize, value: f64) {

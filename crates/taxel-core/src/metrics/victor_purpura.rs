@@ -1,17 +1,10 @@
 //! Victor-Purpura distance: the least cost of turning one spike train into another.
 
-mod lanes;
-
 use serde::{Deserialize, Serialize};
 
-use super::distance::{Distance, Pattern, Ready, number_or_name, sum_over_trains};
-use super::pairwise::{DistanceMatrix, Work};
-use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
-use crate::vectors::Instructions;
 use crate::{Result, Stop};
-use lanes::{TrainBlock, lanes};
 
 /// The least cost of turning one train into the other: 1 for each spike removed or added, `q |dt|` for each spike
 /// moved.
@@ -26,66 +19,17 @@ pub struct VictorPurpura {
     pub q: f64,
 }
 
-impl Distance for VictorPurpura {
-    fn described() -> Described {
-        Described::by(&Self { q: 0.0 }, &["q"], Self::RANGES)
+/// Reads a cost that may be infinite: a number, or its name as text because JSON has no infinity.
+fn number_or_name<'de, D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<f64, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "must be a number")]
+    enum Either {
+        Number(f64),
+        Name(String),
     }
-
-    fn check(&self) -> Result<()> {
-        self.check_ranges()
-    }
-
-    fn ready<'m>(&'m self, _: &Patterns<'_>, _: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
-        Ok(Box::new(self))
-    }
-}
-
-impl Ready for &VictorPurpura {
-    fn between(&self, a: Pattern<'_>, b: Pattern<'_>, stop: Stop<'_>) -> Result<f64> {
-        sum_over_trains(a, b, stop, |a, b| VictorPurpura::between(self, a, b, stop))
-    }
-
-    /// Fills a matrix with the sums of distances over trains, many pairs side by side.
-    ///
-    /// Train after train, the columns' trains are sorted by length, so that trains processed side by side have similar
-    /// lengths.
-    fn fill(
-        &self,
-        matrix: &DistanceMatrix,
-        a: &Patterns<'_>,
-        b: Option<&Patterns<'_>>,
-        work: &mut Work<'_>,
-    ) -> Result<bool> {
-        if !self.has_reach() || work.instructions == Instructions::Plain {
-            return Ok(false);
-        }
-        let (set, lanes) = (work.instructions, lanes(work.instructions));
-        let others = b.unwrap_or(a);
-        let (pairs, reach) = (matrix.pairs(), self.reach());
-        for n in 0..a.trains {
-            let mut order: Vec<usize> = (0..others.count).collect();
-            order.sort_by_key(|&p| others.train(p, n).len());
-            let blocks: Vec<TrainBlock> = order
-                .chunks(lanes)
-                .map(|chunk| TrainBlock::new(lanes, &chunk.iter().map(|&p| others.train(p, n)).collect::<Vec<_>>()))
-                .collect();
-            // For patterns against each other, a row is compared with those that follow in the order.
-            let row = |at: usize| if b.is_some() { (at, 0) } else { (order[at], at + 1) };
-            let report = |rows: usize| ((pairs * n + pairs * rows / a.count) / a.trains, pairs);
-            work.each(a.count, &report, |at, stop| {
-                let (i, first) = row(at);
-                let mut cost = Vec::new();
-                for (block, from) in blocks.iter().zip((0..).step_by(lanes)).skip(first / lanes) {
-                    stop.check()?;
-                    let distances = block.distances(set, a.train(i, n), self.q, reach, &mut cost, stop)?;
-                    for (at, distance) in (from..others.count).zip(distances).skip(first.saturating_sub(from)) {
-                        matrix.add(i, order[at], distance);
-                    }
-                }
-                Ok(())
-            })?;
-        }
-        Ok(true)
+    match Either::deserialize(deserializer)? {
+        Either::Number(value) => Ok(value),
+        Either::Name(name) => name.parse().map_err(|_| serde::de::Error::custom("must be a number")),
     }
 }
 
@@ -94,14 +38,14 @@ impl VictorPurpura {
         q: "1/ms", Range::COST;
     }
 
-    /// Whether moving has a positive and finite cost; otherwise spikes are only counted.
-    pub(super) fn has_reach(&self) -> bool {
-        self.q > 0.0 && self.q.is_finite()
+    /// The parameters with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self { q: 0.0 }, &["q"], Self::RANGES)
     }
 
-    /// Spikes farther apart than this never match; rounded up so that no pair is left out.
-    fn reach(&self) -> f64 {
-        2.0 / self.q * (1.0 + 4.0 * f64::EPSILON)
+    pub(super) fn check(&self) -> Result<()> {
+        self.check_ranges()
     }
 
     /// The distance between two ascending trains.
@@ -113,41 +57,41 @@ impl VictorPurpura {
         if self.q == f64::INFINITY {
             return Ok(count(a.len() + b.len() - 2 * coincident(a, b)));
         }
-        // `cost[j]` is the cost of turning the spikes of `a` so far into the first j of `b`; only columns lo to hi are
-        // up to date. Earlier columns have spikes too early to match and are no longer read; in later ones, whose
-        // spikes are still too late to match, each spike adds a cost of 1.
-        let mut cost = vec![0.0; b.len() + 1];
+        // Beside removing and adding all spikes, to move one by dt saves `2 - q |dt|`. `saved[j]` is the most that can be
+        // saved with the spikes of `a` so far and the first j of `b`; only columns lo to hi are up to date. Earlier
+        // columns have spikes too early to match and are no longer read; later ones, whose spikes are still too late
+        // to match, save as much as column hi.
+        let mut saved = vec![0.0; b.len() + 1];
         let (mut lo, mut hi) = (0, 0);
-        let reach = self.reach();
+        let reach = 2.0 / self.q;
         for (i, &from) in a.iter().enumerate() {
             if i % 64 == 0 {
                 stop.check()?;
             }
             while hi < b.len() && b[hi] <= from + reach {
-                cost[hi + 1] = cost[hi] + 1.0;
+                saved[hi + 1] = saved[hi];
                 hi += 1;
             }
             while lo < hi && b[lo] < from - reach {
                 lo += 1;
             }
-            let mut diagonal = cost[lo];
-            let mut left = diagonal + 1.0;
-            cost[lo] = left;
-            for (&to, above) in b[lo..hi].iter().zip(&mut cost[lo + 1..=hi]) {
-                let moved = diagonal + self.q * (from - to).abs();
+            let mut diagonal = saved[lo];
+            let mut left = diagonal;
+            for (&to, above) in b[lo..hi].iter().zip(&mut saved[lo + 1..=hi]) {
+                let moved = diagonal + (2.0 - self.q * (from - to).abs());
                 diagonal = *above;
-                left = lesser(moved, lesser(diagonal, left) + 1.0);
+                left = greater(greater(moved, diagonal), left);
                 *above = left;
             }
         }
-        Ok(cost[hi] + count(b.len() - hi))
+        Ok(count(a.len() + b.len()) - saved[hi])
     }
 }
 
-/// The smaller of two numbers, neither of which is NaN: a single instruction, unlike `f64::min`.
+/// The greater of two numbers, neither of which is NaN: a single instruction, unlike `f64::max`.
 #[inline(always)]
-fn lesser(x: f64, y: f64) -> f64 {
-    if x < y { x } else { y }
+fn greater(x: f64, y: f64) -> f64 {
+    if x > y { x } else { y }
 }
 
 /// The number of spikes with a partner at exactly the same time, the only ones that match if moving has infinite cost.

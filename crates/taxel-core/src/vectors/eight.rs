@@ -10,12 +10,6 @@ pub(crate) trait Vector: Copy {
     fn store(self, to: &mut [f64; LANES]);
     /// `a b + self`.
     fn add_product(self, a: Self, b: Self) -> Self;
-    fn plus(self, other: Self) -> Self;
-    fn times(self, other: Self) -> Self;
-    /// `|self - other|`.
-    fn away(self, other: Self) -> Self;
-    /// The smaller of the two, neither of which is NaN.
-    fn lesser(self, other: Self) -> Self;
     fn total(self) -> f64;
 }
 
@@ -35,22 +29,6 @@ impl Vector for [f64; LANES] {
     #[inline(always)]
     fn add_product(self, a: Self, b: Self) -> Self {
         std::array::from_fn(|l| a[l] * b[l] + self[l])
-    }
-    #[inline(always)]
-    fn plus(self, other: Self) -> Self {
-        std::array::from_fn(|l| self[l] + other[l])
-    }
-    #[inline(always)]
-    fn times(self, other: Self) -> Self {
-        std::array::from_fn(|l| self[l] * other[l])
-    }
-    #[inline(always)]
-    fn away(self, other: Self) -> Self {
-        std::array::from_fn(|l| (self[l] - other[l]).abs())
-    }
-    #[inline(always)]
-    fn lesser(self, other: Self) -> Self {
-        std::array::from_fn(|l| if self[l] < other[l] { self[l] } else { other[l] })
     }
     #[inline(always)]
     fn total(self) -> f64 {
@@ -94,26 +72,6 @@ mod x86 {
             Self(unsafe { _mm512_fmadd_pd(a.0, b.0, self.0) })
         }
         #[inline(always)]
-        fn plus(self, other: Self) -> Self {
-            // SAFETY: as above.
-            Self(unsafe { _mm512_add_pd(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn times(self, other: Self) -> Self {
-            // SAFETY: as above.
-            Self(unsafe { _mm512_mul_pd(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn away(self, other: Self) -> Self {
-            // SAFETY: as above.
-            Self(unsafe { _mm512_abs_pd(_mm512_sub_pd(self.0, other.0)) })
-        }
-        #[inline(always)]
-        fn lesser(self, other: Self) -> Self {
-            // SAFETY: as above.
-            Self(unsafe { _mm512_min_pd(self.0, other.0) })
-        }
-        #[inline(always)]
         fn total(self) -> f64 {
             // SAFETY: as above.
             unsafe { _mm512_reduce_add_pd(self.0) }
@@ -148,30 +106,6 @@ mod x86 {
         fn add_product(self, a: Self, b: Self) -> Self {
             // SAFETY: as above.
             unsafe { Self(_mm256_fmadd_pd(a.0, b.0, self.0), _mm256_fmadd_pd(a.1, b.1, self.1)) }
-        }
-        #[inline(always)]
-        fn plus(self, other: Self) -> Self {
-            // SAFETY: as above.
-            unsafe { Self(_mm256_add_pd(self.0, other.0), _mm256_add_pd(self.1, other.1)) }
-        }
-        #[inline(always)]
-        fn times(self, other: Self) -> Self {
-            // SAFETY: as above.
-            unsafe { Self(_mm256_mul_pd(self.0, other.0), _mm256_mul_pd(self.1, other.1)) }
-        }
-        #[inline(always)]
-        fn away(self, other: Self) -> Self {
-            // SAFETY: as above.
-            unsafe {
-                let sign = _mm256_set1_pd(-0.0);
-                let away = |a, b| _mm256_andnot_pd(sign, _mm256_sub_pd(a, b));
-                Self(away(self.0, other.0), away(self.1, other.1))
-            }
-        }
-        #[inline(always)]
-        fn lesser(self, other: Self) -> Self {
-            // SAFETY: as above.
-            unsafe { Self(_mm256_min_pd(self.0, other.0), _mm256_min_pd(self.1, other.1)) }
         }
         #[inline(always)]
         fn total(self) -> f64 {

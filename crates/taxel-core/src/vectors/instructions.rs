@@ -169,9 +169,6 @@ macro_rules! wide {
 }
 
 /// Defines a function over [`Vector`](super::Vector)s `V`, compiled for AVX-512, for AVX2 and without either.
-///
-/// The widest set is used by default; if the arguments begin with `on NAME;`, the caller passes the set, which the
-/// machine must have.
 macro_rules! kernel {
     (
         $(#[$about:meta])*
@@ -189,21 +186,6 @@ macro_rules! kernel {
             fn plain<$vector: $crate::vectors::Vector>($($argument: $kind),*) -> $out $body
             $crate::vectors::by_width!(
                 $crate::vectors::Instructions::best(), ($($argument: $kind),*) -> $out, [],
-                plain::<$crate::vectors::Zmm>, plain::<$crate::vectors::Ymm>, plain::<[f64; $crate::vectors::LANES]>
-            )
-        }
-    };
-    (
-        $(#[$about:meta])*
-        $visible:vis fn $name:ident<$vector:ident>(on $set:ident; $($argument:ident: $kind:ty),* $(,)?) -> $out:ty $body:block
-    ) => {
-        $(#[$about])*
-        $visible fn $name($set: $crate::vectors::Instructions, $($argument: $kind),*) -> $out {
-            #[inline(always)]
-            fn plain<$vector: $crate::vectors::Vector>($($argument: $kind),*) -> $out $body
-            assert!($set.present(), "the machine must have the instructions");
-            $crate::vectors::by_width!(
-                $set, ($($argument: $kind),*) -> $out, [],
                 plain::<$crate::vectors::Zmm>, plain::<$crate::vectors::Ymm>, plain::<[f64; $crate::vectors::LANES]>
             )
         }
