@@ -25,7 +25,6 @@ from taxel._base.arguments import checked_path
 from taxel._base.files import create, write_whole
 from taxel._base.stopping import asked_to_end
 from taxel._base.windows_names import name_fault
-from taxel.demo import report
 from taxel.encode import LevelCrossing
 from taxel.live import Live
 from taxel.live._label_file import LabelFile
@@ -213,11 +212,6 @@ def test_a_recording_is_complete_after_ctrl_break(tmp_path: Path) -> None:
     recording = taxel.open(tmp_path / "walk.mcap")
     assert len(recording.events) == 20
     assert not recording.truncated
-
-
-def test_the_demo_gives_no_load_where_the_system_keeps_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "platform", "win32")
-    assert report._load() is None
 
 
 def test_commands_draw_without_a_library_of_windows() -> None:

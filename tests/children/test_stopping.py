@@ -82,7 +82,7 @@ def test_a_recording_is_closed_however_the_command_is_stopped(tmp_path: Path, en
 
 @pytest.mark.parametrize("end", ["kill", *(pytest.param(end, marks=pytest.mark.slow) for end in ("SIGTERM", "SIGHUP"))])
 def test_a_demo_ends_with_the_board_that_it_plays(tmp_path: Path, end: str) -> None:
-    words = ["demo", "--scenes", 50, "--seed", 1, "--noise", 1, "--folder", "report"]
+    words = ["demo", "--scenes", 50, "--seed", 1, "--folder", "report"]
     with Marked(tmp_path / "here", TAXEL, *words, on_terminal=True) as one:
         one.until(lambda it: it.children())
         time.sleep(0.5)

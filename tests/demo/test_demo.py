@@ -1,23 +1,20 @@
-"""The demo: without the clock at toy size, and (slowly) in real time."""
+"""The demo: without the clock at toy size, and (slowly) in real time; its readout, trained anew at toy size."""
 
 import json
-import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 import taxel
 from taxel.cli import app
-from taxel.demo.evaluation import evaluate_acts
-from taxel.demo.judging import GOALS, LABELS
+from taxel.demo.playing import evaluate, play_simulated
 from taxel.demo.script import TRAINING_SEED
-from taxel.demo.shipped import shipped
-from taxel.live import Live
-from taxel.simulate import Scene, Silence
+from taxel.demo.shipped import shipped, trained
+from taxel.simulate import Scene, Silence, play
 
 
 def run(*arguments):
@@ -25,56 +22,42 @@ def run(*arguments):
 
 
 @pytest.fixture(scope="module")
-def toy(tmp_path_factory):
-    """A report of two scenes without the clock."""
-    folder = tmp_path_factory.mktemp("demo") / "report"
-    ended = run("--no-clock", "--scenes", 2, "--seed", 5, "--noise", 2, "--folder", folder)
+def toy():
+    return trained(boards=1, scenes=3)
+
+
+def test_the_demo_scores_scenes_and_leaves_a_report(tmp_path):
+    folder = tmp_path / "report"
+    ended = run("--no-clock", "--scenes", 2, "--seed", 5, "--folder", folder)
     assert ended.exit_code == 0
     assert f"report: {folder / 'report.html'}" in ended.output
-    return folder
-
-
-def test_the_demo_finds_the_impacts_of_scenes_that_it_was_not_trained_on(toy):
-    values = json.loads((toy / "report.json").read_text())
-    for label in LABELS:
-        first = values["neuron"]["classes"]["first impact"][label]
-        assert (first["found"], first["touches"]) == (2, 2)
-        assert values["neuron"]["first_within_goal"][label]["share"] == 1.0
-        assert -GOALS[label] <= first["known_ms"]["p95"] <= GOALS[label]
-    assert values["noise"]["said"] == {"contact": 0, "lift": 0}
-
-
-def test_the_report_shows_what_it_should(toy):
-    page = (toy / "report.html").read_text()
-    assert page.count('<div class="picture"><svg') == 3
-    for said in (
-        "without the clock",
-        "as good as the neuron",
-        "dashpot",
-        "0.02 N",
-        "seed 5",
-        "figure 5.14",
-        "5208 frames",
-        "of 2 first impacts",
-        "at rest before it",
-    ):
-        assert said in page, said
-    assert "nan" not in page.replace("finance", "")
-
-
-def test_what_the_report_says_of_a_live_run_is_counted_there():
-    template = Path(taxel.__file__).with_name("demo") / "report.html.j2"
-    named = set(re.findall(r"values\.host\.(\w+)", template.read_text(encoding="utf-8")))
-    with Live(0, host="127.0.0.1") as live:
-        assert named
-        assert named <= live.counters.keys()
-
-
-def test_an_existing_folder_is_not_touched(toy):
-    before = (toy / "report.json").read_bytes()
+    page = (folder / "report.html").read_text()
+    assert "2 scenes of seed 5" in page
+    assert page.count('<div class="picture"><svg') >= 4
     with pytest.raises(FileExistsError):
-        run("--no-clock", "--scenes", 1, "--folder", toy)
-    assert (toy / "report.json").read_bytes() == before
+        run("--no-clock", "--scenes", 1, "--folder", folder)
+    assert (folder / "report.html").read_text() == page
+
+
+def test_a_toy_training_and_the_shipped_readout_find_every_impact_of_other_scenes(toy):
+    for readout in (toy, shipped()):
+        played = play_simulated(readout, seed=17, scenes=2)
+        assert (played.outcome.score.missed, played.outcome.score.false, played.plain.missed) == (0, 0, 0)
+        for label in ("contact", "lift"):
+            assert 0 < np.median(played.outcome.score[label].delays_ms) < 1.5
+
+
+def test_impacts_have_a_narrow_window_and_presses_a_wide_one():
+    acts = [Silence(300.0), Scene.draw(3), Silence(100.0)]
+    events = play(acts, seed=3).events
+    contacts, _ = taxel.simulate.truth(acts)
+    late = np.rint([contact.start_us + 30_000 for contact in contacts]).astype(np.int64)
+    found = taxel.Detections(["contact"] * len(late), late, late)
+    played = evaluate(events, acts, shipped(), found)
+    kinds = [contact.kind for contact in contacts]
+    assert played.outcome.score["contact"].found < len(kinds)
+    last = played.outcome.score["contact"].pairs[-1, 1]
+    assert kinds[last] == "hand"
 
 
 def test_the_demo_never_plays_what_the_readout_was_trained_on():
@@ -85,33 +68,37 @@ def test_the_demo_never_plays_what_the_readout_was_trained_on():
 
 
 def test_noise_alone_says_nothing():
-    quiet = evaluate_acts([Silence(5_050.3)], shipped(), seed=8)
-    assert len(quiet.detections) == 0
-    assert quiet.judged_plain.false_counts == {"contact": 0, "lift": 0}
-    assert 20 < len(quiet.events) / 5 < 400
+    acts = [Silence(5_050.3)]
+    quiet = evaluate(play(acts, seed=8).events, acts, shipped())
+    assert (len(quiet.outcome.found), quiet.plain.false) == (0, 0)
 
 
-def test_what_the_user_got_wrong_is_one_line(tmp_path):
-    command = [sys.executable, "-m", "taxel", "demo", "--no-clock", "--scenes", "1", "--noise", "0"]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path)
-    assert ended.returncode == 2
-    assert ended.stderr.count("\n") == 1
-    assert "noise" in ended.stderr
-    assert not list(Path(tmp_path).iterdir())
+def test_contact_listens_to_rises_and_lift_to_falls(toy):
+    for readout in (toy, shipped()):
+        contact, lift = (readout.neurons[label].weights for label in ("contact", "lift"))
+        assert np.argmax(contact) == 0
+        assert contact[5:].max() < 0.1 * contact[0]
+        assert np.argmax(lift) == 5
+        assert lift[:5].max() < 0.1 * lift[5]
+
+
+def test_the_shipped_readout_is_what_the_recipe_says(toy):
+    readout = shipped()
+    assert (readout.time, readout.after_spike, readout.run_threshold) == ("grid", "keep", 0.9)
+    assert {label: one.delay_ms for label, one in readout.neurons.items()} == {"contact": 0.2, "lift": 0.5}
+    assert readout.encoder.tare is None
+    for label, train_of in (("contact", 0), ("lift", 5)):
+        mine, theirs = (each.neurons[label].weights[train_of] for each in (toy, readout))
+        assert mine == pytest.approx(theirs, rel=0.2)
 
 
 @pytest.mark.slow
-def test_in_real_time_the_board_is_a_process_of_its_own_and_its_recording_says_the_same(tmp_path):
-    command = [sys.executable, "-m", "taxel", "demo", "--scenes", "2", "--seed", "5", "--noise", "1", "--json"]
+def test_in_real_time_the_board_is_a_process_of_its_own_and_is_recorded(tmp_path):
+    command = [sys.executable, "-m", "taxel", "demo", "--scenes", "2", "--seed", "5", "--json"]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True, cwd=tmp_path)
     values = json.loads(ended.stdout)
-    folder = Path(values["report"]).parent
-    assert {path.name for path in (tmp_path / folder).iterdir()} == {"recording.mcap", "report.html", "report.json"}
-    assert "taxel view recording.mcap" in (tmp_path / folder / "report.html").read_text()
-    host, board = values["host"], values["board"]
-    assert board["bytes"] == host["wire"]["bytes"]
-    assert host["events"] == host["read_out"] + host["events_dropped"]
-    # On a busy machine, events arrive after the readout's time has passed them; these are counted as late.
-    found = values["neuron"]["classes"]["first impact"]["contact"]["found"]
-    assert (values["recording_agrees"] and found == 2) or host["late"] > 0, (found, host)
-    shutil.rmtree(tmp_path / folder)
+    folder = tmp_path / Path(values["report"]).parent
+    assert {path.name for path in folder.iterdir()} == {"recording.mcap", "report.html"}
+    # On a busy machine events arrive too late for the readout; a verdict says how many.
+    assert values["neurons"]["found"] > 0 or len(values["verdicts"]) > 2
+    assert len(taxel.open(folder / "recording.mcap").events) > 1000

@@ -57,7 +57,6 @@ TYPED = [
     ("live", "--readout", "touch.json", "--save-tare", "a.json"),
     ("train", "walk.npz", "--labels", "labels.csv", "-o", "nowhere/x.json"),
     ("train", "walk.npz", "--labels", "labels.csv", "-o", "there.json"),
-    ("demo", "--noise", "0.1"),
     ("study", "fig6.1", "--set", "kappa"),
 ]
 

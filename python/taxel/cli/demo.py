@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import json
+import secrets
+from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from taxel._base.files import check_writable
-from taxel.cli._app import App
+from taxel._base.messages import counted
+from taxel.cli._app import App, JsonOption
+from taxel.cli._recordings import progress
 from taxel.cli._say import say
-from taxel.cli.console import Console
 from taxel.demo.script import TRAINING_SEED
+from taxel.spikes import to_ms
+
+if TYPE_CHECKING:
+    from taxel.detections import Detection
 
 app = App()
 
@@ -26,9 +33,6 @@ def demo(
     no_clock: Annotated[
         bool, typer.Option("--no-clock", help="Simulate as fast as possible instead of in real time, without a socket.")
     ] = False,
-    noise: Annotated[
-        float | None, typer.Option(help="Duration of the noise test, s. Default: 60, or 120 with --no-clock.")
-    ] = None,
     readout: Annotated[
         Path | None, typer.Option(help="A readout to use instead of the one that comes with taxel.")
     ] = None,
@@ -36,42 +40,58 @@ def demo(
     train_to: Annotated[
         Path | None, typer.Option("--train", help="Train the demo's readout, write it to this file, and end.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON, and nothing else.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Play scenes on the emulated board, detect contact and lift-off while they run, and write a report.
 
     A ball falls on foam, is caught in flight, pressed by hand and lifted. The board is a separate process that sends
-    real packets over UDP; this process records, encodes and detects contact and lift. A new folder gets report.html and
-    report.json.
+    real packets over UDP; this process records, encodes and detects contact and lift. A new folder gets report.html
+    and the recording.
 
     Example: taxel demo --seed 1
     Example: taxel demo --scenes 100 --no-clock --folder demo
     """
-    console = Console(quiet=as_json)
+    from taxel.demo.playing import play_live, play_simulated  # noqa: PLC0415  the command line starts quickly
+    from taxel.demo.shipped import shipped, trained  # noqa: PLC0415
+    from taxel.detect import Readout  # noqa: PLC0415
+    from taxel.report import write_detections  # noqa: PLC0415  pictures load slowly
+
     if train_to is not None:
         check_writable(train_to)
-        _train(console, train_to)
+        with progress(as_json) as update:
+            trained(progress=update).save(train_to)
         say(json.dumps({"readout": str(train_to)}) if as_json else f"readout: {train_to.resolve()}")
         return
-    from taxel.demo.showing import show  # noqa: PLC0415  pictures load slowly
+    used = shipped() if readout is None else Readout.load(readout)
+    seed = secrets.randbelow(TRAINING_SEED) if seed is None else seed
+    if folder is None:
+        folder = Path(f"taxel-demo-{datetime.now().astimezone():%Y%m%d-%H%M%S}-{seed}")
+    folder.mkdir(parents=True)
+    title = f"taxel demo: {counted(scenes, 'scene')} of seed {seed}"
+    say(*[] if as_json else [title])
+    with progress(as_json) as update:
+        if no_clock:
+            played = play_simulated(used, seed=seed, scenes=scenes, progress=update)
+        else:
+            update(f"playing {counted(scenes, 'scene')} in real time", 0, 0)
+            recording = folder / "recording.mcap"
+            played = play_live(
+                used, recording, seed=seed, scenes=scenes, said=lambda found: say(*[] if as_json else [_line(found)])
+            )
+        update("writing the report", 0, 0)
+        page = write_detections(
+            folder,
+            used,
+            [played.outcome],
+            title=title,
+            judged="by the simulated truth, on scenes that the readout was not trained on",
+            printed=[*played.lines()],
+        )
+    if as_json:
+        say(json.dumps({"seed": seed, "scenes": scenes, **played.to_dict(), "report": str(page)}))
+    else:
+        say(*played.lines(), f"report: {page.resolve()}")
 
-    values, page = show(
-        console,
-        scenes=scenes,
-        seed=seed,
-        live=not no_clock,
-        noise_s=noise,
-        readout=readout,
-        folder=folder,
-    )
-    # Not wrapped: a path is to be copied.
-    say(json.dumps(values | {"report": str(page)}) if as_json else f"report: {page.resolve()}")
 
-
-def _train(console: Console, file: Path) -> None:
-    from taxel.demo.shipped import described, trained  # noqa: PLC0415
-
-    with console.status("training") as status:
-        readout = trained(progress=lambda step, *_: status.update(step))
-    readout.save(file)
-    console.print(described(readout))
+def _line(found: Detection) -> str:
+    return f"{to_ms(found.t):10.3f} ms  {found.label}"

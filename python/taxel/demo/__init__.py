@@ -1,1 +1,1 @@
-"""The demo: scenes on the emulated board, recorded, detected and scored."""
+"""The demo: scenes on the emulated board, detected by a readout that comes with it, and scored."""

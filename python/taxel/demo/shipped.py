@@ -17,7 +17,7 @@ from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
-__all__ = ["described", "examples", "recipe", "shipped", "trained"]
+__all__ = ["recipe", "shipped", "trained"]
 
 
 def shipped() -> Readout:
@@ -31,17 +31,8 @@ def recipe() -> Recipe:
         return Recipe.load(path)
 
 
-def trained(*, boards: int = 4, scenes: int = 4, draw: int = 0, progress: Progress | None = None) -> Readout:
-    """Train contact and lift on `examples`, with the same parameters, by the demo's `recipe`."""
-    labelled = examples(boards=boards, scenes=scenes, draw=draw, progress=progress)
-    with warnings.catch_warnings():
-        # The base of the foam loses the ball long before a slow lift ends: such events cannot be learnt.
-        warnings.filterwarnings("ignore", ".* (cannot be learnt|come too late)")
-        return fit(labelled, recipe(), progress=progress)
-
-
-def examples(*, boards: int = 4, scenes: int = 4, draw: int = 0, progress: Progress | None = None) -> list[Example]:
-    """Play scenes of balls that bounce and are caught, and as many with the ball left to rest; label their touches.
+def trained(*, boards: int = 4, scenes: int = 4, progress: Progress | None = None) -> Readout:
+    """Train contact and lift on scenes of balls that bounce and are caught, and as many with the ball left to rest.
 
     All fall on a level array, on columns of foam: the demo's slants and its bonded foam are new to the readout.
 
@@ -51,27 +42,24 @@ def examples(*, boards: int = 4, scenes: int = 4, draw: int = 0, progress: Progr
         How many sensors are drawn for each of the two kinds.
     scenes : int
         On each of them; by default 16 scenes of each kind.
-    draw : int
-        Another draw of all of them.
     progress : function of (step, done, all), optional
         Called before each board.
-
-    Returns
-    -------
-    list of Example
-        One for each board: the spikes of the recipe's encoder after the start marker (the time before is for the tare).
     """
     labelled = []
     for n in range(2 * boards):
         reporting(progress)(f"playing training scenes, board {n + 1} of {2 * boards}", 0, 0)
-        seed = TRAINING_SEED + 1000 * draw + n
+        seed = TRAINING_SEED + n
         acts = script(seed, scenes, draw=Scene.draw if n < boards else left_to_rest)
         events = play(acts, seed=seed).events
         start = events.markers[0][0]
         area = ContactArea(tare=Tare.take(events, stop_us=start)).encode(events)
+        # The time before the start marker is for the tare.
         area = area.between(to_ms(start), area.stop)
         labelled.append(Example(area, _labels(area, truth(acts)[0])))
-    return labelled
+    with warnings.catch_warnings():
+        # The base of the foam loses the ball long before a slow lift ends: such events cannot be learnt.
+        warnings.filterwarnings("ignore", ".* (cannot be learnt|come too late)")
+        return fit(labelled, recipe(), progress=progress)
 
 
 def _labels(area: SpikeTrains, contacts: list[Contact]) -> dict[str, NDArray[np.int64]]:
@@ -91,13 +79,3 @@ def _labels(area: SpikeTrains, contacts: list[Contact]) -> dict[str, NDArray[np.
             if not times[label] or t > times[label][-1] + refractory:
                 times[label].append(t)
     return {label: np.rint(to_us(np.array(seconds))).astype(np.int64) for label, seconds in times.items()}
-
-
-def described(readout: Readout) -> str:
-    """Return the weights of contact area's trains that are not 0, one line a neuron."""
-    levels = readout.encoder.get_params()["levels"]
-    names = [f"rise to {n}" for n in levels] + [f"fall below {n}" for n in levels]
-    return "\n".join(
-        f"{label}: " + ", ".join(f"{name} {w:.3f} mV" for name, w in zip(names, cell.weights, strict=True) if w > 5e-4)
-        for label, cell in readout.neurons.items()
-    )
