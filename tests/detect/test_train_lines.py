@@ -209,22 +209,6 @@ def test_a_fold_that_cannot_be_learnt_leaves_the_training_as_it_is(tmp_path: Pat
     assert (code, "the sensor felt nothing" in error) == (2, True), "folds that were asked for are not left out"
 
 
-@pytest.mark.usefixtures("drawn")
-def test_a_page_draws_labels_as_given_and_as_felt(tmp_path: Path, capsys) -> None:
-    recording, labels = recorded(tmp_path, 1, late_us=7_000)
-    options = ("--labels", labels, "-o", tmp_path / "r.json", "--overwrite", "--folds", 0, "--report")
-    assert call(capsys, "train", recording, *options, tmp_path / "with")[0] == 0
-    page = (tmp_path / "with" / "report.html").read_text()
-    assert page.count('<div class="picture"><svg') == 2 * 4 + 2
-    assert page.count("labels were moved to the touches in the recording: by -") == 2
-    assert ">felt</text>" in page
-    recording, _ = recorded(tmp_path, 2)
-    options = ("--labels", tmp_path / "2.csv", *options[2:])
-    assert call(capsys, "train", recording, *options, tmp_path / "without", "--no-align")[0] == 0
-    page = (tmp_path / "without" / "report.html").read_text()
-    assert ">felt</text>" not in page
-
-
 def test_a_recording_without_one_of_the_labels_has_a_row_on_the_page(tmp_path: Path, capsys) -> None:
     recording, labels = recorded(tmp_path, 1)
     tare().save(tmp_path / "tare.json")

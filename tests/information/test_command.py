@@ -53,7 +53,7 @@ def test_a_recording_and_its_table_give_figures_and_a_page(tmp_path):
     assert "wire version" in said
     text = page.read_text()
     assert text.count('<div class="picture"><svg') == 2
-    assert "keeps 95 %" in text
+    assert "keeps 95 % of the full bits?" in text
     assert "{{" not in text
     again = run(recording, "--labels", labels, *QUICK, "--report", page)
     assert isinstance(again.exception, FileExistsError)

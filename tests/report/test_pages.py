@@ -68,31 +68,14 @@ def test_text_of_a_figure_is_text_in_the_page():
 
 
 def page(*figures):
-    drawn = {"contact": {"potential": picture(figures[0]), "weights": picture(figures[1]), "errors": None}}
-    drawn["contact"] |= {"moved": None, "input": ""}
-    return render(
-        "report/listening.html.j2",
-        title="a page",
-        felt="",
-        judged="",
-        readout="none",
-        labels=["contact"],
-        drawn=drawn,
-        rows=[],
-        beside=[],
-        together=[],
-        about=[],
-        most_open=4,
-        warnings=[],
-        printed=[],
-        held_out=[],
-        nearest=None,
-        beside_training=None,
-        worst=[],
-        unclaimed=[],
-        viewed=["'a walk.mcap'"],
-        scored=False,
-    )
+    return detections(drawn={"contact": [picture(figure) for figure in figures]})
+
+
+def detections(**values):
+    """Return the page of some detections."""
+    empty = {"tables": [], "warnings": [], "printed": [], "nearest": [], "beside_training": [], "worst": []}
+    empty |= {"title": "a page", "judged": "", "readout": "none", "neurons": True, "drawn": {}}
+    return render("report/listening.html.j2", **empty | values)
 
 
 def some():
@@ -114,7 +97,6 @@ def test_a_page_needs_nothing_but_itself():
     assert not re.search(r"@import|url\((?!data:|#)", text)
     assert "<script" not in text
     assert "prefers-color-scheme: dark" in text
-    assert "<code>taxel view &#39;a walk.mcap&#39;</code>." in text
 
 
 def opened(text, tmp_path, width=800):
@@ -155,34 +137,16 @@ def test_a_browser_shows_figures_as_large_as_they_were_drawn_and_no_page_is_too_
 def test_no_table_of_a_report_is_cut(tmp_path, name, width):
     score = {"events": 1500, "found": 1400, "missed": 100, "false": 100}
     score["error"] = score["delay"] = "-11.55 ± 105.4 (median -11.92, 95 % in -103.46 to 120.62)"
-    row = {"recording": name, "label": "contact", "detections": 1500, "score": score}
-    text = render(
-        "report/listening.html.j2",
-        title="t",
-        felt="",
-        readout="r",
-        judged="",
-        scored=True,
-        labels=[],
-        drawn={},
-        aligned={},
-        rows=[row],
-        held_out=[row],
+    rules = [("neuron", "contact", "", score), ("the area above 12 taxels for 3 ms", "contact", "", None)]
+    text = detections(
+        tables=[("Neuron and plain rule", rules), ("", [(name, "contact", 1500, score)])],
         worst=[(name, "contact", 123.456789, "missed")],
-        unclaimed=[(name, 123.456789, "a load without a detection: 0.51 s, up to 83.1 counts")],
-        together=[],
-        about=[(name, ["Times are counted from 2026-01-02 03:04:05 UTC."])],
-        most_open=4,
         warnings=[f"{name}: rest: 4 taxels drifted above the tare by more than the noise floor"],
         printed=["all  12  12"],
-        viewed=[],
-        nearest=None,
-        beside_training=None,
-        beside=[("contact", "neuron", score), ("contact", "the area above 12 taxels for 3 ms", score)],
     )
     measured = (
         "<p id=said></p><script>document.getElementById('said').textContent = JSON.stringify([innerWidth, "
         "...[...document.querySelectorAll('.scroll')].map((e) => e.scrollWidth - e.clientWidth)])</script></body>"
     )
     seen = opened(text.replace("</body>", measured), tmp_path, width)
-    assert json.loads(re.search(r'<p id="said">(.*?)</p>', seen)[1]) == [width, 0, 0, 0, 0]
+    assert json.loads(re.search(r'<p id="said">(.*?)</p>', seen)[1]) == [width, 0, 0, 0]

@@ -204,6 +204,7 @@ def _report(
     example, outside = Example(recording, {}, rest), summary.counters["outside"]
     outcome = Outcome(str(summary.path), example, recording.detections, outside=outside)
     title = f"Live detections, recorded to {summary.path}"
+    printed += [text for text in [outcome.outside_text] if text]
     write_detections(folder, readout, [outcome], title=title, printed=printed, overwrite=overwrite)
 
 

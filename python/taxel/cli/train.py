@@ -145,7 +145,6 @@ def train(
             title=f"Training of {out}",
             judged=training.how,
             held_out=training.scored.scores if training.held_out else (),
-            alignments=training.made.alignments,
             scored=training.scored,
             warnings=training.warnings,
             printed=training.lines(),
