@@ -346,7 +346,6 @@ VALUES: dict[str, Callable[[], Any]] = {
     "SpikeTrains.select.trains": lambda: [1],
     "Tare.load.path": lambda: "here_tare.json",
     "Trial.truth": lambda: {"contact": np.array([100])},
-    "Verdict.from_dict.held": lambda: {"status": "lost", "text": "LOST: 2 datagrams", "lost": {"lost_on_the_way": 2}},
     "calibrate.recording": lambda: taxel.open("pressed.npz"),
     "convert.target": lambda: "there.npz",
     "detect.readout": lambda: RULE,

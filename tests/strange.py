@@ -13,10 +13,8 @@ from formats import bags
 
 import taxel
 from taxel import Note
+from taxel.reading import Facts, InMemory, Marks
 from taxel.recording import Recording
-from taxel.recording.contents import Contents, source_from
-from taxel.recording.once import known
-from taxel.recording.sections import Losses, Marks, Origin
 
 #: What a terminal would obey, in a name: clear the screen, set its title; C1, DEL, directions, separators.
 SEQUENCE = "\x1b[2J\x1b]0;owned\x07\x9b31m\x7f\x08\u202e\u2066\u200e\u200f\u061c\u2028\u2029"
@@ -55,10 +53,10 @@ def frames() -> taxel.Frames:
 def recording(source: str = NAME) -> Recording:
     """Such frames with hostile notes, detections, source and remarks."""
     found = taxel.Detections([NAME, CELL], [500_000, 900_000], [500_000, 900_000], [1.0, 1.0])
-    marks = Marks(notes=known((Note(NAME, 300_000, 0), Note(CELL, 600_000, 0))), detections=known(found))
-    losses = Losses(remarks=(NAME,), lost=known((NAME,)))
-    origin = Origin(Path("a.bag"), "a.bag", "ros", source=source)
-    return Recording(Contents.single(source_from(frames(), origin, marks=marks, losses=losses)))
+    marks = Marks(notes=(Note(NAME, 300_000, 0), Note(CELL, 600_000, 0)), detections=found)
+    table = frames()
+    facts = Facts(path=Path("a.bag"), array=table.array, kind="ros", source=source, remarks=(NAME,), lost=(NAME,))
+    return Recording.of(InMemory(facts, table, marks))
 
 
 def labels(place: Path) -> Path:

@@ -28,7 +28,7 @@ PRODUCT = {
     "page": (3_600, "crates/taxel-panel/web"),
     "border": (3_400, "crates/taxel-python/src crates/taxel-border/src"),
     "nouns": (1_600, "__init__ array event_table events frames spikes tare calibration clock plot"),
-    "labels, wire, neuron": (1_100, "labels detections recorded reading wire neuron"),
+    "labels, wire, neuron": (1_100, "labels detections recorded reading verdict wire neuron"),
     "_base": (900, "_base"),
     "formats": (1_250, "formats"),
     "recording": (2_200, "recording"),

@@ -206,21 +206,20 @@ def seeking(version: int, count: int, seeks: int, scratch: Path) -> dict[str, An
 
 def insoles(seconds: float) -> taxel.Recording:
     """Return a walk on two insoles of 99 sensors at 100 Hz: steps of a second, in kPa with fractions."""
-    from taxel.recording.contents import RecordedSource, alone, source_from  # noqa: PLC0415  a recording in memory
-    from taxel.recording.sections import Origin  # noqa: PLC0415
+    from taxel.reading import Facts, InMemory  # noqa: PLC0415  a recording in memory
 
     random, n = np.random.default_rng(7), round(100 * seconds)
     y, x = np.divmod(np.arange(99), 9)
     array = taxel.Array(1, 99, name="bench insole", places=taxel.Places(10.0 * x, 24.0 * y, unit="mm"))
     t = np.arange(n, dtype=np.int64) * 10_000
-    sources: dict[str, RecordedSource] = {}
+    feet: list[InMemory] = []
     for k, foot in enumerate(("left", "right")):
         phase = (np.arange(n) / 100 + k / 2) % 1.0
         load = np.where(phase < 0.6, np.sin(np.pi * phase / 0.6), 0.0)[:, None] * random.random(99) * 300
         values = np.round(load * (1 + 0.05 * random.standard_normal((n, 1))), 1).astype(np.float32)
         frames = taxel.Frames(values[:, None], t, unit="kPa", array=array)
-        sources[foot] = source_from(frames, Origin(Path("insoles"), f"insoles {foot}", "pedar", foot))
-    return taxel.Recording(alone(sources))
+        feet.append(InMemory(Facts(path=Path("insoles"), array=array, kind="pedar", label=foot, side=foot), frames))
+    return taxel.Recording.of(*feet)
 
 
 def opening(path: Path) -> dict[str, Any]:

@@ -97,7 +97,7 @@ __all__ = [
 #: The module of each name that is imported at its first access, so that ``import taxel`` is quick.
 _ROOMS = (
     "board_check", "detect", "device", "encode", "formats", "information", "learn", "live", "metrics", "plot",
-    "recording", "report", "simulate", "tasks", "wire",
+    "reading", "recording", "report", "simulate", "tasks", "wire",
 )  # fmt: skip
 _RECORDING = (
     "BoardChange", "Datagrams", "Health", "Recording", "Verdict", "Zeroing", "convert", "cut", "health", "merge",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
@@ -245,9 +245,13 @@ class Events(FrozenColumns):
             raise ProblemError(
                 f"events of {self.array!r} and of {other.array!r}: only events of one array can be merged"
             )
-        tables = (self, other)
+        return self._joined((self, other))
+
+    @classmethod
+    def _joined(cls, tables: Sequence[Events]) -> Events:
+        """Return the events and markers of tables of one array in order of time, at equal times in their order."""
         ticks = present = None
-        if self.intensity is not None or other.intensity is not None:
+        if any(table.intensity is not None for table in tables):
             none = [np.zeros(len(e), np.uint16) for e in tables]
             ticks = np.concatenate(
                 [z if e.intensity is None else e.intensity for e, z in zip(tables, none, strict=True)]
@@ -256,8 +260,28 @@ class Events(FrozenColumns):
                 [z > 0 if e.present is None else e.present for e, z in zip(tables, none, strict=True)]
             )
         t, x, y, p = (np.concatenate([getattr(e, name) for e in tables]) for name in ("t", "x", "y", "p"))
-        repaired = repaired_of(tables)
-        return self._unchecked(t, x, y, p, self.array, ticks, present, repaired, self.markers + other.markers).sorted()
+        markers = tuple(marker for table in tables for marker in table.markers)
+        return cls._unchecked(t, x, y, p, tables[0].array, ticks, present, repaired_of(tables), markers).sorted()
+
+    def _moved(self, times: Callable[[NDArray[np.int64]], NDArray[np.int64]]) -> Events:
+        """Return the same events and markers by another clock."""
+        at = times(np.array([t for t, _ in self.markers], np.int64)).tolist()
+        markers = tuple(zip(at, (start for _, start in self.markers), strict=True))
+        columns = (self.x, self.y, self.p, self.array, self.intensity, self.present, self.repaired)
+        return self._unchecked(times(self.t), *columns, markers)
+
+    def _on(self, array: Array) -> Events:
+        """Return the same events on another description of their sensor."""
+        same = self[:]
+        same.array = array
+        return same
+
+    def _part(self, x: slice, y: slice) -> Events:
+        """Return the events of a rectangle of columns `x` and rows `y` as those of a smaller array."""
+        (left, _), (top, _) = self.array.region(x, y)
+        inside = self.region(x, y)
+        columns = (inside.x - np.uint16(left), inside.y - np.uint16(top), inside.p, self.array._part(x, y))
+        return self._unchecked(inside.t, *columns, inside.intensity, inside.present, inside.repaired, self.markers)
 
     def to_pandas(self) -> Any:
         """Return a table ``t_us x y p``, with ``intensity`` (missing if absent) and ``repaired`` if there are any."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -197,6 +198,32 @@ class Frames(FrozenColumns):
         if 0 in values.shape[1:]:
             raise ProblemError(f"region {x}, {y}: no taxel of {self.array!r} is in it")
         return Frames(values, self.t, unit=self.unit, array=self.array._part(x, y))
+
+    @classmethod
+    def _joined(cls, tables: Sequence[Frames]) -> Frames:
+        """Return the frames of one sensor and unit in order of time."""
+        t = np.concatenate([table.t for table in tables])
+        order = np.argsort(t, kind="stable")
+        values = np.concatenate([table.values for table in tables])[order]
+        return cls(frozen(values), t[order], unit=tables[0].unit, array=tables[0].array)
+
+    def _moved(self, times: Callable[[NDArray[np.int64]], NDArray[np.int64]]) -> Frames:
+        """Return the same frames by another clock; equal times are moved apart by 1 us."""
+        t, steps = times(self.t), np.arange(len(self))
+        apart = np.maximum.accumulate(t - steps) + steps if len(t) else t
+        return Frames(self.values, apart, unit=self.unit, array=self.array)
+
+    def _on(self, array: Array) -> Frames:
+        """Return the same frames on another description of their sensor, of as many taxels."""
+        return Frames(self.values.reshape(-1, *array.shape), self.t, unit=self.unit, array=array)
+
+    def _resampled(self, period_us: int) -> Frames:
+        """Return the last frame at each multiple of a period after the first."""
+        if not len(self):
+            return self
+        t = np.arange(self.t[0], self.t[-1] + 1, period_us, dtype=np.int64)
+        at = np.searchsorted(self.t, t, side="right") - 1
+        return Frames(self.values[at], t, unit=self.unit, array=self.array)
 
     @cached_property
     def missing(self) -> int:

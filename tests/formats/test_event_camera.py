@@ -321,13 +321,7 @@ def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, window_ms: 
 @pytest.mark.parametrize(
     ("name", "begins", "said"),
     [
-        (
-            "a.aedat",
-            b"#!AER-DAT2.0\r\n",
-            r"\(AEDAT 2\): not a recording; save it as a file of event cameras that taxel reads: .raw, "
-            r".dat, .aedat4",
-        ),
-        ("a.aedat", b"#!AER-DAT4.0\r\n", r"AEDAT 4\).*; rename it to .aedat4"),
+        ("a.aedat", b"#!AER-DAT2.0\r\n", r"not a recording; taxel reads .*and of event cameras .raw, .dat, .aedat4"),
         ("a.dat", b"", "the file is empty; must be a recording"),
     ],
 )

@@ -456,10 +456,8 @@ def test_a_layout_that_contradicts_the_file_is_refused_where_it_is_given(
     assert taxel.open(tmp_path / "one.npz").frames() == frames
 
 
-@pytest.mark.parametrize(("ending", "falls"), mixed([".npz", ".h5", ".mcap"], ["true", "10"]))
-def test_a_recording_that_is_converted_beside_its_layout_is_turned_once(
-    tmp_path: Path, ending: str, falls: str
-) -> None:
+@pytest.mark.parametrize("falls", ["true", "10"])
+def test_a_recording_that_is_converted_beside_its_layout_is_turned_once(tmp_path: Path, falls: str) -> None:
     (tmp_path / "layout.toml").write_text(f'falls = {falls}\nrate_hz = 100\nunit = "N"\nheel = "top"\nside = "left"\n')
     (tmp_path / "step.txt").write_text(lines(VALUES))
     recording = taxel.open(tmp_path / "step.txt")
@@ -467,8 +465,8 @@ def test_a_recording_that_is_converted_beside_its_layout_is_turned_once(
         recording.frames().values[:, 0], (float(falls != "true" and falls) - VALUES).astype("f4")
     )
     for name in ("again", "and_again"):
-        taxel.convert(recording, tmp_path / f"{name}{ending}")
-        recording, before = taxel.open(tmp_path / f"{name}{ending}"), recording
+        taxel.convert(recording, tmp_path / f"{name}.mcap")
+        recording, before = taxel.open(tmp_path / f"{name}.mcap"), recording
         assert recording.frames() == before.frames()
         assert (recording.side, recording.heel, recording.timed) == ("left", "top", True)
     # The same again is no contradiction, another number is.
@@ -490,11 +488,13 @@ def test_a_recording_that_is_converted_beside_its_layout_is_turned_once(
 
 def test_turned_readings_are_not_written_where_a_layout_would_turn_them_again(tmp_path: Path) -> None:
     recording = table(tmp_path, lines(VALUES), "falls = true\nrate_hz = 100")
-    with pytest.raises(
-        taxel.ProblemError, match=r"inverted already, which a \.csv cannot state, and .*step\.layout\.toml"
-    ):
-        taxel.convert(recording, tmp_path / "step.csv")
-    assert "the fact that the readings were inverted (falls = 0)" in taxel.convert(recording, tmp_path / "other.csv")
+    for ending in ("csv", "npz", "h5"):
+        with pytest.raises(
+            taxel.ProblemError, match=rf"inverted already, which a \.{ending} cannot state, and .*step\.layout\.toml"
+        ):
+            taxel.convert(recording, tmp_path / f"step.{ending}")
+        [lost] = taxel.convert(recording, tmp_path / f"other.{ending}")
+        assert "that readings were inverted" in lost
 
 
 def test_a_layout_for_tables_says_nothing_of_a_board_s_recording_in_the_same_folder(tmp_path: Path) -> None:

@@ -466,7 +466,7 @@ def test_only_a_bag_has_topics_and_a_taxel_mcap_is_no_bag(tmp_path: Path) -> Non
     assert not ros.is_bag(tmp_path / "own.mcap")
     assert taxel.open(tmp_path / "own.mcap").events == events
     with pytest.raises(
-        ProblemError, match=r"own\.mcap: is a \.mcap file; topic, field, types and ros are only for ROS bags"
+        ProblemError, match=r"own\.mcap: is not a ROS bag; topic, field, types and ros are only for ROS bags"
     ):
         taxel.open(tmp_path / "own.mcap", topic="/palm")
 

@@ -98,9 +98,8 @@ def test_over_any_restarts_each_step_back_is_in_the_verdict_live_as_in_the_file(
     some = taxel.open(cut)
     if len(steps := steps_of(some.events.t)) <= 256:
         assert some.verdict.steps_back == steps
-    for kind in (".mcap", ".npz", ".h5"):
-        taxel.convert(recording, tmp_path / f"b{kind}")
-        assert taxel.open(tmp_path / f"b{kind}").verdict.steps_back == recording.verdict.steps_back
+    taxel.convert(recording, tmp_path / "b.mcap")
+    assert taxel.open(tmp_path / "b.mcap").verdict.steps_back == recording.verdict.steps_back
 
 
 @pytest.mark.parametrize("session", [None, pytest.param(7, marks=pytest.mark.slow)])

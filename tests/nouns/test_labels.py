@@ -17,7 +17,8 @@ from taxel._base.errors import Place
 from taxel.labels import TURN_US
 from taxel.live._requests.labels import LabelRequests
 from taxel.live._shown_files import Opening
-from taxel.recording.recognition import is_label_table, is_recording
+from taxel.recording.beside import is_label_table
+from taxel.recording.opening import is_recording
 from taxel.tasks.labels import references
 
 ARRAY = {"rows": 64, "columns": 64, "pitch_mm": 2.67, "name": "thesis 64x64"}

@@ -15,9 +15,9 @@ import taxel
 from taxel import Array, Frames, Places
 from taxel.live import Panel
 from taxel.live import _shown_files as shown_files
+from taxel.reading import Facts, InMemory
 from taxel.recording.analysis.pressure import above_rest, force_n
 from taxel.recording.analysis.rest import ticks_by_unit
-from taxel.recording.contents import Contents, source_from
 from taxel.recording.text_options import TextOptions
 
 UNKNOWN = 65_535
@@ -197,10 +197,8 @@ def test_an_encoder_that_does_not_fit_frames_is_refused_with_the_reason(tmp_path
 
 def test_frames_without_times_are_numbered(tmp_path):
     frames = Frames(np.arange(12.0).reshape(4, 1, 3), np.arange(4), array=Array(1, 3))
-    trial = taxel.open_all(write_icub(tmp_path))[0]._contents.main
-    taxel.convert(
-        taxel.Recording(Contents.single(source_from(frames, trial.origin, untimed=True))), tmp_path / "grasp.npz"
-    )
+    facts = Facts(path=tmp_path / "grasp.csv", array=frames.array, kind="icub", timed=False)
+    taxel.convert(taxel.Recording.of(InMemory(facts, frames)), tmp_path / "grasp.npz")
     with Panel(tmp_path / "grasp.npz") as panel, Client(panel) as page:
         about = opened(page, "grasp.npz")
         us = about["frames"]["number_us"]

@@ -23,7 +23,7 @@ from taxel import Array, Calibration, Frames
 from taxel.cli._opening import FileOptions
 from taxel.cli.view import _opening
 from taxel.live import Panel
-from taxel.recording.recognition import recordings_in
+from taxel.recording.opening import recordings_in
 from taxel.recording.text_options import TextOptions
 
 KINDS = ("grasp.bag", "grasp.db3", "grasp.mcap", "grasp")

@@ -106,7 +106,8 @@ def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_pat
     assert said.returncode == 0
     assert said.stdout.startswith(f"written to {tmp_path / 'walk.csv'}\n  lost: ")
     said = run("convert", walk, tmp_path / "walk.npz", "--json")
-    assert json.loads(said.stdout)["lost"] == ["raw datagrams with their arrival times"]
+    [lost] = json.loads(said.stdout)["lost"]
+    assert lost.startswith("a .npz holds the table alone: not the raw data, arrival times, ")
     assert run("convert", walk, tmp_path / "p.npz", "--frames", "500").returncode == 0
     frames = taxel.open(tmp_path / "p.npz").frames()
     assert np.array_equal(np.unique(np.diff(frames.t)), [2000])

@@ -1,4 +1,4 @@
-"""Gaps of time stamps, and silences of an event camera: in the verdict, in info and in the table of a folder."""
+"""Gaps of time stamps: in the verdict, in info and in the table of a folder."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from tests.shell import run
 
 import taxel
 from taxel import Array, Events, Frames
-from taxel.recording.gaps import written_twice
 
 BEGIN_US = 1_764_000_000_000_000
 
@@ -44,7 +43,6 @@ def test_a_verdict_names_the_gaps_of_stamps(tmp_path: Path, begin_us: int) -> No
     verdict = opened(walk((20_000_000, 23_500_000), begin_us=begin_us), tmp_path).verdict
     assert verdict == "losses unknown: the .npz does not record them; 1 gap of 3.5 s at 20.0 s"
     assert (verdict.status, verdict.noted) == ("unknown", {"gaps": 1, "gaps_us": 3_500_000})
-    assert taxel.Verdict.from_dict(json.loads(json.dumps(verdict.to_dict()))) == verdict
 
 
 def test_several_gaps_are_counted_and_the_longest_has_its_time(tmp_path: Path) -> None:
@@ -65,34 +63,6 @@ def test_a_recording_that_counts_its_losses_has_its_gaps_in_a_line_of_info(tmp_p
 
 def test_one_frame_that_is_missing_is_no_gap(tmp_path: Path) -> None:
     assert opened(walk((5_000_000, 5_020_000)), tmp_path).verdict == "losses unknown: the .npz does not record them"
-
-
-@pytest.mark.parametrize("rate", [200.0, 13_000.0])
-@pytest.mark.parametrize("counts", [False, True])
-def test_a_camera_that_is_silent_for_longer_than_chance_has_a_gap(tmp_path: Path, rate: float, counts: bool) -> None:
-    for k, (gaps, said) in enumerate((([], ""), ([(12.0, 15.0)], "; 1 gap of 3.0 s at 12.0 s"))):
-        table: Events | Frames = camera(rate, *gaps)
-        if counts:
-            windows = table.t // 5000
-            values = np.bincount(windows, minlength=6000)[:, None, None]
-            table = Frames(values, 5000 * np.arange(len(values)), unit="events/5 ms")
-        folder = tmp_path / str(k)
-        folder.mkdir()
-        assert opened(table, folder).verdict == f"losses unknown: the .npz does not record them{said}"
-
-
-def test_silence_of_a_board_or_of_a_camera_without_noise_is_no_gap(tmp_path: Path) -> None:
-    for k, table in enumerate(
-        (
-            camera(13_000, (12.0, 15.0), name="mat"),
-            camera(13_000, (2.0, 6.0), (8.0, 14.0)),
-            # So few events are rarely less than seconds apart.
-            camera(3.0),
-        )
-    ):
-        folder = tmp_path / str(k)
-        folder.mkdir()
-        assert opened(table, folder).verdict == "losses unknown: the .npz does not record them", k
 
 
 def test_the_table_of_a_folder_has_gaps_and_bad_taxels_and_no_verdict_that_says_nothing(tmp_path: Path) -> None:
@@ -134,37 +104,3 @@ def test_info_of_a_camera_has_its_rates_and_polarities_and_no_untouched_pixels(t
 def board(folder: Path) -> Path:
     taxel.convert(camera(100.0, name="mat"), folder / "board.npz")
     return folder / "board.npz"
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_frames_that_follow_twice_are_named_and_no_others(seed: int) -> None:
-    random = np.random.default_rng(seed)
-    first, count = random.integers(0, 500), int(random.integers(10, 80))
-    touches = 30 * (np.sin(np.arange(700) / 9) > 0.8)[:, None, None]
-    for values in (random.normal(9.0, 0.1, (700, 3, 4)) + touches, random.normal(2.0, 0.1, (700, 1, 1))):
-        twice = np.concatenate([values[: first + count], values[first:]])
-        named = f"frames {first} to {first + count - 1} ("
-        for changed in (twice, *([np.round(100 * twice)] if twice[0].size > 1 else [])):
-            [text] = written_twice(Frames(changed, 10_000 * np.arange(len(changed))))
-            assert text.startswith(named)
-            assert text.endswith(f" may be {10 * count} ms late")
-        # A slow sensor, a simulated one without noise, and readings that rest.
-        still = np.where(touches, 30.0, 0.0) * np.ones_like(values)
-        for right in (
-            values,
-            np.repeat(values, 2, axis=0),
-            still,
-            np.concatenate([still, still]),
-            np.maximum(values, 9),
-        ):
-            assert written_twice(Frames(right, 10_000 * np.arange(len(right)))) == []
-
-
-def test_info_names_frames_that_are_written_twice(tmp_path: Path) -> None:
-    frames = walk()
-    values = np.concatenate([frames.values[:2000], frames.values[1950:]])
-    twice = Frames(values, 10_000 * np.arange(len(values)), unit="counts", array=frames.array)
-    taxel.convert(twice, tmp_path / "a.npz")
-    text = run("info", tmp_path / "a.npz").stdout
-    assert "frames twice" in text
-    assert "frames 1950 to 1999 (19.500 to 19.990 s) are written twice" in text

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import taxel
-from taxel.recording.recognition import is_label_table
+from taxel.recording.beside import is_label_table
 from taxel.tasks.labels import references
 
 BIDS = "onset\tduration\ttrial_type\tvalue\n0.25\t0.1\theel\t1\n0.5\t0\tn/a\t2\n0.75\tn/a\ttoe\t3\n"

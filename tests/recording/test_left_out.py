@@ -35,7 +35,10 @@ DAMAGE: dict[str, tuple[str, Callable[[Path], None], str]] = {
     "a cut .npz": (".npz", cut, r"b\.npz: the \.npz file is damaged"),
     "a cut .h5": (".h5", cut, r"b\.h5: the HDF5 file is damaged"),
     "a bad line": (".csv", spoilt, r"b\.csv, line 31: "),
-    **{f"an empty {end}": (end, empty, rf"b\{end}.* is empty|b\{end}, line 1: ") for end in (".npz", ".h5", ".csv")},
+    **{
+        f"an empty {end}": (end, empty, rf"b\{end}.* (is empty|damaged)|b\{end}, line 1: ")
+        for end in (".npz", ".h5", ".csv")
+    },
     "an empty .mcap": (".mcap", empty, r"b\.mcap"),
 }
 
@@ -71,7 +74,7 @@ def test_a_damaged_file_of_another_format_or_program_is_left_out(tmp_path: Path)
     file = write_pedar(tmp_path / "pedar")
     file.with_name("second.asc").write_bytes(file.read_bytes() + b"0.5 oh\n")
     with pytest.warns(UserWarning, match=r"^left out, because it cannot be read: second\.asc, line"):
-        assert {each.path.name.split()[0] for each in taxel.open_all(tmp_path / "pedar")} == {file.stem}
+        assert {each.path.stem for each in taxel.open_all(tmp_path / "pedar")} == {file.stem}
     (tmp_path / "tables").mkdir()
     (tmp_path / "tables/layout.toml").write_text("rows = 1\ncolumns = 2\nrate_hz = 10\n")
     for name, content in {"a.txt": "1,2\n3,4\n", "b.txt": "1,2\n3,oh\n", "c.txt": ""}.items():

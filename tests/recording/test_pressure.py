@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import taxel
+from taxel.reading import Facts, InMemory
 from taxel.recording.analysis import pressure
 from taxel.recording.analysis.pressure import series
-from taxel.recording.contents import Contents, source_from
 from taxel.recording.recording import Recording
 
 from .test_commands import run
@@ -115,7 +115,7 @@ def test_noise_has_no_centre_and_each_press_has_one(spread: float, share: float)
         values[press, y : y + 3, x : x + 3] += 100.0
         during[press] = True
     frames = taxel.Frames(np.round(values), np.arange(1200) * 10_000, unit="counts")
-    of = series(Recording(Contents.single(source_from(frames))))
+    of = series(Recording.of(InMemory(Facts(array=frames.array), frames)))
     assert of.rest.source == "quiet"
     has = ~np.isnan(of.centre).any(axis=1)
     assert has[during].all()
@@ -142,7 +142,6 @@ def test_what_is_largest_between_two_frames_of_events_is_said(tmp_path: Path) ->
 @pytest.mark.parametrize("chunk", [64, 1 << 16])
 def test_the_largest_are_those_of_frames_at_all_events(monkeypatch: pytest.MonkeyPatch, chunk: int) -> None:
     from taxel.recording.analysis import pressure
-    from taxel.recording.contents import Contents, source_from
     from taxel.recording.recording import Recording
 
     monkeypatch.setattr(pressure, "_EVENTS", chunk)
@@ -153,7 +152,7 @@ def test_the_largest_are_those_of_frames_at_all_events(monkeypatch: pytest.Monke
         near = (t >= begin) & (t < begin + 6_000)
         ticks[near] += np.int64(random.integers(20, 90) * np.sin(np.pi * (t[near] - begin) / 6_000))
     events = taxel.Events(t, x, y, np.ones(t.size, bool), array=ARRAY, intensity=ticks)
-    recording = Recording(Contents.single(source_from(events)))
+    recording = Recording.of(InMemory(Facts(array=events.array), events))
     found = pressure.series(recording)
     assert found is not None and found.largest is not None  # noqa: PT018
     drawn = pressure._Drawn.from_recording(recording)
@@ -185,7 +184,7 @@ def test_silence_is_read_at_few_times_and_shows_the_same(monkeypatch: pytest.Mon
     n = len(t)
     x, y, p, ticks = (random.integers(0, most, n) for most in (6, 5, 2, 200))
     events = taxel.Events(t, x, y, p.astype(bool), array=array, intensity=ticks)
-    recording = Recording(Contents.single(source_from(events)))
+    recording = Recording.of(InMemory(Facts(array=events.array), events))
 
     def every(drawn: pressure._Drawn) -> tuple[np.ndarray, np.ndarray]:
         times = np.union1d(drawn.t, np.arange(drawn.t[0], drawn.t[-1], 50_000))
@@ -218,7 +217,7 @@ def test_what_info_takes_does_not_grow_with_a_time_that_is_wrong(tmp_path: Path,
     t = np.sort(np.append(np.arange(3000) * 1000, wrong_us))
     x, y, p, ticks = (np.random.default_rng(2).integers(0, most, len(t)) for most in (8, 8, 2, 90))
     events = taxel.Events(t, x, y, p.astype(bool), array=taxel.Array(8, 8), intensity=ticks)
-    drawn = pressure._Drawn.from_recording(Recording(Contents.single(source_from(events))))
+    drawn = pressure._Drawn.from_recording(Recording.of(InMemory(Facts(array=events.array), events)))
     assert len(drawn.sampled[0]) < 20_000
     taxel.convert(events, tmp_path / "wrong.npz")
     begin = perf_counter()

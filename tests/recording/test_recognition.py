@@ -12,17 +12,9 @@ from formats import bags, making
 import taxel
 from taxel import FormatError, ProblemError
 from taxel.formats import FORMATS
-from taxel.recording.recognition import (
-    ForeignFile,
-    FormatFile,
-    Refusal,
-    RosBag,
-    TaxelFile,
-    check_recording,
-    is_recording,
-    recognise,
-    recordings_in,
-)
+from taxel.formats.layout import Layout
+from taxel.reading import Facts, InMemory, Reader
+from taxel.recording.opening import check_recording, is_recording, kind_of, recordings_in
 
 from .making import some_events, some_frames
 
@@ -76,27 +68,27 @@ def described(write: Write) -> Write:
 TABLE = "1,2,3\n" * 30
 PLAIN = {"t": np.arange(4), "values": np.ones((4, 1, 3), np.float32)}
 OTHERS = {"a": np.ones((4, 3))}
-FILES: dict[str, tuple[Write, object]] = {
-    **{kind: (of_taxel(f"walk.{kind}"), TaxelFile(kind)) for kind in ("mcap", "lsa", "npz", "csv", "h5")},
-    **{f"frames {kind}": (of_taxel(f"walk.{kind}", frames=True), TaxelFile(kind)) for kind in ("mcap", "npz", "h5")},
-    "without an ending": (without_ending, TaxelFile("mcap")),
-    "plain columns": (arrays("a.npz", **PLAIN), TaxelFile("npz")),
-    "damaged archive": (content("a.npz", b"PK\x03\x04 and no more"), TaxelFile("npz")),
-    **{name: (getattr(making, f"write_{name}"), FormatFile(name)) for name in FORMATS},
-    **{f"bag {name}": (bag(name), RosBag()) for name in ("grasp.bag", "grasp.db3", "grasp.mcap", "grasp")},
-    **{f"table {ending}": (content(f"a{ending}", TABLE), ForeignFile(False)) for ending in (".csv", ".txt", ".dat")},
-    "table with a layout": (described(content("a.csv", TABLE)), ForeignFile(True)),
-    "arrays": (arrays("a.npz", **OTHERS), ForeignFile(False)),
-    "arrays with a layout": (described(arrays("a.npz", **OTHERS)), ForeignFile(True)),
-    "packed table": (content("a.csv", b"\x1f\x8b\x08\x00"), ForeignFile(False)),
-    "prose": (content("a.txt", "of a hand\n"), ForeignFile(False)),
-    "labels": (content("a.csv", "label,t_us\nheel,5\n"), Refusal),
-    "labels whose times come first": (content("a.csv", "t_us,label\n5,heel\n"), Refusal),
-    "no labels": (content("a.notes.csv", ""), Refusal),
-    "spike trains": (spikes, Refusal),
-    "picture": (content("a.mcap", b"\x89PNG\r\n\x1a\n"), Refusal),
-    "program": (content("a.py", "import taxel\n"), Refusal),
-    "empty": (content("a.npz", b""), Refusal),
+FILES: dict[str, tuple[Write, str | None]] = {
+    **{kind: (of_taxel(f"walk.{kind}"), kind) for kind in ("mcap", "lsa", "npz", "csv", "h5")},
+    **{f"frames {kind}": (of_taxel(f"walk.{kind}", frames=True), kind) for kind in ("mcap", "npz", "h5")},
+    "without an ending": (without_ending, "mcap"),
+    "plain columns": (arrays("a.npz", **PLAIN), "npz"),
+    "damaged archive": (content("a.npz", b"PK\x03\x04 and no more"), "npz"),
+    **{name: (getattr(making, f"write_{name}"), name) for name in FORMATS},
+    **{f"bag {name}": (bag(name), "ros") for name in ("grasp.bag", "grasp.db3", "grasp.mcap", "grasp")},
+    **{f"table {ending}": (content(f"a{ending}", TABLE), "table") for ending in (".csv", ".txt", ".dat")},
+    "table with a layout": (described(content("a.csv", TABLE)), "table"),
+    "arrays": (arrays("a.npz", **OTHERS), "arrays"),
+    "arrays with a layout": (described(arrays("a.npz", **OTHERS)), "arrays"),
+    "packed table": (content("a.csv", b"\x1f\x8b\x08\x00"), "table"),
+    "prose": (content("a.txt", "of a hand\n"), "table"),
+    "labels": (content("a.csv", "label,t_us\nheel,5\n"), None),
+    "labels whose times come first": (content("a.csv", "t_us,label\n5,heel\n"), None),
+    "no labels": (content("a.notes.csv", ""), None),
+    "spike trains": (spikes, None),
+    "picture": (content("a.mcap", b"\x89PNG\r\n\x1a\n"), "mcap"),
+    "program": (content("a.py", "import taxel\n"), None),
+    "empty": (content("a.npz", b""), "npz"),
 }
 
 
@@ -113,14 +105,13 @@ def why(call: Callable[[], object]) -> str | None:
 def test_a_path_is_the_same_for_whoever_asks(name: str, tmp_path: Path) -> None:
     write, expected = FILES[name]
     path = write(tmp_path)
-    found = recognise(path)
-    assert isinstance(found, expected) if isinstance(expected, type) else found == expected
+    assert kind_of(path) == expected
     refused = why(lambda: check_recording(path))
-    assert is_recording(path) == (refused is None)
-    assert is_recording(path) == (not isinstance(found, Refusal) and found != ForeignFile(has_layout=False))
+    # A file that is damaged is one; opening it says what is wrong.
+    assert is_recording(path) == (refused is None or name == "picture") or name == "prose"
     if refused is not None:
         assert why(lambda: taxel.open_all(path)) == refused
-        assert path not in recordings_in(path.parent) or path.suffix in {".mcap", ".npz"}
+        assert path not in recordings_in(path.parent) or name == "picture"
 
 
 def test_a_folder_leaves_out_what_is_of_others_whatever_its_ending(tmp_path: Path) -> None:
@@ -133,12 +124,7 @@ def test_a_folder_leaves_out_what_is_of_others_whatever_its_ending(tmp_path: Pat
     assert [recording.path for recording in taxel.open_all(tmp_path)] == [own]
     assert recordings_in(tmp_path) == [own, grasp]
     (tmp_path / "others.layout.toml").write_text("rows = 1\ncolumns = 3\nrate_hz = 100\n")
-    with pytest.warns(
-        UserWarning,
-        match=r"others\.npz are left out, because tables and arrays are not read in a folder with recordings "
-        r"\(walk\.npz\)",
-    ):
-        assert [recording.path for recording in taxel.open_all(tmp_path)] == [own]
+    assert [recording.path for recording in taxel.open_all(tmp_path)] == [own]
 
 
 def test_a_folder_of_described_arrays_and_tables_opens_all_of_them(tmp_path: Path) -> None:
@@ -175,7 +161,7 @@ def test_a_path_is_converted_as_its_recording(name: str, tmp_path: Path) -> None
     assert taxel.convert(path, target) == taxel.convert(opened[0], again)
     written = [taxel.open(place) for place in (target, again)]
     assert len({rec.has_events for rec in written}) == 1
-    assert [rec.events if rec.has_events else rec.frames() for rec in written] == [written[0]._contents.main.table] * 2
+    assert [rec.events if rec.has_events else rec.frames() for rec in written] == [written[0]._main.table] * 2
 
 
 def test_a_converted_path_keeps_the_labels_of_its_folder(tmp_path: Path) -> None:
@@ -184,3 +170,29 @@ def test_a_converted_path_keeps_the_labels_of_its_folder(tmp_path: Path) -> None
     taxel.convert(path, tmp_path / "target.mcap")
     (tmp_path / "labels.csv").unlink()
     assert [(note.text, note.t) for note in taxel.open(tmp_path / "target.mcap").notes] == [("heel", 5)]
+
+
+class Distribution:
+    """A format of another distribution: files that end in .grasp, with a frame of two values a byte."""
+
+    @staticmethod
+    def knows(path: Path) -> bool:
+        return path.suffix == ".grasp"
+
+    @staticmethod
+    def read(path: Path, layout: Layout | None) -> list[Reader]:  # noqa: ARG004  the size follows from the layout
+        values = np.frombuffer(path.read_bytes(), np.uint8).astype(np.float32).reshape(-1, 1, 2)
+        frames = taxel.Frames(values, np.arange(len(values)) * 1000, unit="N")
+        return [InMemory(Facts(path=path, array=frames.array, kind="grasp", name=name), frames) for name in "ab"]
+
+
+def test_a_format_of_another_distribution_is_opened_as_any_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("taxel.recording.opening._from_elsewhere", lambda: {"grasp": Distribution()})
+    path = content("one.grasp", b"\x01\x02\x03\x04")(tmp_path)
+    (tmp_path / "one.layout.toml").write_text("rows = 2\ncolumns = 1\n")
+    assert recordings_in(tmp_path) == [path]
+    first, second = taxel.open_all(tmp_path)
+    assert [first.name, second.name, first.kind] == ["a", "b", "grasp"]
+    assert first.frames().values.tolist() == [[[1.0], [2.0]], [[3.0], [4.0]]]

@@ -119,7 +119,7 @@ def spoil_bytes(rng: np.random.Generator, data: bytes) -> bytes:
 def read(path: Path) -> None:
     """Read all that a file holds."""
     for recording in taxel.open_all(path):
-        for source in recording._contents.sources.values():
+        for source in recording._sources.values():
             assert len(source.table.t) >= 0
         assert recording.verdict
         assert list(recording.notes) is not None

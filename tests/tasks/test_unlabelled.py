@@ -12,8 +12,7 @@ from tests.tasks.recordings import mat
 import taxel
 from taxel.detect import Example, judge, tune
 from taxel.detect.recipe import Recipe
-from taxel.recording.contents import alone, source_from
-from taxel.recording.sections import Origin
+from taxel.reading import Facts, InMemory
 from taxel.tare import Tare
 from taxel.tasks import train
 
@@ -22,8 +21,8 @@ from taxel.tasks import train
 def feet(tmp_path: Path) -> Path:
     """Write a recording of two sources, each touched eight times, with labels of the left one alone."""
     frames = {name: taxel.open(mat(tmp_path, seed)).frames() for name, seed in (("left", 3), ("right", 4))}
-    sources = {name: source_from(each, Origin(tmp_path, label=name)) for name, each in frames.items()}
-    taxel.convert(taxel.Recording(alone(sources)), tmp_path / "both.mcap")
+    feet = (InMemory(Facts(path=tmp_path, array=each.array, label=name), each) for name, each in frames.items())
+    taxel.convert(taxel.Recording.of(*feet), tmp_path / "both.mcap")
     return tmp_path / "both.mcap"
 
 

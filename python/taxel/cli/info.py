@@ -74,7 +74,7 @@ def info(
     Example: taxel info grasp.db3 --topic /palm --field taxels --array 24x32
     """
     from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
-    from taxel.recording.recognition import are_spike_trains  # noqa: PLC0415
+    from taxel.recording.opening import are_spike_trains  # noqa: PLC0415
     from taxel.tasks.labels import are_trials, trial_name  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
@@ -366,7 +366,6 @@ def _flaws(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "full scale", f"{readings} {greatest}: larger loads may be cut off"
     if (gaps := facts["gaps"]) is not None and "gaps" not in facts["verdict"].noted:
         yield "gaps", gaps["text"]
-    yield from (("frames twice", text) for text in facts["written_twice"])
 
 
 def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:

@@ -30,7 +30,6 @@ def merge(
             help="Put the recordings one after another, with this pause, s. Default: keep their times.",
         ),
     ] = None,
-    beside: Annotated[bool, typer.Option("--beside", help="Put the sensors side by side, left to right.")] = False,
     label: Annotated[
         str | None, typer.Option(help="Merge only the half second before and after each note with this text.")
     ] = None,
@@ -41,11 +40,11 @@ def merge(
 
     At the beginning of each recording, a note has the name of its file.
 
-    Example: taxel merge left.mcap right.mcap -o both.mcap --beside
+    Example: taxel merge left.mcap right.mcap -o both.mcap
     """
     opened = [files.opener.open_one(path) for path in recordings]
     parts = opened if label is None else [part for each in opened for part in taxel.cut(each, label=label)]
-    merged = taxel.merge(parts, gap_us=None if gap is None else gap * 1e6, beside=beside)
+    merged = taxel.merge(parts, gap_us=None if gap is None else gap * 1e6)
     lost = taxel.convert(merged, out, overwrite=overwrite)
     if as_json:
         say(json.dumps({"recordings": [str(path) for path in recordings], "file": str(out), "lost": lost}))

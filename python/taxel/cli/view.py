@@ -21,8 +21,7 @@ from taxel.cli.console import Console
 from taxel.formats.ros import is_bag, topics
 from taxel.live import Panel
 from taxel.recording import Recording
-from taxel.recording.recognition import is_folder, recordings_in
-from taxel.recording.sidecars import calibrate_by
+from taxel.recording.opening import is_folder, recordings_in
 
 app = App()
 
@@ -89,7 +88,7 @@ def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> C
         opened = files.opener.open_joined(file)
         if calibration is None:
             return opened
-        return [calibrate_by(sensor, calibration) for sensor in opened]
+        return [sensor._calibrated_by(calibration) for sensor in opened]
 
     # The panel asks first for the recording that was opened here, so that errors are those of the command.
     opened = {first.absolute(): opens(first)}

@@ -22,7 +22,7 @@ from taxel.recording import Recording
 from taxel.recording.analysis.health import health
 from taxel.recording.analysis.rest import flickering, loaded_from, of_frames, ticks_by_unit
 from taxel.recording.convert import convert
-from taxel.recording.recognition import is_recording
+from taxel.recording.opening import is_recording
 from taxel.recording.text_options import TextOptions
 
 #: A text table of more bytes than the first number is shown by its beginning first, of as many bytes as the second.

@@ -26,7 +26,7 @@ from taxel.detections import Detection
 from taxel.live.lsl import LslInlet, LslOutlet
 from taxel.live.options import LiveOptions
 from taxel.live.summary import Summary, summary_of
-from taxel.recording.changes import Zeroing
+from taxel.reading import Zeroing
 from taxel.tare import Tare
 
 #: Prefix of the sources and destinations of the lab streaming layer.

@@ -24,7 +24,7 @@ from taxel.live._shown_files import Opening
 from taxel.live.live import Live
 from taxel.recording import Recording
 from taxel.recording.frames import period_us
-from taxel.recording.recognition import check_recording, is_folder, recordings_in
+from taxel.recording.opening import check_recording, is_folder, recordings_in
 from taxel.recording.text_options import TextOptions
 from taxel.tare import Tare
 

@@ -9,8 +9,8 @@ from typing import Any
 from taxel import _core
 from taxel.recording import open_one
 from taxel.recording.readers.mcap import DOUBTS, STEPS
-from taxel.recording.verdict import Verdict
 from taxel.tare import Tare
+from taxel.verdict import Verdict
 
 
 @dataclass(frozen=True)

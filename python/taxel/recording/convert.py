@@ -1,35 +1,28 @@
-"""Conversion between kinds of recordings; information that the target cannot hold is reported."""
+"""Converts recordings: a .mcap holds everything; other kinds are exports, which say what they leave out."""
 
 from __future__ import annotations
 
 import errno
-import json
 import os
-import tempfile
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from taxel import _core
 from taxel._base.arguments import checked_path, flag, shown, text
 from taxel._base.errors import refused
 from taxel._base.files import whole_file, write_whole
-from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.events import Events
+from taxel.formats.layout import Layout
 from taxel.frames import Frames
-from taxel.recording.contents import BoardSource, Contents, RecordedSource, Stream, alone, share_clock, source_from
-from taxel.recording.frames import as_frames, period_us
-from taxel.recording.kinds import ENDINGS
+from taxel.reading import ENDINGS, Facts, InMemory
+from taxel.recording.frames import period_us
 from taxel.recording.opening import open_one
 from taxel.recording.recording import Recording
-from taxel.recording.sections import Wire
-from taxel.recording.writers.csv import write_csv
-from taxel.recording.writers.h5 import write_h5
+from taxel.recording.source import SourceView, share_clock
+from taxel.recording.writers.columns import write_h5, write_npz
+from taxel.recording.writers.csv import array_in_csv, write_csv
+from taxel.recording.writers.lsa import write_lsa
 from taxel.recording.writers.mcap import write_mcap
-from taxel.recording.writers.npz import write_npz
-from taxel.recording.writers.stored import needs_new_bytes, storable
 
 __all__ = ["KINDS", "convert"]
 
@@ -61,8 +54,9 @@ def convert(
     Returns
     -------
     list of str
-        A line for each kind of information that was lost: `Recording.lost` of the source, and the information that the
-        target cannot hold; empty if nothing is lost.
+        A line for each kind of information that was lost: `Recording.lost` of the source, and one for all that the
+        target leaves out; empty if nothing is lost. A .mcap holds everything, a .lsa the bytes of the manual; .npz, .h5
+        and .csv are exports of the table, with its times, unit and sensor.
 
     Raises
     ------
@@ -78,9 +72,9 @@ def convert(
     >>> taxel.convert(events, folder / "two.npz")
     []
     >>> taxel.convert(folder / "two.npz", folder / "two.csv")
-    ['the sensor (8 x 8 taxels, of unknown pitch, "array")']
+    ['a .csv holds the table alone: not the sensor']
     >>> taxel.convert(folder / "two.npz", folder / "two.lsa")
-    ['the sensor (8 x 8 taxels, of unknown pitch, "array")', 'times finer than 100 us']
+    ["a .lsa holds the board's bytes alone: not the sensor, times finer than 100 us"]
     """
     path = Path(checked_path("target", target))
     kind = path.suffix.lower()
@@ -91,93 +85,108 @@ def convert(
         raise FileExistsError(errno.EEXIST, "exists already; give overwrite=True to replace it", str(path))
     if frames_hz is not None:
         period_us("frames_hz", frames_hz)
-    contents = _contents(source)
+    recording = _recording(source)
     if frames_hz is not None:
         if isinstance(source, Frames):
             raise refused(
                 "frames_hz",
                 ": the times of frames are not changed; to resample frames, open the file and call frames(rate_hz)",
             )
-        if contents.is_several and share_clock(contents.sources):
-            contents = alone(
-                {name: as_frames(source, frames_hz, name="frames_hz") for name, source in contents.sources.items()}
-            )
-        else:
-            contents = Contents(as_frames(contents.main, frames_hz, name="frames_hz"), contents.sources)
-    written = storable(contents, path)
-    main, lost = written.main, list(written.main.losses.lost())
+        recording = _as_frames(recording, frames_hz)
+    sources = recording._sources
+    if kind == ".mcap" and recording.is_several and share_clock(sources) and not recording.has_events:
+        chosen, others = sources, list[str]()
+    else:
+        only = recording._only
+        chosen = {only.facts.label: only}
+        others = [f"the source {name}" for name, each in sources.items() if each is not only]
+    if kind == ".mcap":
+        with whole_file(path, overwrite=overwrite) as temporary:
+            return [*write_mcap(temporary, chosen, compression), *others]
+    return _export(path, kind, next(iter(chosen.values())), others, overwrite)
+
+
+def _export(path: Path, kind: str, source: SourceView, others: list[str], overwrite: bool) -> list[str]:
+    """Write the table of a source, and return what was lost."""
+    table, facts = source.table, source.facts
+    _refuse_turned(path, source)
+    left = [*_beside_table(source), *others]
     match kind:
         case ".lsa":
-            _write_lsa(path, main, overwrite)
-        case ".npz":
-            write_whole(path, lambda file: write_npz(file, main), overwrite=overwrite)
+            left = [*write_lsa(path, source, overwrite=overwrite), *left]
         case ".csv":
-            write_whole(path, lambda file: write_csv(file, main.table), overwrite=overwrite)
-        case ".h5":
-            write_h5(path, main, overwrite=overwrite)
+            left = [*_left_of_csv(source), *left]
+            write_whole(path, lambda file: write_csv(file, table), overwrite=overwrite)
+        case ".npz":
+            write_whole(path, lambda file: write_npz(file, table, timed=facts.timed), overwrite=overwrite)
         case _:
-            with whole_file(path, overwrite=overwrite) as temporary:
-                sources_before = contents.sources if written.is_several else {main.origin.label: contents.main}
-                counts = {name: _counts(sources_before[name], source) for name, source in written.sources.items()}
-                write_mcap(temporary, written, compression, counts)
-                lost += _read_otherwise(temporary, contents.main)
-    return lost
+            write_h5(path, table, timed=facts.timed, overwrite=overwrite)
+    holds = "the board's bytes" if kind == ".lsa" else "the table"
+    return [*source.lost, *[f"a {kind} holds {holds} alone: not {', '.join(left)}"] * bool(left)]
 
 
-def _write_lsa(path: Path, source: RecordedSource, overwrite: bool) -> None:
-    """Write a `.lsa` and its `.lss` whole; until then an older pair stays as it is."""
-    marker = path.with_suffix(".lss")
-    if not overwrite and os.path.lexists(marker):
-        raise FileExistsError(errno.EEXIST, "exists already; give overwrite=True to replace it", str(marker))
-    with (
-        whole_file(path, overwrite=overwrite) as temporary,
-        tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder,
-    ):
-        new = Path(folder) / "made.lsa"
-        payload = source.section(Wire).payload
-        assert payload is not None  # `storable` sets it
-        _core.write_lsa(new, payload.tobytes())
-        os.replace(new, temporary)
-    write_whole(marker, lambda _: None, overwrite=True)
+def _beside_table(source: SourceView) -> list[str]:
+    """Return what a recording has beside its table."""
+    facts, marks, clock = source.facts, source.marks, source.clock
+    there = {
+        "the raw data": source.received is not None and facts.kind != "lsa",
+        "arrival times": clock is not None and len(clock.board_us) > 0,
+        "notes": bool(marks.notes),
+        "detections": len(marks.detections) > 0,
+        "zeroed taxels": bool(marks.zeroings),
+        "registers": marks.registers is not None or bool(marks.settings),
+        "changes of the board": bool(marks.changes),
+        "the values at the beginning": marks.held is not None,
+        "the side": bool(facts.side),
+        "the place of the heel": bool(facts.heel),
+        "the names of the columns": bool(facts.columns),
+        "that readings were inverted": facts.turned is not None,
+        "the verdict": facts.kind not in ("events", *ENDINGS.values()) or facts.kind == "mcap",
+    }
+    return [name for name, is_there in there.items() if is_there]
 
 
-def _contents(source: object) -> Contents:
+def _refuse_turned(path: Path, source: SourceView) -> None:
+    """Refuse to write readings that a layout beside the file would invert again, as only a .mcap states that."""
+    layout = Layout.beside(path)
+    if source.facts.turned is not None and layout is not None and Layout.read(layout).turned is not None:
+        raise ProblemError(
+            f"{path}: the readings were inverted already, which a {path.suffix} cannot state, and {layout} beside it "
+            "would invert them again; write the recording to another folder, or as a .mcap"
+        )
+
+
+def _left_of_csv(source: SourceView) -> list[str]:
+    """Return what a .csv leaves out of a table."""
+    table = source.table
+    left = [] if array_in_csv(table) == source.array else ["the sensor"]
+    if isinstance(table, Events):
+        return left + ["markers of start and stop"] * bool(table.markers)
+    unit = [f"the unit ({table.unit})"] * (table.unit != "counts")
+    return [*left, *unit, *["that it has no times"] * (not source.facts.timed)]
+
+
+def _as_frames(recording: Recording, frames_hz: float) -> Recording:
+    """Return a recording of frames at a rate."""
+
+    def drawn(source: SourceView) -> SourceView:
+        frames = Recording({source.facts.label: source}).frames(frames_hz)
+        lost = ("raw datagrams",) * (source.facts.raw == "datagrams")
+        # The first frame includes the held values.
+        marks = replace(source.marks, held=None)
+        return SourceView(source.in_memory(frames, marks, lost=tuple(dict.fromkeys((*source.lost, *lost)))))
+
+    if recording.is_several and share_clock(recording._sources):
+        return recording._each(drawn)
+    only = recording._only
+    return Recording({**recording._sources, only.facts.label: drawn(only)})
+
+
+def _recording(source: object) -> Recording:
     if isinstance(source, str | os.PathLike):
         source = open_one(checked_path("source", source))
     if isinstance(source, Recording):
-        return source._contents
+        return source
     if not isinstance(source, Events | Frames):
         raise refused("source", f" is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or a path")
-    return Contents.single(source_from(source))
-
-
-def _counts(source: RecordedSource, written: RecordedSource) -> dict[str, Any]:
-    """Return the counts of a recording under the names of the live format."""
-    samples = source.stream.samples() if isinstance(source, Stream) else None
-    if samples is not None:
-        return {"received": len(samples)}
-    received = len(written.wire.datagrams() or ()) if isinstance(written, BoardSource) else len(written.table)
-    if source.origin.kind == "events":
-        # Nothing is missing of what was made here.
-        return {"received": received, "missing": 0}
-    if not isinstance(written, BoardSource):
-        return {"received": received}
-    counts = source.losses.counts()
-    known = {name: counts.get(name) or 0 for name in ("dropped_by_queue", "received")}
-    by_kernel = counts.get("dropped_by_kernel")
-    # Where it is not counted it is unknown; a file without its end says nothing of it.
-    known["dropped_by_kernel"] = by_kernel if known["received"] else by_kernel or 0
-    decoder = counts.get("decoder")
-    damage = _core.recording_damage(json.dumps(decoder)) if decoder else {}
-    return {**known, "decoder": damage}
-
-
-def _read_otherwise(path: Path, source: RecordedSource) -> list[str]:
-    """Return a line if copied datagrams decode to other events than the recording's."""
-    if not isinstance(source, BoardSource) or needs_new_bytes(source):
-        return []
-    events = source.table
-    again = Events._from_parts(_core.RecordingReader(path).decode("direct").events, events.array)
-    if (len(again), again.intensity is None) != (len(events), events.intensity is None):
-        return [f"the pairing of intensities ({counted(len(again), 'event')} when paired directly)"]
-    return ["the order of times that step back by more than 0.1 s"] * (not np.array_equal(again.t, events.t))
+    return Recording.of(InMemory(Facts(array=source.array), source))

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import assert_never
-
 import numpy as np
 
 from taxel._base.arguments import finite, instance, text, window
 from taxel._core import ProblemError
-from taxel.events import Events
-from taxel.recording import sections
-from taxel.recording.changes import Zeroing
-from taxel.recording.contents import Contents, apply_rule, refuse_several
-from taxel.recording.once import Once
+from taxel.array import Array
 from taxel.recording.recording import Recording
 
 
@@ -46,8 +39,8 @@ def cut(
     Returns
     -------
     list of Recording
-        One recording, or one for each note. Times do not change. `Recording.lost` lists the information that a part by
-        region cannot hold (datagrams); its registers are those of the whole sensor.
+        One recording, or one for each note, of the same file: nothing is read before it is asked for. Times do not
+        change; its registers are those of the whole sensor.
 
     Raises
     ------
@@ -79,21 +72,16 @@ def cut(
     if columns is None and rows is None:
         return slices
     across, down = (slice(None) if chosen is None else chosen for chosen in (columns, rows))
-    return [Recording(region(time_slice._contents, across, down)) for time_slice in slices]
+    _check(recording.array, across, down)
+    return [Recording({each._only.facts.label: each._only.region(across, down)}) for each in slices]
 
 
 def _bounds(chosen: slice) -> str:
     return f"{chosen.start or 0} to {'the last' if chosen.stop is None else chosen.stop}"
 
 
-def region(contents: Contents, columns: slice, rows: slice) -> Contents:
-    """Return the part of a recording within a rectangle, as a separate sensor; unchanged if that is all.
-
-    Raises
-    ------
-    ProblemError : an end beyond the array, no taxel in the rectangle, or the file holds several boards
-    """
-    array = contents.main.sensor.array
+def _check(array: Array, columns: slice, rows: slice) -> None:
+    """Refuse an end beyond an array, or a rectangle without a taxel."""
     (left, right), (top, bottom) = array.region(columns, rows)
     for name, chosen, count in (("columns", columns, array.columns), ("rows", rows, array.rows)):
         if any(not -count <= end <= count for end in (chosen.start, chosen.stop) if end is not None):
@@ -107,52 +95,6 @@ def region(contents: Contents, columns: slice, rows: slice) -> Contents:
             if chosen != slice(None)
         )
         raise ProblemError(f"{bounds}: no taxel is there; the array has {array.columns} columns and {array.rows} rows")
-    if (bottom - top, right - left) == array.shape:
-        return contents
-    refuse_several(contents.main)
-    small = array._part(columns, rows)
-
-    def events(before: Events) -> Events:
-        inside = before.region(columns, rows)
-        x, y = (inside.x - np.uint16(left)), (inside.y - np.uint16(top))
-        ticks, present, repaired = inside.intensity, inside.present, inside.repaired
-        return Events._unchecked(inside.t, x, y, inside.p, small, ticks, present, repaired, before.markers)
-
-    def zeroings(before: tuple[Zeroing, ...]) -> tuple[Zeroing, ...]:
-        inside = (z for z in before if left <= z.x < right and top <= z.y < bottom)
-        return tuple(Zeroing(z.t, z.x - left, z.y - top, z.rest, z.before) for z in inside)
-
-    def rule(section: sections.Section) -> sections.Section | None:  # noqa: PLR0911  one a type
-        match section:
-            case sections.Origin() | sections.Timing() | sections.Losses():
-                return section
-            case sections.Sensor():
-                calibration = section.calibration.to(
-                    lambda before: None if before is None else before._region(columns, rows)
-                )
-                return sections.Sensor(small, section.side, section.heel, calibration)
-            case sections.Settings():
-                inside = np.s_[top:bottom, left:right]
-                held = section.held.to(lambda held: None if held is None else np.ascontiguousarray(held[inside]))
-                return sections.Settings(held, section.registers, section.register_changes)
-            case sections.Marks():
-                return replace(section, zeroings=Once(lambda: zeroings(section.zeroings())))
-            case sections.EventTable():
-                return sections.EventTable(Once(lambda: events(section.events())))
-            case sections.FrameTable():
-                return replace(section, frames=Once(lambda: section.frames().region(columns, rows)))
-            case sections.SampleColumns():
-                return sections.SampleColumns(section.columns[left:right])
-            case sections.Wire():
-                return None
-            case _:
-                assert_never(section)
-
-    return Contents.single(
-        apply_rule(
-            contents.main, rule, lambda: [*contents.main.section(sections.SampleColumns).received(), *contents.others()]
-        )
-    )
 
 
 def span_us(recording: Recording) -> tuple[int, int]:

@@ -16,13 +16,10 @@ from taxel._base.errors import refused
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
-from taxel.events import Events
 from taxel.formats.layout import Layout, load_packaged
 from taxel.frames import Frames
-from taxel.recording.contents import BoardSource, Contents, FrameSource, RecordedSource, S, Stream, alone
 from taxel.recording.frames import times_at
-from taxel.recording.once import known
-from taxel.recording.sections import EventTable, FrameTable
+from taxel.recording.source import SourceView
 
 #: Units that say nothing: what a table or a stream of numbers holds.
 _UNSAID = ("counts", "as sent")
@@ -46,33 +43,18 @@ def is_row_of(stated: Array, array: Array) -> bool:
     return is_row and array.rows > 1 and not stated._is_measured
 
 
-def on_array(source: S, array: Array) -> S:
+def on_array(source: SourceView, array: Array) -> SourceView:
     """Return the same source on another description of its sensor, of as many taxels; their names stay."""
-    if array.names is None and source.sensor.array.names is not None:
-        array = replace(array, names=source.sensor.array.names)
-
-    def events(table: Events) -> Events:
-        same = table[:]
-        same.array = array
-        return same
-
-    def frames(table: Frames) -> Frames:
-        return Frames(table.values.reshape(-1, *array.shape), table.t, unit=table.unit, array=array)
-
-    same = replace(source, sensor=replace(source.sensor, array=array))
-    if isinstance(same, BoardSource):
-        return replace(same, event_table=EventTable(same.event_table.events.to(events)))
-    if isinstance(same, FrameSource):
-        return replace(same, frame_table=replace(same.frame_table, frames=same.frame_table.frames.to(frames)))
-    return same
+    names = source.array.names
+    return source.stated(array=replace(array, names=names) if array.names is None and names is not None else array)
 
 
-def apply_layout(contents: Contents, layout: Layout, *, given: bool) -> Contents:
-    """Return a recording with what its layout says of it; it says nothing of streams of numbers.
+def apply_layout(source: SourceView, layout: Layout, *, given: bool) -> SourceView:
+    """Return a source with what its layout says of it; it says nothing of streams of numbers.
 
     Parameters
     ----------
-    contents : Contents
+    source : SourceView
     layout : Layout
     given : bool
         Whether it was named for this recording; else it is beside it, and fills only what a file that states its sensor
@@ -82,34 +64,30 @@ def apply_layout(contents: Contents, layout: Layout, *, given: bool) -> Contents
     ------
     FormatError : the layout is of another number of taxels, or contradicts the file (names the layout)
     """
-    return alone(
-        {
-            name: source if isinstance(source, Stream) else _apply_layout(source, layout, given=given)
-            for name, source in contents.sources.items()
-        }
-    )
+    return source if source.facts.columns else _apply_layout(source, layout, given=given)
 
 
-def _apply_layout(source: RecordedSource, layout: Layout, *, given: bool) -> RecordedSource:
+def _apply_layout(source: SourceView, layout: Layout, *, given: bool) -> SourceView:
     """Return a source with what its layout says of it."""
-    kind, name, sensor = source.origin.kind, source.origin.name, source.sensor
+    facts = source.facts
+    kind, name = facts.kind, facts.name
     strict = given or kind not in _STATING
     try:
         array = _array(source, layout)
     except ProblemError as error:
         if strict:
             raise FormatError(f"{layout.path}: {name}: {first_line(error)}") from None
-        array = sensor.array
-    if strict and sensor.heel and layout.heel not in ("", sensor.heel):
-        raise FormatError(f"{layout.path}: states heel {layout.heel}, but {name} states {sensor.heel}")
-    same = source if array == sensor.array else on_array(source, array)
-    same = replace(same, sensor=replace(same.sensor, side=sensor.side or layout.side, heel=sensor.heel or layout.heel))
-    if not isinstance(same, FrameSource):
+        array = facts.array
+    if strict and facts.heel and layout.heel not in ("", facts.heel):
+        raise FormatError(f"{layout.path}: states heel {layout.heel}, but {name} states {facts.heel}")
+    same = source if array == facts.array else on_array(source, array)
+    same = same.stated(side=facts.side or layout.side, heel=facts.heel or layout.heel)
+    if facts.has_events:
         if strict and (layout.turned is not None or layout.unit or layout.rate_hz or layout.zeros_before_s):
             of_frames = "falls, unit, rate_hz and zeros_before_s are only for frames"
             raise FormatError(f"{layout.path}: {name} contains events; {of_frames}")
         return same
-    was = same.frame_table.turned
+    was = facts.turned
     if strict and was is not None and layout.falls is not None and layout.turned != was:
         falls = "false" if layout.turned is None else f"{layout.turned:g}"
         raise FormatError(
@@ -117,23 +95,29 @@ def _apply_layout(source: RecordedSource, layout: Layout, *, given: bool) -> Rec
             f"{was:g}; remove falls from the layout file"
         )
     full = layout.turned if was is None else None
+    if full is None and layout.unit is None and layout.rate_hz is None and layout.zeros_before_s is None:
+        return same
     # Read at once, so that a layout that contradicts the file is refused where the file is opened.
-    frames = _read(same.table, layout, full, name, is_alone=kind in _ALONE, strict=strict)
-    untimed = same.untimed and layout.rate_hz is None
+    table = same.table
+    assert isinstance(table, Frames)  # the facts say so
+    frames = _read(table, layout, full, name, is_alone=kind in _ALONE, strict=strict)
+    untimed = not facts.timed and layout.rate_hz is None
     if layout.zeros_before_s is not None:
         if untimed:
             raise FormatError(
                 f"{layout.path}: zeros_before_s needs times, but {name} has none; to give times, write rate_hz"
             )
         frames = _after_zeros(frames, layout.zeros_before_s)
-    return replace(same, frame_table=FrameTable(known(frames), untimed, was if full is None else full))
+    turned = was if full is None else full
+    return SourceView(same.in_memory(frames, timed=not untimed, turned=turned))
 
 
-def _array(source: RecordedSource, layout: Layout) -> Array:
+def _array(source: SourceView, layout: Layout) -> Array:
     """Return the sensor of a recording as its layout says, which may not contradict the file."""
-    stated, kind = source.sensor.array, source.origin.kind
-    array = layout.array(stated.rows * stated.columns, stated, source.sensor.side)
-    if source.has_events and array.shape != stated.shape:
+    facts = source.facts
+    stated, kind = facts.array, facts.kind
+    array = layout.array(stated.rows * stated.columns, stated, facts.side)
+    if facts.has_events and array.shape != stated.shape:
         raise ProblemError(
             f"the layout states {array.rows} x {array.columns} taxels; the events have {stated.rows} x {stated.columns}"
         )
@@ -146,9 +130,7 @@ def _array(source: RecordedSource, layout: Layout) -> Array:
             stated if array.shape == stated.shape else replace(array, pitch_mm=stated.pitch_mm, name=stated.name)
         )
         return with_names if stated.places is None or array.shape == stated.shape else array
-    along = (
-        kind in _ALONG and stated.places == load_packaged(kind).array(stated.columns, stated, source.sensor.side).places
-    )
+    along = kind in _ALONG and stated.places == load_packaged(kind).array(stated.columns, stated, facts.side).places
     if stated._is_measured and not along and (stated.pitch_mm, stated.places) != (array.pitch_mm, array.places):
         raise ProblemError(f"the layout states taxels {array._apart()}; the file states {stated._apart()}")
     return array

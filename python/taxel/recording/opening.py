@@ -1,45 +1,55 @@
-"""Opens a recording: a file that taxel writes, a file of another format, or a folder of trials."""
+"""Opens recordings: taxel's own files, and those of other programs by the first format that knows them."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache
+from importlib.metadata import entry_points
 from pathlib import Path
 from shlex import quote
-from typing import NoReturn
+from typing import TypeAlias
 
-from taxel import formats
+from taxel import _core, formats
 from taxel._base import arguments
-from taxel._base.arguments import flag, instance, shown, text
+from taxel._base.arguments import checked_path, flag, instance, shown, text
+from taxel._base.arrays import fields_of, stored_names
 from taxel._base.errors import refused
 from taxel._base.limits import available
-from taxel._base.messages import warn
+from taxel._base.messages import first_line, warn
 from taxel._base.options import with_fields_of
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
-from taxel.formats import Trial
+from taxel.events import Events
+from taxel.formats import Trial, event_camera
+from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction, reduced
-from taxel.formats.layout import Layout
-from taxel.labels import Labels, Note, beside, trial_of
-from taxel.recording import recognition, sections
-from taxel.recording.contents import BoardSource, Contents, RecordedSource, Stream, several, source_from
-from taxel.recording.kinds import ENDINGS, LABELS
-from taxel.recording.layout import apply_layout, check_size, on_array
-from taxel.recording.once import Once, known
-from taxel.recording.readers.csv import read_csv
-from taxel.recording.readers.foreign import read_foreign
-from taxel.recording.readers.h5 import read_h5
+from taxel.formats.layout import Layout, advice
+from taxel.formats.ros import is_bag
+from taxel.labels import Labels, Note, trial_of
+from taxel.reading import ENDINGS, Facts, InMemory, Marks, Reader
+from taxel.recording.beside import LABELS, first_lines, is_label_table, labels_for
+from taxel.recording.layout import apply_layout, check_size
+from taxel.recording.readers.columns import EVENTS, SENSOR, is_h5_of_taxel, is_table, read_columns, read_records
+from taxel.recording.readers.csv import check_head, names_in, read_csv
+from taxel.recording.readers.foreign import ARRAYS, read_foreign
 from taxel.recording.readers.lsa import read_lsa
 from taxel.recording.readers.mcap import read_mcap
-from taxel.recording.readers.npz import read_npz, read_records
 from taxel.recording.readers.ros import Topics, read_ros
-from taxel.recording.recording import Recording, add_notes, with_notes
-from taxel.recording.sidecars import begin_of, labels_of, with_sidecars
+from taxel.recording.readers.without_layout import refuse_without_layout
+from taxel.recording.recording import Recording
+from taxel.recording.source import SourceView
 
 #: The sources of a trial of both feet.
 FEET = ("left", "right")
+#: A layout, the path of one, or None for the layout file beside a recording, if there is one.
+GivenLayout: TypeAlias = str | os.PathLike[str] | Layout | None
+#: The endings of tables of text, also compressed by gzip, and those that may be tables of labels.
+#: Kinds of files of other programs, which a layout describes.
+_FOREIGN = ("table", "arrays")
+_TABLES, _LABELS = (".csv", ".txt", ".tsv", ".dat", ".asc"), (".csv", ".txt", ".tsv")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,18 +86,17 @@ class OpenOptions(SharedOptions):
         """Selection of the events of a camera."""
         return Reduction(self.region, self.bin, self.window_ms, self.polarity)
 
-    def how(self, path: Path, name: str, layout: Layout | None) -> dict[str, Reduction]:
-        """Return the arguments of a format's own with which a path of this format is read.
+    def check(self, path: Path, kind: str) -> None:
+        """Refuse what is only for files of another kind.
 
         Raises
         ------
-        ProblemError : what is read of a camera's events is given for another format
+        ProblemError : topics of a file that is no ROS bag, or what is read of a camera's events for one of a maker
         """
-        if name == "event_camera":
-            return {"reduction": self.reduction.but(None if layout is None else layout.event_camera)}
-        if self.reduction.is_given:
-            raise _no_camera(path)
-        return {}
+        text("pairing", self.pairing, ("direct", "taxel"))
+        flag("differences", self.differences)
+        if self.topics.are_given and kind != "ros":
+            raise ProblemError(f"{path}: is not a ROS bag; topic, field, types and ros are only for ROS bags")
 
 
 def _no_camera(path: Path) -> ProblemError:
@@ -148,7 +157,7 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     Parts of a .mcap are read when they are first used.
 
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column for each taxel. The layout of
-    a .h5 is described in `taxel.recording.writers.h5`. The reference events of a ``labels.csv`` in a folder
+    a .h5 is described in `taxel.recording.writers.columns`. The reference events of a ``labels.csv`` in a folder
     (`taxel.Labels`) become notes of the files of frames that the table names, and so do those of tables beside a
     recording: ``NAME_labels.csv``, ``NAME_events.csv``, ``NAME_events.tsv``, and a label track ``NAME.txt``.
 
@@ -162,7 +171,7 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     Recording(step.npz: 2 events, 0 to 200 us, 8 x 8 taxels)
     """
     file = Path(arguments.checked_path("path", path))
-    if recognition.is_folder(file):
+    if is_folder(file):
         raise ProblemError(
             f"{file}: is a folder; name one of its recordings (in Python, taxel.open_all opens all of them)"
         )
@@ -208,8 +217,8 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
     Notes
     -----
     The reference events of a ``labels.csv`` in the folder (`taxel.Labels`) become notes of the recordings that it
-    names, and so do those of tables beside each (`taxel.open`). In a folder with files that taxel writes, all other
-    files are ignored.
+    names, and so do those of tables beside each (`taxel.open`). In a folder with recordings that taxel or a
+    board wrote, all other files are ignored.
 
     Examples
     --------
@@ -226,318 +235,397 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
     return _open(Path(arguments.checked_path("path", path)), options)
 
 
-def _open(path: Path, options: OpenOptions) -> list[Recording]:
-    """Open all recordings of a folder, or all trials of a file."""
-    if recognition.is_folder(path):
-        return list(map(_labelled, _open_folder(path, options)))
-    layout = recognition.layout_of(path, options.layout)
-    return [_labelled(_named_beside(path, recording)) for recording in _open_file(path, options, layout)]
+@dataclass(frozen=True)
+class Kind:
+    """Say how files of a kind are known, and how they are read.
 
+    Other distributions add theirs by entry points of the group ``taxel.formats``: an object with these attributes.
 
-def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[Recording]:
-    """Open a file or a ROS bag by its layout; from a file of another format, open all trials."""
-    text("pairing", options.pairing, ("direct", "taxel"))
-    flag("differences", options.differences)
-    try:
-        found = recognition.recognise_recording(path, layout)
-        match found:
-            case recognition.FormatFile(name):
-                how = options.how(path, name, layout)
-                return [_recording_of(trial, path, name, options.layout) for trial in formats.trials(path, name, **how)]
-            case recognition.RosBag():
-                topics = options.topics.but({} if layout is None else layout.ros)
-                grid = layout.grid() if options.array is None and layout is not None else options.array
-                contents = read_ros(path, topics, grid)
-            case recognition.ForeignFile():
-                assert layout is not None  # one without is refused
-                if options.topics.are_given:
-                    raise ProblemError(f"{path}: is not a ROS bag; topic, field, types and ros are only for ROS bags")
-                array = None if options.array is None else Array._given(options.array)
-                contents = Contents.single(read_foreign(path, layout, array))
-                if array is not None and not contents.main.has_events:
-                    contents = Contents.single(_on_given(contents.main, array))
-            case recognition.TaxelFile(kind):
-                if options.topics.are_given:
-                    raise ProblemError(f"{path}: is a .{kind} file; topic, field, types and ros are only for ROS bags")
-                array = None if options.array is None else Array._given(options.array)
-                if kind == "records" and array is None and layout is not None:
-                    array = layout.grid()
-                contents = _read(path, kind, array, options.pairing, options.differences)
-        if layout is not None:
-            contents = apply_layout(contents, layout, given=options.layout is not None)
-        return [Recording(with_sidecars(_of_camera(contents, path, options.reduction, layout)))]
-    except MemoryError:
-        raise FormatError(f"{path}: needs more memory than is available ({available()} bytes)") from None
-
-
-def _of_camera(contents: Contents, path: Path, given: Reduction, layout: Layout | None) -> Contents:
-    """Return a recording with what is asked for of its events, if they are without intensities.
-
-    Raises
-    ------
-    ProblemError : it is given, and these are none
+    Parameters
+    ----------
+    knows : function of a path
+        Returns whether a file, or a folder, is of this kind.
+    read : function of a path and its layout, or None
+        Returns a reader of each source; readers of one name are the sources of one recording.
     """
-    reduction, source = given.but(None if layout is None else layout.event_camera), contents.main
-    if not reduction.is_given:
-        return contents
-    events = source.table if isinstance(source, BoardSource) and not contents.is_several else None
-    if events is None or (events.present is not None and events.present.any()):
-        if given.is_given:
-            raise _no_camera(path)
-        return contents
-    table = reduced(str(path), events, reduction)
-    same = source_from(table, source.origin, sensor=replace(source.sensor, array=table.array))
-    return Contents.single(
-        replace(same, settings=source.settings, marks=source.marks, timing=source.timing, losses=source.losses)
+
+    knows: Callable[[Path], bool]
+    read: Callable[[Path, Layout | None], Sequence[Reader]]
+
+
+def kinds(options: OpenOptions | None = None) -> dict[str, Kind]:
+    """Return the formats by name, in the order in which they are tried; those of other distributions come first."""
+    how = OpenOptions() if options is None else options
+    of_topics = isinstance(how.array, list | tuple) and all(isinstance(each, Array) for each in how.array)
+    array = None if how.array is None or of_topics else Array._given(how.array)
+
+    def read_arrays(path: Path, layout: Layout | None) -> Sequence[Reader]:
+        if layout is None:
+            refuse_without_layout(path)
+            if path.suffix.lower() == ".csv":
+                check_head(path)
+            raise _unknown(path)
+        return [_on_given(read_foreign(path, layout, array), array)]
+
+    def read_camera(path: Path, layout: Layout | None) -> Sequence[Reader]:
+        reduction = how.reduction.but(None if layout is None else layout.event_camera)
+        return [reader_of(trial, path, "event_camera") for trial in event_camera.trials(path, reduction)]
+
+    def read_bag(path: Path, layout: Layout | None) -> Sequence[Reader]:
+        grid = layout.grid() if how.array is None and layout is not None else how.array
+        return read_ros(path, how.topics.but({} if layout is None else layout.ros), grid)
+
+    def read_events(path: Path, layout: Layout | None) -> Sequence[Reader]:
+        return [read_records(path, layout.grid() if array is None and layout is not None else array)]
+
+    def read_npz(path: Path, layout: Layout | None) -> Sequence[Reader]:
+        names = stored_names(path)
+        # Other programs name their times t too.
+        is_foreign = SENSOR not in names and layout is not None and layout.data is not None
+        return read_arrays(path, layout) if is_foreign else [read_columns(path, array)]
+
+    return {
+        **_from_elsewhere(),
+        "ros": Kind(is_bag, read_bag),
+        "lsa": Kind(_ending(".lsa"), lambda path, _: [read_lsa(path, array, how.pairing, differences=how.differences)]),
+        "mcap": Kind(_is_mcap, lambda path, _: read_mcap(path, how.pairing)),
+        "h5": Kind(is_h5_of_taxel, lambda path, _: [read_columns(path, array)]),
+        "csv": Kind(_is_csv, lambda path, _: [read_csv(path, array)]),
+        "records": Kind(lambda path: set(EVENTS) <= set(fields_of(path)), read_events),
+        **{name: _of_maker(name, maker) for name, maker in formats.FORMATS.items() if name != "event_camera"},
+        "event_camera": Kind(lambda path: bool(event_camera.files(path)), read_camera),
+        "npz": Kind(_is_npz, read_npz),
+        "arrays": Kind(lambda path: _ending(*ARRAYS)(path) and not are_spike_trains(path), read_arrays),
+        "table": Kind(_is_table, read_arrays),
+    }
+
+
+@cache
+def _from_elsewhere() -> dict[str, Kind]:
+    """Return the formats of other distributions."""
+    return {point.name: point.load() for point in entry_points(group="taxel.formats")}
+
+
+def _ending(*endings: str) -> Callable[[Path], bool]:
+    """Return a function of whether a file, perhaps compressed by gzip, has one of some endings."""
+    return lambda path: path.is_file() and Path(path.name.removesuffix(".gz")).suffix.lower() in endings
+
+
+def _of_maker(name: str, maker: formats.Format) -> Kind:
+    return Kind(
+        lambda path: bool(maker.files(path)),
+        lambda path, _: [reader_of(trial, path, name) for trial in maker.trials(path)],
     )
 
 
-def _on_given(source: RecordedSource, array: Array) -> RecordedSource:
+def _is_mcap(path: Path) -> bool:
+    """Return whether a file is a .mcap by its ending or its first bytes."""
+    if not path.is_file():
+        return False
+    with open(path, "rb") as file:
+        return path.suffix.lower() == ".mcap" or file.read(8) == b"\x89MCAP0\r\n"
+
+
+def _is_csv(path: Path) -> bool:
+    """Return whether the first line of a .csv begins as taxel's own recordings do; a table of labels is none."""
+    if not _ending(".csv")(path) or path.suffix.lower() != ".csv" or is_label_table(path):
+        return False
+    names = names_in(first_lines(path)[0])
+    return names[0] == "t_us" and len(names) > 1
+
+
+def _is_npz(path: Path) -> bool:
+    """Return whether a .npz holds the columns of a table; true of a damaged one, which opening it reports."""
+    names = stored_names(path) if _ending(".npz")(path) else ("none",)
+    return not names or is_table(names)
+
+
+def _is_table(path: Path) -> bool:
+    is_text = _ending(*_TABLES)(path)
+    return is_text and not (path.suffix.lower() in _LABELS and is_label_table(path))
+
+
+def _on_given(reader: InMemory, array: Array | None) -> Reader:
     """Return frames of another program on the given sensor: as many rows and columns, or a row of as many channels.
 
     Raises
     ------
     ProblemError : another number of taxels, rows or columns
     """
-    stated = source.sensor.array
+    stated, table = reader.facts.array, reader.data
+    if array is None or isinstance(table, Events):
+        return reader
     if stated.shape != (1, array.rows * array.columns):
-        check_size(source.origin.path, stated.shape, array)
+        check_size(reader.facts.path, stated.shape, array)
     says_more = array.shape != stated.shape or (array._is_measured and not stated._is_measured)
-    return on_array(source, array) if says_more else source
+    return replace(reader, data=table._on(replace(array, names=array.names or stated.names))) if says_more else reader
 
 
-def _read(path: Path, kind: str, array: Array | None, pairing: str, differences: bool) -> Contents:
-    """Read a file by the reader of its kind."""
-    if kind == "mcap":
-        return read_mcap(path, pairing)
-    if kind == "lsa":
-        return Contents.single(read_lsa(path, array or Array.thesis(), pairing, differences))
-    readers = {"npz": read_npz, "records": read_records, "csv": read_csv, "h5": read_h5}
-    return Contents.single(readers[kind](path, array))
+def reader_of(trial: Trial, path: Path, kind: str) -> Reader:
+    """Return a reader of a trial of another format, with its reference events as notes."""
+    notes = sorted(
+        (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
+    )
+    unread = [*trial.series, *trial.unread]
+    facts = Facts(
+        path=path if path.is_file() else path / trial.name,
+        array=trial.recorded.array,
+        kind=kind,
+        name=trial.name,
+        label=trial.foot if trial.foot and trial.name.endswith(f" {trial.foot}") else "board",
+        source=trial.source,
+        side=trial.foot,
+        timed=trial.timed,
+        lost=(f"columns that are not taxels: {', '.join(unread)}",) * bool(unread),
+    )
+    return InMemory(facts, trial.recorded, Marks(notes=tuple(notes)))
 
 
-def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
-    """Open all recordings of a folder, with the labels in the same folder."""
-    files = recognition.files_in(folder)
-    recorded = recognition.recorded_by_taxel(files, options.layout)
-    if options.topic or not recorded:
-        bags = recognition.bags_of(files)
-        recorded = [file for file in files if file in recorded or file in bags]
-    names = [] if recorded else [*recognition.formats_of(folder)]
-    if len(names) == 1:
-        (name,) = names
-        how = options.how(folder, name, recognition.layout_of(folder, options.layout))
-
-        def read(place: Path) -> list[Recording]:
-            return [_recording_of(trial, folder, name, options.layout) for trial in formats.trials(place, name, **how)]
-
-        try:
-            of_files, left_out = _each([folder], read)
-        except (FormatError, OSError):
-            # A format may read a table of the folder for each of its files, so that this takes longer.
-            of_files, left_out = _each(formats.FORMATS[name].files(folder), read)
-        pairs = [(Path(recording.name), recording) for _, recording in of_files]
-        pairs.sort(key=lambda pair: recognition.natural_order(pair[0]))
-        return _add_labels(folder / LABELS, pairs, left_out)
-    if recorded:
-        _warn_of_tables(folder, recorded, files, options)
-    found = recorded or ([] if names else recognition.described_tables(files, options.layout))
-    if not found:
-        _refuse_folder(folder, files, names)
-    if found is not recorded and options.layout is None:
-        _warn_of_undescribed(folder, found, files)
-    # A layout file that cannot be read is no damage of one recording.
-    layouts = {file: recognition.layout_of(file, options.layout) for file in found}
-    opened, left_out = _each(found, lambda file: _open_file(file, options, layouts[file]))
-    pairs = [(file.relative_to(folder), recording) for file, recording in opened]
-    return _add_labels(folder / LABELS, pairs, left_out)
-
-
-def _each(
-    files: Iterable[Path], read: Callable[[Path], list[Recording]]
-) -> tuple[list[tuple[Path, Recording]], list[Path]]:
-    """Return the recordings of files, and the files that cannot be read, which are left out with a warning.
+def kind_of(path: Path) -> str | None:
+    """Return the name of the format of a file or a folder; None if no format knows it.
 
     Raises
     ------
-    FormatError : as of the first file, if none can be read
+    OSError : the path is not there, or cannot be read
+    """
+    path.stat()
+    return next((name for name, kind in kinds().items() if kind.knows(path)), None)
+
+
+def is_recording(path: Path, layout: GivenLayout = None) -> bool:
+    """Return whether a path is a recording; what is damaged inside shows only when it is opened."""
+    try:
+        kind = kind_of(path)
+        return kind is not None and (kind not in _FOREIGN or _describes(layout, path))
+    except (FormatError, OSError):
+        return False
+
+
+def _describes(given: GivenLayout, path: Path) -> bool:
+    """Return whether a layout is given or beside a file; one of arrays alone describes no text."""
+    layout = layout_of(path, given)
+    of_arrays = layout is not None and layout.data is not None and layout.table is None
+    return layout is not None and (not of_arrays or path.suffix.lower() in ARRAYS)
+
+
+def check_recording(path: Path, layout: GivenLayout = None) -> None:
+    """Refuse a path that is not a recording by its name, its first bytes, and its layout file.
+
+    Raises
+    ------
+    FormatError : no recording; an invalid layout file; a table or arrays of another program without a layout file
+    """
+    match kind_of(path):
+        case None:
+            raise _unknown(path)
+        case "mcap":
+            _core.RecordingReader(path)
+        case "csv":
+            check_head(path)
+        case "table" | "arrays" if not _describes(layout, path):
+            refuse_without_layout(path)
+
+
+def is_folder(path: Path) -> bool:
+    """Return whether a path is a folder, and no ROS bag."""
+    return path.is_dir() and not is_bag(path)
+
+
+def layout_of(path: Path, layout: GivenLayout) -> Layout | None:
+    """Return what the given layout file says, or the one beside a recording; None if there is none."""
+    if isinstance(layout, Layout):
+        return layout
+    file = Layout.beside(path) if layout is None else Path(checked_path("layout", layout))
+    return None if file is None else Layout.read(file)
+
+
+def files_in(folder: Path) -> list[Path]:
+    """Return the files and folders in a folder but its table of labels, in the order of their names: 2 before 10."""
+    found = (file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir()))
+    return sorted(found, key=natural_order)
+
+
+def recordings_in(folder: Path, layout: GivenLayout = None) -> list[Path]:
+    """Return what of a folder is a recording, ROS bags last, in the order of the names: 2 before 10.
+
+    Tables and arrays of other programs are those that `layout`, or a layout file beside them, describes; they count in
+    a folder that holds nothing else.
+    """
+    named = {file: kind for file in files_in(folder) if (kind := _kind_in_folder(file)) is not None}
+    own = [file for file, kind in named.items() if kind in (*ENDINGS.values(), "records")]
+    # An empty file beside others of its ending has lost its content: opening it says so.
+    endings = {file.suffix for file in own}
+    empty = [
+        file for file, kind in named.items() if kind in _FOREIGN and file.suffix in endings and not file.stat().st_size
+    ]
+    own = sorted([*own, *empty], key=natural_order)
+    bags = [file for file, kind in named.items() if kind == "ros"]
+    makers = [file for file, kind in named.items() if kind not in (*_FOREIGN, "ros")]
+    tables = [] if bags else [file for file in named if named[file] in _FOREIGN and _describes(layout, file)]
+    return [*(own or makers or tables), *bags]
+
+
+def _kind_in_folder(file: Path) -> str | None:
+    """Return the format of something in a folder; None of what cannot be read, and of folders that are no ROS bags."""
+    try:
+        return kind_of(file) if file.is_file() or is_bag(file) else None
+    except OSError:
+        # Opening it raises the error.
+        return ENDINGS.get(file.suffix.lower())
+
+
+def natural_order(path: Path) -> list[tuple[bool, int, str]]:
+    """Return the sort key of a name in natural order: 2 before 10."""
+    return [(part.isdecimal(), int(part) if part.isdecimal() else 0, part) for part in re.split(r"([0-9]+)", str(path))]
+
+
+def are_spike_trains(path: Path) -> bool:
+    """Return whether a file holds the arrays that `SpikeTrains.save` writes."""
+    is_npz = path.suffix.lower() == ".npz" and path.is_file()
+    return is_npz and {"times", "offsets", "start", "stop"} <= set(stored_names(path))
+
+
+def _unknown(path: Path) -> FormatError:
+    """Return the error of a path that no format knows."""
+    if path.suffix.lower() in _LABELS and is_label_table(path):
+        return FormatError(f"{path}, line 1: a table of labels (docs/command-line.md), not a recording")
+    if are_spike_trains(path):
+        return FormatError(
+            f"{path}: contains spike trains, not a recording; to describe them, run taxel info; to read them in "
+            "Python, call taxel.SpikeTrains.load"
+        )
+    with open(path, "rb") as file:
+        head = file.read(4)
+    if not head:
+        return FormatError(f"{path}: the file is empty; must be a recording")
+    describes = advice(path, "describe a table or an array of another program")
+    known = f"{', '.join(ENDINGS)}, and of event cameras {', '.join(CAMERA)}"
+    begins = " ".join(f"{byte:02X}" for byte in head)
+    return FormatError(f"{path}, byte 0: starts with {begins}: not a recording; taxel reads {known}; {describes}")
+
+
+def _open(path: Path, options: OpenOptions) -> list[Recording]:
+    """Open all recordings of a folder, or all trials of a file, with the labels of the tables beside them."""
+    if is_folder(path):
+        return _open_folder(path, options)
+    opened = _open_file(path, options, layout_of(path, options.layout))
+    return [labels_for(each, Path(each.name if each.kind in formats.FORMATS else path.name)) for each in opened]
+
+
+def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[Recording]:
+    """Open a file, a ROS bag, or a folder of a maker by its layout; each trial is a recording."""
+    kind = kind_of(path)
+    if kind is None:
+        raise _unknown(path)
+    options.check(path, kind)
+    try:
+        readers = kinds(options)[kind].read(path, layout)
+    except MemoryError:
+        raise FormatError(f"{path}: needs more memory than is available ({available()} bytes)") from None
+    by_name: dict[str, list[Reader]] = {}
+    for reader in readers:
+        by_name.setdefault(reader.facts.name, []).append(reader)
+    opened = [Recording.of(*each) for each in by_name.values()]
+    if layout is not None:
+        given = options.layout is not None
+        opened = [each._each(lambda source: apply_layout(source, layout, given=given)) for each in opened]
+    return opened if kind == "event_camera" else [_of_camera(each, path, options.reduction, layout) for each in opened]
+
+
+def _of_camera(recording: Recording, path: Path, given: Reduction, layout: Layout | None) -> Recording:
+    """Return a recording with what is asked for of its events, if they are without intensities.
+
+    Raises
+    ------
+    ProblemError : it is given, and these are none
+    """
+    reduction = given.but(None if layout is None else layout.event_camera)
+    if not reduction.is_given:
+        return recording
+    source = recording._main
+    table = source.table if source.facts.has_events and not recording.is_several else None
+    if not isinstance(table, Events) or (table.present is not None and table.present.any()):
+        if given.is_given:
+            raise _no_camera(path)
+        return recording
+    return Recording({source.facts.label: SourceView(source.in_memory(reduced(str(path), table, reduction)))})
+
+
+def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
+    """Open all recordings of a folder; files that cannot be read are left out with a warning.
+
+    Raises
+    ------
+    FormatError : none, or as of the first file, if none can be read
     OSError : as of the first file, if none can be read
     """
+    found = recordings_in(folder, options.layout)
+    if not options.topics.topic and not all(map(is_bag, found)):
+        found = [file for file in found if not is_bag(file)]
+    whole = {str(kind_of(file)) for file in found} - {*ENDINGS.values(), "records", "ros", *_FOREIGN}
+    if len(whole) > 1:
+        raise FormatError(f"{folder}: contains several formats ({', '.join(sorted(whole))}): name one file")
+    if not found:
+        _refuse_folder(folder)
+    # The feet of one trial are one recording; a layout file that cannot be read is no damage of one recording.
+    layouts = {file: layout_of(file, options.layout) for file in found}
     opened: list[tuple[Path, Recording]] = []
     errors: dict[Path, FormatError | OSError] = {}
-    for file in files:
+    for file in found:
         try:
-            opened += [(file, recording) for recording in read(file)]
-        except OSError as error:
-            errors[file] = error
-        except FormatError as error:
+            opened += [
+                (Path(each.name) if whole else file.relative_to(folder), each)
+                for each in _open_file(file, options, layouts[file])
+            ]
+        except (FormatError, OSError) as error:
             # One that names an argument is no damage of a file.
-            if error.argument is not None:
+            if isinstance(error, FormatError) and error.argument is not None:
                 raise
             errors[file] = error
     if errors and not opened:
         raise next(iter(errors.values()))
     for file, damage in errors.items():
-        why = f"{file}: {damage.strerror}" if isinstance(damage, OSError) else str(damage).partition("\n")[0]
-        warn(f"left out, because it cannot be read: {why}", stacklevel=6)
-    return opened, list(errors)
+        why = f"{file}: {damage.strerror}" if isinstance(damage, OSError) else first_line(damage)
+        warn(f"left out, because it cannot be read: {why}", stacklevel=5)
+    opened.sort(key=lambda pair: natural_order(pair[0]))
+    count = len({trial_of(str(name), each.label) for name, each in opened}) + len(errors)
+    labels = Labels(folder / LABELS) if (folder / LABELS).exists() else None
+    if labels is not None:
+        _check_labels(labels, count, opened, [*errors])
+    return [labels_for(each, name, labels, is_alone=count == 1) for name, each in opened]
 
 
-def _refuse_folder(folder: Path, files: Sequence[Path], names: Sequence[str]) -> NoReturn:
-    """Refuse a folder without a recording, or with files of several formats, by what there is in it."""
-    for file in files if not names else ():
-        if file.is_file():
-            recognition.refuse_undescribed(file)
-    problem = "no recording" if not names else f"several formats ({', '.join(names)}): name one file"
-    deeper = sorted(
-        inner.name
-        for inner in folder.iterdir()
-        if inner.is_dir() and os.access(inner, os.R_OK | os.X_OK) and recognition.recorded_by_taxel(inner.iterdir())
-    )
-    hint = (
-        f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} contain recordings: name these folders"
-        if deeper
-        else ""
-    )
-    known_kinds = (
-        f"taxel reads {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and, "
-        "with a layout file, arrays and tables, for example .npy and .txt (docs/files.md)"
-    )
-    raise FormatError(f"{folder}: contains {problem}; {hint or known_kinds}")
-
-
-def _warn_of_tables(folder: Path, recorded: Sequence[Path], files: Sequence[Path], options: OpenOptions) -> None:
-    """Warn of tables and arrays with a layout that are left out beside recordings, unless they were converted."""
-    stems = {file.stem for file in recorded}
-    left = [
-        file.name
-        for file in recognition.described_tables(files, options.layout)
-        if file not in recorded and file.stem not in stems
+def _refuse_folder(folder: Path) -> None:
+    """Refuse a folder without a recording by what there is in it: a table that no layout describes, deeper folders."""
+    for file in files_in(folder):
+        if file.is_file() and (are_spike_trains(file) or kind_of(file) in _FOREIGN):
+            check_recording(file)
+    deeper = [
+        each.name for each in files_in(folder) if is_folder(each) and os.access(each, os.X_OK) and recordings_in(each)
     ]
-    if left:
-        names = ", ".join(left[:5]) + " ..." * (len(left) > 5)
-        beside = ", ".join(file.name for file in recorded[:3]) + " ..." * (len(recorded) > 3)
-        warn(
-            f"{folder}: {names} are left out, because tables and arrays are not read in a folder with recordings "
-            f"({beside}): "
-            f"convert them, or move them to a separate folder",
-            stacklevel=6,
-        )
+    hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} contain recordings: name these folders"
+    known = (
+        f"taxel reads {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and, with a "
+        "layout file, arrays and tables, for example .npy and .txt (docs/files.md)"
+    )
+    raise FormatError(f"{folder}: contains no recording; {hint if deeper else known}")
 
 
-def _warn_of_undescribed(folder: Path, described: Sequence[Path], files: Sequence[Path]) -> None:
-    """Warn of tables and arrays that no layout describes, beside others of their kind that have one."""
-    if left := [file.name for file in recognition.undescribed_tables(files, described)]:
-        warn(
-            f"{folder}: {', '.join(left[:5])}{' ...' * (len(left) > 5)} are left out, because no layout file describes "
-            "them; to describe all tables of the folder, write a file layout.toml in it",
-            stacklevel=6,
-        )
-
-
-def _add_labels(table: Path, pairs: list[tuple[Path, Recording]], left_out: Sequence[Path]) -> list[Recording]:
-    """Add the reference events of a folder to the notes of its recordings; those of files left out go with them."""
-    if not table.exists():
-        return [recording for _, recording in pairs]
-    labels = Labels(table)
-    known = {labels.named(name) for name, _ in pairs}
+def _check_labels(
+    labels: Labels, count: int, opened: Sequence[tuple[Path, Recording]], left_out: Sequence[Path]
+) -> None:
+    """Refuse a table of labels of a folder of so many recordings that names another one, or none of several."""
+    known = {labels.named(name) for name, _ in opened}
     stems = tuple(file.stem for file in left_out)
     unknown = [name for name in labels.recordings if name not in known and not Path(name).name.startswith(stems)]
     if unknown:
-        names = ", ".join(str(name) for name, _ in pairs[:8])
-        raise FormatError(f"{table}: {unknown[0]} is not a recording of this folder; must be one of {names}")
-    # The feet of one trial are one recording.
-    count = len({trial_of(str(name), recording.label) for name, recording in pairs}) + len(left_out)
+        names = ", ".join(str(name) for name, _ in opened[:8])
+        raise FormatError(f"{labels.path}: {unknown[0]} is not a recording of this folder; must be one of {names}")
     if count > 1 and any(not row.recording for row in labels.rows):
         raise FormatError(
-            f"{table}: does not state the recording of each label, but there are {count} recordings; state it in the "
-            f"column recording; the columns are {', '.join(map(shown, labels._columns))}"
+            f"{labels.path}: does not state the recording of each label, but there are {count} recordings; state it in "
+            f"the column recording; the columns are {', '.join(map(shown, labels._columns))}"
         )
-    return [_with_labels(labels, name, recording) for name, recording in pairs]
-
-
-def _named_beside(path: Path, recording: Recording) -> Recording:
-    """Add the reference events of the folder to the notes of frames that it names; the page opens them one by one."""
-    table, contents = path.parent / LABELS, recording._contents
-    if any(source.has_events for source in contents.sources.values()):
-        return recording
-    if not (table.is_file() and recognition.is_label_table(table)):
-        return recording
-    labels, name = Labels(table), Path(recording.name if recording.kind in formats.FORMATS else path.name)
-    return recording if labels.named(name) in (None, "") else _with_labels(labels, name, recording)
-
-
-def _labelled(recording: Recording) -> Recording:
-    """Add the labels of tables that other programs wrote beside a recording to its notes."""
-    place = recording.path.parent / trial_of(recording.name, recording.label)
-    for table in recognition.label_tables(place):
-        recording = _with_labels(Labels(table), place, recording)
-    return recording
-
-
-def _with_labels(labels: Labels, name: Path, recording: Recording) -> Recording:
-    """Add the reference events of a recording, and of each of its sources, to the notes."""
-    contents = recording._contents
-    begin_us = begin_of(contents.sources.values(), labels)
-    if not contents.is_several:
-        return Recording(with_notes(contents, Once(partial(_notes, labels, name, contents.main, begin_us))))
-    sources = {
-        label: source
-        if isinstance(source, Stream)
-        else add_notes(source, Once(partial(_notes, labels, name, source, begin_us)))
-        for label, source in contents.sources.items()
-    }
-    return Recording(Contents(several(sources), sources))
-
-
-def _notes(labels: Labels, name: Path, source: RecordedSource, begin_us: Callable[[], int]) -> tuple[Note, ...]:
-    """Return the reference events of a recording, less those that a label beside it repeats or replaces."""
-    clock = source.timing.usable()
-    of_labels = name, source.origin.label, "", source.sensor.side
-    times = labels._times(*of_labels, begin_us, lambda: clock)
-    rows = labels._rows(*of_labels, begin_us)
-    of_source = {row.text: row.source for row in sorted(rows, key=lambda row: bool(row.source))}
-    names, replaced, labelled = labels_of(source), set[int | None](), set[object]()
-    if beside(source.origin.path).is_file():
-        set_here = Labels(beside(source.origin.path))
-        replaced = set_here._replaced(*names, begin_us)
-        labelled = {(row.text, row.t) for row in set_here._rows(*names, begin_us)}
-    notes = (
-        Note(label, t, 0 if clock is None else int(clock.host_ns(t)), source=of_source.get(label, ""))
-        for label, label_times in times.items()
-        for t in label_times.tolist()
-        if t not in replaced and (label, t) not in labelled
-    )
-    return tuple(sorted(notes, key=lambda note: note.t or 0))
-
-
-def _recording_of(trial: Trial, path: Path, kind: str, given_layout: str | os.PathLike[str] | None) -> Recording:
-    """Return a trial of another format as a recording, with its reference events as notes."""
-    notes = sorted(
-        (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
-    )
-    label = trial.foot if trial.foot and trial.name.endswith(f" {trial.foot}") else "board"
-    origin = sections.Origin(path if path.is_file() else path / trial.name, trial.name, kind, label, trial.source)
-    contents = Contents.single(
-        source_from(
-            trial.recorded,
-            origin,
-            untimed=not trial.timed,
-            sensor=sections.Sensor(trial.recorded.array, trial.foot),
-            marks=sections.Marks(notes=known(tuple(notes))),
-            losses=sections.Losses(lost=known(_beside_frames(trial))),
-        )
-    )
-    layout = recognition.layout_of(path, given_layout)
-    if layout is not None:
-        contents = apply_layout(contents, layout, given=given_layout is not None)
-    return Recording(with_sidecars(contents))
-
-
-def _beside_frames(trial: Trial) -> tuple[str, ...]:
-    """Return the line of `lost` for what a file holds of a trial beside its taxels, times and reference events."""
-    names = [*trial.series, *trial.unread]
-    return (f"columns that are not taxels: {', '.join(names)}",) if names else ()
 
 
 def join_feet(opened: Sequence[Recording]) -> list[Recording]:
@@ -553,29 +641,24 @@ def join_feet(opened: Sequence[Recording]) -> list[Recording]:
     list of Recording
         In their order; all others unchanged.
     """
-    groups: dict[tuple[str, str], dict[str, Contents]] = {}
+    groups: dict[tuple[str, str], dict[str, SourceView]] = {}
     for recording in opened:
-        origin = recording._contents.main.origin
-        # In a folder the path of a trial ends with its name, and so with its foot.
-        key = (str(origin.path).removesuffix(f" {origin.label}"), origin.name.removesuffix(f" {origin.label}"))
-        groups.setdefault(key, {})[origin.label or origin.name] = recording._contents
+        for label, source in recording._sources.items():
+            # In a folder the path of a trial ends with its name, and so with its foot.
+            key = (str(recording.path).removesuffix(f" {label}"), source.facts.name.removesuffix(f" {label}"))
+            groups.setdefault(key, {})[label] = source
     together: list[Recording] = []
     for (path, _), feet in groups.items():
         if set(feet) == set(FEET):
-            sources = {foot: feet[foot].main for foot in FEET}
-            sources = {
-                foot: replace(source, origin=replace(source.origin, path=Path(path)))
-                for foot, source in sources.items()
-            }
-            together.append(Recording(Contents(several(sources), sources)))
+            together.append(Recording({foot: feet[foot].stated(path=Path(path)) for foot in FEET}))
         else:
-            together += [Recording(contents) for contents in feet.values()]
+            together.append(Recording(feet))
     return together
 
 
 def sensors(recording: Recording) -> list[Recording]:
     """Return each sensor of a file with several as a recording; any other recording itself."""
-    if not recording._contents.is_several:
+    if not recording.is_several:
         return [recording]
     return [source for source in recording.sources.values() if not source.is_stream]
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import weakref
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,18 +22,12 @@ from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.recording.between import Slices, between, inside
-from taxel.recording.changes import BoardChange, Zeroing
-from taxel.recording.contents import Contents, FrameSource, S, Stream, refuse_several
-from taxel.recording.frames import as_frames, at_rate, calibrate
+from taxel.reading import BoardChange, Datagrams, Reader, Zeroing, kind_of_file
+from taxel.recording.frames import FRAMES_HZ, period_us
 from taxel.recording.gaps import Gaps, gaps_of, with_gaps
-from taxel.recording.kinds import kind_of_file, verdict_of
-from taxel.recording.on_clock import on_clock
-from taxel.recording.once import UNKNOWN, Once, known
-from taxel.recording.raw import Datagrams
-from taxel.recording.sections import Wire
-from taxel.recording.verdict import Verdict
+from taxel.recording.source import SourceView, one_clock, share_clock
 from taxel.tare import Tare
+from taxel.verdict import Verdict
 from taxel.wire import Registers
 
 if TYPE_CHECKING:
@@ -48,8 +41,8 @@ class Recording:
 
     Parameters
     ----------
-    contents : Contents
-        The contents that `taxel.open` read.
+    sources : mapping from str to SourceView
+        The sources of the file by name.
 
     Attributes
     ----------
@@ -84,21 +77,65 @@ class Recording:
     'nothing lost'
     """
 
-    def __init__(self, contents: Contents) -> None:
-        if not isinstance(contents, Contents):
-            raise refused("contents", f" is {shown(contents)}: to open a recording, call taxel.open(path)")
-        self._contents = contents
-        main = contents.main
-        self.path, self.name, self.kind = main.origin.path, main.origin.name, main.origin.kind
-        self.array, self.source = main.sensor.array, main.origin.source
-        self._cut_from: tuple[weakref.ref[Recording], float, float] | None = None
-        self._gaps: Once[Gaps | None] = Once(lambda: None if contents.is_several else gaps_of(main))
+    def __init__(self, sources: Mapping[str, SourceView]) -> None:
+        named = sources if isinstance(sources, Mapping) else {}
+        if not named or not all(isinstance(source, SourceView) for source in named.values()):
+            raise refused("sources", f" is {shown(sources)}: to open a recording, call taxel.open(path)")
+        self._sources = dict(named)
+        sensors = [source for source in named.values() if not source.facts.columns]
+        self._main = (sensors or [*named.values()])[0]
+        #: Whether its events or frames are those of its `sources` alone.
+        self.is_several = len(named) > 1 and len(sensors) != 1
+        facts = self._main.facts
+        label = f" {facts.label}"
+        self.path, self.kind, self.source, self.array = facts.path, facts.kind, facts.source, self._main.array
+        # A source is named after its file and itself.
+        self.name = facts.name.removesuffix(label) if self.is_several else facts.name
+
+    @classmethod
+    def of(cls, *readers: Reader) -> Recording:
+        """Return the recording of the sources that readers read.
+
+        Parameters
+        ----------
+        *readers : Reader
+
+        Examples
+        --------
+        >>> import taxel
+        >>> from taxel.reading import Facts, InMemory
+        >>> frames = taxel.Frames([[[1.0, 2.0]]], [0], unit="N")
+        >>> Recording.of(InMemory(Facts(path=Path("press.txt"), array=frames.array), frames))
+        Recording(press.txt: 1 frame, 0 to 0 us, 1 x 2 taxels)
+        """
+        sources = {reader.facts.label: SourceView(reader) for reader in readers}
+        if sum(not source.facts.columns for source in sources.values()) > 1:
+            for label, source in sources.items():
+                if not source.facts.columns:
+                    sources[label] = source.stated(name=f"{source.facts.name} {label}")
+        return cls(sources)
 
     path: Path
     name: str
     kind: str
     array: Array
     source: str
+    is_several: bool
+
+    @property
+    def _only(self) -> SourceView:
+        """The only sensor; of several an error that lists them."""
+        if self.is_several:
+            first = next(iter(self._sources))
+            raise ProblemError(
+                f"{self.path}: contains {len(self._sources)} sources ({', '.join(self._sources)}); choose one with "
+                f"recording.sources[{first!r}], or write one to a separate file with taxel convert --source NAME"
+            )
+        return self._main
+
+    def _each(self, change: Callable[[SourceView], SourceView]) -> Recording:
+        """Return the recording with each source changed."""
+        return Recording({name: change(source) for name, source in self._sources.items()})
 
     @property
     def events(self) -> Events:
@@ -106,9 +143,9 @@ class Recording:
 
         Raises
         ------
-        ProblemError : the file holds frames
+        ProblemError : the file holds frames, or several sensors
         """
-        events = self._contents.main.table
+        events = self._only.table
         if not isinstance(events, Events):
             raise ProblemError(f"{self.path}: contains frames and no events; call frames()")
         return events
@@ -131,7 +168,19 @@ class Recording:
         ------
         ProblemError : an invalid rate, or events without intensities
         """
-        return as_frames(self._contents.main, rate_hz).table
+        period = None if rate_hz is None else period_us("rate_hz", rate_hz)
+        source = self._only
+        if period is not None and not self.timed:
+            raise ProblemError(
+                f"{self.path}: the frames have no times, so their rate is unknown; to give one, call recording.at_rate"
+            )
+        table = source.table
+        if isinstance(table, Frames):
+            return table if period is None else table._resampled(period)
+        held = source.marks.held
+        ends = () if source.interval is None else source.interval
+        period = round(1e6 / FRAMES_HZ) if period is None else period
+        return Frames.from_events(table, period, *ends, held=None if held is None else np.nan_to_num(held))
 
     @property
     def sources(self) -> dict[str, Recording]:
@@ -140,13 +189,10 @@ class Recording:
         Each is a recording that every function accepts. A file of one board has one source. In a file of one board and
         streams of numbers (an IMU) the events, frames and other attributes are those of the board, except the verdict,
         which is of all; in a file of several boards they raise an error that names the sources.
-
-        Raises
-        ------
-        ProblemError : a slice by the clock of one source, as the other sources have other clocks
         """
-        sources = self._contents.sources
-        return {name: self if len(sources) == 1 else Recording(Contents(sources[name], sources)) for name in sources}
+        if len(self._sources) == 1:
+            return dict.fromkeys(self._sources, self)
+        return {name: Recording({name: source}) for name, source in self._sources.items()}
 
     def on_clock(self, name: str) -> Recording:
         """Return the same recording with the times of all sources by the clock of a single source, or of the host.
@@ -167,7 +213,7 @@ class Recording:
         After ``both = taxel.open("two.mcap").on_clock("left")`` the times of ``both.sources["right"].events`` are in us
         of the board "left".
         """
-        return Recording(on_clock(self._contents, text("name", name)))
+        return Recording(one_clock(self._sources, text("name", name)))
 
     @property
     def held(self) -> NDArray[np.float32] | None:
@@ -177,8 +223,7 @@ class Recording:
         otherwise be unknown; for a slice they follow from the events before it. `frames` begins with them, and so do
         encoders and readouts whose argument is the recording (not its events alone).
         """
-        held = self._contents.main.settings.held()
-        return None if held is None else np.where(held == UNKNOWN, np.nan, held).astype(np.float32)
+        return self._only.marks.held
 
     @property
     def calibration(self) -> Calibration | None:
@@ -189,7 +234,22 @@ class Recording:
         FormatError : it cannot be read
         ProblemError : it is of another array, or of readings in another unit
         """
-        return self._contents.main.sensor.calibration()
+        source, file = self._only, Calibration.beside(self.path)
+        return None if file is None or source.facts.columns else self._fitting(file)
+
+    def _fitting(self, path: Path) -> Calibration:
+        """Return the calibration of a file; refuse one of another array or of readings in another unit."""
+        calibration, array, view = Calibration.load(path), self._only.facts.array, self._only.view
+        table = None if self.has_events else self._only.table
+        unit = table.unit if isinstance(table, Frames) else "ticks"
+        if not calibration.array.fits(array) or calibration.reading_unit != unit:
+            raise ProblemError(
+                f"{path}: the calibration is for {calibration.reading_unit} of {calibration.array!r}; {self.name} "
+                f"contains {unit} of {array!r}"
+            )
+        is_part = view.columns is not None or view.rows is not None
+        whole = slice(None)
+        return calibration._region(view.columns or whole, view.rows or whole) if is_part else calibration
 
     def calibrated(self, rate_hz: float | None = None, rest: Tare | None = None) -> Frames:
         """Return frames in N or kPa, by the calibration in the file's folder.
@@ -205,54 +265,71 @@ class Recording:
         ------
         ProblemError : no calibration is beside it, or a calibration of another array
         """
-        return calibrate(self._contents.main, rate_hz, rest).table
+        calibration = self.calibration
+        if calibration is None:
+            raise ProblemError(
+                f"{self.path}: no calibration was found beside it, so the values cannot be converted to N or kPa; to "
+                "make a calibration, run taxel calibrate"
+            )
+        return calibration.apply(self.frames(rate_hz), rest)
+
+    def _calibrated_by(self, path: Path) -> Recording:
+        """Return the recording, or each sensor of one with several, as frames in N or kPa by a calibration file.
+
+        Raises
+        ------
+        FormatError : it cannot be read
+        ProblemError : it is of another array than the recording, or of readings in another unit
+        """
+
+        def calibrated(source: SourceView) -> SourceView:
+            if source.facts.columns:
+                return source
+            one = Recording({source.facts.label: source})
+            return SourceView(source.in_memory(one._fitting(path).apply(one.frames())))
+
+        return self._each(calibrated)
 
     @property
     def side(self) -> str:
         """The foot or hand of the sensor, "left" or "right"; "" if not stated."""
-        return self._contents.main.sensor.side
+        return self._main.facts.side
 
     @property
     def heel(self) -> str:
         """Place of the heel on the sensor, "top" or "bottom"; "" if not stated."""
-        return self._contents.main.sensor.heel
+        return self._main.facts.heel
 
     @property
     def is_slice(self) -> bool:
         """Whether this is a slice of the file, made by `between`."""
-        return self._contents.main.timing.interval is not None
+        return self._main.view.is_slice
 
     @property
     def interval(self) -> tuple[int, int] | None:
         """The first time and the end of a slice, us; None for a whole file."""
-        interval = self._contents.main.timing.interval
-        return None if interval is None else interval()
-
-    @property
-    def is_several(self) -> bool:
-        """Whether its events or frames are those of its `sources` alone."""
-        return self._contents.is_several
+        return self._main.interval
 
     @property
     def has_events(self) -> bool:
         """Whether the file holds events (else frames)."""
-        return self._contents.main.has_events
+        return not share_clock(self._sources) if self.is_several else self._main.facts.has_events
 
     @property
     def timed(self) -> bool:
         """Whether it has times; else its frames are numbered: the time of frame k is k us (`at_rate`)."""
-        return not self._contents.main.untimed
+        return self._main.facts.timed
 
     @property
     def label(self) -> str:
         """The name of the source within its file, such as "left"; "" for a file of several sensors as a whole."""
-        return self._contents.main.origin.label
+        return "" if self.is_several else self._main.facts.label
 
     @property
     def title(self) -> str:
         """The path, with the name of the source or of the trial where the file holds several."""
-        path, sources = str(self.path), inside(self._contents.sources)
-        if self.label and sum(not isinstance(source, Stream) for source in sources.values()) > 1:
+        path, in_file = str(self.path), f"{self.path.name} {self.label}"
+        if self.name == in_file:
             return f"{path} {self.label}"
         return path if path.endswith(self.name) else f"{path}, {self.name}"
 
@@ -266,17 +343,17 @@ class Recording:
         ------
         FormatError : an invalid table of labels (names the line)
         """
-        return self._contents.main.marks.notes()
+        return self._main.marks.notes
 
     @property
     def zeroings(self) -> tuple[Zeroing, ...]:
         """Taxels that people zeroed while recording, in order; a slice includes those before it, which still apply."""
-        return self._contents.main.marks.zeroings()
+        return self._only.marks.zeroings
 
     @property
     def detections(self) -> Detections:
         """The detections of a readout while recording."""
-        return self._contents.main.marks.detections()
+        return self._main.marks.detections
 
     @property
     def registers(self) -> Registers | None:
@@ -284,36 +361,34 @@ class Recording:
 
         They are those of the whole sensor (`Registers.array`), even if the recording is a part of it.
         """
-        return self._contents.main.settings.registers()
+        return self._only.marks.registers
 
     @property
     def frame_us(self) -> float | None:
         """The length of a frame, us, as the board's registers or a source of frames state it; None if none does."""
         if (registers := self.registers) is not None:
             return registers.frame_us
-        main = self._contents.main
-        return main.frame_table.frame_us if isinstance(main, FrameSource) else None
+        return self._main.facts.frame_us
 
     @property
     def _turned(self) -> float | None:
         """The number that readings were subtracted from, as a layout says; None of others."""
-        main = self._contents.main
-        return main.frame_table.turned if isinstance(main, FrameSource) else None
+        return self._main.facts.turned
 
     @property
     def register_changes(self) -> tuple[tuple[int, Registers], ...]:
         """The registers at each change while recording, with the host's time (ns since 1970)."""
-        return self._contents.main.settings.register_changes()
+        return self._only.marks.settings
 
     @property
     def board_changes(self) -> tuple[BoardChange, ...]:
         """Resets of the board and changes of its version of the wire, as detected while recording."""
-        return self._contents.main.marks.board_changes()
+        return self._only.marks.changes
 
     @property
     def clock(self) -> Clock | None:
         """Arrival times against board time; None if the file has no arrival times."""
-        return self._contents.main.timing.clock()
+        return self._only.clock
 
     @property
     def columns(self) -> list[str]:
@@ -323,36 +398,35 @@ class Recording:
         ------
         ProblemError : the recording is not a stream of numbers
         """
-        columns = self._contents.main.columns
-        if columns is None:
+        columns = self._main.facts.columns
+        if self.is_several or not columns:
             raise ProblemError(f"{self.path}: source {self.label!r} is not a stream of numbers, so it has no columns")
         return list(columns)
 
     @property
     def is_stream(self) -> bool:
         """Whether it is a stream of numbers, such as that of an IMU, instead of an array of taxels."""
-        return self._contents.main.columns is not None
+        return not self.is_several and bool(self._main.facts.columns)
 
     @property
     def is_on_clock(self) -> bool:
         """Whether times were converted to another clock by `on_clock`."""
-        return self._contents.main.timing.clock_of is not None
+        return self._main.view.clock is not None
 
     def datagrams(self) -> Datagrams:
-        """Return the raw datagrams as received; a slice returns all those of the file.
+        """Return the raw datagrams as received.
 
         Raises
         ------
-        ProblemError : there are none: a stream, a part of a sensor, or a kind of file that does not hold them
+        ProblemError : there are none: a stream, a part of a recording, or a kind of file that does not hold them
         """
-        refuse_several(self._contents.main)
-        datagrams = self._contents.main.section(Wire).datagrams()
-        if datagrams is not None:
-            return datagrams
+        received = self._only.received if self.kind == "mcap" else None
+        if isinstance(received, Datagrams):
+            return received
         if self.is_stream:
             why = f"source {self.label!r} is a stream of numbers, which has lines and no datagrams"
-        elif self.kind == "mcap":
-            why = "a part of the sensor has no datagrams; the datagrams of the file belong to the whole sensor"
+        elif self._main.facts.raw == "datagrams" and self.kind == "mcap":
+            why = "a part of the recording has no datagrams; those of the file belong to the whole"
         else:
             why = f"the {kind_of_file(self.kind)} contains no datagrams; only a .mcap does"
         raise ProblemError(f"{self.path}: {why}")
@@ -360,24 +434,35 @@ class Recording:
     @property
     def counts(self) -> dict[str, Any]:
         """The numbers of the counts of received and lost data, by cause."""
-        return dict(self._contents.main.losses.counts())
+        if self.is_several:
+            return {name: dict(source.counts) for name, source in self._sources.items()}
+        return dict(self._main.counts)
 
     @property
     def verdict(self) -> Verdict:
         """Losses at each stage: a line of text, with a status and numbers by cause (`taxel.Verdict`).
 
-        A part of a file has the verdict of the whole file. Only gaps of frames with times, and gaps in the events of a
-        camera, are those of the part; they are in the verdict if the file does not state what was lost. The page *What
-        the output means* lists statuses, causes and wordings; `remarks` has further facts.
+        A part of a file has the verdict of the whole file. Only gaps of frames with times are those of the part; they
+        are in the verdict if the file does not state what was lost. The page *What the output means* lists statuses,
+        causes and wordings; `remarks` has further facts.
         """
-        each = self.sources if self.is_several else {self.label: self}
-        return with_gaps(verdict_of(self._contents.main), {name: source._gaps() for name, source in each.items()})
+        gaps = {name: Recording({name: source})._gaps for name, source in self._sources.items()}
+        verdicts = [(name, source.verdict) for name, source in self._sources.items()]
+        verdict = verdicts[0][1] if len(verdicts) == 1 else Verdict._of_sources(verdicts)
+        return with_gaps(verdict, gaps)
+
+    @cached_property
+    def _gaps(self) -> Gaps | None:
+        """The gaps of frames with times; None without any. A board sends nothing where nothing changes."""
+        if self.is_several or self.has_events or not self.timed:
+            return None
+        return gaps_of(self._main.table.t)
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """Further facts, one line each: the clock of its times, what was left out, what it was converted from.
 
-        `.mcap`, `.npz` and `.h5` store it.
+        A `.mcap` stores it.
 
         Examples
         --------
@@ -389,14 +474,21 @@ class Recording:
         >>> one.verdict, one.remarks
         ('losses unknown: the .npz does not record them', ('converted from one.npz',))
         """
-        return self._contents.main.losses.remarks
+        return self._remarks()
+
+    def _remarks(self) -> tuple[str, ...]:
+        """Return the remarks of all sources, each with its source's name if they differ."""
+        each = {name: source.facts.remarks for name, source in self._sources.items()}
+        if not self.is_several or len(set(each.values())) == 1:
+            return self._main.facts.remarks
+        return tuple(f"{name}: {line}" for name, lines in each.items() for line in lines)
 
     @property
     def lost(self) -> tuple[str, ...]:
         """Information that functions could not carry over from the original recording, one line each.
 
-        Cutting, merging, converting and similar functions add to it, and `.mcap`, `.npz` and `.h5` store it. It is
-        empty for an original file. Losses while recording are in `verdict`.
+        A part of a file has no raw datagrams; a `.mcap` stores these lines. It is empty for an original file. Losses
+        while recording are in `verdict`.
 
         Examples
         --------
@@ -409,12 +501,13 @@ class Recording:
         >>> whole.lost, half.lost
         ((), ('raw datagrams',))
         """
-        return self._contents.main.losses.lost()
+        chosen = self._sources.values() if self.is_several else [self._main]
+        return tuple(dict.fromkeys(line for source in chosen for line in source.lost))
 
     @property
     def truncated(self) -> bool:
         """Whether the last data are missing: the writer was killed, or the file was cut within its data."""
-        return self._contents.main.losses.truncated
+        return any(source.facts.truncated for source in self._sources.values())
 
     @property
     def rebuilt(self) -> dict[str, int]:
@@ -422,7 +515,7 @@ class Recording:
 
         A missing or damaged summary (`no_summary`) and damaged final counts (`no_end`) count 1.
         """
-        return dict(self._contents.main.losses.rebuilt())
+        return dict(self._main.reader.damage())
 
     def between(self, start: float, stop: float) -> Recording:
         """Return the slice of ``start <= t < stop`` (us of the board's clock).
@@ -446,24 +539,31 @@ class Recording:
         >>> taxel.open(place).between(100, 200)
         Recording(two.npz: 1 event, 192 to 192 us, 8 x 8 taxels)
         """
-        time_slice = Recording(between(self._contents, *window("us", start, stop)))
-        # A weak reference, so that a slice does not hold what it was taken from.
-        time_slice._cut_from = weakref.ref(self), start, stop
-        return time_slice
+        start, stop = window("us", start, stop)
+        chosen = self._sources
+        if len(chosen) > 1 and not share_clock(chosen):
+            # The interval is by the clock of the only sensor.
+            label = self._apart().facts.label
+            others = tuple(f"the source {name} (it has another clock)" for name in chosen if name != label)
+            chosen = {label: self._main.stated(lost=(*self._main.facts.lost, *others))}
+        return Recording({name: source.between(start, stop) for name, source in chosen.items()})
 
-    def __getstate__(self) -> dict[str, Any]:
-        return vars(self) | {"_cut_from": None}
+    def _apart(self) -> SourceView:
+        """Return the only sensor beside streams of numbers; refuse several, which have different clocks."""
+        if self.is_several:
+            raise ProblemError(
+                f"{self.path}: the sources ({', '.join(self._sources)}) have different clocks, so one interval does "
+                "not fit all; call on_clock(name) before between"
+            )
+        return self._main
 
     def _why_empty(self) -> str:
         """Return where the events or frames of a recording are of which an empty slice was taken."""
-        if self._cut_from is None:
+        view, t = self._main.view, self._main._whole.table.t
+        if not view.is_slice:
             return f": {self.title} is empty"
-        reference, start, stop = self._cut_from
-        bounds, recording = f" from {plain(start)} to {plain(stop)} us", reference()
-        if recording is None:
-            return f"{bounds} of {self.title}"
-        t = recording._contents.main.table.t
-        return f"{bounds}: {recording.title} " + (f"is from {t.min()} to {t.max()} us" if len(t) else "is empty")
+        bounds = f" from {plain(view.start)} to {plain(view.stop)} us"
+        return f"{bounds}: {self.title} " + (f"is from {t.min()} to {t.max()} us" if len(t) else "is empty")
 
     def at_rate(self, rate_hz: float) -> Recording:
         """Return the same recording of numbered frames with times: `rate_hz` frames per second, the first at 0.
@@ -478,15 +578,17 @@ class Recording:
 
         Examples
         --------
-        >>> import pathlib, tempfile, taxel
-        >>> from taxel.recording.contents import Contents, source_from
-        >>> from taxel.recording.sections import Origin
+        >>> import pathlib, taxel
+        >>> from taxel.reading import Facts, InMemory
         >>> frames = taxel.Frames([[[1.0]], [[2.0]]], [0, 1])
-        >>> numbered = source_from(frames, Origin(pathlib.Path("grasp"), "grasp", "icub"), untimed=True)
-        >>> taxel.Recording(Contents.single(numbered)).at_rate(50).frames().t
+        >>> facts = Facts(path=pathlib.Path("grasp"), array=frames.array, kind="icub", timed=False)
+        >>> taxel.Recording.of(InMemory(facts, frames)).at_rate(50).frames().t
         array([    0, 20000])
         """
-        return Recording(at_rate(self._contents, rate_hz))
+        period_us("rate_hz", rate_hz)
+        if self.timed:
+            raise ProblemError(f"{self.path}: the frames have times; a rate is only for frames without times")
+        return self._each(lambda source: source.at_rate(rate_hz))
 
     def with_notes(self, notes: Iterable[Note]) -> Recording:
         """Return the same recording with further notes.
@@ -500,7 +602,8 @@ class Recording:
         ProblemError : something that is not a `taxel.Note`
         """
         more = tuple(instance("notes", note, Note) for note in several("notes", notes))
-        return Recording(with_notes(self._contents, known(more)))
+        label = self._main.facts.label
+        return Recording({**self._sources, label: self._main.with_notes(more)})
 
     def plot(self) -> Figure:
         """Draw events (or the sum of pressure) over time, and the activity of each taxel."""
@@ -510,39 +613,16 @@ class Recording:
         return draw("html", self)  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
-        contents = self._contents
-        if contents.is_several:
-            return escaped(f"Recording({self.name}: {len(contents.sources)} sources: {', '.join(contents.sources)})")
-        table = contents.main.table
+        if self.is_several:
+            return escaped(f"Recording({self.name}: {len(self._sources)} sources: {', '.join(self._sources)})")
+        table = self._main.table
         noun = "event" if self.has_events else "frame"
         time = f"{int(table.t.min())} to {int(table.t.max())} us" if len(table) and self.timed else "no time"
         more = [counted(len(self.notes), "note")] * bool(self.notes)
         more += [counted(len(self.detections), "detection")] * bool(len(self.detections))
         more += [counted(len(self.zeroings), "zeroed taxel")] * bool(self.zeroings)
         more += ["truncated"] * self.truncated
-        others = (
-            [] if self.is_slice and not self.is_on_clock else [name for name in contents.sources if name != self.label]
-        )
+        others = [name for name in self._sources if name != self.label]
         more += [f"beside {', '.join(others)}"] * bool(others)
         size = f"{self.array.rows} x {self.array.columns} taxels"
         return escaped(f"Recording({self.name}: {', '.join([counted(len(table), noun), time, size, *more])})")
-
-
-def with_notes(contents: Contents, more: Once[tuple[Note, ...]]) -> Contents:
-    """Return the same contents with further notes."""
-    label, sources = contents.main.origin.label, contents.sources
-    if label in sources:
-        source = add_notes(inside(sources)[label], more)
-        sources = sources.but(label, source) if isinstance(sources, Slices) else {**sources, label: source}
-    return Contents(add_notes(contents.main, more), sources)
-
-
-def add_notes(source: S, more: Once[tuple[Note, ...]]) -> S:
-    """Return the same source with further notes; one of the same text and time as another is that note."""
-
-    def notes() -> tuple[Note, ...]:
-        there = source.marks.notes()
-        held = {(note.text, note.t) for note in there if note.t is not None}
-        return there + tuple(note for note in more() if (note.text, note.t) not in held)
-
-    return replace(source, marks=replace(source.marks, notes=Once(notes)))

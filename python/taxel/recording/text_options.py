@@ -13,11 +13,9 @@ from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.array import Array, of_size
 from taxel.formats.layout import Layout
-from taxel.recording.contents import Contents
 from taxel.recording.layout import is_row_of, on_array
-from taxel.recording.opening import SharedOptions, join_feet, open_all, sensors
+from taxel.recording.opening import SharedOptions, files_in, is_folder, join_feet, kind_of, open_all, sensors
 from taxel.recording.readers.foreign import is_lone_array
-from taxel.recording.recognition import ForeignFile, files_in, is_folder, recognise
 from taxel.recording.recording import Recording
 
 #: How an option is typed of whose name a command may have another one.
@@ -85,7 +83,11 @@ class TextOptions(SharedOptions):
         if self.layout is not None or self.rate_hz is None or not path.exists():
             return self.layout
         files = files_in(path) if is_folder(path) else [path]
-        undescribed = [file for file in files if file.is_file() and recognise(file) == ForeignFile(has_layout=False)]
+        undescribed = [
+            file
+            for file in files
+            if file.is_file() and Layout.beside(file) is None and kind_of(file) in ("table", "arrays")
+        ]
         return Layout(path) if undescribed and all(map(is_lone_array, undescribed)) else None
 
     def _on_array(self, recording: Recording) -> Recording:
@@ -137,8 +139,8 @@ class TextOptions(SharedOptions):
 
 def _on_sensor(recording: Recording, array: Array) -> Recording:
     """Return a recording on another description of its sensor."""
-    contents = recording._contents
-    return type(recording)(Contents(on_array(contents.main, array), contents.sources))
+    label = recording._main.facts.label
+    return Recording({**recording._sources, label: on_array(recording._main, array)})
 
 
 def _is_row_of(recording: Recording, array: Array) -> bool:

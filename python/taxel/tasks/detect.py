@@ -27,7 +27,6 @@ from taxel.frames import Frames
 from taxel.recorded import recorded, unit_of
 from taxel.recording import Recording
 from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
-from taxel.recording.gaps import written_twice
 from taxel.recording.opening import sensors_of
 from taxel.tasks.info import sensor_line
 from taxel.tasks.labels import (
@@ -422,9 +421,7 @@ def _naming(recording: str) -> Iterator[None]:
 def _remarks(recording: Recording) -> Iterator[str]:
     """Yield what may keep detections away or make false ones, as ``taxel info`` finds it."""
     source = recorded(recording, hold=False)
-    if isinstance(source, Frames):
-        yield from written_twice(source)
-        if (quiet := of_frames(source)).falls:
-            yield f"rest: {quiet.text(recording.path, recording._turned)}"
+    if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
+        yield f"rest: {quiet.text(recording.path, recording._turned)}"
     if line := sensor_line(recording):
         yield line

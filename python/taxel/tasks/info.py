@@ -100,7 +100,7 @@ def sensor_line(recording: Recording) -> str:
         counts = {word: int(np.count_nonzero(mask)) for word, mask in masks.items()}
         named = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
         parts = [f"{named} of {counted(source.array.taxels, 'taxel')}"] if named else []
-    if gaps := recording._gaps():
+    if gaps := recording._gaps:
         parts.append(str(gaps))
     return f"sensor: {'; '.join(parts)} (taxel info lists them)" if parts else ""
 

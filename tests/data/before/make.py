@@ -109,29 +109,21 @@ def live() -> None:
 def made() -> None:
     """Write what is made from other recordings, and files of frames."""
     board = taxel.open(HERE / "board.mcap")
-    for ending in ("npz", "h5", "csv", "lsa"):
+    for ending in ("csv", "lsa"):
         taxel.convert(board, HERE / f"events.{ending}")
-    taxel.convert(taxel.open(HERE / "events.npz"), HERE / "converted.mcap", compression="zstd")
+    taxel.convert(board, HERE / "converted.mcap", compression="zstd")
     [part] = taxel.cut(board, start_us=100_000, stop_us=200_000)
     taxel.convert(part, HERE / "cut.mcap", compression="zstd")
-    taxel.convert(part, HERE / "cut.npz")
-    [rest] = taxel.cut(board, start_us=200_000, stop_us=300_000)
-    taxel.convert(taxel.merge([part, rest]), HERE / "merged.h5")
+    [region] = taxel.cut(board, columns=slice(2, 9), rows=slice(1, 7))
+    taxel.convert(region, HERE / "region.mcap")
     both = taxel.merge([board, taxel.open(HERE / "events.csv", array=board.array)])
-    for ending in ("mcap", "npz"):
-        taxel.convert(both, HERE / f"merged.{ending}", compression="zstd" if ending == "mcap" else "none")
+    taxel.convert(both, HERE / "merged.mcap", compression="zstd")
     values = np.arange(48, dtype=np.float32).reshape(4, 3, 4) / 8
     exists = np.ones((3, 4), bool)
     exists[0, 0] = False
     plate = taxel.Array(3, 4, (7.62, 5.08), exists, "plate")
-    for ending in ("npz", "h5", "mcap", "csv"):
+    for ending in ("mcap", "csv"):
         taxel.convert(Frames(values, [0, 1000, 2500, 4000], unit="kPa", array=plate), HERE / f"frames.{ending}")
-    taxel.convert(HERE / "frames.mcap", HERE / "again.npz")
-    taxel.convert(HERE / "again.npz", HERE / "again.mcap", compression="zstd")
-    insole = taxel.Array(1, 3, name="insole", places=taxel.Places([0.0, 10.0, 4.0], [0.0, 2.0, 8.0], None, "mm"))
-    taxel.convert(Frames(values[:, :1, :3], [0, 1000, 2500, 4000], unit="N", array=insole), HERE / "insole.npz")
-    millimetre = Frames(values[:, :2, :2], [0, 1, 2, 3], unit="N", array=taxel.Array(2, 2, 1.0, name="fine"))
-    taxel.convert(millimetre, HERE / "fine.npz")
 
 
 def texts() -> None:
@@ -175,7 +167,7 @@ def texts() -> None:
 
 def pinned() -> None:
     """Write what all of them hold."""
-    made = ("contents.json", "events.lss", "make.py", "README.md")
+    made = ("contents.json", "events.lss", "exports.py", "make.py", "README.md")
     names = sorted(file.name for file in HERE.iterdir() if file.is_file() and file.name not in made)
     lines = [f"{json.dumps(name)}: {json.dumps(contents(HERE / name), sort_keys=True)}" for name in names]
     (HERE / "contents.json").write_text("{\n" + ",\n".join(lines) + "\n}\n")

@@ -17,6 +17,7 @@ from taxel.calibration._curves import N_PER_KPA_MM2
 from taxel.encode import ContactArea
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.reading import Facts, InMemory
 from taxel.recording.analysis.rest import (
     FrameBlock,
     Rest,
@@ -27,9 +28,7 @@ from taxel.recording.analysis.rest import (
     of_frames,
     rest_scale,
 )
-from taxel.recording.contents import Contents, source_from
 from taxel.recording.frames import FRAMES_HZ, period_us
-from taxel.recording.once import UNKNOWN
 from taxel.recording.recording import Recording
 from taxel.tare import Tare
 
@@ -284,10 +283,10 @@ class _Drawn:
         taxels, column = np.unique(events.array.index(events.x[present], events.y[present]), return_inverse=True)
         since = np.full(len(taxels), np.iinfo(np.int64).max)
         np.minimum.at(since, column, events.t[present])
-        begins, held = None, recording._contents.main.settings.held()
+        begins, held = None, recording.held
         if held is not None:
-            known = held.reshape(-1)[taxels] != UNKNOWN
-            begins = np.where(known, held.reshape(-1)[taxels], 0).astype(np.float32)
+            known = ~np.isnan(held.reshape(-1)[taxels])
+            begins = np.nan_to_num(held.reshape(-1)[taxels])
             since[known] = np.iinfo(np.int64).min
         values = _core.HeldValues(events._parts(), taxels.astype(np.uint32), begins)
         y, x = np.divmod(taxels, events.array.columns)
@@ -409,8 +408,7 @@ def _rate_hz(recording: Recording) -> float:
 def _times(recording: Recording) -> NDArray[np.int64]:
     """Return the times of the frames of `Recording.frames`."""
     t = recording.events.t
-    interval = recording._contents.main.timing.interval
-    first, stop = (int(t.min()), int(t.max()) + 1) if interval is None else interval()
+    first, stop = recording.interval or (int(t.min()), int(t.max()) + 1)
     return np.arange(first, stop, period_us("rate_hz", _rate_hz(recording)), dtype=np.int64)
 
 
@@ -471,7 +469,7 @@ def above_rest_at(events: Events, t: NDArray[np.int64]) -> NDArray[np.float32]:
     -------
     float32, shape (n, rows, columns), ticks
     """
-    recording = Recording(Contents.single(source_from(events)))
+    recording = Recording.of(InMemory(Facts(array=events.array), events))
     drawn = _Drawn.from_recording(recording)
     # The rest is found from the first event on.
     from_first = np.union1d(t, min(t[0], events.t.min())) if len(t) else t

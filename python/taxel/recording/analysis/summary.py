@@ -12,7 +12,6 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording.analysis.health import health, unchanging_taxels, whole_lines
 from taxel.recording.analysis.pressure import Series
-from taxel.recording.gaps import of_camera, written_twice
 from taxel.recording.recording import Recording
 
 #: The interval over which the highest rate is measured, us.
@@ -60,7 +59,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         facts["intensities"] = 0 if events.present is None else int(events.present.sum())
         facts["markers"] = [{"t_us": t, "start": start} for t, start in events.markers]
         facts["events_per_s_board"] = len(events) / seconds if seconds else None
-        if of_camera(recording._contents.main):
+        if events.intensity is None and _may_be_of_camera(recording):
             facts |= {
                 "on_share": float(events.p.mean()) if len(events) else None,
                 "events_per_s_rest": _at_rest(events),
@@ -71,8 +70,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         facts["frames_per_s"] = (len(table) - 1) / seconds if seconds else None
         facts["missing"] = {"values": table.missing, "of": table.values.size}
         facts["full_scale"] = _full_scale(table)
-        facts["written_twice"] = written_twice(table)
-    gaps = recording._gaps()
+    gaps = recording._gaps
     facts["gaps"] = None if gaps is None else gaps.to_dict()
     clock = recording.clock
     if clock is not None and len(clock.board_us) > 1:
@@ -117,6 +115,11 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "verdict_details": recording.verdict.to_dict(),
         "remarks": list(recording.remarks),
     }
+
+
+def _may_be_of_camera(recording: Recording) -> bool:
+    """Return whether events are of an event camera by the file's kind or the sensor's name."""
+    return recording.kind in ("event_camera", "records") or recording.array.name.startswith("event camera")
 
 
 def _places(taxels: NDArray[np.bool_]) -> list[tuple[int, int]]:

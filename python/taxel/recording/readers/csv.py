@@ -31,9 +31,8 @@ from taxel.events import Events
 from taxel.formats.checks import table as limited
 from taxel.formats.layout import advice
 from taxel.frames import Frames
-from taxel.recording.contents import RecordedSource, source_from
-from taxel.recording.readers.npz import around
-from taxel.recording.sections import Origin
+from taxel.reading import Facts, InMemory
+from taxel.recording.readers.columns import around
 
 #: Columns of events: those that a table must have, and those that may follow.
 EVENTS = ("t_us", "x", "y", "p")
@@ -57,14 +56,15 @@ _AT_ONCE = 1 << 22
 _Block = tuple[int, bytes]
 
 
-def read_csv(path: Path, array: Array | None) -> RecordedSource:
+def read_csv(path: Path, array: Array | None = None) -> InMemory:
     """Read a .csv of events or of frames.
 
     Raises
     ------
     FormatError : another header, or an invalid value (names line and column)
     """
-    return source_from(limited(path, _table(path, array)), Origin(path, path.name, "csv"))
+    table = limited(path, _table(path, array))
+    return InMemory(Facts(path=path, array=table.array, kind="csv"), table)
 
 
 def check_head(path: Path) -> None:

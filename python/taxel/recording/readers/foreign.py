@@ -22,10 +22,8 @@ from taxel.formats.checks import table as limited
 from taxel.formats.layout import Data, Layout, as_size
 from taxel.formats.times import UNITS_US
 from taxel.frames import Frames
-from taxel.recording.contents import RecordedSource, source_from
-from taxel.recording.once import known
+from taxel.reading import Facts, InMemory
 from taxel.recording.readers.table import Readings, frames_hint, read_events, read_table
-from taxel.recording.sections import Losses, Origin
 
 #: The endings of files of arrays.
 ARRAYS = (".npy", ".npz", ".h5", ".hdf5", ".mat")
@@ -41,7 +39,7 @@ def is_lone_array(path: Path) -> bool:
     return len(found) == 1 and all(len(shape) in (2, 3) for shape in found.values())
 
 
-def read_foreign(path: Path, layout: Layout, array: Array | None = None) -> RecordedSource:
+def read_foreign(path: Path, layout: Layout, array: Array | None = None) -> InMemory:
     """Read a file whose layout says how.
 
     Parameters
@@ -54,7 +52,7 @@ def read_foreign(path: Path, layout: Layout, array: Array | None = None) -> Reco
 
     Returns
     -------
-    Source
+    InMemory
         Readings as they are in the file: `taxel.recording.layout.apply_layout` turns those that fall. Without a time
         column and a rate the time of a frame is its number in us: 0, 1, 2 ...
 
@@ -85,8 +83,9 @@ def read_foreign(path: Path, layout: Layout, array: Array | None = None) -> Reco
     except ProblemError as error:
         raise FormatError(f"{layout.path}: {path.name}: {first_line(error)}") from None
     limited(path, frames)
-    origin = Origin(path, path.name, "table" if is_table else "arrays")
-    return source_from(frames, origin, untimed=read.t is None, losses=Losses(lost=known(read.lost)))
+    kind = "table" if is_table else "arrays"
+    facts = Facts(path=path, array=frames.array, kind=kind, timed=read.t is not None, lost=tuple(read.lost))
+    return InMemory(facts, frames)
 
 
 def list_arrays(shapes: Mapping[str, tuple[int, ...]]) -> str:

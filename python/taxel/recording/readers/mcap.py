@@ -1,9 +1,9 @@
-"""Reads the live format: each source as contents, whose fields are read at their first access."""
+"""Reads the live format: each source by a reader, which reads its parts at their first access."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -11,28 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base import limits
+from taxel._base.arguments import finite, flag, integer, number, text
 from taxel._base.columns import frozen
 from taxel._base.limits import available
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.clock import Clock
+from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording import sections
-from taxel.recording.contents import BoardSource, Contents, FrameSource, RecordedSource, Stream, alone
-from taxel.recording.description import (
-    array_of,
-    board_changes_of,
-    counts_of,
-    detections_of,
-    frame_us_of,
-    notes_of,
-    turned_of,
-    zeroings_of,
-)
-from taxel.recording.once import Once, known
-from taxel.recording.raw import Datagrams, Samples
-from taxel.recording.verdict import Verdict
+from taxel.labels import Note
+from taxel.reading import BoardChange, Datagrams, Facts, Lines, Marks, Reader, Zeroing
+from taxel.verdict import Verdict
 from taxel.wire import Registers
 
 #: The damage after which times are doubtful; from when on is known by the file's own times alone.
@@ -41,8 +32,8 @@ DOUBTS = ("jumps_of_time", "stamps_out_of_order", "drifts_from_arrival")
 STEPS = ("events_out_of_order", "events_overtaken")
 
 
-def read_mcap(path: Path, pairing: str) -> Contents:
-    """Return the contents of a .mcap: those of its only source or board, including all sources.
+def read_mcap(path: Path, pairing: str = "direct") -> list[McapReader]:
+    """Return a reader of each source of a .mcap.
 
     Raises
     ------
@@ -50,191 +41,203 @@ def read_mcap(path: Path, pairing: str) -> Contents:
     OSError : the file cannot be read
     """
     reader = _core.RecordingReader(path)
-    sources: dict[str, RecordedSource] = {}
-    for name in reader.sources():
-        channel = _Source(path, reader.of_source(name))
-        if channel.header.get("frames") is not None:
-            sources[name] = channel.frames()
-        else:
-            sources[name] = channel.board(pairing) if channel.header.get("stream") is None else channel.stream()
-    sensors = [name for name, source in sources.items() if type(source) is FrameSource]
-    if len(sensors) > 1:
-        for name in sensors:
-            source = sources[name]
-            sources[name] = replace(source, origin=replace(source.origin, name=f"{path.name} {name}"))
-    return alone(sources)
+    return [McapReader(path, reader.of_source(name), pairing) for name in reader.sources()]
 
 
-class _Source:
-    """Reader of one source of a file: its header and trailer, and the values that several fields share."""
+class McapReader(Reader):
+    """Reads one source of a .mcap: a board, frames, or a stream of numbers, whose lines are frames of one row.
 
-    def __init__(self, path: Path, reader: _core.RecordingReader) -> None:
-        self._reader = reader
-        self.header, ending, self.opened = reader.about()
-        self.ending = ending or {}
-        self.array = array_of(self.header["array"])
-        # Those of the recording that a source was converted from.
-        self.before = _read_entry(path, "counts", counts_of, self.header.get("counts")) or {}
-        self.remarks = Once(lambda: self.reader().remarks())
-        label = self.header.get("name", "board")
-        self.origin = sections.Origin(path, path.name, "mcap", label, self.header["source"])
-        self.sensor = sections.Sensor(self.array, self.header.get("side", ""), self.header.get("heel", ""))
+    Parameters
+    ----------
+    path : Path
+    reader : RecordingReader
+        Of this source.
+    pairing : {"direct", "taxel"}
+    """
 
-    def losses(
-        self, counts: Callable[[], dict[str, Any]], found: Callable[[], dict[str, Any]] | None = None
-    ) -> sections.Losses:
-        """Return what was lost; arguments are those of `counts` and `verdict`."""
-        return sections.Losses(
-            counts=self.counts(counts),
-            verdict=Once(lambda: self.verdict(found)),
-            remarks=tuple(self.header.get("remarks", ())),
-            truncated=bool(self.opened["unfinished"]) or "finished" not in self.ending,
-            rebuilt=Once(self.rebuilt),
-            lost=known(tuple(self.header.get("lost", ()))),
+    def __init__(self, path: Path, reader: _core.RecordingReader, pairing: str) -> None:
+        self._reader, self._pairing = reader, pairing
+        self._header, ending, self._opened = reader.about()
+        self._ending = ending or {}
+        self._frames = self._header.get("frames")
+        self._stream = self._header.get("stream")
+        about, header = self._frames or {}, self._header
+        # Those of the recording that it was converted from.
+        self._before = _entry(path, "counts", counts_of, header.get("counts")) or {}
+        is_board = self._frames is None and self._stream is None
+        columns = about.get("columns") or ()
+        if self._stream is not None:
+            columns = [name for name in self._stream["columns"] if name != self._stream.get("time")]
+        self.facts = Facts(
+            path=path,
+            array=Array._from_geometry(header["array"]),
+            kind="mcap",
+            label=header.get("name", "board"),
+            source=header["source"],
+            side=header.get("side", ""),
+            heel=header.get("heel", ""),
+            has_events=is_board,
+            timed=about.get("clock", True),
+            columns=tuple(columns),
+            turned=_entry(path, "turned", _turned_of, about.get("turned")),
+            frame_us=_entry(path, "frame_us", _frame_us_of, about.get("frame_us")),
+            raw="datagrams" if is_board else "lines" if self._stream is not None else "",
+            begins_us=int(header["origin_us"]) if is_board else None,
+            remarks=tuple(header.get("remarks", ())),
+            lost=tuple(header.get("lost", ())),
+            truncated=bool(self._opened["unfinished"]) or "finished" not in self._ending,
         )
 
-    def reader(self) -> _core.RecordingReader:
+    def _now(self) -> _core.RecordingReader:
         """Return the reader of this source, which reads as much as the memory that is available now allows."""
         return self._reader.within(available())
 
-    def board(self, pairing: str) -> BoardSource:
-        """Return the contents of a board."""
-        decoded = Once(lambda: self.reader().decode(pairing))
+    @cached_property
+    def _remarks(self) -> _core.Remarks:
+        return self._now().remarks()
 
-        def arrived() -> bool:
-            return self.remarks().datagrams > 0
+    @cached_property
+    def _decoded(self) -> _core.DecodedDatagrams:
+        return self._now().decode(self._pairing)
 
-        return BoardSource(
-            self.origin,
-            self.sensor,
-            sections.EventTable(Once(lambda: Events._from_parts(decoded().events, self.array))),
-            sections.Wire(
-                datagrams=Once(lambda: Datagrams(**self.reader().datagrams()), arrived),
-                version_2=Once(lambda: bool(decoded().version_2["intact"])),
-                differences=bool(self.header["difference"]),
-                origin_us=int(self.header["origin_us"]),
-                unmarked=tuple(self.header.get("repaired", ())),
-            ),
-            timing=sections.Timing(Once(lambda: _clock(decoded()), arrived)),
-            losses=self.losses(lambda: self.counts_of_board(decoded()), lambda: decoded().found),
-            settings=self.settings(),
-            marks=self.marks(),
-        )
+    @cached_property
+    def _samples(self) -> _core.Samples:
+        return self._now().samples()
 
-    def settings(self) -> sections.Settings:
-        """Return the board's state of a board, or of the frames that were made of one."""
-        return sections.Settings(Once(self.held), Once(self.registers), Once(self.register_changes))
+    @cached_property
+    def _read_frames(self) -> tuple[NDArray[np.int64], NDArray[np.float32], int]:
+        return self._now().frames()
 
-    def marks(self) -> sections.Marks:
-        """Return what happened at a time."""
-        return sections.Marks(
-            board_changes=Once(lambda: board_changes_of(self.remarks().board)),
-            notes=Once(lambda: notes_of(self.remarks().notes)),
-            detections=Once(lambda: detections_of(self.remarks().detections)),
-            zeroings=Once(lambda: zeroings_of([remark for _, remark in self.remarks().zeroings])),
-        )
-
-    def frames(self) -> FrameSource:
-        """Return the contents of a source of frames."""
-        about, path = self.header["frames"], self.origin.path
-        read = Once(lambda: self.reader().frames())
-
-        def frames() -> Frames:
-            t, values, _ = read()
-            shaped = frozen(values).reshape(len(t), *self.array.shape)
-            try:
-                return Frames(shaped, frozen(t), unit=about["unit"], array=self.array)
-            except ProblemError as error:
-                raise FormatError(f"{path}, source {self.origin.label}: {error}") from None
-
-        def counts() -> dict[str, Any]:
-            t, _, bad = read()
-            damage = {"frames": len(t), "frames_that_could_not_be_read": bad}
-            return {**damage, "received": self.counted().get("received"), **self.rebuilt()}
-
-        turned = _read_entry(path, "turned", turned_of, about.get("turned"))
-        frame_us = _read_entry(path, "frame_us", frame_us_of, about.get("frame_us"))
-        frame_table = sections.FrameTable(Once(frames), not about.get("clock", True), turned, frame_us)
-        header: dict[str, Any] = {"settings": self.settings(), "marks": self.marks(), "losses": self.losses(counts)}
-        if not about.get("columns"):
-            return FrameSource(self.origin, self.sensor, frame_table, **header)
-        return Stream(self.origin, self.sensor, frame_table, sections.SampleColumns(tuple(about["columns"])), **header)
-
-    def stream(self) -> Stream:
-        """Return the contents of a stream of numbers, whose lines are frames of one row."""
-        stream = self.header["stream"]
-        read = Once(lambda: self.reader().samples())
-
-        def samples() -> Samples:
-            lines = read()
-            rows = lines.values.reshape(len(lines.t), self.array.columns)
-            if stream.get("time") is not None:
-                times = lines.t / float(stream["unit_us"])
-                rows = np.insert(rows, stream["columns"].index(stream["time"]), times, axis=1)
-            return Samples(self.header, lines.arrived_ns, lines.number, lines.t, np.ascontiguousarray(rows))
-
-        def frames() -> Frames:
-            t = read().t
+    @cached_property
+    def _table(self) -> Events | Frames:
+        array = self.facts.array
+        if self._stream is not None:
+            t, values = self._samples.t, self._samples.values
             order = np.argsort(t, kind="stable")
-            rows = read().values.reshape(len(t), 1, self.array.columns)[order]
-            return Frames(rows.astype(np.float32), ascending(t[order]), unit="as sent", array=self.array)
+            rows = frozen(values.reshape(len(t), 1, array.columns)[order].astype(np.float32))
+            return Frames(rows, ascending(t[order]), unit="as sent", array=array)
+        if self._frames is None:
+            return Events._from_parts(self._decoded.events, array)
+        at, flat, _ = self._read_frames
+        try:
+            shaped = frozen(flat).reshape(len(at), *array.shape)
+            return Frames(shaped, frozen(at), unit=self._frames["unit"], array=array)
+        except ProblemError as error:
+            raise FormatError(f"{self.facts.path}, source {self.facts.label}: {error}") from None
 
-        names = tuple(name for name in stream["columns"] if name != stream.get("time"))
-        return Stream(
-            self.origin,
-            self.sensor,
-            sections.FrameTable(Once(frames)),
-            sections.SampleColumns(names, Once(samples, lambda: self.remarks().samples > 0)),
-            # The arrival of lines that waited in a file is none of their clock.
-            timing=sections.Timing()
-            if stream.get("waited")
-            else sections.Timing(Once(lambda: Clock(read().t, read().arrived_ns))),
-            losses=self.losses(lambda: self.counts_of_stream(read()), lambda: read().found),
-            marks=self.marks(),
+    def table(self) -> Events | Frames:
+        """Return the events or the frames."""
+        return self._table
+
+    @cached_property
+    def _marks(self) -> Marks:
+        remarks = self._remarks
+        settings = tuple((at, Registers._of_file(values, self._driven())) for at, values in remarks.registers)
+        first = self._header.get("registers")
+        at_beginning = settings[0][1] if settings else None
+        return Marks(
+            notes=notes_of(remarks.notes),
+            detections=detections_of(remarks.detections),
+            zeroings=zeroings_of([remark for _, remark in remarks.zeroings]),
+            changes=board_changes_of(remarks.board),
+            registers=at_beginning if first is None else Registers._of_file(first, self._driven()),
+            settings=settings,
+            held=self._held(remarks.held),
         )
 
-    def driven(self) -> Array:
+    def marks(self) -> Marks:
+        """Return what happened at a time."""
+        return self._marks
+
+    def _driven(self) -> Array:
         """Return the array that the registers drive."""
-        geometry = self.header.get("driven")
-        return self.array if geometry is None else array_of(geometry)
+        geometry = self._header.get("driven")
+        return self.facts.array if geometry is None else Array._from_geometry(geometry)
 
-    def registers(self) -> Registers | None:
-        """Return the registers at the beginning, or the first that were set."""
-        first = self.header["registers"]
-        if first is None:
-            changes = self.register_changes()
-            return changes[0][1] if changes else None
-        return Registers._of_file(first, self.driven())
-
-    def register_changes(self) -> tuple[tuple[int, Registers], ...]:
-        """Return the registers at each change."""
-        return tuple((at, Registers._of_file(values, self.driven())) for at, values in self.remarks().registers)
-
-    def held(self) -> NDArray[np.uint16] | None:
-        """Return the values that the taxels held at the beginning."""
-        held = self.remarks().held
-        if held is None or len(held) != self.array.rows * self.array.columns:
+    def _held(self, held: list[int] | None) -> NDArray[np.float32] | None:
+        array = self.facts.array
+        if held is None or len(held) != array.rows * array.columns:
             return None
-        return np.array(held, np.uint16).reshape(self.array.shape)
+        ticks = np.array(held, np.float32).reshape(array.shape)
+        return np.where(ticks == _core.UNKNOWN, np.float32(np.nan), ticks)
 
-    def rebuilt(self) -> dict[str, int]:
-        """Return counts of damage that the reader skipped or repaired."""
-        rebuilt = {key: int(value) for key, value in self.opened.items() if key != "unfinished"}
-        return {**rebuilt, "bad_chunks": int(self.remarks().condition["bad_chunks"])}
+    @cached_property
+    def _clock(self) -> Clock | None:
+        if self._frames is not None:
+            return None
+        if self._stream is not None:
+            # The arrival of lines that waited in a file is none of their clock.
+            return None if self._stream.get("waited") else Clock(self._samples.t, self._samples.arrived_ns)
+        has = self._decoded.left > np.iinfo(np.int64).min
+        left, arrived = self._decoded.left[has], self._decoded.arrived_ns[has]
+        return Clock(np.ascontiguousarray(left), np.ascontiguousarray(arrived))
 
-    def counts(self, read: Callable[[], dict[str, Any]]) -> Once[Mapping[str, Any]]:
-        """Return the field of counts: those that are read, or those of the recording before it was converted.
+    def clock(self) -> Clock | None:
+        """Return arrival times against the source's time."""
+        return self._clock
+
+    @cached_property
+    def _verdict(self) -> Verdict:
+        condition = self._remarks.condition
+        has_messages = self._frames is None and condition["messages"]
+        if has_messages and (condition["changed"] or self._must_decode()):
+            found = self._decoded.found if self._stream is None else self._samples.found
+            condition = condition | {"decoded": found}
+        return Verdict._of({"file": condition})
+
+    def verdict(self) -> Verdict:
+        """Return what was lost at which stage; a board or a stream is decoded only if the file does not say it."""
+        return self._verdict
+
+    def _must_decode(self) -> bool:
+        """Return whether the counts in the file do not tell what decoding finds: damage at the end, wrong times."""
+        if "finished" not in self._ending:
+            return True
+        counts = self._ending["finished"]["counts"]
+        causes = DOUBTS if counts.get("steps_back") else (*DOUBTS, *STEPS)
+        return not self._header.get("converted") and any(counts["decoder"].get(cause, 0) for cause in causes)
+
+    def datagrams(self) -> Datagrams | Lines | None:
+        """Return the datagrams of a board, or the lines of a stream, as received."""
+        if self._frames is not None:
+            return None
+        if self._stream is None:
+            return Datagrams(
+                **self._now().datagrams(),
+                version=2 if self._decoded.version_2["intact"] else 1,
+                differences=bool(self._header["difference"]),
+                origin_us=int(self._header["origin_us"]),
+                unmarked=tuple(self._header.get("repaired", ())),
+            )
+        lines, stream = self._samples, self._stream
+        rows = lines.values.reshape(len(lines.t), self.facts.array.columns)
+        if stream.get("time") is not None:
+            times = lines.t / float(stream["unit_us"])
+            rows = np.insert(rows, stream["columns"].index(stream["time"]), times, axis=1)
+        return Lines(self._header, lines.arrived_ns, lines.number, lines.t, np.ascontiguousarray(rows))
+
+    def damage(self) -> Mapping[str, int]:
+        """Return the numbers of what reading the file skipped or repaired, by cause."""
+        rebuilt = {key: int(value) for key, value in self._opened.items() if key != "unfinished"}
+        return {**rebuilt, "bad_chunks": int(self._remarks.condition["bad_chunks"])}
+
+    def counts(self) -> Mapping[str, Any]:
+        """Return the numbers of what was received and lost, by cause; or those from before it was converted.
 
         Those have the damage of this file beside them.
         """
-        if not self.before:
-            return Once(read, lambda: True)
-        return Once(lambda: {**self.before, **{cause: n for cause, n in self.rebuilt().items() if n}}, lambda: True)
+        if self._before:
+            return {**self._before, **{cause: n for cause, n in self.damage().items() if n}}
+        if self._frames is not None:
+            t, _, bad = self._read_frames
+            own = {"frames": len(t), "frames_that_could_not_be_read": bad, "received": self._counted.get("received")}
+        else:
+            own = self._counts_of_board() if self._stream is None else self._counts_of_stream()
+        return {**own, **self.damage()}
 
-    def counts_of_board(self, decoded: _core.DecodedDatagrams) -> dict[str, Any]:
-        """Return the numbers of received and lost datagrams and events of a board, by cause and version of the wire."""
-        remarks = self.remarks()
-        counts = self.counted() or remarks.counts or {}
+    def _counts_of_board(self) -> dict[str, Any]:
+        remarks, decoded = self._remarks, self._decoded
+        counts = self._counted or remarks.counts or {}
         of_2 = decoded.version_2
         # Datagrams that this computer dropped or the file lost are missing among the board's numbers too, and are
         # counted separately.
@@ -244,42 +247,27 @@ class _Source:
             "datagrams": remarks.datagrams,
             "bytes": remarks.datagram_bytes,
             "missing_numbers": skipped,
-            "lost_in_file": self.verdict(lambda: decoded.found).lost.get("lost_in_file", 0),
+            "lost_in_file": self._verdict.lost.get("lost_in_file", 0),
             **{name: counts.get(name) for name in ("received", "dropped_by_kernel", "dropped_by_queue")},
             "decoder": decoded.counts,
             **({"decoder_version_2": of_2} if of_2["datagrams"] else {}),
-            **self.rebuilt(),
         }
 
-    def counts_of_stream(self, read: _core.Samples) -> dict[str, Any]:
-        """Return the numbers of received and lost datagrams and lines of a stream, by cause."""
-        found, counts = read.found["damage"], self.counted() or self.remarks().counts or {}
+    def _counts_of_stream(self) -> dict[str, Any]:
+        read = self._samples
+        found, counts = read.found["damage"], self._counted or self._remarks.counts or {}
         # Bytes that are in no line are not in the file.
         lost = {cause: max(n, counts.get("decoder", {}).get(cause, 0)) for cause, n in found.items()}
-        return {"samples": len(read.t), **lost, "received": self.counted().get("received"), **self.rebuilt()}
+        return {"samples": len(read.t), **lost, "received": self._counted.get("received")}
 
-    def counted(self) -> dict[str, Any]:
-        """Return the final counts of what was received; of a converted recording, or one that lacks its end, none."""
-        counts = self.ending.get("finished", {}).get("counts") or {}
-        return {} if self.header.get("converted") else counts
-
-    def verdict(self, found: Callable[[], dict[str, Any]] | None = None) -> Verdict:
-        """Return what was lost at which stage; `found` decodes a board or a stream, and returns what it found."""
-        condition = self.remarks().condition
-        if found is not None and condition["messages"] and (condition["changed"] or self.must_decode()):
-            condition = condition | {"decoded": found()}
-        return Verdict._of({"file": condition})
-
-    def must_decode(self) -> bool:
-        """Return whether the counts in the file do not tell what decoding finds: damage at the end, wrong times."""
-        if "finished" not in self.ending:
-            return True
-        counts = self.ending["finished"]["counts"]
-        causes = DOUBTS if counts.get("steps_back") else (*DOUBTS, *STEPS)
-        return not self.header.get("converted") and any(counts["decoder"].get(cause, 0) for cause in causes)
+    @property
+    def _counted(self) -> dict[str, Any]:
+        """The final counts of what was received; of a converted recording, or one that lacks its end, none."""
+        counts = self._ending.get("finished", {}).get("counts") or {}
+        return {} if self._header.get("converted") else counts
 
 
-def _read_entry(path: Path, entry: str, read: Callable[[Any], Any], value: Any) -> Any:
+def _entry(path: Path, entry: str, read: Callable[[Any], Any], value: Any) -> Any:
     """Return what an entry of a header states; None if it is not there."""
     try:
         return None if value is None else read(value)
@@ -287,12 +275,71 @@ def _read_entry(path: Path, entry: str, read: Callable[[Any], Any], value: Any) 
         raise FormatError(f"{path}, header, {entry}: {error}") from None
 
 
-def _clock(decoded: _core.DecodedDatagrams) -> Clock:
-    has = decoded.left > np.iinfo(np.int64).min
-    return Clock(np.ascontiguousarray(decoded.left[has]), np.ascontiguousarray(decoded.arrived_ns[has]))
-
-
 def ascending(t: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return times of frames, with equal times moved apart by 1 us."""
     steps = np.arange(len(t))
     return np.maximum.accumulate(t - steps) + steps if len(t) else t
+
+
+def notes_of(records: Any) -> tuple[Note, ...]:
+    """Return notes from records of text, t_us and at_ns."""
+    return tuple(Note(text("text", n["text"]), _time("t_us", n["t_us"]), integer("at_ns", n["at_ns"])) for n in records)
+
+
+def detections_of(records: Any) -> Detections:
+    """Return detections from records of (host ns, label, t, known, slope, repaired); JSON has no NaN."""
+    rows = list(records)
+    slopes = [float("nan") if row[4] is None else float(row[4]) for row in rows]
+    label, t, known, repaired = ([row[k] for row in rows] for k in (1, 2, 3, 5))
+    return Detections._of(label, t, known, slopes, repaired=repaired)
+
+
+def zeroings_of(records: Any) -> tuple[Zeroing, ...]:
+    """Return zeroed taxels, in order of time, from records of t, x, y, rest and before."""
+    zeroings = (
+        Zeroing(
+            integer("t", record["t"], -limits.TIME_US, limits.TIME_US),
+            integer("x", record["x"], 0, 65_535),
+            integer("y", record["y"], 0, 65_535),
+            number("rest", record["rest"]),
+            None if record["before"] is None else number("before", record["before"]),
+        )
+        for record in records
+    )
+    return tuple(sorted(zeroings, key=lambda zeroing: zeroing.t))
+
+
+def board_changes_of(records: Any) -> tuple[BoardChange, ...]:
+    """Return changes of the board from pairs of a host time (ns) and a record of t_us, change, version, asked."""
+    return tuple(
+        BoardChange(
+            _time("t_us", record["t_us"]),
+            integer("at_ns", at),
+            text("change", record["change"]),
+            None if record.get("version") is None else integer("version", record["version"], 0, 255),
+            flag("asked", record.get("asked", False)),
+        )
+        for at, record in records
+    )
+
+
+def _time(name: str, value: Any) -> int | None:
+    return None if value is None else integer(name, value, -limits.TIME_US, limits.TIME_US)
+
+
+def counts_of(counts: Any, depth: int = 0) -> dict[str, Any]:
+    """Return counts by cause, whole numbers of 0 or more; those of the decoder are a nested mapping."""
+    if not isinstance(counts, dict):
+        raise ProblemError("not an object")
+    return {
+        name: n if n is None else counts_of(n, 1) if isinstance(n, dict) and depth == 0 else integer(name, n, 0)
+        for name, n in counts.items()
+    }
+
+
+def _turned_of(value: Any) -> float:
+    return finite("turned", value, least=-limits.VALUE, most=limits.VALUE)
+
+
+def _frame_us_of(value: Any) -> float:
+    return finite("frame_us", value, "us", least=1.0, most=3.6e9)

@@ -17,10 +17,8 @@ from taxel.array import Array
 from taxel.formats.ros import Chosen, Read, read
 from taxel.frames import Frames
 from taxel.labels import source_of
-from taxel.recording.contents import Contents, RecordedSource, alone, source_from
-from taxel.recording.once import known
+from taxel.reading import Facts, InMemory, Reader
 from taxel.recording.readers.mcap import ascending
-from taxel.recording.sections import Losses, Origin
 
 
 @dataclass(frozen=True)
@@ -88,8 +86,8 @@ def _arrays(array: Array | Sequence[Array] | None) -> list[Array]:
     return [arguments.instance("array", entry, Array) for entry in entries]
 
 
-def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) -> Contents:
-    """Return the contents of a ROS bag: those of its only chosen topic, or of several sources.
+def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) -> list[Reader]:
+    """Return a reader of each chosen topic of a ROS bag.
 
     Raises
     ------
@@ -103,32 +101,33 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
         )
         raise helped(error, "topic", "give")
     reads = read(path, topics.chosen(array), topics.folder, topics.ros)
-    sources: dict[str, RecordedSource] = {}
+    readers = list[Reader]()
     for name, topic in zip(_names(path, reads), reads, strict=True):
         left_out = tuple(_lines_of_losses(topic))
         for line in left_out:
             warn(f"{path}: topic {topic.topic}: {line}", stacklevel=6)
-        losses = Losses(
-            known(
-                {
-                    "messages": len(topic.t),
-                    "messages_of_another_length": topic.left_out,
-                    "times_by_the_bag": topic.by_the_bag,
-                }
-            ),
-            remarks=()
-            if topic.has_stamps
-            else ("the times are those of the bag, because the messages have no header",),
-            lost=known(
-                (*left_out, f"other topics of the bag: {', '.join(topic.unread)}") if topic.unread else left_out
-            ),
-        )
-        source = topic.topic + f".{topic.field}" * bool(topic.field) + f" ({topic.type})"
+        others = (f"other topics of the bag: {', '.join(topic.unread)}",) * bool(topic.unread)
         frames = Frames(
             frozen_whole(topic.values), frozen_whole(ascending(topic.t)), unit=topic.unit, array=topic.array
         )
-        sources[name] = source_from(frames, Origin(path, path.name, "ros", name, source), losses=losses)
-    return alone(sources)
+        facts = Facts(
+            path=path,
+            array=topic.array,
+            kind="ros",
+            label=name,
+            source=topic.topic + f".{topic.field}" * bool(topic.field) + f" ({topic.type})",
+            remarks=()
+            if topic.has_stamps
+            else ("the times are those of the bag, because the messages have no header",),
+            lost=(*left_out, *others),
+        )
+        counts = {
+            "messages": len(topic.t),
+            "messages_of_another_length": topic.left_out,
+            "times_by_the_bag": topic.by_the_bag,
+        }
+        readers.append(InMemory(facts, frames, counted=counts))
+    return readers
 
 
 def _names(path: Path, reads: Sequence[Read]) -> list[str]:

@@ -36,10 +36,8 @@ from taxel.formats.checks import in_s, whole_us
 from taxel.formats.checks import table as limited
 from taxel.formats.layout import Layout, Table
 from taxel.formats.times import ISO, UNITS_US
-from taxel.recording.contents import RecordedSource, source_from
-from taxel.recording.once import known
-from taxel.recording.readers.npz import around
-from taxel.recording.sections import Losses, Origin
+from taxel.reading import Facts, InMemory
+from taxel.recording.readers.columns import around
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +215,7 @@ def frames_hint(layout: Layout, taxels: int) -> str:
     return f"; if {lines} lines are a frame, write in the layout file: [table] frame_lines = {lines}"
 
 
-def read_events(path: Path, layout: Layout, array: Array | None) -> RecordedSource:
+def read_events(path: Path, layout: Layout, array: Array | None) -> InMemory:
     """Read a table of events as its layout says.
 
     Raises
@@ -259,7 +257,7 @@ def read_events(path: Path, layout: Layout, array: Array | None) -> RecordedSour
     except ProblemError as error:
         raise FormatError(f"{layout.path}: {path.name}: {first_line(error)}") from None
     limited(path, events)
-    return source_from(events, Origin(path, path.name, "table"), losses=Losses(lost=known(head.lost)))
+    return InMemory(Facts(path=path, array=events.array, kind="table", lost=tuple(head.lost)), events)
 
 
 def _lines_of_frame(head: _Head, rows: int, needed: int | None) -> int:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.recording.readers.columns import around
 from taxel.recording.readers.csv import EVENTS, MORE, sensor_of
-from taxel.recording.readers.npz import around
 
 #: Number of frames that are written at once.
 _FRAMES = 4096

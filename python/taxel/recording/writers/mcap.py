@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -17,138 +16,182 @@ from taxel._core import ProblemError, RecordingWriter
 from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.reading import Datagrams, Lines
 from taxel.recording.analysis.pressure import above_rest
 from taxel.recording.analysis.rest import Rest, ticks_by_unit
-from taxel.recording.contents import BoardSource, Contents, FrameSource, RecordedSource, Stream
-from taxel.recording.kinds import verdict_of
-from taxel.recording.once import known
-from taxel.recording.raw import Datagrams
 from taxel.recording.recording import Recording
+from taxel.recording.source import SourceView, ticks_of
 
-__all__ = ["RecordingWriter", "cut_raw", "encode_events", "write_mcap"]
+__all__ = ["RecordingWriter", "encode_events", "write_mcap"]
 
 #: Number of values of a block of frames: a chunk of the file.
 _BLOCK = 1 << 18
 #: Interval between the pictures for viewers, us.
 _EVERY_US = 100_000
+#: The most numbers of repaired events in the description of a file, which is limited to 16 MiB.
+_MOST = 1_000_000
 #: What a picture for viewers states as the rest that was subtracted, by the source of the rest.
 _RESTS = {"unit": "0", "quiet": "quiet stretch"}
 
 
-def write_mcap(path: Path, contents: Contents, compression: str, counts: Mapping[str, dict[str, Any]]) -> None:
-    """Write a .mcap of contents as it can hold them (`taxel.recording.writers.stored.storable`).
+def write_mcap(path: Path, sources: Mapping[str, SourceView], compression: str) -> tuple[str, ...]:
+    """Write a .mcap of a board, of a stream of numbers, or of sources of frames by one clock.
 
     Parameters
     ----------
     path : Path
-    contents : Contents
-        Of a board with datagrams, of a stream with lines, or of frames.
+    sources : mapping from str to SourceView
     compression : {"none", "lz4", "zstd"}
-    counts : mapping from str to dict
-        For each source the numbers of what was received and lost, under the names of the live format.
+
+    Returns
+    -------
+    tuple of str
+        A line for each kind of information that is not there any more.
 
     Raises
     ------
+    ProblemError : events that a .mcap cannot hold
     OSError : the disk is full ...
     """
-    main = contents.main
-    samples = main.stream.samples() if isinstance(main, Stream) else None
-    if samples is not None:
-        header = {**samples.about, "sources": [], **_provenance(main)}
-        writer = RecordingWriter(path, json.dumps(header), compression, True)
-        writer.samples(samples.arrived_ns, samples.number, np.ascontiguousarray(samples.values).reshape(-1))
-        _add_small(writer, main, _by_host(main))
-        writer.finish(json.dumps(counts[main.origin.label]))
-        return
-    if not isinstance(main, BoardSource):
-        frame_sources = {name: source for name, source in contents.sources.items() if isinstance(source, FrameSource)}
-        _write_frames(path, frame_sources, compression, counts)
-        return
-    wire, events = main.wire, main.table
-    datagrams = wire.datagrams()
-    assert datagrams is not None  # `storable` sets them
+    first = next(iter(sources.values()))
+    received = first.received
+    if isinstance(received, Lines):
+        _write_lines(path, first, received, compression)
+    elif isinstance(first.table, Events):
+        return _write_board(path, first, first.table, received, compression)
+    else:
+        _write_frames(path, sources, compression)
+    return tuple(dict.fromkeys(line for source in sources.values() for line in source.lost))
+
+
+def _write_lines(path: Path, source: SourceView, lines: Lines, compression: str) -> None:
+    header = {**lines.about, "sources": [], **_provenance(source, source.lost)}
+    writer = RecordingWriter(path, json.dumps(header), compression, True)
+    writer.samples(lines.arrived_ns, lines.number, np.ascontiguousarray(lines.values).reshape(-1))
+    _add_small(writer, source, _by_host(source))
+    writer.finish(json.dumps({"received": len(lines)}))
+
+
+def _write_board(
+    path: Path, source: SourceView, events: Events, datagrams: Datagrams | None, compression: str
+) -> tuple[str, ...]:
+    """Write the datagrams of a board, or new ones made of its events; return what is lost."""
+    lost = source.lost
+    if datagrams is None:
+        if source.facts.raw:
+            lost = tuple(dict.fromkeys((*lost, "raw datagrams")))
+        clock = source.clock
+        datagrams = encode_events(
+            events, source.marks.held, clock if clock is not None and len(clock.board_us) else None
+        )
+        if len(datagrams.unmarked) > _MOST:
+            lost = (*lost, f"the fact that {len(datagrams.unmarked) - _MOST} of the events are repaired")
     # Host times before 1970 are not possible, so all board times are shifted together.
     earliest = int(datagrams.arrived_ns[0]) if len(datagrams) else 0
     arrived = datagrams.arrived_ns - min(0, earliest)
+    started = int(arrived[0]) if len(arrived) else 0
     header = {
-        **_header(main),
-        "repaired": wire.unmarked,
-        "difference": wire.differences,
-        "origin_us": wire.origin_us,
-        "started_ns": int(arrived[0]) if len(arrived) else 0,
+        **_header(source, lost),
+        "repaired": datagrams.unmarked[:_MOST],
+        "difference": datagrams.differences,
+        "origin_us": datagrams.origin_us,
+        "started_ns": started,
     }
     writer = RecordingWriter(path, json.dumps(header), compression, True)
     # Written before all datagrams, as the recorder does, because a player reads it there.
-    if (held := main.settings.held()) is not None:
-        writer.held(int(arrived[0]) if len(arrived) else 0, None, np.ascontiguousarray(held).reshape(-1))
+    if (held := ticks_of(source.marks.held)) is not None:
+        writer.held(started, None, held)
     done = 0
     # Commands of the host are written between the datagrams before and after them, an order that the decoder needs.
-    for change in main.marks.board_changes():
+    for change in source.marks.changes:
         upto = int(np.searchsorted(datagrams.arrived_ns, change.at_ns, side="left"))
         _add_datagrams(writer, datagrams, arrived, done, max(done, upto))
         writer.board_change(max(0, change.at_ns), json.dumps(change._described()))
         done = max(done, upto)
     _add_datagrams(writer, datagrams, arrived, done, len(arrived))
-    _add_remarks(writer, events, main)
-    writer.finish(json.dumps(counts[main.origin.label]))
+    _add_remarks(writer, events, source)
+    writer.finish(json.dumps(_counts(source, len(datagrams))))
+    return lost
 
 
-def _header(source: RecordedSource) -> dict[str, Any]:
+def _counts(source: SourceView, received: int) -> dict[str, Any]:
+    """Return the counts of a recording under the names of the live format."""
+    if source.facts.kind == "events":
+        # Nothing is missing of what was made here.
+        return {"received": received, "missing": 0}
+    if not source.facts.has_events:
+        return {"received": received}
+    counts = source.counts
+    known = {name: counts.get(name) or 0 for name in ("dropped_by_queue", "received")}
+    by_kernel = counts.get("dropped_by_kernel")
+    # Where it is not counted it is unknown; a file without its end says nothing of it.
+    known["dropped_by_kernel"] = by_kernel if known["received"] else by_kernel or 0
+    decoder = counts.get("decoder")
+    damage = _core.recording_damage(json.dumps(decoder)) if decoder else {}
+    return {**known, "decoder": damage}
+
+
+def _header(source: SourceView, lost: tuple[str, ...]) -> dict[str, Any]:
     """Return what a header states of a sensor."""
-    registers, array = source.settings.registers(), source.sensor.array
-    driven = array if registers is None else registers.array
+    facts, registers = source.facts, source.marks.registers
+    driven = source.array if registers is None else registers.array
     return {
-        "array": array._geometry(),
+        "array": source.array._geometry(),
         "registers": None if registers is None else registers._held,
-        **({} if driven == array else {"driven": driven._geometry()}),
-        **_provenance(source),
-        "source": source.origin.source,
-        "side": source.sensor.side,
-        "heel": source.sensor.heel,
+        **({} if driven == source.array else {"driven": driven._geometry()}),
+        **_provenance(source, lost),
+        "source": facts.source or facts.name or ("events" if facts.has_events else "frames"),
+        "side": facts.side,
+        "heel": facts.heel,
     }
 
 
-def _provenance(source: RecordedSource) -> dict[str, Any]:
+def _provenance(source: SourceView, lost: tuple[str, ...]) -> dict[str, Any]:
     """Return what a header states of the recording that a file was made of."""
-    # The verdict is here and not with the final counts, so that a file that was cut still states it.
-    converted = None if source.losses.verdict() is None else verdict_of(source)._held
-    counts = dict(source.losses.counts())
-    return {"lost": source.losses.lost(), "remarks": source.losses.remarks, "converted": converted, "counts": counts}
+    facts = source.facts
+    is_file = facts.kind != "events"
+    # `source` names the recordings that were merged.
+    converted = [f"converted from {facts.name}"] * (is_file and facts.kind != "merged")
+    return {
+        "lost": lost,
+        "remarks": tuple(dict.fromkeys((*facts.remarks, *converted))),
+        # The verdict is here and not with the final counts, so that a file that was cut still states it.
+        "converted": source.verdict._held if is_file else None,
+        "counts": dict(source.counts),
+    }
 
 
-def _write_frames(
-    path: Path, sources: Mapping[str, FrameSource], compression: str, counts: Mapping[str, dict[str, Any]]
-) -> None:
+def _write_frames(path: Path, sources: Mapping[str, SourceView], compression: str) -> None:
     """Write sources of frames, all by one clock; times in the file are those of the board, counted from 0."""
-    tables = {name: source.table for name, source in sources.items()}
+    tables = {name: cast("Frames", source.table) for name, source in sources.items()}
     origin_us = min([0, *(int(table.t[0]) for table in tables.values() if len(table))])
     headers = [
         {
-            **_header(source),
-            "name": name,
+            **_header(source, source.lost),
+            "name": source.facts.label,
             "frames": {
-                "unit": source.table.unit,
-                "clock": not source.untimed,
-                "columns": source.columns or (),
-                "turned": source.frame_table.turned,
-                "frame_us": source.frame_table.frame_us,
+                "unit": tables[name].unit,
+                "clock": source.facts.timed,
+                "columns": source.facts.columns,
+                "turned": source.facts.turned,
+                "frame_us": source.facts.frame_us,
             },
         }
         for name, source in sources.items()
     ]
     header = {**headers[0], "sources": headers[1:], "started_ns": 0}
     writer = RecordingWriter(path, json.dumps(header), compression, True)
-    tracks = {name: writer.track(name) for name in sources}
+    tracks = {name: writer.track(source.facts.label) for name, source in sources.items()}
 
     def at_ns(t: int) -> int:
         return max(0, (t - origin_us) * 1000)
 
-    shown = {name: _low_rate(source) for name, source in sources.items()}
+    shown = {name: _low_rate(source, tables[name]) for name, source in sources.items()}
     drawn = dict.fromkeys(shown, 0)
     for name, source in sources.items():
-        if (held := source.settings.held()) is not None:
-            tracks[name].held(0, None, np.ascontiguousarray(held).reshape(-1))
-        for change in source.marks.board_changes():
+        if (held := ticks_of(source.marks.held)) is not None:
+            tracks[name].held(0, None, held)
+        for change in source.marks.changes:
             tracks[name].board_change(max(0, change.at_ns), json.dumps(change._described()))
     for name, first, block, fits in _blocks(tables):
         t = np.ascontiguousarray(block.t)
@@ -162,23 +205,23 @@ def _write_frames(
         drawn[name] = stop
     for name, source in sources.items():
         _add_small(tracks[name], source, at_ns)
+    counts = {name: json.dumps(_counts(source, len(tables[name]))) for name, source in sources.items()}
     for name in [*sources][1:]:
-        tracks[name].end(json.dumps(counts[name]))
-    writer.finish(json.dumps(counts[next(iter(sources))]))
+        tracks[name].end(counts[name])
+    writer.finish(counts[next(iter(sources))])
 
 
-def _low_rate(source: FrameSource) -> tuple[Frames, tuple[float, str, str]]:
+def _low_rate(source: SourceView, frames: Frames) -> tuple[Frames, tuple[float, str, str]]:
     """Return frames above rest, ten a second, and what white is at least, the rest that was subtracted, the unit.
 
     There are none where frames have no times.
     """
-    frames = source.table
     _, first = np.unique(frames.t // _EVERY_US, return_index=True)
-    first = first[: 0 if source.untimed else None]
+    first = first[: None if source.facts.timed else 0]
     few = Frames(frames.values[first], frames.t[first], unit=frames.unit, array=frames.array)
     if not len(few):
         return few, (1.0, "none", few.unit)
-    recording = Recording(Contents.single(replace(source, frame_table=replace(source.frame_table, frames=known(few)))))
+    recording = Recording({source.facts.label: SourceView(source.in_memory(few))})
     above, _, rest = cast("tuple[Frames, float, Rest]", above_rest(recording))
     return above, (1.0 / ticks_by_unit(few), _RESTS.get(rest.source, rest.source), above.unit)
 
@@ -199,35 +242,29 @@ def _blocks(tables: Mapping[str, Frames]) -> Iterator[tuple[str, int, Frames, bo
                 done[name] = stop
 
 
-def encode_events(
-    events: Events, held: NDArray[np.uint16] | None, clock: Clock | None
-) -> tuple[int, Datagrams, NDArray[np.int64]]:
+def encode_events(events: Events, held: NDArray[np.float32] | None, clock: Clock | None) -> Datagrams:
     """Return events as datagrams of wire version 2, without loss.
 
     Parameters
     ----------
     events : Events
-    held : uint16, shape (rows, columns), ticks, optional
-        The values that the taxels held at the beginning.
+    held : float32, shape (rows, columns), ticks, optional
+        The values that the taxels held at the beginning; NaN for unknown.
     clock : Clock, optional
         If given, each datagram promises a time and has the host's time for it as its arrival time, so that a reader
         computes the same clock; otherwise datagrams promise no time, and a reader finds no clock.
 
     Returns
     -------
-    int, us
-        Offset to be added to times in the datagrams.
     Datagrams
-    int64, shape (n,)
-        The numbers of repaired events that no state of a taxel can encode.
+        With the numbers of the repaired events that no state of a taxel can encode (`unmarked`).
 
     Raises
     ------
     ProblemError : an array of more than 65 536 positions, or times more than 8.9 years apart
     """
-    begins = None if held is None else np.ascontiguousarray(held).reshape(-1)
     try:
-        encoded = _core.encode_datagrams(events._parts(), begins, clock is not None)
+        encoded = _core.encode_datagrams(events._parts(), ticks_of(held), clock is not None)
     except ProblemError as error:
         smaller = "to make fewer taxels of an event camera's file, use region and bin"
         raise ProblemError(f"{first_line(error)}; write such events to a .npz, .h5 or .csv; {smaller}") from None
@@ -238,8 +275,15 @@ def encode_events(
     )
     # Arrival times never decrease.
     arrived = np.maximum.accumulate(at) if len(at) else at
-    datagrams = Datagrams(arrived, np.arange(len(arrived), dtype=np.uint64), encoded.offsets, encoded.payload)
-    return encoded.origin_us, datagrams, encoded.unmarked
+    return Datagrams(
+        arrived,
+        np.arange(len(arrived), dtype=np.uint64),
+        encoded.offsets,
+        encoded.payload,
+        version=2,
+        origin_us=encoded.origin_us,
+        unmarked=tuple(encoded.unmarked.tolist()),
+    )
 
 
 def _add_datagrams(writer: Any, datagrams: Datagrams, arrived: NDArray[np.int64], first: int, last: int) -> None:
@@ -249,16 +293,16 @@ def _add_datagrams(writer: Any, datagrams: Datagrams, arrived: NDArray[np.int64]
         )
 
 
-def _by_host(source: RecordedSource) -> Callable[[int], int]:
+def _by_host(source: SourceView) -> Callable[[int], int]:
     """Return the function of a source's times, us, to those in the file, ns: by its clock where that is known."""
-    clock = source.timing.usable()
-    return lambda t: max(0, t * 1000 if clock is None else int(clock.host_ns(t)))
+    clock = source.clock
+    has_times = clock is not None and len(clock.board_us) > 0
+    return lambda t: max(0, int(clock.host_ns(t)) if has_times and clock is not None else t * 1000)
 
 
-def _add_remarks(writer: Any, events: Events, source: RecordedSource) -> None:
-    at_ns = _by_host(source)
-    detections = source.marks.detections()
-    noted = [note.t for note in source.marks.notes() if note.t is not None]
+def _add_remarks(writer: Any, events: Events, source: SourceView) -> None:
+    at_ns, marks = _by_host(source), source.marks
+    detections, noted = marks.detections, [note.t for note in marks.notes if note.t is not None]
     around = np.concatenate(
         [detections.t, detections.known, np.array([*(t for t, _ in events.markers), *noted], np.int64)]
     )
@@ -269,20 +313,13 @@ def _add_remarks(writer: Any, events: Events, source: RecordedSource) -> None:
     _add_small(writer, source, at_ns)
 
 
-def _add_small(writer: Any, source: RecordedSource, at_ns: Callable[[int], int]) -> None:
+def _add_small(writer: Any, source: SourceView, at_ns: Callable[[int], int]) -> None:
     """Write notes, zeroed taxels, registers and detections."""
-    for note in source.marks.notes():
+    for note in source.marks.notes:
         writer.note(note.at_ns, note.t, note.text)
-    for zeroing in source.marks.zeroings():
+    for zeroing in source.marks.zeroings:
         writer.zeroing(at_ns(zeroing.t), zeroing.t, zeroing.x, zeroing.y, zeroing.rest, zeroing.before)
-    for at, values in source.settings.register_changes():
+    for at, values in source.marks.settings:
         writer.registers(at, values._json())
-    for d in source.marks.detections():
+    for d in source.marks.detections:
         writer.detection(at_ns(d.known), d.label, d.t, d.known, d.slope, d.repaired)
-
-
-def cut_raw(raw: NDArray[np.uint8]) -> Datagrams:
-    """Split raw bytes into datagrams; the arrival time of each is the board's time of its first stamp."""
-    raw = np.ascontiguousarray(raw)
-    offsets, times = _core.wire_cut(raw)
-    return Datagrams(times * 1000, np.arange(len(times), dtype=np.uint64), offsets, raw)

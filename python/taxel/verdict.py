@@ -21,7 +21,7 @@ _NUMBERS = ("lost", "damaged", "noted")
 class Verdict(str):
     """State what a recording lost: a line of text with a status, and numbers by cause.
 
-    The page *What the output means* lists the wordings. Made by `taxel.open`, or by `from_dict`.
+    The page *What the output means* lists the wordings. Made by `taxel.open`.
 
     Attributes
     ----------
@@ -40,15 +40,12 @@ class Verdict(str):
     steps_back : list of dict of int
         Steps back of times in the order of arrival, at most the 256 largest: "after_us", the latest time before the
         step; "by_us", the distance of the earliest event before that time; "events", the number of events before it.
-    stretch_of : str or None
-        For a stretch of a recording, a name of the whole recording, to which the losses belong: `merge` counts them
-        once.
     parts : dict of Verdict
         For several sources or merged recordings, the verdict of each, by name; else empty.
 
     Raises
     ------
-    ProblemError : the class is called; a verdict comes from `taxel.open` or `from_dict`
+    ProblemError : the class is called; a verdict comes from `taxel.open`
 
     Notes
     -----
@@ -104,18 +101,19 @@ class Verdict(str):
 
     Examples
     --------
-    >>> verdict = Verdict.from_dict(
-    ...     {"status": "lost", "text": "LOST: 2 datagrams lost or damaged on the way", "lost": {"lost_on_the_way": 2}}
-    ... )
-    >>> verdict.status, verdict.lost, "LOST" in verdict
-    ('lost', {'lost_on_the_way': 2}, True)
+    >>> import pathlib, tempfile, taxel
+    >>> place = pathlib.Path(tempfile.mkdtemp()) / "one.mcap"
+    >>> _ = taxel.convert(taxel.Events([0], [3], [5], [True], array=taxel.Array(8, 8)), place)
+    >>> verdict = taxel.open(place).verdict
+    >>> verdict, verdict.status, verdict.lost
+    ('nothing lost', 'complete', {})
     """
 
     _held: Mapping[str, Any]
 
     def __new__(cls, *_: object) -> Self:
         """Refuse a verdict built by hand."""
-        raise ProblemError("Verdict: take the verdict of a recording, or make one by Verdict.from_dict")
+        raise ProblemError("Verdict: take the verdict of a recording")
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Verdict._from, (self._held,)
@@ -141,15 +139,6 @@ class Verdict(str):
     def _of_sources(cls, named: Iterable[tuple[str, Verdict]]) -> Self:
         """Return the verdict on the sources of one file, each with its name; damage of the file counts once."""
         return cls._of({"sources": [(name, verdict._held) for name, verdict in named]})
-
-    @classmethod
-    def _of_stretches(cls, named: Iterable[tuple[str, Verdict]]) -> Self:
-        """Return the verdict on slices of one recording, each with its name; what the whole lost counts once."""
-        return cls._of({"stretches": [(name, verdict._held) for name, verdict in named]})
-
-    def _as_stretch_of(self, name: str) -> Self:
-        """Return the same verdict as that of a stretch of the recording of this name."""
-        return self._from({**self._held, "stretch_of": name})
 
     def _later(self, shift: int) -> Self:
         """Return the verdict on the recording whose times are later by so many us."""
@@ -192,110 +181,14 @@ class Verdict(str):
         return [dict(step) for step in self._held["steps_back"]]
 
     @property
-    def stretch_of(self) -> str | None:
-        """The name of the whole recording, of a stretch of one."""
-        return self._held["stretch_of"]  # type: ignore[no-any-return]
-
-    @property
     def parts(self) -> dict[str, Verdict]:
         """The verdicts of the sources or merged recordings, by name."""
         return {name: Verdict._from(verdict) for name, verdict in self._held["parts"]}
 
     def to_dict(self) -> dict[str, Any]:
-        """Return text, status and numbers, ready for JSON.
-
-        Returns
-        -------
-        dict
-            By the names of the attributes, and the line as "text"; each of "parts" is such a dict.
-
-        Examples
-        --------
-        >>> Verdict.from_dict({"status": "complete", "text": "nothing lost"}).to_dict()["lost"]
-        {}
-        """
+        """Return text, status and numbers, ready for JSON."""
         numbers = {name: dict(self._held[name]) for name in _NUMBERS}
         parts = {name: verdict.to_dict() for name, verdict in self.parts.items()}
         about = {"status": self.status, "text": str(self), **numbers}
         rest = {"doubtful_after_us": self.doubtful_after_us, "steps_back": self.steps_back}
-        return about | rest | {"stretch_of": self.stretch_of, "parts": parts}
-
-    @classmethod
-    def from_dict(cls, held: Mapping[str, Any]) -> Self:
-        """Return the verdict that `to_dict` gave.
-
-        Parameters
-        ----------
-        held : dict
-            As from `to_dict`, also by way of JSON; all but "status" and "text" may be missing.
-
-        Raises
-        ------
-        ProblemError : not such a dict
-
-        Examples
-        --------
-        >>> verdict = Verdict.from_dict({"status": "complete", "text": "nothing lost"})
-        >>> verdict, Verdict.from_dict(verdict.to_dict()) == verdict
-        ('nothing lost', True)
-        """
-        return cls._from(_check(held))
-
-
-def _are_steps(steps: Any) -> bool:
-    """Return whether these are steps back as `to_dict` gives them."""
-    least = {"after_us": -(2**63), "by_us": 1, "events": 1}
-    return isinstance(steps, list | tuple) and all(
-        isinstance(step, Mapping)
-        and step.keys() == least.keys()
-        and all(type(step[name]) is int and low <= step[name] < 2**63 for name, low in least.items())
-        for step in steps
-    )
-
-
-def _check(held: Any) -> dict[str, Any]:
-    """Return a verdict from `to_dict` as the compiled part states it."""
-    values = held if isinstance(held, Mapping) else {}
-    numbers, parts = [*(values.get(name, {}) for name in _NUMBERS)], values.get("parts", {})
-    doubtful = "doubtful_after_us"
-    counts = [count for each in numbers if isinstance(each, Mapping) for count in each.values()]
-    if (
-        values.get("status") not in STATUSES
-        or not isinstance(values.get("text"), str)
-        or not all(isinstance(each, Mapping) for each in (*numbers, parts))
-        or not all(type(count) is int and 0 <= count < 2**64 for count in counts)
-        or type(values.get(doubtful, None)) not in (int, type(None))
-        or not isinstance(values.get("stretch_of"), str | None)
-        or not _are_steps(values.get("steps_back", []))
-    ):
-        raise ProblemError("verdict: must be a dict of status, text, lost and others, as to_dict returns it")
-    for name, least in (("lost", "lost"), ("damaged", "damaged")):
-        if STATUSES.index(values["status"]) < STATUSES.index(least) and any(values.get(name, {}).values()):
-            raise ProblemError(
-                f"verdict: status is {values['status']}; must be {least!r} or worse, because {name} is not empty"
-            )
-    if STATUSES.index(values["status"]) < STATUSES.index("damaged") and values.get(doubtful) is not None:
-        raise ProblemError(
-            f"verdict: status is {values['status']}; must be 'damaged' or worse, because the times of the "
-            "recording are doubtful"
-        )
-    stated = {str(name): _check(part) for name, part in parts.items()}
-    for name, part in stated.items():
-        inner = part["status"]
-        if STATUSES.index(inner) > STATUSES.index(values["status"]):
-            raise ProblemError(
-                f"verdict: status is {values['status']}; must not be better than that of its part {name}, {inner}"
-            )
-    for name, totals in zip(_NUMBERS, numbers, strict=True):
-        for cause in {cause for part in stated.values() for cause in part[name]}:
-            # Not their sum: damage of a file is that of each of its sources.
-            least = max(part[name].get(cause, 0) for part in stated.values())
-            if totals.get(cause, 0) < least:
-                raise ProblemError(
-                    f"verdict: {name} states {totals.get(cause, 0)} of {cause}; must be at least {least}, as in a part"
-                )
-    fields = {"status": values["status"], "text": values["text"], doubtful: values.get(doubtful)}
-    fields |= {"steps_back": [dict(step) for step in values.get("steps_back", [])]}
-    fields |= {"stretch_of": values.get("stretch_of")}
-    fields |= {name: dict(each) for name, each in zip(_NUMBERS, numbers, strict=True)}
-    return fields | {"parts": list(stated.items())}
+        return about | rest | {"parts": parts}
