@@ -139,13 +139,13 @@ def rust_values(source: Table, *, warns: bool) -> str:
 
 
 def rust_field(f: Table) -> str:
-    """Write a field: its place in the registers, and its range."""
-    return (
-        f'    Field {{\n        name: "{f["name"]}",\n        manual: "{f["manual"]}",\n'
-        f'        unit: "{f["unit"]}",\n        text: "{f["text"]}",\n        register: {f["register"]},\n'
-        f"        shift: {f['low']},\n        mask: {2 ** f['bits'] - 1:#x},\n        offset: {f['offset']},\n"
-        f"        least: {f['least']},\n        greatest: {f['greatest']},\n    }},"
-    )
+    """Write a field on a line: a macro makes the struct, its words and the list of fields of these lines."""
+    # A field with an offset: the manual's value is less by it, so the manual's name is no alias for ours.
+    alias = "" if f["manual"] == f["name"] or f["offset"] else f'alias = "{f["manual"]}"'
+    serde = ", ".join(filter(None, [alias, "default" if f.get("later") else ""]))
+    attribute = f"#[serde({serde})] " if serde else ""
+    place = f"{f['register']}, {f['low']}, {2 ** f['bits'] - 1:#x}, {f['offset']}, {f['least']}, {f['greatest']}"
+    return f'    /// {f["text"]}\n    {attribute}{f["name"]}: {rust_type(f)}, "{f["manual"]}", "{f["unit"]}", {place};'
 
 
 def as_formatted(text: str) -> str:
@@ -155,94 +155,17 @@ def as_formatted(text: str) -> str:
 
 
 def rust_table(source: Table) -> str:
-    """Write the struct that holds the registers, and its words."""
-    fields = source["field"]
-    struct = []
-    for field in fields:
-        # A field with an offset: the manual's value is less by it, so the manual's name is no alias for ours.
-        rename = (
-            ""
-            if field["manual"] == field["name"] or field["offset"]
-            else f'    #[serde(alias = "{field["manual"]}")]\n'
-        )
-        unit = "" if field["unit"] in ("flag", "lines", "channels", "version") else f" In units of {field['unit']}."
-        lacking = "    #[serde(default)]\n" if field.get("later") else ""
-        struct.append(f"    /// {field['text']}{unit}\n{rename}{lacking}    pub {field['name']}: {rust_type(field)},")
-    words, masks, stores = [], [], []
-    for register in range(8):
-        here = [f for f in fields if f.get("register") == register]
-        if not here:
-            continue
-        parts, assignments, mask = [], [], 0
-        for f in here:
-            bits = 2 ** f["bits"] - 1
-            mask |= bits << f["low"]
-            stored = f"u32::from(self.{f['name']})" if rust_type(f) != "u32" else f"self.{f['name']}"
-            if f["offset"]:
-                stored = f"({stored}.wrapping_sub({f['offset']}) & {bits:#x})"
-            parts.append(stored + (f" << {f['low']}" if f["low"] else ""))
-            cut = f"value >> {f['low']}" if f["low"] else "value"
-            if f["bits"] < 32:
-                cut = f"({cut}) & {bits:#x}" if f["low"] else f"{cut} & {bits:#x}"
-            if rust_type(f) == "bool":
-                decoded = f"{cut} == 1"
-            elif f["offset"]:
-                decoded = f"({cut}) as {rust_type(f)} + {f['offset']}"
-            else:
-                decoded = cut if rust_type(f) == "u32" else f"({cut}) as {rust_type(f)}"
-            assignments.append(f"                self.{f['name']} = {decoded};")
-        words.append(f"            {register} => {' | '.join(parts)},")
-        masks.append(f"            {register} => {mask:#x},")
-        stores.append(f"            {register} => {{\n" + "\n".join(assignments) + "\n            }")
-    newline = "\n"
-    return as_formatted(f"""use serde::{{Deserialize, Serialize}};
-
-/// The values of the registers, in the registers' own units (Table 5.5).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Registers {{
-{newline.join(struct)}
-}}
-
-impl Registers {{
-    /// The word of register `n`; 0 if there is no such register.
-    #[must_use]
-    pub fn word(&self, n: u8) -> u32 {{
-        match n {{
-{newline.join(words)}
-            _ => 0,
-        }}
-    }}
-
-    /// Mask of the bits of register `n`; the others are reserved and must be 0.
-    #[must_use]
-    pub fn mask(n: u8) -> u32 {{
-        match n {{
-{newline.join(masks)}
-            _ => 0,
-        }}
-    }}
-
-    /// Sets a register's fields without checking the rules.
-    pub(super) fn store(&mut self, register: u8, value: u32) {{
-        match register {{
-{newline.join(stores)}
-            _ => {{}}
-        }}
-    }}
-}}
-""")
-
-
-def rust_fields(source: Table) -> str:
-    """Write where each field lies in the registers."""
+    """Write the struct that holds the registers, and where each field lies in them."""
     rows = [rust_field(f) for f in source["field"] if "register" in f]
+    build = [f for f in source["field"] if "register" not in f]
+    rest = [f"    /// {f['text']}\n    {f['name']}: {rust_type(f)};" for f in build]
     newline = "\n"
-    return as_formatted(f"""use super::field::Field;
-
-pub(super) const FIELDS: [Field; {len(rows)}] = [
+    return as_formatted(f"""super::field::registers! {{
+    // The field: its type, the manual's name, unit; register, lowest bit, mask, offset, least and greatest value.
 {newline.join(rows)}
-];
+    ; // Of the board's build:
+{newline.join(rest)}
+}}
 """)
 
 
@@ -537,7 +460,6 @@ def schema(source: Table) -> str:
 
 MADE = {
     "crates/taxel-core/src/wire/registers/table.rs": rust_table,
-    "crates/taxel-core/src/wire/registers/fields.rs": rust_fields,
     "crates/taxel-core/src/wire/registers/presets.rs": rust_presets,
     "crates/taxel-core/src/wire/registers/rules.rs": rust_checks,
     "crates/taxel-core/src/wire/registers/power_law.rs": rust_power_law,

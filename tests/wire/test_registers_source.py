@@ -18,7 +18,6 @@ ROOT = Path(__file__).parents[2]
 PANEL = "crates/taxel-panel/web/registers.js"
 MADE = (
     "crates/taxel-core/src/wire/registers/table.rs",
-    "crates/taxel-core/src/wire/registers/fields.rs",
     "crates/taxel-core/src/wire/registers/presets.rs",
     "crates/taxel-core/src/wire/registers/rules.rs",
     "crates/taxel-core/src/wire/registers/power_law.rs",

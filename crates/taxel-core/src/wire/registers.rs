@@ -5,7 +5,6 @@
 //! [`Registers::set`]. Fields, rules and presets are made from `registers.toml`.
 
 mod field;
-mod fields;
 mod power_law;
 mod presets;
 mod rules;
@@ -30,7 +29,7 @@ const TIMING: [u8; 4] = [1, 2, 3, 4];
 /// All fields, in the order of the registers.
 #[must_use]
 pub fn fields() -> &'static [Field] {
-    &fields::FIELDS
+    table::FIELDS
 }
 
 /// A write that the rules forbid; nothing has changed.

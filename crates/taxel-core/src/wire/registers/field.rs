@@ -25,6 +25,100 @@ pub struct Field {
     pub greatest: u32,
 }
 
+/// A value as the bits of a field.
+pub(super) trait Bits {
+    fn bits(self) -> u32;
+    fn of_bits(bits: u32) -> Self;
+}
+
+impl Bits for bool {
+    fn bits(self) -> u32 {
+        u32::from(self)
+    }
+
+    fn of_bits(bits: u32) -> Self {
+        bits == 1
+    }
+}
+
+macro_rules! bits_of_numbers {
+    ($($number:ident)*) => {
+        $(impl Bits for $number {
+            fn bits(self) -> u32 {
+                self as u32
+            }
+
+            fn of_bits(bits: u32) -> Self {
+                bits as Self
+            }
+        })*
+    };
+}
+bits_of_numbers! { u8 u16 u32 }
+
+/// Makes the struct that holds the registers, its words and the list of its fields, of one line a field.
+macro_rules! registers {
+    (
+        $(
+            #[doc = $text:literal]
+            $(#[serde($($serde:tt)*)])? $name:ident: $type:ident, $manual:literal, $unit:literal,
+            $register:literal, $shift:literal, $mask:literal, $offset:literal, $least:literal, $greatest:literal;
+        )*
+        ;
+        $(#[doc = $about:literal] $other:ident: $kind:ident;)*
+    ) => {
+        /// The values of the registers, in the registers' own units (Table 5.5).
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct Registers {
+            $(#[doc = $text] #[doc = concat!(" Unit: ", $unit, ".")] $(#[serde($($serde)*)])? pub $name: $type,)*
+            $(#[doc = $about] pub $other: $kind,)*
+        }
+
+        /// All fields, in the order of the registers.
+        pub(super) const FIELDS: &[$crate::wire::registers::Field] = &[
+            $($crate::wire::registers::Field {
+                name: stringify!($name),
+                manual: $manual,
+                unit: $unit,
+                text: $text.trim_ascii_start(),
+                register: $register,
+                shift: $shift,
+                mask: $mask,
+                offset: $offset,
+                least: $least,
+                greatest: $greatest,
+            },)*
+        ];
+
+        impl Registers {
+            /// The word of register `n`; 0 if there is no such register.
+            #[must_use]
+            pub fn word(&self, n: u8) -> u32 {
+                let mut word = 0;
+                $(if n == $register {
+                    word |= ($crate::wire::registers::field::Bits::bits(self.$name).wrapping_sub($offset) & $mask) << $shift;
+                })*
+                word
+            }
+
+            /// Mask of the bits of register `n`; the others are reserved and must be 0.
+            #[must_use]
+            pub fn mask(n: u8) -> u32 {
+                FIELDS.iter().filter(|field| field.register == n).fold(0, |mask, field| mask | field.mask << field.shift)
+            }
+
+            /// Sets a register's fields without checking the rules.
+            pub(super) fn store(&mut self, register: u8, value: u32) {
+                $(if register == $register {
+                    self.$name = $crate::wire::registers::field::Bits::of_bits((value >> $shift & $mask) + $offset);
+                })*
+            }
+        }
+    };
+}
+pub(super) use registers;
+
 /// The numbers of an array on a board that the rules need.
 pub(super) struct Scanned {
     pub(super) steps: u32,
