@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import entry_points
@@ -253,8 +253,11 @@ class Kind:
     read: Callable[[Path, Layout | None], Sequence[Reader]]
 
 
-def kinds(options: OpenOptions | None = None) -> dict[str, Kind]:
-    """Return the formats by name, in the order in which they are tried; those of other distributions come first."""
+def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
+    """Yield the kinds of files with their names, in the order in which they are tried.
+
+    Files that taxel writes come first, then formats of other distributions, which are looked for only if it is none.
+    """
     how = OpenOptions() if options is None else options
     of_topics = isinstance(how.array, list | tuple) and all(isinstance(each, Array) for each in how.array)
     array = None if how.array is None or of_topics else Array._given(how.array)
@@ -284,20 +287,22 @@ def kinds(options: OpenOptions | None = None) -> dict[str, Kind]:
         is_foreign = SENSOR not in names and layout is not None and layout.data is not None
         return read_arrays(path, layout) if is_foreign else [read_columns(path, array)]
 
-    return {
-        **_from_elsewhere(),
+    yield from {
         "ros": Kind(is_bag, read_bag),
         "lsa": Kind(_ending(".lsa"), lambda path, _: [read_lsa(path, array, how.pairing, differences=how.differences)]),
         "mcap": Kind(_is_mcap, lambda path, _: read_mcap(path, how.pairing)),
         "h5": Kind(is_h5_of_taxel, lambda path, _: [read_columns(path, array)]),
         "csv": Kind(_is_csv, lambda path, _: [read_csv(path, array)]),
         "records": Kind(lambda path: set(EVENTS) <= set(fields_of(path)), read_events),
+    }.items()
+    yield from _from_elsewhere().items()
+    yield from {
         **{name: _of_maker(name, maker) for name, maker in formats.FORMATS.items() if name != "event_camera"},
         "event_camera": Kind(lambda path: bool(event_camera.files(path)), read_camera),
         "npz": Kind(_is_npz, read_npz),
         "arrays": Kind(lambda path: _ending(*ARRAYS)(path) and not are_spike_trains(path), read_arrays),
         "table": Kind(_is_table, read_arrays),
-    }
+    }.items()
 
 
 @cache
@@ -389,7 +394,7 @@ def kind_of(path: Path) -> str | None:
     OSError : the path is not there, or cannot be read
     """
     path.stat()
-    return next((name for name, kind in kinds().items() if kind.knows(path)), None)
+    return next((name for name, kind in kinds() if kind.knows(path)), None)
 
 
 def is_recording(path: Path, layout: GivenLayout = None) -> bool:
@@ -519,7 +524,7 @@ def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[
         raise _unknown(path)
     options.check(path, kind)
     try:
-        readers = kinds(options)[kind].read(path, layout)
+        readers = next(each for name, each in kinds(options) if name == kind).read(path, layout)
     except MemoryError:
         raise FormatError(f"{path}: needs more memory than is available ({available()} bytes)") from None
     by_name: dict[str, list[Reader]] = {}
