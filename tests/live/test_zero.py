@@ -84,10 +84,11 @@ def test_what_is_zeroed_is_heard_anew_live_and_from_the_recording(tmp_path: Path
     np.testing.assert_array_equal(said.known, kept.detections.known)
     # The events alone do not contain the zeroing: the area stays at 2 from the drift on.
     assert len(taxel.detect.run(readout(), kept.events, tare=tare)) == 1
-    for ending in (".mcap", ".npz", ".h5"):
-        assert not [lost for lost in taxel.convert(kept, tmp_path / f"b{ending}") if "zeroed" in lost]
-        assert taxel.open(tmp_path / f"b{ending}").zeroings == kept.zeroings
-    assert "3 zeroed taxels" in taxel.convert(kept, tmp_path / "b.csv")
+    assert taxel.convert(kept, tmp_path / "b.mcap") == []
+    assert taxel.open(tmp_path / "b.mcap").zeroings == kept.zeroings
+    for ending in (".npz", ".csv"):
+        [lost] = taxel.convert(kept, tmp_path / f"b{ending}")
+        assert "zeroed taxels" in lost
     later = kept.between(int(kept.events.t[-1]), np.inf)
     assert later.zeroings == kept.zeroings, "they still hold"
     (part,) = taxel.cut(kept, columns=slice(2, 4))

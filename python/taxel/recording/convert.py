@@ -14,7 +14,7 @@ from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.formats.layout import Layout
 from taxel.frames import Frames
-from taxel.reading import ENDINGS, Facts, InMemory
+from taxel.reading import ENDINGS, Datagrams, Facts, InMemory
 from taxel.recording.frames import period_us
 from taxel.recording.opening import open_one
 from taxel.recording.recording import Recording
@@ -110,7 +110,7 @@ def _export(path: Path, kind: str, source: SourceView, others: list[str], overwr
     """Write the table of a source, and return what was lost."""
     table, facts = source.table, source.facts
     _refuse_turned(path, source)
-    left = [*_beside_table(source), *others]
+    left = [*_beside_table(source, kind), *others]
     match kind:
         case ".lsa":
             left = [*write_lsa(path, source, overwrite=overwrite), *left]
@@ -125,11 +125,12 @@ def _export(path: Path, kind: str, source: SourceView, others: list[str], overwr
     return [*source.lost, *[f"a {kind} holds {holds} alone: not {', '.join(left)}"] * bool(left)]
 
 
-def _beside_table(source: SourceView) -> list[str]:
-    """Return what a recording has beside its table."""
-    facts, marks, clock = source.facts, source.marks, source.clock
+def _beside_table(source: SourceView, kind: str) -> list[str]:
+    """Return what a recording has beside its table that a kind of export leaves out."""
+    facts, marks, clock, received = source.facts, source.marks, source.clock, source.received
+    are_bytes = kind == ".lsa" and isinstance(received, Datagrams) and received.version == 1
     there = {
-        "the raw data": source.received is not None and facts.kind != "lsa",
+        "the raw data": received is not None and not are_bytes,
         "arrival times": clock is not None and len(clock.board_us) > 0,
         "notes": bool(marks.notes),
         "detections": len(marks.detections) > 0,
