@@ -70,7 +70,7 @@ def _labelled(
     notes: tuple[Note, ...],
 ) -> tuple[Note, ...]:
     """Return the notes of a source and the labels that tables have for it, without those that others replace."""
-    facts = source.facts
+    facts, labelled = source.facts, list[Note]()
     names = facts.label, trial_of(facts.name, facts.label), facts.side
     for table in tables:
         labels = table if isinstance(table, Labels) else Labels(table)
@@ -80,11 +80,12 @@ def _labelled(
             continue
         replaced = labels._replaced(recording, *names, begin_us)
         notes = tuple(note for note in notes if note.t is None or note.t not in replaced)
-        there = {(note.text, note.t) for note in notes}
-        rows = [_by_run(row, source, labels) for row in labels._rows(recording, *names, begin_us)]
-        new = sorted((row for row in rows if (row.text, row.t) not in there), key=lambda row: row.t or 0)
-        notes += tuple(Note(row.text, row.t, row.at_ns, source=row.source) for row in dict.fromkeys(new))
-    return notes
+        labelled = [note for note in labelled if note.t not in replaced]
+        there = {(note.text, note.t) for note in (*notes, *labelled)}
+        rows = (_by_run(row, source, labels) for row in labels._rows(recording, *names, begin_us))
+        new = dict.fromkeys(row for row in rows if (row.text, row.t) not in there)
+        labelled += [Note(row.text, row.t, row.at_ns, source=row.source) for row in new]
+    return notes + tuple(sorted(labelled, key=lambda note: note.t or 0))
 
 
 def _by_run(row: Note, source: SourceView, labels: Labels) -> Note:

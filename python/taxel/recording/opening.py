@@ -10,7 +10,7 @@ from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 from shlex import quote
-from typing import TypeAlias
+from typing import NoReturn, TypeAlias
 
 from taxel import _core, formats
 from taxel._base import arguments
@@ -264,10 +264,7 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
 
     def read_arrays(path: Path, layout: Layout | None) -> Sequence[Reader]:
         if layout is None:
-            refuse_without_layout(path)
-            if path.suffix.lower() == ".csv":
-                check_head(path)
-            raise _unknown(path)
+            _refuse_undescribed(path)
         return [_on_given(read_foreign(path, layout, array), array)]
 
     def read_camera(path: Path, layout: Layout | None) -> Sequence[Reader]:
@@ -428,7 +425,15 @@ def check_recording(path: Path, layout: GivenLayout = None) -> None:
         case "csv":
             check_head(path)
         case "table" | "arrays" if not _describes(layout, path):
-            refuse_without_layout(path)
+            _refuse_undescribed(path)
+
+
+def _refuse_undescribed(path: Path) -> NoReturn:
+    """Refuse a table or arrays that no layout describes, or what is not of the kind that its name says."""
+    refuse_without_layout(path)
+    if path.suffix.lower() == ".csv":
+        check_head(path)
+    raise _unknown(path)
 
 
 def is_folder(path: Path) -> bool:
