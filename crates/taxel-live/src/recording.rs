@@ -89,7 +89,7 @@ pub struct Header {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stream: Option<StreamColumns>,
     /// For a source of frames, their unit and more; none for a board.
-    #[serde(default, skip_serializing_if = "Option::is_none", alias = "pictures")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frames: Option<FrameProperties>,
     /// The other sources of the file: frames on the same clock, any other with a clock of its own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

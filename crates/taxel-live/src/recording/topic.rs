@@ -34,9 +34,6 @@ pub enum Topic {
     Frames = 11,
 }
 
-/// Names of channels in files of earlier commits, which are still read; old keys of JSON are aliases of their fields.
-const OLD_NAMES: [(Topic, &str); 1] = [(Topic::Frames, "/pictures")];
-
 /// Difference of the channel numbers of one source from those of the source before it in the file.
 const NEXT_SOURCE: u16 = 16;
 
@@ -139,20 +136,14 @@ impl Topic {
         if source == 0 { self.name().to_owned() } else { format!("/{named}{}", self.name()) }
     }
 
-    /// The names of the channel in files: today's first, then those of earlier commits.
-    fn channel_names(self, source: usize, named: &str) -> impl Iterator<Item = String> {
-        let old = OLD_NAMES.into_iter().filter(move |(topic, _)| *topic == self);
-        std::iter::once(self.channel_name(source, named)).chain(old.map(move |(_, old)| format!("{old}/{named}")))
-    }
-
     /// The topic of a channel with this name, if the channel belongs to the source.
     pub(super) fn of_name(name: &str, source: usize, named: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|topic| topic.channel_names(source, named).any(|of_topic| of_topic == name))
+        Self::ALL.into_iter().find(|topic| topic.channel_name(source, named) == name)
     }
 
     /// The number of messages of the channel, of those of all channels by name.
     pub(super) fn total(self, totals: &BTreeMap<String, u64>, source: usize, named: &str) -> Option<u64> {
-        self.channel_names(source, named).find_map(|name| totals.get(&name).copied())
+        totals.get(&self.channel_name(source, named)).copied()
     }
 
     /// The topic of a channel with this number in a file of ours, if the channel belongs to the source.
