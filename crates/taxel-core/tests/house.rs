@@ -33,7 +33,7 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
         "taxel-live",
         &[
             &["error", "kernel_drops", "latency", "locked", "read_at", "readable_file", "system_error", "text_lines"],
-            &["clock", "named_pipe", "regular_file"],
+            &["clock", "named_pipe"],
             &["address", "ports"],
             &["serial_line"],
             &["board_line", "line_place", "recording"],

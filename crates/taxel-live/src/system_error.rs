@@ -23,11 +23,3 @@ pub fn exists() -> Error {
 pub fn denied() -> Error {
     Error::from_raw_os_error(codes::DENIED)
 }
-
-/// The file is a folder, for which Windows has no code of its own.
-pub fn is_folder() -> Error {
-    #[cfg(unix)]
-    return Error::from_raw_os_error(libc::EISDIR);
-    #[cfg(windows)]
-    return std::io::ErrorKind::IsADirectory.into();
-}

@@ -17,7 +17,6 @@ use taxel_live::recording::{
     WriterOptions, damage_of_version_1, decode_lsa, numbered,
 };
 
-use crate::descriptors::into_descriptor;
 use crate::threaded::Threaded;
 use taxel_border::convert::{ArrayParts, Column, array, column, from_events, slice, to_array};
 use taxel_border::enter::enter;
@@ -460,12 +459,6 @@ pub fn clock_doubt(drift_ppm: f64, delay_us: f64, median_us: f64) -> Option<Stri
 #[pyfunction]
 pub fn seconds_of(text: &str) -> f64 {
     dates::seconds_of(text).unwrap_or(f64::NAN)
-}
-
-/// The descriptor of a regular file, opened for reading.
-#[pyfunction]
-pub fn open_regular(py: Python<'_>, path: PathBuf) -> PyResult<i32> {
-    into_descriptor(py, enter(py, |_| taxel_live::open_regular(&path))?)
 }
 
 /// The name of a recording in automatic mode: the index appended to the name.

@@ -9,7 +9,6 @@ use taxel_core::wire::{self, Decoder, Pairing};
 use taxel_core::{Array, Events, Stop};
 
 use super::{OutputFile, limits};
-use crate::regular_file::open_regular;
 use crate::{Error, Result, system_error};
 
 /// Writes a `.lsa`. Its `.lss` is created by [`LsaWriter::finish`] only.
@@ -157,7 +156,7 @@ pub fn decode_lsa(
 ) -> Result<DecodedLsa> {
     /// Bytes between two checks of `stop`.
     const PIECE: usize = 1 << 22;
-    let (mut bytes, file) = (vec![], open_regular(path)?);
+    let (mut bytes, file) = (vec![], File::open(path).map_err(Error::file(path))?);
     let length = file.metadata().map_err(Error::file(path))?.len();
     limits::in_memory(path, "raw data", length, memory)?;
     file.take(length).read_to_end(&mut bytes).map_err(Error::file(path))?;

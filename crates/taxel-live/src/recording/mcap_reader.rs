@@ -11,6 +11,7 @@ mod summary;
 mod walk;
 
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -24,7 +25,6 @@ use super::{
     Samples, Topic, limits,
 };
 use crate::clock::leaves;
-use crate::regular_file::open_regular;
 use crate::{Error, Result};
 use blocks::{Blocks, IndexedChunks};
 pub use message::Message;
@@ -148,7 +148,7 @@ impl Reader {
     ///
     /// `File` if it cannot be read; `Core` (format) if it is not an MCAP file, or not one of ours.
     pub fn open(path: &Path) -> Result<Self> {
-        let file = open_regular(path)?;
+        let file = File::open(path).map_err(Error::file(path))?;
         let length = file.metadata().map_err(Error::file(path))?.len();
         let mut walk = FileWalk::new(path, &file, length);
         walk.magic()?;

@@ -1,6 +1,7 @@
 //! The folder of recordings: which there are, and their keyframe indices.
 
 use std::collections::HashMap;
+use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, Weak};
@@ -9,7 +10,7 @@ use std::time::UNIX_EPOCH;
 use taxel_core::detect::Detector;
 use taxel_core::problem;
 use taxel_live::locked::lock;
-use taxel_live::{Error, Result, open_regular};
+use taxel_live::{Error, Result};
 use tokio::sync::OwnedMutexGuard;
 
 use super::indexed::Indexed;
@@ -78,7 +79,7 @@ impl Folder {
 
     fn begins_as_readout(&self, name: &str) -> bool {
         let mut begin = Vec::with_capacity(256);
-        let read = open_regular(&self.path.join(name)).is_ok_and(|file| file.take(256).read_to_end(&mut begin).is_ok());
+        let read = File::open(self.path.join(name)).is_ok_and(|file| file.take(256).read_to_end(&mut begin).is_ok());
         read && Detector::is_begun_by(&begin)
     }
 

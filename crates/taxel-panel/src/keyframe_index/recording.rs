@@ -23,7 +23,7 @@ use taxel_live::recording::{
     Basis, Condition, DamageCounts, Header, ReadPosition, Reader, Remarks, Topic, Unread, Verdict, begin_with,
     damage_of_version_1,
 };
-use taxel_live::{Error, Result, open_regular};
+use taxel_live::{Error, Result};
 
 /// Memory that the keyframes of a recording may take, bytes.
 const KEYFRAME_BYTES: usize = 128 << 20;
@@ -103,7 +103,7 @@ impl RecordingIndex {
                 (OpenedFile::Mcap(Box::new(reader)), header, unfinished)
             }
             Some("lsa") => {
-                let file = open_regular(path)?;
+                let file = File::open(path).map_err(Error::file(path))?;
                 let header = Header::of_board(Array::thesis(), None, path.display().to_string(), 0);
                 (OpenedFile::Lsa(file, bytes), header, !path.with_extension("lss").exists())
             }
