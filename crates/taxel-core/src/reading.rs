@@ -3,7 +3,7 @@
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::Error;
+use crate::{Error, Place};
 
 /// The part of a JSON text that is not valid.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -12,21 +12,40 @@ pub struct Unfit {
     path: String,
     /// Why it is not valid.
     message: String,
+    /// The line, counted from 1, of a text that is not JSON.
+    line: Option<u64>,
 }
 
 impl Unfit {
-    /// The whole error for a text that describes `subject`.
+    /// The error of a text that describes `subject`, as one of bytes or a file.
     #[must_use]
-    pub fn text(&self, subject: &str) -> String {
+    pub fn format(&self, subject: &str) -> Error {
+        self.placed(Error::format(self.text(subject)))
+    }
+
+    /// The error of a text that describes `subject`, as one of a scene.
+    #[must_use]
+    pub fn scene(&self, subject: &str) -> Error {
+        self.placed(Error::scene(self.text(subject)))
+    }
+
+    fn text(&self, subject: &str) -> String {
         let colon = if self.path.is_empty() { "" } else { ": " };
         format!("{subject}{colon}{}: {}", self.path, self.message)
+    }
+
+    fn placed(&self, error: Error) -> Error {
+        match self.line {
+            Some(line) => error.at(Place::line(line)),
+            None => error,
+        }
     }
 
     /// The error of the parameter, for a caller who passed `subject` its parameters.
     #[must_use]
     pub fn problem(self, subject: &str) -> Error {
         match self.path.find(['.', '[']).map_or((self.path.as_str(), ""), |end| self.path.split_at(end)) {
-            ("", _) => Error::Problem(self.text(subject).into()),
+            ("", _) => self.placed(Error::Problem(self.text(subject).into())),
             (argument, rest) => Error::argument(argument, &format!("{rest}: {}", self.message)),
         }
     }
@@ -45,8 +64,12 @@ impl Unfit {
 ///
 /// [`Unfit`] if the text is not JSON, or not a valid `T`.
 pub fn from_text<T: DeserializeOwned>(text: &str) -> Result<T, Unfit> {
-    let value = serde_json::from_str(text)
-        .map_err(|error| Unfit { path: String::new(), message: format!("not JSON: {error}") })?;
+    let value = serde_json::from_str(text).map_err(|error| {
+        let (line, column, message) = (error.line(), error.column(), error.to_string());
+        let why = message.strip_suffix(&format!(" at line {line} column {column}")).unwrap_or(&message);
+        let message = format!("not JSON: {why} (column {column})");
+        Unfit { path: String::new(), message, line: Some(line as u64) }
+    })?;
     from_value(value)
 }
 
@@ -66,7 +89,7 @@ pub fn from_value<T: DeserializeOwned>(value: Value) -> Result<T, Unfit> {
             let dot = if path.is_empty() { "" } else { "." };
             path = format!("{path}{dot}{key}");
         }
-        Unfit { path, message }
+        Unfit { path, message, line: None }
     })
 }
 
@@ -116,11 +139,13 @@ mod tests {
     }
 
     #[test]
-    fn a_text_that_is_no_json_has_no_argument() {
-        for text in ["{\n\"tau\": x", "{\"tau\": 1", "7", ""] {
+    fn a_text_that_is_no_json_has_a_line_and_no_argument() {
+        for (text, line) in [("{\n\"tau\": x", Some(2)), ("{\"tau\": 1", Some(1)), ("7", None), ("", Some(1))] {
             let unfit = from_text::<Whole>(text).unwrap_err();
             assert_eq!(unfit.path, "");
-            assert_eq!(unfit.problem("whole").reason().unwrap().argument, None);
+            let error = unfit.problem("whole");
+            assert_eq!(error.reason().unwrap().argument, None);
+            assert_eq!(error.reason().unwrap().place, line.map(Place::line));
         }
     }
 }

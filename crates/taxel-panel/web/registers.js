@@ -77,11 +77,11 @@ export function refused(v) {
   if (lines > driven_lines) broken.push({ rule: 4, text: `lines is ${lines}: must be at most ${driven_lines}, the number of the array's columns (rule 4)` });
   if (line_read > line_period) broken.push({ rule: 1, text: `line_read ${us(line_read)} us is longer than line_period ${us(line_period)} us (rule 1)` });
   if (step_read > step_period) broken.push({ rule: 1, text: `step_read ${us(step_read)} us is longer than step_period ${us(step_period)} us (rule 1)` });
-  if (steps * step_period > line_read) broken.push({ rule: 2, text: `${steps} x step_period ${us(step_period)} us is longer than line_read ${us(line_read)} us (rule 2)` });
+  if (steps * step_period > line_read) broken.push({ rule: 2, text: `step_period ${us(step_period)} us is too long for line_read ${us(line_read)} us: ${steps} steps take ${us(steps * step_period)} us (rule 2)` });
   if (ramp + 5 > 3 * step_read) broken.push({ rule: 3, text: `ramp ${ramp} ticks is too long for step_read ${us(step_read)} us = ${3 * step_read} ticks: the ramp must be at least 5 ticks shorter (rule 3)` });
   if (random_lines !== 0 && 16 * lines > line_period) broken.push({ rule: 5, text: `random_lines: moving to any of ${lines} lines takes up to ${us(16 * lines)} us, longer than line_period ${us(line_period)} us (rule 5)` });
   if (channels + 10 > step_period) broken.push({ rule: 7, text: `step_period ${us(step_period)} us is too short for ${channels} channels: the logic compares one channel per clock and needs ${us(channels + 10)} us (rule 7)` });
-  if (wire_version !== 2 && (driven_lines > 64 || sense_lines > 64)) broken.push({ rule: 8, text: `version 1 of the wire can address only 64 x 64 taxels, but the array has ${sense_lines} x ${driven_lines}: choose version 2 (rule 8)` });
+  if (wire_version !== 2 && (driven_lines > 64 || sense_lines > 64)) broken.push({ rule: 8, text: `wire_version ${wire_version} can address only 64 x 64 taxels, but the array has ${sense_lines} x ${driven_lines}: choose version 2 (rule 8)` });
   return broken;
 }
 

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::circuit::Ramp;
 use taxel_core::contact::Sensor;
-use taxel_core::{Error, Result, reading};
+use taxel_core::{Result, reading};
 
 use taxel_border::convert::{array, slice};
 use taxel_border::enter::enter;
@@ -12,7 +12,7 @@ use taxel_border::errors::core;
 use taxel_border::parameters::Plain;
 
 fn law(json: &str) -> Result<Sensor> {
-    let sensor: Sensor = reading::from_text(json).map_err(|unfit| Error::scene(unfit.text("law")))?;
+    let sensor: Sensor = reading::from_text(json).map_err(|unfit| unfit.scene("law"))?;
     sensor.check()?;
     Ok(sensor)
 }

@@ -33,7 +33,7 @@ pub(crate) enum ActIn<'py> {
 }
 
 fn scene(json: &str) -> Result<Scene> {
-    reading::from_text(json).map_err(|unfit| Error::scene(unfit.text("scene")))
+    reading::from_text(json).map_err(|unfit| unfit.scene("scene"))
 }
 
 fn to_act(act: ActIn<'_>) -> PyResult<Act> {
@@ -51,7 +51,7 @@ fn to_acts(acts: Vec<ActIn<'_>>) -> PyResult<Vec<Act>> {
 }
 
 fn to_sensor(json: &str) -> PyResult<Sensor> {
-    reading::from_text(json).map_err(|unfit| core(Error::scene(unfit.text("sensor"))))
+    reading::from_text(json).map_err(|unfit| core(unfit.scene("sensor")))
 }
 
 /// What one body does at even steps, by name.
@@ -349,7 +349,7 @@ impl Layer {
     /// `foam` is JSON.
     #[new]
     fn new(py: Python<'_>, parts: ArrayParts, foam: &str, cells_per_pitch: u16, tolerance: f64) -> PyResult<Self> {
-        let foam: Foam = reading::from_text(foam).map_err(|unfit| core(Error::scene(unfit.text("foam"))))?;
+        let foam: Foam = reading::from_text(foam).map_err(|unfit| core(unfit.scene("foam")))?;
         let array = to_array(parts)?;
         let layer =
             enter(py, |stop| Ok::<_, Error>(Bonded::new(&foam, &array, cells_per_pitch, stop)?.to_within(tolerance)))?;

@@ -16,7 +16,7 @@ const VERSION: u64 = 1;
 pub(super) fn parts(name: &str, text: &str, formats: &[&'static str]) -> Result<(&'static str, Value)> {
     let format = |message: String| Error::format(format!("{name}: {message}"));
     let names = formats.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(" or ");
-    let mut value: Value = reading::from_text(text).map_err(|unfit| Error::format(unfit.text(name)))?;
+    let mut value: Value = reading::from_text(text).map_err(|unfit| unfit.format(name))?;
     let Some(object) = value.as_object_mut() else {
         return Err(format("not a JSON object".to_owned()));
     };

@@ -8,7 +8,7 @@ use crate::detect::running_rule::{Limits, RunningRule, When};
 use crate::detect::{FrameClock, FrameTime, ReadoutStream, TrainingData, file};
 use crate::encode::{Quantity, Tare};
 use crate::spikes::us;
-use crate::{Array, Error, Result, problem, reading};
+use crate::{Array, Result, problem, reading};
 
 #[cfg(test)]
 mod tests;
@@ -191,7 +191,7 @@ impl PlainRule {
 
     /// As [`PlainRule::from_json`], from the contents of the file without format and version.
     pub(super) fn from_parts(parts: Value) -> Result<Self> {
-        let rule: Self = reading::from_value(parts).map_err(|unfit| Error::format(unfit.text("plain rule")))?;
+        let rule: Self = reading::from_value(parts).map_err(|unfit| unfit.format("plain rule"))?;
         rule.check().map_err(|error| error.in_part("plain rule").into_format())?;
         Ok(rule)
     }

@@ -134,7 +134,7 @@ impl Tare {
     ///
     /// `Format` if the JSON is not a tare, `Problem` if its parts do not match.
     pub fn from_json(json: &str) -> Result<Self> {
-        let tare: Self = reading::from_text(json).map_err(|unfit| crate::Error::format(unfit.text("tare")))?;
+        let tare: Self = reading::from_text(json).map_err(|unfit| unfit.format("tare"))?;
         tare.check()?;
         Ok(tare)
     }

@@ -16,6 +16,7 @@ pub use power_law::{POWER_LAW, POWER_LAW_FRACTION};
 pub use presets::{PRESETS, Preset};
 pub use table::Registers;
 
+use crate::error::Reason;
 use crate::wire::Command;
 use crate::{Array, Error, Result, problem};
 
@@ -45,7 +46,18 @@ pub struct WriteRefusal {
 
 impl From<WriteRefusal> for Error {
     fn from(refusal: WriteRefusal) -> Self {
-        Self::device(refusal.text)
+        broken(&refusal.text)
+    }
+}
+
+/// The error of a broken rule: of the field with which its text begins.
+fn broken(text: &str) -> Error {
+    let field = fields().iter().find(|f| text.strip_prefix(f.name).is_some_and(|rest| rest.starts_with([' ', ':'])));
+    match field {
+        Some(Field { name, .. }) => {
+            Error::Device(Reason { argument: Some((*name).to_owned()), ..text[name.len()..].into() })
+        }
+        None => Error::device(text),
     }
 }
 
@@ -65,7 +77,7 @@ impl Registers {
     pub fn preset(name: &str) -> Result<Self> {
         match PRESETS.iter().find(|preset| preset.name == name) {
             Some(preset) => Ok(preset.registers),
-            None => Err(problem!("preset {name:?} is not known: must be one of {}", preset_names(&PRESETS))),
+            None => Err(problem!("preset"; " {name:?} is not known: must be one of {}", preset_names(&PRESETS))),
         }
     }
 
@@ -81,7 +93,7 @@ impl Registers {
         if !fitting().any(|preset| preset.name == name) {
             let Array { rows, columns, .. } = array;
             return Err(problem!(
-                "preset {name:?} is not for a board of {rows} x {columns} taxels: must be one of {}",
+                "preset"; " {name:?} is not for a board of {rows} x {columns} taxels: must be one of {}",
                 preset_names(fitting())
             ));
         }
@@ -240,7 +252,8 @@ impl Registers {
         if matches!(self.channels, 16 | 64) {
             return Ok(());
         }
-        Err(Error::device(format!("{} channels: the converter has 16 or 64 channels", self.channels)))
+        let text = format!(" is {}: must be 16 or 64, those of the converter", self.channels);
+        Err(Error::Device(Reason { argument: Some("channels".to_owned()), ..text.into() }))
     }
 
     /// The rules that refuse, in the order in which the board checks them; the first is that every value is in its
@@ -337,14 +350,15 @@ impl Registers {
             }
             let Some(field) = fields().iter().find(|f| f.name == name || f.manual == name) else {
                 let names: Vec<_> = fields().iter().map(|f| f.name).collect();
-                return Err(problem!("register {name:?} is not known: must be one of {}, channels", names.join(", ")));
+                return Err(problem!(name; " is no register: must be one of {}, channels", names.join(", ")));
             };
             // The manual's name takes the value as the register holds it; ours takes the number meant, without the
             // register's offset.
             let offset = if name == field.name { field.offset } else { 0 };
             let (least, greatest) = (field.least - field.offset + offset, field.greatest - field.offset + offset);
             if value < least || value > greatest {
-                return Err(Error::device(format!("{name} is {value}: must be from {least} to {greatest} (rule 4)")));
+                let text = format!(" is {value}: must be from {least} to {greatest} (rule 4)");
+                return Err(Error::Device(Reason { argument: Some(name.to_owned()), ..text.into() }));
             }
             let stored = value - offset;
             let rest = next.word(field.register) & !(field.mask << field.shift);

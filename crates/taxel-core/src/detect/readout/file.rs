@@ -28,7 +28,7 @@ impl Readout {
         if let Some(encoder) = parts.get("encoder") {
             Encoder::from_json(&encoder.to_string()).map_err(invalid)?;
         }
-        let readout: Self = reading::from_value(parts).map_err(|unfit| Error::format(unfit.text("readout")))?;
+        let readout: Self = reading::from_value(parts).map_err(|unfit| unfit.format("readout"))?;
         readout.check().map_err(invalid)?;
         Ok(readout)
     }

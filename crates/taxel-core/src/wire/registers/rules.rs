@@ -39,10 +39,11 @@ pub(super) fn first_refusal(registers: &Registers, scanned: &Scanned) -> Option<
         return Some((
             2,
             format!(
-                "{} x step_period {} us is longer than line_read {} us (rule 2)",
-                steps,
+                "step_period {} us is too long for line_read {} us: {} steps take {} us (rule 2)",
                 us(step_period),
-                us(line_read)
+                us(line_read),
+                steps,
+                us(steps * step_period)
             ),
         ));
     }
@@ -83,8 +84,8 @@ pub(super) fn first_refusal(registers: &Registers, scanned: &Scanned) -> Option<
         return Some((
             8,
             format!(
-                "version 1 of the wire can address only 64 x 64 taxels, but the array has {} x {}: choose version 2 (rule 8)",
-                sense_lines, driven_lines
+                "wire_version {} can address only 64 x 64 taxels, but the array has {} x {}: choose version 2 (rule 8)",
+                wire_version, sense_lines, driven_lines
             ),
         ));
     }
