@@ -7,6 +7,8 @@ import numpy as np
 from scipy import ndimage, signal
 
 TICK_SHIFT = 0.5
+#: Two sums of a potential, as a share of the range, or of a time in ms differ by rounding by no more.
+ROUNDING = 1e-9
 
 
 def change_events(t, values, noise_floor=3.0, bits=1, previous="last_sent", rounding="truncate"):
@@ -253,21 +255,33 @@ def moments(t, frames, rest, end, floor, pitch, every, tonic=None):
     return sorted(spikes)
 
 
-def afferent(t, values, transfer, *, range_, threshold, jump, recovery_ms, refractory_ms, settled, finer=20):
-    """A linear filter (numerator, denominator in ms) of pressure that moves in straight lines; a moving threshold.
+def afferent(t, values, stages, e, *, settled):
+    """Linear filters (numerator, denominator in ms) in turn, and a moving threshold.
 
-    Spikes in ms, on a grid `finer` than the samples; `settled` is the filter's gain at rest.
+    The input of each moves in straight lines between samples, which what comes out of another does not quite.
+
+    A spike is emitted at the first sample at which the potential has come up to the threshold and the refractory time
+    is over; it counts from the time between the samples at which a straight line reaches the threshold. Returns the
+    spikes (ms) up to the first sample at which rounding decides, and that time; `settled` is the filter's gain at rest.
     """
-    x = np.maximum(np.asarray(values, float), 0) / range_
-    fine = np.linspace(t[0], t[-1], (len(t) - 1) * finer + 1)
-    line = np.interp(fine, t, x)
-    # The filter is linear and at rest for the first value, so only the difference from it is filtered.
-    u = signal.lsim(transfer, line - line[0], fine - fine[0])[1] + settled * line[0]
-    raised, last, spikes, step = max(u[0] - threshold, 0.0), -np.inf, [], fine[1] - fine[0]
-    for at, potential in zip(fine[1:], u[1:], strict=True):
-        raised *= np.exp(-step / recovery_ms)
-        if potential >= threshold + raised and at - last >= refractory_ms:
-            raised += jump
-            last = at
+    x = np.maximum(np.asarray(values, float), 0) / e.range
+    step = t[1] - t[0]
+    # The filters are linear and at rest for the first value, so only the difference from it is filtered.
+    potential = x - x[0]
+    for stage in stages:
+        potential = signal.lsim(stage, potential, t - t[0])[1]
+    potential += settled * x[0]
+    raised, wait, spikes = max(potential[0] - e.threshold, 0.0), 0.0, []
+    for at, before, now in zip(t[1:], potential, potential[1:], strict=False):
+        below, waited = e.threshold + raised - before, wait
+        raised, wait = raised * np.exp(-step / e.recovery_ms), max(wait - step, 0.0)
+        above = now - e.threshold - raised
+        if abs(above) < ROUNDING or 0 < abs(waited - step) < ROUNDING:
+            return np.array(spikes), at
+        if above >= 0 and waited < step:
+            crossed = step * below / (below + above) if below > 0 else 0.0
+            since = step - max(crossed, waited)
+            raised += e.jump * np.exp(-since / e.recovery_ms)
+            wait = max(e.refractory_ms - since, 0.0)
             spikes.append(at)
-    return np.array(spikes)
+    return np.array(spikes), np.inf

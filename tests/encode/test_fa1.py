@@ -1,7 +1,6 @@
 """The FA-1 afferent against equations 5.1 to 5.5, written once more in plain Python."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusal import refused
@@ -44,10 +43,7 @@ def test_fa1_is_equations_5_1_to_5_5_and_5_7(seed, ticks, decay, theta, period, 
     encoder = FA1(alpha=alpha, decay=decay, theta_0=theta, period_ms=period, bits=bits)
     given_parameters = {"decay": decay, "theta_0": theta, "period_ms": period, "bits": bits}
     wanted = oracles.fa1(t, values.astype(np.float32), alpha, **given_parameters)
-    found = spikes_of(encoder.encode(frames_of(t, values)))
-    assert [spike[:2] for spike in found] == [spike[:2] for spike in wanted]
-    # A value that lies between two counts is rounded up by one and down by the other.
-    assert np.abs([a[2] - b[2] for a, b in zip(found, wanted, strict=True)] or 0).max() <= 1
+    assert spikes_of(encoder.encode(frames_of(t, values))) == wanted
 
 
 def test_fa1_takes_its_baseline_from_the_range_after_the_power_law():
@@ -65,25 +61,6 @@ def test_fa1_on_ticks_by_table_equals_fa1_on_the_same_numbers_without_it():
     odd = np.concatenate([values, np.full((500, 1), 0.5)], axis=1)
     direct = FA1().encode(frames_of(t, odd)).select(range(10))
     assert spikes_of(FA1().encode(frames_of(t, values))) == spikes_of(direct)
-
-
-@pytest.mark.parametrize(
-    ("call", "argument"),
-    [
-        (lambda: FA1(alpha=0), "alpha"),
-        (lambda: FA1(alpha=5), "alpha"),
-        (lambda: FA1(a=-1), "a"),
-        (lambda: FA1(b=-1), "b"),
-        (lambda: FA1(theta_0=-1), "theta_0"),
-        (lambda: FA1(range=0), "range"),
-        (lambda: FA1(bits=11), "bits"),
-        (lambda: FA1(range=1, theta_0=1), None),
-        (lambda: FA1(decay="s"), "decay"),
-    ],
-)
-def test_nonsense_gets_one_clear_line(call, argument):
-    with refused(argument=argument):
-        call()
 
 
 def test_fa1_refuses_frames_that_do_not_come_at_its_period():

@@ -17,6 +17,11 @@ const WHOLE: f64 = 4_503_599_627_370_496.0; // 2^52
 /// x^alpha for alpha > 0; values below 0 count as 0.
 #[inline(always)]
 pub(super) fn power(values: &Block, alpha: f64, out: &mut [f64; BLOCK]) {
+    if alpha == 1.0 {
+        // Exact: a difference of whole numbers is one, whose count in thresholds would else be rounded down.
+        *out = values.map(|value| if value > 0.0 { f64::from(value) } else { 0.0 });
+        return;
+    }
     for (out, &value) in out.iter_mut().zip(values) {
         *out = power_of(f64::from(value), alpha);
     }
@@ -66,6 +71,14 @@ mod tests {
                 x *= 1.000_37;
             }
         }
+    }
+
+    #[test]
+    fn the_first_power_is_the_value() {
+        let values: Block = std::array::from_fn(|k| k as f32 * 1.7 - 3.0);
+        let mut out = [1.0; BLOCK];
+        power(&values, 1.0, &mut out);
+        assert_eq!(out, values.map(|value| f64::from(value.max(0.0))));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Tests of a rule's parts and its file; `tests/detect/test_plain_rule.py` compares its detections with a plain loop.
 
 use super::*;
+use crate::Error;
 use crate::detect::{Detector, Readout};
 
 fn rule() -> PlainRule {
