@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from draws import mixed, stretches
 from interrupts import ctrl_c_after
-from making import lists, made
+from making import made
 from refusal import refused
 from stated import examples, grid_rows, row, shares, terms, threshold
 
@@ -258,24 +258,6 @@ def test_a_shift_in_time_and_another_order_of_trains_change_nothing():
     assert moved.weights_ == pytest.approx(here.weights_[order], abs=1e-6)
 
 
-@pytest.mark.parametrize("after", ["keep", "ignore", "reset"])
-def test_days_from_time_0_the_verdict_is_the_same(after):
-    for seed in range(60):
-        random = np.random.default_rng([after == "keep", seed])
-        tau = float(random.choice([0.5, 15.0, 190.0]))
-        neuron = Neuron(tau=tau, refractory=random.uniform(0.05, 1.5) * tau, after_spike=after)
-        # In 1024ths of a ms all that is given moves without rounding; the end of a refractory time does not.
-        times = [np.unique(np.round(random.uniform(0, 12 * tau, 6) * 1024)) / 1024 for _ in range(30)]
-        targets = np.round(np.array([3.0, 6.0, 9.0]) * tau * 1024) / 1024
-        fits = []
-        for shift in (0.0, 2.0 ** random.integers(25, 33)):
-            trains = SpikeTrains.from_lists([t + shift for t in times], start=shift, stop=14 * tau + shift)
-            fits.append(ConeX(neuron=neuron, lb=-1, ub=1).fit([trains], [targets + shift]))
-        here, there = fits
-        assert there.status_ == here.status_
-        assert there.objective_ == pytest.approx(here.objective_, rel=1e-4)
-
-
 @pytest.mark.parametrize(
     "options",
     [
@@ -374,77 +356,6 @@ def test_progress_is_told_round_by_round():
     assert told[-1][3] == cone.objective_
     with pytest.raises(ZeroDivisionError):
         ConeX(lb=-1, ub=1).fit(patterns, targets, progress=lambda *_: 1 / 0)
-
-
-@pytest.mark.parametrize(
-    ("options", "argument"),
-    [
-        ({"tau": 0}, "tau"),
-        (
-            {"kernel": "exponential"},
-            "kernel",
-        ),
-        ({"kernel": "box"}, "kernel"),
-        ({"kappa": 0}, "kappa"),
-        ({"delta_t_ms": -1}, "delta_t_ms"),
-        ({"lambdas": (1, 2)}, "lambdas"),
-        ({"lambdas": (1, 2, "3")}, "lambdas"),
-        ({"lambdas": (1, 2, -3)}, "lambdas"),
-        ({"ub": float("inf")}, "ub"),
-        ({"lb": [0.0, float("nan")]}, "lb"),
-        ({"lb": "low"}, "lb"),
-        ({"margin": 0.0}, "margin"),
-        ({"slope": -1.0}, "slope"),
-        ({"slope": 0.1, "time": "grid"}, "slope"),
-        ({"horizon": float("nan")}, "horizon"),
-        ({"tolerance": 0}, "tolerance"),
-        ({"max_seconds": 0}, "max_seconds"),
-        ({"norm": "max"}, "norm"),
-        ({"norm": 2}, "norm"),
-    ],
-)
-def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, argument):
-    with refused(argument=argument):
-        made(ConeX, **options)
-
-
-@pytest.mark.parametrize(
-    ("options", "patterns", "targets", "argument"),
-    [
-        ({}, [], [], "patterns"),
-        ({}, [lists([1.0])], [], "targets"),
-        ({}, [lists([], [])], [[5.0]], None),
-        ({}, [lists([1.0]), lists([1.0], [2.0])], [[5.0], [5.0]], None),
-        ({}, [lists([1.0])], [[float("nan")]], None),
-        ({}, [lists([1.0])], [[30.0, 20.0]], None),
-        (
-            {},
-            [lists([1.0])],
-            [[30.0, 31.5]],
-            None,
-        ),
-        ({}, [lists([1.0])], [[130.0]], None),
-        ({}, ["spikes"], [[5.0]], None),
-        ({"lb": 0.3, "ub": 0.2}, [lists([1.0])], [[5.0]], None),
-        ({"lb": [0.0, 0.0, 0.0]}, [lists([1.0])], [[5.0]], None),
-        ({"horizon": [9.0, 9.0]}, [lists([1.0])], [[5.0]], "horizon"),
-        (
-            {"horizon": 50.0},
-            [lists([1.0])],
-            [[60.0]],
-            None,
-        ),
-    ],
-)
-def test_examples_that_make_no_sense_are_one_clear_error_each(options, patterns, targets, argument):
-    with refused(argument=argument):
-        made(ConeX, **options).fit(patterns, targets)
-
-
-def test_the_defaults_that_python_shows_are_those_of_the_core():
-    checked = taxel._core.check_parameters
-    assert checked("cone_x", ConeX()._json()) == checked("cone_x", "{}")
-    assert repr(ConeX(neuron=Neuron(tau=3.0), lb=[0.0, 0.1])) == "ConeX(neuron=Neuron(tau=3.0), lb=[0.0, 0.1])"
 
 
 def test_a_fitted_cone_can_be_read_out():

@@ -191,19 +191,6 @@ def test_all_is_checked_again_in_fit(kind):
         kind(neuron=5)
 
 
-def test_cone_r_is_trained_on_its_neuron_s_step_whatever_its_clock():
-    patterns, targets = examples()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)
-        cone, on_grid = (
-            ConeR(neuron=Neuron(tau=10.0, step_ms=0.5, time=time)).fit(patterns, targets)
-            for time in ("continuous", "grid")
-        )
-    assert cone.neuron == Neuron(tau=10.0, step_ms=0.5)
-    assert cone.neuron_ == Neuron(tau=10.0, step_ms=0.5, time="grid") == on_grid.neuron_
-    assert np.array_equal(cone.weights_, on_grid.weights_)
-
-
 def test_a_fit_goes_on_in_a_window_that_was_pickled():
     patterns, targets = examples()
     with warnings.catch_warnings():
@@ -254,18 +241,6 @@ def test_a_search_over_a_pipeline_finds_touches_in_recordings():
     (spikes,) = search.predict(recordings[:1])
     assert np.abs(spikes - targets[0]).min() < 50.0
     assert search.score(recordings, targets) == 1.0
-
-
-def test_a_tare_in_seconds_is_each_recording_s_own():
-    recording, _ = touches(1)
-    given = ContactArea(tare=taxel.Tare.take(recording, stop_us=200_000)).encode(recording)
-    taken = ContactArea(tare=0.2).encode(recording)
-    assert np.array_equal(given.times, taken.times)
-    assert ContactArea(tare=0.2) == ContactArea(tare=0.2) != ContactArea(tare=0.3)
-    assert ContactArea(tare=0.2).to_json() == ContactArea().to_json()
-    for tare, argument in ((0.9, "tare"), (0, None), ("soon", "tare")):
-        with refused(argument=argument):
-            ContactArea(tare=tare).encode(recording)
 
 
 def test_an_encoder_transforms_a_list_and_splits_signed_trains():
