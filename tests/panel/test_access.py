@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import http.client
-import socket
 import threading
-import time
 
 import pytest
 from panel.protocol import (
@@ -62,34 +59,6 @@ def test_a_foreign_or_nameless_visitor_is_not_let_in(panel):
     assert line.getresponse().status == 405
 
 
-def test_connections_that_say_nothing_are_so_many_and_no_more(live, panel):
-    with Client(panel) as page, contextlib.ExitStack() as idle:
-        crowd = [idle.enter_context(socket.create_connection(panel.address, SOON)) for _ in range(600)]
-        assert page.ask("recordings")["type"] == "done", "who was in is served"
-
-        def closed():
-            count = 0
-            for one in crowd:
-                one.setblocking(False)
-                with contextlib.suppress(BlockingIOError):
-                    count += one.recv(1) == b""
-            return count
-
-        until = time.monotonic() + SOON
-        while closed() < 600 - 511:
-            assert time.monotonic() < until
-            time.sleep(0.05)
-        assert closed() == 600 - 511
-        idle.close()
-        while True:
-            # The places of the disconnected clients are free as soon as the server has noticed.
-            with contextlib.suppress(OSError, websockets.exceptions.InvalidHandshake), Client(panel) as other:
-                assert other.until("hello")["live"]
-                break
-            assert time.monotonic() < until
-            time.sleep(0.05)
-
-
 @pytest.mark.parametrize(
     "message",
     [
@@ -130,15 +99,6 @@ def test_what_no_page_sends_ends_the_connection(panel, message, code):
         with pytest.raises(websockets.exceptions.ConnectionClosed) as closed:
             page.until("nothing")
     assert closed.value.rcvd.code == code
-
-
-def test_who_is_refused_over_and_over_is_let_go(panel):
-    with Client(panel) as page:
-        for _ in range(101):
-            page.socket.send("nonsense")
-        with pytest.raises(websockets.exceptions.ConnectionClosed) as closed:
-            page.until("nothing")
-    assert closed.value.rcvd.code == 1008
 
 
 def test_a_hundred_visitors_half_of_whom_never_read_cost_no_event_and_no_frame_of_another(live, panel):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from formats.making import write_gaitpdb, write_icub, write_pedar, write_tekscan
+from formats.making import write_gaitpdb, write_icub, write_pedar
 from panel.protocol import Client, head, parts_of, section
 
 import taxel
@@ -283,14 +283,6 @@ def test_what_is_no_recording_is_refused_at_once(tmp_path):
         Panel(tmp_path / "empty")
 
 
-def test_the_health_of_frames_names_the_places_that_are_shown(tmp_path):
-    file = write_tekscan(tmp_path)
-    with Panel(file) as panel, Client(panel) as page:
-        opened(page, file.name)
-        assert page.ask("health")["type"] == "done"
-        assert page.since_asked("health")["source"] == file.name
-
-
 def above_rest_of(page, about, t_us):
     """Return what the client draws above rest at a time, in the unit of the file."""
     _, frame = values_at(page, about, t_us)
@@ -320,32 +312,6 @@ def test_frames_of_unknown_unit_are_above_the_rest_of_a_quiet_stretch_as_info_ha
             assert head(page.frames[-1])[0]["flags"] & 96 == 64
         force, _ = max_and_column(page, about)
         assert force == pytest.approx(np.where(over.values >= floor, over.values, 0).sum(axis=(1, 2)).max(), rel=0.02)
-
-
-@pytest.mark.parametrize("layout", [None, "falls = true"])
-def test_a_press_that_is_held_sets_the_rest_of_a_falling_sensor_nowhere_anew(tmp_path, layout):
-    t = np.arange(3000) * 20_000
-    values = np.rint(3000 + np.random.default_rng(2).normal(0, 2, (3000, 16, 16)))
-    values[250:1250, 3:6, 4:7] -= 200
-    taxel.convert(Frames(values, t, unit="counts", array=Array(16, 16)), tmp_path / "mat.npz")
-    if layout is not None:
-        (tmp_path / "layout.toml").write_text(layout)
-    with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:
-        about = opened(page, "mat.npz")
-        [source] = about["frames"]["sources"]
-        assert (source["rest"], source["falls"]) == ("quiet", layout is None)
-        # Before it, in it, and after it, taxels that read as at rest are at rest; pressed ones are above it if turned.
-        for k in (100, 260, 700, 1240, 1300, 2500):
-            shown = above_rest_of(page, about, int(t[k])).reshape(16, 16)
-            pressed = layout is not None and 250 <= k < 1250
-            assert (shown[3:6, 4:7] > 60).all() == pressed, k
-            shown[3:6, 4:7] = 0
-            assert np.count_nonzero(shown) <= 16, k
-            if not pressed:
-                assert shown.max() < 20, k
-    over, floor, rest = above_rest(taxel.open(tmp_path / "mat.npz"))
-    assert rest.falls == (layout is None)
-    assert np.count_nonzero(over.values[[100, 1300, 2500]] > floor) <= 3 * 16
 
 
 @pytest.mark.parametrize("unit", ["raw", "kPa"])
@@ -446,18 +412,6 @@ def test_each_foot_has_a_sum_and_a_centre(tmp_path, column_us):
                 )
 
 
-def test_without_a_quiet_stretch_values_are_shown_as_they_are(tmp_path):
-    rng, t = np.random.default_rng(8), np.arange(100) * 10_000
-    values = rng.uniform(20, 90, (100, 4, 4))
-    taxel.convert(Frames(values, t, unit="raw", array=Array(4, 4)), tmp_path / "mat.npz")
-    with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:
-        about = opened(page, "mat.npz")
-        assert [one["rest"] for one in about["frames"]["sources"]] == ["none"]
-        shown = above_rest_of(page, about, 300_000)
-        assert shown == pytest.approx(np.float32(values[30]).ravel(), abs=about["frames"]["step"])
-        assert head(page.frames[-1])[0]["flags"] & 96 == 0
-
-
 def test_the_centre_is_at_the_places_and_channels_have_none(tmp_path):
     frames = np.zeros((20, 1, 3))
     frames[5:] = [1.0, 3.0, 0.0]
@@ -470,16 +424,6 @@ def test_the_centre_is_at_the_places_and_channels_have_none(tmp_path):
             _, frame = values_at(page, about, 150_000)
             centre = section(frame, 3, "<f4").reshape(-1, 4)[-1, 2:]
             assert centre == pytest.approx(expected, abs=0.02, nan_ok=True)
-
-
-def test_feet_in_one_system_of_coordinates_keep_their_places_and_others_stand_apart():
-    def foot(xs):
-        return Array(1, len(xs), places=Places(xs, [0.0] * len(xs)))
-
-    both, lefts = Array._beside([foot([-700.0, -300.0]), foot([300.0, 700.0])], gap=1)
-    assert (lefts, both.places.x.ravel()[[0, 1, 3, 4]].tolist()) == ([0, 3], [-700, -300, 300, 700])
-    both, _ = Array._beside([foot([0.0, 400.0]), foot([0.0, 400.0])], gap=1)
-    assert both.places.x.ravel()[[0, 1, 3, 4]].tolist() == [0, 400, 600, 1000]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -534,12 +478,3 @@ def test_channels_have_a_curve_each(tmp_path, column):
                 ends = [min(end, t_us) for end in parts_of(number, column_us)]
                 at = np.searchsorted(frames.t, ends, side="right") - 1
                 np.testing.assert_array_equal(curve * about["frames"]["step"], values[at, 0].max(axis=0))
-
-
-def test_only_channels_have_a_curve_each(tmp_path):
-    for name, array in (("mat", Array(2, 3)), ("line", Array(1, 6, pitch_mm=5.0)), ("many", Array(1, 65))):
-        frames = Frames(np.ones((20, *array.shape)), np.arange(20) * 10_000, unit="N", array=array)
-        taxel.convert(frames, tmp_path / f"{name}.npz")
-        with Panel(tmp_path / f"{name}.npz") as panel, Client(panel) as page:
-            _, frame = values_at(page, opened(page, f"{name}.npz"), 100_000)
-            assert not section(frame, 7, "<u2").size

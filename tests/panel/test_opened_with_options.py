@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from contextlib import contextmanager
-from pathlib import Path
 from types import SimpleNamespace
 from urllib.parse import urlsplit
 
@@ -20,8 +19,6 @@ from shell import call
 
 import taxel
 from taxel import Array, Calibration, Frames
-from taxel.cli._opening import FileOptions
-from taxel.cli.view import _opening
 from taxel.live import Panel
 from taxel.recording.opening import recordings_in
 from taxel.recording.text_options import TextOptions
@@ -60,63 +57,6 @@ def test_a_bag_is_walked_to_the_page_by_the_options_of_its_topic(name, tmp_path)
         assert np.array_equal(shown, values[30])
         assert page.ask("mark", label="touch", t_us=t + 200_000)["type"] == "done"
     assert [note.t for note in taxel.open(bag, topic="/palm").notes] == [t + 200_000]
-
-
-def test_the_command_that_trains_in_a_shell_has_the_options_and_quotes_what_needs_it(tmp_path):
-    folder = tmp_path / "two words"
-    folder.mkdir()
-    palms(folder, "grasp one.bag")
-    with viewed(tmp_path, "two words/grasp one.bag", "--topic", "/palm", "--array", "24x32") as page:
-        assert opened(page, "grasp one.bag")["train"] == (
-            "taxel train 'two words/grasp one.bag' --labels notes -o 'two words/grasp one.readout.json'"
-            " --array 24x32 --topic /palm"
-        )
-    with viewed(folder, "grasp one.bag", "--topic", "/palm", "--array", "24x32") as page:
-        assert opened(page, "grasp one.bag")["train"].startswith("taxel train 'grasp one.bag' --labels notes ")
-    shown = tmp_path / "elsewhere.npz"
-    taxel.convert(Frames(np.zeros((2, 3, 2)), [0, 1000], unit="N", array=Array(3, 2)), shown)
-    with viewed(folder, shown) as page:
-        assert opened(page, shown.name)["train"] == (
-            f"taxel train {shown} --labels notes -o {tmp_path / 'elsewhere.readout.json'}"
-        )
-    shown.rename(folder / "-grasp.npz")
-    with viewed(folder, folder / "-grasp.npz") as page:
-        assert opened(page, "-grasp.npz")["train"] == (
-            "taxel train ./-grasp.npz --labels notes -o ./-grasp.readout.json"
-        )
-
-
-def test_a_bag_is_opened_once_for_the_page(tmp_path, monkeypatch):
-    bag, _ = palms(tmp_path, "grasp.bag")
-    opened_as, joined = [], TextOptions.open_joined
-    monkeypatch.setattr(TextOptions, "open_joined", lambda self, path: (opened_as.append(path), joined(self, path))[1])
-    for shown in (bag, Path("grasp.bag")):
-        monkeypatch.chdir(tmp_path)
-        opened_as.clear()
-        opens = _opening(FileOptions(topic=["/palm"], array=["24x32"]), None, shown)
-        with Panel(shown, opens=opens) as panel, Client(panel) as page:
-            assert opened(page, "grasp.bag")["frames"]["count"] == 40
-        assert len(opened_as) == 1
-
-
-def test_a_bag_without_a_topic_is_refused_at_the_command_line(capsys, tmp_path):
-    bag, _ = palms(tmp_path, "grasp.db3")
-    code, _, errors = call(capsys, "view", bag, "--no-open", "--seconds", 1)
-    assert code == 2
-    first, *table = errors.strip().splitlines()
-    assert first == f"taxel: {bag}: ROS bag; open a topic by --topic /palm --field taxels --array ROWSxCOLUMNS"
-    _, listing, _ = call(capsys, "info", bag)
-    assert table == listing.splitlines()[1:]
-    assert "/palm" in table[1]
-
-
-def test_a_refused_bag_is_named_once_on_the_page(tmp_path):
-    palms(tmp_path, "grasp.bag")
-    taxel.convert(Frames(np.zeros((2, 3, 2)), [0, 1000], unit="N", array=Array(3, 2)), tmp_path / "mat.npz")
-    with viewed(tmp_path, "mat.npz") as page:
-        refused = page.ask("open", name="grasp.bag")
-        assert (refused["type"], refused["field"]) == ("refused", "name")
-        assert refused["reason"].startswith(f"{tmp_path / 'grasp.bag'}: is a ROS bag; choose one of its topics")
 
 
 def test_a_folder_of_bags_is_shown_by_options_that_hold_for_each(capsys, tmp_path):
@@ -193,25 +133,6 @@ def test_labels_of_a_folder_are_of_the_bag_that_they_name(capsys, tmp_path):
         code, _, errors = call(capsys, "train", folder, *how, "-o", tmp_path / "r.json", "--overwrite")
         assert code == 2
         assert reason in errors
-
-
-def test_labels_of_a_folder_are_of_the_topic_that_they_name(tmp_path):
-    topics = ["/palm", "/wrist"]
-    times = presses(tmp_path / "two", ("a.bag", "b.bag"), topics)["a.bag"]
-    rows = [f"a.bag,,turn,{times[0]}", f"a.bag,/wrist,contact,{times[1]}"]
-    (tmp_path / "two" / "labels.csv").write_text("\n".join(["recording,source,label,t_us", *rows]))
-    folder = taxel.open_all(tmp_path / "two", topic=topics)
-    for one, expected in zip(
-        [*folder, taxel.open(tmp_path / "two" / "a.bag", topic=topics)], (True, False, True), strict=True
-    ):
-        said = {name: [note.text for note in source.notes] for name, source in one.sources.items()}
-        assert said == {"palm": ["turn"] * expected, "wrist": ["turn", "contact"] * expected}
-
-
-def test_of_a_folder_own_recordings_come_before_bags(tmp_path):
-    palms(tmp_path, "a.bag")
-    taxel.convert(Frames(np.zeros((2, 3, 2)), [0, 1000], unit="N", array=Array(3, 2)), tmp_path / "mat.npz")
-    assert [file.name for file in recordings_in(tmp_path)] == ["mat.npz", "a.bag"]
 
 
 def test_a_layout_and_a_rate_are_those_of_the_page(tmp_path):
@@ -325,19 +246,3 @@ def test_labels_of_a_trial_are_its_own_and_training_takes_the_labelled_trials(ca
     )
     assert (code, len(json.loads(said)["recordings"])) == (0, 2)
     assert "left out 2 of its 4 trials" in errors
-
-
-@pytest.mark.parametrize(
-    ("name", "says"),
-    [("plain.csv", "a table of 4 columns, not written by taxel"), ("plain.npy", "not written by taxel")],
-)
-def test_a_table_or_array_of_another_program_is_refused_by_the_command_with_the_name_of_its_layout(
-    name: str, says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("plain.csv").write_text("0,1,0,2\n0,2,0,1\n")
-    np.save("plain.npy", np.zeros((20, 4, 4)))
-    status, _, error = call(capsys, "view", name, "--no-open", "--seconds", "0.1")
-    assert status == 2
-    assert says in error
-    assert "in a layout file, plain.layout.toml beside it or another file given as layout " in error

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.panel.pages import shown, shows
 from tests.panel.protocol import Client, say, word
 from tests.recording.test_clock_doubt import CAUSE, recorded
 
@@ -45,14 +44,6 @@ def test_the_arrivals_of_a_recording_are_judged(
         assert CAUSE in pace["doubt"]
 
 
-def test_frames_have_no_arrivals(tmp_path: Path) -> None:
-    frames = taxel.Frames(np.zeros((2, 3, 2)), [0, 1000], unit="N", array=taxel.Array(3, 2))
-    taxel.convert(frames, tmp_path / "mat.npz")
-    with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:
-        assert page.ask("open", name="mat.npz")["type"] == "done"
-        assert page.since_asked("opened", name="mat.npz")["pace"] is None
-
-
 def test_a_board_that_lags_behind_its_own_clock_is_said_to_be_wrong_live(live: Any, panel: Any) -> None:
     with Client(panel) as page:
         assert page.until("counters")["pace"] is None
@@ -70,19 +61,3 @@ def test_a_board_that_lags_behind_its_own_clock_is_said_to_be_wrong_live(live: A
         assert found is not None, pace
         assert -900_000 < float(found[1]) < -100_000
         assert CAUSE in pace["doubt"]
-
-
-@pytest.mark.parametrize("drift_ppm", [-120.0, 20_000.0])
-def test_the_page_shows_drift_and_delays_and_says_which_cannot_be(
-    chromium: Any, tmp_path: Path, drift_ppm: float
-) -> None:
-    recorded(tmp_path / "board.mcap", drift_ppm, 0.0)
-    with shown(chromium, tmp_path / "board.mcap") as page:
-        page.locator("#tab-board").click()
-        drift = r"−1[12]\d" if drift_ppm < 0 else r"\+(19|20)\d\d\d"
-        delays = r"delays beyond the shortest: \S+ [µm]s \(median\), .* \(99 %\)"
-        shows(page, "pace", rf"^Clock: drift {drift}\.\d ppm; {delays}$")
-        banner = page.locator("#silence")
-        assert banner.is_visible() == (drift_ppm > 0)
-        if drift_ppm > 0:
-            shows(page, "silence", rf"^A drift of .* {CAUSE}")

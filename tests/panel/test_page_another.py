@@ -56,16 +56,3 @@ def test_another_recording_is_shown_as_by_a_page_that_opens_on_it(chromium: Any,
             page.locator("#label-name").fill("contact")
             page.locator("#files").select_option(name)
             assert said(page, name) == anew[name], f"{name} after {before}"
-
-
-def test_a_reload_shows_what_was_opened_last(chromium: Any, tmp_path: Path) -> None:
-    one, other, *_ = folder_of_several(tmp_path)
-    with shown(chromium, tmp_path / one) as page:
-        page.locator("#files").select_option(other)
-        shows(page, "source", f"^{other}")
-        page.reload()
-        shows(page, "source", f"^{other}")
-        page.locator("#files").select_option(one)
-        shows(page, "source", f"^{one}")
-        page.reload()
-        shows(page, "source", f"^{one}")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.panel.pages import press, shown, shows, until
+from tests.panel.pages import shown, shows, until
 
 import taxel
 from taxel import Array, Frames, Places
@@ -101,28 +101,3 @@ def test_a_sensor_is_drawn_as_its_geometry_is_known(name: str, chromium: Any, tm
             until(lambda named=named: page.locator("#taxel-name").inner_text() == named, named)
             page.locator("#tab-view").click()
             page.locator("#flip-x").check()
-
-
-@pytest.mark.parametrize("count", [3, 20])
-def test_channels_are_called_as_the_columns_of_their_table(count: int, chromium: Any, tmp_path: Path) -> None:
-    names = ["Daumen", "Zeigefinger", "", *(f"s{k}" for k in range(3, count))]
-    rows = "".join(f"{k * 20_000}," + ",".join(str(5 * (k > 20)) for _ in names) + "\n" for k in range(60))
-    (tmp_path / "glove.csv").write_text(f"t_us,{','.join(names)}\n{rows}")
-    with shown(chromium, tmp_path / "glove.csv") as page:
-        press(page, "c", *["ArrowLeft"] * count)
-        shows(page, "taxel-name", "^Daumen$")
-        ends = "Daumen\nZeigefinger\n2" if count == 3 else "Daumen\ns19"
-        assert page.locator("#channel-names").all_inner_texts() == [ends]
-
-
-@pytest.mark.parametrize(
-    ("unit", "title"),
-    [("N", "Force"), ("N/cm2", "Pressure"), ("counts", "Counts"), ("events/5 ms", "Events"), ("mV", "Values")],
-)
-def test_the_map_is_headed_with_the_quantity_of_its_unit(chromium: Any, tmp_path: Path, unit: str, title: str) -> None:
-    values = np.zeros((60, 4, 5))
-    values[20:, 1, 1] = 10
-    taxel.convert(Frames(values, np.arange(60) * 20_000, unit=unit, array=SENSORS["grid"]), tmp_path / "a.npz")
-    with shown(chromium, tmp_path / "a.npz") as page:
-        shows(page, "pressure-title", f"^{title}$")
-        assert page.locator("#pressure-frame").get_attribute("aria-label").startswith(f"{title}: ")

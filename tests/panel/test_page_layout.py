@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ from tests.panel.pages import (
     opened,
     page,
     press,
-    record_form,
     recording,
     replay,
     shows,
@@ -61,81 +59,6 @@ def test_a_sensor_of_any_shape_is_seen_pointed_at_and_saved(
             press(page, "s")
         width, height = np.frombuffer(Path(download.value.path()).read_bytes()[16:24], ">u4")
         assert 0 < height < 4 * width
-
-
-def test_colours_are_those_of_their_makers_and_grow_lighter_all_the_way(replay: Any) -> None:
-    """Oracle: Matplotlib's tables; the law: lightness tells the order, which is what colour-blind eyes need."""
-    import matplotlib
-
-    for name in ("lipari", "batlow", "cividis", "viridis", "grey"):
-        words = replay.evaluate("name => import('/colours.js').then(c => [...c.pressureWords(name, 'dark', 1)])", name)
-        colours = np.array([[w & 255, w >> 8 & 255, w >> 16 & 255] for w in words])
-        if name in ("cividis", "viridis"):
-            ours = np.array(matplotlib.colormaps[name].colors) * 255
-            assert np.abs(colours - ours).max() <= 3, name
-        linear = np.where(colours / 255 <= 0.04045, colours / 255 / 12.92, ((colours / 255 + 0.055) / 1.055) ** 2.4)
-        luminance = linear @ [0.2126, 0.7152, 0.0722]
-        assert (np.diff(luminance) > -1e-3).all(), name
-        light = replay.evaluate("name => import('/colours.js').then(c => [...c.pressureWords(name, 'light', 1)])", name)
-        assert light == words[::-1], name
-
-
-def test_tones_have_their_pitch_and_fade(replay: Any) -> None:
-    for hz, length in ((440, 0.12), (880, 0.35), (330, 0.2)):
-        samples = replay.evaluate(
-            """([hz, length]) => import('/tones.js').then(async ({ sound }) => {
-                const context = new OfflineAudioContext(1, 24000, 48000);
-                sound(context, hz, length);
-                return [...(await context.startRendering()).getChannelData(0)];
-            })""",
-            [hz, length],
-        )
-        wave = np.array(samples)
-        spectrum = np.abs(np.fft.rfft(wave * np.hanning(len(wave))))
-        assert abs(np.argmax(spectrum) * 2 - hz) <= 4
-        assert np.abs(wave[int(48_000 * length) + 10 :]).max() == 0
-        assert np.abs(np.diff(wave)).max() < 0.2 * 2 * np.pi * 880 / 48_000 * 1.1
-
-
-def test_the_page_fits_a_phone_and_its_foot_hides_nothing(chromium: Any, live: SimpleNamespace) -> None:
-    with opened(chromium, live.url, width=390, height=844, has_touch=True, is_mobile=True) as page:
-        shows(page, "state-word", "^Live$")
-        for tab in ("board", "record", "labels", "view"):
-            page.locator(f"#tab-{tab}").click()
-            assert page.evaluate("document.documentElement.scrollWidth") <= 390, tab
-        # The counters' widest texts, as on a slow board.
-        for name, text in {
-            "events": "120,000",
-            "frames": "20,833",
-            "latency": "134 / 134,218",
-            "lost": "12,345",
-        }.items():
-            page.locator(f"#{name}").evaluate("(place, text) => { place.textContent = text }", text)
-        edge = page.evaluate(
-            "Math.max(...[...document.querySelectorAll('header *')].map(e => e.getBoundingClientRect().right))"
-        )
-        assert edge <= 390
-        page.evaluate("window.scrollTo(0, document.body.scrollHeight)")
-        foot = page.locator("footer").bounding_box()
-        assert page.locator("header").bounding_box()["height"] + foot["height"] < 844 / 8
-        low = page.locator("aside").bounding_box()
-        assert low["y"] + low["height"] <= foot["y"]
-        for button in page.locator("footer button:visible, header button:visible").all():
-            assert min(button.bounding_box()["height"], button.bounding_box()["width"]) >= 44, button.inner_text()
-        for button in page.locator(".under button:visible").all():
-            assert min(button.bounding_box()["height"], button.bounding_box()["width"]) >= 36, button.inner_text()
-
-
-@pytest.mark.parametrize("motion", ["reduce", "no-preference"])
-def test_nothing_moves_by_itself_where_less_motion_is_wanted(chromium: Any, live: SimpleNamespace, motion: str) -> None:
-    with opened(chromium, live.url, motion=motion) as page:
-        shows(page, "state-word", "^Live$")
-        record_form(page, name=f"motion-{motion}", index="")
-        press(page, "r")
-        shows(page, "record-word", "^Stop$")
-        assert bool(page.evaluate("document.getAnimations().length")) is (motion == "no-preference")
-        press(page, "r")
-        shows(page, "record-word", "^Record$")
 
 
 def test_every_control_has_a_name_and_every_id_is_one(page: Any) -> None:

@@ -153,30 +153,6 @@ def test_what_does_not_arrive_is_said(chromium: Any, tmp_path: Path) -> None:
         shows(page, "frames", "^–$")
 
 
-def test_the_page_is_there_while_a_tare_waits(chromium: Any, tmp_path: Path) -> None:
-    fit([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe()).save(tmp_path / "touch.json")
-    port = str(free_port())
-    with running("emulate", "--port", port, "--control", "0", "--heartbeat", "10", folder=tmp_path) as board:
-        control = board.wait_for(r"commands are accepted at (\S+)")
-        other = str(free_port())
-        how = ("--port", other, "--host", "127.0.0.1", "--control", control, "--readout", "touch.json", "--tare", "0.2")
-        with running("live", "--panel", *how, folder=tmp_path) as server:
-            server.wait_for(r"(the readout assumes frames of 24 us)")
-            with opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page:
-                shows(page, "silence", "^Nothing has arrived")
-                shows(page, "assumed", r"assumes frames of 24 µs")
-                shows(page, "where-info", "no control line")
-                rest = np.full((8, 8), 50)
-                source = taxel.live.Source(taxel.Array(8, 8), 100.0, to=f"127.0.0.1:{other}")
-                source.push(rest)
-                shows(page, "silence", "^Taking a tare|^The board is lost")
-                for _ in range(40):
-                    source.push(rest)
-                    time.sleep(0.01)
-                # The serial line has had its first user, the tare.
-                shows(page, "where-info", re.escape(control))
-
-
 def story(page: Any, folder: Path, name: str, floor_ticks: int) -> None:
     """Set a register, see the map move, record, label, stop, replay, and look into the file."""
     before = page.evaluate(PIXELS, "pressure-map")
@@ -225,52 +201,6 @@ def test_a_register_a_recording_and_a_label_reach_board_and_file(page: Any, live
     story(page, live.folder, "walk", 5)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("turn", range(20))
-def test_the_story_holds_every_time(page: Any, live: SimpleNamespace, turn: int) -> None:
-    story(page, live.folder, f"again{turn:02}-", 3 + turn % 5)
-
-
-def test_a_refused_value_stays_typed_with_its_reason_until_escape(page: Any) -> None:
-    period = page.get_by_label("Step period", exact=True)
-    period.fill("4")
-    period.press("Enter")
-    shows(page, "register-step_period-reason", r"4 x step_period 4\.00 us is longer than line_read 3\.00 us \(rule 2\)")
-    assert period.input_value() == "4"
-    assert period.get_attribute("aria-invalid") == "true"
-    # A slower line period makes the value valid: both are written together.
-    for name, value in (("Line period", "20"), ("Line read", "20")):
-        page.get_by_label(name, exact=True).fill(value)
-        page.get_by_label(name, exact=True).press("Enter")
-    until(lambda: period.get_attribute("aria-invalid") == "false" and period.input_value() == "4.00", "all are written")
-    period.fill("nonsense")
-    period.press("Enter")
-    shows(page, "register-step_period-reason", "nonsense is not a number")
-    period.press("Escape")
-    assert period.input_value() == "4.00"
-    page.locator("#preset").select_option("5.2 kHz")
-    until(lambda: period.input_value() == "0.75", "the preset is back")
-
-
-def test_presets_of_ones_own_are_kept_applied_and_deleted(page: Any) -> None:
-    page.locator("#preset-path").click()
-    floor = page.get_by_label("Noise floor", exact=True)
-    floor.fill("9")
-    floor.press("Enter")
-    until(lambda: page.locator("#preset").input_value() == "", "no preset is this")
-    page.locator("#preset-name").fill("quiet")
-    page.locator("#preset-name").press("Enter")
-    until(lambda: page.locator("#preset").input_value() == "quiet", "it is kept")
-    page.locator("#preset").select_option("5.2 kHz")
-    until(lambda: floor.input_value() == "3", "another is applied")
-    page.locator("#preset").select_option("quiet")
-    until(lambda: floor.input_value() == "9", "and ours again")
-    page.locator("#preset-delete").click()
-    until(lambda: page.locator("#preset option[value=quiet]").count() == 0, "it is gone")
-    page.locator("#preset").select_option("5.2 kHz")
-    until(lambda: floor.input_value() == "3", "the preset is back")
-
-
 def test_recordings_count_down_go_on_by_themselves_and_overwrite_nothing(page: Any, live: SimpleNamespace) -> None:
     record_form(page, name="auto", index="1", countdown="1", length="1", advance=True)
     press(page, "r")
@@ -313,31 +243,3 @@ def test_looking_back_while_live_holds_the_view_and_not_the_board(page: Any) -> 
     shows(page, "state-word", "^Live$")
     until(lambda: clock(page) > held + 0.1, "it follows again")
     shows(page, "clock-more", "^$")
-
-
-def test_the_crosshair_goes_by_keys_and_names_its_taxel(page: Any) -> None:
-    press(page, "c")
-    page.keyboard.press("Escape")
-    shows(page, "taxel-name", "^none")
-    for key in ("ArrowUp", "ArrowLeft", "Shift+ArrowUp"):
-        page.keyboard.press(key)
-    shows(page, "taxel-name", r"row 24, column 31 · sense line 24, driven line 31")
-    page.locator("#tab-view").click()
-    page.locator("#flip-x").check()
-    box = page.locator("#pressure-frame").bounding_box()
-    page.mouse.click(box["x"] + 3, box["y"] + 3)
-    shows(page, "taxel-name", "row 0, column 63")
-    page.locator("#flip-x").uncheck()
-
-
-def test_a_taxel_is_zeroed_by_a_button_and_marked(page: Any) -> None:
-    shows(page, "state-word", "^Live$")
-    button = page.get_by_role("button", name="Zero", exact=True)
-    page.locator("#pressure-frame").click()
-    until(lambda: "ticks" in page.locator("#taxel-value").inner_text(), "the taxel was heard of")
-    button.click()
-    shows(page, "taxel-value", "zeroed")
-    until(lambda: page.locator("#pressure-marks .unwell.zeroed").count() == 1, "it is marked")
-    press(page, "Space")
-    shows(page, "state-word", "^Held$")
-    assert button.is_hidden(), "what it holds now is not what is shown"

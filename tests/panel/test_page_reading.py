@@ -38,18 +38,6 @@ def test_a_long_recording_opens_on_its_first_touches_with_all_of_it_below(chromi
         until(lambda: span(page)[1] - span(page)[0] > 59, "all of it")
 
 
-def test_values_that_fall_are_turned_by_the_button_beside_what_says_so(chromium: Any, tmp_path: Path) -> None:
-    frames = taxel.Frames(500 - touched(3, 1200), np.arange(1200) * 10_000, unit="counts", array=taxel.Array(6, 6))
-    taxel.convert(frames, tmp_path / "mat.npz")
-    with shown(chromium, tmp_path / "mat.npz") as page:
-        shows(page, "silence-text", r"fall from their rest.*mat\.layout\.toml")
-        page.locator("#turn-values").click()
-        until(lambda: page.locator("#silence").is_hidden(), "they are turned")
-        assert (tmp_path / "mat.layout.toml").read_text() == "falls = true\n"
-        until(lambda: float(page.locator("#force-sum").inner_text().split()[0]) > 400, "the first touch is shown")
-    assert taxel.open(tmp_path / "mat.npz").frames().values[520, 2, 2] == pytest.approx(-340, abs=3)
-
-
 def test_the_rate_of_an_array_is_stated_on_the_page(chromium: Any, tmp_path: Path) -> None:
     np.save(tmp_path / "mat.npy", touched(3, 1200))
     (tmp_path / "mat.layout.toml").write_text("# mine\nunit = 'counts'\n")

@@ -30,26 +30,6 @@ __all__ = ["recording", "replay"]
 pytestmark = pytest.mark.timeout(600)
 
 
-def test_steps_leap_over_silence_both_ways(replay: Any) -> None:
-    press(replay, "End")
-    until(lambda: clock(replay) > 9, "the end")
-    press(replay, "Home")
-    until(lambda: clock(replay) < 0.3, "the beginning")
-    replay.locator("#strip").focus()
-    for _ in range(3):
-        at = clock(replay)
-        replay.keyboard.press("Shift+ArrowRight")
-        until(lambda at=at: clock(replay) > at + 0.9, "a second on")
-    # Between two footfalls a step moves to the last stamp of one, or to the first of the next.
-    replay.keyboard.press("ArrowRight")
-    at = still(replay)
-    press(replay, ",")
-    until(lambda: clock(replay) < at - 0.05, "back over the silence")
-    at = still(replay)
-    press(replay, ".")
-    until(lambda: clock(replay) > at, "on over the silence")
-
-
 def test_a_recording_opens_on_all_of_its_time_and_its_first_touch(replay: Any) -> None:
     until(lambda: 0.2 < clock(replay) < 0.212, "the first touch, where its force is greatest")
     start, stop = span(replay)
@@ -96,22 +76,6 @@ def test_the_lanes_zoom_and_scroll_as_a_time_axis(replay: Any) -> None:
     shows(replay, "span", r"^4\.\d s$")
     press(replay, "x", "x", "x")
     until(lambda: span(replay)[1] - span(replay)[0] < 10, "no longer than the recording")
-
-
-def test_a_replay_that_leaves_the_window_takes_it_along(replay: Any) -> None:
-    still(replay)
-    replay.mouse.move(pixel(replay, 0.2), replay.locator("#raster").bounding_box()["y"] + 5)
-    for _ in range(6):
-        press(replay, "z")
-    until(lambda: span(replay)[1] < 1, "a short stretch")
-    press(replay, "Space")
-    until(lambda: clock(replay) > 2, "it plays")
-    press(replay, "Space")
-    at = still(replay)
-    start, stop = span(replay)
-    assert start < at <= stop + 0.01
-    # The lanes have what was played: the force of the last fall that the window shows.
-    assert replay.evaluate(PIXELS, "raster")
 
 
 def test_spikes_of_an_encoder_are_shown_in_a_recording(replay: Any) -> None:
@@ -210,50 +174,6 @@ def test_a_click_anywhere_in_the_row_makes_a_label_and_a_handle_moves_it(replay:
     shows(replay, "label-count", "^5 label")
     replay.locator("#notice-offer").click()
     shows(replay, "label-count", "^6 label")
-
-
-def test_a_drag_across_the_row_marks_nothing_and_delete_takes_the_newest_label(replay: Any, recording: Path) -> None:
-    table = recording.with_suffix("").with_suffix(".notes.csv")
-    table.write_text("label,t_us\ntoe,6000000\n")
-    replay.reload()
-    shows(replay, "label-count", "^1 label$")
-    still(replay)
-    flag = replay.locator(".flag", has_text="toe")
-    handle = flag.locator("i").bounding_box()
-    replay.mouse.click(handle["x"] + 4, handle["y"] + 4)
-    replay.locator("#label-name").fill("heel")
-    lane = replay.locator("#label-lane").bounding_box()
-    low = lane["y"] + lane["height"] - 4
-    replay.mouse.move(pixel(replay, 3.5), low)
-    replay.mouse.down()
-    replay.mouse.move(pixel(replay, 7.0), low, steps=4)
-    replay.mouse.up()
-    assert replay.evaluate("getSelection().toString()") == ""
-    replay.mouse.click(pixel(replay, 9.0), low)
-    shows(replay, "label-count", "^2 labels$")
-    chosen = replay.locator(".flag.chosen")
-    until(lambda: "label heel at" in chosen.get_attribute("aria-label"), "the new one is chosen")
-    press(replay, "Delete")
-    shows(replay, "label-count", "^1 label$")
-    assert flag.count() == 1
-    table.unlink()
-
-
-def test_flags_stack_and_more_are_counted(replay: Any, recording: Path) -> None:
-    table = recording.with_suffix("").with_suffix(".notes.csv")
-    table.write_text("label,t_us\n" + "".join(f"contact,{5_000_000 + 1000 * k}\n" for k in range(9)))
-    replay.reload()
-    shows(replay, "label-count", "^9 labels")
-    shows(replay, "label-lane", "^9$")
-    assert replay.locator(".flag").count() == 0
-    # The count leads to them: far enough apart, each is a flag.
-    replay.locator("#label-lane .count").click()
-    until(lambda: replay.locator(".flag").count() == 9, "a flag each")
-    table.write_text("label,t_us\n" + "".join(f"contact,{5_000_000 + 100 * k}\n" for k in range(3)))
-    until(lambda: replay.locator(".flag").count() == 3, "as many as there are levels")
-    levels = replay.locator(".flag").evaluate_all("all => all.map(e => e.dataset.level)")
-    assert levels == ["0", "1", "2"]
-    table.unlink()
 
 
 def test_a_stretch_is_cut_out_and_the_picture_saved(replay: Any, recording: Path, tmp_path: Path) -> None:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import os
 import pty
-import socket
 import threading
 import time
 import tty
@@ -16,15 +14,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from live.test_rest_shift import SHAPE, unplugged
 from loopback import free_port
 from tests.panel.browser import running
 from tests.panel.pages import opened, shows, until
 
 import taxel
-from taxel.detect import PlainRule
 from taxel.formats.layout import Layout
-from taxel.live import Live, Panel
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -100,24 +95,6 @@ def test_a_mat_on_a_serial_line_is_chosen_seen_and_recorded(chromium: Any, tmp_p
         until(lambda: "The line is silent" in page.content(), "the page says that the line is silent")
 
 
-def test_what_arrives_is_shown_and_another_source_takes_the_place_of_the_first(tmp_path: Path) -> None:
-    with mat(4, 4) as (line, _), Live(0, host="127.0.0.1", record_later=True) as first, Panel(first) as panel:
-        panel.read_source(f"serial:{line},array=4x4,frame_end=blank,rate=50")
-        live = panel.live
-        assert live is not None
-        assert (live.array.shape, live.unit, first.is_over) == ((4, 4), "counts", True)
-        until(lambda: live.counters["frames"] > 10, "frames arrive")
-        live.record(tmp_path / "mat.mcap")
-        until(lambda: live.counters["frames"] > 40, "more frames arrive")
-        live.end_recording()
-        assert taxel.open(tmp_path / "mat.mcap").frames().array.shape == (4, 4)
-        with pytest.raises(taxel.ProblemError, match="must be 25 per frame"):
-            panel.read_source(f"serial:{line},array=5x5,frame_lines=4,columns=a:b:c:d,rate=50")
-        assert panel.live is not None
-        assert panel.live.array.shape == (4, 4)
-        until(lambda: panel.live is not None and panel.live.counters["frames"] > 5, "the source before is back")
-
-
 def test_a_plug_that_is_pulled_while_recording_is_said_and_is_in_the_verdict(chromium: Any, tmp_path: Path) -> None:
     plug = tmp_path / "mat"
     with (
@@ -156,63 +133,3 @@ def test_a_plug_that_is_pulled_while_recording_is_said_and_is_in_the_verdict(chr
     verdict = taxel.open(tmp_path / "trial1.mcap").verdict
     assert verdict.noted["silences"] == 1
     assert verdict.noted["silent_ms"] >= 1000
-
-
-@contextlib.contextmanager
-def falling() -> Iterator[str]:
-    """Yield the address of a mat whose readings fall under touch, to whoever connects, 100 times a second."""
-    over = threading.Event()
-
-    def send(connection: socket.socket) -> None:
-        rng = np.random.default_rng(1)
-        with contextlib.suppress(OSError), connection:
-            for k in itertools.count():
-                frame = 800 + rng.integers(-1, 2, (6, 6))
-                frame[2:5, 2:5] -= 200 * (k > 100 and k % 100 < 25)
-                connection.sendall((",".join(map(str, frame.flat)) + "\n").encode())
-                if over.wait(0.01):
-                    break
-
-    def accept() -> None:
-        while not over.is_set():
-            with contextlib.suppress(OSError):
-                connection, _ = server.accept()
-                threading.Thread(target=send, args=(connection,), daemon=True).start()
-
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        server.settimeout(0.2)
-        thread = threading.Thread(target=accept, daemon=True)
-        thread.start()
-        try:
-            yield f"127.0.0.1:{server.getsockname()[1]}"
-        finally:
-            over.set()
-            thread.join(10)
-
-
-def test_values_of_a_live_source_that_fall_are_turned_by_the_button_beside_what_says_so(chromium: Any) -> None:
-    with (
-        falling() as address,
-        Live(sources=f"lines+tcp:{address},array=6x6,rate=100") as live,
-        Panel(live) as panel,
-        opened(chromium, panel.url) as page,
-    ):
-        shows(page, "silence-text", "fall from their rest.*falls=true")
-        page.locator("#turn-values").click()
-        until(lambda: page.locator("#silence").is_hidden(), "they are turned")
-        assert page.locator("#numbers").input_value() == f"lines+tcp:{address},array=6x6,rate=100,falls=true"
-        until(lambda: panel.live is not live and panel.live.frame.min() < -700, "the readings are turned")
-
-
-def test_a_rest_that_shifted_in_a_gap_is_a_warning_of_the_source_until_it_is_zeroed(chromium: Any) -> None:
-    shift = np.where(np.arange(36).reshape(SHAPE) < 20, 32.0, 0.0)
-    rule = PlainRule("total", 200.0, 0.6, noise_floor=8.0, unit="counts")
-    with (
-        unplugged(shift) as address,
-        Live(sources=f"lines+tcp:{address},array=6x6,rate=100", readout=rule, tare=0.5) as live,
-        Panel(live) as panel,
-        opened(chromium, panel.url) as page,
-    ):
-        shows(page, "silence-text", "After a gap of .* s, the rest of 20 of 36 taxels differs from the tare")
-        live.zero(*np.indices(SHAPE)[::-1].reshape(2, -1))
-        until(lambda: page.locator("#silence").is_hidden(), "it is zeroed")

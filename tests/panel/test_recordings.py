@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import threading
 import time
 
@@ -22,7 +21,6 @@ from panel.protocol import (
 
 import taxel
 import taxel.device
-from taxel.cli import main
 from taxel.live import Live, Panel, send
 
 
@@ -225,15 +223,6 @@ def test_a_recording_alone_is_viewed_and_the_address_names_it(tmp_path):
         Panel(tmp_path / "none.mcap")
 
 
-def test_the_command_shows_a_recording_and_says_where(tmp_path, capsys):
-    events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
-    taxel.convert(events, tmp_path / "two.mcap")
-    with pytest.raises(SystemExit) as ended:
-        main(["view", str(tmp_path / "two.mcap"), "--no-open", "--seconds", "0.2", "--json"])
-    assert ended.value.code in (0, None)
-    assert json.loads(capsys.readouterr().out)["url"].startswith("http://127.0.0.1:")
-
-
 def test_a_taxel_is_zeroed_for_all_and_the_next_recording_begins_with_it(live, tmp_path):
     with Panel(live, folder=tmp_path) as panel, Client(panel) as page, Client(panel) as other:
         assert page.until("zeroed")["taxels"] == []
@@ -327,37 +316,3 @@ def test_a_label_outside_the_recording_is_refused(tmp_path):
             mine = labels_of(page)[0]["label_id"]
             assert page.ask("move", label_id=mine, t_us=10**12)["type"] == "refused"
             assert page.ask("rename", label_id=mine, label="b")["type"] == "done"
-
-
-def test_a_note_that_became_a_label_counts_once_however_it_is_changed(tmp_path):
-    frames = taxel.Frames(np.zeros((100, 4, 4)), np.arange(100) * 10_000, unit="N", array=taxel.Array(4, 4))
-    (tmp_path / "own").mkdir()
-    taxel.convert(frames, tmp_path / "own" / "mat.npz")
-    (tmp_path / "own" / "mat.notes.csv").write_text("label,t_us\nheel,300000\ntoe,500000\nheel,700000\n")
-    taxel.convert(taxel.open(tmp_path / "own" / "mat.npz"), tmp_path / "mat.mcap")
-
-    def counted():
-        return sorted((note.t, note.text) for note in taxel.open(tmp_path / "mat.mcap").notes)
-
-    own = [(300_000, "heel"), (500_000, "toe"), (700_000, "heel")]
-    with Panel(tmp_path / "mat.mcap") as panel, Client(panel) as page:
-        assert page.ask("open", name="mat.mcap")["type"] == "done"
-        for t_us, text in own:
-            assert page.ask("mark", label=text, t_us=t_us, replaces_us=t_us)["type"] == "done"
-        assert counted() == own
-        first, second, third = (row["label_id"] for row in labels_of(page))
-        assert page.ask("move", label_id=first, t_us=310_000)["type"] == "done"
-        assert page.ask("rename", label_id=second, label="ball")["type"] == "done"
-        assert page.ask("delete", label_id=third)["type"] == "done"
-        assert counted() == [(310_000, "heel"), (500_000, "ball")]
-        assert [row["replaces_us"] for row in labels_of(page)] == [300_000, 500_000]
-        assert page.ask("delete", label_id=third)["type"] == "refused"
-        page.send(type="recordings")
-        assert [one["labels"] for one in page.until("recordings")["files"]] == [2]
-    # Another panel knows it from the table.
-    with Panel(tmp_path / "mat.mcap") as panel, Client(panel) as page:
-        assert page.ask("open", name="mat.mcap")["type"] == "done"
-        assert [row["replaces_us"] for row in labels_of(page)] == [300_000, 500_000]
-        assert page.ask("mark", label="heel", t_us=700_000, replaces_us=700_000)["type"] == "done"
-        assert counted() == [(310_000, "heel"), (500_000, "ball"), (700_000, "heel")]
-        assert page.ask("mark", label="x", t_us=1, replaces_us="soon")["field"] == "replaces_us"

@@ -14,7 +14,7 @@ from tests.tasks.recordings import rested
 
 import taxel
 from taxel.detect import Example, fit
-from taxel.live import Live, Panel, Source
+from taxel.live import Live, Panel
 
 
 @pytest.fixture
@@ -117,22 +117,6 @@ def test_a_recording_says_where_its_first_touch_is_and_how_strong_touches_are(st
         at = (np.array([2.2, 3, 5.2, 8.2]) * 1e6 - overview["start_us"]) // overview["step_us"]
         for found, touch in zip(force[at.astype(int)].tolist(), [30, 0, 60, 90], strict=True):
             assert near(found, touch), (found, touch)
-
-
-def test_what_is_not_known_of_registers_is_not_shown_as_a_rate(tmp_path):
-    array = taxel.Array(4, 4)
-    held = Source(array, 500.0, bits=12, to="127.0.0.1:9").registers
-    for registers, rate in ((None, None), (held, 500.0), ("5.2 kHz", 5208.3)):
-        given = {} if registers == "5.2 kHz" else {"array": array}
-        with (
-            Live(0, host="127.0.0.1", registers=registers, **given) as live,
-            Panel(live, folder=tmp_path) as panel,
-            Client(panel) as page,
-        ):
-            assert page.until("registers")["stated"] is (registers is not None)
-            shown = page.until("counters")
-            assert shown["frames_per_s"] == (None if rate is None else pytest.approx(rate, rel=1e-3))
-            assert (shown["arrival"]["state"], shown["arrival"]["since_ns"]) == ("nothing", None)
 
 
 def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
