@@ -8,11 +8,7 @@ import re
 from pathlib import Path
 from typing import get_args
 
-import pytest
-from refusal import refused
-
 import taxel
-from taxel._base.arguments import instance, public_name
 from taxel.learn._learner import Status
 
 ROOMS = ("", *(f".{room}" for room in ("detect", "encode", "learn", "metrics", "recording", "simulate", "wire")))
@@ -29,18 +25,6 @@ CLASSES = sorted(
     },
     key=lambda kind: (kind.__module__, kind.__name__),
 )
-
-
-@pytest.mark.parametrize("kind", CLASSES, ids=public_name)
-def test_a_class_is_named_as_it_is_imported(kind):
-    with refused(argument="x") as error:
-        instance("x", "odd", kind)
-    name = str(error.value).rpartition(" ")[2]
-    module, _, attribute = name.rpartition(".")
-    assert getattr(importlib.import_module(module), attribute) is kind
-    # As short as it can be: no private module, and the package itself where it has the class.
-    assert "._" not in name
-    assert name == f"taxel.{attribute}" or getattr(taxel, attribute, None) is not kind
 
 
 def test_the_words_of_status_are_one_list():

@@ -12,9 +12,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 import sound
-import test_border as border
 import test_docstrings as docstrings
-import test_error_names as error_names
 import test_manners as manners
 import test_nonsense as nonsense
 import test_parameters as parameters
@@ -155,21 +153,10 @@ def test_docstrings_are_whole() -> None:
     assert docstrings.unnamed_sources(PUBLIC) == []
 
 
-@pytest.mark.parametrize("name", taxel_rules.__all__)
-def test_a_class_is_named_as_it_is_imported(name: str) -> None:
-    error_names.test_a_class_is_named_as_it_is_imported(getattr(taxel_rules, name))
-
-
 def test_the_words_of_status_are_those_of_the_readme() -> None:
     table = (ROOT / "README.md").read_text().split("## How a training ended")[1]
     listed = re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)
     assert set(listed) - {"status_"} == set(get_args(Status))
-
-
-def test_the_compiled_part_returns_no_json_and_no_long_tuple() -> None:
-    stub = (ROOT / "taxel_rules" / "_rules.pyi").read_text()
-    assert border.of_text(stub) == {"Trained.ended"}
-    assert border.long_tuples(stub) == set()
 
 
 def test_errors_are_taxel_s_own_and_an_interrupt_ends_a_call() -> None:
