@@ -30,13 +30,13 @@ def _by_name(place: Place | None) -> Place | None:
 
 
 def messages(calls: dict[str, Callable[[Path], object]], folder: Path) -> dict[str, str]:
-    """Return what is said of each call with something wrong, which may write files into a folder, shown as DIR."""
+    """Return class, argument and sentence of each wrong call, which may write into a folder, shown as DIR."""
     said = {}
     for name, call in calls.items():
         try:
             call(folder)
         except Error as error:
-            said[name] = f"{type(error).__name__}: {error}".replace(str(folder), "DIR")
+            said[name] = f"{type(error).__name__}({error.argument or ''}): {error}".replace(str(folder), "DIR")
         assert len(said.get(name, "").splitlines()) == 1, name
     return said
 

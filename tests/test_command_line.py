@@ -22,10 +22,7 @@ import taxel
 from taxel.cli import app
 from taxel.cli._commands import OWN, plugins
 from taxel.cli._opening import FileOptions
-from taxel.live import send
 from taxel.recording.text_options import TYPED, TextOptions
-from taxel.tasks.labels import references
-from taxel.wire.registers import QUOTED_PRESETS
 
 DOCS = Path(__file__).parent.parent / "docs"
 
@@ -64,40 +61,6 @@ def test_o_says_where_output_goes_too(capsys) -> None:
 def test_exit_codes_are_those_of_the_docs() -> None:
     table = (DOCS / "command-line.md").read_text()
     assert set(re.findall(r"^\| (\d+) \|", table, re.MULTILINE)) == {"0", "1", "2", "3", "130"}
-
-
-def test_localhost_is_the_same_address_for_sender_and_receiver() -> None:
-    with taxel.live.Live(0, host="localhost") as live:
-        assert live.address[0] == "127.0.0.1"
-        sent = send([b"12345"], "localhost", live.address[1], seconds=0.01)
-    assert live.stop().counters["capture"]["datagrams"] == sent["datagrams"]
-
-
-def test_a_datagram_that_is_too_large_for_udp_is_named_in_the_error() -> None:
-    with pytest.raises(OSError, match="70000"):
-        send([bytes(70_000)], port=9, seconds=0.01)
-
-
-@pytest.mark.parametrize("segment", [True, False])
-def test_a_datagram_larger_than_the_paths_mtu_is_named_in_the_error(segment: bool) -> None:
-    """In a network namespace whose loopback has an MTU of 1000 bytes."""
-    script = (
-        "import socket, taxel.live as live\n"
-        "with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:\n"
-        f"    live.send([bytes(1400)] * 8, port=9, each=8, seconds=0.01, segment={segment})\n"
-    )
-    inside = ["sh", "-c", 'ip link set lo mtu 1000 up && exec "$0" -c "$1"', sys.executable, script]
-    try:
-        done = subprocess.run(["unshare", "-rn", *inside], capture_output=True, text=True, check=False, timeout=60)
-    except FileNotFoundError:
-        pytest.skip("needs unshare")
-    if "unshare" in done.stderr or "ip:" in done.stderr or "RTNETLINK" in done.stderr:
-        pytest.skip(f"needs a network of its own: {done.stderr.strip()}")
-    if not segment:
-        # The kernel cuts a single one into packets: it arrives.
-        assert done.returncode == 0, done.stderr
-    else:
-        assert "a datagram of 1400 bytes, and 28 of headers, is larger than the path's MTU, 1000" in done.stderr
 
 
 @pytest.mark.parametrize("after_s", [0.0, 0.1, 0.3, 1.0])
@@ -222,22 +185,6 @@ def test_a_command_of_another_distribution_that_is_broken_is_one_error_and_break
     assert call(capsys, "--help")[0] == call(capsys, "merge", "--help")[0] == 0
 
 
-def test_labels_of_a_recording_that_is_not_there_are_left_out(here: Path, capsys) -> None:
-    taxel.detect.PlainRule("area", 3).save("rule.json")
-    Path("labels.csv").write_text("recording,label,t_us\n" + "".join(f"walk{k},contact,500000\n" for k in ("", *"01")))
-    rule = ("--readout", "rule.json", "--tare", "0.1")
-    code, _, error = call(capsys, "detect", "walk.npz", *rule, "--truth", "labels.csv")
-    assert (code, error) == (0, "")
-    (events,) = references("labels.csv", [taxel.open("walk.npz")])
-    assert events["contact"].tolist() == [500_000]
-
-
-def test_the_file_of_the_rule_of_a_label_keeps_its_letters() -> None:
-    from taxel.cli.train import _of_label
-
-    assert _of_label(Path("a/rule.json"), "Zehenablösung links/2").name == "rule.Zehenablösung_links_2.json"
-
-
 def test_each_option_of_opening_is_typed_by_its_name() -> None:
     typed = {TYPED.get(option.name, option.name) for option in fields(TextOptions)}
     assert {option.name for option in fields(FileOptions)} == typed
@@ -252,17 +199,6 @@ def _commands(group: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[st
             yield from _commands(command, (*path, name))
         else:
             yield (*path, name), command
-
-
-def test_a_preset_is_described_by_all_names() -> None:
-    options = [
-        option
-        for _, command in _commands(typer.main.get_command(app))
-        for option in command.params
-        if "--preset" in option.opts
-    ]
-    assert len(options) >= 3
-    assert all(QUOTED_PRESETS in option.help for option in options)
 
 
 def test_an_option_of_one_value_is_refused_where_it_is_given_twice() -> None:

@@ -92,19 +92,6 @@ def together(work, threads=6):
         raise failed[0]
 
 
-def test_a_decoder_may_be_used_from_several_threads():
-    decoder, data = taxel.wire.Decoder(), bytes.fromhex("c000050304") * 20_000
-
-    def push(_):
-        for _ in range(20):
-            decoder.push(data)
-            assert decoder.counts.skipped == 0
-
-    together(push)
-    decoder.finish()
-    assert decoder.counts.changes == 6 * 20 * 20_000
-
-
 def test_a_board_may_be_used_from_several_threads():
     board = taxel.simulate.Board()
     ticks = np.full((64, 64), 100, np.uint16)
@@ -116,40 +103,6 @@ def test_a_board_may_be_used_from_several_threads():
 
     together(scan)
     assert board.time_us > 0
-
-
-def test_a_decoder_of_version_2_may_be_used_from_several_threads():
-    board, ticks = taxel.simulate.Board(taxel.wire.Registers(wire_version=2)), np.zeros(4096, np.uint16)
-    datagrams = []
-    for value in range(40, 60):
-        ticks[:] = value
-        datagrams += board.frame(ticks)
-    decoder = taxel.wire.Decoder(2)
-
-    def push(number):
-        for datagram in datagrams[number::6]:
-            decoder.push(datagram)
-            assert decoder.counts.missing >= 0
-            assert decoder.held.shape == (64, 64)
-            assert decoder.status is None or decoder.status.frames
-
-    together(push)
-    assert (decoder.counts.intact, decoder.counts.missing) == (len(datagrams), 0)
-
-
-def test_a_stream_of_version_2_may_be_used_from_several_threads():
-    board = taxel.simulate.Board(taxel.wire.Registers(wire_version=2))
-    sent = board.frame(np.full(4096, 40, np.uint16))
-    data = b"".join(len(datagram).to_bytes(2, "little") + datagram for datagram in sent)
-    reader, found = taxel.wire.StreamReader(), []
-
-    def push(_):
-        for _ in range(20):
-            found.extend(reader.push(data))
-            assert reader.skipped == 0
-
-    together(push)
-    assert len(found) == 6 * 20 * len(sent)
 
 
 def test_a_recording_may_be_written_from_several_threads(tmp_path):
@@ -169,18 +122,6 @@ def test_a_recording_may_be_written_from_several_threads(tmp_path):
     recording = taxel.open(tmp_path / "many.mcap")
     assert len(recording.notes) == 1200
     assert len(recording.events) == 1200
-
-
-def test_a_window_may_be_used_from_several_threads():
-    pattern = taxel.SpikeTrains.from_lists([[k / 7.0 + 2 * n for n in range(40)] for k in range(30)], stop=100.0)
-    window = taxel.learn.OnlineConeR(window=50)
-
-    def add(_):
-        for _ in range(5):
-            window.partial_fit(pattern, [50.0])
-
-    together(add)
-    assert window.patterns_ == 30
 
 
 def test_columns_that_two_threads_share_are_one_clear_error():

@@ -20,12 +20,11 @@ from refusal import refused
 from shell import run
 
 import taxel
-from taxel import Frames, Labels, Neuron, Readout, _core
+from taxel import Frames, Labels
 from taxel._base.arguments import checked_path
 from taxel._base.files import create, write_whole
 from taxel._base.stopping import asked_to_end
 from taxel._base.windows_names import name_fault
-from taxel.encode import LevelCrossing
 from taxel.live import Live
 from taxel.live._label_file import LabelFile
 
@@ -72,14 +71,6 @@ def test_a_board_is_recorded_and_labelled_in_any_folder(folder: Path) -> None:
     for t in (7, 9):
         LabelFile(table, frozenset({""})).change([[(None, taxel.Note("heel ł", t))]])
     assert [(row.text, row.t) for row in taxel.Labels(table).rows] == [("heel ł", 7), ("heel ł", 9)]
-
-
-def test_a_readout_is_saved_in_any_folder(folder: Path) -> None:
-    readout = Readout(
-        LevelCrossing(levels=[50.0]), {"ł": (Neuron(tau=2.0), [0.5] * 4)}, array=taxel.Array(1, 2), unit="N"
-    )
-    readout.save(folder / "é.json")
-    assert Readout.load(folder / "é.json").labels == ("ł",)
 
 
 @pytest.mark.parametrize(
@@ -166,14 +157,6 @@ def test_a_new_file_never_replaces_another(tmp_path: Path, monkeypatch: pytest.M
     assert write_whole(tmp_path / "whole", lambda file: file.write(b"1")).read_bytes() == b"1"
 
 
-def test_windows_firewall_is_named_on_windows_alone(tmp_path: Path) -> None:
-    assert ("Windows' firewall" in _core.FIREWALL) == (sys.platform == "win32")
-    with Live(0, host="127.0.0.1", record=tmp_path / "walk.mcap") as live:
-        port = live.address[1]
-        said = str(live.stop().verdict)
-    assert said.endswith(f"and to port {port}?{_core.FIREWALL}"), said
-
-
 def test_ctrl_break_stops_as_ctrl_c_does(monkeypatch: pytest.MonkeyPatch) -> None:
     """Another signal stands for it where there is none."""
     if not hasattr(signal, "SIGBREAK"):
@@ -212,12 +195,3 @@ def test_a_recording_is_complete_after_ctrl_break(tmp_path: Path) -> None:
     recording = taxel.open(tmp_path / "walk.mcap")
     assert len(recording.events) == 20
     assert not recording.truncated
-
-
-def test_commands_draw_without_a_library_of_windows() -> None:
-    script = (
-        "import os; from taxel import cli; cli.main = lambda **_: None; cli.program(); print(os.environ['MPLBACKEND'])"
-    )
-    environment = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=environment)
-    assert done.stdout == "Agg\n"

@@ -2,14 +2,11 @@
 
 import json
 import re
-import shlex
 import shutil
-from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 import pytest
-from formats.making import write_plate
 from markupsafe import escape
 from shell import call
 from test_readout import ARRAY, recipe, tare, touches
@@ -17,7 +14,6 @@ from test_readout import ARRAY, recipe, tare, touches
 import taxel
 from taxel import _core
 from taxel.cli import main
-from taxel.tasks.labels import references
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -107,17 +103,6 @@ def test_the_command_and_the_function_train_the_same(trained: Path) -> None:
     assert taxel.Readout.load(trained)._with(training=None) == taxel.detect.fit(examples, recipe())
 
 
-def test_the_recording_of_a_folder_that_does_not_fit_is_named(tmp_path: Path, trained: Path, capsys) -> None:
-    for name, array in (("small", taxel.Array(4, 4)), ("smaller", taxel.Array(3, 3))):
-        taxel.convert(taxel.Events([0, 1000], [0, 1], [0, 1], [1, 1], array=array), tmp_path / f"{name}.npz")
-    code, _, error = call(capsys, "detect", tmp_path, "--readout", trained)
-    assert code == 2
-    assert re.search(r"small.npz: an array of 4 x 4 taxels", error), error
-    code, _, error = call(capsys, "detect", tmp_path / "smaller.npz", "--readout", trained)
-    assert code == 2
-    assert re.search(r"smaller.npz: an array of 3 x 3 taxels: the readout was trained on 8 x 8$", error.strip())
-
-
 def test_recordings_of_other_arrays_are_left_out_where_one_fits(
     tmp_path: Path, folder: Path, trained: Path, capsys
 ) -> None:
@@ -141,97 +126,10 @@ def test_recordings_of_other_arrays_are_left_out_where_one_fits(
     assert [Path(name).name for name in found["left_out"]] == ["1.npz", "2.npz", "3.npz", "4.npz"]
 
 
-def test_how_labels_name_trials_of_a_file_is_said_in_short_lines(tmp_path: Path, capsys) -> None:
-    file, labels = write_plate(tmp_path, count=5), tmp_path / "labels.csv"
-    code, said, _ = call(capsys, "info", file)
-    assert (code, said.splitlines()[-1]) == (
-        0,
-        "labels of these trials need a column recording with the trial's name, for example subj900/00",
-    )
-    names = f"subj900/00, subj900/01, subj900/02 and 2 more of {file}"
-    labels.write_text("recording,label,t_us\n" + "".join(f"{name},contact,9000\n" for name in "abcde"))
-    command = ("train", file, "--labels", labels, "-o", tmp_path / "r.json")
-    code, _, error = call(capsys, *command)
-    assert (code, f"names no event in {names}; it names a, b, c and 2 more" in error) == (2, True), error
-    labels.write_text("label,t_us\ncontact,9000\n")
-    code, _, error = call(capsys, *command)
-    assert (code, "state it in the column recording, with names like subj900/00" in error) == (2, True), error
-    code, _, error = call(capsys, "info", file, "--table", tmp_path / "p.csv")
-    assert code == 2
-    assert (
-        f"a table can contain only one recording: taxel convert {file} FOLDER writes each to a separate file" in error
-    )
-    assert call(capsys, "convert", file, tmp_path / "each")[0] == 0
-    code, _, error = call(capsys, "info", tmp_path / "each", "--table", tmp_path / "p.csv")
-    assert (code, "a table can contain only one recording: taxel info " in error) == (2, True), error
-    for several in (file, tmp_path / "each"):
-        picture = tmp_path / f"{several.name}.svg"
-        code, said, _ = call(capsys, "info", several, "--picture", picture)
-        assert (code, said.splitlines()[-1 - (several == file)]) == (0, f"picture written to {picture}")
-        drawn = picture.read_text()
-        names = [recording.title.removeprefix(f"{recording.path.parent}/") for recording in taxel.open_all(several)]
-        assert [name for name in names if f"<!-- {name} -->" not in drawn] == []
-
-
-def test_detections_go_to_a_table(folder: Path, trained: Path, capsys) -> None:
-    table = folder / "found.csv"
-    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare", folder / "tare.json", "--out", table)
-    assert call(capsys, *arguments)[0] == 0
-    found = taxel.Detections.from_csv(table)
-    assert found == taxel.detect.run(taxel.Readout.load(trained), taxel.open(folder / "9.npz"), tare=tare())
-    code, _, error = call(capsys, *arguments)
-    assert code == 2
-    assert "exists already" in error
-
-
 def test_a_tare_may_be_the_beginning_of_the_recording(folder: Path, trained: Path, capsys) -> None:
     arguments = ("detect", folder / "9.npz", "--readout", trained, "--truth", folder / "truth.csv", "--json")
     code, out, _ = call(capsys, *arguments, "--tare", 0.05)
     assert (code, json.loads(out)["score"]["found"]) == (0, 12)
-
-
-def test_taxels_whose_rest_is_not_in_the_tare_are_said(folder: Path, trained: Path, tmp_path: Path, capsys) -> None:
-    """Recorded from the middle of a stream: only what changed is known, and encoders leave all else out."""
-    taxel.convert(taxel.open(folder / "9.npz").events.between(1000, 2**40), tmp_path / "late.npz")
-    heard = np.zeros(ARRAY.shape, bool)
-    events = taxel.open(tmp_path / "late.npz").events
-    heard[events.y, events.x] = True
-    code, _, error = call(capsys, "detect", tmp_path / "late.npz", "--readout", trained, "--tare", 0.05)
-    known = np.count_nonzero(~np.isnan(taxel.Tare.take(events, stop_us=int(events.t[0]) + 50_000).rest))
-    assert code == 0
-    assert f"the rest of {heard.sum() - known} of {heard.sum()} taxels is not known" in error
-    assert "give a tare's file" in error
-    code, _, error = call(capsys, "detect", folder / "9.npz", "--readout", trained, "--tare", 0.05)
-    assert (code, error) == (0, "")
-
-
-def test_a_tare_that_holds_a_touch_is_said(folder: Path, trained: Path, capsys) -> None:
-    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare")
-    code, _, error = call(capsys, *arguments, 0.2)
-    assert (code, error.count("\n")) == (0, 1)
-    assert re.search(
-        r"warning: tare is 0\.2: the beginning of .*9\.npz is not quiet but contains a touch of \d+ taxels", error
-    )
-    assert call(capsys, *arguments, 0.05)[2] == ""
-
-
-def test_a_readout_as_a_tare_is_called_what_it_is(folder: Path, trained: Path, capsys) -> None:
-    code, _, error = call(capsys, "detect", folder / "9.npz", "--readout", trained, "--tare", trained)
-    assert (code, error) == (
-        2,
-        f"taxel: {trained}: is a taxel readout, not a tare: must be a file that Tare.save or taxel live --save-tare "
-        "wrote\n",
-    )
-
-
-def test_a_tare_longer_than_half_of_the_recording_is_refused(folder: Path, trained: Path, capsys) -> None:
-    events = taxel.open(folder / "9.npz").events
-    half = (int(events.t[-1]) - int(events.t[0])) / 2e6
-    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare")
-    code, _, error = call(capsys, *arguments, half + 0.001)
-    assert (code, error.count("\n")) == (2, 1)
-    assert f"--tare is {half + 0.001}: more than half of {folder / '9.npz'}" in error
-    assert call(capsys, *arguments, half - 0.001)[0] == 0
 
 
 def test_spikes_are_written_and_read_back(folder: Path, capsys) -> None:
@@ -414,61 +312,6 @@ def test_without_a_tare_the_rest_is_taken_from_before_the_first_label(folder: Pa
     assert "give --tare SECONDS or FILE" in error
 
 
-@pytest.mark.parametrize("given", [None, "tare.json", "0.05"])
-def test_the_command_that_follows_a_training_is_said_and_runs(
-    folder: Path, monkeypatch, capsys, tmp_path: Path, given: str | None
-) -> None:
-    monkeypatch.chdir(folder)
-    out = tmp_path / "a readout.json"
-    command = ("train", "9.npz", "--labels", "truth.csv", "--folds", 0, "-o", out)
-    code, said, _ = call(capsys, *command, *(() if given is None else ("--tare", given)))
-    assert code == 0
-    [following] = re.findall(r"^written to .*; next: taxel (.*)$", said, re.MULTILINE)
-    detect = ["9.npz" if word == "RECORDING" else word for word in shlex.split(following)]
-    assert detect[:4] == ["detect", "9.npz", "--readout", str(out)]
-    if given is not None:
-        assert detect[-1] == given
-    code, found, _ = call(capsys, *detect)
-    assert (code, found.count("contact")) == (0, 6 + 1)
-
-
-@pytest.mark.parametrize("first", [1_000_000, 2_500_000, 3_700_000])
-def test_the_tare_that_is_said_is_no_more_than_half_of_the_recording(tmp_path: Path, capsys, first: int) -> None:
-    values = np.random.default_rng(1).normal(100.0, 30.0, (400, 4, 4))  # never quiet
-    values[first // 10_000 : first // 10_000 + 10, 1:3, 1:3] += 300.0
-    taxel.convert(taxel.Frames(values, np.arange(400) * 10_000, unit="counts"), tmp_path / "a.npz")
-    (tmp_path / "a.notes.csv").write_text(f"label,t_us\ncontact,{first}\n")
-    code, said, _ = call(capsys, "train", tmp_path / "a.npz", "-o", tmp_path / "a.json")
-    assert code == 0
-    [tare] = re.findall(r"--tare ([\d.]+)$", said, re.MULTILINE)
-    assert float(tare) == pytest.approx(min(first / 1e6 - 0.02, 1.995))
-    assert call(capsys, "detect", tmp_path / "a.npz", "--readout", tmp_path / "a.json", "--tare", tare)[0] == 0
-
-
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_too_few_labels_are_said(folder: Path, capsys, tmp_path: Path, count: int) -> None:
-    rows = (folder / "truth.csv").read_text().splitlines()[1:]
-    few = [line for label in ("contact", "lift") for line in [one for one in rows if one.startswith(label)][:count]]
-    (tmp_path / "few.csv").write_text("\n".join(["label,t_us", *few]) + "\n")
-    command = ("train", folder / "9.npz", "--labels", tmp_path / "few.csv", "--recipe", folder / "recipe.toml")
-    low = ("--set", "learner.ub=1e-6", "--tare", folder / "tare.json")
-    code, _, warned = call(capsys, *command, *low, "-o", tmp_path / "few.json")
-    assert code == 0
-    there = "is 1 event" if count == 1 else f"are {count} events"
-    assert warned.startswith(f"taxel: warning: contact: there {there} to learn from; {count} cannot be learnt")
-
-
-def test_labels_that_lie_outside_are_left_out_and_said(folder: Path, trained: Path, capsys, tmp_path: Path) -> None:
-    late = tmp_path / "late.csv"
-    late.write_text((folder / "truth.csv").read_text() + "contact,3600000000\n")
-    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare", folder / "tare.json", "--truth")
-    code, out, error = call(capsys, *arguments, late, "--json")
-    assert (code, json.loads(out)["score"]["missed"]) == (0, 0)
-    assert f"1 of the 13 events of {late} left out: outside {folder / '9.npz'}" in error
-    late.write_text("label,t_us\ncontact,3600000000\n")
-    assert "holds 1 event (3600.000 s), none within" in call(capsys, *arguments, late)[2]
-
-
 @pytest.mark.parametrize(
     ("late_us", "how"), [(0, None), (50_000, None), (50_001, "behind"), (1_000_000, "behind"), (1_000_001, "outside")]
 )
@@ -486,24 +329,6 @@ def test_labels_behind_the_last_event_are_named(
     assert ("left out: outside" in error) == (how == "outside")
 
 
-@pytest.mark.parametrize(("late_us", "left_out"), [(9_999, False), (10_000, False), (10_001, True)])
-def test_a_note_behind_the_last_frame_is_left_out_and_said(tmp_path: Path, late_us: int, left_out: bool) -> None:
-    frames = taxel.Frames(np.zeros((100, 2, 2)), np.arange(100) * 10_000, unit="N", array=taxel.Array(2, 2))
-    taxel.convert(frames, tmp_path / "mat.npz")
-    (tmp_path / "mat.notes.csv").write_text(f"label,t_us\ntouch,400000\ntouch,{990_000 + late_us}\n")
-    with pytest.warns(UserWarning, match="1 of the 2 events of the notes of ") if left_out else nullcontext():
-        [events] = references("notes", [taxel.open(tmp_path / "mat.npz")])
-    assert len(events["touch"]) == 1 + (not left_out)
-
-
-def test_a_name_that_no_recording_has_is_listed(folder: Path, capsys, tmp_path: Path) -> None:
-    labels = tmp_path / "labels.csv"
-    labels.write_text((folder / "labels.csv").read_text().replace("2.npz", "two.npz"))
-    code, _, error = call(capsys, "train", folder / "1.npz", folder / "2.npz", "--labels", labels, "-o", "no.json")
-    assert (code, error.count("\n")) == (2, 1)
-    assert f"names no event in {folder / '2.npz'}; it names 1.npz, 9.npz, two.npz" in error
-
-
 @pytest.mark.parametrize(("label", "section"), [("slip", "[neurons.slip]"), ("toe off", '[neurons."toe off"]')])
 def test_a_label_without_a_neuron_is_an_error(folder: Path, capsys, tmp_path: Path, label: str, section: str) -> None:
     labels = tmp_path / "labels.csv"
@@ -519,20 +344,6 @@ def test_a_label_without_a_neuron_is_an_error(folder: Path, capsys, tmp_path: Pa
         capsys, *arguments, "--recipe", folder / "recipe.toml", "--set", option[2], "-o", tmp_path / "r.json"
     )
     assert (code, "has no neuron" in error) == (0, False)
-
-
-def test_a_line_of_labels_that_makes_no_sense_is_named(tmp_path: Path) -> None:
-    table = tmp_path / "labels.csv"
-    for text, said in [
-        ("a,b\n", "line 1: column 'label' is missing; the columns are 'a', 'b'; must be label,t_us"),
-        ("label,t_us\nstep,soon\n", "line 2: t_us is 'soon'; must be whole us"),
-        ("label,t_us\nstep\n", "line 2: 1 cells; must have 2"),
-        ("label,t_us\n,5\n", "line 2: must have a label"),
-        ("label,t_us\nstep,99999999999999999999\n", "line 2: must have a label, and a time within 2"),
-    ]:
-        table.write_text(text)
-        with pytest.raises(taxel.FormatError, match=said.replace("^", r"\^")):
-            taxel.Labels(table)
 
 
 def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, capsys, tmp_path: Path) -> None:
@@ -561,24 +372,6 @@ def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, ca
     assert page.count("9.npz</td>", held, own) == 2
     assert page.count("9.npz</td>", own, page.index("Output of the command")) == 2
     assert out.startswith("held out: whole recordings, 3 folds (window 50 ms)\n")
-
-
-def test_a_report_that_fails_loses_no_score(folder: Path, capsys, tmp_path: Path, monkeypatch) -> None:
-    def fail(*_: object, **__: object) -> None:
-        raise taxel.ProblemError("no page")
-
-    monkeypatch.setattr("taxel.report.write_detections", fail)
-    plan = ("--recipe", folder / "recipe.toml", "--tare", folder / "tare.json", "--folds", 0)
-    out, report = tmp_path / "touch.json", ("--report", tmp_path / "r")
-    arguments = ("train", folder / "1.npz", "--labels", folder / "labels.csv", *plan, "-o", out, *report)
-    code, said, error = call(capsys, *arguments)
-    assert (code, error.splitlines()[-1]) == (2, "taxel: no page")
-    assert "not held out" in said
-    assert f"written to {out}\n" in said
-    code, said, _ = call(capsys, *arguments, "--overwrite", "--json")
-    assert (code, json.loads(said)["readout"]) == (2, str(out))
-    code, said, _ = call(capsys, "detect", folder / "9.npz", "--readout", out, "--tare", folder / "tare.json", *report)
-    assert (code, "slope (mV/ms)" in said) == (2, True)
 
 
 @pytest.mark.usefixtures("drawn")
@@ -679,22 +472,6 @@ def test_a_folder_of_trials_is_trained_on_and_heard_as_its_recordings_are(tmp_pa
     code, said, _ = call(capsys, "detect", *files, "--readout", out, "--truth", trials / "labels.csv", "--json")
     del folder["written"], folder["report"]
     assert (code, json.loads(said)) == (0, {key: value for key, value in folder.items() if key != "recording"})
-
-
-def test_an_example_may_be_a_recording(folder: Path) -> None:
-    from taxel.detect import Example, fit
-
-    one = taxel.open(folder / "1.npz")
-    labels = taxel.Labels(folder / "labels.csv").times(one)
-    trained = [
-        fit([Example(source, labels, tare())], taxel.detect.Recipe.load(folder / "recipe.toml"))
-        for source in (one, one.events)
-    ]
-    assert trained[0] == trained[1]
-    with pytest.raises(
-        taxel.ProblemError, match=r"example 0 is .*: must be an Example of a Recording, Events, Frames or SpikeTrains"
-    ):
-        fit([Example("1.npz", labels)], taxel.detect.Recipe.load(folder / "recipe.toml"))
 
 
 def test_times_since_1970_are_written_from_the_beginning_on(folder: Path, trained: Path, capsys, tmp_path: Path):

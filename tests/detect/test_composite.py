@@ -116,27 +116,6 @@ def test_inputs_are_given_by_label_too() -> None:
     assert [one.inputs for one in by_label.neurons.values()] == [("area",), ("change",)]
 
 
-@pytest.mark.parametrize(
-    ("neuron", "more", "text"),
-    [
-        (
-            (Neuron(), [1.0] * 4, 0.0, ("b",)),
-            {},
-            'a: inputs: the composite has no encoder "b": its encoders are area, change',
-        ),
-        ((Neuron(), [1.0] * 4, 0.0, ("area", "area")), {}, 'a: inputs: "area" comes twice'),
-        ((Neuron(), [1.0] * 5, 0.0, ("area",)), {}, "a: 5 weights, but the encoder makes 4 trains"),
-        ((Neuron(), [1.0] * 4), {}, "a: 4 weights, but the encoder makes 36 trains"),
-        ((Neuron(), [1.0] * 4), {"inputs": {"b": ["area"]}}, "inputs: no neuron 'b': the neurons are a"),
-        ((Neuron(), [1.0] * 4), {"inputs": ["area"]}, "inputs is "),
-        ((Neuron(), [1.0] * 4), {"inputs": {"a": 3}}, "a: inputs is 3"),
-    ],
-)
-def test_inputs_that_do_not_exist_are_refused(neuron: tuple, more: dict, text: str) -> None:
-    with refused(text):
-        Readout(Composite({"area": PARTS["area"], "change": PARTS["change"]}), {"a": neuron}, array=ARRAY, **more)
-
-
 def test_one_encoder_has_no_inputs() -> None:
     with refused("a: inputs are .*: must be left out, because only a composite"):
         Readout(PARTS["area"], {"a": (Neuron(), [1.0] * 4, 0.0, ("area",))})
@@ -269,30 +248,6 @@ def test_inputs_are_chosen_among_the_points_and_what_none_uses_is_not_encoded() 
         neurons={"contact": {"inputs": ["level"]}},
     )
     assert fit([one._replace(tare=None) for one in alone], free).encoder == LevelCrossing([60.0])
-
-
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        (
-            {"neurons": {"a": {"inputs": ["skin"]}}},
-            "neurons.a: inputs: 'skin' is not the name of an encoder: must be one of area, moments",
-        ),
-        ({"neurons": {"a": {"inputs": []}}}, "neurons.a: inputs is empty"),
-        ({"neurons": {"a": {"inputs": ["moments"], "delay_ms": 3.0}}}, "neurons.a: delay_ms is 3: .* 0, 4, 6"),
-        (
-            {"neurons": {"a": {"delay_ms": 4.0, "search": [{"inputs": ["b"]}]}}},
-            "neurons.a.search: inputs: .b. is not the name of an encoder",
-        ),
-        ({"encoders": {"area": {"name": "areas"}}}, "recipe: encoders.area: encoder areas: must be one of"),
-        ({"encoders": {"area": 3}}, "recipe: encoders.area"),
-        ({"encoders": 3}, "recipe: states no encoder"),
-        ({"encoder": {"name": "fa1"}}, "encoder and encoders are both given"),
-    ],
-)
-def test_recipes_that_make_no_sense_are_refused(changes: dict, text: str) -> None:
-    with refused(text):
-        recipe(**changes)
 
 
 def test_a_delay_needs_an_age_of_its_own_inputs_alone() -> None:

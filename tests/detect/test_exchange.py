@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import mixed
-from refusal import refused_saying as refused
 from test_commands import call
 
 import taxel
@@ -108,24 +107,6 @@ def test_what_nir_cannot_hold_is_said(tmp_path: Path) -> None:
     assert "refractory" not in said
     assert "rise" not in said
     assert "continuous" not in said
-
-
-def test_exponential_kernels_beside_others_are_refused(tmp_path: Path) -> None:
-    mixed = {
-        "a": (taxel.Neuron(kernel="exponential", time="grid"), [0.1] * 8),
-        "b": (taxel.Neuron(time="grid"), [0.1] * 8),
-    }
-    with pytest.raises(taxel.ProblemError, match="different nodes"):
-        taxel.Readout(ENCODER, mixed).to_nir(tmp_path / "a.nir")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_graded_spikes_are_refused(tmp_path: Path) -> None:
-    encoder = taxel.encode.Moments(levels=1, graded=True)
-    graded = taxel.Readout(encoder, {"a": (taxel.Neuron(), np.zeros(encoder.trains(taxel.Array(2, 2))))})
-    with refused("NIR takes no graded trains: .* those of moments do"):
-        graded.to_nir(tmp_path / "a.nir")
-    assert not (tmp_path / "a.nir").exists()
 
 
 def test_the_command_writes_the_graph_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -138,7 +138,8 @@ def test_no_label_that_the_neuron_finds_is_called_one_that_cannot_be_learnt(unit
         warnings.simplefilter("always")
         readout = fit([Example(frames, labels)], plan)
     found = score(run(readout, frames), labels, 50.0).found
-    said = [str(warning.message) for warning in caught]
+    # That a neuron fires again within tau of a target is another warning.
+    said = [text for text in (str(warning.message) for warning in caught) if "extra spike" not in text]
     assert found > 6
     assert said
     waits = (
@@ -147,7 +148,7 @@ def test_no_label_that_the_neuron_finds_is_called_one_that_cannot_be_learnt(unit
     )
     later = rf"the inputs of \d+ of 12 labels come too late to fire at the label .*; the neuron fires later, .* {found}"
     for text in said:
-        assert re.match(rf"contact: ({waits}|{later} of 12|on its training patterns, .*)$", text)
+        assert re.match(rf"contact: ({waits}|{later} of 12)$", text)
 
 
 def test_events_that_cannot_be_learnt_are_named_from_the_beginning_of_a_recording_since_1970() -> None:

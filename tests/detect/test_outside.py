@@ -4,12 +4,11 @@ import json
 from pathlib import Path
 
 import numpy as np
-import pytest
 from shell import call
 from test_plain_rule import tare
 
 import taxel
-from taxel import Array, Events, Neuron, Readout, SpikeTrains
+from taxel import Array, Events, Readout, SpikeTrains
 from taxel.detect import Example, Recipe, fit, load
 from taxel.detect.readout import run_counting
 from taxel.detect.seen import seen
@@ -82,17 +81,3 @@ def test_the_range_is_that_of_values_or_of_how_many_spikes_a_memory_holds() -> N
     assert seen(plain, 1.0, graded=False) == {"most": [2, 0, 1]}
     assert seen(plain, 2.0, graded=False) == {"most": [3, 0, 1]}
     assert seen(plain, 5.0, graded=False) == {"most": [3, 0, 2]}
-
-
-def test_a_file_with_ranges_that_make_no_sense_is_refused() -> None:
-    readout = Readout(ContactArea(levels=[2]), {"a": (Neuron(), [1.0, 0.5])})
-    for wrong, text in (
-        ({"a": {"most": [1.0]}}, "a: seen: most has 1 entries for 2 weights"),
-        ({"a": {"most": [1.0, -1.0]}}, r"a: seen: most\[1\] is -1"),
-        ({"a": {"most": [1.0, 1.0], "least": [0.5, 0.0]}}, r"a: seen: least\[0\] is 0.5"),
-        ({"b": {"most": [1.0, 1.0]}}, "a: the ranges of the neuron's inputs are missing in seen"),
-        ({"a": {"most": [1.0, 1.0]}, "b": {"most": []}}, "seen: the readout has no neuron b"),
-    ):
-        parts = json.loads(readout.to_json()) | {"seen": wrong}
-        with pytest.raises(taxel.FormatError, match=text):
-            Readout.from_json(json.dumps(parts))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from taxel import Array, Events, FormatError, Frames, ProblemError
+from taxel import Array, Events, Frames, ProblemError
 from taxel.detect import Recipe, recipes
 from taxel.detect.fitting import rows_of
 from taxel.encode import ContactArea
@@ -147,37 +147,6 @@ def test_what_is_said_for_all_neurons_comes_before_what_one_has_and_what_is_said
     assert (recipe.learner_of("foot_off")[1], recipe.learner_of("step")[1]) == (8.0, 12.0)
     assert ("20.0" in said(recipe, "foot_off")[0], "7.0" in said(recipe, "step")[0]) == (True, True)
     assert "190" not in said(recipe, "foot_off")[0]
-
-
-@pytest.mark.parametrize(
-    ("recipe", "error", "text"),
-    [
-        (
-            "gaitpdb",
-            ProblemError,
-            r"recipe 'gaitpdb': must be one of event_counts, gait_channel, .*, or the path of a file, with a dot",
-        ),
-        ("./gaitpdb", FileNotFoundError, "No such file"),
-        (3, ProblemError, "recipe is 3: must be a path"),
-        (KEPT / "nothing.toml", FileNotFoundError, "No such file"),
-        (Path(__file__), FormatError, "not TOML"),
-    ],
-)
-def test_what_is_no_recipe_is_refused(recipe: object, error: type[Exception], text: str) -> None:
-    with pytest.raises(error, match=text):
-        Recipe.load(recipe)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("key", ["fits", "other", "fits.unit"])
-def test_a_change_that_would_do_nothing_is_refused(key: str) -> None:
-    with pytest.raises(ProblemError, match=f"{key}: .* has no effect"):
-        Recipe.load("touch", {key: "x"})
-
-
-def test_another_label_has_to_be_one_of_the_recipe(tmp_path: Path) -> None:
-    (tmp_path / "odd.toml").write_text('other = "lift"\n[encoder]\nname = "fa1"\n[neurons.contact]\ntau = 2.0\n')
-    with pytest.raises(ProblemError, match="recipe: other is 'lift': must be one of 'contact'"):
-        Recipe.load(tmp_path / "odd.toml", labels=["contact"])
 
 
 def test_a_recipe_takes_every_option_of_its_learner_and_of_the_neuron_and_those_of_the_objective_share_rows() -> None:

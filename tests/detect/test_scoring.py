@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from refusal import refused_saying as refused
 
 import taxel
 from taxel.detect import Score, Spread, score
@@ -104,35 +103,6 @@ def test_the_spread_is_numpys(values: list[float]) -> None:
     assert np.allclose(spread, expected, rtol=1e-9, atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("truth", "window_ms", "said"),
-    [
-        ({"a": [0.5]}, 50, "truth\\['a'\\]\\[0\\] is 0.5: must be a whole number that fits int64"),
-        ({"a": [[1]]}, 50, "dimensions"),
-        ({"a": ["x"]}, 50, "truth"),
-        ({1: [5]}, 50, "truth: the label 1 must be a text"),
-        ({"a": None}, 50, "truth"),
-        ([1, 2], 50, "truth has no labels, found has a, b"),
-        ({"a": [1]}, -1, "window_ms is -1: must be from 0 to 3600000"),
-        ({"a": [1]}, math.nan, "window_ms is nan"),
-        ({"a": [1]}, math.inf, "window_ms is inf"),
-        ({"a": [1]}, "wide", "window_ms"),
-        ({"a": [1]}, None, "window_ms is None"),
-        ({"a": [1]}, [1, 2], "one number for each of 1 event"),
-        ({"a": [1]}, {"b": 1}, "window_ms: the value for 'a' is missing"),
-    ],
-)
-def test_nonsense_in_a_score_is_one_clear_error(truth: object, window_ms: object, said: str) -> None:
-    with refused(said):
-        score(some(), truth, window_ms)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("found", [None, [1, 2], "contact", 3.0])
-def test_a_score_takes_detections_only(found: object) -> None:
-    with pytest.raises(taxel.ProblemError, match=r"must be a taxel\.Detections"):
-        score(found, {})  # type: ignore[arg-type]
-
-
 def test_detections_come_back_from_numpy_and_csv(tmp_path) -> None:
     found = some()
     with_reported = taxel.Detections(found.label, found.t, found.known, [0.5, 1.5, None], reported=[9, 8, 7])
@@ -162,22 +132,6 @@ def test_a_slope_keeps_every_digit_in_a_table(tmp_path) -> None:
     assert taxel.Detections.from_csv(found.to_csv(tmp_path / "a.csv")) == found
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("", "line 1: contains nothing"),
-        ("a,b\n", "line 1: contains a,b"),
-        ("label,t_us,known_us,slope_mv_per_ms\nx,1,2\n", "line 2: 3 cells; must have 4"),
-        ("label,t_us,known_us,slope_mv_per_ms\nx,1,soon,0\n", "line 2: invalid literal"),
-    ],
-)
-def test_a_table_that_is_none_is_refused_by_line(tmp_path, text: str, said: str) -> None:
-    path = tmp_path / "a.csv"
-    path.write_text(text)
-    with pytest.raises(taxel.FormatError, match=said):
-        taxel.Detections.from_csv(path)
-
-
 def test_detections_are_chosen_by_label_time_and_place() -> None:
     found = some()
     assert found.labels == ("a", "b")
@@ -199,27 +153,6 @@ def test_detections_are_chosen_by_label_time_and_place() -> None:
     for start, stop in ((5, 1), (None, 1), ("a", "b"), (math.nan, 1)):
         with pytest.raises(taxel.ProblemError, match="start"):
             found.between(start, stop)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("columns", "said"),
-    [
-        ((["a"], [1], [1, 2]), "known has 2 entries, label has 1"),
-        ((["a"], [1.5], [1]), "t\\[0\\] is .*: must be a whole number that fits int64"),
-        ((["a"], [math.nan], [1]), "t\\[0\\] is .*: must be a whole number that fits int64"),
-        ((["a"], [2**63], [1]), "t"),
-        ((["a"], [1], ["x"]), "known"),
-        ((["a"], [[1]], [1]), "t has 2 dimensions"),
-        (([5], [1], [1]), "label is .*: must be a list of texts"),
-        ((None, [], []), "label is .*: must be a list of texts"),
-        (("a", [1], [1]), "label is .*: must be a list of texts"),
-        ((["a"], [1], [1], ["steep"]), "slope"),
-        ((["a"], [1], [1], [1.0], [1, 2]), "reported has 2 entries"),
-    ],
-)
-def test_nonsense_in_detections_is_one_clear_error(columns: tuple[object, ...], said: str) -> None:
-    with refused(said):
-        taxel.Detections(*columns)  # type: ignore[arg-type]
 
 
 def test_detections_can_be_drawn() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from functools import partial
 from pathlib import Path
 
@@ -91,13 +90,6 @@ def test_a_file_without_a_unit_reads_values_in_any(unit: str) -> None:
         assert run(old, pressed(unit), tare=example(unit).tare) == run(made, pressed("N"), tare=example("N").tare)
 
 
-def test_a_unit_has_a_name() -> None:
-    with refused("unit is empty: must be a name, or left out"):
-        PlainRule("area", 2, unit=" ")
-    with refused("unit is 3: must be a text"):
-        Readout(LevelCrossing([5.0]), {"contact": (taxel.Neuron(), [1.0, 1.0])}, unit=3)  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize("does", [lambda x: fit(x, RECIPE), lambda x: judge(x, RECIPE, 2), tune])
 def test_recordings_in_different_units_are_not_trained_on_together(does) -> None:
     with refused("example 1 is in N, example 0 in kPa: must be in one unit"):
@@ -126,16 +118,3 @@ def test_the_commands_and_the_page_name_both_units(tmp_path: Path, capsys) -> No
     code, _, error = call(capsys, "live", "--readout", readout, "--tare", "0.05", "--seconds", "0.1")
     last = error.splitlines()[-1]
     assert (code, "live values are in ticks, but the readout was trained on kPa" in last) == (2, True), error
-
-
-def test_a_training_on_two_units_says_which_recording_is_in_which(tmp_path: Path, capsys) -> None:
-    for unit in ("kPa", "counts"):
-        taxel.convert(pressed(unit), tmp_path / f"{unit}.npz")
-    rows = [f"{unit},contact,{t}\n" for unit in ("kPa", "counts") for t in (400_000, 900_000, 1_400_000)]
-    (tmp_path / "labels.csv").write_text("recording,label,t_us\n" + "".join(rows))
-    code, out, error = call(
-        capsys, "train", tmp_path, "--labels", tmp_path / "labels.csv", "-o", tmp_path / "readout.json"
-    )
-    assert (code, out, error.count("\n")) == (2, "", 1), error
-    assert re.search("kPa.npz is in kPa, .*counts.npz in counts: must be in one unit, because a readout", error), error
-    assert not (tmp_path / "readout.json").exists()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from refusal import refused
 
-from taxel import Array, Frames, SpikeTrains, Tare
+from taxel import Frames, SpikeTrains, Tare
 from taxel.encode import FA1, FA2, ChangeEvents, Composite, ContactArea, Encoder, Moments, ThresholdIzhikevich
 
 from . import scenes
@@ -77,52 +77,3 @@ def test_the_order_in_which_parts_are_given_says_nothing() -> None:
     assert again == Composite({"b": two, "x": one})
     assert json.loads(again.to_json())["parts"]["b"]["name"] == "fa1"
     assert repr(again).startswith("Composite(parts={'b': FA1(")
-
-
-@pytest.mark.parametrize(
-    ("parts", "argument"),
-    [
-        ({}, None),
-        (None, "parts"),
-        ({"a": 3}, "parts"),
-        ({" ": FA1()}, None),
-        ({3: FA1()}, None),
-        ({"a": Composite({"b": FA1()})}, None),
-    ],
-)
-def test_parts_that_make_no_sense_are_refused(parts: object, argument: str) -> None:
-    with refused(argument=argument):
-        Composite(parts)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("parts", "argument"),
-    [
-        ({"area": {"name": "contact_area", "noise_floor": -1.0}}, None),
-        ({"area": {"name": "contact_area", "wings": 2}}, None),
-        ({"area": {"name": "composed"}}, None),
-        ({"area": {}}, None),
-        (3, "parts"),
-    ],
-)
-def test_an_error_in_a_part_names_it(parts: object, argument: str) -> None:
-    with refused(argument=argument):
-        Encoder.from_json(json.dumps({"name": "composite", "parts": parts}))
-
-
-@pytest.mark.parametrize(
-    "names",
-    [
-        ["b"],
-        ["a", "a"],
-        [],
-        3,
-    ],
-)
-def test_parts_are_chosen_by_their_names(names: object) -> None:
-    for call in (
-        lambda: Composite({"a": FA1()}).only(names),
-        lambda: Composite({"a": FA1()}).places(names, Array(1, 1)),
-    ):
-        with refused(argument="inputs"):
-            call()

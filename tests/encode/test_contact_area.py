@@ -1,7 +1,6 @@
 """Contact area against a plain count."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusal import refused
@@ -85,22 +84,3 @@ def test_a_noise_floor_of_0_is_of_whole_numbers_alone():
     values[3] = 0.4
     with refused(argument="noise_floor"):
         encoder.encode(Frames(values, frames.t, unit="N"))
-
-
-@pytest.mark.parametrize(
-    ("call", "argument"),
-    [
-        (lambda: ContactArea(noise_floor=-1), "noise_floor"),
-        (lambda: ContactArea(levels=[]), "levels"),
-        (lambda: ContactArea(levels=[0, 2]), "levels"),
-        (lambda: ContactArea(levels=[2, 2]), "levels"),
-        (lambda: ContactArea(levels=[2.5]), "levels"),
-        (lambda: ContactArea(tare="soon"), "tare"),
-        (lambda: ContactArea().encode(Frames(np.zeros((1, 3, 4)), [0])), "tare"),
-        (lambda: ContactArea().stream(ARRAY), "tare"),
-        (lambda: ContactArea().with_tare(None), "tare"),
-    ],
-)
-def test_nonsense_gets_one_clear_line(call, argument):
-    with refused(argument=argument):
-        call()

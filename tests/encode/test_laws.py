@@ -7,7 +7,6 @@ what the encoder does with an event that a state repaired: "read" (as any other)
 a spike) or "both".
 """
 
-import json
 from copy import copy
 from importlib import import_module
 from itertools import pairwise
@@ -21,8 +20,7 @@ from refusal import refused
 
 import taxel
 from taxel import Array, Events, Frames, _core
-from taxel._base.parameters import described
-from taxel.encode import FA1, ChangeEvents, ContactArea, Encoder, LevelCrossing, RunningRange
+from taxel.encode import FA1, ChangeEvents, ContactArea, Encoder, LevelCrossing
 
 from .scenes import ARRAY, at_times, ended, frames_of, rest, spikes_of, touch, wander
 
@@ -343,19 +341,6 @@ def test_an_encoder_says_its_trains_as_its_spikes_have_them(encoder):
     assert (encoder.trains(ARRAY), encoder.signed) == (len(spikes), spikes.signed)
 
 
-@each_encoder
-def test_the_defaults_shown_in_python_are_those_of_the_compiled_part(encoder):
-    needed = {name: getattr(encoder, name) for name in described(encoder.name)["required"]}
-    plain = {name: json.loads(encoder.to_json())[name] for name in needed}
-    from_rust = json.loads(_core.check_encoder(json.dumps({"name": encoder.name} | plain)))
-    assert json.loads(type(encoder)(**needed).to_json()) == from_rust
-
-
-def test_the_defaults_of_the_running_range_are_those_of_the_compiled_part():
-    text = '{"name": "level_crossing", "levels": [0.5], "running_range": {}}'
-    assert Encoder.from_json(text) == LevelCrossing([0.5], running_range=RunningRange())
-
-
 def test_nothing_in_gives_nothing_out():
     empty = Events([], [], [], [], array=ARRAY, intensity=[])
     for encoder in ENCODERS.values():
@@ -377,32 +362,6 @@ def test_a_long_silence_costs_no_time_once_nothing_can_come():
         stream.advance(36 * year)
         stream.push(Events([36 * year + 5], [0], [0], [1], array=ARRAY, intensity=[150]))
         assert stream.finish().stop >= 36 * year / 1000
-
-
-@pytest.mark.parametrize(
-    ("call", "argument"),
-    [
-        (lambda: ENCODERS["area"].encode(Frames(np.zeros((1, 4, 3)), [0])), None),
-        (lambda: FA1().with_tare(5), "tare"),
-        (lambda: Encoder.from_json("{"), None),
-        (lambda: Encoder.from_json("[]"), None),
-        (lambda: Encoder.from_json("{}"), None),
-        (lambda: Encoder.from_json('{"name": "sa3"}'), None),
-        (lambda: Encoder.from_json('{"name": "fa1", "tau": 5}'), "tau"),
-        (lambda: Encoder.from_json('{"name": "level_crossing"}'), "levels"),
-        (lambda: Encoder.from_json(None), "encoder"),
-        (lambda: FA1().encode([1, 2]), None),
-        (lambda: FA1().stream(5), "array"),
-        (lambda: FA1().trains(None), "array"),
-        (lambda: FA1().stream().push("x"), None),
-        (lambda: FA1().stream().advance(1.5), "t_us"),
-        (lambda: FA1().stream().advance("x"), "t_us"),
-        (lambda: FA1().stream().advance(2**62), "t_us"),
-    ],
-)
-def test_nonsense_gets_one_clear_line(call, argument):
-    with refused(argument=argument):
-        call()
 
 
 @each_encoder

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused
 
 from taxel.encode import LevelCrossing, RunningRange
 
@@ -98,32 +97,3 @@ def test_renewals_go_on_over_a_gap_longer_than_the_window():
     shares = (values - ranges[:, 0]) / (ranges[:, 1] - ranges[:, 0])
     wanted = oracles.level_crossing(t[100:].tolist(), shares[100:], [0.5], int(t[-1]))
     assert spikes_of(encoder.encode(frames_of(t, values))) == wanted
-
-
-@pytest.mark.parametrize(
-    ("call", "argument"),
-    [
-        (lambda: LevelCrossing([]), "levels"),
-        (lambda: LevelCrossing(5.0), "levels"),
-        (lambda: LevelCrossing([1.0, 1.0]), "levels"),
-        (lambda: LevelCrossing([2.0, float("inf")]), "levels"),
-        (lambda: LevelCrossing([1e300]), "levels"),
-        (lambda: LevelCrossing([1.0], release_share=0), "release_share"),
-        (lambda: LevelCrossing([1.0], release_share=1.01), "release_share"),
-        (lambda: LevelCrossing([-1.0, 1.0], release_share=0.7), "release_share"),
-        (lambda: LevelCrossing([1.0], release_by=-1), "release_by"),
-        (lambda: LevelCrossing([1.0], release_by=1, release_share=1), None),
-        (lambda: LevelCrossing([1.0], hold_ms=-1), "hold_ms"),
-        (lambda: LevelCrossing([1.0], tonic_ms=0), "tonic_ms"),
-        (lambda: LevelCrossing([1.0], tonic_level=1.0), None),
-        (lambda: LevelCrossing([1.0], tonic_ms=5, tonic_level=2.0), "tonic_level"),
-        (lambda: LevelCrossing([1.0], running_range=RunningRange(low=95, high=10)), None),
-        (lambda: LevelCrossing([1.0], running_range=RunningRange(high=101)), "high"),
-        (lambda: LevelCrossing([1.0], running_range=RunningRange(renew_s=-1)), "renew_s"),
-        (lambda: LevelCrossing([1.0], running_range={"low": 1}), "running_range"),
-        (lambda: LevelCrossing([1.0], running_range=5), "running_range"),
-    ],
-)
-def test_nonsense_gets_one_clear_line(call, argument):
-    with refused(argument=argument):
-        call()

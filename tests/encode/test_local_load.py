@@ -286,27 +286,6 @@ def test_a_taxel_without_a_value_yet_does_not_hide_a_touch_beside_it():
     assert largest(readings).tolist() == [0, 0, pytest.approx(2.0)]
 
 
-@pytest.mark.parametrize(
-    ("wrong", "argument"),
-    [
-        ({"noise_floor": -1}, "noise_floor"),
-        ({"least_noise": 0}, "least_noise"),
-        ({"rest": "lowest"}, "rest"),
-        ({"local_ms": (50, 0)}, "local_ms"),
-        ({"local_ms": 50}, "local_ms"),
-        ({"period_ms": 0}, "period_ms"),
-        ({"tare": "soon"}, "tare"),
-        ({"levels": (4, 4)}, "levels"),
-        ({"levels": (0, 4)}, "levels"),
-        ({"release": 0}, "release"),
-        ({"release": 1.1}, "release"),
-    ],
-)
-def test_nonsense_gets_one_clear_line(wrong, argument):
-    with refused(argument=argument):
-        LocalLoad(**wrong)
-
-
 def test_without_a_tare_nothing_is_encoded():
     frames = Frames(np.zeros((1, 3, 4)), [0])
     for call in (lambda x: LocalLoad().stream(x.array), LocalLoad().encode, LocalLoad().values):

@@ -78,48 +78,6 @@ def test_a_taxel_that_does_not_exist_has_no_rest():
     assert repr(tare) == "Tare(1 of 1 taxel, 0 to 100 us)"
 
 
-EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[5, 6])
-
-
-@pytest.mark.parametrize(
-    ("call", "argument"),
-    [
-        (lambda: Tare.take(5), "x"),
-        (lambda: Tare.take(EVENTS, start_us=1.5), "start_us"),
-        (lambda: Tare.take(EVENTS, stop_us=True), "stop_us"),
-        (lambda: Tare.take(EVENTS, start_us=900, stop_us=900), None),
-        (lambda: Tare.take(EVENTS, stop_us=-5), None),
-        (lambda: Tare.take(EVENTS.between(0, 0)), "tare"),
-        (lambda: Tare.take(EVENTS, note=3), "note"),
-        (lambda: Tare.take(Events([0], [0], [0], [1], array=Array(1, 1))), None),
-        (
-            lambda: Tare.take(Frames(np.full((2, 1, 1), np.nan), [0, 1])),
-            None,
-        ),
-        (lambda: Tare.take(Frames(np.ones((1, 1, 1)), [0])), None),
-        (Tare, None),
-        (lambda: Tare.from_json(5), "tare"),
-        (lambda: Tare.from_json("[1"), None),
-        (lambda: Tare.from_json('{"rest": []}'), None),
-        (
-            lambda: Tare.from_json(Tare.take(EVENTS).to_json().replace("[5.0]", "[5.0, 6.0]")),
-            None,
-        ),
-        (
-            lambda: Tare.from_json(Tare.take(EVENTS).to_json().replace('"noise":[0.0]', '"noise":[0.0, 6.0]')),
-            None,
-        ),
-        (
-            lambda: Tare.from_json(Tare.take(EVENTS).to_json().replace('"noise":[0.0]', '"noise":[-1.0]')),
-            None,
-        ),
-    ],
-)
-def test_nonsense_gets_one_clear_line(call, argument):
-    with refused(taxel.Error, argument):
-        call()
-
-
 def test_a_file_that_is_no_tare_is_named(tmp_path):
     place = tmp_path / "x.json"
     place.write_bytes(b"\xff\xfe")

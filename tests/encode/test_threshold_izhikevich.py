@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused
 
 from taxel.encode import ThresholdIzhikevich
 
@@ -81,16 +80,3 @@ def test_a_spike_after_a_short_gap_comes_late(published, latency):
     on = (t >= 50_000) & ~((t >= 450_000) & (t < 470_000))
     spikes = ThresholdIzhikevich([0.4], published=published).encode(frames_of(t, on[:, None])).split_by_sign()
     assert spikes[0][1] - 470 == pytest.approx(latency, abs=3.0)
-
-
-@pytest.mark.parametrize(
-    ("call", "argument"),
-    [
-        (lambda: ThresholdIzhikevich([1.0], published="6.5.2"), "published"),
-        (lambda: ThresholdIzhikevich([1.0], begin="now"), "begin"),
-        (lambda: ThresholdIzhikevich([3.0, 2.0]), "levels"),
-    ],
-)
-def test_nonsense_gets_one_clear_line(call, argument):
-    with refused(argument=argument):
-        call()

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused
 
 import taxel
 from taxel.encode import FA1, ChangeEvents
@@ -258,12 +257,6 @@ def test_what_lies_before_the_contact_is_told_apart(before, tells):
     assert (control.found.bits > 0.8) is tells
 
 
-def test_the_same_question_has_the_same_answer():
-    ask = {"encoder": ENCODER, "window_ms": 20, "windows_ms": [5], "periods_ms": [1, 5], "taxels": [], "pools": []}
-    one, two = (answer(trials_of(40), **ask, draws=2, shuffles=2, seed=5).to_dict() for _ in range(2))
-    assert one == two
-
-
 def test_events_by_fa1_do_as_well():
     found = answer(
         trials_of(40),
@@ -304,37 +297,6 @@ def test_neurons_name_touches_too():
     model = ConeRReadout(tau=30.0, bound=2.0).fit(patterns[:16], labels[:16])
     assert (model.predict(patterns[16:]) == labels[16:]).mean() >= 0.9
     assert set(model.get_params()) >= {"tau", "max_seconds"}
-
-
-@pytest.mark.parametrize(
-    ("change", "argument"),
-    [
-        ({"periods_ms": [0.5]}, None),
-        ({"window_ms": None}, None),
-        ({"windows_ms": [80]}, "windows_ms"),
-        ({"taxels": [7]}, "taxels"),
-        ({"taxels_at_ms": 3}, "taxels_at_ms"),
-        ({"classifiers": ["forest"]}, "classifiers"),
-        ({"encoder": ChangeEvents(noise_floor=1e6)}, "trials"),
-        ({"encoder": taxel.encode.LevelCrossing([5.0])}, "encoder"),
-    ],
-)
-def test_what_cannot_be_answered_is_one_clear_error(change, argument):
-    values = np.zeros((50, 1, 2))
-    values[5::10] = 100
-    frames = taxel.Frames(values, np.arange(50) * 1000)
-    events = trials_of(20)
-    if "periods_ms" in change:
-        events = [LabelledTrial(frames, "ab"[k % 2], 1000 * k, 1000 * k + 40_000) for k in range(20)]
-    ask = {"encoder": ENCODER, "window_ms": 20, "draws": 1, "shuffles": 1} | change
-    with refused(argument=argument):
-        answer(events, **ask)
-
-
-def test_trials_of_two_arrays_are_refused():
-    other = taxel.Frames(np.zeros((5, 2, 2)), np.arange(5))
-    with refused():
-        answer([*trials_of(4), LabelledTrial(other, "left first", 0)], window_ms=20)
 
 
 def test_recordings_show_their_own_period():

@@ -1,7 +1,6 @@
 """`taxel information`, as a lab would use it."""
 
 import json
-import re
 
 import numpy as np
 import pytest
@@ -9,8 +8,7 @@ from typer.testing import CliRunner
 
 import taxel
 from taxel import ProblemError
-from taxel.cli import app, main
-from taxel.cli._bar import bar, duration
+from taxel.cli import app
 from taxel.information import read_trials
 from taxel.labels import Note, beside, text_with
 
@@ -58,32 +56,6 @@ def test_a_recording_and_its_table_give_figures_and_a_page(tmp_path):
     again = run(recording, "--labels", labels, *QUICK, "--report", page)
     assert isinstance(again.exception, FileExistsError)
     assert page.read_text() == text
-
-
-def test_a_bar_shows_what_is_left(tmp_path, monkeypatch, capsys):
-    recording, labels = folder(tmp_path, 24)
-    asked = ["information", *map(str, (recording, "--labels", labels, *QUICK, "--overwrite"))]
-    report = ["--report", str(tmp_path / "page.html")]
-    with pytest.raises(SystemExit):
-        main([*asked, *report])
-    assert capsys.readouterr().err == ""
-    monkeypatch.setenv("TTY_COMPATIBLE", "1")  # as a terminal
-    with pytest.raises(SystemExit):
-        main([*asked, *report])
-    assert "drawing" in capsys.readouterr().err
-    with bar(quiet=False) as update:
-        update("reading", 0, 0)
-        update("1 ms", 0, 40)
-        update("2 ms", 10, 40)
-    assert re.search(r"2 ms .*\d s left", capsys.readouterr().err)
-    with pytest.raises(SystemExit):
-        main([*asked, *report, "--json"])
-    assert capsys.readouterr().err == ""
-
-
-@pytest.mark.parametrize(("seconds", "text"), [(0.2, "1 s"), (99, "99 s"), (150, "2 min"), (9000, "2.5 h")])
-def test_a_time_is_told_in_words(seconds, text):
-    assert duration(seconds) == text
 
 
 def test_json_holds_all_figures(tmp_path):
@@ -232,36 +204,6 @@ def test_what_is_wrong_is_one_clear_error(tmp_path, table, arguments, text):
     assert not page.exists()
 
 
-def test_recordings_that_make_no_sense_together_are_one_clear_error(tmp_path):
-    events, _ = ordered(24)
-    (tmp_path / "empty").mkdir()
-    for day in ("a", "b"):
-        (tmp_path / day).mkdir()
-        taxel.convert(events, tmp_path / day / "touches.npz")
-    wide = taxel.Events(events.t, events.x, events.y, events.p, array=taxel.Array(2, 3), intensity=events.intensity)
-    taxel.convert(wide, tmp_path / "wide.npz")
-    (tmp_path / "labels.csv").write_text(GOOD)
-    both = GOOD + GOOD.split("\n", 1)[1].replace("touches.npz", "wide.npz")
-    (tmp_path / "both.csv").write_text(both)
-    first, second = tmp_path / "a" / "touches.npz", tmp_path / "b" / "touches.npz"
-    for given, labels, text in (
-        ([first, first], "labels.csv", f"{first}: is named twice"),
-        ([first, tmp_path / "a" / ".." / "a" / "touches.npz"], "labels.csv", "is named twice"),
-        ([first, second], "labels.csv", f"labels.csv, line 2: recording 'touches.npz' may be {first} or {second}"),
-        ([tmp_path / "empty"], "labels.csv", f"{tmp_path / 'empty'}: contains no recording"),
-        ([first], "empty", f"{tmp_path / 'empty'}: is a directory; must be a .csv recording,t_us,label"),
-        ([first, tmp_path / "wide.npz"], "both.csv", "line 26: the array has 2 x 3 taxels, but that of "),
-    ):
-        done = run(*given, "--labels", tmp_path / labels, "--window-ms", "50", "--report", tmp_path / "page.html")
-        assert isinstance(done.exception, taxel.Error), done.output
-        assert text in str(done.exception)
-    done = run(first, first, "--window-ms", "50", "--report", tmp_path / "page.html")
-    assert "is named twice" in str(done.exception)
-    done = run(first, "--window-ms", "50", "--report", tmp_path / "page")
-    assert "page: the name of the report must end in .html" in str(done.exception)
-    assert not (tmp_path / "page.html").exists()
-
-
 def test_frames_without_times_are_told_so(tmp_path):
     for label in ("a", "b"):
         (tmp_path / label).mkdir()
@@ -309,39 +251,6 @@ def test_a_recording_that_the_table_does_not_name_is_said(tmp_path):
         recording, tmp_path / "forgotten.npz", "--labels", labels, "--window-ms", "20", "--report", tmp_path / "p.html"
     )
     assert "has no trial of" in str(done.exception)
-
-
-def test_a_label_that_tables_write_for_what_is_missing_is_refused(tmp_path):
-    recording, labels = folder(tmp_path, 20)
-    labels.write_text(labels.read_text().replace("left first", "NaN"))
-    done = run(recording, "--labels", labels, *QUICK, "--report", tmp_path / "page.html")
-    assert "line 3: label is 'NaN', which tables use for a missing value" in str(done.exception)
-
-
-def test_a_sensor_that_a_table_of_events_does_not_hold_is_said(tmp_path):
-    events, rows = ordered(24)
-    taxel.convert(events, tmp_path / "touches.csv")
-    labels = tmp_path / "labels.csv"
-    labels.write_text("\n".join(["t_us,label", *(f"{t},{label}" for t, label in rows)]) + "\n")
-    page = tmp_path / "page.html"
-    asked = [tmp_path / "touches.csv", "--labels", labels, *QUICK, "--pools", "2", "--report", page, "--overwrite"]
-    pooled = {}
-    for said in ((), ("--array", "4x4x5")):
-        done = run(*asked, *said, "--json")
-        assert done.exit_code == 0, done.output
-        pooled[said] = [p["taxels"] for p in json.loads(done.stdout)["taxels"] if p["kind"] == "pooled"]
-    assert list(pooled.values()) == [[32 * 32], [2 * 2]]
-
-
-def test_folders_of_labels_are_named_where_their_folder_is_given(tmp_path):
-    events, _ = ordered(4)
-    for label in ("left", "right"):
-        (tmp_path / "trials" / label).mkdir(parents=True)
-        taxel.convert(events, tmp_path / "trials" / label / "one.npz")
-    done = run(tmp_path / "trials", "--window-ms", "60", "--report", tmp_path / "page.html")
-    assert str(done.exception).endswith(
-        "trials: contains no recording; its folders left, right contain recordings: name these folders"
-    )
 
 
 def test_numbered_frames_are_refused_until_a_rate_is_given(tmp_path):

@@ -201,28 +201,6 @@ def test_the_rule_rarely_takes_a_setting_that_is_too_cheap():
     assert "loses" in said
 
 
-@pytest.mark.parametrize(
-    ("call", "argument"),
-    [
-        (lambda: estimate(["a", "a"], ["a", "b"]), "labels"),
-        (lambda: estimate(["a", "b"], ["a"]), "responses"),
-        (lambda: estimate(["a", "b"], ["a", "b"], groups=["x"]), "groups"),
-        (lambda: estimate(["a", "b"], [1, 2]), None),
-        (lambda: estimate(["a", "b"], ["a", "b"], confidence=1.0), "confidence"),
-        (lambda: folds(["a"] * 5, count=2), "labels"),
-        (lambda: folds(["a", "b"] * 2, count=10), None),
-        (
-            lambda: folds(["a", "a", "b", "b"], count=2, groups=["x", "y", "z", "z"]),
-            None,
-        ),
-        (lambda: folds(["a", "a", "b"], count=2), None),
-    ],
-)
-def test_what_cannot_be_told_is_one_clear_error(call, argument):
-    with refused(argument=argument):
-        call()
-
-
 def test_folds_are_even_and_groups_stay_whole():
     random = np.random.default_rng(2)
     labels = random.integers(0, 4, 203)

@@ -68,22 +68,6 @@ def test_a_class_that_a_training_set_lacks_is_said():
     assert isinstance(both.missing, tuple)
 
 
-@pytest.mark.parametrize(
-    ("call", "argument"),
-    [
-        (lambda: nested_predictions([[[1.0, 2.0], [3.0, 1.0]]], [3], [0, 1], count=2), "gram"),
-        (lambda: nested_predictions([np.eye(4)], [4, 4], [0, 1, 0, 1], count=2), "features"),
-        (lambda: nested_predictions([np.eye(4)], [4], [0, 1, 0, 1], count=2, ridges=[0.0]), "ridges"),
-        (lambda: nested_predictions([np.eye(4)], [4], [0, 0, 0, 0], count=2), "y"),
-        (lambda: ConeRReadout().predict([]), None),
-        (lambda: ConeRReadout().set_params(bounds=1), None),
-    ],
-)
-def test_what_cannot_be_learnt_is_one_clear_error(call, argument):
-    with refused(argument=argument):
-        call()
-
-
 def test_scikit_learn_can_clone_and_cross_validate_neurons():
     assert clone(ConeRReadout(tau=5.0)).get_params() == {"tau": 5.0, "bound": 0.3, "max_seconds": 10.0}
     patterns = [SpikeTrains.from_lists([[t], [30.0 - t]], stop=30.0) for t in np.linspace(1, 9, 12) + [0, 20] * 6]

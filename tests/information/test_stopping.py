@@ -12,8 +12,6 @@ import numpy as np
 import pytest
 from draws import mixed
 
-from taxel.cli import main
-
 from .touches import folder
 
 estimating = importlib.import_module("taxel.information.estimate")
@@ -113,25 +111,3 @@ def test_ctrl_c_ends_the_command_soon_with_the_bits_so_far(tmp_path: Path) -> No
     )
     assert re.fullmatch(r".*; period 10 ms: 0\.\d\d within 10 ms, 0\.\d\d within 60 ms", line)
     assert not (tmp_path / "page.html").exists()
-
-
-def test_ctrl_c_says_the_same_beside_json(tmp_path: Path) -> None:
-    ended = stopped(tmp_path, after=1, more=["--json"])
-    assert ended.returncode == 130
-    expected = "stopped after 1 of 3 draws; bits so far, without confidence intervals: period 1 ms: 1.00 within 10 ms"
-    assert ended.stderr.splitlines() == [expected]
-
-
-def test_ctrl_c_before_any_setting_is_done_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    recording, labels = folder(tmp_path, 20)
-
-    def stop(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(importlib.import_module("taxel.tasks.information"), "answer", stop)
-    with pytest.raises(SystemExit) as ended:
-        main(["information", str(recording), "--labels", str(labels), "--window-ms", "60"])
-    assert ended.value.code == 130
-    assert capsys.readouterr().err == "stopped before the bits of any setting were known\n"

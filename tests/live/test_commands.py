@@ -1,7 +1,6 @@
 """The commands `taxel record` and `taxel live`: when they end, what they print and with which exit code."""
 
 import json
-import re
 import signal
 import socket
 import subprocess
@@ -14,9 +13,7 @@ from loopback import free_port
 from shell import run
 
 import taxel
-from taxel import Array, Events, Neuron, Readout, wire
-from taxel.cli import main
-from taxel.encode import ContactArea
+from taxel import Array, Events, wire
 from taxel.live import Live, send
 from taxel.recording.text_options import TextOptions
 from taxel.simulate import Board, Scene, emulate
@@ -62,44 +59,6 @@ def test_taxel_record_keeps_the_registers_of_a_sensor_of_ones_own(tmp_path: Path
     # No pitch is stated.
     assert taxel.open(file).array.pitch_mm is None
     assert TextOptions(array=["4x4"]).open_one(file).array.pitch_mm is None
-
-
-@pytest.mark.parametrize("which", [("record", "own.mcap"), ("live", "--panel")])
-@pytest.mark.parametrize(
-    ("more", "reason"),
-    [
-        ([], "--rate-hz and --bits: give both"),
-        (["--rate-hz", "500", "--preset", "2 kHz"], "--rate-hz and --preset"),
-    ],
-)
-def test_a_sensor_of_ones_own_is_stated_by_rate_and_bits_alone(
-    which: tuple[str, ...],
-    more: list[str],
-    reason: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    how = ("--port", "0", "--host", LOOPBACK, "--seconds", "0.1", "--array", "4x4", "--bits", "12")
-    with pytest.raises(SystemExit) as ended:
-        main([*which, *how, *more])
-    assert ended.value.code == 2
-    assert reason in capsys.readouterr().err
-
-
-def test_a_readout_without_a_tare_says_what_to_type(tmp_path: Path) -> None:
-    rule = tmp_path / "rule.json"
-    taxel.detect.PlainRule("area", 2, noise_floor=3.0).save(rule)
-    ended = run("live", "--readout", rule, "--port", 0, "--host", LOOPBACK, "--seconds", 0.1)
-    assert ended.returncode == 2
-    assert ended.stderr.splitlines()[-1] == "taxel: plain rule without a tare; give --tare FILE or SECONDS"
-
-
-def test_the_panels_address_is_on_standard_error_where_lines_are_json() -> None:
-    ended = run("live", "--panel", "--json", "--port", 0, "--host", LOOPBACK, "--seconds", 0.1)
-    assert ended.stdout == ""
-    assert re.search(r"^panel: http://127\.0\.0\.1:\d+/#token=\w+$", ended.stderr, re.MULTILINE), ended.stderr
 
 
 def test_taxel_record_says_how_much_a_board_of_version_2_sent(tmp_path: Path) -> None:
@@ -203,64 +162,6 @@ def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path, difference
     recorded = taxel.open(tmp_path / "live.mcap")
     np.testing.assert_array_equal([line["t_us"] for line in lines], recorded.detections.t)
     np.testing.assert_array_equal(recorded.events.intensity, events.intensity)
-
-
-def test_taxel_live_prints_a_line_a_detection_where_nobody_watches(tmp_path: Path) -> None:
-    port = free_port()
-    touch().save(tmp_path / "touch.json")
-    arguments = command("live", "--readout", tmp_path / "touch.json", "--host", LOOPBACK, "--port", port)
-    arguments += ["--array", "4x4", "--guard-frames", "1e6"]
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        listening(process)
-        play(presses(6), port)
-        assert process.stdout is not None
-        # With this guard each press is reported when the next one arrives; the last one is reported at the end, if it
-        # had arrived by then.
-        lines = [process.stdout.readline() for _ in range(5)]
-        process.send_signal(signal.SIGINT)
-        rest = process.stdout.read().splitlines()
-    assert process.returncode == 0
-    told = re.compile(r" +\d+\.\d{4} s  touch +output -?\d+\.\d\d ms after it was known")
-    assert all(told.match(line) for line in lines), lines
-    last = [line for line in rest if told.match(line)]
-    assert rest[len(last)].startswith(f"{5 + len(last)} detections, "), rest
-
-
-def test_taxel_live_says_which_taxels_its_tare_does_not_know(tmp_path: Path) -> None:
-    """Begun in the middle of a stream, it hears of the taxels that change and of no others."""
-    port = free_port()
-    Readout(ContactArea(), {"contact": (Neuron(tau=0.5), np.ones(10))}).save(tmp_path / "touch.json")
-    arguments = command("live", "--readout", tmp_path / "touch.json", "--host", LOOPBACK, "--port", port)
-    arguments += ["--array", "4x4", "--tare", 0.05, "--seconds", 60]
-    with subprocess.Popen(
-        list(map(str, arguments)), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True
-    ) as process:
-        listening(process)
-        play(presses(5), port)
-        assert process.stderr is not None
-        said = next(line for line in process.stderr if "the tare has only" in line)
-        process.send_signal(signal.SIGINT)
-        process.stderr.read()
-    assert said.startswith("taxel: the tare has only the 1 of 16 taxels that changed")
-
-
-def test_taxel_live_refuses_a_tare_that_nobody_keeps(tmp_path: Path) -> None:
-    touch().save(tmp_path / "touch.json")
-    done = run("live", "--readout", tmp_path / "touch.json", "--save-tare", tmp_path / "tare.json")
-    assert done.returncode == 2
-    assert done.stderr == "taxel: --save-tare needs a fresh tare: give --tare SECONDS\n"
-
-
-def test_taxel_live_to_which_nothing_came_names_no_latency(tmp_path: Path) -> None:
-    touch().save(tmp_path / "touch.json")
-    port = free_port()
-    here = ["--host", LOOPBACK, "--port", port, "--array", "4x4", "--seconds", 0.2]
-    done = run("live", "--readout", tmp_path / "touch.json", *here)
-    assert done.returncode == 3
-    assert f"nothing arrived at UDP {LOOPBACK}:{port}" in done.stdout
-    assert "p50" not in done.stdout
-    with Live(0, host=LOOPBACK) as live:
-        assert live.counters["decode_latency"] == {"count": 0, "p50_us": None, "p99_us": None, "max_us": None}
 
 
 @pytest.mark.parametrize("version", [1, 2])

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from loopback import until
 
 import taxel
-from taxel import ProblemError
 from taxel._base.cells import seconds_of
 from taxel.live import Live
 
@@ -91,36 +90,3 @@ def test_times_live_are_those_of_the_file(tmp_path: Path, form: str, stated: str
     assert np.array_equal(frames.values, expected.values)
     # What waited in a file has no clock to compare with.
     assert summary.verdict.damaged == {}
-
-
-def test_numbers_that_are_no_frames_have_dates_too(tmp_path: Path) -> None:
-    file = tmp_path / "imu.txt"
-    file.write_text("".join(f"2024-05-01 10:15:{k:02}.010, {k}, 0.5\n" for k in range(0, 60, 5)))
-    for name, source in {"a": f"lines:{file}", "b": f"lines:{file},columns=at:x:y,time=at:iso"}.items():
-        path = tmp_path / f"{name}.mcap"
-        with Live(0, host="127.0.0.1", record=path, sources={"imu": source}) as live:
-            until(lambda live=live: live.counters["sources"]["imu"]["lines"] == 12)  # type: ignore[misc]
-            summary = live.stop()
-        assert summary.verdict.parts["imu"].damaged == {}
-        imu = taxel.open(path).sources["imu"]
-        assert imu.frames().t.tolist() == [1_714_558_500_010_000 + 1_000_000 * k for k in range(0, 60, 5)]
-        assert imu.verdict.damaged == {}
-
-
-def test_a_day_and_a_time_in_two_columns_are_added(tmp_path: Path) -> None:
-    file = tmp_path / "a.txt"
-    file.write_text("".join(f"01.05.2024;10:15:02,{k:03};{k};7\n" for k in range(10, 30, 10)))
-    with Live(sources=f"lines:{file},array=1x2,rate=100", record=tmp_path / "a.mcap") as live:
-        until(lambda: live.counters["frames"] == 2)
-    assert taxel.open(tmp_path / "a.mcap").frames().t.tolist() == [1_714_558_502_010_000, 1_714_558_502_020_000]
-
-
-def test_a_date_that_the_keys_do_not_expect_is_said(tmp_path: Path) -> None:
-    file = tmp_path / "a.txt"
-    file.write_text("2024-05-01T10:15:02,1,2\n2024-05-01T10:15:03,1,2\n")
-    with pytest.raises(ProblemError, match=r"all with a date in column 1 \(.*\): add time=1:iso"):
-        Live(sources=f"lines:{file},columns=at:a:b,array=1x2,leave_out=2", first_line_s=0.5)
-    with pytest.raises(
-        ProblemError, match=r"the unit is missing; add it, for example time=at:ms, or time=at:iso for dates"
-    ):
-        Live(sources=f"lines:{file},columns=at:a:b,array=1x2,time=at")

@@ -56,14 +56,6 @@ def line(request: pytest.FixtureRequest) -> Iterator[tuple[str, Board]]:
             yield f"127.0.0.1:{server.getsockname()[1]}", board
 
 
-def test_a_register_is_written_and_read_back(line: tuple[str, Board]) -> None:
-    place, board = line
-    with Cable(place, timeout=30) as cable:
-        assert cable.command(Command(4, 140)) == 140
-        assert cable.read(4) == 140
-    assert board.registers.ramp == 140
-
-
 def test_the_floor_is_0_for_a_while_and_the_lines_stay(line: tuple[str, Board]) -> None:
     place, board = line
     with Cable(place, timeout=30) as cable:
@@ -72,46 +64,12 @@ def test_the_floor_is_0_for_a_while_and_the_lines_stay(line: tuple[str, Board]) 
         assert (board.registers.noise_floor, board.registers.lines) == (3, 64)
 
 
-def test_a_refusal_names_the_rule(line: tuple[str, Board]) -> None:
-    place, _ = line
-    with (
-        Cable(place, timeout=30) as cable,
-        pytest.raises(DeviceError, match=r"refuses REG2 = 0x0000012D \(REG2 rule 1"),
-    ):
-        cable.command(Command(2, 301))
-
-
 def test_a_line_without_a_board_is_said() -> None:
     ours, theirs = pty.openpty()
     with Cable(os.ttyname(theirs), timeout=0.05) as cable, pytest.raises(DeviceError, match="no answer within"):
         cable.read(5)
     os.close(ours)
     os.close(theirs)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        ({"place": "ttyUSB0"}, 'place is "ttyUSB0"'),
-        ({"place": 3}, "place is 3"),
-        ({"place": "host:99999"}, 'place is "host:99999"'),
-        ({"place": "/dev/null", "baud": 5}, "baud is 5: must be a whole number from 300 to 4000000"),
-        ({"place": "/dev/null", "timeout": 0}, "timeout is 0"),
-    ],
-)
-def test_nonsense_is_refused_by_name(arguments: dict[str, object], said: str) -> None:
-    with pytest.raises(ProblemError) as refused:
-        Cable(**arguments)  # type: ignore[arg-type]
-    assert said in str(refused.value)
-
-
-def test_a_file_that_is_no_serial_port_is_refused() -> None:
-    with pytest.raises(DeviceError, match="/dev/null: no serial port"):
-        Cable("/dev/null")
-    for place in ("/dev/no-such-device", "COM250"):
-        with pytest.raises(FileNotFoundError) as refused:
-            Cable(place)
-        assert refused.value.filename == place
 
 
 def test_a_port_that_another_program_has_opened_is_refused() -> None:
@@ -229,19 +187,6 @@ def test_a_board_of_another_size_is_refused() -> None:
     os.close(theirs)
 
 
-@pytest.mark.parametrize("channels", [16, 64])
-def test_a_large_board_takes_its_presets_by_name(channels: int) -> None:
-    array, name = taxel.Array(100, 128), {16: "128 x 128, 1.3 kHz", 64: "128 x 128, 2 kHz"}[channels]
-    ours, theirs = pty.openpty()
-    serve(Board(Registers(array=array, channels=channels), array), ours, ours)
-    with Device(os.ttyname(theirs), timeout=30) as device:
-        held = device.apply(name)
-        assert (held.wire_version, held.channels, held.lines) == (2, channels, 128)
-        with pytest.raises(DeviceError, match="rule"):
-            device.apply("128 x 128, 5.2 kHz").replace(step_period=0.1)
-    os.close(theirs)
-
-
 def test_a_greeting_that_nobody_asked_for_tells_of_a_reset() -> None:
     ours, theirs = pty.openpty()
     board = Board()
@@ -301,10 +246,6 @@ def test_faults_are_counted_as_the_board_says_them() -> None:
         assert device.faults == {"queue": 5, "comparator": 12}
         assert device.set(ramp=140).ramp == 140
     os.close(theirs)
-
-
-def test_ports_have_names() -> None:
-    assert all(port.place and port.kind in ("usb", "pci", "bluetooth", "other") for port in ports())
 
 
 def test_the_command_does_all_of_it_on_an_emulated_line(tmp_path: Path) -> None:

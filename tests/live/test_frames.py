@@ -14,12 +14,11 @@ import numpy as np
 import pytest
 from loopback import until
 from numpy.typing import NDArray
-from shell import call
 
 import taxel
 from live.boards import LOOPBACK
 from taxel import Array, Frames, Tare
-from taxel.detect import Example, PlainRule, Readout, Recipe, fit, run
+from taxel.detect import PlainRule, Readout, run
 from taxel.detect.readout import run_counting
 from taxel.detections import Detection
 from taxel.encode import LevelCrossing
@@ -164,36 +163,6 @@ def test_lines_that_are_no_frame_are_counted_and_the_next_frame_is_whole(tmp_pat
     assert taxel.open(tmp_path / "a.mcap").verdict.damaged == summary.verdict.damaged
 
 
-@pytest.mark.parametrize("keys", [",array=1x3", ",columns=a:b:c", ""])
-def test_a_frame_amid_which_reading_began_is_no_fault(tmp_path: Path, keys: str) -> None:
-    with (
-        served("2,3\n1,2,3\n4,5,6\n") as address,
-        Live(sources=f"lines+tcp:{address}{keys},rate=10", record=tmp_path / "a.mcap") as live,
-    ):
-        until(lambda: live.counters["frames"] == 2)
-        summary = live.stop()
-    assert (dict(summary.verdict.damaged), dict(summary.verdict.noted)) == ({}, {})
-    assert taxel.open(tmp_path / "a.mcap").frames().values[:, 0].tolist() == [[1, 2, 3], [4, 5, 6]]
-
-
-def test_kinds_of_lines_that_are_no_frame_are_named_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = "Mat 1.0 ready\n1,2\n3\n4,5\nERR 7\n6,7\n8,9\n"
-    with served(text) as address:
-        words = (
-            "record",
-            tmp_path / "a.mcap",
-            "--source",
-            f"lines+tcp:{address},array=1x2,rate=10",
-            "--seconds",
-            "0.4",
-        )
-        code, out, err = call(capsys, *words)
-    assert code == 0
-    assert "4 frames" in out.replace("\n", " ")
-    assert err.count("2 lines of text, the first: 'Mat 1.0 ready'") == 1
-    assert err.count("1 line with another number of values, the first: '3'") == 1
-
-
 def test_a_layout_file_names_a_source(tmp_path: Path) -> None:
     layout = tmp_path / "mat.layout.toml"
     with served("t,x,a,b\n0,hi,1000,1023\n20,hi,900,1023\n") as address:
@@ -210,14 +179,6 @@ def test_a_layout_file_names_a_source(tmp_path: Path) -> None:
     layout.write_text("rows = 1\ncolumns = 2\n")
     with pytest.raises(taxel.FormatError, match=r"\[source\] place is missing"):
         Live(sources=str(layout))
-
-
-def test_readings_that_fall_are_turned(tmp_path: Path) -> None:
-    with served("1000,1023\n900,1023\n0,1020\n") as address:
-        source = f"lines+tcp:{address},array=1x2,falls=1023,rate=10"
-        with Live(sources=source, record=tmp_path / "a.mcap") as live:
-            until(lambda: live.counters["frames"] == 3)
-    assert taxel.open(tmp_path / "a.mcap").frames().values[:, 0].tolist() == [[23, 0], [123, 0], [1023, 3]]
 
 
 def test_a_tare_is_measured_and_the_recording_tells_the_same(tmp_path: Path) -> None:
@@ -268,90 +229,6 @@ def test_lines_of_the_standard_input_are_read_to_their_end(tmp_path: Path, shown
     assert len(done.stdout.splitlines()) == len(expected) > 3
 
 
-@pytest.mark.parametrize("falls", [False, True])
-def test_values_that_fall_are_named_in_the_shell(tmp_path: Path, falls: bool) -> None:
-    random = np.random.default_rng(5)
-    values = 600 + random.normal(0, 2, (900, 8, 8)).round()
-    for begin in range(200, 900, 100):
-        values[begin : begin + 30, 2:4, 3:5] += -150 if falls else 150
-    text = lines_of(values, np.arange(len(values)) * PERIOD_US)
-    words = ["record", tmp_path / "a.mcap", "--source", "lines:-,array=8x8,time=1:us"]
-    done = subprocess.run(
-        [sys.executable, "-m", "taxel", *map(str, words)],
-        input=text,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    said = done.stdout + done.stderr
-    assert done.returncode == 0, said
-    assert (
-        "values fall under touch: if smaller values mean more pressure, add ,falls=true to the source"
-        in " ".join(said.split())
-    ) == falls
-
-
-def test_the_report_says_how_many_detections_lie_outside_the_training(tmp_path: Path) -> None:
-    values = touches(np.random.default_rng(5), 2, 3, 400, "N")
-    frames = Frames(values, np.arange(len(values)) * PERIOD_US, unit="N", array=Array(2, 3))
-    risen = run(readout_of(2, 3, "N"), frames[:200]).t
-    labels = {"contact": risen[np.diff(risen, prepend=-PERIOD_US) >= PERIOD_US]}
-    learner = {"tau": 20.0, "ub": 3.0, "lb": -3.0, "delay_ms": 1.0, "after_spike": "reset"}
-    readout = fit([Example(frames[:200], labels)], Recipe(LevelCrossing([25.0]), learner, {"contact": {}}))
-    detector, path = readout.save(tmp_path / "a.json"), tmp_path / "a.mcap"
-    words = [
-        "live",
-        "--source",
-        "lines:-,array=2x3,time=1:us,unit=N",
-        "--readout",
-        detector,
-        "--record",
-        path,
-        "--json",
-    ]
-    done = subprocess.run(
-        [sys.executable, "-m", "taxel", *map(str, words), "--report", str(tmp_path / "r")],
-        input=lines_of(values, frames.t),
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    found, outside = run_counting(readout, taxel.open(path))
-    assert outside is not None
-    page = (tmp_path / "r" / "report.html").read_text()
-    counted = f"detections with an input outside what was seen in training: {outside} of {len(found)}"
-    assert (counted in page) == (outside > 0)
-
-
-def test_what_a_live_command_writes_is_replaced_only_where_it_is_told_to(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    readout, places = tmp_path / "a.json", [tmp_path / name for name in ("a.mcap", "tare.json", "r/report.html")]
-    readout_of(2, 2, "counts").save(readout)
-    (tmp_path / "r").mkdir()
-    for place in places:
-        place.write_text("an earlier one")
-    text = lines_of(np.ones((60, 2, 2)), np.arange(60) * PERIOD_US)
-    record, save_tare, report = ("--record", places[0]), ("--save-tare", places[1]), ("--report", tmp_path / "r")
-    plan = ("--readout", readout, "--tare", "0.05", "--seconds", "0.5")
-    for place, option in zip(places, (record, save_tare, (*record, *report)), strict=True):
-        with served(text) as at:
-            source = f"lines+tcp:{at},array=2x2,time=1:us,unit=counts"
-            code, _, err = call(capsys, "live", "--source", source, *plan, *option)
-        said = f"taxel: {place}: exists already; give --overwrite, or another name"
-        assert (code, err.splitlines()[-1]) == (2, said)
-    with served(text) as at:
-        source = f"lines+tcp:{at},array=2x2,time=1:us,unit=counts"
-        code, _, err = call(capsys, "live", "--source", source, *plan, *record, *save_tare, *report, "--overwrite")
-    assert code == 0, err
-    assert len(taxel.open(places[0]).frames()) == 60
-    assert Tare.load(places[1]).rest.shape == (2, 2)
-    assert places[2].read_text().startswith("<!doctype html>")
-
-
 def test_numbers_that_a_program_passes_are_frames(tmp_path: Path) -> None:
     values = touches(np.random.default_rng(5), 2, 3, 100, "N")
     path = tmp_path / "a.mcap"
@@ -393,42 +270,3 @@ def test_a_source_that_states_no_unit_is_taken_in_that_of_the_readout(tmp_path: 
         assert {source.frames().unit for source in taxel.open(path).sources.values()} == {unit}
     with Live(sources="given,array=2x2,rate=10") as live:
         assert live.unit == "counts"
-
-
-def test_where_nothing_arrives_there_is_no_empty_board(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with served("t_ms,a,b\n1,2,3\n11,4,5\n21,6,7\n") as address:
-        path = tmp_path / "a.mcap"
-        words = ("record", path, "--source", f"imu=lines+tcp:{address}", "--seconds", "0.3")
-        code, out, err = call(capsys, *words)
-    assert (code, "UDP" in err) == (0, False), out
-    recording = taxel.open(path)
-    assert (list(recording.sources), recording.frames().values[:, 0].tolist()) == (["imu"], [[2, 3], [4, 5], [6, 7]])
-    assert recording.frames().t.tolist() == [1000, 11_000, 21_000]
-    assert recording.columns == ["a", "b"]
-
-
-def test_all_sources_of_lines_may_be_silent_as_long(tmp_path: Path) -> None:
-    with served("") as left, served("") as right:
-        sources = [f"left=lines+tcp:{left},array=1x2,rate=100", f"right=lines+tcp:{right},array=1x2"]
-        with pytest.raises(taxel.ProblemError, match="no line arrived within 0 s"):
-            Live(sources=sources, record=tmp_path / "a.mcap", first_line_s=0.1)
-
-
-def test_the_command_says_which_sources_it_does_not_read_out(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    readout, path = tmp_path / "a.json", tmp_path / "a.mcap"
-    readout_of(2, 2, "as sent").save(readout)
-    text = lines_of(np.ones((40, 2, 2)), np.arange(40) * PERIOD_US)
-    with served(text) as left, served(text) as right, served("t_ms,a\n1,2\n") as imu:
-        sources = [f"{name}=lines+tcp:{at},array=2x2,time=1:us" for name, at in (("left", left), ("right", right))]
-        sources.append(f"imu=lines+tcp:{imu}")
-        words = [word for source in sources for word in ("--source", source)]
-        code, _, err = call(capsys, "live", *words, "--readout", readout, "--record", path, "--seconds", "0.3")
-    assert code == 0, err
-    told = [line for line in err.splitlines() if "recorded, but" in line]
-    assert told == [
-        "right: this source is recorded, but neither read out nor shown; a second taxel live can read it out"
-    ]
-    code, _, err = call(capsys, "detect", path, "--readout", readout, "--tare", "0.1")
-    assert code == 0, err

@@ -135,26 +135,6 @@ def test_what_comes_before_the_first_line_is_counted_and_names_no_column(tmp_pat
     assert said in out.replace("\n", " ")
 
 
-def test_without_a_first_line_the_error_says_how_much_came(tmp_path: Path) -> None:
-    place = tmp_path / "pipe"
-    with (
-        writing(place, [b"x" * 200_000]),
-        pytest.raises(taxel.ProblemError, match="200000 bytes arrived within 3 s, but no line of numbers"),
-    ):
-        Live(0, host=LOOPBACK, record=tmp_path / "a.mcap", sources={"imu": f"lines:{place}"})
-
-
-def test_of_a_pipe_that_closes_at_once_nothing_arrived(tmp_path: Path) -> None:
-    place = tmp_path / "pipe"
-    sources = {"imu": f"lines:{place},columns=a"}
-    with writing(place, []) as written, Live(0, host=LOOPBACK, record=tmp_path / "a.mcap", sources=sources) as live:
-        assert written.wait(5)
-        summary = live.stop()
-    counts = summary.counters["sources"]["imu"]
-    assert (counts["lines"], counts["bytes_in_no_line"], counts["bytes_of_unfinished_lines"]) == (0, 0, 0)
-    assert (summary.verdict.parts["imu"], summary.verdict.parts["imu"].status) == ("nothing arrived", "nothing arrived")
-
-
 @contextlib.contextmanager
 def plugged(kind: str, link: Path) -> Iterator[tuple[str, Callable[[], Callable[[bytes], bool]]]]:
     """Yield the place of a serial line, and a function that plugs it in anew and returns one that sends on it."""

@@ -87,28 +87,3 @@ def test_in_silence_the_end_is_detected() -> None:
     assert [one and one.label for one in found] == ["contact", "lift"]
     assert found[1] is not None
     assert found[1].known > events.t[-1]
-
-
-def test_commands_take_a_rule_where_they_take_a_readout(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    rule = PlainRule("area", 2, frames=2)
-    path = rule.save(tmp_path / "rule.json")
-    TARE.save(tmp_path / "tare.json")
-    events = touches(3)
-    recording = tmp_path / "touches.npz"
-    taxel.convert(events, recording)
-    truth = tmp_path / "truth.csv"
-    found = run(rule, events, tare=TARE)
-    truth.write_text("label,t_us\n" + "".join(f"contact,{t}\n" for t in found["contact"].t))
-    report = tmp_path / "report"
-    code, out, _ = call(
-        capsys, "detect", recording, "--readout", path, "--tare", tmp_path / "tare.json", "--truth", truth,
-        "--report", report, "--json",
-    )  # fmt: skip
-    assert code == 0
-    result = json.loads(out)
-    assert [one["t_us"] for one in result["detections"]] == found.t.tolist()
-    assert result["detections"][0]["slope_mv_per_ms"] is None
-    assert result["score"]["by_label"]["contact"]["missed"] == 0
-    page = (report / "report.html").read_text()
-    assert "PlainRule(area" in page
-    assert "potential" not in page

@@ -16,7 +16,7 @@ import pytest
 from loopback import free_port, until
 
 import taxel
-from taxel.live import Live, Panel
+from taxel.live import Live
 
 from .boards import LOOPBACK, SMALL, command, play, presses, touch, wait_for
 
@@ -177,69 +177,6 @@ def test_who_does_not_read_loses_lines_and_holds_nothing(tmp_path: Path) -> None
     assert len([line for line in lines if line.endswith(b"}")]) == sent["sent"], (
         "whole lines, and as many as were counted"
     )
-
-
-def test_a_reader_that_comes_late_hears_what_is_said_from_then_on(tmp_path: Path) -> None:
-    pipe, events = tmp_path / "later", presses(8)
-    os.mkfifo(pipe)
-    with listen(f"lines:{pipe}", tmp_path / "said.mcap") as live:
-        n = play(events[: 4 * 20], live.address[1])
-        wait_for(live, n)
-        until = time.monotonic() + 30
-        while live.counters["sent"][0]["lost"] < 3:
-            assert time.monotonic() < until, live.counters
-            time.sleep(0.002)
-        lost = live.counters["sent"][0]["lost"]
-        assert live.counters["sent"][0]["trouble"] == "no reader"
-        reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
-        wait_for(live, n + play(events[4 * 20 :], live.address[1]))
-        counts = live.stop().counters
-    os.set_blocking(reader, True)
-    lines = everything(reader)
-    os.close(reader)
-    assert counts["sent"][0]["sent"] == len(lines) == 8 - counts["sent"][0]["lost"]
-    assert counts["sent"][0]["lost"] in (lost, lost + 1), "one may be said before the reader is seen"
-    kept = taxel.open(tmp_path / "said.mcap").detections
-    assert [json.loads(line)["t_us"] for line in lines] == kept.t[-len(lines) :].tolist()
-
-
-@pytest.mark.parametrize(
-    ("to", "kind", "said"),
-    [
-        (
-            "nowhere",
-            taxel.ProblemError,
-            "must be serial:PLACE[,baud=RATE], lines:PATH, lines+tcp:HOST:PORT or lines+udp:HOST:PORT",
-        ),
-        ("lines+udp:9000", taxel.ProblemError, "must be a host and a port"),
-        ("serial:/dev/null,baud=fast", taxel.ProblemError, "'fast'".replace("'", '"')),
-        ("lines:/dev/null", taxel.ProblemError, "/dev/null: is not a named pipe; mkfifo creates it"),
-        ("lines:/no/such/pipe", FileNotFoundError, "/no/such/pipe"),
-        ("serial:/no/such/line", OSError, "/no/such/line"),
-        (7, taxel.ProblemError, "send is 7"),
-        ([7], taxel.ProblemError, "send is 7"),
-    ],
-)
-def test_a_destination_that_is_none_is_refused(to: object, kind: type[Exception], said: str) -> None:
-    with pytest.raises(kind) as refused:
-        Live(0, host=LOOPBACK, array=SMALL, readout=touch(), send=to)  # type: ignore[arg-type]
-    assert said in str(refused.value)
-
-
-def test_a_readout_that_the_page_chooses_sends_too(tmp_path: Path) -> None:
-    touch().save(tmp_path / "touch.json")
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
-        other.bind((LOOPBACK, 0))
-        other.settimeout(30)
-        send_to = f"lines+udp:{LOOPBACK}:{other.getsockname()[1]}"
-        with Live(0, host=LOOPBACK, array=SMALL, send=send_to, guard_frames=1e6) as live, Panel(live) as panel:
-            play(presses(3), live.address[1])
-            until(lambda: bool(live.frame.any()))
-            assert live.counters["detections"] == 0
-            panel.read_out(tmp_path / "touch.json")
-            assert panel.live is not None
-            play(presses(3), panel.live.address[1])
-            assert set(json.loads(other.recv(65_536))) == KEYS
 
 
 def test_taxel_live_sends_and_says_what_was_lost(tmp_path: Path) -> None:

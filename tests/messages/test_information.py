@@ -5,7 +5,17 @@ from refusal import messages
 
 import taxel
 from taxel import Frames, SpikeTrains
-from taxel.information import ConeRReadout, LabelledTrial, answer, estimate, folds, nested_predictions
+from taxel.information import (
+    ConeRReadout,
+    LabelledTrial,
+    answer,
+    confusion_matrix,
+    estimate,
+    folds,
+    nested_predictions,
+    panzeri_treves,
+    plug_in,
+)
 
 GRADED = [SpikeTrains.from_lists([[1.0]], values=[[2.0]], kind="graded")] * 2
 CALLS = {
@@ -16,6 +26,13 @@ CALLS = {
     "folds": lambda _: folds(["a", "b"] * 2, count=10),
     "one trial": lambda _: folds(["a", "a", "b"], count=2),
     "one group": lambda _: folds(["a", "a", "b", "b"], count=2, groups=["x", "y", "z", "z"]),
+    "groups": lambda _: estimate(["a", "b"], ["a", "b"], groups=["x"]),
+    "no number": lambda _: plug_in([[0, 0], [0, 0]]),
+    "negative number": lambda _: plug_in([[1, -2], [0, 1]]),
+    "half a number": lambda _: panzeri_treves([[0.5, 1]]),
+    "names of a matrix": lambda _: confusion_matrix(["a", 1.5], ["a", "b"], ["b"]),
+    "one class": lambda _: nested_predictions([np.eye(4)], [4], [0, 0, 0, 0], count=2),
+    "features": lambda _: nested_predictions([np.eye(4)], [4, 4], [0, 1, 0, 1], count=2),
     "ridge": lambda _: nested_predictions([np.eye(4)], [4], [0, 1, 0, 1], count=2, ridges=[0.0]),
     "not symmetric": lambda _: nested_predictions([[[1.0, 2.0], [3.0, 1.0]]], [3], [0, 1], count=2),
     "not fitted": lambda _: ConeRReadout().predict([]),

@@ -8,9 +8,11 @@ import pytest
 from refusal import messages
 
 from taxel import Array
-from taxel.simulate import Flaws, FrameSequence, Layer, Scene, SceneFile, Silence, play, truth
-from taxel.simulate.circuit import Converter
+from taxel.simulate import Board, Flaws, FrameSequence, Layer, Scene, SceneFile, Silence, play, truth
+from taxel.simulate.circuit import AdaptiveRamp, Circuit, Converter, Divider, VirtualGround
+from taxel.wire import Registers
 
+VERSION_2 = Registers(wire_version=2)
 BALL = """
 seed = 5
 [[bodies]]
@@ -77,6 +79,16 @@ CALLS = {
     "too few frames": lambda _: play([Silence(10.0)], seed=1),
     "sensor": lambda _: play([Silence(100.0)], seed=1, sensor={"exponent": 2.0}),
     "flaw": lambda _: Flaws(dead=2.0),
+    "adaptive ramp": lambda _: AdaptiveRamp(steepest=600),
+    "wire": lambda _: VirtualGround(wire_ohm=1e-5),
+    "conductance": lambda _: VirtualGround().volts([[1.0, -2.0]]),
+    "no line": lambda _: Divider().volts(np.zeros((2, 0))),
+    "step of a ramp": lambda _: Converter(ramp=200),
+    "voltage": lambda _: Converter().ticks([[np.nan]]),
+    "readout of a board": lambda _: Circuit(readout=Divider()),
+    "asynchronous, version": lambda _: Board(asynchronous=True),
+    "asynchronous, receptor": lambda _: Board(VERSION_2.replace(mechanoreceptor=True), asynchronous=True),
+    "asynchronous, circuit": lambda _: Board(VERSION_2, circuit=Circuit(), asynchronous=True),
     "layer": lambda _: Layer({"colour": 1.0}),
     "indentation": lambda _: Layer().press(np.zeros((3, 3))),
     "ramp": lambda _: Converter(ramp=0),

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from refusal import refused
 from scipy.optimize import brentq
 
-import taxel
 from taxel import Neuron, SpikeTrains
 
 
@@ -250,49 +249,6 @@ def test_keep_fires_again_at_once_while_the_potential_stays_above_the_threshold(
     fired = Neuron(tau=10.0, theta_plus=0.0).run([3.0], trains)
     assert np.diff(fired[:5]) == pytest.approx([3.0] * 4, abs=1e-12)
     assert len(Neuron(tau=10.0, theta_plus=0.0, after_spike="reset").run([3.0], trains)) == 1
-
-
-@pytest.mark.parametrize(
-    ("arguments", "argument"),
-    [
-        (([1.0, 2.0], [[1.0]]), "weights"),
-        (([float("inf")], [[1.0]]), "weights"),
-        (([[1.0]], [[1.0]]), "weights"),
-    ],
-)
-def test_weights_that_make_no_sense_are_one_clear_error(arguments, argument):
-    weights, times = arguments
-    trains = SpikeTrains.from_lists(times, stop=10.0)
-    with refused(argument=argument):
-        Neuron().run(weights, trains)
-    with refused(argument=argument):
-        Neuron().potential(weights, trains, [1.0])
-
-
-def test_other_arguments_that_make_no_sense_are_one_clear_error_each():
-    trains = SpikeTrains.from_lists([[1.0]], stop=10.0)
-    signed = SpikeTrains.from_lists([[1.0]], stop=10.0, values=[[-1.0]])
-    for call, argument in (
-        (lambda: Neuron().run([1.0], signed), "trains"),
-        (lambda: Neuron().potential([1.0], signed, [1.0]), "trains"),
-        (lambda: Neuron().run([1.0], trains, threshold=0), "threshold"),
-        (lambda: Neuron().run([1.0], trains, threshold=float("nan")), "threshold"),
-        (
-            lambda: Neuron().potential([1.0], trains, [2.0, 1.0]),
-            "times",
-        ),
-        (lambda: Neuron().potential([1.0], trains, [float("nan")]), "times"),
-        (lambda: Neuron().potential([1.0], trains, [1.0], spikes=[5.0, 3.0]), "spikes"),
-        (lambda: Neuron(tau=-1), "tau"),
-        (lambda: Neuron(time="often"), "time"),
-    ):
-        with refused(argument=argument):
-            call()
-
-
-def test_the_defaults_that_python_shows_are_those_of_the_core():
-    checked = taxel._core.check_parameters
-    assert checked("neuron", Neuron()._json()) == checked("neuron", "{}")
 
 
 def test_neurons_compare_and_print_by_their_parameters():

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from refusal import refused
 
 from taxel import Neuron, SpikeTrains
-
-TRAINS = SpikeTrains.from_lists([[1.0], [2.0]], stop=10.0)
 
 
 @pytest.mark.parametrize("time", ["grid", "continuous"])
@@ -33,25 +30,3 @@ def test_nothing_gives_nothing(time: str) -> None:
     assert len(neuron.run_many(np.ones((0, 2)), nothing)) == 0
     assert len(neuron.run_many(np.ones((5, 0)), SpikeTrains.from_lists([], stop=10.0))) == 5
     assert len(neuron.run_many(np.ones((1, 1)), SpikeTrains.from_lists([[0.0]], 0.0, 0.0)).times) == 0
-
-
-@pytest.mark.parametrize(
-    ("weights", "trains", "threshold", "argument"),
-    [
-        ([1.0, 2.0], TRAINS, 1.0, "weights"),
-        ([[1.0, 2.0, 3.0]], TRAINS, 1.0, "weights"),
-        ([[1.0, 2.0], [1.0, np.nan]], TRAINS, 1.0, "weights"),
-        (np.array([[1.0, 2.0], [np.inf, 0.0]], np.float32), TRAINS, 1.0, "weights"),
-        ([[1.0], [2.0, 3.0]], TRAINS, 1.0, "weights"),
-        (None, TRAINS, 1.0, "weights"),
-        ([[1.0, 2.0]], TRAINS, 0.0, "threshold"),
-        ([[1.0, 2.0]], TRAINS, "a", "threshold"),
-        ([[1.0]], SpikeTrains.from_lists([[1.0]], values=[[1.0]]), 1.0, "trains"),
-        ([[1.0]], [[1.0]], 1.0, "trains"),
-    ],
-)
-def test_nonsense_is_one_error_of_its_argument(
-    weights: object, trains: object, threshold: object, argument: str
-) -> None:
-    with refused(argument=argument):
-        Neuron().run_many(weights, trains, threshold=threshold)

@@ -69,20 +69,6 @@ def test_nan_is_refused_by_name(name):
         NAN[name](float("nan"))
 
 
-def test_detections_without_a_slope_are_carried_on():
-    found = Detections(["a", "b"], [1, 2], [2, 3])
-    assert np.isnan(found[1:].slope).all()
-    assert np.isnan((found + found).slope).all()
-    assert np.isnan(Detections.from_numpy(found.to_numpy()).slope).all()
-
-
-def test_faults_are_shares_together_too():
-    with refused(argument="lost"):
-        Faults(lost=1.5)
-    with refused():
-        Faults(lost=0.6, cut=0.6)
-
-
 @pytest.mark.parametrize("wrong", ["soon", float("nan"), -1.0, float("inf")])
 def test_arguments_that_a_call_does_not_need_are_checked_too(tmp_path, wrong):
     events = taxel.Events([0, 200], [0, 1], [0, 1], [True, False], array=taxel.Array(2, 2))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from refusal import refused
 
 from taxel import Array
 from taxel._core import ProblemError
@@ -44,28 +43,6 @@ def test_the_mask_is_a_copy_that_cannot_be_changed() -> None:
 
 def test_the_thesis_array_is_64_by_64() -> None:
     assert Array.thesis() == Array(64, 64, 2.67, name="thesis 64x64")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "argument"),
-    [
-        ((0, 5), "rows"),
-        ((5, -1), "columns"),
-        ((5, 65_536), "columns"),
-        ((5.5, 5), "rows"),
-        ((True, 5), "rows"),
-        ((5, 5, 0), "pitch_mm"),
-        ((5, 5, -1.0), "pitch_mm"),
-        ((5, 5, float("nan")), "pitch_mm"),
-        ((5, 5, float("inf")), "pitch_mm"),
-        ((5, 5, 1.0, np.ones((4, 5), bool)), "exists"),
-        ((5, 5, 1.0, "all"), "exists"),
-        ((2, 2, 1.0, [[2, 0], [0, 1]]), "exists"),
-    ],
-)
-def test_nonsense_is_one_error_that_names_the_argument(arguments: tuple, argument: str) -> None:
-    with refused(argument=argument):
-        Array(*arguments)
 
 
 @pytest.mark.parametrize(("x", "y"), [(8, 0), (-1, 0), (0, 8), ("a", 0), ([0, 1], [0, 1, 2]), (0.5, 0), (None, 0)])

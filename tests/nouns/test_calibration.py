@@ -156,12 +156,6 @@ def test_two_loads_that_two_exponents_fit_are_said_to_be_too_few():
     assert json.loads(found.to_json())["curve"]["power"]["exponent"] == pytest.approx(0.5, rel=1e-3)
 
 
-def test_one_load_fits_itself_and_has_no_residual():
-    found = Calibration.fit([Load(frames(2.0), 6.0)], date=DAY)
-    assert found.residual is None
-    assert found.apply(frames(4.0)).total() == pytest.approx([12.0])
-
-
 def test_uniform_pressure_gives_each_taxel_its_own_gain():
     own = np.linspace(0.5, 2.0, 12).reshape(ARRAY.shape)
     loads = [Load(frames(20.0 / own), 20.0, "kPa"), Load(frames(60.0 / own), 60.0, "kPa")]
@@ -189,15 +183,6 @@ def test_a_law_is_corrected_by_a_known_load():
     found = Calibration.fit([Load(read, 2 * 12 * 0.4)], start=law, date=DAY)
     assert found.apply(read).values == pytest.approx(0.8, rel=1e-5)
     assert "law" in json.loads(found.to_json())["curve"]
-
-
-def test_a_table_of_each_taxel_is_a_table_by_taxel():
-    own = np.linspace(1.0, 3.0, 12).reshape(ARRAY.shape)
-    table = Calibration.table(ARRAY, [5 * own, 20 * own], [1.0, 8.0], unit="kPa", date=DAY)
-    assert table.apply(frames(5 * own)).values == pytest.approx(1.0)
-    assert table.apply(frames(12.5 * own)).values == pytest.approx(4.5)
-    with refused(argument="readings"):
-        Calibration.table(ARRAY, np.ones((1, 3, 3)), [1.0], unit="N")
 
 
 # what lies beside a recording
@@ -244,54 +229,6 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
     table = Calibration.table(array, [10.0], [1.0], unit="N", rest=[[2.0, np.nan, 0.0]], floor=1.0)
     values = table.apply(Frames([[[7.0, 7.0, 7.0]], [[3.0, 0.0, 0.0]]], [0, 1], array=array)).values
     assert values.tolist() == [[[0.5, 0.0, 0.0]], [[0.0, 0.0, 0.0]]]
-
-
-@pytest.mark.parametrize(
-    ("call", "argument"),
-    [
-        (Calibration, None),
-        (lambda: Calibration.fit([]), "loads"),
-        (lambda: Calibration.fit([Load(frames(0.0), 1.0)]), None),
-        (lambda: Calibration.fit([Load(frames(1.0), -1.0)]), None),
-        (lambda: Calibration.fit([Load(frames(1.0), 1.0, "kg")]), "unit"),
-        (lambda: Calibration.fit([Load(frames(1.0), 1.0, "N", (9, 0))]), "x"),
-        (lambda: Calibration.fit([Load(frames(1.0), 1.0)], each=True), "each"),
-        (
-            lambda: Calibration.fit([Load(frames(1.0), 1.0), Load(frames(1.0, "ticks"), 1.0)]),
-            None,
-        ),
-        (
-            lambda: Calibration.fit([Load(frames(1.0, "N"), 1.0)]),
-            "reading_unit",
-        ),
-        (
-            lambda: Calibration.table(ARRAY, [1.0, 1.0], [1.0, 2.0], unit="N"),
-            None,
-        ),
-        (lambda: Calibration.table(ARRAY, [1.0], [1.0, 2.0], unit="N"), None),
-        (
-            lambda: Calibration.table(ARRAY, [0.0, 1.0], [1.0, 2.0], unit="N"),
-            None,
-        ),
-        (lambda: Calibration.table(ARRAY, [1.0], [1.0], unit="bar"), "unit"),
-        (lambda: Calibration.law(ARRAY, sensor={"exponent": 2.0}), None),
-        (lambda: Calibration.law(ARRAY, sensor={"foam": 1.0}), None),
-        (lambda: Calibration.law(ARRAY, ramp=0.0), "ramp"),
-        (
-            lambda: Calibration.law(ARRAY, date="yesterday"),
-            "date",
-        ),
-        (lambda: Calibration.law(ARRAY, rest=[[1.0]]), "rest"),
-        (lambda: Calibration.law(ARRAY, gain=0.0), "gain"),
-        (
-            lambda: Calibration.law(ARRAY).apply(frames(1.0)),
-            None,
-        ),
-    ],
-)
-def test_what_makes_no_sense_is_said(call, argument):
-    with refused(argument=argument):
-        call()
 
 
 @pytest.mark.parametrize("entry", ["unit", "of", "curve", "array", "gain", "rest", "date", "floor", "loads", "taxel"])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from unittest.mock import ANY
 
 import matplotlib as mpl
 import numpy as np
@@ -12,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from refusal import refused
 
-import taxel
 from taxel import Array, Events, Frames
 
 mpl.use("Agg")
@@ -216,90 +214,3 @@ def test_held_intensities_are_the_last_that_came_at_each_time() -> None:
 def test_repr_is_one_line_and_names_the_count(events: Events) -> None:
     assert repr(events).startswith(f"Events({len(events)} event{'s' * (len(events) != 1)}, ")
     assert "\n" not in repr(events)
-
-
-def test_every_noun_draws_itself() -> None:
-    import matplotlib.pyplot as plt
-
-    ax = plt.subplots()[1]
-    events = Events([0, 5], [1, 2], [3, 4], [1, 0], array=GRID, intensity=[3, 4])
-    assert events.plot(ax) is ax
-    assert events[:0].plot() is not None
-    plt.close("all")
-
-
-GOOD = {"t": [0, 5], "x": [1, 2], "y": [3, 4], "p": [True, False]}
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "argument"),
-    [
-        ("t", [0, float("nan")], "t"),
-        ("t", [0, 0.5], "t"),
-        ("t", [[0, 5]], "t"),
-        ("t", [0, 2**63], "t"),
-        ("t", [0], None),
-        ("x", [1, -2], "x"),
-        ("x", [1, 12], None),
-        ("x", [1, 70_000], "x"),
-        ("x", [1, 2.5], "x"),
-        ("x", "ab", "x"),
-        ("y", [3, 8], None),
-        ("y", [3, 4, 5], None),
-        ("y", object(), "y"),
-        ("p", [2, 0], "p"),
-        ("p", [0.5, 0], "p"),
-        ("p", [True], None),
-        ("array", None, "array"),
-        ("array", (8, 12), "array"),
-        ("intensity", [1], None),
-        ("intensity", [1, -1], "intensity"),
-        ("intensity", [1, 65_536], "intensity"),
-        ("present", [True, False], None),
-        ("markers", [3], "markers"),
-        ("markers", [(0.5, True)], "markers"),
-        ("markers", [("now", True)], "markers"),
-    ],
-)
-def test_nonsense_in_a_column_is_one_error_that_names_it(name: str, value: object, argument: str) -> None:
-    arguments = {**GOOD, "array": GRID, name: value}
-    with refused(argument=argument):
-        Events(**arguments)
-
-
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda e: e.between(2, 1),
-        lambda e: e.between(0, float("nan")),
-        lambda e: e.region(3, slice(2)),
-        lambda e: e.region(slice(0, 8, 2), slice(2)),
-        lambda e: e[1.5],
-        lambda e: e[[0, 9]],
-        lambda e: e[np.array([True])],
-        lambda e: e[[[0, 1]]],
-        lambda e: Frames.from_events(e, 0),
-        lambda e: Frames.from_events(e, -5),
-        lambda e: Frames.from_events(e, 100, 0, float("nan")),
-        lambda e: Frames.from_events(e, 1, 0, 10**15),
-        lambda e: Frames.from_events(Events([0], [1], [2], [1], array=GRID), 100),
-        lambda e: Events.from_numpy(np.zeros(3), GRID),
-        lambda e: Events.from_numpy(e.to_numpy(), None),
-        lambda e: Events.from_tonic(np.zeros(3, [("x", "i4")]), GRID),
-        lambda e: Events.from_faery(e.to_numpy(), GRID),
-    ],
-)
-def test_nonsense_in_a_method_is_one_error(call) -> None:
-    events = Events(**GOOD, array=GRID, intensity=[1, 2])
-    with refused(argument=ANY):
-        call(events)
-
-
-def test_a_taxel_that_tonic_cannot_hold_is_refused() -> None:
-    wide = Events([0], [40_000], [0], [True], array=Array(1, 50_000))
-    with refused(argument="x"):
-        wide.to_tonic()
-
-
-def test_events_are_part_of_the_public_face() -> None:
-    assert taxel.Events is Events

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from unittest.mock import ANY
-
 import matplotlib as mpl
-import matplotlib.pyplot as plt
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from refusal import refused
 
-from taxel import Array, Events, Frames
+from taxel import Array, Frames
 
 mpl.use("Agg")
 
@@ -94,51 +89,3 @@ def test_repr_is_one_line(frames: Frames) -> None:
     count = "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
     assert repr(frames).startswith(f"Frames({count} of {frames.array.rows} x {frames.array.columns} ")
     assert "\n" not in repr(frames)
-
-
-def test_frames_draw_themselves() -> None:
-    frames = Frames(np.arange(12).reshape(3, 2, 2), [0, 10, 20])
-    ax = plt.subplots()[1]
-    assert frames.plot(ax=ax) is ax
-    for at, title in ((-5, "0.000 ms"), (0, "0.000 ms"), (15, "0.010 ms"), (99, "0.020 ms"), (None, "0.020 ms")):
-        assert frames.plot(at).get_title() == title
-        plt.close("all")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "argument"),
-    [
-        ({"values": np.zeros((2, 2))}, "values"),
-        ({"values": [[["a"]]]}, "values"),
-        ({"values": np.zeros((2, 0, 3))}, "rows"),
-        ({"t": [0]}, "t"),
-        ({"t": [0, 0]}, "t"),
-        ({"t": [5, 3]}, "t"),
-        ({"t": [0, 0.5]}, "t"),
-        ({"t": [0, np.nan]}, "t"),
-        ({"unit": ""}, "unit"),
-        ({"array": Array(9, 9)}, None),
-    ],
-)
-def test_nonsense_in_an_argument_is_one_error_that_names_it(arguments: dict, argument: str) -> None:
-    good = {"values": np.zeros((2, 2, 3)), "t": [0, 1]}
-    with refused(argument=argument):
-        Frames(**{**good, **arguments})
-
-
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda f: f[0],
-        lambda f: f[::-1],
-        lambda f: f.between(2, 1),
-        lambda f: f.region(0, 0),
-        lambda f: f.region(slice(3, 3), slice(None)),
-        lambda f: f[:0].plot(),
-        lambda f: Frames.from_events(f, 10),
-        lambda f: Frames.from_events(Events([0], [0], [0], [1], array=Array(2, 2)), 10),
-    ],
-)
-def test_nonsense_in_a_method_is_one_error(call) -> None:
-    with refused(argument=ANY):
-        call(Frames(np.zeros((2, 2, 3)), [0, 1]))

@@ -64,28 +64,6 @@ def test_nwb_files_and_neo_trains_without_a_kind_are_signed(tmp_path: Path) -> N
         SpikeTrains.from_nwb(tmp_path / "b.nwb")
 
 
-@pytest.mark.parametrize(
-    ("values", "kind", "argument"),
-    [
-        ([1.0, float("nan")], "graded", "values"),
-        ([1.0, float("-inf")], "graded", "values"),
-        ([1e39, 1.0], "graded", "values"),
-        ([1.0, 0.0], "graded", "values"),
-        ([1.0, -0.0], "graded", "values"),
-        ([1.0, 1e-60], "graded", "values"),
-        ([1.0], "graded", "values"),
-        (None, "graded", None),
-        (None, "signed", None),
-        ([1.0, 1.0], "unsigned", None),
-        ([1.0, 1.0], "loud", "kind"),
-        ([1.0, 1.0], 3, "kind"),
-    ],
-)
-def test_values_must_be_those_of_the_kind(values: object, kind: object, argument: str) -> None:
-    with refused(argument=argument):
-        SpikeTrains([1.0, 2.0], [0, 2], 0.0, 5.0, values, kind=kind)
-
-
 @given(some(), some())
 def test_trains_side_by_side_are_the_inputs_of_one_neuron(a: SpikeTrains, b: SpikeTrains) -> None:
     both = SpikeTrains.side_by_side([a, b])

@@ -18,8 +18,6 @@ from taxel.labels import TURN_US
 from taxel.live._requests.labels import LabelRequests
 from taxel.live._shown_files import Opening
 from taxel.recording.beside import is_label_table
-from taxel.recording.opening import is_recording
-from taxel.tasks.labels import references
 
 ARRAY = {"rows": 64, "columns": 64, "pitch_mm": 2.67, "name": "thesis 64x64"}
 BEGAN_NS = 1_700_000_000_000_000_000
@@ -241,29 +239,6 @@ def test_a_table_of_a_spreadsheet_is_the_one_with_commas(tmp_path: Path, separat
     assert is_label_table(place)
 
 
-def test_a_cell_in_a_column_without_a_name_is_refused_and_an_empty_one_is_not(tmp_path: Path) -> None:
-    place = tmp_path / "labels.csv"
-    place.write_text("label,t_us,\nheel,5,\n")
-    assert [row.others for row in taxel.Labels(place).rows] == [()]
-    place.write_text("label,t_us,,\nheel,5,late,\n")
-    with refused(taxel.FormatError, place=Place("labels.csv", line=2)):
-        taxel.Labels(place)
-
-
-@pytest.mark.parametrize("text", [b"", b"\n \n", b"\xef\xbb\xbf", b"\xef\xbb\xbf\r\n"])
-@pytest.mark.parametrize("name", ["walk.notes.csv", "labels.csv"])
-def test_an_empty_table_has_no_labels(text: bytes, name: str, tmp_path: Path) -> None:
-    made = record(tmp_path / "walk.mcap", 0, 1.0)
-    place = tmp_path / name
-    place.write_bytes(text)
-    table = taxel.Labels(place)
-    assert (table.rows, table.removed, table.recordings) == ((), (), ())
-    assert taxel.open(made.path).notes == made.notes == ()
-    # It is no recording of its folder.
-    assert [one.path for one in taxel.open_all(tmp_path)] == [made.path]
-    assert not is_recording(place)
-
-
 GERMAN = [["Zeit", "Ereignis"], ["02.01.1970 00:00:00,5", "Fuß auf"], ["02.01.1970 00:00:01,25", "Abheben"]]
 
 
@@ -338,15 +313,6 @@ def test_feet_are_named_in_a_column_of_another_name(tmp_path: Path, name: str, c
     # Other texts are a remark.
     place.write_text(f"Aufnahme;Zeit [s];{name};Ereignis\ngang;0,3;bare;heel\n")
     assert [row.source for row in taxel.Labels(place).rows] == [""]
-
-
-def test_numbers_of_trials_name_no_recording_and_the_columns_are_said(tmp_path: Path) -> None:
-    made = [record(tmp_path / f"{name}.mcap", 0, 1.0) for name in "ab"]
-    place = tmp_path / "given" / "labels.csv"
-    place.parent.mkdir()
-    place.write_text("Trial;Ereignis;Zeit [s]\n1;auf;0,3\n")
-    with refused(argument="labels"):
-        references(place, made)
 
 
 def test_a_table_of_another_program_is_no_recording_of_its_folder(tmp_path: Path) -> None:

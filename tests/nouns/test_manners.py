@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import subprocess
 import sys
-from collections.abc import Callable
 from typing import Any
 
 import matplotlib as mpl
@@ -13,7 +12,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from refusal import refused
 
 import taxel
 from taxel import Array, Detections, Events, Frames, SpikeTrains
@@ -115,20 +113,6 @@ def test_trains_of_both_are_merged_train_by_train(seed: int, signed: bool) -> No
 
 def _values(of: SpikeTrains, k: int) -> np.ndarray:
     return np.ones(len(of[k])) if of.values is None else of.values[of.offsets[k] : of.offsets[k + 1]]
-
-
-@pytest.mark.parametrize(
-    "add",
-    [
-        lambda: drawn(1, 3) + Events([], [], [], [], array=Array(3, 5)),
-        lambda: trains(1, signed=True) + trains(1, signed=False),
-        lambda: trains(1, signed=True) + trains(1, signed=True, n=4),
-        lambda: found(1, 3) + found(1, 3, said=True),
-    ],
-)
-def test_what_does_not_go_together_is_refused(add: Callable[[], Any]) -> None:
-    with refused():
-        add()
 
 
 @pytest.mark.parametrize("noun", [drawn(1, 3), trains(1, signed=True), found(1, 3)])

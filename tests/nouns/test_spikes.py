@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 from pathlib import Path
-from unittest.mock import ANY
 
 import matplotlib as mpl
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
@@ -17,7 +15,7 @@ from refusal import refused
 from taxel import SpikeTrains
 from taxel._base.arguments import column
 from taxel._base.errors import Place
-from taxel._core import FormatError, ProblemError
+from taxel._core import FormatError
 
 mpl.use("Agg")
 
@@ -219,41 +217,6 @@ def test_repr_is_one_line(trains: SpikeTrains) -> None:
     assert "\n" not in repr(trains)
 
 
-def test_trains_draw_themselves() -> None:
-    ax = plt.subplots()[1]
-    assert SpikeTrains.from_lists([[1.0], []], stop=5.0).plot(ax) is ax
-    SpikeTrains.from_lists([[1.0, 2.0]], values=[[1, -1]]).plot()
-    SpikeTrains.from_lists([]).plot()
-    plt.close("all")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "argument"),
-    [
-        (([[1.0, float("nan")]],), None),
-        (([[1.0], [float("inf")]],), None),
-        (([[5.0, 3.0]],), None),
-        (([[5.0]], 6.0), None),
-        (([[5.0]], 0.0, 4.0), None),
-        (([[5.0]], 0.0, float("nan")), "stop"),
-        (([[5.0]], float("-inf"), 9.0), None),
-        (([[5.0]], "0"), "start"),
-        (([[5.0]], 0.0, "9"), "stop"),
-        (([["a"]],), "times"),
-        (([[[1.0, 2.0]]],), "times"),
-        ((3,), "times"),
-        ((None,), "times"),
-        (([None],), "times"),
-        (([[1.0]], 0.0, 2.0, [[1.0, 2.0]]), "values"),
-        (([[1.0]], 0.0, 2.0, 3), "values"),
-        (([[1.0]], 0.0, 2.0, [["a"]]), "values"),
-    ],
-)
-def test_nonsense_in_an_argument_is_one_error_with_its_place(arguments: tuple, argument: str) -> None:
-    with refused(argument=argument):
-        SpikeTrains.from_lists(*arguments)
-
-
 def test_trains_are_converted_together_and_not_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = []
     for module in ("spikes.trains", "_base.columns"):
@@ -264,39 +227,6 @@ def test_trains_are_converted_together_and_not_one_by_one(monkeypatch: pytest.Mo
     assert set(seen) == {"times", "values", "offsets"}
     with refused(argument="times"):
         SpikeTrains.from_lists([[0.5]] * 700 + [["soon"]] + [[0.5]] * 300)
-
-
-@pytest.mark.parametrize(
-    ("offsets", "values"),
-    [([0, 2, 1], None), ([1, 2], None), ([0, 3], None), ([], None), ([0, -1, 2], None), ([0, 2], [1.0]), ("ab", None)],
-)
-def test_offsets_and_values_must_fit(offsets: object, values: object) -> None:
-    with pytest.raises(ProblemError):
-        SpikeTrains([1.0, 2.0], offsets, 0.0, 5.0, values)
-
-
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda s: s[1.0],
-        lambda s: s.between(3, 2),
-        lambda s: s.between(float("nan"), 2),
-        lambda s: s.between(float("-inf"), 2),
-        lambda s: s.select([5]),
-        lambda s: s.select([-1]),
-        lambda s: s.select([True]),
-        lambda s: s.select([0.5]),
-        lambda s: SpikeTrains.from_neo([3]),
-        lambda s: s.delayed([]),
-        lambda s: s.delayed([-1.0]),
-        lambda s: s.delayed([2.0, 1.0]),
-        lambda s: s.delayed([1.0, 1.0]),
-        lambda s: s.delayed([0.0, float("inf")]),
-    ],
-)
-def test_nonsense_in_a_method_is_one_error(call) -> None:
-    with refused(argument=ANY):
-        call(SpikeTrains.from_lists([[1.0, 2.0], []], stop=5.0))
 
 
 def test_a_train_that_is_not_there_is_an_index_error() -> None:

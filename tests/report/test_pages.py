@@ -59,14 +59,6 @@ def test_a_figure_of_many_marks_stays_small_and_keeps_its_words(draw, marks):
     assert ">weight, mV</text>" in html
 
 
-def test_text_of_a_figure_is_text_in_the_page():
-    figure, axes = axes_of()
-    axes.set_title("</text><script>alert(1)</script>")
-    html = picture(figure)
-    assert "<script" not in html
-    assert "&lt;/text&gt;&lt;script&gt;alert(1)&lt;/script&gt;</text>" in html
-
-
 def page(*figures):
     return detections(drawn={"contact": [picture(figure) for figure in figures]})
 

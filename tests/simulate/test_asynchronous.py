@@ -10,7 +10,7 @@ import pytest
 from refusal import refused
 
 import taxel
-from taxel.simulate import Board, FrameSequence, Scene, Silence, Version2, emulate, play, truth
+from taxel.simulate import Board, FrameSequence, Scene, Silence, Version2, play, truth
 from taxel.simulate.circuit import Circuit, VirtualGround
 from taxel.wire import Registers
 
@@ -111,22 +111,6 @@ def test_an_array_by_itself_hears_the_same_touch_as_a_scanned_one():
         assert 0 < touched[0] - contact < 2000
         assert played.words == 0 < played.bytes
     assert abs(np.percentile(alone.events.t, 50) - np.percentile(scanned.events.t, 50)) < 30_000
-
-
-def test_nonsense_is_refused_in_one_line():
-    version_2 = Registers(wire_version=2)
-    with refused(argument="asynchronous"):
-        Board(asynchronous=True)
-    with refused(argument="asynchronous"):
-        Board(version_2, previous="last_sample", asynchronous=True)
-    with refused(argument="asynchronous"):
-        Board(version_2.replace(mechanoreceptor=True), asynchronous=True)
-    with refused(argument="asynchronous"):
-        Board(version_2, circuit=Circuit(), asynchronous=True)
-    with refused(argument="asynchronous"):
-        emulate("127.0.0.1:9", [Silence(60.0)], wire=2, circuit=Circuit(), asynchronous=True)
-    with refused(argument="asynchronous"):
-        play([Silence(60.0)], seed=1, wire=1, asynchronous=True)
 
 
 def test_a_board_alone_and_in_a_play_read_through_the_circuit():

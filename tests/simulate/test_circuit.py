@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from refusal import refused
 
 import taxel
 from taxel.simulate.circuit import AdaptiveRamp, Circuit, Converter, Divider, Fabric, VirtualGround
@@ -326,27 +325,3 @@ def test_the_ramp_turns_steep_where_a_taxel_moves_and_gentle_where_none_does():
     assert np.median(during) < 100
     assert (after == 400).all()
     assert np.diff(seen.t_us) == pytest.approx(16 * (1.0 + 4 * seen.ramp[:-1] / 300), rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "argument"),
-    [
-        (lambda: AdaptiveRamp(steepest=600), "steepest"),
-        (lambda: AdaptiveRamp().convert(np.ones((9, 4, 4)), period_us=0.0), "period_us"),
-        (lambda: VirtualGround(wire_ohm=1e-5), "wire_ohm"),
-        (
-            lambda: VirtualGround().volts([[1.0, -2.0]]),
-            None,
-        ),
-        (lambda: VirtualGround().volts([1.0]), "conductance_us"),
-        (lambda: Divider().volts(np.zeros((2, 0))), "conductance_us"),
-        (lambda: Converter(ramp=200), "step_us"),
-        (lambda: Converter().ticks([[np.nan]]), "volts"),
-        (lambda: Converter().ticks([[1.0, -1.1e6]]), "volts"),
-        (lambda: Converter().trace([1.0]), None),
-        (lambda: Circuit(readout=Divider()), "readout"),
-    ],
-)
-def test_nonsense_is_one_clear_error(wrong, argument):
-    with refused(argument=argument):
-        wrong()

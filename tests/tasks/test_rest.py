@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-import shlex
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +18,7 @@ from taxel.detect import PlainRule
 from taxel.live._requests.training import TrainingRequests
 from taxel.live._shown_files import Opening, ShownFiles
 from taxel.tasks import detect, rest
-from taxel.tasks.rest import UnknownRestError, tare_before, tare_if_any
+from taxel.tasks.rest import tare_before, tare_if_any
 
 from .recordings import board, mat, trials
 
@@ -205,46 +203,6 @@ def test_a_recording_at_rest_is_a_tare(tmp_path: Path, begin_us: int) -> None:
     assert "rule.json: is a taxel plain rule, not a tare" in refused.stderr
 
 
-def test_a_warning_about_the_rest_names_a_command_that_takes_it(tmp_path: Path) -> None:
-    """Forces that do not rest near 0 in a quiet stretch behind the recording's beginning."""
-    frames, _ = pressed(1)
-    values = np.maximum(frames.values - 50, 0) / 10 + np.random.default_rng(1).uniform(4, 8, (6, 6))
-    values[:3, 1:3, 1:3] += 40.0
-    place = tmp_path / "a walk.npz"
-    taxel.convert(Frames(values, frames.t, unit="N", array=frames.array), place)
-    (line,) = taxel.tasks.info(taxel.open(place), None).warnings
-    found = re.search(
-        r"give --tare rest\.npz to subtract the values of this stretch; to make this file, run: (taxel cut .*)$", line
-    )
-    assert found is not None
-    _, *words = shlex.split(found[1])
-    words[2] = str(tmp_path / "rest.npz")
-    assert run(*words).returncode == 0
-    tare = rest(taxel.open(place), tmp_path / "rest.npz").tare
-    assert np.abs(tare.rest).min() > 4.0
-
-
-def test_frames_too_far_apart_for_a_quiet_half_second_are_said(tmp_path: Path) -> None:
-    values = np.random.default_rng(1).normal(12.5, 0.1, (60, 1, 1))
-    taxel.convert(Frames(values, 1_000_000 * np.arange(60), unit="mV"), tmp_path / "a.npz")
-    with pytest.raises(ProblemError, match="quiet with nothing on it: its frames are 1 s apart; give tare"):
-        rest(taxel.open(tmp_path / "a.npz"))
-
-
-@pytest.mark.parametrize(("loaded", "unit"), [(True, "counts"), (False, "counts"), (True, "events/5 ms")])
-def test_zeros_before_are_advised_only_where_a_recording_begins_loaded(tmp_path: Path, loaded: bool, unit: str) -> None:
-    """The sensor reads 0 without a load; each load lasts for less than half a second, and moves."""
-    t = np.arange(300)
-    values = (
-        np.abs(np.random.default_rng(4).normal(0, 400, (300, 3, 4))) * ((t // 20) % 2 == (not loaded))[:, None, None]
-    )
-    taxel.convert(Frames(values, 10_000 * t, unit=unit), tmp_path / "a.npz")
-    with pytest.raises(UnknownRestError, match="the values of its taxels at rest are not known") as caught:
-        rest(taxel.open(tmp_path / "a.npz"))
-    assert ("zeros_before_s" in str(caught.value)) == (loaded and unit == "counts")
-    assert caught.value.argument == "tare"
-
-
 @pytest.mark.parametrize(
     "unit", ["N", "mN", "gf", "kgf", "Pa", "hPa", "kPa", "mbar", "bar", "psi", "mmHg", "N/cm2", "N/cm²"]
 )
@@ -252,17 +210,3 @@ def test_units_of_force_and_pressure_rest_at_0(tmp_path: Path, unit: str) -> Non
     taxel.convert(Frames(np.full((100, 1, 2), 5.0), 10_000 * np.arange(100), unit=unit), tmp_path / "a.npz")
     taken = rest(taxel.open(tmp_path / "a.npz"))
     assert (taken.source, taken.tare.rest.any()) == ("unit", np.False_)
-
-
-@pytest.mark.parametrize("unit", ["counts", "kPa"])
-def test_the_quiet_stretch_is_found_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unit: str) -> None:
-    from taxel.recording.analysis import rest
-
-    frames, labels = pressed(20, 25)
-    values = frames.values - (50 if unit == "kPa" else 0)
-    taxel.convert(taxel.Frames(values, frames.t, unit=unit, array=frames.array), tmp_path / "a.npz")
-    recording, found, find = taxel.open(tmp_path / "a.npz"), [], rest.find_rest
-    monkeypatch.setattr(rest, "find_rest", lambda *words, **named: found.append(1) or find(*words, **named))
-    rule = taxel.detect.PlainRule("area", 2, noise_floor=20.0, unit=unit)
-    assert len(taxel.tasks.detect(rule, recording, [labels]).outcomes[0].found) == 50
-    assert len(found) == 1

@@ -48,16 +48,6 @@ def test_a_source_that_no_row_names_is_neither_trained_nor_scored(feet: Path, tm
     assert training.to_dict()["unlabelled"] == {"contact": ["right"]}
 
 
-def test_it_holds_for_each_label_alone(feet: Path, tmp_path: Path) -> None:
-    begins = rows(BEGINS, "left") + rows(BEGINS, "right")
-    training = train(taxel.open(feet), table(tmp_path / "l.csv", begins + rows(ENDS, "left", "lift")))
-    found = {label: (score.events, score.false) for label, score in training.score.by_label.items()}
-    assert found == {"contact": (16, 0), "lift": (8, 0)}
-    assert training.scored.plain is not None
-    assert training.scored.plain.together is not None
-    assert training.scored.plain.together["lift"].false == 0
-
-
 def test_where_rows_name_no_source_nothing_happened_where_no_row_is(feet: Path, tmp_path: Path) -> None:
     each = taxel.open_all(feet)
     training = train(each, [{"contact": [10_000 * k for k in BEGINS]}, {}])
@@ -78,13 +68,6 @@ def test_where_rows_name_no_source_nothing_happened_where_no_row_is(feet: Path, 
     assert len(training.recordings) == 4
     assert training.score.events == 24
     assert training.score.false + training.score.missed >= 8
-
-
-def test_notes_of_one_source_say_nothing_of_the_other(feet: Path) -> None:
-    table(feet.with_name("both.notes.csv"), rows(BEGINS, "left"))
-    training = train(taxel.open(feet))
-    assert training.unlabelled == {"contact": ("right",)}
-    assert training.score.false == 0
 
 
 def test_detections_of_it_are_not_scored(feet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -127,23 +110,3 @@ def test_an_example_is_left_out_of_what_is_not_known_of_it(tmp_path: Path) -> No
 
 def known_detections() -> taxel.Detections:
     return taxel.Detections(["contact"], [1000], [1000])
-
-
-def test_the_feet_of_a_plate_s_labels_are_no_sources(tmp_path: Path) -> None:
-    values = np.zeros((60, 4, 4))
-    values[20:40, 1:3, 1:3] = 50.0
-    for name in ("a", "b"):
-        taxel.convert(taxel.Frames(values, 10_000 * np.arange(60), unit="kPa"), tmp_path / f"{name}.npz")
-    table = tmp_path / "labels.csv"
-    table.write_text("Trial;Foot;Event;Time_s\na;R;contact;0,2\na;L;contact;0,3\nb;L;contact;0,2\n")
-    opened = taxel.open_all(tmp_path)
-    with pytest.warns(UserWarning, match="labels of left and right count alike, because no recording states its side"):
-        events = taxel.tasks.labels.references(table, opened)
-    assert [each["contact"].tolist() for each in events] == [
-        [200_000, 300_000],
-        [200_000],
-    ]
-    rule = taxel.detect.PlainRule("area", 2, noise_floor=10.0, unit="kPa", labels=("contact", "lift"))
-    found = taxel.tasks.detect(rule, opened, table)
-    assert found.score is not None
-    assert (found.score.events, found.unlabelled) == (3, {"lift": ()})
