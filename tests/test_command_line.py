@@ -160,31 +160,6 @@ def test_a_command_of_another_distribution_is_listed_and_runs(stranger: Path, ca
     assert "taxel train a" in call(capsys, "train", "--help")[1], "ours"
 
 
-@pytest.mark.parametrize(
-    ("name", "source", "said"),
-    [
-        ("nod", None, "stranger:absent of stranger 2.0 could not be loaded: AttributeError: "),
-        (
-            "wave",
-            "import nowhere_at_all",
-            "stranger:app of stranger 2.0 could not be loaded: ModuleNotFoundError: No",
-        ),
-        ("wave", "app = 3", "stranger:app of stranger 2.0 could not be loaded: AttributeError: "),
-        ("wave", "raise RuntimeError('a\\nb')", "stranger:app of stranger 2.0 could not be loaded: RuntimeError: a"),
-    ],
-)
-def test_a_command_of_another_distribution_that_is_broken_is_one_error_and_breaks_no_other(
-    stranger: Path, capsys, name: str, source: str | None, said: str
-) -> None:
-    if source is not None:
-        stranger.write_text(source)
-    code, out, error = call(capsys, name)
-    assert (code, out) == (2, "")
-    assert error.startswith(f"taxel: taxel {name}: the command {said}")
-    assert error.count("\n") == 1
-    assert call(capsys, "--help")[0] == call(capsys, "merge", "--help")[0] == 0
-
-
 def test_each_option_of_opening_is_typed_by_its_name() -> None:
     typed = {TYPED.get(option.name, option.name) for option in fields(TextOptions)}
     assert {option.name for option in fields(FileOptions)} == typed

@@ -236,64 +236,6 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
     assert json.loads(out)["recordings"][0]["score"]["found"] == 4
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("detect", "none.npz", "--readout", "touch.json"), "none.npz: no such file"),
-        (("detect", "9.npz", "--readout", "none.json"), "none.json: no such file"),
-        (("detect", "9.npz", "--readout", "labels.csv"), "labels.csv, line 1: not JSON"),
-        (
-            ("detect", "9.npz", "--readout", "touch.json"),
-            "9.npz: the values of its taxels at rest are not known, because no half second is quiet with nothing on "
-            "it; give --tare S",
-        ),
-        (("detect", "9.npz", "--readout", "touch.json", "--tare", "-1"), "--tare is -1: must be seconds above 0"),
-        (("detect", "9.npz", "--readout", "touch.json", "--tare", "none.json"), "none.json: no such file"),
-        (("detect", "9.npz", "--readout", "touch.json", "--tare", "tare.json", "--frame-us", "0"), "--frame-us is 0"),
-        (("detect", "9.npz", "--readout", "touch.json", "--truth", "recipe.toml"), "recipe.toml, line 1"),
-        (("encode", "1.npz", "out.txt", "--encoder", "fa1"), "out.txt: the name of the spikes' file must end in .npz"),
-        (("encode", "1.npz", "out.npz", "--encoder", "fa9"), "encoder fa9: must be one of"),
-        (("encode", "1.npz", "out.npz", "--encoder", "fa1", "--set", "wings=2"), "wings"),
-        (("encode", "1.npz", "out.npz", "--encoder", "fa1", "--set", "wings"), "--set wings: must be KEY=VALUE"),
-        (
-            ("train", "1.npz", "--labels", "labels.csv", "--recipe", "gaitpdb", "-o", "new.json"),
-            "recipe 'gaitpdb': must be one of event_counts, gait_channel, ",
-        ),
-        (("train", "1.npz", "--labels", "labels.csv", "--recipe", "./gait", "-o", "new.json"), "gait: no such file"),
-        (("train", "1.npz", "--labels", "none.csv", "--encoder", "fa1", "-o", "new.json"), "none.csv: no such file"),
-        (
-            ("train", "1.npz", "2.npz", "--labels", "truth.csv", "--encoder", "fa1", "-o", "new.json"),
-            "does not state the recording of each label",
-        ),
-        (("train", "1.npz", "--recipe", "labels.csv", "-o", "new.json"), "labels.csv, line 1: not TOML"),
-        (
-            ("train", "1.npz", "--recipe", "recipe.toml", "--set", "learner.wings=2", "-o", "n.json"),
-            "no parameter 'wings'",
-        ),
-        (
-            ("train", "1.npz", "--recipe", "touch", "--set", "encoder.noise_floor=2"),
-            "taxel: encoder.noise_floor: recipe touch has several encoders: change encoders.NAME.noise_floor",
-        ),
-        (
-            ("train", "1.npz", "--recipe", "recipe.toml", "--set", "wings=2"),
-            "a recipe has no key 'wings': its keys are encoder, learner",
-        ),
-        (("train", "1.npz", "--recipe", "recipe.toml", "-o", "touch.json"), "touch.json: exists already"),
-    ],
-)
-def test_wrong_input_ends_in_one_line(
-    folder: Path, trained: Path, monkeypatch, capsys, arguments: tuple[str, ...], said: str
-) -> None:
-    monkeypatch.chdir(folder)
-    assert trained.exists()
-    code, _, error = call(capsys, *arguments)
-    assert code == 2
-    assert said in error
-    assert error.count("\n") == 1, error
-    assert not Path("new.json").exists()
-    assert not Path("readout.json").exists()
-
-
 def test_without_a_tare_the_rest_is_taken_from_before_the_first_label(folder: Path, capsys, tmp_path: Path) -> None:
     events = taxel.open(folder / "9.npz").events
     plan = ("--recipe", folder / "recipe.toml", "--set", "neurons.lift.tau=3.0")

@@ -6,13 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import taxel
 from taxel import Array, Frames, Readout, Tare
-from taxel.detect import Example, Outcome, PlainRule, Recipe, fit, judge, recipes, run, score, tune
+from taxel.detect import Example, PlainRule, Recipe, fit, judge, recipes, run, score, tune
 from taxel.encode import LevelCrossing
-from taxel.report import write_detections
 from taxel.tasks import DetectOptions, detect, train
 
 
@@ -118,33 +116,3 @@ def test_a_smaller_grid_gives_what_its_padded_frames_give() -> None:
     pieces = [stream.push(small.source[k : k + 100]) for k in range(0, len(small.source), 100)]
     found = [d for piece in pieces for d in piece] + list(stream.advance(int(small.source.t[-1]) + 1_000_000))
     assert [(d.label, d.t) for d in found] == [(d.label, d.t) for d in run(readout, small.source)]
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_a_report_pads_a_smaller_grid_as_the_readout_does(tmp_path: Path) -> None:
-    small, large = sized((6, 7), 1), sized((8, 8), 2)
-    learner = {"tau": 5.0, "ub": 3.0, "lb": -3.0, "delay_ms": 1.0}
-    readout = fit([small, large], Recipe(LevelCrossing([70.0]), learner, {"contact": {}, "lift": {}}))
-    outcomes = []
-    for example in (small, large):
-        found = run(readout, example.source, tare=example.tare)
-        outcomes.append(Outcome("walk", example, found, score(found, example.labels, 50.0)))
-    page = write_detections(tmp_path, readout, outcomes, title="Two sizes").read_text()
-    assert "Two sizes" in page
-
-
-def test_a_report_draws_channels_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn: list[Figure] = []
-    monkeypatch.setattr("taxel.report.detections.picture", lambda figure: drawn.append(figure) or "")
-    learnt = single((1, 4), 1, times=100.0)
-    assert isinstance(learnt.source, Frames)
-    names = ["heel", "ball", "big toe", "toes"]
-    t = learnt.source.t + 4_000_000
-    frames = Frames(learnt.source.values, t, unit="N", array=Array(1, 4, names=names))
-    example = Example(frames, {label: times + 4_000_000 for label, times in learnt.labels.items()})
-    learner = {"tau": 20.0, "ub": 30.0, "lb": -30.0, "delay_ms": 20.0, "after_spike": "reset"}
-    readout = fit([example], Recipe(LevelCrossing([2.0, 5.0]), learner, {"contact": {}, "lift": {}}))
-    outcome = Outcome("walk", example, run(readout, frames), None)
-    write_detections(tmp_path, readout, [outcome], title="channels")
-    titles = [[text.get_text() for text in axis.get_xticklabels()] for figure in drawn for axis in figure.axes[:1]]
-    assert titles.count(names) == 2

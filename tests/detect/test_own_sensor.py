@@ -18,13 +18,11 @@ from shell import call
 
 import taxel
 from taxel import Array, Frames, Tare
-from taxel._base import progress
-from taxel.cli import _recordings
 from taxel.detect import Example, Recipe, judge, load, recipes, run, score
 from taxel.detect.fitting import fit_aligned
 from taxel.detect.floors import measured_floor
 from taxel.detect.followed import follow
-from taxel.encode import ContactArea, LevelCrossing, LocalLoad
+from taxel.encode import ContactArea, LocalLoad
 
 LABELS = ("contact", "lift")
 
@@ -191,18 +189,6 @@ def test_a_refused_training_leaves_no_folder_of_its_report(tmp_path: Path, capsy
     assert (tmp_path / "kept").is_dir()
 
 
-def test_a_training_that_is_ended_while_its_report_is_drawn_leaves_no_folder(
-    tmp_path: Path, monkeypatch, capsys
-) -> None:
-    def ended(*_: object, **__: object) -> str:
-        raise KeyboardInterrupt
-
-    arguments = written(tmp_path, *touched((6, 6), 3, gain=100.0, noise=1.0))
-    monkeypatch.setattr("taxel.report.detections.picture", ended)
-    assert call(capsys, *arguments, "--folds", 0, "--report", tmp_path / "a" / "b")[0] != 0
-    assert not (tmp_path / "a").exists()
-
-
 def test_an_end_of_touches_is_learnt_by_any_name() -> None:
     frames, labels = touched((8, 8), 5, gain=200.0, noise=1.0)
     frames = Frames(frames.values, frames.t, unit="V", array=frames.array)
@@ -242,58 +228,6 @@ def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail
     assert {one.inputs for one in made.readout.neurons.values()} <= {("area",), ("load",), ()}
 
 
-def test_a_training_estimates_how_long_it_takes_by_the_folds_that_are_done(monkeypatch: pytest.MonkeyPatch) -> None:
-    now = [0.0]
-    monkeypatch.setattr(progress, "perf_counter", lambda: now[0])
-    steps, said = progress.Steps(), []
-    folds = [(10, "fold 1 of 5", 0, 5), (15, "learning", 0, 0), (20, "fold 2 of 5", 1, 5), (29, "learning", 0, 0)]
-    for at, *step in [(0, "reading", 0, 0), *folds]:
-        now[0] = float(at)
-        steps.update(*step)
-        said.append(str(steps))
-    # Reading is no part of a fold; the plain rules count as one.
-    told = ["fold 2 of 5, after 20 s; about 70 s in all", "learning, after 29 s; about 70 s in all"]
-    assert said == ["reading, after 0 s", "fold 1 of 5, after 10 s", "learning, after 15 s", *told]
-    now[0] = 90.0
-    assert str(steps) == "learning, after 90 s"
-
-
-def test_without_a_terminal_lines_say_where_it_is_also_within_a_step(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(_recordings, "_REPORT_S", (0.1, 0.2))
-    with _recordings.progress(quiet=False) as update:
-        update("reading a.npy", 0, 0)
-        time.sleep(1.0)
-    said = capsys.readouterr().err.splitlines()
-    assert len(said) >= 2
-    assert all(re.fullmatch(r"taxel: reading a\.npy, after [01] s", line) for line in said)
-    with _recordings.progress(quiet=True) as update:
-        update("reading a.npy", 0, 0)
-        time.sleep(0.3)
-    assert capsys.readouterr().err == ""
-
-
-def test_a_row_of_channels_is_told_how_it_is_laid_out_and_array_does_it(tmp_path: Path, capsys) -> None:
-    values = np.zeros((400, 3, 4), np.float32)
-    values[100:200, 1:, 1:] = values[250:300, 1:, 1:] = 20.0
-    np.save(tmp_path / "flat.npy", values.reshape(400, 12))
-    (tmp_path / "flat.layout.toml").write_text("rate_hz = 1000\n")
-    taxel.detect.PlainRule("local_load", 3).save(tmp_path / "rule.json")
-    detect = ("detect", tmp_path / "flat.npy", "--readout", tmp_path / "rule.json", "--tare", "0.05")
-    assert "a pitch; if the taxels are a grid, row by row, give --array ROWSxCOLUMNS" in call(capsys, *detect)[2]
-    assert "--array has 4 x 4 taxels; " in call(capsys, *detect, "--array", "4x4")[2]
-    status, said, _ = call(capsys, *detect, "--array", "3x4", "--json")
-    assert status == 0
-    assert [one["t_us"] / 1000 for one in json.loads(said)["detections"]] == [100, 200, 250, 300]
-    grid = Frames(values, np.arange(400) * 1000)
-    recipe = Recipe(LevelCrossing([10.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
-    example = Example(grid, {"contact": [100_000, 250_000]}, Tare.take(grid, stop_us=50_000))
-    taxel.detect.fit([example], recipe).save(tmp_path / "readout.json")
-    said = call(capsys, "detect", tmp_path / "flat.npy", "--readout", tmp_path / "readout.json", "--tare", "0.05")[2]
-    assert "on 3 x 4; if the taxels are a grid, row by row, give --array ROWSxCOLUMNS[xMM], or rows and" in said
-
-
 def test_ctrl_c_while_a_training_reads_or_learns_ends_it_and_leaves_nothing(tmp_path: Path) -> None:
     values = np.random.default_rng(4).integers(0, 3, (20_000, 24, 40)).astype(np.int16)
     labels = ["label,t_us"]
@@ -318,30 +252,6 @@ def test_ctrl_c_while_a_training_reads_or_learns_ends_it_and_leaves_nothing(tmp_
     assert "Traceback" not in more
     assert time.perf_counter() - before < 10
     assert sorted(one.name for one in tmp_path.iterdir()) == ["a.layout.toml", "a.npy", "labels.csv"]
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["train", "a.npy", "-o", "r.json"], "notes: names no event in a.npy; give --labels FILE"),
-        (["info", "a.npy", "--topic", "/a"], "a.npy: is not a ROS bag; topic, field, types and ros are only for "
-        "ROS bags"),
-        (["info", "b.npy", "--rate-hz", "-3"], "must be above 0"),
-        (["info", "a.npy", "--array", "0x5"], "--array is 0x5: rows is 0: must be a whole number from 1 to 65535"),
-        (["info", "labels.csv"], "line 1: a table of labels (docs/command-line.md), not a recording"),
-    ],
-)  # fmt: skip
-def test_wrong_input_says_what_would_be_right(
-    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    for name, layout in (("a", "rate_hz = 10"), ("b", 'unit = "counts"')):
-        np.save(f"{name}.npy", np.zeros((9, 2, 3)))
-        Path(f"{name}.layout.toml").write_text(layout)
-    Path("labels.csv").write_text("label,t_us\ncontact,3\n")
-    status, _, wrong = call(capsys, *words)
-    assert (status, wrong.count("\n")) == (2, 1)
-    assert said in wrong
 
 
 def test_info_takes_the_rate_of_numbered_frames(tmp_path: Path, capsys) -> None:

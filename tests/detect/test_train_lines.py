@@ -2,7 +2,6 @@
 
 import json
 import re
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ from test_ages import touched
 from test_readout import ARRAY, tare, touches
 
 import taxel
-from taxel._base.progress import Forecast
 from taxel.detect import PlainRule, run, score
 from taxel.tasks.__main__ import run as run_task
 
@@ -207,35 +205,3 @@ def test_a_fold_that_cannot_be_learnt_leaves_the_training_as_it_is(tmp_path: Pat
     assert "contact, neuron: 6 of 7 found, 1 missed, 0 false" in out
     code, _, error = call(capsys, *arguments, "--folds", 2, "-o", tmp_path / "r.json")
     assert (code, "the sensor felt nothing" in error) == (2, True), "folds that were asked for are not left out"
-
-
-def test_a_recording_without_one_of_the_labels_has_a_row_on_the_page(tmp_path: Path, capsys) -> None:
-    recording, labels = recorded(tmp_path, 1)
-    tare().save(tmp_path / "tare.json")
-    taxel.convert(touches(2)[0].between(0, 70_000), tmp_path / "2.npz")
-    rows = [f"1,{line}" for line in labels.read_text().splitlines()[1:]]
-    labels.write_text("\n".join(["recording,label,t_us", *rows, "2,contact,9000"]) + "\n")
-    arguments = (
-        "train",
-        recording,
-        tmp_path / "2.npz",
-        "--labels",
-        labels,
-        "--tare",
-        tmp_path / "tare.json",
-        "-o",
-        tmp_path / "r.json",
-    )
-    code, out, error = call(capsys, *arguments, "--report", tmp_path / "page")
-    assert code == 0, error
-    assert (code, out.splitlines()[0].rpartition(": ")[2]) == (0, "all events lift are in the same recording")
-    assert '2.npz</td><td class="left">lift</td><td>0</td>' in (tmp_path / "page" / "report.html").read_text()
-
-
-def test_a_long_training_says_how_long_before_its_folds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(import_module("taxel.tasks.train"), "_LONG_S", 0.0)
-    recording, labels = recorded(tmp_path, 1, 12)
-    steps: list[str] = []
-    taxel.train(taxel.open(recording), labels, progress=lambda step, *_: steps.append(step))
-    (said,) = [step for step in steps if isinstance(step, Forecast)]
-    assert steps.index(said) < steps.index("fold 1 of 5")
