@@ -111,5 +111,5 @@ def test_nonsense_is_refused_in_one_line(call, argument):
 
 
 def test_a_preset_for_more_lines_than_the_array_has_is_refused():
-    with refused(taxel.DeviceError):
+    with refused(taxel.DeviceError, argument="lines"):
         Board(Registers.preset("5.2 kHz"), taxel.Array(8, 8))

@@ -92,20 +92,20 @@ def test_the_manuals_names_are_aliases_in_its_own_units():
 @pytest.mark.parametrize(
     ("call", "argument"),
     [
-        (lambda: Registers(speed=1), None),
+        (lambda: Registers(speed=1), "speed"),
         (lambda: Registers(line_period=3.001), "line_period"),
         (lambda: Registers(line_period=float("nan")), "line_period"),
         (lambda: Registers(ramp=1.5), "ramp"),
         (lambda: Registers(ramp=-1), "ramp"),
         (lambda: Registers(nrows=0.5), "nrows"),
-        (lambda: Registers.preset("fast"), None),
+        (lambda: Registers.preset("fast"), "preset"),
         (
             lambda: Registers().with_preset("128 x 128, 1 kHz"),
-            None,
+            "preset",
         ),
         (
             lambda: Registers(array=taxel.Array(128, 128)).with_preset("2 kHz"),
-            None,
+            "preset",
         ),
         (lambda: Command(8, 0), "register"),
         (lambda: Command(0, -1), "value"),

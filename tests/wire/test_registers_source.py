@@ -120,9 +120,6 @@ def _warnings(values):
 
 
 def test_a_field_that_does_not_fit_is_refused_alike():
-    with refused(taxel.DeviceError):
-        Registers(lines=65)
-    with refused(taxel.DeviceError):
-        Registers(lines=257)
-    with refused(taxel.DeviceError):
-        Registers(wire_version=3)
+    for name, value in (("lines", 65), ("lines", 257), ("wire_version", 3)):
+        with refused(taxel.DeviceError, argument=name):
+            Registers(**{name: value})

@@ -334,7 +334,9 @@ def _raw(name: str, value: object) -> int:
     if name in _TIMES:
         units = finite(name, value) * 100
         if not 0 <= units < 2**32:
-            raise DeviceError(f"{name} {shown(value)} us does not fit into the bits of its register (rule 4)")
+            error = DeviceError(f" {shown(value)} us does not fit into the bits of its register (rule 4)")
+            error.argument = name
+            raise error
         if not abs(units - np.rint(units)) < 1e-6:
             raise refused(name, f" is {shown(value)} us: must be a whole multiple of 0.01 us")
         return int(np.rint(units))
