@@ -1,7 +1,4 @@
-"""Write the files of this folder with the taxel that the README names.
-
-`PYTHONPATH=tests python tests/data/before/make.py`, in the empty folder.
-"""
+"""Write the files of this folder anew: `PYTHONPATH=tests python tests/data/before/make.py`, in the empty folder."""
 
 from __future__ import annotations
 
@@ -22,7 +19,7 @@ from test_before import contents
 import taxel
 from taxel import Calibration, Detections, Frames, Neuron, Readout, Tare, _core
 from taxel.calibration import Load
-from taxel.detect import Example, PlainRule, Recipe, train
+from taxel.detect import Example, PlainRule, Recipe, fit
 from taxel.encode import FA1, Composite, ContactArea
 from taxel.live import Live
 from taxel.simulate import Board, Version2
@@ -124,6 +121,12 @@ def made() -> None:
     plate = taxel.Array(3, 4, (7.62, 5.08), exists, "plate")
     for ending in ("mcap", "csv"):
         taxel.convert(Frames(values, [0, 1000, 2500, 4000], unit="kPa", array=plate), HERE / f"frames.{ending}")
+    for source, name in (("board", "events"), ("frames", "frames")):
+        for ending in ("npz", "h5"):
+            taxel.convert(HERE / f"{source}.mcap", HERE / f"{name}.{ending}")
+    places = taxel.Places([0.0, 10.0, 4.0], [0.0, 2.0, 8.0], None, "mm")
+    insole = taxel.Array(1, 3, name="insole", places=places)
+    taxel.convert(Frames(values[:, :1, :3], [0, 1000, 2500, 4000], unit="N", array=insole), HERE / "insole.npz")
 
 
 def texts() -> None:
@@ -150,7 +153,7 @@ def texts() -> None:
     )
     touch().save(HERE / "touch.json")
     recipe = Recipe(ContactArea(levels=[1]), {"ub": 5.0, "lb": -5.0}, {"touch": {"tau": 5.0, "delay_ms": 2.0}})
-    train([Example(touches(4), {"touch": [k * 40_000 + 2000 for k in range(4)]}, tare)], recipe).save(
+    fit([Example(touches(4), {"touch": [k * 40_000 + 2000 for k in range(4)]}, tare)], recipe).save(
         HERE / "trained.json"
     )
     loads = [Load(Frames([[[20.0]], [[20.0]]], [0, 1000]), 5.0), Load(Frames([[[45.0]], [[45.0]]], [0, 1000]), 10.0)]
@@ -167,7 +170,7 @@ def texts() -> None:
 
 def pinned() -> None:
     """Write what all of them hold."""
-    made = ("contents.json", "events.lss", "exports.py", "make.py", "README.md")
+    made = ("contents.json", "events.lss", "make.py", "README.md")
     names = sorted(file.name for file in HERE.iterdir() if file.is_file() and file.name not in made)
     lines = [f"{json.dumps(name)}: {json.dumps(contents(HERE / name), sort_keys=True)}" for name in names]
     (HERE / "contents.json").write_text("{\n" + ",\n".join(lines) + "\n}\n")
