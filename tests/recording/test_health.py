@@ -472,8 +472,8 @@ def test_clean_taxels_that_drift_are_not_noisy(unit: str, seed: int, rows: int, 
     assert not taxel.health(taxel.Frames(values, t, unit=unit, array=taxel.Array(rows, columns))).noisy.any()
 
 
-# On two rows or columns a touch loads all taxels, so that fewer stretches of sound ones are quiet than of the noisy one,
-# and six times their noise is read as 4.4 times (2 x 2, seed 2961), below the 4.5 that count.
+# On two rows or columns a touch loads all taxels: fewer stretches of sound ones are quiet than of the noisy one. Six
+# times their noise is then read as 4.4 times (2 x 2, seed 2961), below the 4.5 that count.
 @pytest.mark.parametrize("unit", ["N", "as sent"])
 @given(st.integers(0, 10_000), st.integers(3, 16), st.integers(3, 16))
 def test_a_taxel_with_six_times_the_noise_of_the_others_is_noisy(unit: str, seed: int, rows: int, columns: int) -> None:
