@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from taxel._base.arguments import shown
-from taxel._base.cells import seconds_of, unit_of
+from taxel._base.cells import seconds_of, time_unit
 from taxel._base.errors import unreadable
 from taxel._base.header_table import HeaderTable
 from taxel._base.messages import counted, warn
@@ -99,7 +99,7 @@ def are_of_events(names: Sequence[str], cells: Sequence[str], *, named: bool = F
     """
     if are_of_bids(names):
         return True
-    kinds = ["time" if unit_of(name) is not None else name.lower() for name in names]
+    kinds = ["time" if time_unit(name) is not None else name.lower() for name in names]
     labels = [k for k, kind in enumerate(kinds) if kind in _LABELS]
     if named:
         return bool(labels) or any(map(_is_text, cells))
@@ -181,7 +181,7 @@ def _time(table: HeaderTable) -> int:
     """Return which column holds the times, by its name."""
     if are_of_bids(table.header):
         return [name.lower() for name in table.header].index("onset")
-    times = [k for k, name in enumerate(table.header) if name not in _OTHERS and unit_of(name) is not None]
+    times = [k for k, name in enumerate(table.header) if name not in _OTHERS and time_unit(name) is not None]
     if len(times) == 1:
         return times[0]
     there = ", ".join(map(shown, table.header))
@@ -226,7 +226,7 @@ def _is_text(cell: str, separator: str = ";") -> bool:
 
 def _us(location: str, line: int, name: str, cell: str, separator: str) -> int:
     """Return the time of a cell in whole us."""
-    number, unit = _number(cell, separator), "s" if name.lower() == "onset" else unit_of(name) or ""
+    number, unit = _number(cell, separator), "s" if name.lower() == "onset" else time_unit(name) or ""
     if math.isnan(number):
         number, unit = seconds_of(cell), "s"
     elif not unit:

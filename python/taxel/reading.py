@@ -249,6 +249,8 @@ class Facts:
         A line for each kind of information that is not there any more, or that was not read.
     truncated : bool
         Whether the last data are missing.
+    layout : str
+        The text of a layout file by which a table or array of another program was read, complete.
     """
 
     path: Path = Path()
@@ -269,6 +271,7 @@ class Facts:
     remarks: tuple[str, ...] = ()
     lost: tuple[str, ...] = ()
     truncated: bool = False
+    layout: str = ""
 
     def __post_init__(self) -> None:
         if not self.name:

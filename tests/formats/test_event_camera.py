@@ -339,11 +339,16 @@ def test_too_many_frames_name_a_larger_window(tmp_path: Path, monkeypatch: pytes
         taxel.open(write(tmp_path / "a.raw", some_rows()), window_ms=0.001)
 
 
-@pytest.mark.parametrize("names", ["timestamp,col,row,polarity", "t,column,row,on", "ts,x,y,p", "time (us),X,Y,pol"])
+@pytest.mark.parametrize("names", ["timestamp_us,col,row,polarity", "t_us,column,row,on", "time (us),X,Y,pol"])
 def test_names_of_columns_of_events_are_known(names: str, tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text(f"{names}\n100,3,4,1\n230,5,6,0\n400,3,6,1\n600,1,1,0\n")
-    with pytest.raises(FormatError, match=r"a table of events \(t, x, y, p\)(.|\n)*columns = \[.t., .x., .y., .p.\]"):
-        taxel.open(tmp_path / "a.csv")
+    (tmp_path / "a.csv").write_text(f"{names}\n100,3,4,1\n230,5,6,0\n400,3,6,1\n600,1,1,0\n".replace("t_us", "t (us)"))
+    events = taxel.open(tmp_path / "a.csv").events
+    assert (events.t.tolist(), events.x.tolist(), events.y.tolist()) == (
+        [100, 230, 400, 600],
+        [3, 5, 3, 1],
+        [4, 6, 6, 1],
+    )
+    assert events.p.tolist() == [True, False, True, False]
 
 
 def test_taxels_beyond_the_sensor_are_refused(tmp_path: Path) -> None:
@@ -359,3 +364,18 @@ def test_the_pitch_of_a_camera_stays_unknown(tmp_path: Path, capsys: pytest.Capt
     with pytest.raises(SystemExit, match="0"):
         main(["info", str(write(tmp_path / "a.raw", some_rows())), "--array", "48x64"])
     assert "48 x 64 taxels, of unknown pitch" in capsys.readouterr().out
+
+
+def test_the_size_that_a_header_lacks_is_given_or_in_a_layout(tmp_path: Path) -> None:
+    file = write(tmp_path / "a.raw", some_rows())
+    whole = taxel.open(file).events
+    head = file.read_bytes()
+    lines = [line for line in head.partition(b"% end\n")[0].splitlines(keepends=True) if b"eometry" not in line]
+    bare = b"".join(line.split(b";")[0].rstrip() + b"\n" for line in lines) + b"% end\n"
+    file.write_bytes(bare + head.partition(b"% end\n")[2])
+    with refused("the header does not state the size of the sensor", FormatError):
+        taxel.open(file)
+    assert taxel.open(file, array=taxel.Array(*whole.array.shape)).events.t.tolist() == whole.t.tolist()
+    rows, columns = whole.array.shape
+    (tmp_path / "a.layout.toml").write_text(f"rows = {rows}\ncolumns = {columns}\n")
+    assert taxel.open(file).events.x.tolist() == whole.x.tolist()

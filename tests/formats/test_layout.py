@@ -18,7 +18,6 @@ import taxel
 from taxel import Array, Events, FormatError, Frames, Places
 from taxel.cli import app
 from taxel.formats.layout import Layout, load_packaged
-from taxel.recording.text_options import TextOptions
 
 from .making import write_gaitpdb
 from .tables import VALUES, lines, table
@@ -99,32 +98,6 @@ def test_a_compressed_table_a_numbered_time_column_and_missing_cells(tmp_path: P
     expected[1, 0] = np.nan
     np.testing.assert_array_equal(frames.values[:, 0], expected.astype(np.float32))
     assert frames.t.tolist() == [500_000, 1_000_000, 1_500_000]
-
-
-@pytest.mark.parametrize("mark", ["nan", "NaN", "", "-"])
-def test_a_table_with_missing_cells_says_how_to_read_them(tmp_path: Path, mark: str) -> None:
-    """The layout line that the error names, added as it stands, opens the table."""
-    text = lines(VALUES).replace("6.5", mark)
-    with pytest.raises(FormatError, match=r"line 2: column 1 is .*\[table\] missing = '") as caught:
-        table(tmp_path, text, "rate_hz = 100\n")
-    remedy = str(caught.value).rpartition("[table] ")[2]
-    assert np.isnan(table(tmp_path, text, f"rate_hz = 100\n[table]\n{remedy}\n").frames().values[1, 0, 0])
-
-
-@pytest.mark.parametrize("at_once", [1, 2, 3, 4096])
-def test_a_table_is_the_same_however_many_rows_are_read_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: int
-) -> None:
-    monkeypatch.setattr(taxel.formats.text, "_CELLS", at_once)
-    layout = 'rate_hz = 100\n[table]\nmissing = "NA"\n'
-    frames = table(tmp_path, lines(VALUES).replace("6.5", "NA"), layout).frames()
-    expected = VALUES.copy()
-    expected[1, 0] = np.nan
-    np.testing.assert_array_equal(frames.values[:, 0], expected.astype(np.float32))
-    for cell, said in (("9,", "line 3: column 1 is 'x'"), ("9,8,", "line 3: 5 cells; must have 6")):
-        wrong = lines(VALUES).replace(cell, "x," if cell == "9," else "9,")
-        with pytest.raises(FormatError, match=said):
-            table(tmp_path, wrong, layout)
 
 
 def test_readings_that_fall_are_turned_once(tmp_path: Path) -> None:
@@ -218,8 +191,9 @@ def test_arrays_of_every_kind_of_number_open(tmp_path: Path, kind: str, stored: 
             h5["palm"], h5["t"] = values, np.arange(7) / 4
     with pytest.raises(FormatError, match=r"docs/files\.md") as refused:
         taxel.open(place)
-    # The lines that the refusal prints are the layout that reads it.
-    (tmp_path / "grasp.layout.toml").write_text(str(refused.value).partition("\n")[2])
+    # The lines that the refusal prints are the layout that reads it: the second where the longest axis is not the time.
+    printed = str(refused.value).split("\n# ")[-2 if str(refused.value).count("axes") > 1 and ending != ".npy" else -1]
+    (tmp_path / "grasp.layout.toml").write_text(printed.partition("\n")[2])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         recording = taxel.open(place)
@@ -234,7 +208,7 @@ def test_a_value_that_does_not_fit_names_its_place(tmp_path: Path, at: Any, name
     values[at] = value
     np.save(tmp_path / "a.npy", values)
     (tmp_path / "a.layout.toml").write_text("rate_hz = 10\n")
-    with pytest.raises(FormatError, match=rf"a\.npy.*{named}: .*must fit 32 bits"):
+    with pytest.raises(FormatError, match=rf"a\.npy.*{named}: must fit 32 bits"):
         taxel.open(tmp_path / "a.npy")
 
 
@@ -271,7 +245,7 @@ def test_a_layout_names_a_data_set_in_a_group_by_its_path(tmp_path: Path) -> Non
         assert recording.lost == ("other arrays of the file: run1/pressure, run1/when",)
     layout.write_text('[data]\narray = "pressure"\n')
     with pytest.raises(
-        FormatError, match=r"no array pressure; its arrays are run1/pressure \(3 x 2 x 3\), run2/pressure"
+        FormatError, match=r"no array pressure, .*; its arrays are run1/pressure \(3 x 2 x 3\), run2/pressure"
     ):
         taxel.open(tmp_path / "a.h5")
 
@@ -283,9 +257,9 @@ def test_a_layout_names_a_data_set_in_a_group_by_its_path(tmp_path: Path) -> Non
         ('array = "palm"', r"array is not known: write it in \[data\], for arrays in a file$"),
         (
             '[data]\narray = "2x3x4.5"',
-            r"the layout states \[data\] array; to state a size, write rows = 2, .*pitch_mm = 4.5",
+            r"the layout states as \[data\] array; .*; to state a size, write rows = 2, .*pitch_mm = 4.5",
         ),
-        ('[data]\ntime = "when"', r"the layout states \[data\] time; remove time"),
+        ('[data]\ntime = "when"', r"the layout states as \[data\] time; its one array has no name"),
     ],
 )
 def test_a_size_or_a_name_where_none_belongs_is_told_where_it_does(tmp_path: Path, layout: str, said: str) -> None:
@@ -296,7 +270,7 @@ def test_a_size_or_a_name_where_none_belongs_is_told_where_it_does(tmp_path: Pat
     np.savez(tmp_path / "b.npz", palm=VALUES, when=[1, 2, 3])
     (tmp_path / "b.layout.toml").write_text('[data]\narray = "2x3"')
     with pytest.raises(
-        FormatError, match=r"no array 2x3; its arrays are palm .*; to state a size, write rows = 2, columns = 3"
+        FormatError, match=r"no array 2x3, .*; its arrays are palm .*; to state a size, write rows = 2, columns = 3"
     ):
         taxel.open(tmp_path / "b.npz")
 
@@ -388,7 +362,7 @@ def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) ->
         ("table = 3", "table"),
         ("[table]\nseparator = ', '", "separator is ', ': must be one character"),
         ("[table]\nskip_lines = 40", "no line follows the 40 skipped lines"),
-        ("[table]\ntime_column = 'when'", "column 'when' of times is missing"),
+        ("[table]\ntime_column = 'when'", "column 'when' of time_column is missing"),
         ("[table]\ntime_column = 9", "time_column is 9, but the table has 6 columns"),
         ("rows = [", "not TOML"),
     ],
@@ -418,13 +392,6 @@ def test_a_table_of_times_in_us_with_another_separator_follows_its_layout(tmp_pa
     frames = taxel.open(tmp_path / "step.csv", layout=layout if given else None).frames()
     assert np.array_equal(frames.values.reshape(3, 6), VALUES)
     assert frames.t.tolist() == [0, 20_000, 40_000]
-
-
-def test_a_name_with_a_comma_over_one_column_is_a_name(tmp_path: Path) -> None:
-    frames = table(
-        tmp_path, "force, N\n 1\n2\n3\n", "rows = 1\ncolumns = 1\nrate_hz = 50\n[table]\nseparator = ';'"
-    ).frames()
-    assert frames.values.ravel().tolist() == [1, 2, 3]
 
 
 @pytest.mark.parametrize(
@@ -517,10 +484,10 @@ def test_a_layout_for_another_count_of_channels_of_a_trial_is_refused(tmp_path: 
     ("write", "match"),
     [
         (
-            lambda place: np.savez(place, a=np.zeros((2, 6)), b=np.zeros(3)),
-            r"contains a \(2 x 6\), b \(3\); name one of these arrays in the layout",
+            lambda place: np.savez(place, a=np.zeros((2, 6)), b=np.zeros((2, 3))),
+            r"contains a \(2 x 6\), b \(2 x 3\); name the array of frames in a layout",
         ),
-        (lambda place: np.savez(place, a=np.zeros(6)), "must contain numbers of shape frames x rows x columns"),
+        (lambda place: np.savez(place, a=np.zeros(6)), "states 2 x 3 taxels"),
         (lambda place: np.savez(place, a=np.array([["x"] * 6])), "contains no numbers"),
         (lambda place: np.savez(place, a=np.zeros((2, 5))), "states 2 x 3 taxels"),
     ],
@@ -537,39 +504,6 @@ def test_a_layout_is_found_by_the_recording_s_name_first(tmp_path: Path) -> None
         (tmp_path / name).write_text("")
     assert Layout.beside(tmp_path / "walk.csv.gz") == tmp_path / "walk.layout.toml"
     assert Layout.beside(tmp_path / "run.csv") == tmp_path / "layout.toml"
-
-
-@pytest.mark.parametrize("name", ["time", "Time (ms)", "time_s", "timestamp", "t", "t [us]"])
-@pytest.mark.parametrize("layout", ["rate_hz = 100", "rows = 2\ncolumns = 3"])
-def test_a_time_that_the_layout_does_not_name_is_no_channel(tmp_path: Path, name: str, layout: str) -> None:
-    text = f"{name},a,b,c,d,e,f\n" + lines(np.column_stack([[0.01, 0.02, 0.03], VALUES]))
-    with pytest.raises(FormatError, match=r"line 1: column .* time_column = ") as refused:
-        table(tmp_path, text, layout)
-    said = str(refused.value)
-    assert f'time_column = "{name}"' in said
-    assert "\n" not in said
-    assert (
-        table(tmp_path, text, f'{layout.replace("rate_hz = 100", "")}\n[table]\ntime_column = "{name}"').array.taxels
-        == 6
-    )
-    assert table(tmp_path, text, "[table]\nskip_lines = 1").array.taxels == 7
-
-
-def test_a_taxel_may_be_named_by_the_letter_t(tmp_path: Path) -> None:
-    text = "o,p,q,r,s,t\n" + lines(VALUES)
-    assert table(tmp_path, text, "rate_hz = 100").array.taxels == 6
-
-
-def test_the_rate_on_the_command_line_opens_an_array_without_a_layout(tmp_path: Path) -> None:
-    palm = tmp_path / "palm.npy"
-    np.save(palm, VALUES.reshape(3, 2, 3))
-    opened = TextOptions(rate_hz=100.0).open_one(palm)
-    assert opened.frames().t.tolist() == [0, 10_000, 20_000]
-    assert opened.array.shape == (2, 3)
-    np.save(palm, VALUES)
-    assert TextOptions(rate_hz=100.0, array=["2x3"]).open_one(palm).array.shape == (2, 3)
-    refused = CliRunner().invoke(app, ["info", str(palm)])
-    assert "give rate_hz, or describe it" in str(refused.exception)
 
 
 @pytest.mark.parametrize(

@@ -136,7 +136,7 @@ def test_every_format_has_tests_of_its_own_and_a_maker_of_small_files(name: str)
 def test_every_module_of_a_format_is_registered() -> None:
     folder = Path(formats.__file__).parent
     shared_by_all = {"__init__", "checks", "layout", "layout_text", "text", "trial", "array_file", "column_names"}
-    shared_by_all |= {"lines", "table", "table_form", "table_text", "times"}
+    shared_by_all |= {"foreign", "lines", "table", "table_form", "table_text", "times", "xdf"}
     missing = {p.stem for p in folder.glob("*.py")} - shared_by_all - set(formats.FORMATS)
     assert not missing, f"taxel/formats/__init__.py: FORMATS lacks {', '.join(sorted(missing))}"
 

@@ -21,7 +21,6 @@ from shell import call
 import taxel
 from taxel import FormatError, ProblemError
 from taxel.formats import ros
-from taxel.formats.ros.reading import _times
 from taxel.recording.text_options import TextOptions
 from taxel.tasks.labels import references
 
@@ -207,128 +206,10 @@ def test_messages_of_another_length_are_left_out_and_counted(tmp_path: Path) -> 
     for array in (None, taxel.Array(1, 3)):
         opened = taxel.open(bag, topic="/hand", field="thumb", array=array)
         assert (opened.counts["messages"], opened.counts["messages_of_another_length"]) == (4, 2)
-        assert opened.lost == ("2 of 6 messages are left out, because they do not have 1 x 3 values",)
+        assert opened.lost == ("2 of 6 messages are left out, of another length",)
         assert np.array_equal(opened.frames().t - BEGIN_NS // 1000, [0, 10_000, 30_000, 50_000])
     with pytest.raises(FormatError, match="thumb: the messages have 3 values each; the array has 2 x 2"):
         taxel.open(bag, topic="/hand", field="thumb", array=taxel.Array(2, 2))
-
-
-@pytest.mark.parametrize(
-    ("stamps", "late", "expected", "by_the_bag"),
-    [
-        ([1, 11, 21, 31], 2, [1, 11, 21, 31], 0),
-        ([1, None, 21, 31], 2, [1, 13, 21, 31], 1),
-        ([None, 11, 21, 31], 2, [3, 11, 21, 31], 1),
-        ([1, 11, 5, 31], 2, [1, 11, 23, 31], 1),
-        ([1, 11, 11, 31], 2, [1, 11, 23, 31], 1),
-        # The bag's time would come after the next stamp: the median time under way is taken off.
-        ([1, None, 21, 31], 25, [1, 11, 21, 31], 1),
-        # A clock that was set back: what follows continues by the bag.
-        ([1001, 1011, 21, 31], 2, [1001, 1011, 1021, 1031], 2),
-        # One stamp ahead, by less than a day or by years, leaves those after it as they are.
-        ([1, 1011, 21, 31], 2, [1, 13, 21, 31], 1),
-        ([1, 11, 21, 3e11], 2, [1, 11, 21, 33], 1),
-        ([-1e12, 11, 21, 31], 2, [3, 11, 21, 31], 1),
-        ([1, 11, -1e12, 31], 20, [1, 11, 21, 31], 1),
-        # The last stamp ahead by an hour, the one before it, and the first back by an hour.
-        ([1, 11, 21, 31, 3_600_041], 2, [1, 11, 21, 31, 43], 1),
-        ([1, 11, 21, 3_600_031, 41], 2, [1, 11, 21, 33, 41], 1),
-        ([-3_600_001, 11, 21, 31, 41], 2, [3, 11, 21, 31, 41], 1),
-        # Half of them sound, ahead of the bag's time or behind it.
-        ([1, None, 21, None], 2, [1, 13, 21, 33], 2),
-        ([3_600_001, None, 3_600_021, None], 2, [3_600_001, 3_600_011, 3_600_021, 3_600_031], 2),
-        # Fewer than half: none, one value for all, falling ones, all of another day, and three of four ahead.
-        ([None] * 4, 2, [3, 13, 23, 33], 4),
-        ([1] * 4, 2, [3, 13, 23, 33], 4),
-        ([31, 21, 11, 1], 2, [3, 13, 23, 33], 4),
-        ([86_500_001, 86_500_011, 86_500_021, 86_500_031], 2, [3, 13, 23, 33], 4),
-        ([3e11, 3e11, 21, 3e11], 2, [3, 13, 23, 33], 4),
-        # Of one message the one stamp counts, if it is sound.
-        ([1], 2, [1], 0),
-        ([None], 2, [3], 1),
-        ([3e11], 2, [3], 1),
-    ],
-)
-def test_a_wrong_stamp_gives_way_to_the_bags_time_and_those_of_most_to_the_bags_times(
-    stamps, late, expected, by_the_bag, tmp_path
-) -> None:
-    several = [("/palm", PALM, 1 + 10 * k + late, stamp, bags.palm(PALMS[0])) for k, stamp in enumerate(stamps)]
-    bag, count = bags.write(tmp_path / "grasp.mcap", several), len(stamps)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        opened = taxel.open(bag, topic="/palm")
-    assert (opened.frames().t - BEGIN_NS // 1000).tolist() == [1000 * ms for ms in expected]
-    assert opened.counts["times_by_the_bag"] == by_the_bag
-    said = f"{by_the_bag} of {count} message{'s' * (count > 1)} have the time of the bag"
-    assert [said in line for line in opened.lost] == [True] * (by_the_bag > 0)
-    assert [f"{bag}: topic /palm: {line}" for line in opened.lost] == [str(one.message) for one in caught]
-
-
-@pytest.mark.parametrize(
-    ("lengths", "read", "places"),
-    [
-        # The first message, or the last, is odd; so are most in turn; the first of two lengths alike.
-        ([5, 3, 3, 3], 3, [1, 2, 3]),
-        ([3, 3, 3, 5], 3, [0, 1, 2]),
-        ([1, 3, 3], 3, [1, 2]),
-        ([0, 1, 2, 9, 4, 4], 4, [4, 5]),
-        ([6, 2, 6, 2, 6, 2], 6, [0, 2, 4]),
-        ([12] * 5 + [3] * 25, 3, list(range(5, 30))),
-        ([7], 7, [0]),
-    ],
-)
-@pytest.mark.parametrize(("layout", "name"), mixed(["a row", "a grid"], ["grasp.bag", "grasp.mcap"]))
-def test_the_most_frequent_length_is_read_whatever_comes_first(
-    name: str, layout: str, lengths: list[int], read: int, places: list[int], tmp_path: Path, capsys
-) -> None:
-    sizes = (lambda n: (2, n)) if layout == "a grid" else lambda n: ()
-    twice = 2 if layout == "a grid" else 1
-    kind = "std_msgs/msg/Int16MultiArray"
-    sent = [
-        ("/raw", kind, 10 * k, None, bags.multi_array(np.arange(twice * n) + k, sizes(n) if n else (0, 0)))
-        for k, n in enumerate(lengths)
-    ]
-    bag = bags.write(tmp_path / name, sent)
-    opened = taxel.open(bag, topic="/raw")
-    assert opened.array.shape == ((2, read) if layout == "a grid" else (1, read))
-    assert (opened.frames().t - BEGIN_NS // 1000).tolist() == [10_000 * k for k in places]
-    assert opened.frames().values[:, 0, 0].tolist() == places
-    left = len(lengths) - len(places)
-    assert opened.counts["messages_of_another_length"] == left
-    assert [f"{left} of {len(lengths)} messages are left out" in line for line in opened.lost] == [True] * (left > 0)
-    # The count is told before anything else, and the list of topics names the shape of most.
-    head, first, *_ = call(capsys, "info", bag, "--topic", "/raw")[1].splitlines()
-    assert (f"{left} of {len(lengths)} messages are left out" in first) == (left > 0), head
-    (listed,) = ros.topics(bag)
-    assert listed.shape == ((2, read) if layout == "a grid" else (read,))
-
-
-@given(
-    stamps=st.lists(
-        st.one_of(st.just(0), st.integers(-(10**12), 10**12), st.integers(1, 20), st.just(2**62)),
-        min_size=1,
-        max_size=30,
-    ),
-    steps=st.lists(st.integers(0, 10**9), min_size=30, max_size=30),
-)
-def test_times_never_fall_and_are_stamps_or_are_counted(stamps, steps) -> None:
-    bag = np.cumsum(steps)[: len(stamps)] + 10**6
-    t, by_the_bag = _times(np.array(stamps, np.int64), bag)
-    assert (np.diff(t) >= 0).all()
-    assert np.count_nonzero(t != stamps) <= by_the_bag
-    # The most stamps that ascend, by trying each that could come before.
-    most: list[int] = []
-    for k, stamp in enumerate(stamps):
-        near = stamp > 0 and abs(int(bag[k]) - stamp) <= 86_400 * 10**9
-        most.append(near * (1 + max((most[j] for j in range(k) if stamps[j] < stamp), default=0)))
-    sound = max(most)
-    if 2 * sound < len(stamps):
-        assert by_the_bag == len(stamps)
-    else:
-        # At most the first and the last of them lie too far from the bag's times.
-        assert by_the_bag == len(stamps) or len(stamps) - sound <= by_the_bag <= len(stamps) - sound + 2
-    if by_the_bag == len(stamps):
-        assert t.tolist() == bag.tolist()
 
 
 def without_definitions(bag: Path) -> Path:
@@ -337,45 +218,6 @@ def without_definitions(bag: Path) -> Path:
         database.execute("DELETE FROM message_definitions")
     database.close()
     return bag
-
-
-def test_a_bag_without_definitions_names_both_options_and_opens_by_them(tmp_path: Path) -> None:
-    bag = without_definitions(bags.write(tmp_path / "grasp.db3", palms()))
-    (listed,) = ros.topics(bag)
-    assert (listed.messages, listed.trouble) == (6, f"no definition of {PALM}")
-    said = (
-        rf"the definition of {PALM} \(topic /palm\) is not in the bag; .*folder of .* release of ROS, one of "
-        r".*humble.*; give types"
-    )
-    with pytest.raises(FormatError, match=said):
-        taxel.open(bag, topic="/palm")
-    (tmp_path / "skins_msgs" / "msg").mkdir(parents=True)
-    own = tmp_path / "skins_msgs" / "msg" / "Palm.msg"
-    own.write_text(bags.DEFINITIONS[PALM])
-    with pytest.raises(FormatError, match=r"the definition of std_msgs/msg/Header .*release of ROS"):
-        taxel.open(bag, topic="/palm", types=tmp_path / "skins_msgs")
-    flat = tmp_path / "flat"
-    flat.mkdir()
-    shutil.copy(own, flat)
-    for types in (tmp_path / "skins_msgs", tmp_path / "skins_msgs" / "msg", flat):
-        opened = taxel.open(bag, topic="/palm", types=types, ros="humble", array=PALM_ARRAY)
-        assert np.array_equal(opened.frames().values, PALMS)
-    # The bag holds the digest of its definition, so that another one is not taken for it.
-    own.write_text("std_msgs/Header header\nint16[767] taxels\n")
-    with pytest.raises(FormatError, match=f"was recorded with another definition of {PALM}"):
-        taxel.open(bag, topic="/palm", types=tmp_path / "skins_msgs", ros="humble")
-
-
-def test_a_definition_in_idl_opens_a_bag(tmp_path: Path) -> None:
-    bag = without_definitions(bags.write(tmp_path / "grasp.db3", palms()))
-    (tmp_path / "types").mkdir()
-    (tmp_path / "types" / "Palm.idl").write_text(
-        '#include "std_msgs/msg/Header.idl"\n\nmodule skins_msgs {\n  module msg {\n'
-        "    typedef int16 int16__768[768];\n    struct Palm {\n      std_msgs::msg::Header header;\n"
-        "      int16__768 taxels;\n    };\n  };\n};\n"
-    )
-    opened = taxel.open(bag, topic="/palm", types=tmp_path / "types", ros="humble", array=PALM_ARRAY)
-    assert np.array_equal(opened.frames().values, PALMS)
 
 
 @pytest.mark.parametrize(
@@ -392,9 +234,8 @@ def test_a_definition_in_idl_opens_a_bag(tmp_path: Path) -> None:
         ({"topic": "/hand", "field": "note"}, FormatError, "field note: the field has no numbers"),
         ({"topic": "/palm", "field": "taxels.3"}, FormatError, r"field taxels\.3: the field has no numbers"),
         ({"topic": ["/hand", "/palm"], "field": ["a"] * 3}, ProblemError, "topic is given 2 times for 3 sources"),
-        ({"topic": ["/palm", "/palm"]}, ProblemError, "palm.taxels is chosen twice"),
+        ({"topic": ["/palm", "/palm"]}, ProblemError, "two sources would have the name palm_taxels"),
         ({"topic": "/palm", "ros": "hubble"}, ProblemError, "ros is hubble: must be one of .*humble"),
-        ({"topic": "/palm", "types": "nowhere"}, ProblemError, "nowhere: must be a folder with .msg or .idl files"),
         ({"topic": 3}, ProblemError, "topic is 3"),
         ({"topic": [3]}, ProblemError, "topic is 3"),
         ({"topic": "/palm", "array": [3]}, ProblemError, "array is \\[3\\]: must be a taxel.Array"),
@@ -450,24 +291,12 @@ def test_a_bag_that_was_cut_off_says_what_makes_it_whole(tmp_path: Path) -> None
         taxel.open(bag, topic="/palm")
 
 
-@pytest.mark.parametrize("top", [0x40, 0xFF])
-def test_a_position_in_the_header_that_no_file_has_is_damage(top: int, tmp_path: Path) -> None:
-    bag = bags.write(tmp_path / "a.bag", palms())
-    data = bytearray(bag.read_bytes())
-    data[data.index(b"index_pos=") + 17] = top
-    bag.write_bytes(data)
-    with pytest.raises(taxel.FormatError, match=r"a\.bag: cannot be read as a ROS bag: .*beyond the end of any file"):
-        taxel.open(bag, topic="/palm")
-
-
 def test_only_a_bag_has_topics_and_a_taxel_mcap_is_no_bag(tmp_path: Path) -> None:
     events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
     taxel.convert(events, tmp_path / "own.mcap")
     assert not ros.is_bag(tmp_path / "own.mcap")
     assert taxel.open(tmp_path / "own.mcap").events == events
-    with pytest.raises(
-        ProblemError, match=r"own\.mcap: is not a ROS bag; topic, field, types and ros are only for ROS bags"
-    ):
+    with pytest.raises(ProblemError, match=r"own\.mcap: is not a ROS bag; topic, field and ros are only for ROS bags"):
         taxel.open(tmp_path / "own.mcap", topic="/palm")
 
 
@@ -480,7 +309,7 @@ def test_a_layout_file_says_the_topic_and_that_less_means_more(tmp_path: Path, c
     assert frames.array.shape == (24, 32)
     assert json.loads(call(capsys, "info", bag, "--json")[1])["frames"] == 6
     layout.write_text('[ros]\ntopics = "/palm"\n')
-    with pytest.raises(FormatError, match=r"ros\.topics is not known: must be one of topic, field, types, ros"):
+    with pytest.raises(FormatError, match=r"ros\.topics is not known: must be one of topic, field, ros, by"):
         taxel.open(bag)
 
 
@@ -497,7 +326,7 @@ def test_a_folder_of_bags_opens_as_a_folder_of_trials(tmp_path: Path) -> None:
 
 def test_without_rosbags_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     bag = bags.write(tmp_path / "grasp.bag", palms())
-    monkeypatch.setitem(sys.modules, "rosbags", None)
+    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
     with pytest.raises(ImportError, match=r"needs rosbags, which is not installed: pip install 'taxel\[ros\]'"):
         taxel.open(bag, topic="/palm")
     code, _, said = call(capsys, "info", bag)
@@ -592,3 +421,49 @@ def test_labels_of_two_topics_are_each_of_their_source(names: dict[str, str], tm
         ProblemError, match="there are 2 recordings; state it in the column recording; the columns are "
     ):
         references(str(table), options.open_sensors([bag, other]))
+
+
+@pytest.mark.parametrize("stamps", [[0, 10, 20, 30, 40, 50, 60, 70, 80, 90, None], [*range(100, 0, -10), 3], [5] * 11])
+def test_times_are_stamps_or_if_many_are_wrong_those_of_the_bag(stamps: list[float | None], tmp_path: Path) -> None:
+    messages = [("/palm", PALM, 10 * k + 2, stamp, bags.palm(PALMS[k % 6])) for k, stamp in enumerate(stamps)]
+    with warnings.catch_warnings(record=True):
+        opened = taxel.open(bags.write(tmp_path / "a.mcap", messages), topic="/palm")
+    t = opened.frames().t - BEGIN_NS // 1000
+    if stamps[-1] is None:
+        assert t.tolist() == [*range(0, 100_000, 10_000), 102_000]
+        assert opened.counts["times_by_the_bag"] == 1
+    else:
+        assert t.tolist() == [10_000 * k + 2000 for k in range(11)]
+        assert opened.counts["times_by_the_bag"] == 11
+
+
+NAMED, PATCH = "skins_msgs/msg/Named", "skins_msgs/msg/Touch"
+
+
+def test_named_channels_are_taken_by_name_and_a_field_splits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    definitions = {NAMED: "string[] name\nfloat64[] position\n", PATCH: "string hand\nuint16[] taxels\n"}
+    monkeypatch.setattr(bags, "DEFINITIONS", bags.DEFINITIONS | definitions)
+
+    def named(names: list[str], values: list[float]) -> bags.Make:
+        return lambda types, _: types[NAMED](names, np.array(values, float))
+
+    def touch(hand: str, values: list[int]) -> bags.Make:
+        return lambda types, _: types[PATCH](hand, np.array(values, np.uint16))
+
+    bag = bags.write(
+        tmp_path / "a.mcap",
+        [
+            ("/joints", NAMED, 1, None, named(["thumb", "index"], [1, 2])),
+            ("/joints", NAMED, 11, None, named(["index", "thumb"], [4, 3])),
+            ("/touch", PATCH, 12, None, touch("left", [5, 6])),
+            ("/touch", PATCH, 17, None, touch("right", [7, 8])),
+            ("/touch", PATCH, 22, None, touch("left", [9, 9])),
+        ],
+    )
+    opened = taxel.open(bag, topic="/joints")
+    assert opened.frames().values[:, 0].tolist() == [[1, 2], [3, 4]]
+    assert opened.array.names == ("thumb", "index")
+    (tmp_path / "a.layout.toml").write_text('[ros]\ntopic = "/touch"\nby = "hand"\n')
+    split = taxel.open(bag)
+    assert list(split.sources) == ["touch_left", "touch_right"]
+    assert split.sources["touch_left"].frames().values[:, 0].tolist() == [[5, 6], [9, 9]]

@@ -175,6 +175,7 @@ def test_one_line_says_how_it_was_read_and_what_was_left_out(tmp_path: Path, tex
     [
         ("time,a\n0,1\n1,2\n2,3\n", ["time_unit = ", ""]),
         ("0,5\n0,7\n0,9\n", ["", 'decimal = ","']),
+        ("x,y,p,t\n1,2,1,100\n3,4,0,230\n5,6,1,400\n", ['time_unit = "us"', 'time_unit = "ms"']),
         ("7,5,1\n2,9,4\n4,4,2\n", ["", "frame_lines = 3"]),
         ("01 10 20\n02 11 21\n", ["", 'lines = "hex"']),
         ("0,0,left,1,2\n5,1,right,8,9\n10,0,left,1,2\n", ["by = 3", "leave_out = [2, 3]"]),

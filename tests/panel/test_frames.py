@@ -276,7 +276,7 @@ def test_a_large_table_is_shown_from_its_beginning_and_then_whole(tmp_path, monk
 
 def test_what_is_no_recording_is_refused_at_once(tmp_path):
     (tmp_path / "notes.txt").write_text("bread, milk\n")
-    with pytest.raises(taxel.FormatError, match="not a recording"):
+    with pytest.raises(taxel.FormatError, match="contains no table of numbers"):
         Panel(tmp_path / "notes.txt")
     (tmp_path / "empty").mkdir()
     with pytest.raises(taxel.ProblemError, match="contains no recording"):

@@ -172,7 +172,7 @@ def test_tables_and_arrays_of_other_programs_are_shown_by_their_layout(beside, c
     folder, layout = tmp_path / "tables", tmp_path / "said.toml"
     values, text = tables(folder)
     for words, reason in (
-        (folder, f"{folder}: contains no recording; name a file, or one of the folders in it"),
+        (folder, "palm.csv: can be read in 2 ways"),
         (
             folder / "palm.npy",
             "layout.toml beside it or another file given as layout (docs/files.md):",

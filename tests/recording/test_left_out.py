@@ -81,7 +81,8 @@ def test_a_damaged_file_of_another_format_or_program_is_left_out(tmp_path: Path)
         (tmp_path / "tables" / name).write_text(content)
     with pytest.warns(UserWarning, match="^left out") as said:
         assert [each.name for each in taxel.open_all(tmp_path / "tables")] == ["a.txt"]
-    assert [name in str(each.message) for name, each in zip(("b.txt", "c.txt"), said, strict=True)] == [True, True]
+    left = [str(each.message) for each in said if str(each.message).startswith("left out")]
+    assert [name in line for name, line in zip(("b.txt", "c.txt"), left, strict=True)] == [True, True]
 
 
 def test_if_no_file_can_be_read_the_error_is_that_of_the_first(tmp_path: Path) -> None:

@@ -44,14 +44,10 @@ def test_frames_are_those_that_were_saved(
     place = tmp_path / "walk.mat"
     stored = np.moveaxis(values, 0, -1) if frames == "last" else values
     save(place, {"pressure": stored, "time_s": t[:, None], "left": np.array(3.0)}, how)
-    # What the refusal proposes reads the file.
-    with pytest.raises(FormatError) as refused:
-        taxel.open(place)
-    proposed = (
-        str(refused.value).split("\n", 1)[1] if "\n" in str(refused.value) else "\n".join(refused.value.__notes__)
-    )
-    for text in (proposed, TIMED + f'frames = "{frames}"\n'):
-        (tmp_path / "walk.layout.toml").write_text(text)
+    # Without a layout, the times say which axis counts frames.
+    for text in ("", TIMED + f'frames = "{frames}"\n'):
+        if text:
+            (tmp_path / "walk.layout.toml").write_text(text)
         read = recorded(taxel.open(place))
         assert isinstance(read, taxel.Frames)
         assert np.array_equal(read.values.reshape(values.shape), values.astype(np.float32))
@@ -63,7 +59,7 @@ def test_what_is_no_array_of_numbers_is_named_or_left_out(tmp_path: Path) -> Non
     savemat(place, {"trial": {"pressure": np.ones((5, 2))}, "name": "walk"})
     assert shapes(place) == {}
     with pytest.raises(
-        FormatError, match=r"contains no numbers; .*; if the data are in a struct, save its fields: save\('FILE.mat', "
+        FormatError, match=r"contains no numbers; if the data are in a struct, save its fields: save\('FILE.mat', "
     ):
         taxel.open(place)
     place.write_bytes(b"5, 6\n7, 8\n" * 30)

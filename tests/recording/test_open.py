@@ -46,10 +46,10 @@ def npz(**columns: object) -> bytes:
         ("a.npz", npz(t=[1], x=[2], y=[3], p=[True], array="{"), "a.npz, array: "),
         ("a.npz", npz(t=[1], x=[2], y=[3], p=[True], about="{}"), "was written by an earlier version of taxel"),
         ("a.npz", npz(t=[1], values=np.zeros((2, 3, 3))), "t has shape"),
-        ("a.csv", b"\x89PNG\r\n", "line 1: "),
-        ("a.csv", b"", "line 1: '': must be"),
-        ("a.csv", b"time,x,y\n", "line 1: 'time,x,y': must be t_us,x,y,p[,intensity]"),
-        ("a.csv", b"\xff\xfe\x00", "byte 2: not text in UTF-16 (truncated data); save it as UTF-8"),
+        ("a.csv", b"\x89PNG\r\n", "contains no table of numbers"),
+        ("a.csv", b"", "the file is empty; must be a recording"),
+        ("a.csv", b"time,x,y\n", "contains no table of numbers"),
+        ("a.csv", b"\xff\xfe\x00", "not text in UTF-16 (truncated data); save it as UTF-8"),
         ("a.csv", b"t_us,x,y,p,colour\n", "line 1: 'colour' after p"),
         ("a.csv", b"t_us,x,y,p\n1,2,3\n", "must be 4 numbers per line"),
         ("a.csv", b"t_us,x,y,p\n1,2,3,1\n5,6,abc,1\n", "line 3, column y"),
@@ -64,7 +64,7 @@ def npz(**columns: object) -> bytes:
         ("a.csv", b"t_us,x0y0\n0.5,1\n", "a.csv, line 2, column t_us: is 0.5; must be a whole number of us"),
         ("a.csv", b"t_us,x0y0\n0,1\n1,2,3\n", "line 3"),
         ("a.csv", b"t_us,x9999y9999\n0,1\n", "most are missing"),
-        ("a.txt", b"hello", "not a recording; taxel reads .mcap, .lsa, .npz, .csv, .h5"),
+        ("a.txt", b"hello", "contains no table of numbers"),
         ("a.h5", b"\x89HDF\r\n\x1a\n", "the HDF5 file is damaged or not complete"),
         ("a.h5", b"hello", "the HDF5 file is damaged or not complete"),
         ("a.bag", b"#ROSBAG V2.0", "is a ROS bag; choose one of its topics, or write [ros] in a layout file"),
@@ -399,5 +399,3 @@ def test_the_page_opens_an_array_whose_rate_is_given(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", np.ones((4, 256)))
     with Panel(tmp_path / "a.npy", options=TextOptions(rate_hz=30.0)) as panel:
         assert panel.url
-    with pytest.raises(FormatError, match=r"a\.npy: contains an array"):
-        Panel(tmp_path / "a.npy")

@@ -62,7 +62,7 @@ def test_other_peoples_h5_is_a_list_of_trials_whose_truth_is_notes(tmp_path: Pat
         assert {n.text: n.t for n in rec.notes} == {e: int(t[0]) for e, t in trial.truth.items()}
     with h5py.File(tmp_path / "other.h5", "w") as h5:
         h5["t"] = [1]
-    with pytest.raises(FormatError, match=r"contains t \(1\); must contain the arrays t, x, y and p \(events\)"):
+    with pytest.raises(FormatError, match=r"contains t \(1\); name the array of frames"):
         taxel.open(tmp_path / "other.h5")
 
 
@@ -102,7 +102,7 @@ def test_a_folder_without_a_recording_says_what_there_is_to_read(tmp_path: Path)
 
 def test_a_folder_without_a_recording_names_bags_arrays_and_tables_too(tmp_path: Path) -> None:
     (tmp_path / "notes.pdf").write_bytes(b"%PDF")
-    readable = r"taxel reads .*ROS bags .*tekscan.*with a layout file, arrays and tables, for example \.npy"
+    readable = r"taxel reads .*ROS bags .*tekscan.*arrays and tables of other programs, for example \.npy"
     with pytest.raises(FormatError, match=readable) as said:
         taxel.open_all(tmp_path)
     assert "\n" not in str(said.value)

@@ -20,6 +20,7 @@ _Error = TypeVar("_Error", bound=Error)
 _REMEDIES = {
     "give": "give {}",
     "lay_out": "if the taxels are a grid, row by row, give {}, or rows and columns in a layout file",
+    "lay_out_camera": "give {}, such as 480x640, or rows and columns in a layout file",
     "pitch": "give {} with the pitch in mm, or pitch_mm in a layout file",
     "unfelt": (
         "possible reasons: the first label is later than its touch, so the tare contains a touch (give {}); "

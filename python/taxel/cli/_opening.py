@@ -48,10 +48,6 @@ class FileOptions:
             metavar="NAME", help="The topic's field, for example left.taxels. Default: the only field with numbers."
         ),
     ] = None
-    types: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="A folder of .msg or .idl files, for a ROS bag that lacks definitions."),
-    ] = None
     ros: Annotated[
         str | None,
         typer.Option(

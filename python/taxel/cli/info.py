@@ -90,7 +90,7 @@ def info(
     with progress(quiet=True), bar(as_json) as show:  # the first prints warnings
         show(f"reading {file}", 0, 0)
         if file.exists() and is_bag(file) and not files.opener._names_topic(file):
-            say(*list_topics(file, topics(file, files.types, files.ros), as_json))
+            say(*list_topics(file, topics(file, files.ros), as_json))
             return
         recordings = files.opener.open_trials(file)
         recording = recordings[0]
@@ -294,6 +294,7 @@ def _lines(pressed: Series) -> Iterator[str]:
 
 def _page(facts: dict[str, Any]) -> list[str]:
     """Return the facts of a recording as lines for people."""
+    from taxel.formats.layout import layout_name  # noqa: PLC0415
     from taxel.recording import kind_of_file  # noqa: PLC0415
 
     head = f"{facts['file']}: {kind_of_file(facts['kind'])}" + f", from {facts['source']}" * bool(facts["source"])
@@ -303,6 +304,11 @@ def _page(facts: dict[str, Any]) -> list[str]:
     # Remarks on data left out of a bag, or on other times, concern all rows that follow.
     rows = [*missing, *rows] if facts["kind"] == "ros" else [*rows, *missing]
     lines = [head, *(f"  {name:<19} {value}" for name, value in rows)]
+    if facts["layout"]:
+        lines += [
+            f"read by this layout, which {layout_name(Path(facts['file']))} may state:",
+            *facts["layout"].splitlines(),
+        ]
     return [*lines, *(f"{kind} written to {facts[kind]}" for kind in ("picture", "table") if kind in facts)]
 
 

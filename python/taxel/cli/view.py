@@ -80,7 +80,7 @@ def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> C
     first = recordings[0]
     bag = is_bag(first)
     if bag and not files.opener._names_topic(first):
-        raise ProblemError(*list_topics(first, topics(first, files.types, files.ros), as_json=False))
+        raise ProblemError(*list_topics(first, topics(first, files.ros), as_json=False))
     if not files.opener.words() and calibration is None and not bag:
         return None
 

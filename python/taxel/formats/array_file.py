@@ -26,16 +26,10 @@ from taxel.formats.table_form import unit_of_times
 from taxel.formats.times import UNITS_US, repaired, us_of
 from taxel.frames import Frames
 
-__all__ = ["ARRAYS", "is_lone_array", "read_array_file"]
+__all__ = ["ARRAYS", "look", "read_array_file"]
 
 #: The endings of files of arrays.
 ARRAYS = (".npy", ".npz", ".h5", ".hdf5", ".mat")
-
-
-def is_lone_array(path: Path) -> bool:
-    """Return whether a file of another program holds one array only, of the shape of frames."""
-    found = shapes(path) if path.suffix.lower() in ARRAYS else {}
-    return len(found) == 1 and all(len(shape) in (2, 3) for shape in found.values())
 
 
 def read_array_file(path: Path, layout: Layout) -> Opened:
@@ -45,12 +39,8 @@ def read_array_file(path: Path, layout: Layout) -> Opened:
     ------
     FormatError : no such array, several that may hold the frames, or axes that can be read in two ways (prints both)
     """
-    stored = shapes(path)
-    how = _named(path, layout.data or Data(), stored)
+    how, said, stored = look(path, layout)
     shape = stored[how.array or ""]
-    said = list[str]()
-    if how.axes is None:
-        how, said = _axes(path, layout, how, stored, is_said=layout.data is not None or _is_given(path, layout))
     named = (how.axes or "").split()
     if len(named) != len(shape):
         raise unreadable(
@@ -76,6 +66,24 @@ def read_array_file(path: Path, layout: Layout) -> Opened:
     )
     line = f"{path.name}: read as {size}: {'; '.join(said)}" if said else ""
     return Opened(sources, timed, full, line, lost=lost)
+
+
+def look(path: Path, layout: Layout) -> tuple[Data, list[str], dict[str, tuple[int, ...]]]:
+    """Return how the arrays of a file are read, what was guessed of it, and their shapes; the frames are not read.
+
+    Raises
+    ------
+    FormatError : as of `read_array_file`
+    """
+    stored = shapes(path)
+    if not stored:
+        struct = "; if the data are in a struct, save its fields: save('FILE.mat', '-struct', 'NAME')"
+        raise unreadable(f"contains no numbers{struct * (path.suffix.lower() == '.mat')}", path)
+    how = _named(path, layout.data or Data(), stored)
+    if how.axes is not None:
+        return how, [], stored
+    how, said = _axes(path, layout, how, stored, is_said=layout.data is not None or _is_given(path, layout))
+    return how, said, stored
 
 
 def _is_given(path: Path, layout: Layout) -> bool:
@@ -105,20 +113,17 @@ def _named(path: Path, how: Data, stored: Mapping[str, tuple[int, ...]]) -> Data
         if is_npy or found not in stored:
             size = as_size(name)
             hint = f"; to state a size, write {size}" if size else ""
-            there = "the file has one array, without a name" if is_npy else f"the arrays are {_list(stored)}"
-            raise unreadable(f"contains no array {name}, which [data] {key} names; {there}{hint}", path)
+            there = "its one array has no name" if is_npy else f"its arrays are {_list(stored)}"
+            raise unreadable(f"contains no array {name}, which the layout states as [data] {key}; {there}{hint}", path)
         how = replace(how, **{key: found})
     if how.array is not None or is_npy:
         return how
-    frames = [name for name, shape in stored.items() if len(shape) >= 2 and math.prod(shape) > max(shape)]
-    if len(frames) != 1 and len(stored) != 1:
-        struct = "; if the data are in a struct, save its fields: save('FILE.mat', '-struct', 'NAME')"
-        raise unreadable(
-            f"contains {_list(stored)}; {advice(path, 'name the array of frames')}: [data] array"
-            + struct * path.name.endswith(".mat"),
-            path,
-        )
-    return replace(how, array=(frames or list(stored))[0])
+    several = {name: shape for name, shape in stored.items() if math.prod(shape) > 1 and time_unit(name) is None}
+    grids = [name for name, shape in several.items() if len(shape) >= 2 and math.prod(shape) > max(shape)]
+    frames = grids or list(several)
+    if len(frames) != 1:
+        raise unreadable(f"contains {_list(stored)}; {advice(path, 'name the array of frames')}: [data] array", path)
+    return replace(how, array=frames[0])
 
 
 def _axes(
@@ -190,7 +195,7 @@ def _unit(name: str, times: NDArray[Any]) -> tuple[str, list[str]]:
 
 def _refuse(path: Path, holds: str, choices: Sequence[tuple[str, Layout]]) -> NoReturn:
     lines = [f"# {k}. {name}\n{of_layout(layout)}" for k, (name, layout) in enumerate(choices, 1)]
-    error = unreadable(f"{holds}; {advice(path, 'write one of these')}", path)
+    error = unreadable(f"{holds}; {advice(path, 'write one of these')}:", path)
     error.args = (*error.args, "\n".join(lines).rstrip())
     raise error
 
@@ -201,7 +206,8 @@ def _in_order(path: Path, values: NDArray[Any], named: Sequence[str], how: Data)
         raise unreadable(f"{how.array or 'the array'} contains {values.dtype} of shape {_size(values.shape)}", path)
     large = np.argwhere(np.isinf(values))
     if len(large):
-        at = ", ".join(f"{name} {k}" for name, k in zip(named, large[0].tolist(), strict=True))
+        called = ("frame" if name == "time" else name for name in named)
+        at = ", ".join(f"{name} {k}" for name, k in zip(called, large[0].tolist(), strict=True))
         raise unreadable(f"{how.array or 'the array'}, {at}: must fit 32 bits, or be NaN if it is missing", path)
     names = ["column" if name == "taxel" else name for name in named]
     order = [name for name in ("trial", "time", "row", "column", "axis") if name in names]
@@ -254,7 +260,10 @@ def _frames(path: Path, layout: Layout, values: NDArray[np.float32], t: NDArray[
     try:
         array = layout.array(rows * columns, Array(rows, columns, name=path.stem))
         frames = Frames(
-            frozen_whole(np.ascontiguousarray(values).reshape(-1, *array.shape)), frozen_whole(t), array=array
+            frozen_whole(np.ascontiguousarray(values).reshape(-1, *array.shape)),
+            frozen_whole(t),
+            unit=layout.unit or "counts",
+            array=array,
         )
     except ProblemError as error:
         raise FormatError(f"{layout.path}: {path.name}: {first_line(error)}") from None

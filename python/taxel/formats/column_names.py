@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from taxel._base.cells import last_part, time_unit
+
 __all__ = [
     "AXES",
     "are_units",
@@ -20,26 +22,6 @@ __all__ = [
 
 AXES = ("x", "y", "z")
 
-#: Units of time as people write them.
-_UNITS_OF_TIME = {
-    "s": ("s", "sec", "secs", "second", "seconds", "sek", "sekunden"),
-    "ms": ("ms", "msec", "millis", "milliseconds", "millisekunden"),
-    "us": ("us", "µs", "μs", "usec", "micros", "microseconds"),
-    "ns": ("ns", "nsec", "nanos", "nanoseconds", "nsecs"),
-}
-_UNIT_OF_TIME = "|".join(word for words in _UNITS_OF_TIME.values() for word in words)
-#: What people call times, in some languages.
-_TIME = (
-    r"t|ts|(?:%|rel|abs|host|device|sample|frame|recv|unix|epoch|system|header)?[ ._]*(?:time|stamp|time[ _]?stamp)s?"
-    r"|elapsed(?:[ _]time)?|(?:mess|uhr|system)?zeit(?:stempel|punkt)?|temps|tiempo|tempo|tijd|tid"
-    r"|datetime|date[ _]time|clock|millis|micros"
-)
-#: Names of columns that hold times, with or without a unit: time, timestamp_us, Time (ms), t [s].
-_TIMES = re.compile(
-    rf"(?:{_TIME})"
-    rf"(?:[ _.]*[\[(/] *(?P<within>{_UNIT_OF_TIME}) *[\])]?|(?:, *(?:in )?| in |[ _.]+)(?P<after>{_UNIT_OF_TIME}))?",
-    re.IGNORECASE,
-)
 _COUNTERS = re.compile(
     r"(?:frame|sample|record|packet|line|row|msg|message)?[ ._]*"
     r"(?:seq(?:uence)?|frames?|index|idx|samples?|records?|id|no|nr|num|number|count(?:er)?|#|bild|lfd)[ ._]*"
@@ -58,7 +40,8 @@ _KEYS = re.compile(
     re.IGNORECASE,
 )
 _OTHERS = re.compile(
-    r"(?:.*[ ._])?(?:acc(?:el(?:eration)?)?|gyro?(?:scope)?|mag(?:netometer)?|imu|temp(?:erature)?|temperatur|"
+    r"(?:[agm][ ._]?[xyz])|(?:.*[ ._])?"
+    r"(?:acc(?:el(?:eration)?)?|gyro?(?:scope)?|mag(?:netometer)?|imu|temp(?:erature)?|temperatur|"
     r"batt?(?:ery)?|akku|vbat|hum(?:idity)?|lat(?:itude)?|lon(?:gitude)?|quat(?:ernion)?|roll|pitch|yaw|crc|checksum|cop)"
     r"(?:[ ._\[(]*(?:x|y|z|w|\d+)[\])]?)?(?:[ ._]?[\[(][^\])]*[\])])?",
     re.IGNORECASE,
@@ -74,45 +57,24 @@ _AXIS_OF_LIST = re.compile(r"(.+)\[([012])\]")
 _PLACE = re.compile(r"\D*?(\d+)\D+(\d+)\D*")
 
 
-def time_unit(name: str) -> str | None:
-    """Return the unit of time that the name of a column or an array states, "" if none; None of another name.
-
-    Examples
-    --------
-    >>> time_unit("Time (ms)"), time_unit("run1/time"), time_unit("Time[secs]"), time_unit("palm"), time_unit("%time")
-    ('ms', '', 's', None, '')
-    """
-    found = _TIMES.fullmatch(_last(name))
-    if found is None:
-        return None
-    word = (found["within"] or found["after"] or "").lower()
-    alone = {"millis": "ms", "micros": "us"}.get(name.strip("\"' ").lower(), "")
-    return next((unit for unit, words in _UNITS_OF_TIME.items() if word in words), alone)
-
-
-def _last(name: str) -> str:
-    """Return the last part of a path within a file or a message: header.seq, run1/time."""
-    return re.split(r"[/.](?=[^\W\d])", name.strip("\"' "))[-1]
-
-
 def is_counter(name: str) -> bool:
     """Return whether a column numbers the lines: seq, frame, Index, sample_no."""
-    return _COUNTERS.fullmatch(_last(name)) is not None
+    return _COUNTERS.fullmatch(last_part(name)) is not None
 
 
 def is_label(name: str) -> bool:
     """Return whether a column holds labels or states: label, slipped, contact state."""
-    return _LABELS.fullmatch(_last(name)) is not None
+    return _LABELS.fullmatch(last_part(name)) is not None
 
 
 def is_key(name: str) -> bool:
     """Return whether a column says which sensor a line is of: hand, sensor_id."""
-    return _KEYS.fullmatch(_last(name)) is not None
+    return _KEYS.fullmatch(last_part(name)) is not None
 
 
 def is_other(name: str) -> bool:
     """Return whether a column is of another quantity than force or pressure: acc_x, Battery [%]."""
-    return _OTHERS.fullmatch(_last(name)) is not None
+    return _OTHERS.fullmatch(last_part(name)) is not None
 
 
 def unit_of(name: str) -> str:

@@ -520,7 +520,7 @@ _FOR = {"table": ", for recorded tables", "source": ", for taxel live --source",
 def _keys(table: str) -> list[str]:
     """Return the keys of a table, "" for those that are in none; the mapping is that of a ROS bag."""
     kind = _TABLES[table] if table else Layout
-    return ["topic", "field", "types", "ros"] if kind is dict else [f.name for f in fields(kind) if f.name != "path"]
+    return ["topic", "field", "ros", "by"] if kind is dict else [f.name for f in fields(kind) if f.name != "path"]
 
 
 def _known(table: str, values: Mapping[str, Any]) -> None:

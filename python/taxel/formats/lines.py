@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 from taxel._base.messages import counted
 
-__all__ = ["KINDS", "MISSING", "Line", "OddLines", "is_number", "read_line"]
+__all__ = ["KINDS", "MISSING", "Line", "OddLines", "has_marks", "is_number", "read_line"]
 
 #: How the cells of a line are found: between separators; where marks and names are between them too; JSON; hex.
 KINDS = ("plain", "marked", "json", "hex")
@@ -32,6 +32,19 @@ _BETWEEN = {".": re.compile(r"[\s,;]+"), ",": re.compile(r"[\s;]+")}
 _NAME = re.compile(r"(?<![\w.])[\"']?([^\W\d][\w.%/-]*(?:\[\d+\])*)[\"']?\s*[:=]\s*(?=[-+.\d\[({\"'])")
 #: The blank between a day and a time, which separates no cells.
 _DAY = re.compile(r"(\d{4}-\d\d-\d\d|\d\d?\.\d\d?\.\d{4}) +(?=\d\d?:\d\d)")
+
+
+def has_marks(line: str) -> bool:
+    """Return whether brackets, quotes, an arrow or a name separate cells of a line.
+
+    Examples
+    --------
+    >>> [has_marks(line) for line in ("1,2", "10:00:00 PM,2", "0.1 [2, 3]", "1 -> 2", "a: 3")]
+    [False, False, True, True, True]
+    """
+    return (
+        any(mark in line for mark in "[](){}<>\"'") or _ARROW.search(line) is not None or _NAME.search(line) is not None
+    )
 
 
 @dataclass(frozen=True)
@@ -120,6 +133,10 @@ def read_line(line: str, kind: str = "marked", separator: str = ",", decimal: st
         return _of_json(line)
     if kind == "hex":
         digits = _split(line, separator)
+        if len(digits) == 1:
+            # Bytes without a separator.
+            whole = digits[0].removeprefix("0x")
+            digits = tuple(whole[k : k + 2] for k in range(0, len(whole), 2))
         try:
             numbers = tuple(str(int(cell, 16)) for cell in digits)
         except ValueError:

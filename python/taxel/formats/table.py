@@ -37,7 +37,7 @@ __all__ = ["ENDINGS", "Opened", "read_table"]
 
 ENDINGS = (*TEXTS, *SHEETS)
 #: Cells that pandas converts at once.
-_CELLS = 1 << 20
+_CELLS = 1 << 22
 #: So many odd lines are left out of any table, and of longer ones this share.
 _FEW_ODD, _ODD = 2, 0.1
 _NUMBER = re.compile(r"[-+]?\d+(?:[.,]\d+)?")
@@ -139,7 +139,8 @@ def read_table(path: Path, layout: Layout, array: Array | None = None) -> Opened
     if how.events:
         return _events(path, full, how, columns, rows, array, said, lost)
     values, t, keys, labels = _frames_of_lines(path, full, how, rows, said)
-    empty = [k for k in range(values.shape[2]) if values.shape[1] == 1 and np.isnan(values[:, 0, k]).all()]
+    maybe = np.flatnonzero(np.isnan(values[0, 0])) if values.shape[1] == 1 and len(values) else ()
+    empty = [int(k) for k in maybe if np.isnan(values[:, 0, k]).all()]
     if found.said and 0 < len(empty) < values.shape[2]:
         names = [columns.called(columns.taxels[k]) for k in empty]
         numbers = [columns.taxels[k] + 1 for k in empty]
@@ -343,13 +344,15 @@ def _parsed(source: Any, columns: _Columns, how: Table, *, whole: bool = False, 
     count, taxels = columns.count, list(columns.taxels)
     texts = [k for k in (columns.label, columns.by) if k is not None]
     times = [] if columns.time is None else [columns.time]
-    kinds: dict[int, Any] = dict.fromkeys(taxels, np.float32) | dict.fromkeys(texts, str)
+    # Kinds of numbers that are stated, not found, take pandas half as long again.
+    kinds: dict[int, Any] = dict.fromkeys([*texts, *(times if how.time_unit == ISO else [])], str)
+    places: Any = slice(taxels[0], taxels[-1] + 1) if taxels[-1] - taxels[0] + 1 == len(taxels) else taxels
     chunks = pd.read_csv(
         source,
         header=None,
         names=range(count + 1),
         index_col=False,
-        dtype=kinds | (dict.fromkeys(times, str) if how.time_unit == ISO else {}),
+        dtype=kinds,
         decimal=how.decimal,
         na_values=[*MISSING, *([] if how.missing is None else [how.missing])],
         keep_default_na=False,
@@ -357,6 +360,7 @@ def _parsed(source: Any, columns: _Columns, how: Table, *, whole: bool = False, 
         # An empty line may not be within a frame of so many lines.
         skip_blank_lines=how.frame_lines is None,
         chunksize=max(1, _CELLS // (count + 1)),
+        low_memory=False,
         **options,
     )
     values, stamps, labels, keys = list[NDArray[np.float32]](), list[Any](), list[str](), list[str]()
@@ -365,16 +369,19 @@ def _parsed(source: Any, columns: _Columns, how: Table, *, whole: bool = False, 
         for chunk in chunks:
             if whole and (bool(chunk[count].notna().any()) or bool(chunk[count - 1].isna().any())):
                 raise _OddError
-            block = chunk[taxels].to_numpy(np.float32)
+            part = chunk.iloc[:, places]
+            if any(kind.kind not in "iuf" for kind in part.dtypes):
+                raise _OddError
+            block = part.to_numpy(np.float32)
             if whole and (np.isinf(block).any() or (times and bool(chunk[times[0]].isna().any()))):
                 raise _OddError
-            values.append(np.ascontiguousarray(block))
+            values.append(block)
             stamps += [chunk[k] for k in times]
             labels += chunk[columns.label].fillna("").tolist() if columns.label is not None else []
             keys += chunk[columns.by].fillna("").tolist() if columns.by is not None else []
     if not values:
         raise _OddError
-    together = values[0] if len(values) == 1 else np.concatenate(values)
+    together = np.concatenate(values, out=np.empty((sum(map(len, values)), len(taxels)), np.float32))
     series = pd.concat(stamps, ignore_index=True) if stamps else None
     if whole and series is not None and how.time_unit != ISO and series.dtype.kind not in "iuf":
         raise _OddError
@@ -436,7 +443,7 @@ def _odd(cells: Sequence[str], columns: _Columns, numeric: Sequence[int], missin
 def _refuse_odd(path: Path, rows: _Rows) -> None:
     """Refuse a table of which more lines are odd than may be left out."""
     total = len(rows.values) + rows.odd.total
-    if rows.odd.total > max(_FEW_ODD, _ODD * total):
+    if rows.odd.total > max(_FEW_ODD, _ODD * total) or rows.odd.total >= max(1, len(rows.values)):
         first = min(rows.odd.first.values())
         kinds = "; ".join(rows.odd.said())
         raise unreadable(f"{rows.odd.total} of {total} lines are no frames: {kinds}", path, line=first)
@@ -558,7 +565,9 @@ def _frames(
         # More channels than a sensor may have columns are a grid by the layout.
         stated = stated or (None if taxels <= 65_535 else layout.grid())
         array = layout.array(taxels, stated or Array(1, taxels, name=path.stem, names=names))
-        frames = Frames(frozen_whole(values.reshape(-1, *array.shape)), frozen_whole(t), array=array)
+        frames = Frames(
+            frozen_whole(values.reshape(-1, *array.shape)), frozen_whole(t), unit=layout.unit or "counts", array=array
+        )
     except ProblemError as error:
         raise FormatError(f"{layout.path}: {path.name}: {first_line(error)}") from None
     limited(path, frames)

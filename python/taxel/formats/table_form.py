@@ -29,9 +29,9 @@ from taxel.formats.column_names import (
     time_unit,
     unit_of,
 )
-from taxel.formats.layout import Layout, Table, layout_name
+from taxel.formats.layout import Layout, Table, advice
 from taxel.formats.layout_text import of_layout
-from taxel.formats.lines import MISSING, Line, is_number, read_line
+from taxel.formats.lines import MISSING, Line, has_marks, is_number, read_line
 from taxel.formats.table_text import Text
 from taxel.formats.times import ISO, UNITS_US, is_day, is_time
 
@@ -62,7 +62,7 @@ _ABOVE_FRAME = re.compile(
     r"(?:[ \t,;:@(\[]+(?:t|time)?[ \t=:]*(?P<time>\d+(?:[.,]\d+)?)[ \t]*(?P<time_unit>[mun]?s)?[)\]]?)?[ \t,;]*",
     re.IGNORECASE,
 )
-_HEX = re.compile(r"(?:0x)?(?:[0-9A-Fa-f]{2}){1,4}")
+_HEX = re.compile(r"(?:0x)?(?:[0-9A-Fa-f]{2})+")
 _HEX_LETTER = re.compile(r"(?<![\w.])(?:0x)?[0-9]*[A-Fa-f][0-9A-Fa-f]*(?![\w.])")
 #: A comment, and how a layout is changed for it.
 _Choice: TypeAlias = tuple[str, Callable[[Layout], Layout]]
@@ -139,22 +139,25 @@ def guess(text: Text, layout: Layout) -> Form:
     if layout.table is not None:
         return Form(layout)
     lines = text.head
+    if text.path.suffix.lower() == ".json" and not any(read_line(line, "json") for line in lines[:3]):
+        raise unreadable("is one document of JSON; save a line of JSON per frame, or a .csv", text.path)
     begin, time_of_begin = _begin_of_frames(lines)
     is_begin = [bool(begin) and line.lstrip().startswith(begin) for line in lines]
     shown = ["" if above else line for line, above in zip(lines, is_begin, strict=True)]
+    size = (layout.rows or 0) * (layout.columns or 0)
     in_hex, is_sure = _hex(text, shown)
-    fits = [in_hex] if is_sure and in_hex is not None else sorted(_fits(shown), key=lambda fit: -fit.score)
+    found = [in_hex] if is_sure and in_hex is not None else _fits(shown)
+    fits = sorted(found, key=lambda fit: (-fit.score, bool(size) and fit.count != size))
     fits = [fit for fit in fits if fit.purity >= _FITS]
     if not fits:
-        raise unreadable(
-            "contains no table of numbers; if it has one, describe it in [table] of a layout file (docs/files.md)",
-            text.path,
-        )
+        why = "contains no table of numbers; if it has one, describe it in [table] of a layout file (docs/files.md)"
+        is_empty = not any(line.strip() for line in lines)
+        raise unreadable("the file is empty; must be a recording" if is_empty else why, text.path)
     fit = fits[0]
     reading = _reading(fit, shown)
     for other in fits[1:]:
         is_equal = other.purity >= _EQUALLY * fit.purity and len(other.body) >= len(fit.body)
-        if is_equal and other.count != fit.count and other.kind == fit.kind == "plain":
+        if is_equal and other.count != fit.count != size and other.kind == fit.kind == "plain":
             _decide(reading, fit, other, shown)
             break
     if in_hex is not None and not is_sure:
@@ -165,7 +168,7 @@ def guess(text: Text, layout: Layout) -> Form:
         )
     _frames(reading, fit, lines, is_begin, begin, time_of_begin)
     stated = layout.rows is not None or layout.rate_hz is not None or layout.path != text.path
-    time = _time(reading, fit)
+    time = _time(reading, fit, is_stated=stated)
     if time is None and reading.table.frame_time is None and not stated:
         _without_times(reading, fit, text)
     taxels = _taxels(reading, fit, time)
@@ -175,10 +178,12 @@ def guess(text: Text, layout: Layout) -> Form:
     table = replace(reading.table, leave_out=[reading.called(k) for k in left])
     if _are_events(reading, fit, taxels):
         table = replace(table, events=True)
+        _unit_of_events(reading, fit, time)
     full = replace(layout, table=table)
     if not table.events:
+        _maybe_events(reading, fit)
         full = _with_size(full, reading, taxels)
-    if reading.asked:
+    if reading.asked and not (stated and reading.asked[0][0].startswith("the first line")):
         _refuse(text, full, reading)
     return Form(full, (*_said(reading, fit, time), *reading.said))
 
@@ -190,6 +195,8 @@ def _fits(lines: Sequence[str]) -> Iterator[_Fit]:
         marked = separator in (",", ";") if kind != "plain" else separator == " "
         few = [line for _, line in there[-40:]]
         if not marked and separator != "," and not any(separator in line for line in few):
+            continue
+        if kind == "marked" and 2 * sum(map(has_marks, few)) < len(few):
             continue
         if kind == "json" and not any(line.lstrip()[:1] in "{[" for line in few):
             continue
@@ -282,11 +289,16 @@ def _without_names(fit: _Fit, table: Table, none: tuple[str, ...]) -> _Reading:
     """Return a table without names; a first line that numbers the columns is no frame."""
     first = fit.lines[fit.body[0]][1].cells
     numbers = [float(cell) for cell in first if is_number(cell)]
-    counts = len(numbers) >= 4 and bool(np.all(np.diff(numbers) == 1)) and numbers[0] in (0.0, 1.0)
-    again = len(fit.body) > 1 and fit.lines[fit.body[1]][1].cells[1:] != first[1:]
-    if counts and again and len(numbers) == fit.count and len(fit.body) > 2:
-        return _Reading(replace(table, skip_lines=fit.lines[fit.body[1]][0]), none, none)
-    return _Reading(table, none, none)
+    counts = len(numbers) == fit.count >= 4 and bool(np.all(np.diff(numbers) == 1)) and numbers[0] in (0.0, 1.0)
+    reading = _Reading(table, none, none)
+    if counts and len(fit.body) > 1:
+        below = fit.lines[fit.body[1]][0]
+
+        def skipped(layout: Layout) -> Layout:
+            return replace(layout, table=replace(layout.table or Table(), skip_lines=below))
+
+        reading.ask("the first line is 1, 2, 3 ...", ("a frame", _same), ("numbers of columns", skipped))
+    return reading
 
 
 def _names_above_marks(fit: _Fit, lines: Sequence[str]) -> tuple[str, ...]:
@@ -396,8 +408,11 @@ def _frames(
         reading.said.append(f"{groups[0]} lines per frame, between empty lines")
 
 
-def _time(reading: _Reading, fit: _Fit) -> int | None:
-    """Return the column of times, and say its unit; None without one."""
+def _time(reading: _Reading, fit: _Fit, *, is_stated: bool) -> int | None:
+    """Return the column of times, and say its unit; None without one.
+
+    Where a layout states the sensor or the rate, a column is one of times by its name or its cells alone.
+    """
     names, table = reading.names, reading.table
     ascending = [k for k in range(fit.count) if fit.types[k] == "number" and _ascends(fit.numbers(k))]
     named = [k for k in range(fit.count) if time_unit(names[k]) is not None and fit.types[k] in ("number", "time")]
@@ -408,7 +423,7 @@ def _time(reading: _Reading, fit: _Fit) -> int | None:
     for k in named[1:]:
         reading.left[k] = "another time"
     if column is None and table.frame_time is None:
-        column = _unnamed_time(reading, fit, ascending)
+        column = _unnamed_time(reading, fit, ascending, is_stated=is_stated)
     if column is None:
         return None
     unit = ISO if fit.types[column] == "time" else _unit_of_time(reading, fit, column)
@@ -438,7 +453,7 @@ def _counts(numbers: NDArray[np.float64]) -> bool:
     return bool((np.diff(numbers) == 1).all())
 
 
-def _unnamed_time(reading: _Reading, fit: _Fit, ascending: Sequence[int]) -> int | None:
+def _unnamed_time(reading: _Reading, fit: _Fit, ascending: Sequence[int], *, is_stated: bool) -> int | None:
     """Return a column of times that no name says: of times since 1970, or the only one that ascends in like steps."""
     strict = [k for k in ascending if bool((np.diff(fit.numbers(k)) > 0).mean() >= 0.9)]
     since_1970 = [k for k in strict if _is_epoch(fit.numbers(k)) and fit.count > 1]
@@ -446,7 +461,14 @@ def _unnamed_time(reading: _Reading, fit: _Fit, ascending: Sequence[int]) -> int
         return since_1970[0]
     even = [k for k in strict if not reading.names[k] and _is_even(fit.numbers(k)) and not is_counter(reading.names[k])]
     few = len(fit.body) < _ASCENDS
-    if len(fit.body) < 3 or fit.count < (3 if few else 2) or not even or len(even) > 2:
+    if (
+        is_stated
+        or fit.kind == "hex"
+        or len(fit.body) < 3
+        or fit.count < (3 if few else 2)
+        or not even
+        or len(even) > 2
+    ):
         return None
     times = [k for k in even if not _counts(fit.numbers(k))]
     if len(times) == 1 and not few and len(even) == 1:
@@ -585,7 +607,11 @@ def _named(reading: _Reading, fit: _Fit, column: int) -> None:
 
 def _text(reading: _Reading, fit: _Fit, column: int) -> None:
     """Say what a column of texts is: the sensor of each line, which is asked, labels, or remarks."""
-    name, cells = reading.names[column], [cell for cell in fit.cells(column) if cell not in MISSING]
+    name = reading.names[column]
+    if time_unit(name) is not None and len(name) > 1:
+        reading.left[column] = "times in a form that taxel does not read"
+        return
+    cells = [cell for cell in fit.cells(column) if cell not in MISSING]
     changes = sum(a != b for a, b in pairwise(cells))
     few = 1 < len(set(cells)) <= _KEYS and len(cells) == len(fit.body)
     if few and (is_key(name) or 3 * changes > len(cells)) and not is_label(name):
@@ -657,6 +683,42 @@ def _are_events(reading: _Reading, fit: _Fit, taxels: Sequence[int]) -> bool:
     return are_places and (set(p.tolist()) <= {0.0, 1.0} or set(p.tolist()) <= {-1.0, 1.0})
 
 
+def _maybe_events(reading: _Reading, fit: _Fit) -> None:
+    """Ask whether four columns without names are events, in one of the orders that programs write."""
+    if any(reading.names) or fit.count != 4:
+        return
+    for order in ("txyp", "xypt"):
+        t, x, y, p = (fit.numbers(order.index(name)) for name in "txyp")
+        whole = all(bool((axis % 1 == 0).all() and (axis >= 0).all()) for axis in (x, y))
+        if not whole or not bool((np.diff(t) >= 0).all()) or set(p.tolist()) not in ({0.0, 1.0}, {-1.0, 1.0}):
+            continue
+        of_events = replace(
+            reading.table, columns=list(order), time_column="t", time_unit="us", leave_out=[], events=True
+        )
+        break
+    else:
+        return
+
+    def as_events(layout: Layout) -> Layout:
+        return replace(layout, table=of_events)
+
+    reading.asked.insert(0, ("frames or events", [("frames of taxels", _same), ("events, in us", as_events)]))
+
+
+def _unit_of_events(reading: _Reading, fit: _Fit, time: int | None) -> None:
+    """Ask for the unit of times of events that no name says: their rate says nothing, as that of frames does."""
+    reading.asked = [each for each in reading.asked if not each[0].startswith("the unit of the time")]
+    numbers = fit.numbers(time or 0)
+    if time is None or time_unit(f"{reading.names[time]}") or fit.types[time] == "time" or _is_epoch(numbers):
+        return
+
+    def in_unit(unit: str) -> Callable[[Layout], Layout]:
+        return lambda layout: replace(layout, table=replace(layout.table or Table(), time_unit=unit))
+
+    units = ("us", "ms") if bool((numbers % 1 == 0).all()) else ("s", "ms")
+    reading.ask("the unit of the time of the events", *((unit, in_unit(unit)) for unit in units))
+
+
 def _with_size(layout: Layout, reading: _Reading, taxels: Sequence[int]) -> Layout:
     """Return the layout with its unit, its axes (which are asked), and rows and columns that the names state."""
     unit = next((reading.units[k] for k in taxels if reading.units[k]), "")
@@ -675,8 +737,7 @@ def _with_size(layout: Layout, reading: _Reading, taxels: Sequence[int]) -> Layo
     if places is not None and min(places) > 1:
         full = replace(full, rows=places[0], columns=places[1])
     # Lines that are parts of a frame whose size is known.
-    table = full.table or Table()
-    size = (layout.rows or 0) * (layout.columns or 0)
+    table, size = full.table or Table(), (layout.rows or 0) * (layout.columns or 0)
     if size > len(taxels) and size % len(taxels) == 0 and not table.has_lines:
         full = replace(full, table=replace(table, frame_lines=size // len(taxels)))
     return full
@@ -719,10 +780,10 @@ def _refuse(text: Text, layout: Layout, reading: _Reading) -> NoReturn:
         timed = table.time_column is not None or table.frame_time is not None or changed.rate_hz is not None
         lines += [*([] if timed else [_RATE_NOT_SAID]), written.rstrip("\n"), ""]
     also = "".join(f"; also open: {other}" for other, _ in reading.asked[1:])
+    unread = [reading.names[k] for k, why in reading.left.items() if why.startswith("times in")]
+    also += "".join(f"; {name} has times in a form that taxel does not read" for name in unread)
     ways = f"can be read in {len(choices)} ways ({why})" if len(choices) > 1 else why
-    right = (
-        f"write {'one of these layouts' if len(choices) > 1 else 'this layout'} in {layout_name(text.path)} beside it"
-    )
-    error = unreadable(f"{ways}{also}; {right}, or give it as layout", text.path)
+    right = advice(text.path, f"write {'one of these' if len(choices) > 1 else 'this'}")
+    error = unreadable(f"{ways}{also}; {right}:", text.path)
     error.args = (*error.args, "\n".join(lines).rstrip())
     raise error

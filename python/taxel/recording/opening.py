@@ -10,7 +10,7 @@ from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 from shlex import quote
-from typing import NoReturn, TypeAlias
+from typing import TypeAlias
 
 from taxel import _core, formats
 from taxel._base import arguments
@@ -23,22 +23,20 @@ from taxel._base.options import with_fields_of
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats import Trial, event_camera
+from taxel.formats import Trial, event_camera, xdf
 from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction, reduced
+from taxel.formats.foreign import ARRAYS, TABLES, check_foreign, read_foreign, refuse_container
 from taxel.formats.layout import Layout, advice
-from taxel.formats.ros import is_bag
+from taxel.formats.ros import Topics, is_bag, read_ros
 from taxel.labels import Labels, Note, trial_of
 from taxel.reading import ENDINGS, Facts, InMemory, Marks, Reader
 from taxel.recording.beside import LABELS, first_lines, is_label_table, labels_for
 from taxel.recording.layout import apply_layout, check_size
 from taxel.recording.readers.columns import EVENTS, SENSOR, is_h5_of_taxel, is_table, read_columns, read_records
 from taxel.recording.readers.csv import check_head, names_in, read_csv
-from taxel.recording.readers.foreign import ARRAYS, read_foreign
 from taxel.recording.readers.lsa import read_lsa
 from taxel.recording.readers.mcap import read_mcap
-from taxel.recording.readers.ros import Topics, read_ros
-from taxel.recording.readers.without_layout import refuse_without_layout
 from taxel.recording.recording import Recording
 from taxel.recording.source import SourceView
 
@@ -46,10 +44,12 @@ from taxel.recording.source import SourceView
 FEET = ("left", "right")
 #: A layout, the path of one, or None for the layout file beside a recording, if there is one.
 GivenLayout: TypeAlias = str | os.PathLike[str] | Layout | None
-#: The endings of tables of text, also compressed by gzip, and those that may be tables of labels.
-#: Kinds of files of other programs, which a layout describes.
+#: Kinds of files of other programs, which a layout may describe.
 _FOREIGN = ("table", "arrays")
-_TABLES, _LABELS = (".csv", ".txt", ".tsv", ".dat", ".asc"), (".csv", ".txt", ".tsv")
+#: The endings of those that may be tables of labels.
+_LABELS = (".csv", ".txt", ".tsv")
+#: The endings of those that are something else in most folders.
+_RARE = (".json", ".log")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +60,6 @@ class SharedOptions:
     layout: str | os.PathLike[str] | None = None
     topic: str | Sequence[str] | None = None
     field: str | Sequence[str] | None = None
-    types: str | os.PathLike[str] | None = None
     ros: str | None = None
     region: str | None = None
     bin: int | None = None
@@ -79,7 +78,7 @@ class OpenOptions(SharedOptions):
     @property
     def topics(self) -> Topics:
         """Topics of a ROS bag that are opened."""
-        return Topics(self.topic, self.field, self.types, self.ros)
+        return Topics(self.topic, self.field, self.ros)
 
     @property
     def reduction(self) -> Reduction:
@@ -96,7 +95,7 @@ class OpenOptions(SharedOptions):
         text("pairing", self.pairing, ("direct", "taxel"))
         flag("differences", self.differences)
         if self.topics.are_given and kind != "ros":
-            raise ProblemError(f"{path}: is not a ROS bag; topic, field, types and ros are only for ROS bags")
+            raise ProblemError(f"{path}: is not a ROS bag; topic, field and ros are only for ROS bags")
 
 
 def _no_camera(path: Path) -> ProblemError:
@@ -128,9 +127,8 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
         For a ROS bag: the topic that is opened as frames, and the path of a field of its messages, for example
         "left.taxels" (default: the only field with numbers). If they are lists, each entry becomes a source, with its
         own `array` if that is a list too.
-    types, ros : path and str, optional
-        For a ROS bag that does not define its messages: a folder of .msg or .idl files, and a release, for example
-        "humble".
+    ros : str, optional
+        For a ROS bag that does not define its messages: a release, for example "humble".
     region, bin, window_ms, polarity : str, int, float (ms) and str, optional
         For an event camera's file, or other events without intensities. `region`: columns and rows, for example
         "100:420,60:300", where the last are not included. `bin`: side of the square of pixels that becomes a taxel.
@@ -195,7 +193,7 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
     ----------
     path : path
         A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as for `taxel.open`.
-    array, layout, topic, field, types, ros
+    array, layout, topic, field, ros
         As in `taxel.open`.
     region, bin, window_ms, polarity : str, int, float (ms) and str, optional
         As in `taxel.open`.
@@ -263,13 +261,12 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
     array = None if how.array is None or of_topics else Array._given(how.array)
 
     def read_arrays(path: Path, layout: Layout | None) -> Sequence[Reader]:
-        if layout is None:
-            _refuse_undescribed(path)
-        return [_on_given(read_foreign(path, layout, array), array)]
+        return [_on_given(each, array) for each in read_foreign(path, layout, array)]
 
     def read_camera(path: Path, layout: Layout | None) -> Sequence[Reader]:
         reduction = how.reduction.but(None if layout is None else layout.event_camera)
-        return [reader_of(trial, path, "event_camera") for trial in event_camera.trials(path, reduction)]
+        size = layout.grid() if array is None and layout is not None else array
+        return [reader_of(trial, path, "event_camera") for trial in event_camera.trials(path, reduction, size)]
 
     def read_bag(path: Path, layout: Layout | None) -> Sequence[Reader]:
         grid = layout.grid() if how.array is None and layout is not None else how.array
@@ -296,6 +293,7 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
     yield from {
         **{name: _of_maker(name, maker) for name, maker in formats.FORMATS.items() if name != "event_camera"},
         "event_camera": Kind(lambda path: bool(event_camera.files(path)), read_camera),
+        "xdf": Kind(xdf.knows, xdf.read),
         "npz": Kind(_is_npz, read_npz),
         "arrays": Kind(lambda path: _ending(*ARRAYS)(path) and not are_spike_trains(path), read_arrays),
         "table": Kind(_is_table, read_arrays),
@@ -343,8 +341,7 @@ def _is_npz(path: Path) -> bool:
 
 
 def _is_table(path: Path) -> bool:
-    is_text = _ending(*_TABLES)(path)
-    return is_text and not (path.suffix.lower() in _LABELS and is_label_table(path))
+    return _ending(*TABLES)(path) and not (path.suffix.lower() in _LABELS and is_label_table(path))
 
 
 def _on_given(reader: InMemory, array: Array | None) -> Reader:
@@ -398,7 +395,7 @@ def is_recording(path: Path, layout: GivenLayout = None) -> bool:
     """Return whether a path is a recording; what is damaged inside shows only when it is opened."""
     try:
         kind = kind_of(path)
-        return kind is not None and (kind not in _FOREIGN or _describes(layout, path))
+        return kind is not None and (kind not in _FOREIGN or _is_usual(path) or _describes(layout, path))
     except (FormatError, OSError):
         return False
 
@@ -415,8 +412,9 @@ def check_recording(path: Path, layout: GivenLayout = None) -> None:
 
     Raises
     ------
-    FormatError : no recording; an invalid layout file; a table or arrays of another program without a layout file
+    FormatError : no recording; an invalid layout file; a table or arrays that can be read in two ways
     """
+    found = layout_of(path, layout)
     match kind_of(path):
         case None:
             raise _unknown(path)
@@ -424,16 +422,8 @@ def check_recording(path: Path, layout: GivenLayout = None) -> None:
             _core.RecordingReader(path)
         case "csv":
             check_head(path)
-        case "table" | "arrays" if not _describes(layout, path):
-            _refuse_undescribed(path)
-
-
-def _refuse_undescribed(path: Path) -> NoReturn:
-    """Refuse a table or arrays that no layout describes, or what is not of the kind that its name says."""
-    refuse_without_layout(path)
-    if path.suffix.lower() == ".csv":
-        check_head(path)
-    raise _unknown(path)
+        case "table" | "arrays":
+            check_foreign(path, found)
 
 
 def is_folder(path: Path) -> bool:
@@ -458,8 +448,7 @@ def files_in(folder: Path) -> list[Path]:
 def recordings_in(folder: Path, layout: GivenLayout = None) -> list[Path]:
     """Return what of a folder is a recording, ROS bags last, in the order of the names: 2 before 10.
 
-    Tables and arrays of other programs are those that `layout`, or a layout file beside them, describes; they count in
-    a folder that holds nothing else.
+    Tables and arrays of other programs count in a folder that holds nothing else.
     """
     named = {file: kind for file in files_in(folder) if (kind := _kind_in_folder(file)) is not None}
     own = [file for file, kind in named.items() if kind in (*ENDINGS.values(), "records")]
@@ -471,7 +460,8 @@ def recordings_in(folder: Path, layout: GivenLayout = None) -> list[Path]:
     own = sorted([*own, *empty], key=natural_order)
     bags = [file for file, kind in named.items() if kind == "ros"]
     makers = [file for file, kind in named.items() if kind not in (*_FOREIGN, "ros")]
-    tables = [] if bags else [file for file in named if named[file] in _FOREIGN and _describes(layout, file)]
+    foreign = [] if bags else [file for file in named if named[file] in _FOREIGN]
+    tables = [file for file in foreign if _is_usual(file) or _describes(layout, file)]
     return [*(own or makers or tables), *bags]
 
 
@@ -482,6 +472,11 @@ def _kind_in_folder(file: Path) -> str | None:
     except OSError:
         # Opening it raises the error.
         return ENDINGS.get(file.suffix.lower())
+
+
+def _is_usual(file: Path) -> bool:
+    """Return whether a table or an array is a recording of its folder, also without a layout file."""
+    return Path(file.name.removesuffix(".gz")).suffix.lower() not in _RARE and not file.name.endswith(".notes.csv")
 
 
 def natural_order(path: Path) -> list[tuple[bool, int, str]]:
@@ -504,6 +499,7 @@ def _unknown(path: Path) -> FormatError:
             f"{path}: contains spike trains, not a recording; to describe them, run taxel info; to read them in "
             "Python, call taxel.SpikeTrains.load"
         )
+    refuse_container(path)
     with open(path, "rb") as file:
         head = file.read(4)
     if not head:
@@ -606,17 +602,17 @@ def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
 
 
 def _refuse_folder(folder: Path) -> None:
-    """Refuse a folder without a recording by what there is in it: a table that no layout describes, deeper folders."""
+    """Refuse a folder without a recording by what there is in it: spike trains, deeper folders."""
     for file in files_in(folder):
-        if file.is_file() and (are_spike_trains(file) or kind_of(file) in _FOREIGN):
+        if are_spike_trains(file):
             check_recording(file)
     deeper = [
         each.name for each in files_in(folder) if is_folder(each) and os.access(each, os.X_OK) and recordings_in(each)
     ]
     hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} contain recordings: name these folders"
     known = (
-        f"taxel reads {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and, with a "
-        "layout file, arrays and tables, for example .npy and .txt (docs/files.md)"
+        f"taxel reads {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and "
+        "arrays and tables of other programs, for example .npy and .txt (docs/files.md)"
     )
     raise FormatError(f"{folder}: contains no recording; {hint if deeper else known}")
 

@@ -12,10 +12,9 @@ from taxel._base.arguments import checked_path, several, text
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.array import Array, of_size
-from taxel.formats.layout import Layout
+from taxel.formats.layout import Layout, layout_name
 from taxel.recording.layout import is_row_of, on_array
 from taxel.recording.opening import SharedOptions, files_in, is_folder, join_feet, kind_of, open_all, sensors
-from taxel.recording.readers.foreign import is_lone_array
 from taxel.recording.recording import Recording
 
 #: How an option is typed of whose name a command may have another one.
@@ -30,7 +29,7 @@ class TextOptions(SharedOptions):
     ----------
     array : sequence of str, optional
         Rows, columns and pitch (mm) of the sensor, as "24x20x5"; of a ROS bag one for each topic, or one for all.
-    layout, topic, field, types, ros, region, bin, window_ms, polarity
+    layout, topic, field, ros, region, bin, window_ms, polarity
         As in `taxel.open`.
     rate_hz : float, Hz, optional
         Frames a second, for recordings without times.
@@ -79,7 +78,7 @@ class TextOptions(SharedOptions):
         return bool(self.topic) or (layout is not None and "topic" in Layout.read(Path(layout)).ros)
 
     def layout_of(self, path: Path) -> Any:
-        """Return the layout that is given, or an empty one for arrays without one, whose rate `rate_hz` says."""
+        """Return the layout that is given, or an empty one for a table or arrays, whose rate `rate_hz` says."""
         if self.layout is not None or self.rate_hz is None or not path.exists():
             return self.layout
         files = files_in(path) if is_folder(path) else [path]
@@ -88,7 +87,7 @@ class TextOptions(SharedOptions):
             for file in files
             if file.is_file() and Layout.beside(file) is None and kind_of(file) in ("table", "arrays")
         ]
-        return Layout(path) if undescribed and all(map(is_lone_array, undescribed)) else None
+        return Layout(path.with_name(layout_name(path))) if undescribed else None
 
     def _on_array(self, recording: Recording) -> Recording:
         """Return a recording on the sensor of `array`; refuse one that holds a sensor that differs from it."""

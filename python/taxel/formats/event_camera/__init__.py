@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from taxel.array import Array
 from taxel.formats.checks import files_at
 from taxel.formats.event_camera.counting import reduced
 from taxel.formats.event_camera.headers import ENDINGS, is_dat
@@ -25,7 +26,7 @@ def files(path: Path) -> list[Path]:
     return [file for file in named if file.suffix.lower() != ".dat" or is_dat(file)]
 
 
-def trials(path: str | Path, reduction: Reduction | None = None) -> Iterator[Trial]:
+def trials(path: str | Path, reduction: Reduction | None = None, size: Array | None = None) -> Iterator[Trial]:
     """Read one file, or all of a folder, one after the other.
 
     Parameters
@@ -33,6 +34,8 @@ def trials(path: str | Path, reduction: Reduction | None = None) -> Iterator[Tri
     path : str or Path
     reduction : Reduction, optional
         Selection of the events; default: all, unchanged.
+    size : Array, optional
+        Rows and columns of a sensor whose header does not state them.
 
     Raises
     ------
@@ -41,4 +44,4 @@ def trials(path: str | Path, reduction: Reduction | None = None) -> Iterator[Tri
     ProblemError : a region beyond the sensor
     """
     for file in files_at(path, files, f"{', '.join(ENDINGS)} of an event camera"):
-        yield Trial(file.name, file.stem, read(file, reduction or Reduction()), {}, "")
+        yield Trial(file.name, file.stem, read(file, reduction or Reduction(), size), {}, "")

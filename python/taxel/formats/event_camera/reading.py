@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from taxel._base.columns import Growing
-from taxel._base.errors import damaged, unreadable
+from taxel._base.errors import damaged, helped, unreadable
 from taxel._base.limits import TIME_US
 from taxel._base.messages import escaped, first_line, installing
 from taxel._core import FormatError
@@ -20,8 +20,8 @@ from taxel.formats.event_camera.reduction import Reduction
 from taxel.frames import Frames
 
 
-def read(path: Path, reduction: Reduction) -> Events | Frames:
-    """Read the events of a file, or their counts in windows.
+def read(path: Path, reduction: Reduction, size: Array | None = None) -> Events | Frames:
+    """Read the events of a file, or their counts in windows; `size` is that of a sensor whose header has none.
 
     Raises
     ------
@@ -40,10 +40,13 @@ def read(path: Path, reduction: Reduction) -> Events | Frames:
     read = Growing(str(path), t=((), np.int64), x=((), np.uint16), y=((), np.uint16), p=((), np.bool_))
     try:
         # A header without a size has that of no event.
-        stream = faery.events_stream_from_file(path, file_type=kind, dimensions_fallback=(0, 0))
+        given = (0, 0) if size is None else (size.columns, size.rows)
+        stream = faery.events_stream_from_file(path, file_type=kind, dimensions_fallback=given)
         columns, rows = stream.dimensions()
         if not columns or not rows:
-            raise unreadable("the header does not state the size; add a line to it, such as % geometry 640x480", path)
+            raise helped(
+                unreadable("the header does not state the size of the sensor", path), "array", "lay_out_camera"
+            )
         for packet in stream:
             read.add(t=packet["t"], x=packet["x"], y=packet["y"], p=packet["on"])
     except (FormatError, MemoryError, KeyboardInterrupt):

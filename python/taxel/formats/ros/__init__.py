@@ -5,6 +5,6 @@ A bag is a ``.bag`` of ROS 1, a ``.db3`` or ``.mcap`` of ROS 2, or a folder with
 
 from taxel.formats.ros.bag import is_bag
 from taxel.formats.ros.listing import Topic, topics
-from taxel.formats.ros.reading import Chosen, Read, read
+from taxel.formats.ros.reading import Topics, read_ros
 
-__all__ = ["Chosen", "Read", "Topic", "is_bag", "read", "topics"]
+__all__ = ["Topic", "Topics", "is_bag", "read_ros", "topics"]

@@ -1,28 +1,25 @@
-"""The topics of a ROS bag that hold numbers: fields, shapes and rates, by a message of the most frequent length."""
+"""The topics of a ROS bag that hold numbers: fields, shapes and rates, by their first message with numbers."""
 
 from __future__ import annotations
 
-from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from taxel._core import FormatError
-from taxel.formats.ros.bag import Bag, open_bag
+from taxel.formats.ros.bag import open_bag
 from taxel.formats.ros.fields import grid, leaves
 
 __all__ = ["Topic", "topics"]
 
-#: How many lengths of a topic's messages are looked at, in bytes, by the first message of each: lengths of clouds and
-#: texts may all differ.
-_MOST_LENGTHS = 32
-
 
 @dataclass(frozen=True)
 class Topic:
-    """Describe a field of a ROS topic that holds numbers, by the topic's first message of the most frequent length.
+    """Describe a field of a ROS topic that holds numbers, by the topic's first message that has some.
 
     Parameters
     ----------
@@ -50,58 +47,46 @@ class Topic:
     trouble: str = ""
 
 
-def topics(path: Path, types: Path | None = None, ros: str | None = None) -> list[Topic]:
+def topics(path: Path, ros: str | None = None) -> list[Topic]:
     """Return the fields of a bag's topics that hold more numbers than one.
 
     Parameters
     ----------
     path : Path
-    types : Path, optional
-        A folder of .msg or .idl files, for types that the bag does not define.
     ros : str, optional
-        A release of ROS, for example "humble", whose types are used if neither bag nor folder defines them.
+        A release of ROS, for example "humble", whose types a bag without definitions has.
 
     Raises
     ------
     ImportError : rosbags is not installed (``pip install 'taxel[ros]'``)
     FormatError : damaged, or of a kind that rosbags does not read
-    ProblemError : an unknown release, or a folder without definitions
+    ProblemError : an unknown release
     """
-    with open_bag(path, types, ros) as bag:
-        return [each for topic in sorted({c.topic for c in bag.reader.connections}) for each in _of_topic(bag, topic)]
+    with open_bag(path, ros) as bag:
+        names = sorted({connection.topic for connection in bag.connections})
+        return [each for name in names for each in _of_topic(bag, name)]
 
 
-def _of_topic(bag: Bag, topic: str) -> list[Topic]:
-    """Return the fields of a topic by the first message of the most frequent length that has numbers; count all."""
-    connections = [connection for connection in bag.reader.connections if connection.topic == topic]
-    kind = connections[0].msgtype
-    undefined = bag.undefined(kind)
-    if undefined:
-        count = sum(connection.msgcount for connection in connections)
-        return [Topic(topic, kind, "", (), "", count, None, f"no definition of {undefined}")]
-    lengths: Counter[int] = Counter()
-    firsts: dict[int, tuple[Any, bytes]] = {}
-    times: list[int] = []
+def _of_topic(bag: Any, topic: str) -> Iterator[Topic]:
+    """Yield the fields of a topic by the first message that has numbers; all are counted."""
+    connections = [connection for connection in bag.connections if connection.topic == topic]
+    kind, count = connections[0].msgtype, sum(connection.msgcount for connection in connections)
+    if kind not in bag.typestore.fielddefs:
+        yield Topic(topic, kind, "", (), "", count, None, f"no definition of {kind}")
+        return
+    times, found, first = list[int](), list[tuple[str, NDArray[Any]]](), None
     for connection, at, data in bag.messages(connections):
-        lengths[len(data)] += 1
-        if len(firsts) < _MOST_LENGTHS:
-            firsts.setdefault(len(data), (connection, data))
         times.append(at)
-    found: list[tuple[str, NDArray[Any]]] = []
-    for length in sorted(firsts, key=lambda size: -lengths[size]):
-        first = bag.decoded(*firsts[length])
+        if found:
+            continue
         try:
-            found = list(leaves(first))
+            first = bag.deserialize(data, connection.msgtype)
+            found = [(field, content) for field, content in leaves(first) if content.size > 1]
         except FormatError as error:
-            return [Topic(topic, kind, "", (), "", sum(c.msgcount for c in connections), None, str(error))]
-        if any(content.size > 1 for _, content in found):
-            break
-    else:
-        return []
-    span = (max(times) - min(times)) / 1e9
+            yield Topic(topic, kind, "", (), "", count, None, str(error))
+            return
+    span = np.ptp(times) / 1e9 if times else 0.0
     rate = (len(times) - 1) / span if span > 0 else None
-    return [
-        Topic(topic, kind, field, grid(first, field) or content.shape, content.dtype.name, len(times), rate)
-        for field, content in found
-        if content.size > 1
-    ]
+    for field, content in found:
+        shape = grid(first, field) or content.shape
+        yield Topic(topic, kind, field, shape, content.dtype.name, len(times), rate)

@@ -1,313 +1,272 @@
-"""Frames of chosen topics of a ROS bag, with the times of their messages.
-
-A single odd message does not decide for all: the majority decides which length is read, and whether stamps count.
-"""
+"""Chosen topics of a ROS bag, each as a source of frames, with the times of their messages."""
 
 from __future__ import annotations
 
-import math
-from bisect import bisect_left
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.columns import Growing
-from taxel._base.errors import helped
-from taxel._base.limits import TIME_US, VALUE
-from taxel._base.messages import first_line
+from taxel._base import arguments
+from taxel._base.columns import frozen_whole
+from taxel._base.errors import helped, refused
+from taxel._base.messages import counted, first_line, warn
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats.checks import sensor
-from taxel.formats.ros.bag import Bag, open_bag
-from taxel.formats.ros.fields import grid, is_empty, leaves, values
+from taxel.formats.checks import table as limited
+from taxel.formats.ros.bag import open_bag
+from taxel.formats.ros.fields import grid, leaves, values
+from taxel.formats.times import repaired
+from taxel.frames import Frames
+from taxel.labels import source_of
+from taxel.reading import Facts, InMemory, Reader
 
-__all__ = ["Chosen", "Read", "read"]
+__all__ = ["Topics", "read_ros"]
 
 #: A stamp that is further from the bag's time of its message is wrong, ns.
 _DAY_NS = 86_400 * 10**9
-
-#: Nor is a first or last one sound that is further off the others' median delay, ns.
-_SECOND_NS = 10**9
+#: Stamps count if so many are right.
+_MOST = 0.9
 
 
 @dataclass(frozen=True)
-class Chosen:
-    """Choose a field of a topic.
+class Topics:
+    """Choose what of a ROS bag is opened; the arguments are those of `taxel.open`.
 
     Parameters
     ----------
-    topic : str
-    field : str, optional
-        A path, for example "left.taxels"; default: the topic's only field with numbers.
-    array : Array, optional
-        Messages of another length are left out; default: the length of most messages, in the rows and columns that
-        they state, else in one row.
-    """
-
-    topic: str
-    field: str | None = None
-    array: Array | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Read:
-    """Hold the frames of a field.
-
-    Parameters
-    ----------
-    topic, field, type : str
-    array : Array
-    values : float32, shape (n, rows, columns)
-    unit : str
-        "counts" for whole numbers, else "as sent".
-    t : int64, shape (n,), us since 1970 as a rule
-        The header's stamp, or the bag's time; it never falls.
-    has_stamps : bool
-        Whether the messages have a header.
-    by_the_bag : int
-        Number of messages with the bag's time, because their stamp, or the stamps of most messages, are wrong.
-    left_out : int
-        Number of messages that have another length.
-    unread : tuple of str
-        The other topics of the bag, without the chosen ones.
-    """
-
-    topic: str
-    field: str
-    type: str
-    array: Array
-    values: NDArray[np.float32]
-    unit: str
-    t: NDArray[np.int64]
-    has_stamps: bool
-    by_the_bag: int
-    left_out: int
-    unread: tuple[str, ...]
-
-
-def read(path: Path, chosen: Sequence[Chosen], types: Path | None = None, ros: str | None = None) -> list[Read]:
-    """Return the frames of each chosen field, from one pass through the bag.
-
-    Parameters
-    ----------
-    path : Path
-    chosen : sequence of Chosen
-    types, ros : Path and str, optional
-        As in `topics`.
+    topic, field : str, or list of str, optional
+    ros : str, optional
+    by : str, optional
+        A field whose value says which sensor a message is of: each value is a source.
 
     Raises
     ------
-    ImportError : rosbags is not installed (``pip install 'taxel[ros]'``)
-    FormatError : damaged, no such topic or field, no definition of its messages, or no message of the array's length
-    ProblemError : an unknown release, or a folder without definitions
+    ProblemError : not a text, or more fields than topics
     """
-    with open_bag(path, types, ros) as bag:
-        connections = {choice.topic: bag.of_topic(choice.topic) for choice in chosen}
-        topics = [_Held(bag, choice) for choice in chosen]
-        for connection, at, data in bag.messages([c for each in connections.values() for c in each]):
-            try:
-                message = bag.decoded(connection, data)
-            except Exception as error:  # rosbags' own, and those of bytes that it does not expect
-                raise FormatError(f"{path}: a message of topic {connection.topic} at {at} ns: {error}") from None
-            for held_topic in topics:
-                if held_topic.topic == connection.topic:
-                    held_topic.add(message, at)
-        unread = tuple(sorted(bag.topics() - connections.keys()))
-        return [topic.read(connections[topic.topic][0].msgtype, unread) for topic in topics]
+
+    topic: str | Sequence[str] | None
+    field: str | Sequence[str] | None
+    ros: str | None
+    by: str | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("topic", "field"):
+            _texts(name, getattr(self, name))
+        for name in ("ros", "by"):
+            if getattr(self, name) is not None:
+                arguments.text(name, getattr(self, name))
+
+    @property
+    def are_given(self) -> bool:
+        """Whether any of them is."""
+        return any(option is not None for option in (self.topic, self.field, self.ros))
+
+    def but(self, of_layout: Mapping[str, Any]) -> Topics:
+        """Return what is given, and what a layout says of the rest."""
+        return replace(self, **{name: value for name, value in of_layout.items() if getattr(self, name) is None})
+
+    def chosen(self, array: Array | Sequence[Array] | None) -> list[tuple[str, str | None, Array | None]]:
+        """Return each topic with its field and its array."""
+        topics, fields, arrays = _texts("topic", self.topic), _texts("field", self.field), _arrays(array)
+        count = max(len(topics), len(fields), len(arrays))
+        for name, times in (("topic", len(topics)), ("field", len(fields)), ("array", len(arrays))):
+            if times not in (0, 1, count):
+                raise refused(
+                    name, f" is given {times} times for {count} sources; must be given once, or once for each source"
+                )
+        topics = topics * count if len(topics) == 1 else topics
+        every_field: Sequence[str | None] = fields * count if len(fields) == 1 else fields or [None] * count
+        every_array: Sequence[Array | None] = arrays * count if len(arrays) == 1 else arrays or [None] * count
+        return list(zip(topics, every_field, every_array, strict=True))
 
 
-class _Shape(NamedTuple):
-    """The shape of a message's numbers, named as NumPy names it."""
-
-    shape: tuple[int, ...]
-    size: int
-    ndim: int
+def _texts(name: str, texts: str | Sequence[str] | None) -> list[str]:
+    entries = [texts] if isinstance(texts, str) else [] if texts is None else arguments.several(name, texts)
+    return [arguments.text(name, entry) for entry in entries]
 
 
-class _Held:
-    """The messages of one field so far."""
+def _arrays(array: Array | Sequence[Array] | None) -> list[Array]:
+    if array is None or isinstance(array, Array):
+        return [] if array is None else [array]
+    entries = arguments.several("array", array)
+    if entries and not isinstance(entries[0], Array):
+        Array._given(array)
+    return [arguments.instance("array", entry, Array) for entry in entries]
 
-    def __init__(self, bag: Bag, chosen: Chosen) -> None:
-        self.bag, self.array = bag, chosen.array
-        self.topic, self.field = chosen.topic, chosen.field
-        #: The shape of each message's numbers, and all numbers one after the other.
-        self.values: list[_Shape] = []
-        self.numbers = Growing(self.location, numbers=((), np.float32))
-        self.bag_ns: list[int] = []
-        self.stamps_ns: list[int | None] = []
-        self.grids: list[tuple[int, int] | None] = []
-        self.are_whole: list[bool] = []
+
+def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) -> list[Reader]:
+    """Return a reader of each chosen topic of a ROS bag, and of each value of the field `by`.
+
+    Raises
+    ------
+    ImportError : rosbags is not installed
+    FormatError : no topic is chosen; damaged; no such topic or field; no message of the array's length
+    ProblemError : an unknown release
+    """
+    if not topics.topic:
+        error = FormatError(
+            f"{path}: is a ROS bag; choose one of its topics, or write [ros] in a layout file; to list the topics, run "
+            f"taxel info {path}"
+        )
+        raise helped(error, "topic", "give")
+    chosen = topics.chosen(array)
+    names = [topic for topic, _, _ in chosen]
+    found: dict[str, Reader] = {}
+    with open_bag(path, topics.ros) as bag:
+        there = {connection.topic for connection in bag.connections}
+        missing = next((topic for topic in names if topic not in there), None)
+        if missing is not None:
+            listed = ", ".join(sorted(there)) or "none"
+            raise FormatError(f"{path}: the bag has no topic {missing}; its topics are {listed}")
+        unread = tuple(sorted(there - set(names)))
+        for topic, field, size in chosen:
+            held = _Messages(path, topic, field, size)
+            for connection, at, data in bag.messages([c for c in bag.connections if c.topic == topic]):
+                held.add(bag.deserialize(data, connection.msgtype), at, topics.by, connection.msgtype)
+            for key, reader in held.readers(unread, is_named=names.count(topic) > 1):
+                if key in found:
+                    raise ProblemError(f"{path}: two sources would have the name {key}; open one at a time")
+                found[key] = reader
+    return list(found.values())
+
+
+class _Messages:
+    """The messages of a field of a topic."""
+
+    def __init__(self, path: Path, topic: str, field: str | None, array: Array | None) -> None:
+        self.path, self.topic, self.field, self.array = path, topic, field, array
+        self.type = ""
+        self.values, self.times = list[NDArray[Any]](), list[tuple[int, int]]()
+        self.keys, self.grids = list[str](), list[tuple[int, int] | None]()
+        #: The names of channels of the first message that has some; those of others are put in their order.
+        self.names: tuple[str, ...] = ()
         #: Why a message has no numbers to read: those of most may have some.
         self.trouble = ""
 
     @property
     def location(self) -> str:
-        return f"{self.bag.path}: topic {self.topic}" + f", field {self.field}" * bool(self.field)
+        return f"{self.path}: topic {self.topic}" + f", field {self.field}" * bool(self.field)
 
-    def add(self, message: Any, at: int) -> None:
-        """Add a message."""
+    def add(self, message: Any, at: int, by: str | None, kind: str) -> None:
+        """Add a message, which the bag got `at` ns."""
+        self.type = kind
         try:
             if self.field is None:
                 self.field = self._only_field(message)
-            # Before a first reading there may be no field to choose by; such messages are of another length.
             numbers = np.empty(0) if self.field is None else self._numbers(message, self.field)
+            key = "" if by is None else str(reduce(getattr, by.split("."), message))
+        except AttributeError:
+            raise FormatError(f"{self.location}: has no field {by}, which by names") from None
         except FormatError as error:
             raise FormatError(f"{self.location}: {error}") from None
+        stamp = getattr(getattr(message, "header", None), "stamp", None)
+        self.times.append((at, 0 if stamp is None else int(stamp.sec) * 10**9 + int(stamp.nanosec)))
+        self.values.append(self._by_name(message, numbers))
+        self.keys.append(key)
         self.grids.append(None if self.field is None else grid(message, self.field))
-        self.are_whole.append(numbers.dtype.kind in "ui")
-        if numbers.dtype.kind == "f" and (np.abs(numbers) > VALUE).any():
-            raise FormatError(
-                f"{self.location}, message {len(self.values)}: a value is infinite, or does not fit 32 bits"
-            )
-        self.values.append(_Shape(numbers.shape, numbers.size, numbers.ndim))
-        self.numbers.add(numbers=numbers.reshape(-1))
-        self.bag_ns.append(at)
-        header = getattr(message, "header", None)
-        stamp = getattr(header, "stamp", None)
-        self.stamps_ns.append(None if stamp is None else int(stamp.sec) * 10**9 + int(stamp.nanosec))
-
-    def _only_field(self, message: Any) -> str | None:
-        """Return the field of a message that holds more numbers than one; None of a message without any."""
-        found = list(leaves(message))
-        there = [path for path, numbers in found if numbers.size > 1]
-        if len(there) > 1:
-            raise helped(FormatError(f"has several fields with numbers: {_there(message)}"), "field", "give")
-        if not there and not is_empty(found):
-            self.trouble = "no field has more than one number; to find topics with such a field, run taxel info"
-        return there[0] if there else None
 
     def _numbers(self, message: Any, field: str) -> NDArray[Any]:
         try:
             return values(message, field)
         except LookupError:
-            self.trouble = f"the field has no numbers; fields with numbers: {_there(message)}"
+            there = ", ".join(path for path, each in leaves(message) if each.size > 1) or "none"
+            self.trouble = f"the field has no numbers; fields with numbers: {there}"
             return np.empty(0)
 
-    def read(self, kind: str, unread: tuple[str, ...]) -> Read:
-        """Return the frames of the messages."""
-        if not self.values:
-            raise FormatError(f"{self.location}: contains no message")
-        if self.trouble and not any(value.size for value in self.values):
-            raise FormatError(f"{self.location}: {self.trouble}")
+    def _only_field(self, message: Any) -> str | None:
+        """Return the field of a message that holds more numbers than one; None of a message without any."""
+        there = [path for path, numbers in leaves(message) if numbers.size > 1]
+        if len(there) > 1:
+            raise helped(FormatError(f"has several fields with numbers: {', '.join(there)}"), "field", "give")
+        if not there:
+            self.trouble = "no field has more than one number; to find topics with such a field, run taxel info"
+        return there[0] if there else None
+
+    def _by_name(self, message: Any, numbers: NDArray[Any]) -> NDArray[Any]:
+        """Return numbers in the order of the first message's names, where a message names its channels."""
+        for field in ("name", "names", "channels", "channel_names"):
+            names = getattr(message, field, None)
+            if isinstance(names, list) and len(names) == numbers.size and all(isinstance(n, str) for n in names):
+                self.names = self.names or tuple(names)
+                if sorted(names) != sorted(self.names):
+                    return np.empty(0)
+                return numbers[[names.index(name) for name in self.names]]
+        return numbers
+
+    def readers(self, unread: Sequence[str], *, is_named: bool) -> Iterator[tuple[str, Reader]]:
+        """Yield the frames of each key."""
+        if not any(value.size for value in self.values):
+            raise FormatError(f"{self.location}: {self.trouble or 'contains no message with values'}")
         array = sensor(self.location, self.array or self._stated())
-        fits = np.array([_fits(value, array) for value in self.values])
+        fits = np.array([v.shape == array.shape if v.ndim == 2 else v.size == array.taxels for v in self.values])
         if not fits.any():
-            some = next((value for value in self.values if value.size), self.values[0])
-            size = " x ".join(map(str, some.shape)) if some.ndim == 2 else f"{some.size}"
+            size = next(value.size for value in self.values if value.size)
             raise FormatError(
                 f"{self.location}: the messages have {size} values each; the array has {array.rows} x "
                 f"{array.columns} taxels"
             )
-        bag = np.array(self.bag_ns, np.int64)[fits]
-        stamps = [stamp for stamp, fit in zip(self.stamps_ns, fits, strict=True) if fit]
-        order = np.argsort(bag, kind="stable")  # files of a bag may overlap
-        bag, frames = bag[order], self._frames(np.flatnonzero(fits)[order], array)
-        has_stamps = None not in stamps
-        t, by_the_bag = _times(np.array(stamps, np.int64)[order], bag) if has_stamps else (bag, 0)
-        if np.abs(t).max() // 1000 > TIME_US:
-            raise FormatError(
-                f"{self.location}: a message has the time {t[np.abs(t).argmax()]} ns; must be within 142 years of 0"
-            )
-        return Read(
-            self.topic,
-            self.field or "",
-            kind,
-            array,
-            frames,
-            "counts" if all(is_whole for is_whole, fit in zip(self.are_whole, fits, strict=True) if fit) else "as sent",
-            t // 1000,
-            has_stamps,
-            by_the_bag,
-            int(np.count_nonzero(~fits)),
-            unread,
-        )
+        names = source_of(f"{self.topic}.{self.field}" if is_named else self.topic)
+        for key in dict.fromkeys(self.keys):
+            kept = np.flatnonzero(fits & (np.array(self.keys) == key))
+            if len(kept):
+                name = source_of(f"{names}_{key}") if key else names
+                yield name, self._reader(name, array, kept, int((~fits).sum()), unread)
 
-    def _frames(self, chosen: NDArray[np.int64], array: Array) -> NDArray[np.float32]:
-        """Return the numbers of messages as frames; those that are read in their order are moved, not copied."""
-        begins = np.concatenate([[0], np.cumsum([value.size for value in self.values])])
-        numbers, size = self.numbers.column("numbers"), array.rows * array.columns
-        if (np.diff(chosen) > 0).all():
-            numbers.setflags(write=True)
-            chosen_values = numbers[: len(chosen) * size]
-        else:
-            chosen_values = np.empty(len(chosen) * size, np.float32)
-        for k, begin in enumerate(begins[chosen]):
-            if chosen_values is not numbers or begin != k * size:
-                chosen_values[k * size : (k + 1) * size] = numbers[begin : begin + size]
-        return chosen_values.reshape(-1, *array.shape)
+    def _reader(
+        self, name: str, array: Array, kept: NDArray[np.intp], left_out: int, unread: Sequence[str]
+    ) -> InMemory:
+        # Files of a bag may overlap.
+        kept = kept[np.argsort(np.array(self.times)[kept, 0], kind="stable")]
+        rows = np.stack([self.values[k].reshape(-1) for k in kept])
+        with np.errstate(over="ignore"):
+            frames = rows.astype(np.float32)
+        if np.isinf(frames).any():
+            bad = int(np.argwhere(np.isinf(frames))[0, 0])
+            raise FormatError(f"{self.location}, message {kept[bad]}: a value is infinite, or does not fit 32 bits")
+        bag, stamps = np.array(self.times, np.int64)[kept].T
+        right = (stamps > 0) & (np.abs(bag.astype(np.float64) - stamps) <= _DAY_NS)
+        found = repaired(np.where(right, stamps, bag) // 1000)
+        by_the_bag = int((~right).sum())
+        are_few = 2 * len(np.unique(stamps)) < len(stamps)
+        if are_few or right.mean() < _MOST or found.wrong > (1 - _MOST) * len(kept):
+            by_the_bag, found = len(kept), repaired(bag // 1000)
+        frames = frames if found.order is None else frames[found.order]
+        lost = [f"{left_out} of {counted(len(self.values), 'message')} are left out, of another length"] * (
+            left_out > 0
+        )
+        if stamps.any() and by_the_bag:
+            lost.append(
+                f"{by_the_bag} of {counted(len(kept), 'message')} have the time of the bag: their stamps are wrong"
+            )
+        lost += found.said
+        for line in lost:
+            warn(f"{self.path}: topic {self.topic}: {line}", stacklevel=6)
+        others = [f"other topics of the bag: {', '.join(unread)}"] * bool(unread)
+        unit = "counts" if rows.dtype.kind in "ui" else "as sent"
+        table = Frames(frozen_whole(frames.reshape(-1, *array.shape)), frozen_whole(found.t), unit=unit, array=array)
+        limited(self.location, table)
+        remarks = () if stamps.any() else ("the times are those of the bag, because the messages have no header",)
+        source = self.topic + f".{self.field}" * bool(self.field) + f" ({self.type})"
+        facts = Facts(
+            path=self.path, array=array, kind="ros", label=name, source=source, remarks=remarks, lost=(*lost, *others)
+        )
+        counts = {"messages": len(kept), "messages_of_another_length": left_out, "times_by_the_bag": by_the_bag}
+        return InMemory(facts, table, counted=counts)
 
     def _stated(self) -> Array:
         """Return the most frequent length: in rows and columns as most of its messages state them, else in one row."""
         lengths = Counter(value.shape for value in self.values if value.size)
-        if not lengths:
-            raise FormatError(f"{self.location}: the messages contain no values")
         ((most, _),) = lengths.most_common(1)
         stated = Counter(g for value, g in zip(self.values, self.grids, strict=True) if g and value.shape == most)
-        rows, columns = stated.most_common(1)[0][0] if stated else (1, most[0])
+        rows, columns = stated.most_common(1)[0][0] if stated else (1, int(np.prod(most)))
         try:
-            return Array(rows, columns, name=self.topic)
+            return Array(rows, columns, name=self.topic, names=self.names or None)
         except ProblemError as error:
-            raise FormatError(
-                f"{self.location}: the messages have {math.prod(most)} values each: {first_line(error)}"
-            ) from None
-
-
-def _fits(numbers: _Shape, array: Array) -> bool:
-    """Return whether a message's numbers are a frame of an array: as many, and an image of its rows and columns."""
-    return numbers.shape == array.shape if numbers.ndim == 2 else numbers.size == array.rows * array.columns
-
-
-def _there(message: Any) -> str:
-    return ", ".join(path for path, numbers in leaves(message) if numbers.size > 1) or "none with more than one number"
-
-
-def _times(stamps: NDArray[np.int64], bag: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
-    """Return times in ns, which never fall, by the headers' stamps; and how many are the bag's instead.
-
-    Sound stamps are above 0, within a day of the bag's time of their message, and ascend. The first and the last are
-    not sound if their delay is off the median delay by more than a second, and by ten times as much as any other.
-    Where less than half are sound, all messages have the bag's times, else those whose stamp is wrong. The bag's
-    time is later than the stamp by the time that the message was under way: where it would come after the next
-    message's, it is used less the median of that delay, and at most that next time.
-    """
-    near = np.flatnonzero((stamps > 0) & (np.abs(bag.astype(np.float64) - stamps) <= _DAY_NS))
-    sound = near[_ascending(stamps[near].tolist())]
-    # No stamp beside a first or last one bounds it: it is compared with the delays of the others.
-    for end, rest in ((0, slice(1, None)), (-1, slice(-1))):
-        delays = (bag - stamps)[sound].astype(np.float64)
-        off = np.abs(delays - np.median(delays)) if len(sound) > 2 else np.zeros(3)
-        if off[end] > max(_SECOND_NS, 10 * off[rest].max()):
-            near = near[near != sound[end]]
-            sound = near[_ascending(stamps[near].tolist())]
-    if 2 * len(sound) < len(stamps):
-        return bag, len(bag)
-    t, late = stamps.copy(), int(np.median((bag - stamps)[sound]))
-    wrong = np.setdiff1d(np.arange(len(stamps)), sound)
-    for run in np.split(wrong, np.flatnonzero(np.diff(wrong) > 1) + 1) if len(wrong) else ():
-        before, after = t[: run[0]][-1:], stamps[run[-1] + 1 :][:1]
-        candidates = [np.concatenate([before, bag[run] - less, after]) for less in (0, late)]
-        fits = next((stamps for stamps in candidates if (np.diff(stamps) > 0).all()), None)
-        low, high = before[0] if len(before) else None, after[0] if len(after) else None
-        t[run] = np.clip(bag[run] - late, low, high) if fits is None else fits[len(before) :][: len(run)]
-    return t, len(wrong)
-
-
-def _ascending(times: Sequence[int]) -> list[int]:
-    """Return the places of the most times that ascend; of several such choices the one of the latest times."""
-    # From the end, as in patience sorting: for each length the place where the best choice of that length begins.
-    begins: list[int] = []
-    falling: list[int] = []
-    after = [-1] * len(times)
-    for k in reversed(range(len(times))):
-        at = bisect_left(falling, -times[k])
-        after[k] = begins[at - 1] if at else -1
-        begins[at : at + 1], falling[at : at + 1] = [k], [-times[k]]
-    chosen = begins[-1:]
-    while chosen and after[chosen[-1]] >= 0:
-        chosen.append(after[chosen[-1]])
-    return chosen
+            raise FormatError(f"{self.location}: {most} values each: {first_line(error)}") from None

@@ -119,10 +119,8 @@ class FileRequests:
             if not is_bag(path):
                 return []
             options = self._opening.options_of(path)
-            types = None if options.types is None else Path(options.types)
             return [
-                (each.topic, each.field, each.shape, each.messages, each.trouble)
-                for each in topics(path, types, options.ros)
+                (each.topic, each.field, each.shape, each.messages, each.trouble) for each in topics(path, options.ros)
             ]
 
     def describe(

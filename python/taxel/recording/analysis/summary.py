@@ -114,6 +114,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "verdict": recording.verdict,
         "verdict_details": recording.verdict.to_dict(),
         "remarks": list(recording.remarks),
+        "layout": recording._main.facts.layout,
     }
 
 

@@ -1,0 +1,131 @@
+"""Arrays of other programs open where their times say which axis is the time; else layouts are printed."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from refusal import refused
+
+import taxel
+from taxel import FormatError, Frames
+from taxel._base.errors import Place
+from taxel.formats.array_file import read_array_file
+from taxel.formats.layout import Layout
+from taxel.formats.layout_text import of_layout
+from taxel.formats.table import Opened
+
+
+def opened(path: Path, layout: str | None = None) -> Opened:
+    found = read_array_file(
+        path, Layout(path) if layout is None else Layout.of_text(path.with_suffix(".layout.toml"), layout)
+    )
+    again = read_array_file(path, Layout.of_text(path.with_suffix(".layout.toml"), of_layout(found.layout)))
+    assert again.sources == found.sources
+    return found
+
+
+def layouts(path: Path) -> list[str]:
+    """Return the layouts of arrays that can be read in several ways; each must open them."""
+    with pytest.raises(FormatError) as caught:
+        read_array_file(path, Layout(path))
+    printed = str(caught.value).partition("\n")[2]
+    found = [part.partition("\n")[2] for part in re.split(r"(?m)^# \d+\. ", printed)[1:]]
+    for layout in found:
+        opened(path, layout)
+    return found
+
+
+def values(found: Opened, source: str = "") -> np.ndarray:
+    table = found.sources[source]
+    assert isinstance(table, Frames)
+    return table.values
+
+
+@given(
+    shape=st.permutations([30, 4, 5]).map(tuple) | st.permutations([30, 6]).map(tuple),
+    time=st.sampled_from(["time_ms", "t_s", "timestamp"]),
+)
+def test_the_axis_that_has_as_many_as_times_is_the_time(
+    shape: tuple[int, ...], time: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    path = tmp_path_factory.mktemp("axes") / "a.npz"
+    numbers = np.arange(np.prod(shape), dtype=np.float32).reshape(shape)
+    steps = {"time_ms": 10, "t_s": 0.01, "timestamp": 10_000_000}[time]
+    begin = 1_700_000_000_000_000_000 if time == "timestamp" else 0
+    np.savez(path, palm=numbers, **{time: begin + steps * np.arange(30)})
+    found = opened(path)
+    assert np.diff(found.sources[""].t).tolist() == [10_000] * 29
+    assert f"axis {shape.index(30)} (30) is the time" in found.said
+    expected = np.moveaxis(numbers, shape.index(30), 0)
+    np.testing.assert_array_equal(values(found).reshape(expected.shape), expected)
+
+
+@pytest.mark.parametrize(
+    ("shape", "axes"), [((45, 450, 52), ["row time column", "time row column"]), ((90, 6), ["time taxel"])]
+)
+def test_without_times_the_longest_axis_is_suspected_and_none_is_taken(
+    shape: tuple[int, ...], axes: list[str], tmp_path: Path
+) -> None:
+    np.save(tmp_path / "a.npy", np.zeros(shape))
+    assert [re.findall('axes = "(.*)"', layout) for layout in layouts(tmp_path / "a.npy")] == [[each] for each in axes]
+
+
+@pytest.mark.parametrize("named", ["row time column", "column row time", "time column row"])
+def test_a_layout_says_any_order_of_axes(named: str, tmp_path: Path) -> None:
+    numbers = np.arange(60.0, dtype=np.float32).reshape(5, 3, 4)
+    order = [["time", "row", "column"].index(name) for name in named.split()]
+    np.save(tmp_path / "a.npy", numbers.transpose(order))
+    found = opened(tmp_path / "a.npy", f'rate_hz = 10\n[data]\naxes = "{named}"\n')
+    np.testing.assert_array_equal(values(found), numbers)
+
+
+def test_each_trial_is_a_source_and_each_axis_too(tmp_path: Path) -> None:
+    numbers = np.arange(2 * 5 * 4 * 3, dtype=np.float32).reshape(2, 5, 4, 3)
+    np.save(tmp_path / "a.npy", numbers)
+    found = opened(tmp_path / "a.npy", 'axis = "z"\n[data]\naxes = "trial time taxel axis"\n')
+    assert list(found.sources) == ["trial1", "trial2"]
+    np.testing.assert_array_equal(values(found, "trial2")[:, 0], numbers[1, :, :, 2])
+    found = opened(tmp_path / "a.npy", 'axis = "all"\n[data]\naxes = "trial time taxel axis"\n')
+    assert list(found.sources) == [f"trial{k} {axis}" for k in (1, 2) for axis in "xyz"]
+
+
+def test_three_axes_at_the_end_are_asked(tmp_path: Path) -> None:
+    numbers = np.random.default_rng(1).random((50, 4, 5, 3)).astype(np.float32)
+    np.savez(tmp_path / "a.npz", skin=numbers, t_ms=np.arange(50) * 10)
+    z, all_axes, shear = layouts(tmp_path / "a.npz")
+    np.testing.assert_array_equal(values(opened(tmp_path / "a.npz", z)), numbers[..., 2])
+    np.testing.assert_array_equal(values(opened(tmp_path / "a.npz", all_axes), "y"), numbers[..., 1])
+    np.testing.assert_allclose(values(opened(tmp_path / "a.npz", shear)), np.hypot(numbers[..., 0], numbers[..., 1]))
+
+
+def test_several_arrays_are_named_with_their_shapes(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", left=np.zeros((9, 4)), right=np.zeros((9, 5)), t_s=np.arange(9))
+    with refused(FormatError, place=Place("a.npz")) as caught:
+        opened(tmp_path / "a.npz")
+    assert "left (9 x 4), right (9 x 5)" in str(caught.value)
+    found = opened(tmp_path / "a.npz", '[data]\narray = "right"\ntime = "t_s"\n')
+    assert values(found).shape == (9, 1, 5)
+    assert found.lost == ("other arrays of the file: left",)
+
+
+@pytest.mark.parametrize("array", [np.array([["x"] * 6]), np.zeros((0, 3)), np.array([[1, None]], object)])
+def test_what_holds_no_numbers_is_refused(array: np.ndarray, tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", array)
+    with refused(FormatError, place=Place("a.npy")):
+        opened(tmp_path / "a.npy", "rate_hz = 1\n")
+
+
+def test_other_programs_files_are_told_what_to_save_instead(tmp_path: Path) -> None:
+    for ending in (".xls", ".pkl", ".pt", ".tdms", ".c3d"):
+        (tmp_path / f"a{ending}").write_bytes(b"\x80\x04\x95")
+        with refused(FormatError, place=Place(f"a{ending}")) as caught:
+            taxel.open(tmp_path / f"a{ending}")
+        assert "save" in str(caught.value) or "export" in str(caught.value)
+    (tmp_path / "a.json").write_text('{\n "p": [1, 2]\n}\n')
+    with refused(FormatError, place=Place("a.json")):
+        taxel.open(tmp_path / "a.json")
