@@ -22,6 +22,7 @@ from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
+from taxel.formats.checks import around
 from taxel.formats.checks import sensor as limited_sensor
 from taxel.formats.checks import table as limited
 from taxel.frames import Frames
@@ -174,14 +175,3 @@ def _sensor(path: Path, document: str) -> Array:
         return limited_sensor(str(path), Array._from_geometry(dict(json.loads(document))))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, ProblemError) as error:
         raise FormatError(f"{path}, {SENSOR}: {first_line(error)}; must be a sensor as taxel writes it") from None
-
-
-def around(x: NDArray[Any], y: NDArray[Any]) -> Array:
-    """Return the thesis' array, or a larger array if events are outside it."""
-    thesis = Array.thesis()
-    if not len(x):
-        return thesis
-    if min(x.min(), y.min()) < 0 or max(x.max(), y.max()) >= 65_535:
-        raise ProblemError("x and y: must be from 0 to 65534")
-    rows, columns = max(thesis.rows, int(y.max()) + 1), max(thesis.columns, int(x.max()) + 1)
-    return thesis if (rows, columns) == thesis.shape else Array(rows, columns)

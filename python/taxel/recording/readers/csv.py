@@ -28,11 +28,11 @@ from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
+from taxel.formats.checks import around
 from taxel.formats.checks import table as limited
 from taxel.formats.layout import advice
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory
-from taxel.recording.readers.columns import around
 
 #: Columns of events: those that a table must have, and those that may follow.
 EVENTS = ("t_us", "x", "y", "p")

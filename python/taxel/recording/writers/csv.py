@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from taxel.array import Array
 from taxel.events import Events
+from taxel.formats.checks import around
 from taxel.frames import Frames
-from taxel.recording.readers.columns import around
 from taxel.recording.readers.csv import EVENTS, MORE, sensor_of
 
 #: Number of frames that are written at once.
