@@ -116,6 +116,9 @@ def _merged(parts: Sequence[SourceView], shifts: Sequence[int]) -> InMemory:
     facts = [part.facts for part in parts]
     names = ", ".join(each.name for each in facts)
     lost = dict.fromkeys(line for part in parts for line in part.lost)
+    for part in parts:
+        if part.array != table.array and (part.array._is_measured or part.array.names is not None):
+            lost[f"how {part.facts.name} describes the sensor otherwise"] = None
     zeroings = _zeroings(tables, marks)
     if zeroings is None:
         zeroings, lost["zeroed taxels (they would change the rest in a recording without them)"] = (), None
