@@ -43,7 +43,7 @@ $(VENV)/.installed: $(PROJECTS) requirements.lock | prerequisites
 	@touch $@
 
 # One place for each group of extras: $(VENV)/.for-test, .for-lint, .for-docs, .for-dist.
-EXTRAS_test := test beside neo nir nwb cluster bench
+EXTRAS_test := test beside neo nir cluster bench
 EXTRAS_lint := lint
 EXTRAS_docs := docs
 EXTRAS_dist := dist

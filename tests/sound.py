@@ -61,7 +61,6 @@ def write_files() -> None:
     """Write the files that sound calls read to the current folder."""
     FOUND.to_csv("here.csv")
     TRAINS.save("here.npz")
-    TRAINS.to_nwb("here.nwb")
     TARE.save("here_tare.json")
     CALIBRATION.save("here_calibration.json")
     READOUT.save("here_readout.json")
@@ -281,13 +280,11 @@ VALUES: dict[str, Callable[[], Any]] = {
     "y": lambda: [1],
     "Calibration.from_json.text": CALIBRATION.to_json,
     "Calibration.load.path": lambda: "here_calibration.json",
-    "Calibration.readings.frames": lambda: taxel.Frames(np.ones((3, 4, 4)), [0, 192, 384], unit="N", array=ARRAY),
     "Calibration.beside.recording": lambda: "here_events.npz",
     "Events.x": lambda: [1],
     "Labels.named.recording": lambda: "walk.mcap",
     "Readout.from_json.text": READOUT.to_json,
     "Recording.on_clock.name": lambda: "host",
-    "SpikeTrains.from_nwb.path": lambda: "here.nwb",
     "Tare.from_json.text": TARE.to_json,
     "PlainRule.from_json.text": RULE.to_json,
     "Encoder.from_json.text": LEVELS.to_json,
@@ -376,7 +373,6 @@ SMALL: dict[str, dict[str, Any]] = {
     "read_trials": {"window_ms": 0.1},
     "to_csv": {"overwrite": True},
     "to_nir": {"overwrite": True},
-    "to_nwb": {"overwrite": True},
     "save": {"overwrite": True},
     "taxel.convert": {"overwrite": True},
     "tasks.detect": {"options": tasks.DetectOptions(tare=0.3)},

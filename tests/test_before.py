@@ -142,7 +142,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "recipe.json": recipe,
     "encoder.json": lambda path: json.loads(Encoder.from_json(path.read_text("utf-8")).to_json()),
     "fit.calibration.json": calibration,
-    "law.calibration.json": calibration,
+    "table.calibration.json": calibration,
     **dict.fromkeys(("readout.json", "touch.json", "trained.json"), readout),
 }
 

@@ -421,14 +421,6 @@ class Converted:
 
 def adaptive_convert(json: str, shape: tuple[int, int], volts: NDArray[np.float64], period_us: float) -> Converted: ...
 
-# calibration: the law of fabric, amplifier and ramp
-
-def check_law(json: str) -> dict[str, float]: ...
-def law_rest(json: str, ramp: float) -> float: ...
-def law_of(
-    json: str, ramp: float, values: NDArray[np.float64], rest: NDArray[np.float64], back: bool
-) -> NDArray[np.float64]: ...
-
 # simulate: acts as ms of silence, a scene as JSON, or a sequence of frames with its period in us
 
 _Act = float | str | tuple[NDArray[np.float32], float]

@@ -44,9 +44,6 @@ NAN = {
     "Calibration.apply, one taxel": lambda nan: TABLE.apply(
         Frames(np.ones((1, 1, 3)), [0], array=TABLE.array), rest=[[0.0, nan, 0.0]]
     ),
-    "Calibration.readings": lambda nan: TABLE.readings(
-        Frames(np.ones((1, 1, 3)), [0], unit="N", array=TABLE.array), rest=nan
-    ),
     "Frames.area": lambda nan: FRAMES.area(above=nan),
     "Recipe": lambda nan: Recipe(LevelCrossing([0.5]), {}, {}, run_threshold=nan),
     "Detections": lambda nan: Detections(["a", "b"], [1, 2], [2, 3], [0.5, nan]),

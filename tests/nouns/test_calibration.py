@@ -34,9 +34,7 @@ def calibrations(draw):
     unit = draw(st.sampled_from(["N", "kPa"]))
     rest = draw(st.sampled_from([None, np.full(ARRAY.shape, 7.0), np.arange(12.0).reshape(ARRAY.shape)]))
     common = {"unit": unit, "gain": gain, "rest": rest, "date": DAY}
-    kind = draw(st.sampled_from(["law", "table", "power"]))
-    if kind == "law":
-        return Calibration.law(ARRAY, ramp=draw(st.sampled_from([150.0, 1000.0])), **common)
+    kind = draw(st.sampled_from(["table", "power"]))
     if kind == "table" and draw(st.booleans()):
         steps = st.lists(st.floats(0.5, 50.0), min_size=24, max_size=24)
         x = np.cumsum(np.array(draw(steps)).reshape(2, *ARRAY.shape), axis=0)
@@ -60,18 +58,6 @@ def test_more_reading_is_never_less_load(calibration, given):
     assert np.isfinite(values).all()
 
 
-@given(calibrations(), st.floats(0.0, 1.0))
-def test_what_is_read_under_a_load_gives_the_load_back(calibration, share):
-    most = calibration.apply(
-        frames(140.0 if calibration.reading_unit == "ticks" else 60.0, calibration.reading_unit)
-    ).values
-    load = frames(share * most, calibration.unit)
-    again = calibration.apply(calibration.readings(load))
-    assert again.unit == calibration.unit
-    # float32 readings: near a rest of 50 ticks they step by 4e-6, and a power below 1 widens that.
-    assert np.allclose(again.values, load.values, rtol=2e-2, atol=1e-3 * most.max())
-
-
 @given(calibrations())
 @settings(max_examples=40)
 def test_json_gives_it_back(calibration):
@@ -79,39 +65,6 @@ def test_json_gives_it_back(calibration):
     assert again == calibration
     read = frames(33.0, calibration.reading_unit)
     assert again.apply(read) == calibration.apply(read)
-
-
-def test_the_law_is_that_of_the_circuit():
-    """G = G0 + k F^0.7, V = V_trans (1 + R_f G), and a ramp that charges to 3 of 5 V in 150 ticks."""
-    force = np.array([0.0, 0.005, 0.02, 0.3, 1.0])
-    conductance = 0.1e-6 + 1.64e-6 * (force / 0.02) ** 0.7
-    volts = 1.3 * (1 + 47e3 * conductance)
-    ticks = 150 / np.log(2.5) * np.log(5 / (5 - volts))
-    one = Array(1, len(force))
-    read = Frames(ticks.reshape(1, 1, -1), [0], unit="ticks", array=one)
-    assert Calibration.law(one).apply(read).values.ravel() == pytest.approx(force, rel=1e-4, abs=1e-6)
-    side = 2.29
-    pressure = Calibration.law(one, unit="kPa").apply(read).values.ravel()
-    assert pressure == pytest.approx(1e3 * force / side**2, rel=1e-4, abs=1e-3)
-
-
-def test_the_law_finds_the_force_of_a_ball_that_the_emulated_board_felt():
-    """Taxels of 2.29 mm every 2.67 mm feel their share of the force, but for what the noise floor hides.
-
-    The fabric is one that conducts three times as much as usual, so that the floor hides little.
-    """
-    acts = [taxel.simulate.Silence(60.0), taxel.simulate.Scene.draw(3)]
-    sensor = {"touch_us": 5.0, "gain_spread": 0.0, "offset_mv": 0.0, "noise_ticks": 0.0}
-    events = taxel.simulate.play(acts, seed=1, sensor=sensor).events
-    contacts, force = taxel.simulate.truth(acts)
-    law = Calibration.law(events.array, sensor=sensor)
-    touched = Frames.from_events(events, 960, int(contacts[0].start_us), int(contacts[0].stop_us))
-    # A taxel without any event is at rest.
-    rest = law.readings(frames(0.0, "N", events.array)).values[0]
-    held = Frames(np.maximum(touched.values, rest), touched.t, unit="ticks", array=events.array)
-    assert held.values.max() < 150
-    felt, k = law.apply(held).total(), int(law.apply(held).total().argmax())
-    assert felt[k] == pytest.approx((2.29 / 2.67) ** 2 * force[int(touched.t[k] / 192)], rel=0.1)
 
 
 # fits
@@ -174,15 +127,6 @@ def test_a_probe_on_single_taxels_gives_these_their_gain_and_the_others_the_comm
     found = Calibration.fit(loads, exponent=1.0, each=True, date=DAY)
     assert (found.gain[1, 2], found.gain[0, 3]) == (pytest.approx(0.1), pytest.approx(0.3))
     assert 0.1 < found.gain[2, 0] < 0.3
-
-
-def test_a_law_is_corrected_by_a_known_load():
-    law = Calibration.law(ARRAY, date=DAY)
-    true = frames(0.4, "N")
-    read = law.readings(true)
-    found = Calibration.fit([Load(read, 2 * 12 * 0.4)], start=law, date=DAY)
-    assert found.apply(read).values == pytest.approx(0.8, rel=1e-5)
-    assert "law" in json.loads(found.to_json())["curve"]
 
 
 # what lies beside a recording

@@ -50,18 +50,10 @@ def test_files_without_a_kind_are_signed_if_they_have_values(tmp_path: Path) -> 
             SpikeTrains.load(tmp_path / name)
 
 
-def test_nwb_files_and_neo_trains_without_a_kind_are_signed(tmp_path: Path) -> None:
+def test_neo_trains_without_a_kind_are_signed() -> None:
     signed = SpikeTrains.from_lists([[1.0], [2.0]], stop=5.0, values=[[0.5], [-3.0]])
     pytest.importorskip("neo")
     assert SpikeTrains.from_neo(signed.to_neo()).kind == "signed"
-    pynwb = pytest.importorskip("pynwb")
-    assert SpikeTrains.from_nwb(signed.to_nwb(tmp_path / "a.nwb")).kind == "signed"
-    two = SpikeTrains.from_lists([[1.0], [2.0]], stop=5.0, values=[[0.5], [-3.0]], kind="graded")
-    with pynwb.NWBHDF5IO(two.to_nwb(tmp_path / "b.nwb"), "r+") as io:
-        assert list(io.read().units["value_kind"][:]) == ["graded", "graded"]
-        io.read().units["value_kind"].data[1] = "signed"
-    with refused(FormatError, place=Place("b.nwb")):
-        SpikeTrains.from_nwb(tmp_path / "b.nwb")
 
 
 @given(some(), some())

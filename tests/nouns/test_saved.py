@@ -17,7 +17,7 @@ BEFORE = Path(__file__).parents[1] / "data" / "before"
 #: Each class, a file of it, a number in it, and another number.
 KINDS: list[tuple[Any, str, str, str]] = [
     (Tare, "tare.json", "20.5", "20.25"),
-    (Calibration, "law.calibration.json", '"floor": 0.0', '"floor": 0.5'),
+    (Calibration, "table.calibration.json", '"floor": 0.0', '"floor": 0.5'),
     (Readout, "touch.json", '"tau": 2.0', '"tau": 2.5'),
     (PlainRule, "rule.json", '"threshold": 30.0', '"threshold": 31.0'),
 ]

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
-from pathlib import Path
-
 import matplotlib as mpl
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from refusal import refused
 
 from taxel import SpikeTrains
 from taxel._base.arguments import column
-from taxel._base.errors import Place
-from taxel._core import FormatError
 
 mpl.use("Agg")
 
@@ -70,73 +65,6 @@ def test_neo_trains_of_other_units_and_windows_are_read_in_ms() -> None:
     assert (trains.start, trains.stop) == (-5.0, 1000.0)
     assert np.allclose(trains[0], [1.0, 500.0])
     assert trains[1].tolist() == [20.0]
-
-
-@settings(max_examples=settings.default.max_examples // 7, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(some())
-def test_nwb_takes_our_trains_and_gives_them_back(tmp_path: Path, trains: SpikeTrains) -> None:
-    pytest.importorskip("pynwb")
-    assume(len(trains))
-    trains.to_nwb(tmp_path / "a.nwb", overwrite=True)
-    back = SpikeTrains.from_nwb(tmp_path / "a.nwb")
-    assert np.array_equal(back.offsets, trains.offsets)
-    assert np.allclose(
-        [*back.times, back.start, back.stop], [*trains.times, trains.start, trains.stop], rtol=0, atol=1e-9
-    )
-    assert back.signed == trains.signed
-    assert trains.values is None or np.array_equal(back.values, trains.values)
-
-
-def test_nwb_keeps_the_kind_of_trains_without_a_spike(tmp_path: Path) -> None:
-    pytest.importorskip("pynwb")
-    trains = SpikeTrains.from_lists([[], []], 0.0, 100.0, [[], []], kind="signed")
-    back = SpikeTrains.from_nwb(trains.to_nwb(tmp_path / "a.nwb"))
-    assert (len(back), len(back.times), back.kind) == (2, 0, "signed")
-
-
-def test_nwb_holds_seconds_and_what_was_watched(tmp_path: Path) -> None:
-    pynwb = pytest.importorskip("pynwb")
-    begun = datetime(2021, 5, 4, 12, tzinfo=UTC)
-    trains = SpikeTrains.from_lists([[1.0, 250.0], []], -5.0, 1000.0)
-    assert trains.to_nwb(tmp_path / "a.nwb", begun=begun, description="a walk") == tmp_path / "a.nwb"
-    with pynwb.NWBHDF5IO(tmp_path / "a.nwb", "r") as io:
-        file = io.read()
-        assert (file.session_description, file.session_start_time) == ("a walk", begun)
-        assert np.allclose(file.units["spike_times"][0], [0.001, 0.25])
-        assert len(file.units["spike_times"][1]) == 0
-        assert np.allclose(file.units["obs_intervals"][1], [[-0.005, 1.0]])
-    with pytest.raises(FileExistsError):
-        trains.to_nwb(tmp_path / "a.nwb")
-
-
-def test_nwb_units_of_others_are_read_in_ms(tmp_path: Path) -> None:
-    pynwb = pytest.importorskip("pynwb")
-    for name, intervals in (("watched", [[[-0.5, 0.1], [0.2, 0.9]], [[0.0, 0.3]]]), ("unwatched", None)):
-        file = pynwb.NWBFile("theirs", name, datetime(2020, 1, 1, tzinfo=UTC))
-        for n, times in enumerate([[-0.25, 0.5], [0.125]]):
-            file.add_unit(spike_times=times, **({"obs_intervals": intervals[n]} if intervals else {}))
-        with pynwb.NWBHDF5IO(tmp_path / f"{name}.nwb", "w") as io:
-            io.write(file)
-    watched, unwatched = (SpikeTrains.from_nwb(tmp_path / f"{name}.nwb") for name in ("watched", "unwatched"))
-    assert [list(t) for t in watched] == [[-250.0, 500.0], [125.0]]
-    assert (watched.start, watched.stop) == (-500.0, 900.0)
-    assert (unwatched.start, unwatched.stop) == (-250.0, 500.0)
-    assert SpikeTrains.from_nwb(tmp_path / "unwatched.nwb", start=-300.0, stop=600.0).stop == 600.0
-    with refused():
-        SpikeTrains.from_nwb(tmp_path / "unwatched.nwb", stop=300.0)
-
-
-def test_a_file_without_spike_times_is_one_error(tmp_path: Path) -> None:
-    pynwb = pytest.importorskip("pynwb")
-    with pynwb.NWBHDF5IO(tmp_path / "a.nwb", "w") as io:
-        io.write(pynwb.NWBFile("none", "none", datetime(2020, 1, 1, tzinfo=UTC)))
-    with refused(FormatError, place=Place("a.nwb")):
-        SpikeTrains.from_nwb(tmp_path / "a.nwb")
-    (tmp_path / "b.nwb").write_text("nothing of the kind")
-    with refused(FormatError, place=Place("b.nwb")):
-        SpikeTrains.from_nwb(tmp_path / "b.nwb")
-    with pytest.raises(FileNotFoundError):
-        SpikeTrains.from_nwb(tmp_path / "c.nwb")
 
 
 @given(some(), st.lists(st.floats(0, 50), min_size=1, max_size=4, unique=True))

@@ -73,7 +73,7 @@ def test_the_time_of_a_load_counts_from_the_beginning_where_times_count_from_197
         assert taxel.open(place).calibrated().total()[25] == pytest.approx(12.0)
 
 
-def test_a_table_and_the_law_need_no_load(tmp_path: Path) -> None:
+def test_a_table_needs_no_load(tmp_path: Path) -> None:
     path, table = tmp_path / "a.npz", tmp_path / "table.csv"
     pressed(path)
     table.write_text("reading,value\n10,1\n30,4\n")
@@ -82,11 +82,6 @@ def test_a_table_and_the_law_need_no_load(tmp_path: Path) -> None:
     assert (pressure["unit"], pressure["peak"]["most"]) == ("kPa", 4.0)
     newtons = 1e-3 * taxel.open(path).array.pitch_mm ** 2 * pressure["sum"]["most"]
     assert f"  force               at most {newtons:g} N, at " in run("info", path).stdout
-    assert run("calibrate", path, "--law", "--set", "exponent=1.0", "--overwrite").returncode == 0
-    peak = taxel.open(path).calibrated().peak().max()
-    # From 50 to 80 ticks of a ramp of 150 that charges towards 5 V; 1.3 V x 47 kOhm x 1.64 uS a 0.02 N.
-    volts = 5 * (2.5 ** (-50 / 150) - 2.5 ** (-80 / 150))
-    assert peak == pytest.approx(0.02 * volts / (1.3 * 47e-3 * 1.64), rel=1e-4)
 
 
 def test_a_table_by_taxel_names_what_it_lacks(tmp_path: Path) -> None:
@@ -106,7 +101,7 @@ def test_a_table_by_taxel_names_what_it_lacks(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ((), "law, table and loads are missing, so there is nothing to calibrate by; give --loads"),
+        ((), "table and loads are missing, so there is nothing to calibrate by; give --loads"),
         (("--load", "0"), "load 1 is 0: must be above 0"),
         (("--load", "3", "--from", "7", "--to", "9"), "--load: nothing was recorded from 7.0 to 9.0 s"),
         (("--load", "3", "--from", "99"), "--load: nothing was recorded from 99.0 s to the end"),
@@ -114,10 +109,8 @@ def test_a_table_by_taxel_names_what_it_lacks(tmp_path: Path) -> None:
         (("--load", "3", "--to", "1"), "no taxel reads more than 0.28 counts above its rest"),
         (("--load", "3", "--load-unit", "kg"), "unit is 'kg': must be one of 'N', 'kPa'"),
         (("--load", "3", "--each"), "no load determines a single taxel"),
-        (("--law",), "--law: converts ticks of a board to N;"),
         (("--from", "1"), "--from and --to give the time of --load: give --load too"),
         (("--loads", "loads.csv"), "loads.csv, line 2: unit is 'kg'; must be N or kPa"),
-        (("--set", "exponent=9", "--load", "3"), "sensor states parameters of the law, but law is not set"),
     ],
 )
 def test_what_is_wrong_is_one_line_and_nothing_is_written(tmp_path: Path, options: tuple[str, ...], said: str) -> None:

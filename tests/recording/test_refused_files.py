@@ -59,14 +59,8 @@ def own(path: Path) -> Callable[[Path], Any]:
     return taxel.open
 
 
-def units(path: Path) -> Callable[[Path], Any]:
-    pytest.importorskip("pynwb")
-    taxel.SpikeTrains.from_lists([[1.0, 2.0]], stop=5.0).to_nwb(path)
-    return taxel.SpikeTrains.from_nwb
-
-
 @pytest.mark.parametrize("way", [external_storage, virtual, external_link, external_link_behind_a_soft_one])
-@pytest.mark.parametrize("make", [foreign, own, units])
+@pytest.mark.parametrize("make", [foreign, own])
 def test_a_file_that_refers_to_another_one_is_refused_by_name(
     make: Callable[[Path], Callable[[Path], Any]], way: Callable[[h5py.File, Path], str], tmp_path: Path
 ) -> None:

@@ -9,7 +9,6 @@ mod test_hooks;
 mod thread_state;
 mod threaded;
 
-mod calibration;
 mod circuit;
 mod cone_x;
 mod described;
@@ -38,8 +37,6 @@ mod _core {
     use taxel_live::capture::FIREWALL;
     use taxel_live::serial_line::BAUDS;
 
-    #[pymodule_export]
-    use crate::calibration::{check_law, law_of, law_rest};
     #[pymodule_export]
     use crate::circuit::{
         Converted, adaptive_convert, circuit_volts, circuit_volts_alone, converter_ramp, converter_ticks,

@@ -179,8 +179,8 @@ def datasets(file: h5py.File) -> dict[str, h5py.Dataset]:
     return found
 
 
-def read_dataset(file: h5py.File, name: str, *, texts: bool = False) -> NDArray[Any]:
-    """Return a data set of numbers, or of texts.
+def read_dataset(file: h5py.File, name: str) -> NDArray[Any]:
+    """Return a data set of numbers.
 
     Raises
     ------
@@ -189,7 +189,7 @@ def read_dataset(file: h5py.File, name: str, *, texts: bool = False) -> NDArray[
     item = file[name]
     if not hasattr(item, "dtype") or item.shape is None:
         raise unreadable(f"{name}: must be an array", file.filename)
-    return _read(file.filename, f"array {name}: ", _of_dataset(item), None, "U" if texts else _NUMBERS)
+    return _read(file.filename, f"array {name}: ", _of_dataset(item), None, _NUMBERS)
 
 
 def write_hdf5(path: str | os.PathLike[str], write: Callable[[h5py.File], object], *, overwrite: bool = False) -> None:

@@ -23,7 +23,7 @@ from taxel._base.messages import counted, escaped, first_line
 from taxel._base.saved import Saved
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
-from taxel.calibration._curves import Curve, Law, PointCurve, Power, Values, above_0, curve_of
+from taxel.calibration._curves import Curve, PointCurve, Power, Values, above_0, curve_of
 from taxel.calibration._loads import UNITS, CalibratedArray, Load, LoadEquations, best_exponent, gains, same
 from taxel.frames import Frames
 from taxel.tare import Tare
@@ -34,7 +34,7 @@ __all__ = ["Calibration", "Load"]
 class Calibration(Saved):
     """Convert readings to N on each taxel, or kPa at each taxel, for one array on one day.
 
-    Made by `Calibration.law`, `Calibration.table`, `Calibration.fit`, `Calibration.load` or `Calibration.from_json`.
+    Made by `Calibration.table`, `Calibration.fit`, `Calibration.load` or `Calibration.from_json`.
     A value is ``gain * curve(reading, rest)``, 0 where a taxel does not read more than `floor` above its rest.
 
     taxel finds the calibration of ``walk.mcap`` if it is saved beside it as ``walk.calibration.json``, or, for all
@@ -63,7 +63,7 @@ class Calibration(Saved):
 
     Raises
     ------
-    ProblemError : the class is called; use `law`, `table`, `fit`, `load` or `from_json`
+    ProblemError : the class is called; use `table`, `fit`, `load` or `from_json`
 
     Examples
     --------
@@ -91,7 +91,7 @@ class Calibration(Saved):
     _curve: Curve
 
     def __init__(self) -> None:
-        raise ProblemError("Calibration: make one by Calibration.law, .table or .fit, or load one by Calibration.load")
+        raise ProblemError("Calibration: make one by Calibration.table or .fit, or load one by Calibration.load")
 
     @classmethod
     def _made(cls, array: Array, curve: Curve, unit: str, reading_unit: str, how: Mapping[str, Any]) -> Calibration:
@@ -127,60 +127,6 @@ class Calibration(Saved):
         calibration.loads = tuple(how.get("loads", ()))
         calibration.note = checked_text("note", how.get("note", ""))
         return calibration
-
-    @classmethod
-    def law(
-        cls,
-        array: Array,
-        *,
-        ramp: float = 150.0,
-        sensor: Mapping[str, float] | None = None,
-        unit: str = "N",
-        gain: ArrayLike = 1.0,
-        rest: Tare | ArrayLike | None = None,
-        floor: float = 0.0,
-        date: str | None = None,
-        note: str = "",
-    ) -> Calibration:
-        """Use the law of the fabric, its amplifier and its ramp: ticks to N or kPa.
-
-        Parameters
-        ----------
-        array : Array
-        ramp : float, ticks
-            Duration of the board's ramp (its register `ramp_time`).
-        sensor : mapping, optional
-            Parameters that differ from the usual sensor: v_trans, feedback_kohm, rest_us, touch_us, exponent, side_mm
-            ...
-        unit : {"N", "kPa"}
-        gain : float or float64, shape (rows, columns)
-        rest : Tare or float64 of the array's shape, optional
-            Default: the rest of the law.
-        floor : float, ticks
-        date : str, optional
-            Default: today.
-        note : str
-
-        Raises
-        ------
-        ProblemError : a parameter that is invalid, or a tare of another array
-
-        Notes
-        -----
-        Thesis 4.3.2. The exponent and the conductance at rest are guesses that no maker's curve supports; a fit to a
-        known load corrects the gain, and the exponent too.
-
-        Examples
-        --------
-        >>> law = Calibration.law(Array(1, 1), date="2026-11-21")
-        >>> law.readings(Frames([[[0.02]]], [0], unit="N")).values.round(1) - law.readings(
-        ...     Frames([[[0.0]]], [0], unit="N")).values.round(1)
-        array([[[4.5]]], dtype=float32)
-        """
-        constants = {} if sensor is None else mapping("sensor", sensor)
-        curve = Law(ramp, checked_text("unit", unit, UNITS), **constants)
-        how = {"gain": gain, "rest": rest, "floor": floor, "date": date, "note": note}
-        return cls._made(array, curve, unit, "ticks", how)
 
     @classmethod
     def table(
@@ -256,10 +202,10 @@ class Calibration(Saved):
         unit : {"N", "kPa"}
             Unit of the calibration. To convert between N and kPa, the area of each taxel must be known.
         start : Calibration, optional
-            The calibration whose curve (a law, a table) is fitted; else a power of the reading.
+            The calibration whose curve is fitted; else a power of the reading.
         exponent : float, above 0, optional
-            Exponent of the value as a function of the reading's conductance or count, if it is not to be fitted.
-            Default: fitted; if all loads are alike, 1, or the exponent of the law.
+            Exponent of the value as a function of the reading, if it is not to be fitted. Default: fitted; if all loads
+            are alike, 1.
         each : bool
             A separate gain for each taxel that a load determines: uniform pressure (kPa), or a load on one
             taxel. The other taxels keep the common gain.
@@ -334,30 +280,6 @@ class Calibration(Saved):
         same(self.array, instance("frames", frames, Frames).array, "the frames", frames.unit, self.reading_unit)
         return Frames(self._values(frames.values, self._rest(rest)), frames.t, unit=self.unit, array=frames.array)
 
-    def readings(self, frames: Frames, rest: Tare | ArrayLike | None = None) -> Frames:
-        """Return what the sensor would read under frames in N or kPa: the inverse of `apply`.
-
-        Parameters
-        ----------
-        frames : Frames
-            Frames in the calibration's unit.
-        rest : Tare or float64, shape (rows, columns), in the unit of the readings, optional
-            Today's rest; default: the rest of the calibration.
-
-        Returns
-        -------
-        Frames
-            In the unit of the readings.
-
-        Raises
-        ------
-        ProblemError : frames of another array, or in another unit
-        """
-        same(self.array, instance("frames", frames, Frames).array, "the frames", frames.unit, self.unit)
-        rest_values = np.nan_to_num(self._rest(rest))
-        values = self._curve.readings(np.maximum(frames.values, 0.0) / self.gain, rest_values)
-        return Frames(_32_bits(values), frames.t, unit=self.reading_unit, array=frames.array)
-
     def _rest(self, rest: Tare | ArrayLike | None) -> Values:
         if isinstance(rest, Tare):
             same(self.array, rest.array, "the tare")
@@ -368,7 +290,7 @@ class Calibration(Saved):
             return _by_taxel("rest", rest, self.array)
         if self.rest is not None:
             return self.rest
-        return np.full(self.array.shape, self._curve.rest() if isinstance(self._curve, Law) else 0.0)
+        return np.zeros(self.array.shape)
 
     def _values(self, readings: NDArray[Any], rest: Values) -> NDArray[np.float32]:
         known = np.nan_to_num(rest)
@@ -432,7 +354,7 @@ class Calibration(Saved):
             array = Array._from_geometry(mapping(entry, document[entry]))
             entry = "curve"
             unit = checked_text("unit", document["unit"], UNITS)
-            curve = curve_of(mapping(entry, document[entry]), unit)
+            curve = curve_of(mapping(entry, document[entry]))
             entry = "loads"
             loads = [
                 (number("load", x["load"]), str(x["unit"]), number("made", x["made"])) for x in document.get(entry, ())
@@ -482,7 +404,7 @@ class Calibration(Saved):
             "power": f"power {values.get('exponent', 0):.3g}",
             "table": f"table of {len(values.get('values', ()))}",
         }
-        parts = [curve.get(kind, "law of the fabric")]
+        parts = [curve[kind]]
         parts += [f"fit to {counted(count, 'load')}"] * bool(count)
         parts += [] if self.residual is None else [f"residual {100 * self.residual:.1f} %"]
         return ", ".join([f"{self.reading_unit} to {self.unit}", *parts, self.date])

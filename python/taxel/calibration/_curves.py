@@ -1,8 +1,7 @@
-"""Curves from readings to N or kPa: a power, a table, the law of fabric, amplifier and ramp."""
+"""Curves from readings to N or kPa: a power, a table."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from typing import Any, Protocol
@@ -10,8 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import _core
-from taxel._base.arguments import floats, mapping, number, numbers, parameters, shown
+from taxel._base.arguments import floats, mapping, number, numbers, shown
 from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
@@ -23,14 +21,10 @@ Values = NDArray[np.float64]
 
 
 class Curve(Protocol):
-    """Conversion of readings to values, and back, by a taxel of gain 1; both rise."""
+    """Conversion of readings to values by a taxel of gain 1; both rise."""
 
     def values(self, readings: Values, rest: Values) -> Values:
         """Return the values of readings, each with its rest."""
-        ...
-
-    def readings(self, values: Values, rest: Values) -> Values:
-        """Return the readings of values: the inverse."""
         ...
 
     def to_dict(self) -> dict[str, Any]:
@@ -50,9 +44,6 @@ class Power:
 
     def values(self, readings: Values, rest: Values) -> Values:
         return np.asarray(np.maximum(readings - rest, 0.0) ** self.exponent)
-
-    def readings(self, values: Values, rest: Values) -> Values:
-        return np.asarray(rest + values ** (1 / self.exponent))
 
     def to_dict(self) -> dict[str, Any]:
         return {"power": {"exponent": self.exponent}}
@@ -92,22 +83,15 @@ class PointCurve:
         if not np.any(at_rest):
             self.x, self.y = np.concatenate([0 * self.x[:1], self.x]), np.append(0.0, self.y)
 
-    def _each(self, inputs: Values, *, back: bool) -> Values:
-        if self.x.ndim == 1:
-            return np.asarray(np.interp(inputs, *((self.y, self.x) if back else (self.x, self.y))))
-        out = np.empty(np.broadcast_shapes(inputs.shape, self.x.shape[1:]))
-        by_taxel = np.broadcast_to(inputs, out.shape)
-        for row, column in np.ndindex(self.x.shape[1:]):
-            known = self.x[:, row, column]
-            points = (self.y, known) if back else (known, self.y)
-            out[..., row, column] = np.interp(by_taxel[..., row, column], *points)
-        return out
-
     def values(self, readings: Values, rest: Values) -> Values:
-        return self._each(readings - rest, back=False)
-
-    def readings(self, values: Values, rest: Values) -> Values:
-        return np.asarray(rest + self._each(values, back=True))
+        above = readings - rest
+        if self.x.ndim == 1:
+            return np.asarray(np.interp(above, self.x, self.y))
+        by_taxel = np.broadcast_to(above, np.broadcast_shapes(above.shape, self.x.shape[1:]))
+        out = np.empty(by_taxel.shape)
+        for row, column in np.ndindex(self.x.shape[1:]):
+            out[..., row, column] = np.interp(by_taxel[..., row, column], self.x[:, row, column], self.y)
+        return out
 
     def to_dict(self) -> dict[str, Any]:
         return {"table": {"readings": self.x.tolist(), "values": self.y.tolist()}}
@@ -116,49 +100,9 @@ class PointCurve:
         raise refused("exponent", ": a table has no exponent; only the gain of a table is fitted")
 
 
-class Law:
-    """Fabric, amplifier and ramp: G = G0 + k F^n, V = V_trans (1 + R_f G), and the time at which a ramp passes V."""
-
-    def __init__(self, ramp: object, unit: str, **sensor: object) -> None:
-        self.ramp, self.unit = above_0("ramp", ramp), unit
-        if self.ramp > 65_535:
-            raise refused("ramp", f" is {self.ramp:g} ticks: must be 65535 or less")
-        try:
-            self.sensor: dict[str, float] = _core.check_law(parameters(sensor))
-        except _core.SceneError as error:
-            raise ProblemError(str(error)) from None
-        self.text = json.dumps(self.sensor)
-        # The law gives the force on a taxel's own face.
-        self.share = 1.0 if unit == "N" else 1 / (N_PER_KPA_MM2 * self.sensor["side_mm"] ** 2)
-
-    def rest(self) -> float:
-        return _core.law_rest(self.text, self.ramp)
-
-    def _of(self, inputs: Values, rest: Values, back: bool) -> Values:
-        columns = np.broadcast_arrays(inputs, rest)
-        values, at_rest = (np.ascontiguousarray(column, np.float64).ravel() for column in columns)
-        return _core.law_of(self.text, self.ramp, values, at_rest, back).reshape(columns[0].shape)
-
-    def values(self, readings: Values, rest: Values) -> Values:
-        return self.share * self._of(readings, rest, back=False)
-
-    def readings(self, values: Values, rest: Values) -> Values:
-        return self._of(values / self.share, rest, back=True)
-
-    def to_dict(self) -> dict[str, Any]:
-        return {"law": {"ramp": self.ramp, **self.sensor}}
-
-    def bent(self, exponent: float) -> Law:
-        return Law(self.ramp, self.unit, **{**self.sensor, "exponent": 1 / exponent})
-
-
-def curve_of(document: Mapping[str, Any], unit: str) -> Curve:
+def curve_of(document: Mapping[str, Any]) -> Curve:
     """Return the curve that a file describes."""
-    kinds: dict[str, Any] = {
-        "power": Power,
-        "table": PointCurve,
-        "law": lambda ramp, **sensor: Law(ramp, unit, **sensor),
-    }
+    kinds: dict[str, Any] = {"power": Power, "table": PointCurve}
     if len(document) != 1 or next(iter(document)) not in kinds:
         raise ProblemError(f"{shown(dict(document))}: must be one of {', '.join(kinds)}")
     ((kind, values),) = document.items()

@@ -13,7 +13,7 @@ from taxel._base.files import beside, check_writable, named
 from taxel._core import ProblemError
 from taxel.cli._app import App, JsonOption, OverwriteOption
 from taxel.cli._opening import FileOptions
-from taxel.cli._recordings import assignments, progress, say_warnings, tare_option
+from taxel.cli._recordings import progress, say_warnings, tare_option
 from taxel.cli._say import say
 
 app = App()
@@ -37,24 +37,12 @@ def calibrate(
         Path | None,
         typer.Option(help="A .csv of loads: load,unit,from_s,to_s and, for a load on a single taxel, x,y."),
     ] = None,
-    law: Annotated[
-        bool,
-        typer.Option(
-            "--law",
-            help="Use the physical model of fabric, amplifier and ramp. "
-            "Loads, if given, correct the gain of this model.",
-        ),
-    ] = False,
     table: Annotated[
         Path | None,
         typer.Option(
             help="Use a .csv of reading,value (above rest); with columns x,y for each taxel. Loads, if given, correct "
             "the gain of this table."
         ),
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="A parameter of the law: v_trans, feedback_kohm, exponent ..."),
     ] = None,
     unit: Annotated[str, typer.Option(help="Unit of the calibrated values: N or kPa, at a taxel.")] = "N",
     each: Annotated[
@@ -72,7 +60,7 @@ def calibrate(
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Calibrate readings (ticks, counts) to N or kPa by a known load, a table or the fabric's law.
+    """Calibrate readings (ticks, counts) to N or kPa by a known load or a table.
 
     The file is written beside the recording, where taxel info and Recording.calibrated find it; a file
     calibration.json is used for all recordings of its folder.
@@ -83,7 +71,7 @@ def calibrate(
         raise ProblemError("--from and --to give the time of --load: give --load too")
     if start is not None and stop is not None and start > stop:
         raise ProblemError(f"--from {start} and --to {stop} s: --from must not be after --to")
-    options = taxel.tasks.CalibrateOptions(law, assignments(set_ or []), table, unit, each, exponent, tare, date, note)
+    options = taxel.tasks.CalibrateOptions(table, unit, each, exponent, tare, date, note)
     opened = files.opener.open_one(recording)
     file = beside(recording, f"{named(recording).stem}.calibration.json") if out is None else out
     check_writable(file, overwrite=overwrite)

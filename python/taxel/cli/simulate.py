@@ -1,4 +1,4 @@
-"""``taxel simulate``: a scene from a file, as a recording and as a movie."""
+"""``taxel simulate``: a scene from a file, as a recording."""
 
 from __future__ import annotations
 
@@ -29,12 +29,6 @@ def simulate(
         Path | None,
         typer.Option("--out", "-o", help="Write the recording that a host would make: .mcap, .lsa, .npz, .csv or .h5."),
     ] = None,
-    movie: Annotated[
-        Path | None, typer.Option(help="Draw a movie: .gif, or another format of matplotlib's writers, such as .mp4.")
-    ] = None,
-    slower: Annotated[
-        float, typer.Option(min=0.1, max=1000, help="How many times slower than real time the movie runs.")
-    ] = 10.0,
     labels: Annotated[
         Path | None, typer.Option("--truth", help="Write the true times of the touches to this CSV, label,t_us.")
     ] = None,
@@ -44,50 +38,34 @@ def simulate(
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Simulate a scene on the emulated board, as fast as possible; without -o and --movie only check it.
+    """Simulate a scene on the emulated board, as fast as possible; without -o only check it.
 
-    Example: taxel simulate scene.toml -o touch.mcap --movie touch.gif
+    Example: taxel simulate scene.toml -o touch.mcap --truth touch.csv
     """
-    from taxel.plot.film import film, writer_of  # noqa: PLC0415  loads pictures
-
     with progress(quiet=True):
         scene_file = taxel.simulate.SceneFile.open(scene)
     seed = scene_file.seed if seed is None else seed
-    targets = [path for path in (out, movie, labels) if path is not None]
+    targets = [path for path in (out, labels) if path is not None]
     if len({path.resolve() for path in targets}) < len(targets):
-        raise ProblemError("--out, --movie and --truth: must be different files")
-    if movie is not None:
-        writer_of(movie)
+        raise ProblemError("--out and --truth: must be different files")
     for path in targets:
         check_writable(path, overwrite=overwrite)
     contacts, force = taxel.simulate.truth(scene_file.acts(), preset=scene_file.preset, array=scene_file.array)
     about: dict[str, Any] = {"scene": str(scene), "seed": seed, "contacts": [contact._asdict() for contact in contacts]}
     about["peak_n"] = float(force.max())
     lines = [f"{scene}: {counted(len(contacts), 'touch', 'touches')}, at most {plain(force.max(), 3)} N"]
-    with bar(as_json) as show:
-        if out is not None or movie is not None:
+    if out is not None:
+        with bar(as_json) as show:
             played = taxel.simulate.play(
                 scene_file.acts(),
                 seed=seed,
                 watch=lambda share: show("playing", round(100 * share), 100),
                 **scene_file.options,
             )
-            about["events"] = len(played.events)
-        if out is not None:
-            lost = taxel.convert(played.events, out, overwrite=overwrite)
-            lines.append(f"{counted(len(played.events), 'event')} written to {out}")
-            lines += [f"  lost: {loss}" for loss in lost]
-        if movie is not None:
-            film(
-                played.events,
-                movie,
-                force,
-                frame_us=scene_file.registers.frame_us,
-                slower=slower,
-                overwrite=overwrite,
-                watch=lambda share: show("drawing", round(100 * share), 100),
-            )
-            lines.append(f"movie written to {movie}")
+        about["events"] = len(played.events)
+        lost = taxel.convert(played.events, out, overwrite=overwrite)
+        lines.append(f"{counted(len(played.events), 'event')} written to {out}")
+        lines += [f"  lost: {loss}" for loss in lost]
     if labels is not None:
         with_ends = sorted([(c.start_us, "contact") for c in contacts] + [(c.stop_us, "lift") for c in contacts])
         rows = "".join(f"{label},{round(t)}\n" for t, label in with_ends)

@@ -17,7 +17,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded, recorded
 from taxel.spikes import SpikeTrains
-from taxel.spikes.exchange import Kind
+from taxel.spikes.trains import Kind
 from taxel.tare import Tare
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,12 +18,12 @@ from taxel._base.drawing import draw
 from taxel._base.errors import refused, unreadable
 from taxel._base.files import write_whole
 from taxel._base.messages import counted, first_line
-from taxel._core import FormatError, ProblemError
-from taxel.spikes.exchange import Kind, read_nwb, write_nwb
+from taxel._core import ProblemError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Kind = Literal["unsigned", "signed", "graded"]
 _KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
@@ -436,72 +435,6 @@ class SpikeTrains(FrozenColumns):
 
         columns: dict[str, Any] = {"train": np.repeat(np.arange(len(self)), self.counts), "t_ms": self.times}
         return pandas.DataFrame(columns if self.values is None else columns | {"value": self.values})
-
-    def to_nwb(
-        self,
-        path: str | os.PathLike[str],
-        *,
-        begun: datetime | None = None,
-        description: str = "spike trains of taxel",
-        overwrite: bool = False,
-    ) -> Path:
-        """Write the trains to an NWB file, a unit for each train; return its path.
-
-        The window becomes each unit's observation interval, and values become a column ``value``; graded trains have a
-        further column ``value_kind``. NWB counts in seconds.
-
-        Parameters
-        ----------
-        path : path
-            NWB's own tools require the ending ``.nwb``.
-        begun : datetime, optional
-            Date and time of time 0, which NWB requires; default: now. Without a time zone, local time.
-        description : str
-            Description of the session, which NWB requires.
-        overwrite : bool
-
-        Raises
-        ------
-        FileExistsError : the file is there already and `overwrite` is false
-        ImportError : pynwb is not installed (``pip install 'taxel[nwb]'``)
-        """
-        return write_nwb(
-            path,
-            list(self),
-            self._values(),
-            self.kind,
-            (self.start, self.stop),
-            begun=begun,
-            description=description,
-            overwrite=overwrite,
-        )
-
-    @classmethod
-    def from_nwb(
-        cls, path: str | os.PathLike[str], *, start: float | None = None, stop: float | None = None
-    ) -> SpikeTrains:
-        """Read the units of an NWB file, a train for each unit, in the order of its table.
-
-        Parameters
-        ----------
-        path : path
-        start, stop : float, ms, optional
-            The window. Default: the widest of the units' observation intervals; if the file has none, from 0, or the
-            first spike if it is earlier, to the last spike.
-
-        Raises
-        ------
-        FormatError : not an NWB file; a file without units, or units without spike times; a file in which a link or a
-            data set leads to another file (names the file)
-        FileNotFoundError : no such file
-        """
-        times, offsets, first, last, values, kind = read_nwb(path, start, stop)
-        try:
-            return cls(times, offsets, first, last, values, kind=kind)
-        except ProblemError as error:
-            # With the caller's own window the window may be wrong, otherwise the file is.
-            fault = FormatError if start is None and stop is None else ProblemError
-            raise fault(f"{path}: {error}") from None
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the trains to a .npz (``times offsets start stop``, ``values`` if any); return its path.

@@ -1,19 +1,19 @@
-"""Calibrate readings (ticks, counts) to N or kPa by known loads, a table or the fabric's law."""
+"""Calibrate readings (ticks, counts) to N or kPa by known loads or a table."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import checked_path, finite, flag, instance, mapping, several
+from taxel._base.arguments import checked_path, finite, flag, instance, several
 from taxel._base.arguments import text as checked_text
-from taxel._base.errors import helped, refused
+from taxel._base.errors import helped
 from taxel._base.messages import collected
 from taxel._base.times import beginning_us
 from taxel._core import FormatError, ProblemError
@@ -74,10 +74,6 @@ class CalibrateOptions:
 
     Parameters
     ----------
-    law : bool
-        Whether the law of the fabric, amplifier and ramp is used; loads correct its gain.
-    sensor : mapping of str to value
-        Parameters of the law, as "v_trans".
     table : path, optional
         A .csv of reading,value (above rest), with columns x,y for each taxel; loads correct its gain.
     unit : {"N", "kPa"}
@@ -98,12 +94,10 @@ class CalibrateOptions:
 
     Examples
     --------
-    >>> CalibrateOptions(law=True, sensor={"exponent": 1.0}, unit="kPa").each
+    >>> CalibrateOptions(exponent=1.0, unit="kPa").each
     False
     """
 
-    law: bool = False
-    sensor: Mapping[str, Any] = field(default_factory=dict)
     table: str | os.PathLike[str] | None = None
     unit: str = "N"
     each: bool = False
@@ -114,14 +108,10 @@ class CalibrateOptions:
 
     def __post_init__(self) -> None:
         """Refuse options that contradict each other, before the recording is read."""
-        flag("law", self.law), flag("each", self.each), mapping("sensor", self.sensor)
+        flag("each", self.each)
         check_tare(self.tare)
         if self.table is not None:
             checked_path("table", self.table)
-        if self.law and self.table is not None:
-            raise refused("law", ": must be left out where table is given")
-        if self.sensor and not self.law:
-            raise ProblemError("sensor states parameters of the law, but law is not set")
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,10 +181,8 @@ def calibrate(
     options = CalibrateOptions() if options is None else instance("options", options, CalibrateOptions)
     table = isinstance(loads, str | os.PathLike)
     known = read_loads(checked_path("loads", loads)) if table else several("loads", loads)
-    if not known and not options.law and options.table is None:
-        raise helped(
-            ProblemError("law, table and loads are missing, so there is nothing to calibrate by"), "loads", "give"
-        )
+    if not known and options.table is None:
+        raise helped(ProblemError("table and loads are missing, so there is nothing to calibrate by"), "loads", "give")
     if not known and (options.each or options.exponent is not None):
         raise helped(ProblemError("each and exponent are only for a fit to loads"), "loads", "give")
     with collected() as warnings:
@@ -207,22 +195,13 @@ def _calibrated(recording: Recording, known: Sequence[KnownLoad], options: Calib
     how: dict[str, Any] = {"unit": options.unit, "rest": rest, "floor": floor}
     how |= {"date": options.date, "note": options.note}
     calibration: Calibration | None = None
-    if options.law:
-        if frames.unit != "ticks":
-            raise refused(
-                "law",
-                f": converts ticks of a board to {options.unit}; the values of {recording.path} are in {frames.unit}",
-            )
-        registers = recording.registers
-        ramp = 150.0 if registers is None else float(registers.ramp)
-        calibration = Calibration.law(recording.array, ramp=ramp, sensor=options.sensor, **how)
-    elif options.table is not None:
+    if options.table is not None:
         points = _points(Path(options.table), recording.array)
         calibration = Calibration.table(recording.array, *points, reading_unit=frames.unit, **how)
     measured = [_load(frames, load) for load in known]
     if measured:
         calibration = Calibration.fit(measured, start=calibration, exponent=options.exponent, each=options.each, **how)
-    assert calibration is not None  # one of the three is given
+    assert calibration is not None  # one of the two is given
     return calibration
 
 

@@ -158,7 +158,9 @@ def texts() -> None:
     )
     loads = [Load(Frames([[[20.0]], [[20.0]]], [0, 1000]), 5.0), Load(Frames([[[45.0]], [[45.0]]], [0, 1000]), 10.0)]
     Calibration.fit(loads, date="2026-11-26", note="two weights").save(HERE / "fit.calibration.json")
-    Calibration.law(SMALL, rest=tare, date="2026-11-26").save(HERE / "law.calibration.json")
+    Calibration.table(
+        SMALL, [5.0, 20.0], [1.0, 8.0], unit="kPa", reading_unit="ticks", rest=tare, date="2026-11-26"
+    ).save(HERE / "table.calibration.json")
     (HERE / "encoder.json").write_text(encoder.to_json() + "\n")
     (HERE / "recipe.json").write_text(
         '{"run_threshold": 0.9, "encoder": {"name": "contact_area", "levels": [2, 4, 8]},\n'

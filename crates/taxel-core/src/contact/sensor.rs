@@ -68,28 +68,6 @@ impl Sensor {
     fn readout(&self) -> VirtualGround {
         VirtualGround { v_trans: self.v_trans, feedback_kohm: self.feedback_kohm, ..VirtualGround::default() }
     }
-
-    /// Volts that a microsiemens adds.
-    fn gain_v(&self) -> f64 {
-        self.v_trans * 1e-3 * self.feedback_kohm
-    }
-
-    /// What a taxel reads under a force, ticks, where it reads `rest` without one; the ramp's end at most.
-    #[must_use]
-    pub fn reading(&self, force_n: f64, rest: f64, ramp: f64) -> f64 {
-        let ramp = Ramp::rc(ramp);
-        ramp.ticks(ramp.volts(rest) + self.gain_v() * self.fabric().conductance_gain_us(force_n))
-    }
-
-    /// Force on a taxel that reads `ticks`, N, where it reads `rest` without one: the inverse of [`Sensor::reading`].
-    ///
-    /// 0 at the rest and below; at the ramp's end the least force that it can be.
-    #[must_use]
-    pub fn force(&self, ticks: f64, rest: f64, ramp: f64) -> f64 {
-        let ramp = Ramp::rc(ramp);
-        let gained = (ramp.volts(ticks) - ramp.volts(rest)).max(0.0) / self.gain_v();
-        self.fabric().force_n(self.rest_us + gained)
-    }
 }
 
 /// An array of taxels, each with its own gain and offset, and the converter that reads them.
@@ -245,19 +223,6 @@ mod tests {
         assert!((touch - rest - 0.1).abs() < 5e-4, "{}", touch - rest);
         let ticks = Ramp::rc(150.0).ticks(touch) - Ramp::rc(150.0).ticks(rest);
         assert!((ticks - 4.5).abs() < 0.1, "{ticks}");
-    }
-
-    #[test]
-    fn a_force_is_read_back_from_its_ticks_up_to_the_ramps_end() {
-        let sensor = Sensor::default();
-        let rest = Ramp::rc(150.0).ticks(sensor.volts(0.0));
-        for force in [0.0, 1e-6, 0.02, 0.5, 1.1] {
-            let ticks = sensor.reading(force, rest, 150.0);
-            assert!((ticks - Ramp::rc(150.0).ticks(sensor.volts(force))).abs() < 1e-9, "{force} N reads {ticks}");
-            assert!((sensor.force(ticks, rest, 150.0) - force).abs() < 1e-9, "{force} N");
-        }
-        assert!(sensor.force(rest - 5.0, rest, 150.0) == 0.0);
-        assert!(sensor.force(150.0, rest, 150.0) == sensor.force(1e9, rest, 150.0));
     }
 
     #[test]
