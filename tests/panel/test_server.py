@@ -6,7 +6,6 @@ import time
 
 import numpy as np
 from panel.protocol import (
-    SOON,
     Client,
     head,
     heard,
@@ -17,8 +16,6 @@ from panel.protocol import (
 
 from taxel import _core
 from taxel.live import send
-from taxel.simulate import Board, Version2
-from taxel.wire import Registers
 
 
 def test_a_frame_shows_what_came(live, panel):
@@ -160,33 +157,3 @@ def test_health_of_what_is_shown_is_that_of_taxel_health(live, panel):
         assert (health["dead"], health["stuck"], health["noisy"]) == ([[2, 2]], [], [])
         # Of the others, those that moved work.
         assert health["untested"] == 64 * 64 - 25
-
-
-def test_a_dead_taxel_of_a_board_of_version_2_is_found_though_states_tell_of_it(live, panel):
-    random = np.random.default_rng(3)
-    board = Board(Registers(wire_version=2), version_2=Version2(states_us=2_000))
-    sent, until = 0, time.monotonic() + SOON
-    for _ in range(60):
-        ticks = random.integers(40, 100, board.array.taxels).astype(np.uint16)
-        ticks[board.array.index(4, 7)] = 0
-        datagrams = board.frame(ticks)
-        say(live, *datagrams)
-        sent += len(datagrams)
-        # One frame at a time, so that a busy machine loses nothing.
-        while live.counters["capture"]["datagrams"] < sent:
-            assert time.monotonic() < until, live.counters
-            time.sleep(0.001)
-    with Client(panel) as page:
-        page.send(type="credit", n=1)
-        # Waits until a state has reported the value of the dead taxel.
-        while section(page.until("frame"), 0, "<u2").reshape(64, 64)[7, 4] != 0:
-            pass
-        dead = []
-        for _ in range(200):
-            # Until the other taxels have had enough events to be distinguished from the dead one.
-            assert page.ask("health")["type"] == "done"
-            dead = next(m for m in reversed(page.said) if m["type"] == "health")["dead"]
-            if dead:
-                break
-            time.sleep(0.1)
-        assert dead == [[4, 7]]

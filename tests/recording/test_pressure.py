@@ -126,44 +126,6 @@ def test_noise_has_no_centre_and_each_press_has_one(spread: float, share: float)
     assert (found <= (12.0, 9.0)).all()
 
 
-def test_what_is_largest_between_two_frames_of_events_is_said(tmp_path: Path) -> None:
-    # A bounce of 4 ms between the frames at 1.1 and 1.11 s; at 1.104 s both taxels change, and one is back at rest.
-    path, table = tmp_path / "a.npz", tmp_path / "a.csv"
-    t = [0, 0, 0, 1_103_000, 1_104_000, 1_104_000, 1_107_000, 1_300_000]
-    x, ticks = [1, 2, 4, 2, 4, 2, 4, 1], [60, 50, 40, 80, 60, 50, 40, 60]
-    taxel.convert(taxel.Events(t, x, [3] * 8, [1] * 8, array=ARRAY, intensity=ticks), path)
-    found = json.loads(run("info", path, "--table", table, "--json").stdout)["pressure"]
-    assert found["area_mm2"] == {"most": 4.0, "t_us": 1_103_000}
-    assert found["peak"] == found["sum"] == {"most": pytest.approx(30.0), "t_us": 1_103_000}
-    # The table's frames, every 10 ms, have nothing of it.
-    assert {float(row["sum_ticks"]) for row in csv.DictReader(table.open())} == {0.0}
-
-
-@pytest.mark.parametrize("chunk", [64, 1 << 16])
-def test_the_largest_are_those_of_frames_at_all_events(monkeypatch: pytest.MonkeyPatch, chunk: int) -> None:
-    from taxel.recording.analysis import pressure
-    from taxel.recording.recording import Recording
-
-    monkeypatch.setattr(pressure, "_EVENTS", chunk)
-    random = np.random.default_rng(1)
-    t = np.sort(random.integers(0, 4_000_000, 20_000)) // 192 * 192
-    x, y, ticks = random.integers(0, 8, t.size), random.integers(0, 6, t.size), 50 + random.integers(0, 3, t.size)
-    for begin in random.integers(1_000_000, 3_900_000, 20):
-        near = (t >= begin) & (t < begin + 6_000)
-        ticks[near] += np.int64(random.integers(20, 90) * np.sin(np.pi * (t[near] - begin) / 6_000))
-    events = taxel.Events(t, x, y, np.ones(t.size, bool), array=ARRAY, intensity=ticks)
-    recording = Recording.of(InMemory(Facts(array=events.array), events))
-    found = pressure.series(recording)
-    assert found is not None and found.largest is not None  # noqa: PT018
-    drawn = pressure._Drawn.from_recording(recording)
-    rest = pressure._rest_of(recording, drawn, None)
-    every = pressure._series_of(pressure.replace(drawn, t=np.unique(t)), rest, ARRAY)
-    for name in ("area", "peak", "total"):
-        most = getattr(every, name).max()
-        assert getattr(found.largest, name).max() == pytest.approx(most, rel=1e-3)
-    assert found.total.max() < found.largest.total.max()
-
-
 def test_frames_of_missing_values_alone_are_no_peak(tmp_path: Path) -> None:
     values = np.zeros((40, 4, 4))
     values[10:15], values[20:30] = 7.0, np.nan

@@ -209,13 +209,10 @@ def _overview(place: Path, of_each: Sequence[dict[str, Any]]) -> list[str]:
     # Columns that say the same of each recording say nothing.
     with_gaps = any(facts["gaps"] for facts in sensors)
     with_verdict = any(facts["verdict"].status != "unknown" for facts in sensors)
-    with_unchanging = any(facts["taxels_unchanging"] for facts in sensors)
     head: tuple[str, ...] = ("recording", "array", "time (s)", "contents", "rate (1/s)", "notes", *_TAXELS)
-    head += ("unchanging",) * with_unchanging
     head += ("gaps",) * with_gaps + ("verdict",) * with_verdict
     contents = ", ".join(counted(total, noun) for noun, total in sums.items() if total)
     bad = [str(sum(len(facts["taxels"][name]) for facts in sensors)) for name in _TAXELS]
-    bad += [str(sum(facts["taxels_unchanging"] for facts in sensors))] * with_unchanging
     last: tuple[str, ...] = (
         "sum",
         "",
@@ -226,7 +223,7 @@ def _overview(place: Path, of_each: Sequence[dict[str, Any]]) -> list[str]:
         *bad,
     )
     last += ("",) * (with_gaps + with_verdict)
-    columns = {"with_unchanging": with_unchanging, "with_gaps": with_gaps, "with_verdict": with_verdict}
+    columns = {"with_gaps": with_gaps, "with_verdict": with_verdict}
     rows = [head, *(_row(facts, **columns) for facts in sensors), last]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     of_notes = ", ".join(f"{text} {count}" for text, count in sorted(notes.items()))
@@ -249,7 +246,7 @@ def _notes(facts: dict[str, Any]) -> list[dict[str, Any]]:
     return next((notes for sensor in _sensors(facts) if (notes := sensor["notes"])), [])
 
 
-def _row(facts: dict[str, Any], *, with_unchanging: bool, with_gaps: bool, with_verdict: bool) -> tuple[str, ...]:
+def _row(facts: dict[str, Any], *, with_gaps: bool, with_verdict: bool) -> tuple[str, ...]:
     """Return the cells of a sensor in the table of several recordings."""
     array, events = Array._from_geometry(facts["array"]), facts.get("events")
     rate = facts["frames_per_s"] if events is None else facts["events_per_s_board"]
@@ -261,7 +258,6 @@ def _row(facts: dict[str, Any], *, with_unchanging: bool, with_gaps: bool, with_
         "" if rate is None else f"{rate:.4g}",
         str(len(facts["notes"])),
         *(str(len(facts["taxels"][name])) for name in _TAXELS),
-        *([str(facts["taxels_unchanging"])] if with_unchanging else []),
         *([_gaps(facts["gaps"])] if with_gaps else []),
         *([facts["verdict"].status] if with_verdict else []),
     )
@@ -383,20 +379,10 @@ def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
     for name, taxels in facts["taxels"].items():
         yield f"{name} taxels", f"{len(taxels)}{at(taxels, len(taxels))}"
-        if name == "stuck":
-            yield from (("", held["text"]) for held in facts["taxels_held"])
     # Each touch is seen by few pixels of a camera.
     if "on_share" in facts:
         return
-    yield from (("rows and columns", line) for line in facts["taxels_lines"])
-    unchanging = facts["taxels_unchanging"]
-    if unchanging:
-        where = at(facts["taxels_unchanging_at"], unchanging)
-        yield (
-            "unchanging taxels",
-            f"{unchanging} always read the same value, while most change: dead, or never touched{where}",
-        )
-    if (untested := facts["taxels_untested"]) and unchanging < untested:
+    if untested := facts["taxels_untested"]:
         # The places of most of an array say nothing.
         few = 2 * untested <= Array._from_geometry(facts["array"]).taxels
         where = at(facts["taxels_untested_at"], untested) if few else ""

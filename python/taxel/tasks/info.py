@@ -13,7 +13,7 @@ from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
-from taxel.recording.analysis.health import health, unchanging_taxels
+from taxel.recording.analysis.health import health
 from taxel.recording.analysis.pressure import Series, series
 from taxel.recording.analysis.summary import summary
 from taxel.spikes import SpikeTrains
@@ -96,7 +96,6 @@ def sensor_line(recording: Recording) -> str:
             source = source[:: 1 + len(source) // _LOOKS]
         of_taxels = health(source)
         masks = {"dead": of_taxels.dead, "stuck": of_taxels.stuck, "noisy": of_taxels.noisy}
-        masks["unchanging"] = unchanging_taxels(of_taxels, source)
         counts = {word: int(np.count_nonzero(mask)) for word, mask in masks.items()}
         named = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
         parts = [f"{named} of {counted(source.array.taxels, 'taxel')}"] if named else []

@@ -19,7 +19,7 @@ from taxel.formats.ros import is_bag, topics
 from taxel.live._requests.reasons import reasons
 from taxel.live._requests.typed import typed
 from taxel.live._shown_files import Opening, ReadFrames, ShownFiles
-from taxel.recording.analysis.health import TaxelStatistics, Touches, judge
+from taxel.recording.analysis.health import judge
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
 
@@ -62,10 +62,11 @@ class FileRequests:
             Number of different values; least and greatest held value, -1 where unknown.
         """
         sensor = Array._from_parts(array)
-        activity, repeated, *known = (
-            np.asarray(column, np.int64).reshape(sensor.shape) for column in (events, moved, *(values or ()))
+        greatest = np.zeros(sensor.shape) if values is None else values[2]
+        activity, repeated, most = (
+            np.asarray(column, np.int64).reshape(sensor.shape) for column in (events, moved, greatest)
         )
-        result = judge(sensor, TaxelStatistics(activity, repeated, Touches.from_counts(*touches), *known))
+        result = judge(sensor, activity, repeated, touches, most > 0)
         taxels = result.named()
         return taxels["dead"], taxels["stuck"], taxels["noisy"], int(np.count_nonzero(result.untested))
 

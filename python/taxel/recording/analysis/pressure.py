@@ -15,9 +15,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.calibration._curves import N_PER_KPA_MM2
 from taxel.encode import ContactArea
-from taxel.events import Events
 from taxel.frames import Frames
-from taxel.reading import Facts, InMemory
 from taxel.recording.analysis.rest import (
     FrameBlock,
     Rest,
@@ -36,8 +34,6 @@ from taxel.tare import Tare
 MOST_FRAMES = 2000
 #: Number of values of frames that are computed at once.
 _BLOCK = 1 << 21
-#: So many events are looked at at once for where area, peak and sum are largest, in so many moments of each.
-_EVENTS, _MOMENTS = 1 << 16, 32
 #: The rest of events is tracked this often, us, and so many times make a stretch that may be quiet.
 _TRACKED_US, _STRETCH = 50_000, 10
 #: In silence, where nothing changes, the rest is tracked so many times, and then after each further one in so many of
@@ -70,8 +66,6 @@ class Series:
         What was subtracted.
     force : float64, shape (n,), N
         Of values in kPa, if the area of each taxel is known.
-    largest : Series, optional
-        Of events: the same at the moments between the frames where area, peak and sum are largest.
     """
 
     t: NDArray[np.int64]
@@ -85,7 +79,6 @@ class Series:
     centre_unit: str
     rest: Rest
     force: NDArray[np.float64] | None = None
-    largest: Series | None = None
 
     @classmethod
     def from_frames(cls, frames: Frames, above: float, rest: Rest) -> Series:
@@ -141,16 +134,7 @@ def series(recording: Recording, tare: Tare | None = None) -> Series | None:
     if events.present is None or events.intensity is None or not events.present.any():
         return None
     drawn = _Drawn.from_recording(recording)
-    rest = _rest_of(recording, drawn, tare)
-    drawn_series = _series_of(drawn, rest, events.array)
-    moments = _moments(events, drawn, rest, drawn_series)
-    # They are frames more, at which the rest is tracked as at the others.
-    at_all = replace(drawn, t=np.union1d(drawn.t, moments))
-    return (
-        replace(drawn_series, largest=_series_of(at_all, rest, events.array))
-        if len(at_all.t) > len(drawn.t)
-        else drawn_series
-    )
+    return _series_of(drawn, _rest_of(recording, drawn, tare), events.array)
 
 
 def _series_of(drawn: _Drawn, rest: Rest, array: Array) -> Series:
@@ -183,76 +167,6 @@ def _series_of(drawn: _Drawn, rest: Rest, array: Array) -> Series:
         array.centre_unit or "",
         rest,
     )
-
-
-def _moments(events: Events, drawn: _Drawn, rest: Rest, drawn_series: Series) -> NDArray[np.int64]:
-    """Return the times of events at which area, peak and sum may be largest, us.
-
-    Each event changes them by what its taxel changes, above a rest that is constant from one frame to the next. Added
-    to each frame's values, that shows where to look, not what is there.
-    """
-    assert events.present is not None and events.intensity is not None  # noqa: PT018  the caller checked
-    events = events if np.all(np.diff(events.t) >= 0) else events.sorted()
-    assert events.present is not None and events.intensity is not None  # noqa: PT018  the same events
-    size, areas = len(drawn.taxels), drawn.areas(events.array)
-    column = np.zeros(events.array.rows * events.array.columns, np.uint16 if size <= 1 << 16 else np.uint32)
-    column[drawn.taxels] = np.arange(size)
-    base = np.where(np.isnan(rest.values) & (rest.source not in ("quiet", "none")), np.inf, rest.values)
-    for k, _, zero in drawn.zeroed:
-        base[k] = zero
-    held = np.where(drawn.since <= drawn.t[0], drawn.held.at(drawn.t[:1]).reshape(-1), np.nan)
-    base = np.where(np.isnan(base), held, base)
-    load = np.where(held - base > drawn_series.above, held - base, 0.0)
-    sums = {"total": float(load.sum())} | ({} if drawn_series.area is None else {"area": float(areas @ (load > 0))})
-    offs, seen = dict.fromkeys(sums, 0.0), -1
-    found: dict[str, list[tuple[float, int]]] = {name: [] for name in ("peak", *sums)}
-    later = int(np.searchsorted(events.t, drawn.t[0], side="right"))
-    for first in range(later, len(events), _EVENTS):
-        rows = slice(first, first + _EVENTS)
-        is_present = events.present[rows]
-        t, values = events.t[rows][is_present], events.intensity[rows][is_present].astype(np.float64)
-        if not len(t):
-            continue
-        of_taxel = column[events.array.index(events.x[rows][is_present], events.y[rows][is_present])]
-        order = np.argsort(of_taxel, kind="stable")
-        taxel, value = of_taxel[order], values[order]
-        begins = np.flatnonzero(np.diff(taxel, prepend=-1))
-        # A taxel whose rest is not known is above its first value.
-        base[taxel[begins]] = np.where(np.isnan(base[taxel[begins]]), value[begins], base[taxel[begins]])
-        above = value - base[taxel]
-        now = np.where(above > drawn_series.above, above, 0.0)
-        earlier = np.concatenate([[0.0], now[:-1]])
-        earlier[begins] = load[taxel[begins]]
-        load[taxel[begins]] = now[np.append(begins[1:], len(now)) - 1]
-        steps = {"peak": above, "total": now - earlier}
-        if drawn_series.area is not None:
-            steps["area"] = areas[taxel] * ((now > 0) - 1.0 * (earlier > 0))
-        # Only what is there once all of a moment's events are read.
-        last = np.append(np.diff(t) > 0, True)
-        frame = np.searchsorted(drawn.t, t, side="right") - 1
-        starts = np.flatnonzero(np.diff(frame, prepend=-1))
-        for name, step in steps.items():
-            curve = np.empty(len(t))
-            curve[order] = step
-            if name in sums:
-                curve = sums[name] + np.cumsum(curve)
-                at_frame = np.append(sums[name], curve[:-1])[starts]
-                off = getattr(drawn_series, name)[frame[starts]] - at_frame
-                if frame[0] == seen:
-                    off[0] = offs[name]
-                sums[name], offs[name] = curve[-1], off[-1]
-                curve += np.repeat(off, np.diff(starts, append=len(t)))
-            curve[~last] = -np.inf
-            found[name] = sorted(found[name] + _largest(curve, starts, t))[:_MOMENTS]
-        seen = frame[-1]
-    return np.array(sorted({moment for each in found.values() for _, moment in each}), np.int64)
-
-
-def _largest(curve: NDArray[np.float64], starts: NDArray[np.int64], t: NDArray[np.int64]) -> list[tuple[float, int]]:
-    """Return the largest value of a curve after each frame, negative, and its time; of few frames."""
-    most, ends = np.maximum.reduceat(curve, starts), np.append(starts[1:], len(t))
-    few = np.argsort(-most, kind="stable")[:_MOMENTS]
-    return [(-most[k], int(t[starts[k] + np.argmax(curve[starts[k] : ends[k]])])) for k in few]
 
 
 @dataclass(frozen=True, eq=False)
@@ -453,28 +367,6 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
         [(_, shown)] = _above(rest, blocks, frames.array.columns, rest_scale(frames))
     shape = len(frames), *frames.array.shape
     return Frames(shown.reshape(shape), frames.t, unit=frames.unit, array=frames.array), floor, rest
-
-
-def above_rest_at(events: Events, t: NDArray[np.int64]) -> NDArray[np.float32]:
-    """Return the held values of events above the rest that they show (`above_rest`), at times.
-
-    Parameters
-    ----------
-    events : Events
-        With intensities.
-    t : int64, shape (n,), us
-        Ascending.
-
-    Returns
-    -------
-    float32, shape (n, rows, columns), ticks
-    """
-    recording = Recording.of(InMemory(Facts(array=events.array), events))
-    drawn = _Drawn.from_recording(recording)
-    # The rest is found from the first event on.
-    from_first = np.union1d(t, min(t[0], events.t.min())) if len(t) else t
-    drawn = replace(drawn, t=from_first.astype(np.int64))
-    return drawn.frames(_rest_of(recording, drawn, None), events.array)[len(from_first) - len(t) :]
 
 
 def quiet_rest(recording: Recording) -> Rest | None:

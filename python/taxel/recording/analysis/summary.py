@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from taxel.clock import doubt
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.analysis.health import health, unchanging_taxels, whole_lines
+from taxel.recording.analysis.health import health
 from taxel.recording.analysis.pressure import Series
 from taxel.recording.recording import Recording
 
@@ -94,19 +94,13 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
     # Above the rest of readings that fall is nothing but noise.
     facts["pressure"] = None if pressed is None or pressed.rest.falls else _pressure(pressed)
     of_taxels = health(table)
-    unchanging = unchanging_taxels(of_taxels, table)
-    lines, _ = whole_lines({"dead": of_taxels.dead, "stuck": of_taxels.stuck, "unchanging": unchanging}, array)
     return facts | {
         "notes": [{"t_us": note.t, "text": note.text} for note in recording.notes],
         "detections": {label: len(recording.detections[label]) for label in recording.detections.labels},
         "registers": None if recording.registers is None else recording.registers._held,
         "taxels": of_taxels.named(),
-        "taxels_held": [{**each._asdict(), "text": each.text(table)} for each in of_taxels.held],
-        "taxels_lines": lines,
         "taxels_untested": int(np.count_nonzero(of_taxels.untested)),
         "taxels_untested_at": _places(of_taxels.untested),
-        "taxels_unchanging": int(np.count_nonzero(unchanging)),
-        "taxels_unchanging_at": _places(unchanging),
         "counts": recording.counts,
         "truncated": recording.truncated,
         "rebuilt": recording.rebuilt,
@@ -134,18 +128,17 @@ def _pressure(pressed: Series) -> dict[str, Any] | None:
     if not len(pressed.t):
         return None
     facts: dict[str, Any] = {"unit": pressed.unit, "above": pressed.above}
-    largest = pressed if pressed.largest is None else pressed.largest
     curves: dict[str, Any] = {
-        f"area_{largest.area_unit}": largest.area,
-        "peak": largest.peak,
-        "sum": largest.total,
-        "force_n": largest.force,
+        f"area_{pressed.area_unit}": pressed.area,
+        "peak": pressed.peak,
+        "sum": pressed.total,
+        "force_n": pressed.force,
     }
     for name, values in curves.items():
         if values is not None:
             # A frame of missing values alone has no peak.
             k = int(np.where(np.isnan(values), -np.inf, values).argmax())
-            facts[name] = {"most": float(values[k]), "t_us": int(largest.t[k])}
+            facts[name] = {"most": float(values[k]), "t_us": int(pressed.t[k])}
     if pressed.centre is None:
         return facts
     centre = pressed.centre[~np.isnan(pressed.centre).any(axis=1)]
