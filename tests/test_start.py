@@ -161,4 +161,4 @@ def test_each_page_is_named_where_a_reader_begins() -> None:
     begin = (DOCS / "start.md").read_text()
     assert len(PAGES) == 7
     for page in PAGES:
-        assert f"{{doc}}`{page.stem}`" in begin
+        assert f"]({page.name})" in begin

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from formats import making as foreign
+from refusal import refused
 
 import taxel
 from taxel import Frames
@@ -208,7 +209,7 @@ def test_registers_of_a_board_with_other_rules_open(tmp_path: Path) -> None:
 def test_registers_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     for wrong in ({"line_period": 0}, {"lines": 65}, {"channels": 17}):
         header = {"registers": taxel._core.registers_preset("5.2 kHz") | wrong}
-        with pytest.raises(taxel.DeviceError, match=r"17 channels|rule 4"):
+        with refused(taxel.DeviceError, argument=next(iter(wrong))):
             record(tmp_path / "no.mcap", some_events(), header=header)
 
 

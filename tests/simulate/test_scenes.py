@@ -162,7 +162,7 @@ def test_frames_touch_from_the_empty_one_before_to_the_empty_one_after():
         (lambda: truth([FrameSequence(np.zeros((1, 8, 8)), 2000)]), ProblemError, None),
         (lambda: truth([Silence(1.0), Silence(-1.0)]), SceneError, None),
         (lambda: truth(["silence"]), ProblemError, None),
-        (lambda: truth([], preset="9 kHz"), ProblemError, None),
+        (lambda: truth([], preset="9 kHz"), ProblemError, "preset"),
         (lambda: play([Silence(10.0)], seed=1), ProblemError, None),
         (lambda: play([Silence(100.0)], seed=1, tare_ms=-1), ProblemError, "tare_ms"),
         (lambda: play([Silence(100.0)], seed="x"), ProblemError, "seed"),
