@@ -258,7 +258,6 @@ VALUES: dict[str, Callable[[], Any]] = {
     "targets": lambda: [[5.0]],
     "tau": lambda: 5.0,
     "text": lambda: "heel",
-    "than": lambda: SCORE,
     "threshold": lambda: 2,
     "ticks": lambda: [1.0, 9.0],
     "times": lambda: [1.0, 2.0],

@@ -141,14 +141,27 @@ _Decisions: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.f
 class LoadCurve:
     @staticmethod
     def of_events(
-        quantity: str, noise_floor: float, events: _Events, frame_us: float, wire_version: int, tare: str | None
+        quantity: str,
+        levels: list[float],
+        noise_floor: float,
+        events: _Events,
+        frame_us: float,
+        wire_version: int,
+        tare: str | None,
     ) -> LoadCurve: ...
     @staticmethod
     def of_frames(
-        quantity: str, noise_floor: float, frames: _Frames, frame_us: float | None, tare: str | None
+        quantity: str,
+        levels: list[float],
+        noise_floor: float,
+        frames: _Frames,
+        frame_us: float | None,
+        tare: str | None,
     ) -> LoadCurve: ...
     def changes(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...
-    def edges(self, threshold: float, release: float, frames: int) -> tuple[_Decisions, _Decisions]: ...
+    def edges(
+        self, threshold: float, release: float, frames: int, dated_at: float | None, of_largest: bool
+    ) -> tuple[_Decisions, _Decisions]: ...
     def at_age(self, age_ms: float) -> _Decisions: ...
     def at_end(self) -> _Decisions: ...
 

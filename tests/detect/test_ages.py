@@ -70,7 +70,7 @@ def test_kinds_are_told_at_1000_hz_held_out() -> None:
     """A kernel of .05 ms told 9 of 16 and 122 falsely: it fires between the points of its grid that are silent."""
     frames, labels = touched(2, 1000)
     example = Example(frames, labels, Tare.take(frames, stop_us=1_200_000))
-    result = judge([example], Recipe.load("touch", labels=KINDS, noise_floor=0.012), 2).together
+    result = judge([example], Recipe.load("touch", labels=KINDS, noise_floor=0.012), 2).neurons
     assert result.missed + result.false <= 1, result
 
 

@@ -86,7 +86,8 @@ def test_a_trained_readout_finds_what_it_never_heard(folder: Path, trained: Path
     code, out, _ = call(capsys, *arguments, "--truth", folder / "labels.csv", "--window-ms", 10, "--list")
     assert (code, out.count("contact")) == (0, 6 + 4)
     assert out.index("against ") < out.index("known (ms)")
-    assert "slope (mV/ms)" in out
+    assert "slope (mV/ms)" not in out, "its rules are as good, and known earlier"
+    assert "slope (mV/ms)" in call(capsys, *arguments, "--use", "neuron")[1]
     assert "not scored" not in out
     # Labels that the readout does not have do not count as missed; they are named.
     more = folder / "more.csv"
@@ -100,7 +101,8 @@ def test_a_trained_readout_finds_what_it_never_heard(folder: Path, trained: Path
 def test_the_command_and_the_function_train_the_same(trained: Path) -> None:
     examples = [taxel.detect.Example(*touches(seed), tare()) for seed in (1, 2)]
     # The function does not know the recordings that its examples are of.
-    assert taxel.Readout.load(trained)._with(training=None) == taxel.detect.fit(examples, recipe())
+    neurons = taxel.Readout.load(trained)._with(training=None, rules={}, by_rule=[])
+    assert neurons == taxel.detect.fit(examples, recipe())
 
 
 def test_recordings_of_other_arrays_are_left_out_where_one_fits(
@@ -318,7 +320,8 @@ def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, ca
 
 @pytest.mark.usefixtures("drawn")
 def test_a_report_shows_potential_weights_and_the_worst(folder: Path, trained: Path, capsys, tmp_path: Path) -> None:
-    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare", folder / "tare.json", "--report")
+    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare", folder / "tare.json", "--use", "neuron")
+    arguments += ("--report",)
     code, out, _ = call(capsys, *arguments, tmp_path / "with", "--truth", folder / "truth.csv")
     page = (tmp_path / "with" / "report.html").read_text()
     assert (code, f"report: {tmp_path / 'with' / 'report.html'}" in out) == (0, True)

@@ -68,7 +68,7 @@ def test_a_plain_training_finds_the_touches_of_any_grid(
     assert code == 0, error
     lines = out.splitlines()
     assert lines[0] == "held out: 5 blocks of time (window 50 ms)"
-    for line, label in zip(lines[1:4:2], LABELS, strict=True):
+    for line, label in zip(lines[1:5:3], LABELS, strict=True):
         found, missed, false = map(int, re.findall(r"(\d+) (?:of 12 found|missed|false)", line))
         assert (line.startswith(f"{label}, neuron: "), found + missed, missed + false <= 1) == (True, 12, True), line
     assert "recipe touch" in out
@@ -262,27 +262,19 @@ def test_info_takes_the_rate_of_numbered_frames(tmp_path: Path, capsys) -> None:
 
 
 @pytest.mark.parametrize("labels", [("contact", "lift"), ("contact",)])
-def test_a_plain_rule_is_written_and_detects_what_the_training_says(
-    tmp_path: Path, capsys, labels: tuple[str, ...]
-) -> None:
+def test_the_rule_in_a_readout_detects_what_the_training_says(tmp_path: Path, capsys, labels: tuple[str, ...]) -> None:
     frames, truth = touched((6, 6), 1, gain=100.0, noise=1.0, offset=10.0)
     arguments = written(tmp_path, frames, {label: truth[label] for label in labels})
-    place = tmp_path / "rule.json"
-    places = [tmp_path / f"rule.{label}.json" for label in labels] if len(labels) > 1 else [place]
-    places[-1].write_text("mine")
-    code, _, error = call(capsys, *arguments, "--folds", "0", "--rule", place)
-    assert (code, f"{places[-1].name}: exists already; give --overwrite" in error) == (2, True), error
-    assert (places[-1].read_text(), (tmp_path / "readout.json").exists()) == ("mine", False)
-    code, out, error = call(capsys, *arguments, "--folds", "0", "--rule", place, "--overwrite")
+    code, out, error = call(capsys, *arguments, "--folds", "0")
     assert code == 0, error
-    assert sorted(tmp_path.glob("rule*")) == sorted(places)
     tare = Tare.take(frames, stop_us=int(truth["contact"][0]) - 20_000)
-    for label, one in zip(labels, places, strict=True):
-        assert f"plain rule for {label} written to {one}" in out
-        found = score(run(load(one), frames, tare=tare), {label: truth[label]})
-        counts = f"{label}, plain rule: {found.found} of 12 found, {found.missed} missed, {found.false} false"
-        assert counts in out
-    code, out, _ = call(capsys, "detect", tmp_path / "own.npz", "--readout", places[0], "--tare", "0.5")
+    readout = load(tmp_path / "readout.json")
+    for label in labels:
+        found = score(run(readout.using("rule"), frames, tare=tare)[label], {label: truth[label]})
+        counts = f"{found.found} of 12 found, {found.missed} missed, {found.false} false"
+        assert any(line.startswith(f"{label}, plain rule") and counts in line for line in out.splitlines())
+    asked = ("detect", tmp_path / "own.npz", "--readout", tmp_path / "readout.json", "--tare", "0.5", "--use", "rule")
+    code, out, _ = call(capsys, *asked)
     assert (code, "known (ms)" in out, "nan" in out, "slope" in out) == (0, True, False, False)
 
 

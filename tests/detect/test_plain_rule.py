@@ -45,6 +45,18 @@ class LocalLoad:
         return max(0.0, float((sums / np.sqrt(noise)).max()))
 
 
+class Count:
+    """How many levels above rest the taxels are above, each with memory."""
+
+    def __init__(self, levels):
+        on, off = ([np.full(ARRAY.shape, np.float32(REST + part * level)) for level in levels] for part in (1.0, 0.7))
+        self.on_at, self.off_at, self.above = np.array(on), np.array(off), np.zeros((len(levels), *ARRAY.shape), bool)
+
+    def at(self, _t, held):
+        self.above = np.where(self.above, held >= self.off_at, held >= self.on_at)
+        return float(self.above.sum())
+
+
 def quantity(name, held):
     """The number of loaded taxels beside a loaded one, or the sum of their values above rest."""
     loaded = held >= REST + FLOOR + 0.5
@@ -67,12 +79,12 @@ def frame_of(t, period_us, stamp_us):
 class ByLoop:
     """Frames with changes, as (number, end, changes), of which each change is (time, area, quantity)."""
 
-    def __init__(self, name, source, frame_us, version=1, reach_us=0):
-        self.frames = {}
-        held, local = np.zeros(ARRAY.shape), LocalLoad()
+    def __init__(self, rule, source, frame_us, version=1, reach_us=0):
+        self.frames, name = {}, rule.quantity
+        held, follows = np.zeros(ARRAY.shape), {"local_load": LocalLoad(), "count": Count(rule.levels)}.get(name)
 
         def measured(t, held):
-            return t, quantity("area", held), local.at(t, held) if name == "local_load" else quantity(name, held)
+            return t, quantity("area", held), quantity(name, held) if follows is None else follows.at(t, held)
 
         if isinstance(source, Frames):
             self.starts = [int(t) for t in source.t]
@@ -102,28 +114,35 @@ class ByLoop:
         """Until when a recording is continued."""
         return int(source.t.max()) + 1_000_000 + math.ceil(reach_us)
 
-    def edges(self, threshold, release, frames, which=2):
+    def edges(self, threshold, release, frames, which=2, dated_at=None, *, of_largest=False):
         """The onsets and ends: (is end, t, known)."""
-        loaded, first, since, before, found = False, None, 0, 0.0, []
+        loaded, first, since, before, found, rest, largest = False, None, 0, 0.0, [], 0.0, 0.0
         visited = self.frames if hasattr(self, "starts") else {
             n + more for n in self.frames for more in range(frames + 1)
         }  # fmt: skip
+
+        def passes(value, *, dated=False):
+            if of_largest:
+                return value < rest + release * (largest - rest) if loaded else value >= rest + threshold
+            if dated and dated_at is not None:
+                return value < dated_at if loaded else value >= dated_at
+            return value < release * threshold if loaded else value >= threshold
+
         for n in sorted(visited):
-
-            def passes(value, loaded=loaded):
-                return value < release * threshold if loaded else value >= threshold
-
             for change in self.frames.get(n, []):
-                if passes(change[which]) and not passes(before):
-                    since = change[0]
+                passed = passes(before, dated=True)
                 before = change[which]
+                largest, rest = max(largest, before), rest if loaded else min(rest, before)
+                if passes(before, dated=True) and not passed:
+                    since = change[0]
             if not passes(before):
                 first = None
                 continue
             first = (n, since) if first is None else first
             if n - first[0] + 1 == frames:
                 found.append((loaded, first[1], self.end(n)))
-                loaded, first = not loaded, None
+                loaded, first, largest = not loaded, None, before
+                rest = rest if loaded else before
         return found
 
     def kinds(self, threshold, age_us, frame_us):
@@ -164,15 +183,25 @@ def events(draw):
 
 #: Local loads are compared with numbers that no sum reaches exactly, as they are computed in single precision.
 LOCAL_LOADS = st.sampled_from([0.531, 1.071, 2.133, 3.317, 4.313])
-rules = st.builds(
-    lambda compared, release, frames: PlainRule(*compared, release, frames, labels=("on", "off"), noise_floor=FLOOR),
-    st.one_of(
-        st.tuples(st.sampled_from(["area", "total"]), st.sampled_from([1.0, 2.0, 3.0, 3.5, 4.0, 7.25, 9.0])),
-        st.tuples(st.just("local_load"), LOCAL_LOADS),
-    ),
-    st.sampled_from([0.5, 0.75, 1.0]),
-    st.sampled_from([1, 1, 2, 3, 5, 20]),
-)
+
+
+@st.composite
+def rules(draw):
+    """A rule of edges: of any quantity, dated at its threshold or below it, or of its largest value."""
+    name = draw(st.sampled_from(["area", "total", "local_load", "count"]))
+    drawn = LOCAL_LOADS if name == "local_load" else st.sampled_from([1.0, 2.0, 3.0, 3.5, 4.0, 7.25, 9.0])
+    threshold, release, how = draw(drawn), draw(st.sampled_from([0.125, 0.5, 0.75, 1.0])), {}
+    if name == "count":
+        how["levels"] = draw(st.sampled_from([[1.0], [1.75, 2.5], [0.5, 1.0, 2.0, 6.0]]))
+    if draw(st.booleans()):
+        how["of_largest"] = True
+    elif draw(st.booleans()):
+        part = draw(st.sampled_from([0.0, 0.3, 0.5, 1.0]))
+        how["dated_at"] = release * threshold + part * (threshold - release * threshold)
+    frames = draw(st.sampled_from([1, 1, 2, 3, 5, 20]))
+    return PlainRule(name, threshold, release, frames, **how, labels=("on", "off"), noise_floor=FLOOR)
+
+
 kinds = st.builds(
     lambda compared, age: PlainRule(*compared, age_ms=age, labels=("small", "large"), noise_floor=FLOOR),
     st.one_of(
@@ -186,10 +215,11 @@ clocks = st.sampled_from([(192.0, 1), (192.0, 2), (48.0, 1), (48.0, 2), (499.84,
 
 def expected(rule, source, frame_us, version=1):
     reach_us = rule.frames * frame_us + 1000 * (rule.age_ms or 0)
-    loop = ByLoop(rule.quantity, source, frame_us, version, reach_us)
+    loop = ByLoop(rule, source, frame_us, version, reach_us)
     if rule.age_ms is not None:
         return loop.kinds(rule.threshold, round(rule.age_ms * 1000), frame_us)
-    found = loop.edges(rule.threshold, rule.release, rule.frames)
+    how = {"dated_at": rule.dated_at, "of_largest": rule.of_largest}
+    found = loop.edges(rule.threshold, rule.release, rule.frames, **how)
     if isinstance(source, Frames):
         return found
     # A frame that is not over when the recording ends decides nothing.
@@ -198,22 +228,24 @@ def expected(rule, source, frame_us, version=1):
 
 
 @settings(deadline=None)
-@given(events(), st.one_of(rules, kinds), clocks)
+@given(events(), st.one_of(rules(), kinds), clocks)
 def test_events_give_what_a_loop_over_frames_gives(source, rule, clock):
     frame_us, version = clock
     found = run(rule, source, frame_us=frame_us, wire_version=version, tare=tare())
     assert as_tuples(found, rule) == expected(rule, source, frame_us, version)
+    assert (found.t <= found.known).all()
     assert np.isnan(found.slope).all()
     assert not found.repaired.any()
 
 
 @settings(max_examples=60, deadline=None)
-@given(events(), rules, clocks)
+@given(events(), rules(), clocks)
 def test_a_curve_has_the_begins_and_ends_that_the_rule_finds(source, rule, clock):
     frame_us, version = clock
     found = run(rule, source, frame_us=frame_us, wire_version=version, tare=tare())
-    curve = taxel._core.LoadCurve.of_events(rule.quantity, FLOOR, source._parts(), frame_us, version, tare().to_json())
-    begins, ends = curve.edges(rule.threshold, rule.release, rule.frames)
+    how = rule.quantity, list(rule.levels), FLOOR
+    curve = taxel._core.LoadCurve.of_events(*how, source._parts(), frame_us, version, tare().to_json())
+    begins, ends = curve.edges(rule.threshold, rule.release, rule.frames, rule.dated_at, rule.of_largest)
     for label, (t, known, _) in (("on", begins), ("off", ends)):
         assert found[label].t.tolist() == t.tolist()
         assert found[label].known.tolist() == known.tolist()
@@ -224,7 +256,7 @@ def test_a_curve_has_the_begins_and_ends_that_the_rule_finds(source, rule, clock
     st.lists(st.tuples(st.sampled_from([1, 900, 1000, 1000, 2500, HOUR]),
                        st.lists(st.sampled_from([0.0, 3.0, 3.75, 3.8, 9.0]), min_size=12, max_size=12)),
              min_size=1, max_size=12),
-    st.one_of(rules, kinds),
+    st.one_of(rules(), kinds),
 )  # fmt: skip
 def test_each_frame_of_the_input_is_one(steps, rule):
     t = np.cumsum([step for step, _ in steps])
@@ -237,7 +269,7 @@ def test_each_frame_of_the_input_is_one(steps, rule):
 
 
 @settings(max_examples=100, deadline=None)
-@given(events(), st.one_of(rules, kinds), clocks, st.data())
+@given(events(), st.one_of(rules(), kinds), clocks, st.data())
 def test_pieces_give_what_the_whole_gives(source, rule, clock, data):
     frame_us, version = clock
     whole = run(rule, source, frame_us=frame_us, wire_version=version, tare=tare())
@@ -359,6 +391,9 @@ RULES = [
     PlainRule("total", 1 / 3, 0.1 + 0.2, 20, labels=("a", None), noise_floor=0.0, tare=tare()),
     PlainRule("area", 12, age_ms=5, labels=("small", "large")),
     PlainRule("local_load", 4.0, 0.5, 20),
+    PlainRule("count", 8, 4.5 / 8, levels=[5.0, 10.0], dated_at=6.0),
+    PlainRule("range_count", 3, 0.5, levels=[0.1, 0.2]),
+    PlainRule("total", 30.0, 0.25, of_largest=True),
 ]
 
 
@@ -372,6 +407,7 @@ def test_a_saved_rule_is_the_rule(rule, tmp_path: Path):
         assert (again.quantity, again.threshold, again.release, again.frames, again.age_ms, again.labels) == (
             rule.quantity, rule.threshold, rule.release, rule.frames, rule.age_ms, rule.labels
         )  # fmt: skip
+        assert (again.levels, again.dated_at, again.of_largest) == (rule.levels, rule.dated_at, rule.of_largest)
         assert again.tare == rule.tare
         assert again.noise_floor == rule.noise_floor
     with pytest.raises(taxel.FormatError, match=r'rule\.json: readout: format is "taxel plain rule"'):
@@ -410,6 +446,14 @@ def test_one_loader_reads_both_and_refuses_others(tmp_path: Path):
         (("area", 2), {"labels": ("a",)}, "labels is"),
         (("area", 2), {"labels": "ab"}, "labels is"),
         (("area", 2), {"noise_floor": -1}, "noise_floor is -1"),
+        (("count", 2), {}, "levels"),
+        (("area", 2), {"levels": [1.0]}, "levels"),
+        (("count", 2), {"levels": [2.0, 1.0]}, "levels"),
+        (("count", 2), {"levels": [0.0]}, "levels"),
+        (("area", 2, 0.5), {"dated_at": 0.9}, "dated_at"),
+        (("area", 2, 0.5), {"dated_at": 2.1}, "dated_at"),
+        (("area", 2, 0.5), {"dated_at": 1.5, "of_largest": True}, "dated_at"),
+        (("area", 2, 1, 1, 5), {"labels": ("a", "b"), "of_largest": True}, "of_largest"),
     ],
 )
 def test_nonsense_is_refused_by_name(arguments, options, text):
@@ -425,6 +469,53 @@ def test_what_a_rule_cannot_read_is_refused():
         run(rule, taxel.SpikeTrains.from_lists([[1.0]]))
     with pytest.raises(ProblemError, match="tare of 3 x 4"):
         run(rule, press(array=Array(4, 4)), tare=tare())
+
+
+# Counts by running range
+
+
+def test_a_count_by_running_range_is_what_a_loop_over_frames_counts():
+    """Levels are parts of what each channel read in the last ten seconds, renewed each second; none before."""
+    draw, levels = np.random.default_rng(5), [0.1, 0.3, 0.6]
+    t = np.cumsum(draw.choice([90_000, 100_000, 100_000, 130_000, 2_500_000], 400, p=[0.2, 0.4, 0.2, 0.19, 0.01]))
+    values = np.float32(draw.normal(500 * np.sin(t / 3e5), 60)[:, None] + [0.0, 1000.0]) * np.float32([1.0, 0.2])
+    frames = Frames(values[:, None, :], t, array=Array(1, 2))
+
+    def percentile(window, percent):
+        ranked, rank = np.sort(window), percent / 100.0 * (len(window) - 1)
+        below = float(ranked[int(rank)])
+        following = ranked[min(int(rank) + 1, len(ranked) - 1)]
+        return below + (float(following) - below) * (rank - int(rank))
+
+    above, renewed, ranges, counts = np.zeros((3, 2), bool), None, None, []
+    for k, now in enumerate(t.tolist()):
+        due = int(t[0]) + 10_000_000 if renewed is None else renewed + 1_000_000
+        if now >= due:
+            renewed = due + (now - due) // 1_000_000 * 1_000_000
+            since = -1 if ranges is None and renewed == due else renewed - 10_000_000
+            window = values[:k][t[:k] >= since]
+            if len(window):
+                low, high = (np.array([percentile(one, p) for one in window.T]) for p in (10.0, 95.0))
+                ranges = low, high - low
+        if ranges is not None:
+            on, off = (
+                np.float32([[a + part * level * span for a, span in zip(*ranges, strict=True)] for level in levels])
+                for part in (1.0, 0.7)
+            )
+            above = np.where(above, values[k] >= off, values[k] >= on)
+        counts.append(int(above.sum()))
+    assert max(counts) == 6
+    changes = [
+        (now, count) for now, count, last in zip(t.tolist(), counts, [0, *counts], strict=False) if count != last
+    ]
+    curve = taxel._core.LoadCurve.of_frames("range_count", levels, 0.0, frames._parts(), None, None)
+    assert list(zip(*(column.tolist() for column in curve.changes()), strict=True)) == changes
+    # It needs no tare.
+    rule = PlainRule("range_count", 4, 2.5 / 4, levels=levels, dated_at=3.0)
+    whole, stream = run(rule, frames, frame_us=100_000.0), rule.stream(frame_us=100_000.0)
+    pieces = [stream.push(frames[k : k + 7]) for k in range(0, len(t), 7)]
+    assert sum(pieces[1:], pieces[0]) + stream.advance(int(t[-1]) + 2_000_000) == whole
+    assert len(whole) > 20
 
 
 # Tuning
@@ -516,5 +607,6 @@ def test_tuning_frames():
     for wrong in ({"window_ms": -1.0}, {"noise_floor": -1.0}, {"labels": [3]}):
         with pytest.raises(ProblemError):
             tune([source], **wrong)
-    with pytest.raises(ProblemError, match="without a tare"):
+    # Events without a rest have no load; frames have counts by running range.
+    with pytest.raises(ProblemError, match="tare"):
         tune([source._replace(tare=None)])

@@ -1,9 +1,8 @@
-"""The plain rules beside a readout: as tuned and run one by one; the labels of which they are better."""
+"""The plain rules beside a readout: as tuned and run one by one, and stored with it."""
 
 import json
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,8 +11,7 @@ from test_plain_rule import played
 from touching import touched
 
 import taxel
-from taxel import Detections
-from taxel.detect import Example, Fold, Part, PlainRule, PlainScore, Recipe, judge, run, score, tune
+from taxel.detect import Example, Fold, Part, PlainRule, Recipe, judge, run, score, tune
 from taxel.encode import ContactArea
 from taxel.tasks import Training, TrainOptions
 
@@ -68,15 +66,19 @@ def test_there_is_no_rule_where_none_finds_anything_held_out() -> None:
     halves = [Part(0, stop=middle), Part(0, start=middle)]
     judged = judge([example], recipe, [Fold([halves[0]], [halves[1]]), Fold([halves[1]], [halves[0]])])
     assert (judged.plain.together.found, judged.plain.rules) == (0, {"contact": None})
-    assert judged.plain.better(judged.together) == ()
+    assert judged.by_rule == ()
 
 
-def test_the_labels_of_which_the_rule_is_better_are_named(examples) -> None:
-    judged = judge(examples, RECIPE, 3)
-    nothing = score(taxel.Detections([], [], []), {"hit": [1000], "gone": judged.plain.together["gone"].errors_ms * 0})
-    assert set(judged.plain.better(nothing)) <= {"hit", "gone"}
-    assert judged.plain.better(judged.plain.together) == ()
-    assert judged.plain.to_dict(judged.together)["rules"]["hit"]["quantity"] == "area"
+def test_the_labels_own_rule_stands_apart(examples) -> None:
+    """Where labels are thresholds of the area, its rules are none beside the neuron."""
+    own = [one._replace(labels_of="area") for one in examples]
+    judged = judge(own, RECIPE, 3)
+    assert judged.plain.rules["hit"].quantity != "area"
+    rules, scored = judged.plain.own
+    assert rules["hit"].quantity == "area"
+    assert scored["hit"].missed == scored["hit"].false == 0
+    assert judged.plain.to_dict()["own"]["rules"]["hit"]["quantity"] == "area"
+    assert tune(own, noise_floor=3.0) == judged.plain.rules
 
 
 def test_without_a_tare_there_is_no_rule(examples) -> None:
@@ -85,7 +87,8 @@ def test_without_a_tare_there_is_no_rule(examples) -> None:
     assert judged.plain.together is None
     assert judged.plain.rules == {"gone": None, "hit": None}
     assert judged.plain.lacks == "example 0 has no tare to measure a load from"
-    assert judged.plain.better(judged.together) == ()
+    assert judged.by_rule == ()
+    assert judged.neurons.to_dict() == judged.together.to_dict()
 
 
 def test_training_says_which_is_better_and_why_there_is_no_rule(examples, tmp_path: Path, capsys) -> None:
@@ -115,14 +118,27 @@ def test_training_says_which_is_better_and_why_there_is_no_rule(examples, tmp_pa
     detect = ("detect", tmp_path / "one.npz", "--readout", rule.save(tmp_path / "rule.json"), "--json")
     detect += ("--tare", tmp_path / "tare.json", "--truth", tmp_path / "labels.csv", "--window-ms", "2")
     assert json.loads(call(capsys, *detect)[1])["score"]["by_label"]["hit"]["found"] == 6
-    better = result["plain_rule"]["better"]
-    for label in better:
-        lines = call(capsys, *arguments, "-o", tmp_path / "r.json")[1].splitlines()
-        said = [line for line in lines if ": the plain rule is better" in line]
-        assert sum(label in line.split(": ")[0].split(", ") for line in said) == 1
+    lines = call(capsys, *arguments, "-o", tmp_path / "r.json")[1].splitlines()
+    kept = taxel.Readout.load(tmp_path / "r.json")
+    assert list(kept.by_rule) == result["by_rule"]
+    assert set(kept.rules) == {"hit", "gone"}
+    for label in kept.rules:
+        runs = f"{label}, {'plain rule' if label in kept.by_rule else 'neuron'}: "
+        assert [line.startswith(runs) for line in lines if line.startswith(label) and line.endswith("; runs")] == [True]
+    # Each way detects what its own detector does; the default is what was better.
+    both = ("detect", tmp_path / "one.npz", "--readout", tmp_path / "r.json", *detect[4:])
+    found = {use: json.loads(call(capsys, *both, "--use", use)[1]) for use in ("better", "rule", "neuron")}
+    assert found["rule"]["score"]["by_label"]["hit"]["found"] == 6
+    assert found["rule"]["score"]["by_label"]["odd"]["found"] == 0
+    for label in kept.labels:
+        same = found["rule" if label in kept.by_rule else "neuron"]["detections"]
+        assert [one for one in found["better"]["detections"] if one["label"] == label] == [
+            one for one in same if one["label"] == label
+        ]
+    assert call(capsys, *both, "--use", "best")[0] == 2
 
 
-def test_channels_have_plain_rules_by_peak_at_edges() -> None:
+def test_channels_have_plain_rules_but_none_by_local_load() -> None:
     line, values = taxel.Array(1, 4), np.zeros((400, 1, 4))
     values[100:200] = values[250:300] = 20.0
     frames = taxel.Frames(values, np.arange(400) * 1000, unit="N", array=line)
@@ -152,79 +168,6 @@ def test_channels_have_plain_rules_by_peak_at_edges() -> None:
     )
 
 
-def test_a_rule_that_is_as_good_and_knows_sooner_is_named() -> None:
-    true = {"hit": [1000], "gone": [5000]}
-    rule = taxel.detect.PlainRule("area", 2)
-
-    def scored(known):
-        return taxel.detect.score(taxel.Detections(["hit", "gone"], [1000, 5000], known), true)
-
-    plain = taxel.detect.PlainScore({"hit": rule, "gone": None}, scored([1200, 5200]))
-    # Of "gone" there is no rule; a neuron that knows as soon, or earlier, is not named.
-    assert plain.sooner(scored([1500, 5500])) == ("hit",)
-    assert plain.sooner(scored([1200, 5500])) == plain.sooner(scored([1100, 5500])) == ()
-    assert plain.to_dict(scored([1500, 5500]))["sooner"] == ["hit"]
-    # A neuron that misses is worse, not later.
-    missed = taxel.detect.score(taxel.Detections([], [], []), true)
-    assert plain.sooner(missed) == ()
-    assert plain.better(missed) == ("hit",)
-
-
-def test_the_page_of_training_says_that_the_rule_knows_sooner() -> None:
-    true = {"hit": [1000]}
-    neuron, mine = (taxel.detect.score(taxel.Detections(["hit"], [1000], [known]), true) for known in (1500, 1200))
-    plain = taxel.detect.PlainScore({"hit": taxel.detect.PlainRule("area", 2)}, mine)
-    result = Training(TrainOptions(), (), None, SimpleNamespace(plain=plain, together=neuron), "", {}, (), ())
-    (line,) = result._better()
-    assert line.startswith(
-        "hit: the plain rule is as good and knows sooner: both have 0 missed and false; the rule knows +0.2 ms after "
-        "the label (median), the neuron +0.5 ms; "
-    )
-
-
-def test_where_the_rule_is_better_both_delays_are_said() -> None:
-    true = {"hit": [1000, 9000]}
-
-    def better(rule: list[int], neuron: list[int]) -> str:
-        mine = taxel.detect.score(taxel.Detections(["hit"] * 2, [1000, 9000], rule), true)
-        other = taxel.detect.score(taxel.Detections(["hit"] * len(neuron), [1000] * len(neuron), neuron), true)
-        plain = taxel.detect.PlainScore({"hit": taxel.detect.PlainRule("area", 2)}, mine)
-        result = Training(TrainOptions(), (), None, SimpleNamespace(plain=plain, together=other), "", {}, (), ())
-        (line,) = result._better()
-        return line.partition("; --rule")[0]
-
-    assert better([205_000, 213_000], [15_000]) == (
-        "hit: the plain rule is better but knows later: 0 missed and false, known +204 ms after the label (median); "
-        "the neuron: 1 missed and false, +14 ms"
-    )
-    assert better([3_000, 11_000], [15_000]) == (
-        "hit: the plain rule is better and knows no later: 0 missed and false, known +2 ms after the label (median); "
-        "the neuron: 1 missed and false, +14 ms"
-    )
-    assert better([3_000, 11_000], []) == (
-        "hit: the plain rule is better: 0 missed and false; the neuron: 2 missed and false"
-    )
-
-
-def test_where_the_rule_is_better_the_training_says_how_to_write_it() -> None:
-    true = {"hit": [1000]}
-    mine = taxel.detect.score(taxel.Detections(["hit"], [1000], [1200]), true)
-    plain = taxel.detect.PlainScore({"hit": taxel.detect.PlainRule("area", 2)}, mine)
-    nothing = taxel.detect.score(taxel.Detections([], [], []), true)
-    result = Training(TrainOptions(), (), None, SimpleNamespace(plain=plain, together=nothing), "", {}, (), ())
-    (line,) = result._better()
-    assert line.endswith("; --rule FILE writes it, for taxel detect --readout FILE")
-
-
-def test_a_rule_that_detects_nothing_is_never_better() -> None:
-    true = {"lift": [1_000_000, 2_000_000]}
-    at = [5_000_000, 6_000_000, 7_000_000]
-    silent = PlainScore({"lift": PlainRule("area", 2)}, score(Detections([], [], []), true))
-    worse = score(Detections(["lift"] * 3, at, at), true)
-    assert worse.by_label["lift"].rank > silent.together.by_label["lift"].rank
-    assert silent.better(worse) == ()
-
-
 @pytest.fixture(scope="module")
 def of_touches(tmp_path_factory: pytest.TempPathFactory) -> tuple[taxel.Recording, Training]:
     """Readings of less than 1, which no floor of a board fits, and what is trained on them by default."""
@@ -239,10 +182,6 @@ def test_a_rule_does_not_depend_on_the_encoder(of_touches, encoder: str) -> None
     recording, by_default = of_touches
     training = taxel.train(recording, [touched(1)[1]], TrainOptions(folds=2, changes={"encoder.name": encoder}))
     plain = training.scored.plain
-    rules, others = (
-        {label: rule and rule._with(training=None) for label, rule in each.scored.plain.rules.items()}
-        for each in (training, by_default)
-    )
-    assert rules == others
+    assert plain.rules == by_default.scored.plain.rules
     assert plain.together.to_dict() == by_default.scored.plain.together.to_dict()
     assert plain.together.missed == plain.together.false == 0

@@ -40,10 +40,13 @@ def test_each_detection_of_a_board_is_a_crossing_that_can_be_seen(tmp_path: Path
     taxel.convert(play(acts, seed=1).events, tmp_path / "a.mcap")
     contacts, _ = truth(acts)
     labels = {"contact": [round(c.start_us) for c in contacts], "lift": [round(c.stop_us) for c in contacts]}
-    training = taxel.train(taxel.open(tmp_path / "a.mcap"), [labels], taxel.tasks.TrainOptions(folds=0))
+    recording = taxel.open(tmp_path / "a.mcap")
+    training = taxel.train(recording, [labels], taxel.tasks.TrainOptions(folds=0))
+    by_neurons = taxel.tasks.DetectOptions(use="neuron")
+    outcomes = taxel.tasks.detect(training.readout, recording, [labels], by_neurons).outcomes
     assert {trained.neuron.after_spike for trained in training.readout.neurons.values()} == {"reset"}
     for label in labels:
-        figure = _potential(training.readout, label, _moments(training.outcomes, label))
+        figure = _potential(training.readout, label, _moments(outcomes, label))
         threshold = training.readout.run_threshold * training.readout.neurons[label].neuron.theta_0
         for axis in figure.axes:
             assert axis.lines[0].get_ydata().max() >= 0.99 * threshold

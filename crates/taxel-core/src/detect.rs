@@ -17,7 +17,7 @@ pub use frame_clock::{FrameClock, FrameTime};
 pub use load_curve::LoadCurve;
 pub use plain_rule::PlainRule;
 pub use readout::Readout;
-pub use running_rule::Decision;
+pub use running_rule::{Decision, EdgeNumbers};
 pub use score::{Spread, Tally, WIDEST_WINDOW_US, score};
 pub use stream::ReadoutStream;
 pub use trained::{Seen, TrainedNeuron};

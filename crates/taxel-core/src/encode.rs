@@ -5,6 +5,7 @@ mod bracket;
 mod by_stamp;
 mod channels;
 mod encoding;
+mod level_count;
 mod loaded;
 mod local_sums;
 mod periods;

@@ -3,7 +3,7 @@
 
 mod ways;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead, BufReader, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpStream};
 use std::path::PathBuf;
@@ -105,6 +105,8 @@ fn readout_of(encoder: &str, cell: TrainedNeuron) -> Readout {
         pads: false,
         delays_ms: vec![0.0],
         neurons: [("touch".to_owned(), cell)].into(),
+        rules: BTreeMap::new(),
+        by_rule: BTreeSet::new(),
         seen: BTreeMap::new(),
         training: None,
     }

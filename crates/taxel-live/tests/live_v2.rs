@@ -2,7 +2,7 @@
 
 mod ways;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -156,6 +156,8 @@ fn in_silence_time_moves_on_by_the_boards_promises() {
         pads: false,
         delays_ms: vec![0.0],
         neurons: [("touch".to_owned(), cell)].into(),
+        rules: BTreeMap::new(),
+        by_rule: BTreeSet::new(),
         seen: BTreeMap::new(),
         training: None,
     };

@@ -4,8 +4,8 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::Stop;
 use taxel_core::detect::{
-    Decision, Detection, Detector, FrameTime, LoadCurve as CoreCurve, PlainRule, Readout, ReadoutStream as CoreStream,
-    Reference, Spread, score as score_core,
+    Decision, Detection, Detector, EdgeNumbers, FrameTime, LoadCurve as CoreCurve, PlainRule, Readout,
+    ReadoutStream as CoreStream, Reference, Spread, score as score_core,
 };
 use taxel_core::encode::{Quantity, Tare, Zeroing};
 use taxel_core::spikes::us;
@@ -282,6 +282,7 @@ impl LoadCurve {
     fn of_events(
         py: Python<'_>,
         quantity: &str,
+        levels: Vec<f64>,
         noise_floor: f64,
         events: EventsIn<'_>,
         frame_us: f64,
@@ -291,13 +292,16 @@ impl LoadCurve {
         let (quantity, tare) = (to_quantity(quantity)?, parse_tare(tare)?);
         let events = events.view()?;
         let frames = FrameTime::on_wire(frame_us, wire_version);
-        enter(py, |stop| CoreCurve::of_events(quantity, noise_floor, events, frames, tare.as_ref(), stop)).map(Self)
+        let made =
+            |stop: Stop<'_>| CoreCurve::of_events(quantity, &levels, noise_floor, events, frames, tare.as_ref(), stop);
+        enter(py, made).map(Self)
     }
 
     #[staticmethod]
     fn of_frames(
         py: Python<'_>,
         quantity: &str,
+        levels: Vec<f64>,
         noise_floor: f64,
         frames: FramesIn<'_>,
         frame_us: Option<f64>,
@@ -305,7 +309,10 @@ impl LoadCurve {
     ) -> PyResult<Self> {
         let (quantity, tare) = (to_quantity(quantity)?, parse_tare(tare)?);
         let frames = frames.view()?;
-        enter(py, |stop| CoreCurve::of_frames(quantity, noise_floor, frames, frame_us, tare.as_ref(), stop)).map(Self)
+        let made = |stop: Stop<'_>| {
+            CoreCurve::of_frames(quantity, &levels, noise_floor, frames, frame_us, tare.as_ref(), stop)
+        };
+        enter(py, made).map(Self)
     }
 
     /// The times of its changes, us, and the quantity after each.
@@ -322,8 +329,11 @@ impl LoadCurve {
         threshold: f64,
         release: f64,
         frames: u32,
+        dated_at: Option<f64>,
+        of_largest: bool,
     ) -> PyResult<(DecisionsOut<'py>, DecisionsOut<'py>)> {
-        let found = enter(py, |_| Ok::<_, taxel_core::Error>(self.0.edges(threshold, release, frames)))?;
+        let edges = EdgeNumbers { threshold, release, frames, dated_at, of_largest };
+        let found = enter(py, |_| Ok::<_, taxel_core::Error>(self.0.edges(&edges)))?;
         let (begins, ends): (Vec<_>, Vec<_>) = found.into_iter().partition(|decision| decision.label == 0);
         Ok((from_decisions(py, &begins), from_decisions(py, &ends)))
     }

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 from dataclasses import replace
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -67,6 +68,14 @@ def detect(
             help="First move all labels of --truth by this many ms, for example if their times are of another clock."
         ),
     ] = 0.0,
+    use: Annotated[
+        str,
+        typer.Option(
+            metavar="better|rule|neuron",
+            help="What detects each label: the better one in training, its plain rule, or its neuron. A label with no "
+            "rule is not detected by rule.",
+        ),
+    ] = "better",
     lists: Annotated[
         bool,
         typer.Option(
@@ -88,7 +97,7 @@ def detect(
     if report is not None:
         try_report(report, overwrite=overwrite)
     given = one_or_several(truth) if truth else None
-    options = taxel.tasks.DetectOptions(tare, frame_us, window_ms, shift_ms)
+    options = taxel.tasks.DetectOptions(tare, frame_us, window_ms, shift_ms, use)
     loaded = taxel.detect.load(readout)
     with progress(as_json) as update:
         update(f"reading {paths_text(recordings)}", 0, 0)
@@ -96,11 +105,12 @@ def detect(
             opened = files.opener.open_sensors(recordings)
         found = taxel.tasks.detect(loaded, opened, given, options, progress=update)
         found = replace(found, warnings=(*unread, *found.warnings))
+    used = loaded.using(use) if isinstance(loaded, taxel.Readout) else loaded
     if out is not None:
         write_whole(out, lambda file: file.write(_table(found.outcomes).encode()), overwrite=overwrite)
     say_warnings(found.warnings)
     against = paths_text(list(map(Path, truth))) if truth else None
-    printed = list(_lines(found, loaded, recordings, against, given=tare is not None, lists=lists))
+    printed = list(_lines(found, used, recordings, against, given=tare is not None, lists=lists))
     if as_json:
         written = {"written": out, "report": None if report is None else report / "report.html"}
         files_written = {name: str(path) for name, path in written.items() if path is not None}
@@ -110,7 +120,7 @@ def detect(
     if report is not None:  # last, so that nothing is lost where it fails
         place = taxel.report.write_detections(
             report,
-            loaded,
+            used,
             found.outcomes,
             title=f"Detections of {readout} in {paths_text(recordings)}",
             warnings=[*found.unreliable, *found.warnings, *_remarks(found)],
@@ -135,7 +145,7 @@ def _lines(
         yield from found.unreliable
         yield from _score_lines(found, readout.labels, truth, several=several)
     remarks = _remarks(found)
-    if isinstance(readout, taxel.Readout):
+    if isinstance(readout, taxel.Readout) and len(readout.by_rule) < len(readout.labels):
         outside = [(outcome.name, text) for outcome in found.outcomes if (text := outcome.outside_text)]
         remarks += of_names(outside, len(found.each))
     for each in found.each:
@@ -229,9 +239,10 @@ def _detection_lines(
         yield f"times are counted from {begun(begin_us)}"
     width = max(5, *(len(label) for label in detections.labels))
     # A plain rule has no slope; levels of frames come in steps, and may give one for all.
-    sloped = len({f"{slope:.4g}" for slope in detections.slope}) > 1
+    slopes = [f"{slope:.4g}".replace("nan", "") for slope in first.slope]
+    sloped = len({f"{slope:.4g}" for slope in detections.slope if not isnan(slope)}) > 1
     yield f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}" + f"  {'slope (mV/ms)':>13}" * sloped
-    for label, t, known, slope in zip(first.label, first.t, first.known, first.slope, strict=True):
-        yield f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}" + f"  {slope:>13.4g}" * sloped
+    for label, t, known, slope in zip(first.label, first.t, first.known, slopes, strict=True):
+        yield f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}" + f"  {slope:>13}".rstrip() * sloped
     if len(detections) > len(first):
         yield f"... and {len(detections) - len(first)} more; --list prints all, --out and --json write all"

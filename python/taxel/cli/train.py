@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-import re
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -29,11 +27,6 @@ from taxel.cli._recordings import (
     try_report,
 )
 from taxel.cli._say import say
-
-if TYPE_CHECKING:
-    from taxel.detect import PlainScore
-    from taxel.recording import Recording
-    from taxel.tasks.labels import GivenLabels
 
 app = App()
 
@@ -69,13 +62,6 @@ def train(
     out: Annotated[Path, typer.Option("--out", "-o", help="The file that the readout is written to.")] = Path(
         "readout.json"
     ),
-    rule: Annotated[
-        Path | None,
-        typer.Option(
-            help="Write the plain rule to this file, for taxel detect --readout. If several labels have rules, each "
-            "rule is written to a separate file: FILE with the label before its suffix."
-        ),
-    ] = None,
     overwrite: OverwriteOption = False,
     window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
     folds: Annotated[
@@ -97,11 +83,12 @@ def train(
     report: ReportOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Train neurons to detect labelled events, and save them as a readout.
+    """Train neurons to detect labelled events, tune plain rules beside them, and save both as a readout.
 
-    Training starts from the recipe that fits the recordings and labels; --recipe, --encoder and --set change that. The
-    score is cross-validated: each fold is scored by neurons that were trained without it. The first line states that,
-    or why the score is that of the training data.
+    Training starts from the recipe that fits the recordings and labels; --recipe, --encoder and --set change that. Of
+    each label the neuron or the rule runs, whichever is better (taxel detect --use runs the other one). The score is
+    cross-validated: each fold is scored by what was made without it. The first line states that, or why the score is
+    that of the training data.
 
     Example: taxel train trials/ -o gait.json
     Example: taxel train walk.npz --labels events.csv --set neurons.contact.kappa=1.5 -o gait.json
@@ -120,22 +107,18 @@ def train(
         update(f"reading {paths_text(recordings)}", 0, 0)
         with collected() as unread:
             opened = files.opener.open_sensors(recordings)
-        _try_rules(rule, given, opened, overwrite=overwrite)
     say_warnings(unread)  # before the training, which may take long, and again with its result
     with progress(as_json) as update:
         training = taxel.train(opened, given, options, progress=update)
     training.readout.save(out, overwrite=overwrite)
-    rules = _write_rules(training.scored.plain, rule, overwrite=overwrite)
     say_warnings(training.warned)
     training = replace(training, warned=(*unread, *training.warned))
     if as_json:
-        written: dict[str, Any] = {"rules": {str(path): each for path, each in rules.items()}} if rules else {}
-        written |= {} if report is None else {"report": str(report / "report.html")}
+        written = {} if report is None else {"report": str(report / "report.html")}
         say(json.dumps({"readout": str(out), **training.to_dict(), **written}))
     else:
         following = training.command(str(out))
         say(*training.lines(), "", f"written to {out}" + f"; next: {following}" * bool(following))
-        say(*(f"plain rule for {' and '.join(each)} written to {path}" for path, each in rules.items()))
         say(*(f"warning: {warning}" for warning in (*unread, *training.unreliable())))
     if report is not None:  # last, so that nothing is lost where it fails
         place = taxel.report.write_detections(
@@ -151,35 +134,3 @@ def train(
             overwrite=overwrite,
         )
         say(*[] if as_json else [f"report: {place}"])
-
-
-def _try_rules(given: Path | None, labels: GivenLabels, recordings: Sequence[Recording], *, overwrite: bool) -> None:
-    """Check that plain rules can be written, before the work whose result they hold."""
-    from taxel.tasks.labels import references  # noqa: PLC0415
-
-    if given is None:
-        return
-    with collected():  # the training warns of the same
-        names = {label for events in references(labels, recordings) for label in events}
-    for path in (given, *(_of_label(given, label) for label in sorted(names))):
-        check_writable(path, overwrite=overwrite)
-
-
-def _write_rules(plain: PlainScore | None, path_given: Path | None, *, overwrite: bool) -> dict[Path, list[str]]:
-    """Write the plain rules, one of kinds of touch once; return the files, and which labels each detects."""
-    if path_given is None or plain is None:
-        return {}
-    ruled = {label: rule for label, rule in plain.rules.items() if rule is not None}
-    rules = {rule.to_json(): rule for rule in ruled.values()}
-    written = {}
-    for rule in rules.values():
-        labels = [label for label in ruled if label in rule.labels and ruled[label] == rule]
-        path = path_given if len(rules) == 1 else _of_label(path_given, labels[0])
-        written[rule.save(path, overwrite=overwrite)] = labels
-    return written
-
-
-def _of_label(path: Path, label: str) -> Path:
-    """Return the file of the rule of one of several labels."""
-    name = re.sub(r"[^\w-]", "_", label)
-    return path.parent / f"{path.stem}.{name}{path.suffix}"

@@ -17,7 +17,7 @@ from taxel._base.times import beginning_us
 from taxel.detect import recipes
 from taxel.detect.examples import Example, Outcome
 from taxel.detect.floors import TOUCH, early_part, floor_of
-from taxel.detect.loads import PEAK, Loads, clock_of, lacks_neighbours
+from taxel.detect.loads import PEAK, EdgeRule, Loads, clock_of, lacks_neighbours
 from taxel.recorded import recorded
 from taxel.spikes import SpikeTrains, to_us
 
@@ -343,11 +343,12 @@ def off_loads(examples: Sequence[Example]) -> list[str]:
     # Late labels let a tare end in a touch.
     early = [example if (tare := early_part(example)) is None else example._replace(tare=tare) for example in examples]
     quantity, threshold = ("peak", PEAK) if lacks_neighbours(examples) else ("area", TOUCH)
-    loads = Loads(early, [clock_of(example) for example in early], floor_of(early), reporting(None), [quantity])
+    loads = Loads(early, [clock_of(example) for example in early], floor_of(early), reporting(None))
+    edges_of_loads = loads.edges(EdgeRule(quantity, threshold))
     of_kinds = {}
     for k, example in enumerate(examples):
         here = loads.windows([(k, -np.inf, np.inf)])
-        begins, ends = (loads.off(edge.between(here), k).t for edge in loads.edges(quantity, threshold, 1.0, 1))
+        begins, ends = (loads.off(edge.between(here), k).t for edge in edges_of_loads)
         for label, times in example.labels.items():
             edges = {"contact": begins, "lift": ends}.get(recipes.neuron_of("touch", label) or "")
             of_kinds[k, label] = times, np.concatenate([begins, ends]) if edges is None else edges

@@ -12,7 +12,7 @@ from taxel._base.messages import three_digits
 from taxel._base.progress import reporting
 from taxel.detect.examples import Example
 from taxel.detect.floors import TOUCH, floor_of
-from taxel.detect.loads import PEAK, Loads, clock_of, lacks_neighbours
+from taxel.detect.loads import PEAK, EdgeRule, Loads, clock_of, lacks_neighbours
 from taxel.detect.scoring import Score
 from taxel.spikes import SpikeTrains
 
@@ -47,11 +47,12 @@ def of_loads(examples: Sequence[Example], noise_floor: float) -> dict[str, _Valu
         return {}
     felt, threshold = ("peak", PEAK) if lacks_neighbours(examples) else ("area", TOUCH)
     clocks = [clock_of(example) for example in examples]
-    loads = Loads(examples, clocks, noise_floor, reporting(None), ["area", "total", "peak"])
+    loads = Loads(examples, clocks, noise_floor, reporting(None))
+    edges = loads.edges(EdgeRule(felt, threshold))
     features: dict[str, list[_Values]] = {}
     for k in range(len(examples)):
         here = loads.windows([(k, -np.inf, np.inf)])
-        begins, ends = (np.sort(edge.between(here).t) for edge in loads.edges(felt, threshold, 1.0, 1))
+        begins, ends = (np.sort(edge.between(here).t) for edge in edges)
         begins = begins[: len(ends)]  # the last may not end
         measured = {"peak": "peak", "sum": "total", "taxels": "area"}
         of_example = {name: loads.largest(quantity, begins, ends) for name, quantity in measured.items()}

@@ -47,6 +47,9 @@ class Example(NamedTuple):
         What errors call it; "": a recording's title, else its number ("example 3").
     unlabelled : sequence of str
         The labels of which it is not known when they happened: it is neither trained nor scored for those.
+    labels_of : str
+        The quantity whose thresholds the labels are, as "total" where a data set derived them from it: a rule of that
+        quantity is the labels' own, and stands apart. "" where there is none.
 
     Raises
     ------
@@ -65,6 +68,7 @@ class Example(NamedTuple):
     group: str = ""
     name: str = ""
     unlabelled: Sequence[str] = ()
+    labels_of: str = ""
 
     def _known(self, found: Detections) -> Detections:
         """Return those of some detections of which its labels say whether they are right."""
@@ -128,7 +132,7 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
         raise refused("examples", f" is {shown(examples)}: must be one Example or more")
     sound = []
     for k, example in enumerate(examples):
-        is_example = isinstance(example, tuple) and len(example) in (2, 3, 4, 5, 6)
+        is_example = isinstance(example, tuple) and len(example) in range(2, 8)
         source = recorded(example[0]) if is_example else None
         if not isinstance(source, Events | Frames | SpikeTrains):
             raise ProblemError(
@@ -136,9 +140,9 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
                 "and labels"
             )
         _, labels, *rest = example
-        optional: list[Any] = [None, "", "", ()]
+        optional: list[Any] = [None, "", "", (), ""]
         optional[: len(rest)] = rest
-        tare, group, name, unlabelled = optional
+        tare, group, name, unlabelled, labels_of = optional
         name = text(f"example {k}: name", name) or str(getattr(example[0], "title", f"example {k}"))
         if not isinstance(labels, Mapping):
             raise ProblemError(f"{name}: labels is {shown(labels)}: must be times (us) by label")
@@ -147,7 +151,8 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
         without = tuple(text(f"{name}: unlabelled", label) for label in several(f"{name}: unlabelled", unlabelled))
         if both := [label for label in without if label in times]:
             raise ProblemError(f"{name}: unlabelled names {shown(both[0])}, which has labels")
-        sound.append(Example(source, times, tare, text(f"{name}: group", group), name, without))
+        group, labels_of = text(f"{name}: group", group), text(f"{name}: labels_of", labels_of)
+        sound.append(Example(source, times, tare, group, name, without, labels_of))
     return _padded(sound)
 
 

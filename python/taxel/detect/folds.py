@@ -33,7 +33,7 @@ from taxel.detect.fitting import (
 )
 from taxel.detect.levels import fit_levels
 from taxel.detect.loads import Clock, clock_of
-from taxel.detect.plain_score import PlainScore, plain_score
+from taxel.detect.plain_score import PlainScore, RulesBeside
 from taxel.detect.raised_floor import fit_floor
 from taxel.detect.readout import Readout, run
 from taxel.detect.recipe import Recipe
@@ -107,7 +107,8 @@ class Judged:
     Attributes
     ----------
     scores : tuple of Score
-        One an example that was tested, in the order of the examples.
+        One an example that was tested, in the order of the examples: of what was chosen for each label, its neuron or
+        its plain rule.
     together : Score
         All of them.
     how : str
@@ -118,6 +119,11 @@ class Judged:
         How plain rules did that were tuned on the training part of each fold.
     mistakes : tuple of Mistake
         What the scores of each example call missed and false.
+    neurons : Score, optional
+        As `together`, of the neurons alone.
+    by_rule : tuple of str
+        The labels that their plain rule detects better than their neuron in all folds: with fewer missed and false, or
+        as few and known earlier. The score of each fold is of what was better in the other folds.
     """
 
     scores: tuple[Score, ...]
@@ -126,6 +132,8 @@ class Judged:
     trained: tuple[Trained, ...] = ()
     plain: PlainScore | None = None
     mistakes: tuple[Mistake, ...] = ()
+    neurons: Score | None = None
+    by_rule: tuple[str, ...] = ()
 
 
 def judge(
@@ -138,7 +146,10 @@ def judge(
     frame_us: float | None = None,
     progress: Progress | None = None,
 ) -> Judged:
-    """Train once a fold, and score the detections in the data that the fold tests; and those of plain rules likewise.
+    """Train once a fold, and score what is detected in the data that the fold tests by the better of neuron and rule.
+
+    Which is better is decided for each label and fold by the scores of the other folds, so a fold says nothing of what
+    detects in it.
 
     Parameters
     ----------
@@ -181,8 +192,10 @@ def judge(
     recipe = possible(recipe_in_frames, examples)
     patterns = EncodedExamples(examples, recipe, report, search=search)
     array, unit = array_of(examples), unit_of(examples)
-    detections: dict[int, list[Detections]] = {}
-    trained = []
+    labels = recipe._labels(examples)
+    beside = RulesBeside(examples, labels, clocks, window, report)
+    trained: list[Trained] = []
+    found = []
     for n, fold in enumerate(ways):
         report(f"fold {n + 1} of {len(ways)}", n, len(ways))
         plan = fit_levels(fit_floor(recipe, examples, fold.train), examples, fold.train)
@@ -198,16 +211,106 @@ def judge(
             trained_fold = learn(encoded.part(parts_of), plan, array, report)
         of_fold = replace(recipe_in_frames, encoder=plan.encoder, neurons=plan.neurons)._at(trained_fold.recipe.neurons)
         trained.append(trained_fold._replace(recipe=of_fold, readout=trained_fold.readout._with(unit=unit)))
-        for part in fold.test:
-            detections.setdefault(part.example, []).append(_detect(trained[-1].readout, examples, part, clocks))
-    joined = [reduce(add, detections[example]) for example in sorted(detections)]
-    labels = recipe._labels(examples)
-    truths = _truths(examples, ways, labels)
+        report(f"tuning plain rules, fold {n + 1} of {len(ways)}", 0, 0)
+        by_neurons = [_detect(trained[-1].readout, examples, part, clocks) for part in fold.test]
+        found.append(_Found(by_neurons, *beside.in_parts(fold.train, fold.test)))
+    judged = _judged(examples, [fold.test for fold in ways], labels, found, beside, window)
+    return replace(judged, how=how, trained=tuple(trained))
+
+
+def judge_by_training(
+    examples: Sequence[Example],
+    labels: Sequence[str],
+    clocks: Sequence[Clock],
+    by_neurons: Sequence[Detections],
+    window_ms: float,
+    report: Progress,
+) -> Judged:
+    """Return the scores on (checked) examples of neurons that were trained on them, and of rules likewise."""
+    beside = RulesBeside(examples, labels, clocks, window_ms, report)
+    parts = [Part(n) for n in range(len(examples))]
+    found = [_Found(list(by_neurons), *beside.in_parts(parts, parts))]
+    judged = _judged(examples, [parts], labels, found, beside, window_ms, held_out=False)
+    return replace(judged, how="its own training data")
+
+
+class _Found(NamedTuple):
+    """What was detected in each part that a fold tests."""
+
+    by_neurons: list[Detections]
+    by_rules: list[Detections]
+    by_own: list[Detections]
+    """By the labels' own rules."""
+
+
+def _judged(
+    examples: Sequence[Example],
+    tested: Sequence[Sequence[Part]],
+    labels: Sequence[str],
+    found: Sequence[_Found],
+    beside: RulesBeside,
+    window: float,
+    *,
+    held_out: bool = True,
+) -> Judged:
+    """Return the scores of neurons, of rules, and of the better of both, for the parts that each fold tests.
+
+    `held_out`: which is better is decided by the other folds.
+    """
+
+    def true_in(part: Part) -> dict[str, NDArray[np.int64]]:
+        nothing = np.empty(0, np.int64)
+        return {label: np.sort(_inside(examples[part.example].labels.get(label, nothing), part)) for label in labels}
+
+    def in_examples(by_folds: Iterable[Sequence[Detections]]) -> list[Detections]:
+        of_example: dict[int, list[Detections]] = {}
+        for parts, detections in zip(tested, by_folds, strict=True):
+            for part, one in zip(parts, detections, strict=True):
+                of_example.setdefault(part.example, []).append(one)
+        return [reduce(add, of_example[example]) for example in sorted(of_example)]
+
+    truths, in_folds = _truths(examples, tested, labels), [[true_in(part) for part in parts] for parts in tested]
+    pairs = [
+        (score_together(one.by_neurons, truth, window), score_together(one.by_rules, truth, window))
+        for one, truth in zip(found, in_folds, strict=True)
+    ]
+    chosen = []
+    for n, one in enumerate(found):
+        by_others = by_rule(labels, pairs[:n] + pairs[n + 1 :] if held_out else pairs)
+        chosen.append([chosen_of(*both, by_others) for both in zip(one.by_neurons, one.by_rules, strict=True)])
+    joined = in_examples(chosen)
     scores = tuple(score(*compared, window) for compared in zip(joined, truths, strict=True))
-    parts = [(fold.train, fold.test) for fold in ways]
-    plain = plain_score(examples, labels, clocks, parts, truths, window, report)
-    together, mistakes = score_together(joined, truths, window), mistakes_of(joined, truths, scores)
-    return Judged(scores, together, how, tuple(trained), plain, mistakes)
+    mistakes = mistakes_of(joined, truths, scores)
+    together = [score_together(in_examples(by), truths, window) for by in zip(*found, strict=True) if all(by)]
+    neurons, *ruled = together
+    plain = beside.scored(*ruled)
+    whole = score_together(joined, truths, window)
+    runs = by_rule([label for label in labels if plain.rules[label] is not None], pairs)
+    return Judged(scores, whole, "", (), plain, mistakes, neurons, runs)
+
+
+def by_rule(labels: Sequence[str], pairs: Sequence[tuple[Score, Score]]) -> tuple[str, ...]:
+    """Return the labels that rules detect better than neurons, by scores of both on the same events, neurons first.
+
+    They have fewer missed and false, or as few and are known earlier at the median.
+    """
+
+    def worth(label: str, of: int) -> tuple[int, float]:
+        each = [pair[of].by_label[label] for pair in pairs if label in pair[of].by_label]
+        delays = np.concatenate([np.empty(0), *(one.delays_ms for one in each)])
+        return sum(one.rank[0] for one in each), float(np.median(delays)) if len(delays) else np.inf
+
+    return tuple(label for label in labels if worth(label, 1) < worth(label, 0))
+
+
+def chosen_of(neurons: Detections, rules: Detections, by_rule: Sequence[str]) -> Detections:
+    """Return the detections of some labels by rules, and those of all others by neurons, in the order of `known`."""
+    of_rules, of_neurons = (
+        found[np.array([(label in by_rule) == ruled for label in found.label], np.bool_)]
+        for found, ruled in ((rules, True), (neurons, False))
+    )
+    both = of_rules + of_neurons
+    return both[np.argsort(both.known, kind="stable")]
 
 
 def _check_arguments(
@@ -296,7 +399,7 @@ def _marks(
             for part in fold.test:
                 found = _detect(readout, _read(examples, patterns, readout, part), part, clocks)
                 detections[m].setdefault(part.example, []).append(found)
-    truths = _truths(examples, folds, (label,))
+    truths = _truths(examples, [fold.test for fold in folds], (label,))
     return [
         (sys.maxsize, np.inf)
         if m in refused
@@ -344,11 +447,11 @@ def _inside(times: NDArray[np.int64], part: Part) -> NDArray[np.int64]:
 
 
 def _truths(
-    examples: Sequence[Example], folds: Sequence[Fold], labels: Sequence[str]
+    examples: Sequence[Example], parts_of_folds: Sequence[Sequence[Part]], labels: Sequence[str]
 ) -> list[dict[str, NDArray[np.int64]]]:
     """Return, of each example that is tested, the events in its tested parts, by label."""
     tested: dict[int, list[Part]] = {}
-    for part in (part for fold in folds for part in fold.test):
+    for part in (part for parts in parts_of_folds for part in parts):
         tested.setdefault(part.example, []).append(part)
     nothing = np.empty(0, np.int64)
     return [

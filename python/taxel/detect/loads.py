@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._base.progress import Progress
 from taxel.detect.detector import tare_text
-from taxel.detect.examples import Example, unit_of
+from taxel.detect.examples import Example, name_of, unit_of
 from taxel.detect.scoring import APART_US
 from taxel.frames import Frames
 from taxel.recording import Recording
@@ -20,6 +20,8 @@ from taxel.wire import FRAME_US
 
 #: The peak that noise does not reach.
 PEAK = 6.0
+#: Of an example so many frames at least are read for the levels of counts, if it has them; at most twice as many.
+_READ_FRAMES = 5000
 
 #: How long a frame lasts (us; None: as the source says), and the wire's version.
 Clock: TypeAlias = tuple[float | None, int]
@@ -50,53 +52,89 @@ def clock_of(example: object, frame_us: float | None = None) -> Clock:
     return source.frame_us if frame_us is None else frame_us, version
 
 
+class EdgeRule(NamedTuple):
+    """The numbers of a rule that finds begins and ends of loads, as of `PlainRule`."""
+
+    quantity: str
+    threshold: float
+    release: float = 1.0
+    frames: int = 1
+    levels: tuple[float, ...] = ()
+    dated_at: float | None = None
+    of_largest: bool = False
+
+
 class Loads:
-    """Hold the quantities of (checked) examples, and what rules found by them.
+    """Hold the quantities of (checked) examples, each computed once when it is asked for.
 
     The examples are one after the other on one clock, so far apart that nothing of one pairs with another.
     """
 
     def __init__(
-        self,
-        examples: Sequence[Example],
-        clocks: Sequence[Clock],
-        noise_floor: float,
-        report: Progress,
-        quantities: Sequence[str] | None = None,
+        self, examples: Sequence[Example], clocks: Sequence[Clock], noise_floor: float, report: Progress
     ) -> None:
         self.noise_floor, self.unit = noise_floor, unit_of(examples)
         self.names = sorted({name for example in examples for name in example.labels})
+        self._examples, self._clocks, self._report = examples, clocks, report
         self._labels = [{name: np.sort(times) for name, times in example.labels.items()} for example in examples]
         self._unlabelled = [frozenset(example.unlabelled) for example in examples]
         self.whole_examples: list[Stretch] = [(k, -np.inf, np.inf) for k in range(len(examples))]
         self._shift = [k * APART_US - _first(example) for k, example in enumerate(examples)]
         self._frame_ms = max(map(frame_ms, examples))
-        self._curves: dict[str, list[_core.LoadCurve]] = {}
-        self._changes: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
-        self._edges: dict[tuple[str, float, float, int], tuple[FoundTimes, FoundTimes]] = {}
+        self._curves: dict[tuple[str, tuple[float, ...]], list[_core.LoadCurve]] = {}
+        self._changes: dict[tuple[str, tuple[float, ...]], list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
         self._ages: dict[float, FoundTimes] = {}
-        if quantities is None:
-            # Channels have no local load, and their area and total show edges no better than the peak.
-            quantities = ("peak",) if lacks_neighbours(examples) else ("area", "total", "local_load", "peak")
-            measured = dict.fromkeys(("area", *quantities))  # kinds are decided by the area
-        else:
-            measured = dict.fromkeys(quantities)
-        #: The names of the quantities that rules compare at the edges of loads.
-        self.quantities = tuple(quantities)
-        for quantity in measured:
-            report(f"measuring the {quantity.replace('_', ' ')} for plain rules", 0, 0)
-            self._curves[quantity] = [
-                _curve(quantity, noise_floor, example, *clock) for example, clock in zip(examples, clocks, strict=True)
-            ]
 
-    def edges(self, quantity: str, threshold: float, release: float, frames: int) -> tuple[FoundTimes, FoundTimes]:
+    @property
+    def have_rest(self) -> bool:
+        """Whether each example has a tare; without one only counts by running range can be computed."""
+        return all(example.tare is not None for example in self._examples)
+
+    @property
+    def are_channels(self) -> bool:
+        """Whether taxels have no known neighbours."""
+        return lacks_neighbours(self._examples)
+
+    @property
+    def are_frames(self) -> bool:
+        """Whether all examples are frames."""
+        return all(isinstance(example.source, Frames) for example in self._examples)
+
+    @property
+    def labels_of(self) -> frozenset[str]:
+        """The quantities whose thresholds labels are."""
+        return frozenset(example.labels_of for example in self._examples) - {""}
+
+    def _curves_of(self, quantity: str, levels: tuple[float, ...] = ()) -> list[_core.LoadCurve]:
+        """Return a quantity of each example; `levels` are those of a count."""
+        key = quantity, levels
+        if key not in self._curves:
+            self._report(f"measuring the {quantity.replace('_', ' ')} for plain rules", 0, 0)
+            self._curves[key] = [
+                _curve(quantity, levels, self.noise_floor, example, *clock)
+                for example, clock in zip(self._examples, self._clocks, strict=True)
+            ]
+        return self._curves[key]
+
+    def readings(self, parts: Iterable[Stretch]) -> NDArray[np.float64]:
+        """Return what loaded taxels of frames read above their rest in parts of the examples, of spaced frames."""
+        loaded = [np.empty(0)]
+        for k, start, stop in parts:
+            source, tare = self._examples[k].source, self._examples[k].tare
+            if not isinstance(source, Frames) or tare is None:
+                continue
+            every = slice(None, None, 1 + len(source) // _READ_FRAMES)
+            inside = (source.t[every] >= start) & (source.t[every] < stop)
+            above = source.values[every][inside].astype(np.float64) - tare.rest
+            loaded.append(above[above > self.noise_floor])
+        return np.concatenate(loaded)
+
+    def edges(self, rule: EdgeRule) -> tuple[FoundTimes, FoundTimes]:
         """Return the begins and the ends of loads."""
-        point = quantity, threshold, release, frames
-        if point not in self._edges:
-            sides = zip(*(curve.edges(threshold, release, frames) for curve in self._curves[quantity]), strict=True)
-            begins, ends = map(self._together, sides)
-            self._edges[point] = begins, ends
-        return self._edges[point]
+        numbers = rule.threshold, rule.release, rule.frames, rule.dated_at, rule.of_largest
+        sides = zip(*(curve.edges(*numbers) for curve in self._curves_of(rule.quantity, rule.levels)), strict=True)
+        begins, ends = map(self._together, sides)
+        return begins, ends
 
     def ages_ms(self, ages_ms: Iterable[float]) -> list[float]:
         """Return ages at which something else is read than at those before.
@@ -113,18 +151,21 @@ class Loads:
     def at_age(self, age_ms: float) -> FoundTimes:
         """Return the area at an age of every touch."""
         if age_ms not in self._ages:
-            self._ages[age_ms] = self._together([curve.at_age(age_ms) for curve in self._curves["area"]])
+            self._ages[age_ms] = self._together([curve.at_age(age_ms) for curve in self._curves_of("area")])
         return self._ages[age_ms]
 
     def at_end(self) -> FoundTimes:
         """Return how long every touch lasted, ms, when it ended."""
-        return self._together([curve.at_end() for curve in self._curves["area"]])
+        return self._together([curve.at_end() for curve in self._curves_of("area")])
 
-    def changes(self, quantity: str, k: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def changes(
+        self, quantity: str, k: int, levels: tuple[float, ...] = ()
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Return when a quantity changes in example k, us by its clock, and what it is after that."""
-        if quantity not in self._changes:
-            self._changes[quantity] = [curve.changes() for curve in self._curves[quantity]]
-        return self._changes[quantity][k]
+        key = quantity, levels
+        if key not in self._changes:
+            self._changes[key] = [curve.changes() for curve in self._curves_of(*key)]
+        return self._changes[key][k]
 
     def largest(self, quantity: str, begins: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the largest value of a quantity between pairs of times on the one clock, each in one example."""
@@ -136,11 +177,11 @@ class Loads:
             )
         return values
 
-    def values(self, quantity: str, parts: Iterable[Stretch]) -> NDArray[np.float64]:
+    def values(self, quantity: str, parts: Iterable[Stretch], levels: tuple[float, ...] = ()) -> NDArray[np.float64]:
         """Return what a quantity is after each of its changes in parts of the examples."""
         inside = [np.empty(0)]
         for k, start, stop in parts:
-            t, values = self.changes(quantity, k)
+            t, values = self.changes(quantity, k, levels)
             inside.append(values[(t >= start) & (t < stop)])
         return np.concatenate(inside)
 
@@ -190,6 +231,15 @@ def largest(
     return np.array([values[i:k].max() for i, k in zip(first.tolist(), stop.tolist(), strict=True)])
 
 
+def lacks(examples: Sequence[Example]) -> str:
+    """Return what keeps loads of examples from being measured; "" where something can be."""
+    for k, example in enumerate(examples):
+        if isinstance(example.source, SpikeTrains) or (example.tare is None and not isinstance(example.source, Frames)):
+            why = f"{name_of(k, example)} has no tare" if len(examples) > 1 else "there is no tare"
+            return f"{why} to measure a load from"
+    return ""
+
+
 def lacks_neighbours(examples: Sequence[Example]) -> bool:
     """Whether taxels of an example have no known neighbours, as channels and a single taxel."""
     arrays = [example.source.array for example in examples if not isinstance(example.source, SpikeTrains)]  # type: ignore[union-attr]
@@ -211,11 +261,16 @@ def _first(example: Example) -> int:
 
 
 def _curve(
-    quantity: str, noise_floor: float, example: Example, frame_us: float | None, wire_version: int
+    quantity: str,
+    levels: tuple[float, ...],
+    noise_floor: float,
+    example: Example,
+    frame_us: float | None,
+    wire_version: int,
 ) -> _core.LoadCurve:
     """Return a quantity over an example."""
-    source, tare = example.source, tare_text(example.tare)
+    source, tare, how = example.source, tare_text(example.tare), (quantity, list(levels), noise_floor)
     if isinstance(source, Frames):
-        return _core.LoadCurve.of_frames(quantity, noise_floor, source._parts(), frame_us, tare)
+        return _core.LoadCurve.of_frames(*how, source._parts(), frame_us, tare)
     period = FRAME_US if frame_us is None else frame_us
-    return _core.LoadCurve.of_events(quantity, noise_floor, source._parts(), period, wire_version, tare)  # type: ignore[union-attr]
+    return _core.LoadCurve.of_events(*how, source._parts(), period, wire_version, tare)  # type: ignore[union-attr]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from math import ceil
+from typing import Any
 
 from taxel import _core
-from taxel._base.arguments import instance, integer, number, parameters, several, shown, text
+from taxel._base.arguments import flag, floats, instance, integer, number, parameters, several, shown, text
 from taxel._base.errors import refused
 from taxel._base.messages import escaped, plain
 from taxel.array import Array
@@ -32,12 +34,14 @@ class PlainRule(_Detector):
 
     Parameters
     ----------
-    quantity : {"area", "total", "local_load", "peak", "duration"}
+    quantity : {"area", "total", "local_load", "peak", "count", "range_count", "duration"}
         The number of loaded taxels, as `taxel.encode.ContactArea` counts them, of channels as `taxel.encode.TouchEnds`
         does; the sum of their values above rest in the sensor's unit, as `taxel.encode.Moments` adds them; the largest
         sum over 3 x 3 taxels above a rest that follows the sensor, in units of its noise, as of
         `taxel.encode.LocalLoad` ("largest"); the largest value of a taxel above such a rest, in units of that taxel's
-        noise, with what several add, as of `taxel.encode.Peak`; or how long a touch lasts, with the age "end". In
+        noise, with what several add, as of `taxel.encode.Peak`; how many taxels are above a level, added up over
+        `levels` above rest in the sensor's unit, or ("range_count") over `levels` in parts of each taxel's running
+        range (`taxel.encode.RunningRange`), which needs no rest; or how long a touch lasts, with the age "end". In
         single precision.
     threshold : float, above 0
         Number of taxels, the sensor's unit, units of noise, or ms.
@@ -47,6 +51,13 @@ class PlainRule(_Detector):
         How many frames in a row decide. 1 with `age_ms`.
     age_ms : float, ms, from 0 to 60 000, or "end", optional
         The age of a touch at which it decides.
+    levels : sequence of float, above 0, ascending
+        The levels of a count, and of no other quantity. A taxel is above a level until it is below seven tenths of it.
+    dated_at : float, in the unit of the threshold, from release x threshold to it, optional
+        `t` is when the quantity last rose to it before an onset, or fell below it before an end. `known` stays.
+    of_largest : bool
+        Whether `release` is a part of the largest value since the load began. Threshold and largest value are then
+        above a rest: 0 at first, where the quantity was as a load ended, and its least value since.
     labels : (str or None, str or None), optional
         Names of onset and end, default "contact" and "lift"; with `age_ms` of the kinds below the threshold and not
         below it. None: those are not reported.
@@ -80,6 +91,11 @@ class PlainRule(_Detector):
     Detections(2: contact 1, lift 1; 20000 to 50000 us)
     >>> found.known
     array([40000, 70000])
+
+    A count that rises to 2 after it was at most 0, dated at 1:
+
+    >>> PlainRule("count", 2, 0.25, levels=[5.0, 10.0], dated_at=1.0, labels=("contact", None))
+    PlainRule(count rises to 2 after at most 0, dated at 1; levels 5, 10: onset contact)
     """
 
     _WHAT = "plain rule"
@@ -92,6 +108,9 @@ class PlainRule(_Detector):
         frames: int = 1,
         age_ms: float | str | None = None,
         *,
+        levels: Sequence[float] = (),
+        dated_at: float | None = None,
+        of_largest: bool = False,
         labels: Sequence[str | None] | None = None,
         noise_floor: float = 3.0,
         unit: str | None = None,
@@ -107,6 +126,9 @@ class PlainRule(_Detector):
                         "threshold": number("threshold", threshold),
                         "release": number("release", release),
                         "frames": integer("frames", frames, 1, 2**31 - 1),
+                        "levels": floats("levels", levels),
+                        "dated_at": None if dated_at is None else number("dated_at", dated_at),
+                        "of_largest": flag("of_largest", of_largest),
                         "age_ms": age,
                         "labels": _labels(labels, age),
                         "noise_floor": number("noise_floor", noise_floor),
@@ -121,9 +143,16 @@ class PlainRule(_Detector):
     def _check(text: str) -> str:
         return _core.check_plain_rule(text)
 
+    @classmethod
+    def _from_parts(cls, parts: Mapping[str, Any]) -> PlainRule:
+        """Return the rule of checked parts."""
+        rule = cls.__new__(cls)
+        rule._hold(_core.make_plain_rule(parameters(parts)))
+        return rule
+
     @property
     def quantity(self) -> str:
-        """The quantity that is compared with the threshold: "area", "total", "local_load", "peak" or "duration"."""
+        """The quantity that is compared with the threshold."""
         return str(self._parts["quantity"])
 
     @property
@@ -140,6 +169,22 @@ class PlainRule(_Detector):
     def frames(self) -> int:
         """How many frames in a row decide."""
         return int(self._parts["frames"])
+
+    @property
+    def levels(self) -> tuple[float, ...]:
+        """The levels of a count; none of other quantities."""
+        return tuple(self._parts.get("levels", ()))
+
+    @property
+    def dated_at(self) -> float | None:
+        """The value at which `t` is dated, or None where that is the threshold, and release times the threshold."""
+        at = self._parts.get("dated_at")
+        return None if at is None else float(at)
+
+    @property
+    def of_largest(self) -> bool:
+        """Whether `release` is a part of the largest value since the load began."""
+        return bool(self._parts.get("of_largest", False))
 
     @property
     def age_ms(self) -> float | str | None:
@@ -165,7 +210,7 @@ class PlainRule(_Detector):
 
     @property
     def _needs_tare(self) -> bool:
-        return self.tare is None
+        return self.tare is None and self.quantity != "range_count"
 
     @property
     def array(self) -> Array | None:
@@ -179,21 +224,39 @@ class PlainRule(_Detector):
 
     def __repr__(self) -> str:
         first, second = self._parts["labels"]
-        frames = "1 frame" if self.frames == 1 else f"{self.frames} frames"
         if self.age_ms is not None:
             kinds = f"below it {first}, else {second}".replace("None", "nothing")
             when = "the end" if self.age_ms == "end" else f"{self.age_ms:g} ms"
             return escaped(f"PlainRule({self.quantity} {plain(self.threshold, 6)} at {when}: {kinds})")
         found = ", ".join(f"{name} {label}" for name, label in (("onset", first), ("end", second)) if label is not None)
-        threshold = plain(self.threshold, 6)
-        return escaped(f"PlainRule({self.quantity} >= {threshold}, release {self.release:g}, {frames}: {found})")
+        if self.levels:
+            return escaped(f"PlainRule({self._counted(rises=first is not None)}: {found})")
+        threshold, largest = plain(self.threshold, 6), " of the largest" * self.of_largest
+        return escaped(
+            f"PlainRule({self.quantity} >= {threshold}, release {self.release:g}{largest}, {self._framed}: {found})"
+        )
+
+    @property
+    def _framed(self) -> str:
+        return "1 frame" if self.frames == 1 else f"{self.frames} frames"
+
+    def _counted(self, *, rises: bool) -> str:
+        """Return what a rule of a count compares, at onsets or at ends."""
+        n, most = ceil(self.threshold), ceil(self.release * self.threshold) - 1
+        how = f"rises to {n} after at most {most}" if rises else f"falls to {most} after at least {n}"
+        dated = self.dated_at
+        at = "" if dated is None else f", dated at {ceil(dated) - (not rises)}"
+        frames = "" if self.frames == 1 else f", {self._framed}"
+        unit = " of the range" if self.quantity == "range_count" else f" {escaped(self.unit)}" * (self.unit is not None)
+        levels = ", ".join(f"{level:g}" for level in self.levels)
+        return f"count {how}{at}{frames}; levels {levels}{unit}"
 
     @property
     def _named_quantity(self) -> str:
         """The quantity, with the unit of its threshold where that is not a number of taxels."""
         noise = "units of noise"
-        units = {"area": None, "total": self.unit, "local_load": noise, "peak": noise, "duration": "ms"}
-        unit = units[self.quantity]
+        units = {"total": self.unit, "local_load": noise, "peak": noise, "duration": "ms"}
+        unit = units.get(self.quantity)
         return self.quantity if unit is None else f"{self.quantity} ({escaped(unit)})"
 
     def _compared(self) -> str:
@@ -203,11 +266,19 @@ class PlainRule(_Detector):
             kinds = f"below {plain(self.threshold, 3)} {below}, otherwise {above}"
             when = "of the touch, when it ends" if self.age_ms == "end" else f"{self.age_ms:g} ms after the onset"
             return f"one rule for both kinds, the {self._named_quantity} {when}: {kinds}"
-        frames = "1 frame" if self.frames == 1 else f"{self.frames} frames"
-        if self._parts["labels"][0] is None:
-            below = f"below {plain(self.release * self.threshold, 3)} after {plain(self.threshold, 3)} or more"
-            return f"{self._named_quantity} falls {below}, {frames}"
-        return f"{self._named_quantity} >= {plain(self.threshold, 6)}, release {self.release:g}, {frames}"
+        is_end = self._parts["labels"][0] is None
+        if self.levels:
+            return self._counted(rises=not is_end)
+        if is_end:
+            after = f"{plain(self.threshold, 3)} or more"
+            below = f"below {plain(self.release * self.threshold, 3)} after {after}"
+            if self.of_largest:
+                below = f"below {self.release:g} of its largest after {after} above a rest that follows"
+            return f"{self._named_quantity} falls {below}, {self._framed}"
+        largest = " of the largest" * self.of_largest
+        return (
+            f"{self._named_quantity} >= {plain(self.threshold, 6)}, release {self.release:g}{largest}, {self._framed}"
+        )
 
 
 def _labels(labels: object, age: float | str | None) -> list[str | None]:

@@ -65,8 +65,8 @@ def _alone(example: Example, floor: float, start: float, stop: float) -> int:
     """Return how many labels of a part have no begin or end of a touch near, and how many touches have no label."""
     source = example.source
     assert isinstance(source, Frames)
-    curve = _core.LoadCurve.of_frames("area", floor, source._parts(), None, tare_text(example.tare))
-    begins, ends = (np.asarray(edge[0], np.int64) for edge in curve.edges(1.0, 0.5, 1))
+    curve = _core.LoadCurve.of_frames("area", [], floor, source._parts(), None, tare_text(example.tare))
+    begins, ends = (np.asarray(edge[0], np.int64) for edge in curve.edges(1.0, 0.5, 1, None, False))
     labels = np.sort(np.concatenate([*example.labels.values(), np.empty(0, np.int64)]))
     labels = labels[(labels >= start) & (labels < stop)]
 

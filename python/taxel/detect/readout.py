@@ -44,8 +44,12 @@ class FittedLearner(Protocol):
     weights_: NDArray[np.float64]
 
 
+#: What detects the labels of a readout: for each what was better in training, or its plain rule, or its neuron.
+USES = ("better", "rule", "neuron")
+
+
 class Readout(_Detector):
-    """Hold trained neurons with names, and the encoder that they were trained behind.
+    """Hold trained neurons with names, the encoder that they were trained behind, and plain rules that may run instead.
 
     Parameters
     ----------
@@ -70,6 +74,10 @@ class Readout(_Detector):
     inputs : mapping of str to sequence of str, optional
         By label, the parts of a `taxel.encode.Composite` whose trains a neuron receives, in any order; its weights are
         one per train of these, in the encoder's order. A neuron that has none receives all trains.
+    rules : mapping of str to PlainRule, optional
+        By label, the plain rule of the same events. A tare that it holds is not kept.
+    by_rule : sequence of str
+        The labels that their rule detects, not their neuron.
 
     Raises
     ------
@@ -106,6 +114,8 @@ class Readout(_Detector):
         run_threshold: float = 1.0,
         delays_ms: ArrayLike = (0.0,),
         inputs: Mapping[str, Sequence[str]] | None = None,
+        rules: Mapping[str, PlainRule] | None = None,
+        by_rule: Sequence[str] = (),
     ) -> None:
         instance("encoder", encoder, Encoder)
         if not isinstance(neurons, Mapping) or not neurons:
@@ -141,6 +151,8 @@ class Readout(_Detector):
                         }
                         for label, trained_neuron in trained.items()
                     },
+                    "rules": _rule_parts({} if rules is None else mapping("rules", rules)),
+                    "by_rule": [text("by_rule", label) for label in several("by_rule", by_rule)],
                 }
             )
         )
@@ -222,8 +234,46 @@ class Readout(_Detector):
         return (inputs if received is None else inputs.select(received)).delayed(self.delays_ms)
 
     @property
+    def rules(self) -> dict[str, PlainRule]:
+        """The plain rules by label, of labels that have one."""
+        return {label: PlainRule._from_parts(parts) for label, parts in self._parts.get("rules", {}).items()}
+
+    @property
+    def by_rule(self) -> tuple[str, ...]:
+        """The labels that their plain rule detects, not their neuron; one without a rule is never detected."""
+        return tuple(self._parts.get("by_rule", ()))
+
+    def using(self, use: str) -> Readout:
+        """Return the readout with every label detected in one way.
+
+        Parameters
+        ----------
+        use : {"better", "rule", "neuron"}
+            What was better in training: the readout itself; its plain rule, or nothing where it has none; its neuron.
+
+        Returns
+        -------
+        Readout
+
+        Raises
+        ------
+        ProblemError : another word
+        """
+        text("use", use, USES)
+        return self if use == "better" else self._with(by_rule=list(self.labels) if use == "rule" else [])
+
+    def _with_rules(self, rules: Mapping[str, PlainRule | None], by_rule: Sequence[str]) -> Readout:
+        """Return the readout with other plain rules, and the labels that these detect."""
+        known = {label: rule for label, rule in rules.items() if rule is not None}
+        return self._with(rules=_rule_parts(known), by_rule=list(by_rule))
+
+    @property
     def _needs_tare(self) -> bool:
-        return any(part.tare is None for part in self.encoder._each() if hasattr(part, "tare"))
+        by_rule, rules = self.by_rule, self.rules
+        if any(rules[label]._needs_tare for label in by_rule if label in rules):
+            return True
+        runs = set(self.labels) - set(by_rule)
+        return bool(runs) and any(part.tare is None for part in self.encoder._each() if hasattr(part, "tare"))
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -284,7 +334,11 @@ class Readout(_Detector):
         Input, for each delay a `Delay` (where above 0) and a `Linear`, then `CubaLIF` (alpha kernel: both time
         constants equal) or `LIF` (exponential kernel).
         """
-        return write_nir(self._exchanged(), path, spike_ms=spike_ms, overwrite=overwrite)
+        lost = write_nir(self._exchanged(), path, spike_ms=spike_ms, overwrite=overwrite)
+        return [
+            *lost,
+            *(f"the plain rule that detects {label}: the graph has its neuron" for label in self.by_rule),
+        ]
 
     def _exchanged(self) -> Parts:
         """Return the parts that the exchange format is made of; weights of trains that a neuron lacks are 0."""
@@ -307,7 +361,8 @@ class Readout(_Detector):
         taxels = "" if array is None else f" on {array.rows} x {array.columns} taxels"
         threshold = "" if self.run_threshold == 1.0 else f", threshold x {self.run_threshold:g}"
         return escaped(
-            f"Readout({', '.join(self.labels)}; {self.encoder!r}{taxels}; {self.time}, {self.after_spike}{threshold})"
+            f"Readout({', '.join(self.labels)}; {self.encoder!r}{taxels}; {self.time}, {self.after_spike}{threshold}"
+            f"{f'; by rule: {by_rule}' if (by_rule := ', '.join(self.by_rule)) else ''})"
         )
 
 
@@ -372,7 +427,7 @@ def run_counting(
 ) -> tuple[Detections, int | None]:
     """Return what `run` returns, and how many of it have an input outside the range that it had in training.
 
-    None where that is not known: of a plain rule, of a readout whose file does not hold the range, of spike trains.
+    None where that is not known: of plain rules, of a readout whose file does not hold the range, of spike trains.
     Nothing is detected before `begin_us`, the end of a fresh tare, as live; spike trains have none.
     """
     text = detector("readout", readout)._at_noise_of(tare).to_json()
@@ -416,8 +471,23 @@ def _receives(encoder: Encoder, trained: TrainedNeuron, array: Array | None, del
     return np.tile(encoder.places(trained.inputs, array or Array(1, 1)), delays)
 
 
+def _rule_parts(rules: Mapping[str, Any]) -> dict[str, Any]:
+    """Return plain rules as parts of a readout's file, which holds what the data of their training were like."""
+    parts = {text("label", label): instance(f"{label}: rule", rule, PlainRule)._parts for label, rule in rules.items()}
+    return {
+        label: {name: part for name, part in of_rule.items() if name not in ("format", "version", "tare", "training")}
+        for label, of_rule in parts.items()
+    }
+
+
 def _run_spikes(readout: Readout, trains: SpikeTrains) -> Detections:
     """Return what the neurons of a readout detect in the spikes that its encoder made."""
+    if readout.by_rule:
+        raise refused(
+            "source",
+            f" is {shown(trains)}: has no load for the plain rule of {', '.join(readout.by_rule)}; "
+            'Readout.using("neuron") runs the neurons',
+        )
     detections = Detections([], [], [])
     for label, trained in readout.neurons.items():
         inputs = readout.trains_of(label, trains)

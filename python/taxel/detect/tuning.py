@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._base.arguments import finite, number, several, text
 from taxel._base.progress import Progress, reporting
+from taxel._core import ProblemError
 from taxel.detect.examples import Example, check_examples
-from taxel.detect.loads import FoundTimes, Loads, Stretch, clock_of
+from taxel.detect.loads import EdgeRule, FoundTimes, Loads, Stretch, clock_of, lacks
 from taxel.detect.plain_rule import PlainRule
-from taxel.spikes import SpikeTrains, to_us
+from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: Thresholds of the area, taxels.
 AREAS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
-#: Thresholds of the total: these quantiles of all its values above 0.
-QUANTILES = tuple(np.linspace(0.0, 0.95, 20).tolist())
+#: Thresholds of the total: steps of a ladder with so many a decade, between these quantiles of its values above 0.
+TOTALS_A_DECADE, QUANTILES = 8, (0.0, 0.95)
 #: Thresholds of the local load, units of noise.
 LOCAL_LOADS = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
 #: Thresholds of the peak, units of noise.
@@ -29,15 +30,36 @@ PEAKS = (4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 24.0, 32.0, 48.0)
 RELEASES = (0.5, 1.0)
 #: How many frames in a row decide.
 FRAMES = (1, 2, 5, 10, 20)
+#: Parts of its largest value below which a load ends, where its rest follows; and how many frames in a row decide then.
+OF_LARGEST, FRAMES_OF_LARGEST = (0.1, 0.25, 0.5, 0.75), (1, 5)
+#: Levels of a count by the unit: thesis 6.5.3.
+LEVELS = {"N": (5.0, 10.0, 20.0, 30.0, 40.0, 50.0)}
+#: Levels of a count from the data: these quantiles of what loaded taxels read, to two digits; most are low, where loads
+#: begin and end.
+LEVEL_QUANTILES = tuple(np.geomspace(0.01, 0.5, 6).tolist())
+#: Levels of a count in parts of the running range, as of the recipe gait_channel.
+RANGE_LEVELS = (0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.11, 0.15, 0.2, 0.3, 0.45)
+#: Numbers that a count rises to, or falls from.
+COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 24, 32, 48, 64, 96, 128, 192, 256)
+#: The numbers that it was at most before it, or falls to, as parts of it, beside one less.
+COUNT_RELEASES = (0.0, 0.25, 0.5, 0.75)
+#: At so many numbers between the two a detection is dated.
+DATES = 6
 #: Ages at which kinds are decided, ms.
 AGES_MS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 16.0, 20.0, 30.0, 50.0)
+#: Rules are equally often right whose missed and false differ by at most that share of the labels: more is noise.
+EQUAL_SHARE = 0.002
+#: Of these counts how many detections are so near to their label, us.
+NEAR_US = 10_000
 
 
 class _RuleFit(NamedTuple):
-    """How a rule does: the less, the better."""
+    """How a rule does."""
 
     wrong: int
     """Missed and false."""
+    near: int
+    """How many of those that were found are within `NEAR_US` of their label."""
     delay_ms: float
     """Median distance of `known` from the label of those that were found; infinite without any."""
     error_ms: float
@@ -59,19 +81,28 @@ def tune(
 ) -> dict[str, PlainRule | None]:
     """Return for each label the plain rule with the fewest missed and false detections, and of these the nearest one.
 
-    Nearest at the median of `known`, before the label as after it: what is known earlier responds to something else.
+    Of rules whose missed and false differ by at most .2 % of the labels, the one counts with the most detections within
+    10 ms of their label, and of these the one whose `known` is nearest to it at the median, before as after it: what is
+    known earlier responds to something else.
 
-    Tried are all thresholds of the area (`AREAS`), of the total (`QUANTILES` of its values above 0), of the local load
-    (`LOCAL_LOADS`) and of the peak (`PEAKS`), with all numbers of frames (`FRAMES`) and releases (`RELEASES`), at the
-    onset and at the end of a load; of channels those of the peak alone. Two labels are kinds where exactly two are
-    nearer to onsets than to ends, or where there are only two: then thresholds of the area at each of `AGES_MS` are
-    tried too, on a logarithmic scale, and thresholds of the duration as touches end, and hold for both where they are
-    better for both together. Each frame that holds at one of these ages counts once.
+    Tried are thresholds of the area (`AREAS`), of the total (`TOTALS_A_DECADE`), of the local load (`LOCAL_LOADS`) and
+    of the peak (`PEAKS`), with all numbers of frames (`FRAMES`) and releases (`RELEASES`), at the onset and at the end
+    of a load; of channels those of peak and total alone. Of frames so are thresholds of total and peak with ends at
+    parts of what they were at most (`OF_LARGEST`), and counts of levels that are on: levels by the unit (`LEVELS`), by
+    what loaded taxels read (`LEVEL_QUANTILES`) and in parts of the running range (`RANGE_LEVELS`), of which a load
+    begins where the count rises to one number after it was at most another, and ends likewise, dated at a number
+    between them.
+
+    Two labels are kinds where exactly two are nearer to onsets than to ends, or where there are only two: then
+    thresholds of the area at each of `AGES_MS` are tried too, on a logarithmic scale, and thresholds of the duration as
+    touches end, and hold for both where they are better for both together. Each frame that holds at one of these ages
+    counts once.
 
     Parameters
     ----------
     examples : sequence of Example
-        A label that an example lacks is not in it. Sources that are spike trains have no load.
+        A label that an example lacks is not in it. Sources that are spike trains have no load; without a tare there are
+        only counts by running range. Rules of the quantity whose thresholds the labels are (`Example`) are not tried.
     labels : sequence of str, optional
         Those to find rules for; default: all.
     window_ms : float, ms, 0 or more
@@ -89,12 +120,13 @@ def tune(
 
     Raises
     ------
-    ProblemError : examples that are invalid or without a tare
+    ProblemError : examples that are invalid, or events without a tare
 
     Notes
     -----
-    If rules are equal, the first counts: area before total before local load before peak, low thresholds before high,
-    few frames before many. A rule that misses and invents as many as there are labels is no better than none.
+    If rules are equal, the first counts: area before total before local load before peak before counts, low thresholds
+    before high, few frames before many. A rule that misses and invents as many as there are labels is no better than
+    none.
 
     Examples
     --------
@@ -116,87 +148,213 @@ def tune(
     floor = number("noise_floor", noise_floor)
     if any(isinstance(example.source, SpikeTrains) for example in sound):
         return dict.fromkeys(names)
-    loads = Loads(sound, clocks, floor, report)
-    return best_rules(loads, names, loads.whole_examples, width_ms)
+    if why := lacks(sound):
+        raise ProblemError(why)
+    tuning = Tuning(Loads(sound, clocks, floor, report), names, width_ms)
+    return tuning.best_rules(tuning.loads.whole_examples)
 
 
-def best_rules(
-    loads: Loads, names: Sequence[str], parts: Sequence[Stretch], window_ms: float
-) -> dict[str, PlainRule | None]:
-    """Return for each label the best rule on parts of the examples, as `tune` does on all of them."""
-    width_us = round(float(to_us(window_ms)))
-    truth = {name: loads.truth(name, parts) for name in names}
-    best = _at_edges(loads, parts, truth, width_us)
-    onsets = [name for name, (onset, end) in best.items() if onset.fit.error_ms < end.fit.error_ms]
-    single = {name: min(pair, key=lambda tuned: tuned.fit[:2]) for name, pair in best.items()}
-    kinds = onsets if len(onsets) == 2 else list(names) if len(names) == 2 else []
-    if kinds:
-        windows = loads.windows(loads.labelled(kinds, parts))
-        touches: dict[float | str, FoundTimes] = {
-            age: loads.at_age(age).between(windows) for age in loads.ages_ms(AGES_MS)
-        }
-        # What is known last is tried last.
-        touches["end"] = loads.at_end().between(windows)
-        found = _for_kinds(touches, kinds, truth, width_us, loads.noise_floor, loads.unit)
-        if found is not None and sum(fit.wrong for fit, _ in found) < sum(single[name].fit.wrong for name in kinds):
-            single |= dict(zip(kinds, found, strict=True))
-    return {name: tuned.rule if tuned.fit.wrong < len(truth[name]) else None for name, tuned in single.items()}
+class _Outcomes(NamedTuple):
+    """What a rule made of the labels of one name: a row each label, then one each false detection."""
+
+    t: NDArray[np.int64]
+    """The label, or the false detection, us on the one clock."""
+    error_ms: NDArray[np.float32]
+    """How far its detection is from a label; NaN of one that is missed, infinite of a false detection."""
+    delay_ms: NDArray[np.float32]
+    """How far `known` is from it; likewise."""
 
 
-def _points(loads: Loads, parts: Sequence[Stretch]) -> Iterator[tuple[str, float, float, int]]:
-    """Yield the grid: quantity, threshold, release, frames; those that delay least first."""
-    totals = loads.values("total", parts) if "total" in loads.quantities else np.empty(0)
+class Tuning:
+    """Find the best rules on parts of examples; what each rule does in all of them is computed once.
+
+    Parameters
+    ----------
+    loads : Loads
+    names : sequence of str
+        The labels to find rules for.
+    window_ms : float
+        Largest distance of a detection from its label.
+    """
+
+    def __init__(self, loads: Loads, names: Sequence[str], window_ms: float) -> None:
+        self.loads, self._names, self._width_us = loads, list(names), round(float(to_us(window_ms)))
+        self._truth = {name: loads.truth(name, loads.labelled([name], loads.whole_examples)) for name in names}
+        self._outcomes: dict[EdgeRule, dict[tuple[str, int], _Outcomes]] = {}
+
+    def best_rules(self, parts: Sequence[Stretch], only: str | None = None) -> dict[str, PlainRule | None]:
+        """Return for each label the best rule on parts of the examples, as `tune` does on all of them.
+
+        `only`: rules of this quantity are tried alone, also where labels are thresholds of it.
+        """
+        truth = {name: self.loads.truth(name, parts) for name in self._names}
+        points = list(_points(self.loads, parts, only))
+        best = {name: self._at_edges(name, points, parts) for name in self._names}
+        onsets = [name for name, (onset, end) in best.items() if onset.fit.error_ms < end.fit.error_ms]
+        single = {name: _better(pair, len(truth[name])) for name, pair in best.items()}
+        kinds = onsets if len(onsets) == 2 else self._names if len(self._names) == 2 else []
+        if kinds and only is None and self.loads.have_rest:
+            windows = self.loads.windows(self.loads.labelled(kinds, parts))
+            touches: dict[float | str, FoundTimes] = {
+                age: self.loads.at_age(age).between(windows) for age in self.loads.ages_ms(AGES_MS)
+            }
+            # What is known last is tried last.
+            touches["end"] = self.loads.at_end().between(windows)
+            found = _for_kinds(touches, kinds, truth, self._width_us, self.loads.noise_floor, self.loads.unit)
+            if found is not None and sum(fit.wrong for fit, _ in found) < sum(single[name].fit.wrong for name in kinds):
+                single |= dict(zip(kinds, found, strict=True))
+        return {name: tuned.rule if tuned.fit.wrong < len(truth[name]) else None for name, tuned in single.items()}
+
+    def _at_edges(self, name: str, points: Sequence[EdgeRule], parts: Sequence[Stretch]) -> tuple[_Best, _Best]:
+        """Return the best rule for a label at onsets, and the best at ends."""
+        windows = self.loads.windows(self.loads.labelled([name], parts))
+        onset, end = (self._best_at(name, edge, points, windows) for edge in (0, 1))
+        return onset, end
+
+    def _best_at(self, name: str, edge: int, points: Sequence[EdgeRule], windows: Sequence[tuple[int, int]]) -> _Best:
+        """Return the best rule for a label at one edge of loads, in windows on the one clock."""
+        tried = [(point, found) for point in points if (found := self._found(point).get((name, edge))) is not None]
+        rule, fit = EdgeRule("peak", 4.0), _RuleFit(2**62, 0, np.inf, np.inf)
+        if tried:
+            k, fit = _best_of([found for _, found in tried], windows, len(self._truth[name]))
+            rule = tried[k][0]
+        labels_of = [name, None] if edge == 0 else [None, name]
+        how: dict[str, Any] = {"labels": labels_of, "noise_floor": self.loads.noise_floor, "unit": self.loads.unit}
+        return _Best(fit, PlainRule(**rule._asdict(), **how))
+
+    def _found(self, point: EdgeRule) -> dict[tuple[str, int], _Outcomes]:
+        """Return what a rule makes of each label at either edge; none where that is no better than nothing."""
+        if point not in self._outcomes:
+            self._outcomes[point] = {}
+            for edge, edges in enumerate(self.loads.edges(point)):
+                for name, true in self._truth.items():
+                    windows = self.loads.windows(self.loads.labelled([name], self.loads.whole_examples))
+                    outcomes = _outcomes(edges.between(windows), true, self._width_us)
+                    if outcomes is not None:
+                        self._outcomes[point][name, edge] = outcomes
+        return self._outcomes[point]
+
+
+def _points(loads: Loads, parts: Sequence[Stretch], only: str | None) -> Iterator[EdgeRule]:
+    """Yield the grid, those that delay least first."""
+    if loads.have_rest:
+        # Channels have no local load, and their area shows edges no better than the peak.
+        quantities: tuple[str, ...] = (
+            ("peak", "total") if loads.are_channels else ("area", "total", "local_load", "peak")
+        )
+        if only is not None:
+            quantities = (only,)
+        else:
+            quantities = tuple(quantity for quantity in quantities if quantity not in loads.labels_of)
+        totals = loads.values("total", parts) if "total" in quantities else np.empty(0)
+        thresholds = {"area": AREAS, "total": _ladder(totals), "local_load": LOCAL_LOADS, "peak": PEAKS}
+        for quantity in quantities:
+            for threshold, frames, release in product(thresholds[quantity], FRAMES, RELEASES):
+                yield EdgeRule(quantity, threshold, release, frames)
+        for quantity in ("total", "peak"):
+            if quantity not in quantities or not loads.are_frames:
+                continue
+            for threshold, frames, release in product(thresholds[quantity][::2], FRAMES_OF_LARGEST, OF_LARGEST):
+                yield EdgeRule(quantity, threshold, release, frames, of_largest=True)
+    if loads.are_frames and only is None:
+        for quantity, levels in _levels(loads, parts):
+            yield from _counts(quantity, levels, loads.values(quantity, parts, levels))
+
+
+def _ladder(totals: NDArray[np.float64]) -> tuple[float, ...]:
+    """Return thresholds of the total, which are the same for most parts of the same data."""
     totals = totals[totals > 0.0]
-    by_total = np.unique(np.quantile(totals, QUANTILES)).tolist() if len(totals) else []
-    thresholds = {"area": AREAS, "total": by_total, "local_load": LOCAL_LOADS, "peak": PEAKS}
-    for quantity in loads.quantities:
-        for threshold, frames, release in product(thresholds[quantity], FRAMES, RELEASES):
-            yield quantity, threshold, release, frames
+    if not len(totals):
+        return ()
+    low, high = TOTALS_A_DECADE * np.log10(np.quantile(totals, QUANTILES))
+    steps = np.arange(np.floor(low), np.ceil(high) + 1)
+    return tuple(float(f"{step:.3g}") for step in 10.0 ** (steps / TOTALS_A_DECADE))
 
 
-def _at_edges(
-    loads: Loads, parts: Sequence[Stretch], truth: Mapping[str, NDArray[np.int64]], width_us: int
-) -> dict[str, tuple[_Best, _Best]]:
-    """Return for each label the best rule at onsets and the best at ends."""
-    worst = _RuleFit(2**62, np.inf, np.inf)
-    fits = {name: [worst, worst] for name in truth}
-    points: dict[str, list[tuple[str, float, float, int]]] = {name: [("peak", 4.0, 1.0, 1)] * 2 for name in truth}
-    windows: dict[tuple[tuple[int, int], ...], list[str]] = {}
-    for name in truth:
-        windows.setdefault(tuple(loads.windows(loads.labelled([name], parts))), []).append(name)
-    for point, (inside, names) in product(_points(loads, parts), windows.items()):
-        for edge, edges in enumerate(loads.edges(*point)):
-            found = edges.between(inside)
-            for name in names:
-                true = truth[name]
-                fit = _fit(found, true, width_us, fits[name][edge].wrong)
-                if fit is not None and fit[:2] < fits[name][edge][:2]:
-                    fits[name][edge] = fit
-                    points[name][edge] = point
-
-    def rule(name: str, edge: int) -> _Best:
-        labels = [name, None] if edge == 0 else [None, name]
-        how: dict[str, Any] = {"labels": labels, "noise_floor": loads.noise_floor, "unit": loads.unit}
-        return _Best(fits[name][edge], PlainRule(*points[name][edge], **how))
-
-    return {name: (rule(name, 0), rule(name, 1)) for name in truth}
+def _levels(loads: Loads, parts: Sequence[Stretch]) -> Iterator[tuple[str, tuple[float, ...]]]:
+    """Yield the levels of counts that are tried, each with its quantity."""
+    readings = loads.readings(parts) if loads.have_rest else np.empty(0)
+    if len(readings):
+        if loads.unit in LEVELS:
+            yield "count", LEVELS[loads.unit]
+        yield "count", tuple(sorted({float(f"{level:.2g}") for level in np.quantile(readings, LEVEL_QUANTILES)}))
+    yield "range_count", RANGE_LEVELS
 
 
-def _fit(found: FoundTimes, true: NDArray[np.int64], width_us: int, most: int = 2**62) -> _RuleFit | None:
-    """Return how detections fit labels; None where more are wrong than `most`, which their number alone may show."""
-    t, known, _ = found
-    if abs(len(t) - len(true)) > most:
+def _counts(quantity: str, levels: tuple[float, ...], counts: NDArray[np.float64]) -> Iterator[EdgeRule]:
+    """Yield rules of a count: rise to n after at most r, or fall to r after at least n, dated at a number between."""
+    most = counts.max(initial=0.0)
+    for n in COUNTS:
+        if n > most:
+            return
+        for r in sorted({int(part * n) for part in COUNT_RELEASES} | {n - 1}):
+            for dated_at in sorted({int(at) for at in np.linspace(r + 1, n, min(DATES, n - r))}, reverse=True):
+                yield EdgeRule(quantity, n, (r + 0.5) / n, levels=levels, dated_at=float(dated_at))
+
+
+def _outcomes(found: FoundTimes, true: NDArray[np.int64], width_us: int) -> _Outcomes | None:
+    """Return what detections make of labels; None where they are no better than none."""
+    t = found.t
+    if not len(true) or abs(len(t) - len(true)) >= len(true):
         return None
-    label = [""] * len(t)
-    parts = (label, t, known, np.full(len(t), np.nan), np.zeros(len(t), bool))
+    tally = _tally(found, true, width_us)
+    assert tally is not None
+    missed, false = tally.missed_events, tally.false_detections
+    if len(missed) + len(false) >= len(true):
+        return None
+    lost = np.full(len(missed), np.nan), np.full(len(false), np.inf)
+    errors, delays = (np.abs(ms) for ms in (tally.errors_ms, tally.delays_ms))
+    return _Outcomes(
+        np.concatenate([true[tally.events], true[missed], t[false]]),
+        np.concatenate([errors, *lost]).astype(np.float32),
+        np.concatenate([delays, *lost]).astype(np.float32),
+    )
+
+
+def _best_of(several: Sequence[_Outcomes], windows: Sequence[tuple[int, int]], labels: int) -> tuple[int, _RuleFit]:
+    """Return the place of the best rule in windows on the one clock, which ascend and have so many labels."""
+    rule = np.repeat(np.arange(len(several)), [len(outcomes.t) for outcomes in several])
+    t, errors, delays = (np.concatenate(column) for column in zip(*several, strict=True))
+    inside = np.searchsorted(np.array(windows, np.int64).reshape(-1), t, side="right") % 2 == 1
+    rule, errors, delays = rule[inside], errors[inside], delays[inside]
+    found = np.isfinite(errors)
+    wrong, near = (np.bincount(rule[of], minlength=len(several)) for of in (~found, errors <= to_ms(NEAR_US)))
+    equal = np.flatnonzero(wrong <= wrong.min() + EQUAL_SHARE * labels)
+    fits = {}
+    for k in equal[near[equal] == near[equal].max()].tolist():
+        mine = found & (rule == k)
+        fits[k] = _RuleFit(int(wrong[k]), int(near[k]), _median(delays[mine]), _median(errors[mine]))
+    best = min(fits, key=lambda k: (fits[k].delay_ms, k))
+    return best, fits[best]
+
+
+def _better(pair: tuple[_Best, _Best], labels: int) -> _Best:
+    """Return the better of two rules for so many labels; the first where they are equal."""
+    least = min(tuned.fit.wrong for tuned in pair)
+    equal = [tuned for tuned in pair if tuned.fit.wrong <= least + EQUAL_SHARE * labels]
+    return min(equal, key=lambda tuned: (-tuned.fit.near, tuned.fit.delay_ms))
+
+
+def _median(values: NDArray[np.float32]) -> float:
+    return float(np.median(values)) if len(values) else np.inf
+
+
+def _tally(found: FoundTimes, true: NDArray[np.int64], width_us: int) -> _core.Tally | None:
+    """Return how detections pair with labels; None without any of both."""
+    t, known, _ = found
+    parts = ([""] * len(t), t, known, np.full(len(t), np.nan), np.zeros(len(t), bool))
     tallies = _core.score(parts, [""] * len(true), true, np.full(len(true), width_us, np.int64))
-    if not tallies:
-        return _RuleFit(0, np.inf, np.inf)
-    tally = tallies[0]
+    return tallies[0] if tallies else None
+
+
+def _fit(found: FoundTimes, true: NDArray[np.int64], width_us: int) -> _RuleFit:
+    """Return how detections fit labels."""
+    tally = _tally(found, true, width_us)
+    if tally is None:
+        return _RuleFit(0, 0, np.inf, np.inf)
     wrong = len(tally.missed_events) + len(tally.false_detections)
-    if not len(tally.delays_ms):
-        return _RuleFit(wrong, np.inf, np.inf)
-    return _RuleFit(wrong, float(np.median(np.abs(tally.delays_ms))), float(np.median(np.abs(tally.errors_ms))))
+    errors, delays = np.abs(tally.errors_ms), np.abs(tally.delays_ms)
+    return _RuleFit(wrong, int(np.count_nonzero(errors <= to_ms(NEAR_US))), _median(delays), _median(errors))
 
 
 def _for_kinds(
@@ -216,20 +374,19 @@ def _for_kinds(
     is_second = (np.arange(len(times)) >= len(truth[kinds[0]]))[order]
     chosen: tuple[tuple[int, float], list[_Best]] | None = None
     for age, (t, known, areas) in touches.items():
-        parts = ([""] * len(t), t, known, np.full(len(t), np.nan), np.zeros(len(t), bool))
-        tallies = _core.score(parts, [""] * len(times), times[order], np.full(len(times), width_us, np.int64))
-        pairs = (tallies[0].detected, tallies[0].events) if tallies else (np.empty(0, np.int64), np.empty(0, np.int64))
-        second = is_second[pairs[1]]
+        tally = _tally(FoundTimes(t, known, areas), times[order], width_us)
+        detected, events = (np.empty(0, np.int64),) * 2 if tally is None else (tally.detected, tally.events)
+        second = is_second[events]
         if second.all() or not second.any():
             continue
-        threshold, flipped = _between(areas[pairs[0]], second)
+        threshold, flipped = _between(areas[detected], second)
         below, above = reversed(kinds) if flipped else kinds
         fits = {}
         for name, is_kind in ((below, areas < threshold), (above, areas >= threshold)):
             fits[name] = _fit(FoundTimes(t[is_kind], known[is_kind], areas[is_kind]), truth[name], width_us)
         quantity = "duration" if age == "end" else "area"
         rule = PlainRule(quantity, threshold, age_ms=age, labels=(below, above), noise_floor=floor, unit=unit)
-        best = [_Best(fit, rule) for name in kinds if (fit := fits[name]) is not None]
+        best = [_Best(fits[name], rule) for name in kinds]
         rank = (sum(tuned.fit.wrong for tuned in best), max(tuned.fit.delay_ms for tuned in best))
         if chosen is None or rank < chosen[0]:
             chosen = (rank, best)

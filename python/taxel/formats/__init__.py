@@ -35,17 +35,21 @@ class Format:
         Returns the files of this format in a folder, or the file itself, in order; empty if there are none.
     trials : function
         Yields the trials of a folder or a file; those of an event camera by a `Reduction`.
+    labels_of : str
+        The quantity of plain rules whose thresholds the reference events are, as they were derived from it; or "".
     """
 
     about: str
     files: Callable[[Path], list[Path]]
     trials: Callable[..., Iterator[Trial]]
+    labels_of: str = ""
 
 
 def _of(name: str) -> Format:
-    """Return the format that a module defines: the first line of its docstring, `files` and `trials`."""
+    """Return the format that a module defines: the first line of its docstring, `files`, `trials`, any `LABELS_OF`."""
     module = import_module(f"taxel.formats.{name}")
-    return Format((module.__doc__ or "").split("\n", maxsplit=1)[0], module.files, module.trials)
+    about, labels_of = (module.__doc__ or "").split("\n", maxsplit=1)[0], getattr(module, "LABELS_OF", "")
+    return Format(about, module.files, module.trials, labels_of)
 
 
 #: Every format by name, in the order in which they are tried on a folder. A new format is a module and a name here.

@@ -25,6 +25,8 @@ from taxel.frames import Frames
 
 __all__ = ["contacts", "files", "trials"]
 
+#: Reference events are where this quantity of a foot passes thresholds.
+LABELS_OF = "total"
 _NAME = re.compile(r"((Ga|Si|Ju)(Co|Pt)\d+)_\d+\.txt(\.gz)?")
 _COLUMNS = [
     "time",

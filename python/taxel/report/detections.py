@@ -139,7 +139,7 @@ def _tables(
         for label in labels:
             rule = rules[label]
             of_rule = None if rule is None or together is None else together[label]
-            beside.append(("neuron", label, "", scored.together[label]))
+            beside.append(("neuron", label, "", (scored.neurons or scored.together)[label]))
             beside.append(("no plain rule" if rule is None else rule._compared(), label, "", of_rule))
         tables.append(("Neuron and plain rule, on the same labels", beside))
     if held_out:
@@ -173,8 +173,9 @@ def _of_label(
     readout: Readout | PlainRule, listened: Sequence[Outcome], label: str, moments: list[_Moment]
 ) -> Iterable[Figure | None]:
     """Yield the pictures of a label: potential around its moments, errors and weights; a rule has only errors."""
-    if isinstance(readout, Readout) and moments:
-        yield _potential(readout, label, moments)
+    by_neuron = readout if isinstance(readout, Readout) and label not in readout.by_rule else None
+    if by_neuron is not None and moments:
+        yield _potential(by_neuron, label, moments)
     errors = [
         outcome.score[label].errors_ms for outcome in listened if outcome.score and label in outcome.score.by_label
     ]
@@ -184,8 +185,8 @@ def _of_label(
         axis.axvline(0, color=_QUIET, linewidth=0.8)
         axis.set(xlabel="time minus true, ms", ylabel="events")
         yield figure
-    if isinstance(readout, Readout):
-        yield _weights(readout, listened[0], label)
+    if by_neuron is not None:
+        yield _weights(by_neuron, listened[0], label)
 
 
 def _moments(listened: Sequence[Outcome], label: str) -> list[_Moment]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from taxel._base.arguments import finite, instance, shown
+from taxel._base.arguments import finite, instance, shown, text
 from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Progress, reporting
@@ -19,7 +19,7 @@ from taxel.detect import Example, Outcome, PlainRule, Readout, Score, drift, rec
 from taxel.detect.clock import off_detections
 from taxel.detect.detector import detector
 from taxel.detect.examples import check_examples, unreliable
-from taxel.detect.readout import run_counting
+from taxel.detect.readout import USES, run_counting
 from taxel.detect.scoring import many_wrong, score_together
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
@@ -65,6 +65,8 @@ class DetectOptions:
         Largest distance of a detection from its event.
     shift_ms : float, ms
         By how much labels of the truth are moved before all else, as those of another clock; later is positive.
+    use : {"better", "rule", "neuron"}
+        What detects each label of a readout: what was better in training, its plain rule, or its neuron.
 
     Raises
     ------
@@ -80,6 +82,7 @@ class DetectOptions:
     frame_us: float | None = None
     window_ms: float = 50.0
     shift_ms: float = 0.0
+    use: str = "better"
 
     def __post_init__(self) -> None:
         """Refuse values that no recordings could make valid, before these are read."""
@@ -87,6 +90,7 @@ class DetectOptions:
         finite("frame_us", 1.0 if self.frame_us is None else self.frame_us, "us", least=1.0, most=3.6e9)
         finite("window_ms", self.window_ms, "ms", least=0.0)
         check_shift(self.shift_ms)
+        text("use", self.use, USES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +152,8 @@ class Detecting:
         The sources that no row of the truth names, by label, where rows name sources: they are not scored for it. No
         sources: the truth has no label of that name, so nothing is scored for it.
     window_ms, shift_ms : float, ms
+    use : str
+        As asked (`DetectOptions`).
     unreliable : tuple of str
         The labels whose score is too bad to rely on, in all recordings or in some.
     warnings : tuple of str
@@ -161,6 +167,7 @@ class Detecting:
     unlabelled: Mapping[str, tuple[str, ...]]
     window_ms: float
     shift_ms: float = 0.0
+    use: str = "better"
     unreliable: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
@@ -175,6 +182,7 @@ class Detecting:
         result: dict[str, Any] = {
             "recordings": [each.to_dict() for each in self.each],
             "left_out": list(self.left_out),
+            "use": self.use,
             "warnings": [*self.unreliable, *self.warnings],
         }
         if self.score is None:
@@ -236,6 +244,7 @@ def detect(
     """
     detector("readout", readout)
     options = DetectOptions() if options is None else instance("options", options, DetectOptions)
+    readout = _used(readout, options.use)
     update = reporting(progress)
     opened = sensors_of(recordings)
     with collected() as warnings:
@@ -289,8 +298,17 @@ def detect(
         if with_labels
         else ()
     )
-    how = options.window_ms, options.shift_ms
+    how = options.window_ms, options.shift_ms, options.use
     return Detecting(each, together, tuple(unknown), unlabelled, *how, bad, tuple(warnings), names)
+
+
+def _used(readout: Readout | PlainRule, use: str) -> Readout | PlainRule:
+    """Return what detects, as asked."""
+    if isinstance(readout, Readout):
+        return readout.using(use)
+    if use == "neuron":
+        raise refused("use", " is 'neuron': must be 'better' or 'rule', because a plain rule is given")
+    return readout
 
 
 def _score_of(outcomes: Sequence[Outcome], window_ms: float) -> Score:

@@ -14,18 +14,18 @@ from taxel._base.errors import helped, refused
 from taxel._base.messages import collected, warn
 from taxel._base.progress import Forecast, Progress, reporting
 from taxel._core import ProblemError
-from taxel.detect import Example, Judged, Outcome, Recipe, judge, recipes, score
+from taxel.detect import Example, Judged, Outcome, Readout, Recipe, judge, recipes, score
 from taxel.detect.clock import off_loads
-from taxel.detect.drift import error_ms, training_data
+from taxel.detect.drift import training_data
 from taxel.detect.examples import check_examples, sizes_of
 from taxel.detect.fitting import Trained, fit_aligned
 from taxel.detect.floors import measured_floor
-from taxel.detect.folds import count_of_folds
+from taxel.detect.folds import count_of_folds, judge_by_training
 from taxel.detect.loads import clock_of
-from taxel.detect.plain_score import plain_score
 from taxel.detect.readout import run_counting
-from taxel.detect.scoring import many_wrong, mistakes_of, score_together
+from taxel.detect.scoring import many_wrong
 from taxel.events import Events
+from taxel.formats import FORMATS
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
@@ -140,6 +140,10 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     plan = options._plan(names)
     assert plan is not None
     examples = _examples(opened, labelled, without, options.tare, plan)
+    if labels == "notes":
+        examples = [
+            example._replace(labels_of=_labels_of(each)) for example, each in zip(examples, opened, strict=True)
+        ]
     if sizes := sizes_of(examples):
         smallest, largest = ("{} x {}".format(*extreme) for extreme in (sizes[0], np.max(sizes, axis=0)))
         warn(
@@ -148,6 +152,11 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     plan = options._plan(names, measured_floor(examples))
     assert plan is not None
     return replace(_Work(opened, examples, options, update).training(plan), unlabelled=unlabelled)
+
+
+def _labels_of(recording: Recording) -> str:
+    """Return the quantity whose thresholds the reference events of a recording's format are; "" if there is none."""
+    return FORMATS[recording.kind].labels_of if recording.kind in FORMATS else ""
 
 
 def _named(labels: GivenLabels) -> str:
@@ -246,22 +255,22 @@ class _Work:
                 if folds is not None:
                     raise
                 count, why = 0, f"a part of the training data cannot be learnt from: {error}"
-        outcomes = self._outcomes(trained)
-        trained_on = _own(outcomes, window_ms)
         sound = check_examples(self.examples)
         if scored is None:
-            truths = [outcome.example.labels for outcome in outcomes]
-            loads = sound, list(truths[0]), [clock_of(example) for example in self.examples]
-            scored = replace(trained_on, plain=plain_score(*loads, [], truths, window_ms, self.update))
-        data = training_data(sound, scored.together)
-        trained = trained._replace(readout=trained.readout._with(training=data))
-        if scored.plain is not None:
-            late = scored.plain.together or scored.together
-            data = data | {"error_ms": error_ms(late)}
-            rules = {label: rule and rule._with(training=data) for label, rule in scored.plain.rules.items()}
-            scored = replace(scored, plain=replace(scored.plain, rules=rules))
+            scored = self._own(trained, sound)
+        rules = {} if scored.plain is None else scored.plain.rules
+        readout = trained.readout._with_rules(rules, scored.by_rule)
+        trained = trained._replace(readout=readout._with(training=training_data(sound, scored.together)))
         taken = _taken(self.examples) if self.options.tare is None else ()
-        return Training(self.options, self.opened, trained, scored, why, outcomes, taken)
+        return Training(self.options, self.opened, trained, scored, why, self._outcomes(trained.readout), taken)
+
+    def _own(self, trained: Trained, sound: Sequence[Example]) -> Judged:
+        """Return the scores on the training data."""
+        outcomes = zip(sound, self._outcomes(trained.readout), strict=True)
+        by_neurons = [example._known(outcome.found) for example, outcome in outcomes]
+        clocks = [clock_of(example) for example in self.examples]
+        labels = trained.readout.labels
+        return judge_by_training(sound, labels, clocks, by_neurons, self.options.window_ms, self.update)
 
     def _say_how_long(self, once_s: float, folds: int) -> None:
         """Say how long all takes by what one training on all data took, if that is more than a minute."""
@@ -274,9 +283,9 @@ class _Work:
         sooner = "fewer recordings, or no folds (--folds 0), are a quick trial"
         self.update(Forecast(f"about {once_s * trainings / 60:.0f} min left: {ground}; {sooner}"), 0, 0)
 
-    def _outcomes(self, trained: Trained) -> list[Outcome]:
+    def _outcomes(self, readout: Readout) -> list[Outcome]:
         """Return the outcomes of the readout on the recordings that it was trained on."""
-        readout, outcomes = trained.readout, []
+        outcomes = []
         for recording, example in zip(self.opened, self.examples, strict=True):
             self.update(f"scoring on {recording.title}", 0, 0)
             truth = {
@@ -289,12 +298,3 @@ class _Work:
             of_recording = Example(recording, truth, example.tare, unlabelled=example.unlabelled)
             outcomes.append(Outcome(recording.title, of_recording, detections, scored, outside))
         return outcomes
-
-
-def _own(outcomes: Sequence[Outcome], window_ms: float) -> Judged:
-    """Return the scores of a readout on its own training data."""
-    truths = [outcome.example.labels for outcome in outcomes]
-    found = [outcome.example._known(outcome.found) for outcome in outcomes]
-    together = score_together(found, truths, window_ms)
-    scores = tuple(outcome.score for outcome in outcomes if outcome.score is not None)
-    return Judged(scores, together, "its own training data", mistakes=mistakes_of(found, truths, scores))

@@ -31,10 +31,12 @@ from taxel.tasks.rest import GivenTare, check_tare, rest
 _NAMED = 5
 #: Detections are known late that are known so long after their label, ms.
 _LATE_MS = 500.0
+#: The width of a line.
+_WIDTH = 160
+#: What the written readout detects a label by.
+_RUNS = "; runs"
 #: Readouts know at other times whose delays differ by more, ms.
 _APART_MS = 1.0
-#: How a user gets the file of a plain rule, and uses it.
-_RULE_FILE = "--rule FILE writes it, for taxel detect --readout FILE"
 
 
 @dataclass(frozen=True)
@@ -178,6 +180,8 @@ class Training:
                 for recording, score in zip(self.recordings, self.scored.scores, strict=True)
             ],
             "score": self.scored.together.to_dict(),
+            "neurons": (self.scored.neurons or self.scored.together).to_dict(),
+            "by_rule": list(self.readout.by_rule),
             "mistakes": [
                 {
                     "recording": self.recordings[k].name,
@@ -188,9 +192,10 @@ class Training:
                 }
                 for k, label, t, is_missed in self.scored.mistakes
             ],
-            "plain_rule": None if self.scored.plain is None else self.scored.plain.to_dict(self.scored.together),
+            "plain_rule": None if self.scored.plain is None else self.scored.plain.to_dict(),
             "shift_ms": self.options.shift_ms,
             "fitted_levels": list(self.fitted_levels),
+            "chosen": dict(self.made.chosen),
             "warnings": list(self.warnings),
             "unlabelled": {label: list(sources) for label, sources in self.unlabelled.items()},
         }
@@ -211,15 +216,14 @@ class Training:
             lines.append(f"{label}: neither trained nor scored on {', '.join(sources)}, which no row of labels names")
         for label in self.readout.labels:
             lines += self._scores(label)
-        lines += [*self._better(), *self._aligned()]
+        lines += self._aligned()
         if self.options.shift_ms:
             lines.append(f"labels moved by {self.options.shift_ms:+g} ms before training (--shift-ms)")
-        lines += [f"{label}: {chosen}" for label, chosen in self.made.chosen.items()]
         lines += self._kinds()
         if recipe is not None:
             about = self.made.recipe.about
-            lines += ["", f"recipe {recipe}" + (f": {about}" if about else "")]
-        lines += [*self._levels(), *self._tares(), repr(self.readout)]
+            lines.append(_cut(f"recipe {recipe}" + (f": {about}" if about else "")))
+        lines += [*self._levels(), *self._tares(), _cut(repr(self.readout))]
         lines += ["", *repr(self.scored.together).split("\n")]
         if len(self.scored.scores) > 1:
             titles = [recording.title for recording in self.recordings]
@@ -298,18 +302,22 @@ class Training:
         yield f"tare: {text}; --tare sets another tare"
 
     def _scores(self, label: str) -> Iterator[str]:
-        """Yield how the neuron and the plain rule of a label scored on the same labels."""
+        """Yield how the neuron and the plain rule of a label scored on the same labels, and which of them runs."""
         parts = self.readout.encoder_of(label)._each()
         when = "when the touch ends" if any(isinstance(part, TouchEnds) for part in parts) else ""
-        yield _line(label, "neuron", self.scored.together[label], when) + self._written(label)
-        plain = self.scored.plain
+        by_rule, plain = label in self.readout.by_rule, self.scored.plain
         rule = None if plain is None else plain.rules[label]
+        neuron = (self.scored.neurons or self.scored.together)[label]
+        yield _line(label, "neuron", neuron, when) + self._written(label) + _RUNS * (rule is not None and not by_rule)
         if plain is None or plain.together is None:
             yield f"no plain rule for {label}" + (f": {plain.lacks}" if plain is not None else "")
         elif rule is None:
             yield f"no plain rule for {label}: none is better than to detect nothing"
         else:
-            yield f"{_line(label, 'plain rule', plain.together[label])}; tuned on all: {rule._compared()}"
+            yield _line(label, "plain rule", plain.together[label]) + _RUNS * by_rule
+            yield _cut(f"  tuned on all: {rule._compared()}")
+        if plain is not None and plain.own is not None and (own := plain.own[0][label]) is not None:
+            yield _line(label, "the labels' own rule", plain.own[1][label]) + f": {own._compared()}"
 
     def _written(self, label: str) -> str:
         """Return when the readout that is written knows, where folds chose other ages of a touch; else ""."""
@@ -324,32 +332,6 @@ class Training:
             if len(known_ms)
             else ""
         )
-
-    def _better(self) -> Iterator[str]:
-        """Yield the labels of which the plain rule is better, or as good and sooner; and the rules that are lacking."""
-        plain = self.scored.plain
-        if plain is None or plain.together is None:
-            return
-        better, sooner = plain.better(self.scored.together), plain.sooner(self.scored.together)
-        for label in better:
-            rule_score, score = (scores[label] for scores in (plain.together, self.scored.together))
-            rule, neuron = (f"{each.rank[0]} missed and false" for each in (rule_score, score))
-            when = ""
-            if rule_score.found and score.found:
-                later = rule_score.delay.median > score.delay.median
-                when = " but knows later" if later else " and knows no later"
-                rule += f", known {three_digits(rule_score.delay.median, '+')} ms after the label (median)"
-                neuron += f", {three_digits(score.delay.median, '+')} ms"
-            yield f"{label}: the plain rule is better{when}: {rule}; the neuron: {neuron}; {_RULE_FILE}"
-        for label in sooner:
-            rule_score, score = (scores[label] for scores in (plain.together, self.scored.together))
-            yield (
-                f"{label}: the plain rule is as good and knows sooner: both have {rule_score.rank[0]} missed and "
-                f"false; the rule knows {three_digits(rule_score.delay.median, '+')} ms after the label (median), the "
-                f"neuron {three_digits(score.delay.median, '+')} ms; {_RULE_FILE}"
-            )
-        if plain.lacks:
-            yield plain.lacks
 
     def unreliable(self) -> Iterator[str]:
         """Yield the labels of which the readout misses most, or detects no more than one of nothing."""
@@ -390,6 +372,11 @@ def _are_quiet(recordings: Sequence[Recording]) -> bool:
             return all(rest(recording) for recording in recordings)
     except ProblemError:
         return False
+
+
+def _cut(line: str) -> str:
+    """Return a line of at most `_WIDTH` characters."""
+    return line if len(line) <= _WIDTH else f"{line[: _WIDTH - 3]}..."
 
 
 def _line(label: str, by: str, score: Score, when: str = "") -> str:

@@ -1,7 +1,7 @@
 //! What makes detections: a readout or a plain rule, whichever a file holds.
 
 use crate::detect::{Detection, FrameTime, PlainRule, Readout, ReadoutStream, file};
-use crate::encode::{Quantity, Tare, Zeroing};
+use crate::encode::{Tare, Zeroing};
 use crate::{Array, EventsView, FramesView, Result, Stop, problem};
 
 /// The time that a recording is continued after its last event or frame, us: longer than any input can keep a
@@ -83,13 +83,12 @@ impl Detector {
     }
 
     /// The largest noise floor above the tare of what it reads, in the sensor's unit; 0 without one. The local load
-    /// tracks the rest.
+    /// tracks the rest, and a count by running range has none.
     #[must_use]
     pub fn noise_floor(&self) -> f64 {
         match self {
-            Self::Readout(readout) => readout.encoder.noise_floor(),
-            Self::PlainRule(rule) if rule.quantity == Quantity::LocalLoad => 0.0,
-            Self::PlainRule(rule) => rule.noise_floor,
+            Self::Readout(readout) => readout.noise_floor(),
+            Self::PlainRule(rule) => rule.floor_above_tare(),
         }
     }
 
@@ -130,7 +129,7 @@ impl Detector {
     fn silence_us(&self, frames: FrameTime) -> i64 {
         SILENCE_US
             + match self {
-                Self::Readout(readout) => readout.reach_us(),
+                Self::Readout(readout) => readout.reach_us(frames.period_us),
                 Self::PlainRule(rule) => rule.reach_us(frames.period_us),
             }
     }

@@ -1,7 +1,7 @@
 //! A quantity over a whole recording, on which many plain rules are tried without encoding it again.
 
 use crate::detect::detector::{SILENCE_US, usual_distance};
-use crate::detect::running_rule::{Decision, Limits, RunningRule, When};
+use crate::detect::running_rule::{Decision, EdgeNumbers, Limits, RunningRule, When};
 use crate::detect::{FrameClock, FrameTime};
 use crate::encode::{Quantity, Tare};
 use crate::spikes::us;
@@ -26,7 +26,7 @@ pub struct LoadCurve {
 }
 
 impl LoadCurve {
-    /// The quantity in a recording of events.
+    /// The quantity in a recording of events; `levels` are those of a count.
     ///
     /// # Errors
     ///
@@ -34,13 +34,14 @@ impl LoadCurve {
     /// stop.
     pub fn of_events(
         quantity: Quantity,
+        levels: &[f64],
         noise_floor: f64,
         events: EventsView<'_>,
         frames: FrameTime,
         tare: Option<&Tare>,
         stop: Stop<'_>,
     ) -> Result<Self> {
-        let mut stream = Quantity::stream(&[quantity], events.array, tare, noise_floor)?;
+        let mut stream = Quantity::stream(&[quantity], levels, events.array, tare, noise_floor)?;
         let clock = FrameClock::new(frames)?;
         events.check()?;
         events.check_order()?;
@@ -54,20 +55,22 @@ impl LoadCurve {
         Ok(Self { quantity, changes, frame_times: vec![], clock, period_us: frames.period_us, last })
     }
 
-    /// The quantity in a recording of frames, which last `frame_us`, or by default their median distance.
+    /// The quantity in a recording of frames, which last `frame_us`, or by default their median distance; `levels` are those of
+    /// a count.
     ///
     /// # Errors
     ///
     /// Those of [`Quantity::stream`], [`FrameClock::new`] and [`FramesView::check`]; `Interrupted` if asked to stop.
     pub fn of_frames(
         quantity: Quantity,
+        levels: &[f64],
         noise_floor: f64,
         frames: FramesView<'_>,
         frame_us: Option<f64>,
         tare: Option<&Tare>,
         stop: Stop<'_>,
     ) -> Result<Self> {
-        let mut stream = Quantity::stream(&[quantity], frames.array, tare, noise_floor)?;
+        let mut stream = Quantity::stream(&[quantity], levels, frames.array, tare, noise_floor)?;
         let period_us = frame_us.map_or_else(|| usual_distance(frames.t), Ok)?;
         let clock = FrameClock::new(period_us)?;
         frames.check()?;
@@ -90,9 +93,11 @@ impl LoadCurve {
 
     /// The begins and ends of loads, as of a [`PlainRule`](crate::detect::PlainRule) with these numbers.
     #[must_use]
-    pub fn edges(&self, threshold: f64, release: f64, frames: u32) -> Vec<Decision> {
-        let (end, frames) = (release * threshold, i64::from(frames));
-        let limits = Limits { begin: threshold, end, frames, touch_train: 0, threshold, when: When::Edges };
+    pub fn edges(&self, edges: &EdgeNumbers) -> Vec<Decision> {
+        let limits = Limits::at_edges(edges);
+        if limits.follows {
+            return self.run(limits, self.changes.iter());
+        }
         // Begins and ends depend only on which limits the quantity has passed, and it changes far more often than that.
         let mut last = limits.passed_limits(0.0);
         let passing = self.changes.iter().filter(|change| {

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::allowed::above_0;
-use crate::detect::running_rule::{Limits, RunningRule, When};
+use crate::detect::running_rule::{EdgeNumbers, Limits, RunningRule};
+use crate::detect::stream::Way;
 use crate::detect::{FrameClock, FrameTime, ReadoutStream, TrainingData, file};
 use crate::encode::{Quantity, Tare};
 use crate::spikes::us;
@@ -44,6 +45,12 @@ pub enum NamedAge {
 /// time of the first of these frames; it is `known` when the last one is complete. A frame's quantity is that after its
 /// last event; its time is the stamp with which the quantity passed the threshold. A frame of the input is one frame.
 ///
+/// A count thus rises to n after it was at most r with the threshold n and the release (r + 1) / n, and falls to r after it
+/// was at least n. With `dated_at` `t` is when the quantity last rose to that value, or fell below it; what the rule detects,
+/// and when it is known, stay the same. With `of_largest` the load ends where the quantity is below `release` times its
+/// largest value since the begin, and both it and the threshold are above a rest, which is 0 at first, follows the quantity
+/// down while nothing is loaded, and is where the quantity was as a load ended.
+///
 /// With an age it decides once a touch. A touch begins with the first frame in which the area is 2 taxels or more, and
 /// ends with the first in which it is less. The label is that of the quantity in the frame that holds at the age after
 /// the touch's begin, below the threshold or not; `t` is the begin, and `known` the end of that frame. At the end of a touch
@@ -59,6 +66,16 @@ pub struct PlainRule {
     pub release: f64,
     /// The number of frames in a row, 1 or more; 1 with an age.
     pub frames: u32,
+    /// The levels of a count, above 0 and ascending; none of other quantities.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<f64>,
+    /// The value at which `t` is dated, from `release` times the threshold to the threshold; `None`: onset and end are
+    /// dated at these.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dated_at: Option<f64>,
+    /// Whether `release` is a part of the largest value since the load began, above a rest that follows.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub of_largest: bool,
     /// The age of a touch at which the rule decides between two kinds, ms; `None`: it detects onsets and ends.
     pub age_ms: Option<Age>,
     /// The labels of onset and end, or of the kinds below and above the threshold; `None` omits those detections.
@@ -93,6 +110,8 @@ impl PlainRule {
         if !(1..=MOST_FRAMES).contains(&self.frames) {
             return Err(problem!("frames"; " is {}: must be from 1 to {MOST_FRAMES}", self.frames));
         }
+        self.check_levels()?;
+        self.check_dated()?;
         if (self.quantity == Quantity::Duration) != matches!(self.age_ms, Some(Age::Named(NamedAge::End))) {
             return Err(problem!("age_ms"; " end and the quantity duration: must be given together"));
         }
@@ -129,16 +148,50 @@ impl PlainRule {
         self.tare.as_ref().map_or(Ok(()), Tare::check)
     }
 
+    fn check_levels(&self) -> Result<()> {
+        if self.quantity.has_levels() == self.levels.is_empty() {
+            return Err(problem!("levels"; " and a count: must be given together"));
+        }
+        for (k, &level) in self.levels.iter().enumerate() {
+            above_0("levels", level, "")?;
+            if k > 0 && self.levels[k - 1] as f32 >= level as f32 {
+                return Err(problem!("levels"; ": {level} comes after {}; must ascend", self.levels[k - 1]));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_dated(&self) -> Result<()> {
+        let (end, threshold) = (self.release * self.threshold, self.threshold);
+        match self.dated_at {
+            Some(_) if self.age_ms.is_some() || self.of_largest => {
+                Err(problem!("dated_at"; ": must be left out with age_ms, and with of_largest"))
+            }
+            Some(at) if !(end..=threshold).contains(&at) => {
+                Err(problem!("dated_at"; " is {at}: must be from {end}, where the load ends, to {threshold}"))
+            }
+            None if self.age_ms.is_some() && self.of_largest => {
+                Err(problem!("of_largest"; ": must be left out with age_ms"))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Starts a stream for an array with frames of this duration.
     ///
     /// # Errors
     ///
     /// `Problem` if a part is not valid, if there is no tare or one of another array, or if the period is not valid.
     pub fn stream(&self, array: &Array, frames: impl Into<FrameTime>, tare: Option<&Tare>) -> Result<ReadoutStream> {
+        let way = self.way(array, tare)?;
+        Ok(ReadoutStream::new(vec![way], array.clone(), FrameClock::new(frames)?))
+    }
+
+    /// The way of its stream, for an array.
+    pub(super) fn way(&self, array: &Array, tare: Option<&Tare>) -> Result<Way> {
         self.check()?;
-        let loads = Quantity::stream(&self.read(), array, tare.or(self.tare.as_ref()), self.noise_floor)?;
-        let clock = FrameClock::new(frames)?;
-        Ok(ReadoutStream::of_rule(loads, array.clone(), clock, RunningRule::new(self.limits()), self.labels.clone()))
+        let loads = Quantity::stream(&self.read(), &self.levels, array, tare.or(self.tare.as_ref()), self.noise_floor)?;
+        Ok(Way::of_rule(loads, RunningRule::new(self.limits()), self.labels.clone()))
     }
 
     /// The quantities that it reads: the one that is compared with the threshold, and with an age the area.
@@ -153,21 +206,24 @@ impl PlainRule {
         read
     }
 
+    /// The numbers by which it finds begins and ends of loads.
+    fn edges(&self) -> EdgeNumbers {
+        let Self { threshold, release, frames, dated_at, of_largest, .. } = *self;
+        EdgeNumbers { threshold, release, frames, dated_at, of_largest }
+    }
+
     /// How it decides; the parts must have been checked.
     fn limits(&self) -> Limits {
-        let Self { threshold, release, .. } = *self;
         match self.age_ms {
-            Some(Age::Ms(age)) => Limits::at_age(self.read().len() as u32 - 1, threshold, age),
-            Some(Age::Named(NamedAge::End)) => Limits::at_end(threshold),
-            None => Limits {
-                begin: threshold,
-                end: release * threshold,
-                frames: i64::from(self.frames),
-                touch_train: 0,
-                threshold,
-                when: When::Edges,
-            },
+            Some(Age::Ms(age)) => Limits::at_age(self.read().len() as u32 - 1, self.threshold, age),
+            Some(Age::Named(NamedAge::End)) => Limits::at_end(self.threshold),
+            None => Limits::at_edges(&self.edges()),
         }
+    }
+
+    /// The noise floor above the tare, in the sensor's unit; 0 of quantities that follow or need no rest.
+    pub(super) fn floor_above_tare(&self) -> f64 {
+        if matches!(self.quantity, Quantity::LocalLoad | Quantity::RangeCount) { 0.0 } else { self.noise_floor }
     }
 
     /// The time after the last input within which its last detection is complete, us.

@@ -1,13 +1,13 @@
 //! A readout: trained neurons with labels, and the encoder with which they were trained.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
 use crate::allowed::{above_0, is_weight, weight_error};
-use crate::detect::stream::{DelayedNeurons, NamedNeuron, Ranges, ReceivedTrains};
-use crate::detect::{self, FrameClock, FrameTime, ReadoutStream, Seen, TrainedNeuron, TrainingData};
+use crate::detect::stream::{DelayedNeurons, NamedNeuron, Ranges, ReceivedTrains, Way};
+use crate::detect::{self, FrameClock, FrameTime, PlainRule, ReadoutStream, Seen, TrainedNeuron, TrainingData};
 use crate::encode::{Composite, Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
 use crate::spikes::us;
@@ -49,6 +49,12 @@ pub struct Readout {
     pub delays_ms: Vec<f64>,
     /// The neurons by label.
     pub neurons: BTreeMap<String, TrainedNeuron>,
+    /// The plain rule of each label that has one.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub rules: BTreeMap<String, PlainRule>,
+    /// The labels that are detected by their rule, and not by their neuron; without a rule such a label is never detected.
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    pub by_rule: BTreeSet<String>,
     /// The range of each neuron's inputs in its training data, by label; empty if it is not known.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub seen: BTreeMap<String, Seen>,
@@ -121,6 +127,15 @@ impl Readout {
                     ));
                 }
             }
+        }
+        for (label, rule) in &self.rules {
+            rule.check().map_err(|error| error.in_part(label))?;
+            if !rule.labels.iter().flatten().any(|name| name == label) {
+                return Err(problem!("{label}: its rule detects no {label}"));
+            }
+        }
+        if let Some(label) = self.rules.keys().chain(&self.by_rule).find(|&label| !self.neurons.contains_key(label)) {
+            return Err(problem!("rules: the readout has no neuron {label}"));
         }
         match self.seen.keys().find(|&label| !self.neurons.contains_key(label)) {
             Some(label) => Err(problem!("seen: the readout has no neuron {label}")),
@@ -210,7 +225,8 @@ impl Readout {
             self.check_weights(label, cell, array)?;
         }
         let encoder = tare.map_or_else(|| self.encoder.clone(), |tare| self.encoder.with_tare(tare));
-        let neurons = self.neurons.iter().map(|(label, cell)| {
+        let neurons = self.neurons.iter().filter(|&(label, _)| !self.by_rule.contains(label));
+        let neurons = neurons.map(|(label, cell)| {
             let received = match &self.encoder {
                 Encoder::Composite(encoder) if !cell.inputs.is_empty() => Some(encoder.of_parts(&cell.inputs, array)?),
                 _ => None,
@@ -220,13 +236,41 @@ impl Readout {
             let named = named.with_duration(encoder.duration_train(array).map(|train| train as u32));
             Ok(named.with_ranges(Ranges::new(self.seen.get(label).cloned(), encoder.kind())))
         });
-        let neurons = DelayedNeurons::new(neurons.collect::<Result<_>>()?, self.delays_ms.clone());
-        Ok(ReadoutStream::new(encoder.stream(array)?, array.clone(), FrameClock::new(frames)?, neurons))
+        let mut ways = vec![];
+        if self.runs_neurons() {
+            let neurons = DelayedNeurons::new(neurons.collect::<Result<_>>()?, self.delays_ms.clone());
+            ways.push(Way::of_neurons(encoder.stream(array)?, neurons));
+        }
+        for rule in self.running_rules() {
+            ways.push(rule.way(array, tare)?);
+        }
+        Ok(ReadoutStream::new(ways, array.clone(), FrameClock::new(frames)?))
     }
 
-    /// The time by which its neurons receive the last spike later than the last input, us.
-    pub(super) fn reach_us(&self) -> i64 {
-        us(self.delays_ms.last().copied().unwrap_or(0.0)).ceil() as i64
+    /// The rules that run, each with the one label that it detects here: one of two kinds may be detected by its neuron.
+    fn running_rules(&self) -> impl Iterator<Item = PlainRule> {
+        self.by_rule.iter().filter_map(|label| {
+            let rule = self.rules.get(label)?;
+            let labels = rule.labels.clone().map(|name| name.filter(|name| name == label));
+            Some(PlainRule { labels, ..rule.clone() })
+        })
+    }
+
+    /// The largest noise floor above the tare of what runs, in the sensor's unit; 0 without one.
+    pub(super) fn noise_floor(&self) -> f64 {
+        let of_neurons = if self.runs_neurons() { self.encoder.noise_floor() } else { 0.0 };
+        self.running_rules().map(|rule| rule.floor_above_tare()).fold(of_neurons, f64::max)
+    }
+
+    /// Whether a label is detected by its neuron.
+    fn runs_neurons(&self) -> bool {
+        self.neurons.keys().any(|label| !self.by_rule.contains(label))
+    }
+
+    /// The time after the last input within which its last detection is complete, us.
+    pub(super) fn reach_us(&self, period_us: f64) -> i64 {
+        let of_neurons = us(self.delays_ms.last().copied().unwrap_or(0.0)).ceil() as i64;
+        self.running_rules().map(|rule| rule.reach_us(period_us)).fold(of_neurons, i64::max)
     }
 }
 

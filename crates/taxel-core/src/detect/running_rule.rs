@@ -9,10 +9,17 @@ use crate::spikes::{ms, us};
 /// How a rule decides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Limits {
-    /// A load begins in frames in which its quantity is at least this.
+    /// A load begins in frames in which its quantity is at least this, above the rest if that follows.
     pub begin: f64,
-    /// It ends in frames in which the quantity is below this.
+    /// It ends in frames in which the quantity is below this; if the rest follows, below this part of the largest value
+    /// since the begin, both above the rest.
     pub end: f64,
+    /// The time of a begin is when the quantity last came to the first of these, as it comes to `begin`; that of an end
+    /// when it last came to the second one, likewise.
+    pub dated: [f64; 2],
+    /// Whether the rest of the quantity, which is 0 at first, follows it: down while the sensor is not loaded, and to where
+    /// it is as a load ends.
+    pub follows: bool,
     /// The number of such frames in a row.
     pub frames: i64,
     /// The train with the quantity of which a load is made.
@@ -42,7 +49,25 @@ impl Limits {
     /// Decides at an age of each touch, which the area on `touch_train` begins in one frame.
     pub(super) fn at_age(touch_train: u32, threshold: f64, age_ms: f64) -> Self {
         let when = When::AtAge(us(age_ms).round() as i64);
-        Self { begin: Self::TOUCHED, end: Self::TOUCHED, frames: 1, touch_train, threshold, when }
+        let edge = Self::TOUCHED;
+        let (dated, follows) = ([edge; 2], false);
+        Self { begin: edge, end: edge, dated, follows, frames: 1, touch_train, threshold, when }
+    }
+
+    /// Reports the begin and the end of each load.
+    pub(super) fn at_edges(edges: &EdgeNumbers) -> Self {
+        let EdgeNumbers { threshold, release, frames, dated_at, of_largest } = *edges;
+        let end = if of_largest { release } else { release * threshold };
+        Self {
+            begin: threshold,
+            end,
+            dated: dated_at.map_or([threshold, end], |at| [at; 2]),
+            follows: of_largest,
+            frames: i64::from(frames),
+            touch_train: 0,
+            threshold,
+            when: When::Edges,
+        }
     }
 
     /// Decides when each touch ends, which the area on train 0 begins, by its duration, ms.
@@ -50,10 +75,26 @@ impl Limits {
         Self { when: When::AtEnd, ..Self::at_age(0, threshold, 0.0) }
     }
 
-    /// Which limits a quantity of this value has passed.
-    pub(super) fn passed_limits(&self, load: f64) -> [bool; 2] {
-        [load >= self.begin, load < self.end]
+    /// Which limits a quantity of this value has passed, of a rest that does not follow.
+    pub(super) fn passed_limits(&self, load: f64) -> [bool; 4] {
+        let [dated_begin, dated_end] = self.dated;
+        [load >= self.begin, load < self.end, load >= dated_begin, load < dated_end]
     }
+}
+
+/// The numbers of a rule that reports the begin and the end of each load, as of [`PlainRule`](crate::detect::PlainRule).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EdgeNumbers {
+    /// The threshold at which a load begins.
+    pub threshold: f64,
+    /// The part below which it ends, of the threshold or of the largest value.
+    pub release: f64,
+    /// The number of frames in a row.
+    pub frames: u32,
+    /// The value at which begins and ends are dated.
+    pub dated_at: Option<f64>,
+    /// Whether a load ends below a part of its largest value, and the rest follows.
+    pub of_largest: bool,
 }
 
 /// What a rule found.
@@ -99,8 +140,12 @@ pub(super) struct RunningRule {
     load: f64,
     /// The number of the frame of that change.
     changed: i64,
-    /// The time at which the quantity last passed the limit at which the state changes, us.
+    /// The time at which the quantity last passed the limit by which the next change of the state is dated, us.
     passed: i64,
+    /// The rest that the quantity has, if it follows; else 0.
+    rest: f64,
+    /// The largest value of the quantity since the load began.
+    largest: f64,
     /// Whether a quantity changed together with a repair in a frame that is not complete.
     repaired: bool,
     run: Option<LoadRun>,
@@ -120,6 +165,8 @@ impl RunningRule {
             load: 0.0,
             changed: i64::MIN,
             passed: 0,
+            rest: 0.0,
+            largest: 0.0,
             repaired: false,
             run: None,
             quantity: 0.0,
@@ -133,9 +180,13 @@ impl RunningRule {
         let t = us(change.t).round() as i64;
         self.advance(t, clock, out);
         if change.train == self.limits.touch_train {
-            let before = self.passes();
+            let before = self.passes(self.limits.dated);
             (self.load, self.changed) = (f64::from(change.value), clock.number_of(t));
-            if self.passes() && !before {
+            self.largest = self.largest.max(self.load);
+            if self.limits.follows && !self.loaded {
+                self.rest = self.rest.min(self.load);
+            }
+            if self.passes(self.limits.dated) && !before {
                 self.passed = t;
             }
         }
@@ -169,7 +220,7 @@ impl RunningRule {
             return;
         }
         let repaired = std::mem::take(&mut self.repaired);
-        if !self.passes() {
+        if !self.passes([self.limits.begin, self.limits.end]) {
             self.run = None;
             return;
         }
@@ -182,6 +233,10 @@ impl RunningRule {
         }
         self.run = None;
         self.loaded = !self.loaded;
+        self.largest = self.load;
+        if self.limits.follows && !self.loaded {
+            self.rest = self.load;
+        }
         let known = clock.end_of_number(first + self.limits.frames - 1);
         let (begun, repaired_begin) = self.begun;
         if self.loaded {
@@ -201,8 +256,12 @@ impl RunningRule {
         }
     }
 
-    /// Whether the quantity has passed the limit at which the state changes.
-    fn passes(&self) -> bool {
-        self.limits.passed_limits(self.load)[usize::from(self.loaded)]
+    /// Whether the quantity has come to the begin of the next load, or to the end of the present one.
+    fn passes(&self, [begin, end]: [f64; 2]) -> bool {
+        match (self.loaded, self.limits.follows) {
+            (false, _) => self.load >= self.rest + begin,
+            (true, false) => self.load < end,
+            (true, true) => self.load < self.rest + end * (self.largest - self.rest),
+        }
     }
 }

@@ -35,15 +35,12 @@ const FARTHEST_US: i64 = 1 << 52;
 /// advanced.
 #[derive(Clone)]
 pub struct ReadoutStream {
-    encoder: Box<dyn Stream>,
+    /// The neurons of a readout, and the rules that run beside them or alone: each reads the same input.
+    ways: Vec<Way>,
     array: Array,
-    decides: Decides,
     clock: FrameClock,
     /// The time before which no input can follow, us.
     now: Option<i64>,
-    /// Spikes of the encoder that were not yet passed on.
-    emitted: Vec<Spike>,
-    repairs: Repairs,
     /// Taxels to be zeroed, in order of time, each after all events up to its time.
     zeroings: VecDeque<Zeroing>,
     late: u64,
@@ -55,6 +52,16 @@ pub struct ReadoutStream {
     silence_us: i64,
 }
 
+/// An encoder, and what turns its spikes into detections.
+#[derive(Clone)]
+pub(super) struct Way {
+    encoder: Box<dyn Stream>,
+    decides: Decides,
+    /// Spikes of the encoder that were not yet passed on.
+    emitted: Vec<Spike>,
+    repairs: Repairs,
+}
+
 /// What turns the encoder's spikes into detections.
 #[derive(Clone)]
 enum Decides {
@@ -62,34 +69,58 @@ enum Decides {
     Rule(LabelledRule),
 }
 
-impl ReadoutStream {
-    pub(super) fn new(encoder: Box<dyn Stream>, array: Array, clock: FrameClock, neurons: DelayedNeurons) -> Self {
-        Self::start(encoder, array, clock, Decides::Neurons(neurons))
+impl Way {
+    /// That of neurons.
+    pub(super) fn of_neurons(encoder: Box<dyn Stream>, neurons: DelayedNeurons) -> Self {
+        Self::new(encoder, Decides::Neurons(neurons))
     }
 
-    /// A stream of a plain rule: `loads` emits the changes of its quantities.
-    pub(super) fn of_rule(
-        loads: Box<dyn Stream>,
-        array: Array,
-        clock: FrameClock,
-        rule: RunningRule,
-        labels: [Option<String>; 2],
-    ) -> Self {
-        Self::start(loads, array, clock, Decides::Rule(LabelledRule::new(rule, labels)))
+    /// That of a plain rule: `loads` emits the changes of its quantities.
+    pub(super) fn of_rule(loads: Box<dyn Stream>, rule: RunningRule, labels: [Option<String>; 2]) -> Self {
+        Self::new(loads, Decides::Rule(LabelledRule::new(rule, labels)))
     }
 
-    fn start(encoder: Box<dyn Stream>, array: Array, clock: FrameClock, decides: Decides) -> Self {
+    fn new(encoder: Box<dyn Stream>, decides: Decides) -> Self {
         let repairs = Repairs::with_memory(encoder.repaired_span_ms());
-        let (emitted, zeroings) = (vec![], VecDeque::new());
+        Self { encoder, decides, emitted: vec![], repairs }
+    }
+
+    fn neurons(&self) -> Option<&DelayedNeurons> {
+        match &self.decides {
+            Decides::Neurons(neurons) => Some(neurons),
+            Decides::Rule(_) => None,
+        }
+    }
+
+    /// Passes the encoder's spikes on, up to `until`, before which every spike is known.
+    fn settle(&mut self, until: i64, clock: &FrameClock, begin: i64, out: &mut Vec<Detection>) -> Result<()> {
+        let emitted = std::mem::take(&mut self.emitted);
+        let spikes = emitted.into_iter().map(|spike| (spike, self.repairs.may_repair(spike.t)));
+        match &mut self.decides {
+            Decides::Neurons(neurons) => {
+                neurons.receive(spikes, self.encoder.trains(), self.encoder.kind());
+                // The encoder has emitted all spikes before `until`, so repairs too far in the past no longer matter.
+                self.repairs.forget_before(ms(until));
+                neurons.settle(ms(until), clock, begin, out)
+            }
+            Decides::Rule(rule) => {
+                rule.receive(spikes);
+                self.repairs.forget_before(ms(until));
+                rule.settle(until, clock, begin, out);
+                Ok(())
+            }
+        }
+    }
+}
+
+impl ReadoutStream {
+    pub(super) fn new(ways: Vec<Way>, array: Array, clock: FrameClock) -> Self {
         Self {
-            encoder,
+            ways,
             array,
-            decides,
             clock,
             now: None,
-            emitted,
-            repairs,
-            zeroings,
+            zeroings: VecDeque::new(),
             late: 0,
             begin: i64::MIN,
             smaller: None,
@@ -159,9 +190,9 @@ impl ReadoutStream {
         match &self.smaller {
             Some(smaller) if values.len() == smaller.len() => {
                 let padded = self.array.padded(values, smaller.columns, &0.0);
-                self.encoder.push_frame(t, &padded, &mut self.emitted)?;
+                self.ways.iter_mut().try_for_each(|way| way.encoder.push_frame(t, &padded, &mut way.emitted))?;
             }
-            _ => self.encoder.push_frame(t, values, &mut self.emitted)?,
+            _ => self.ways.iter_mut().try_for_each(|way| way.encoder.push_frame(t, values, &mut way.emitted))?,
         }
         self.settle(t, out)?;
         self.clock.start_frame(t);
@@ -177,7 +208,7 @@ impl ReadoutStream {
         check_time(t)?;
         if self.now.is_none_or(|now| t > now) {
             self.zero_before(t);
-            self.encoder.advance(t, &mut self.emitted);
+            self.ways.iter_mut().for_each(|way| way.encoder.advance(t, &mut way.emitted));
             self.settle(t, out)?;
         }
         Ok(())
@@ -205,12 +236,13 @@ impl ReadoutStream {
         Ok(())
     }
 
-    /// The rest of each taxel, row by row; `None` if it is unknown, or if the encoder uses no tare.
+    /// The rest of each taxel, row by row; `None` if it is unknown, or if no encoder uses a tare.
     #[must_use]
     pub fn rest(&self) -> Vec<Option<f64>> {
         let (rows, columns) = (self.input_array().rows, self.input_array().columns);
         let taxels = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
-        taxels.map(|(x, y)| self.encoder.rest(self.array.index(x, y))).collect()
+        let rest_of = |taxel| self.ways.iter().find_map(|way| way.encoder.rest(taxel));
+        taxels.map(|(x, y)| rest_of(self.array.index(x, y))).collect()
     }
 
     /// The number of events that arrived after later events, or after time was advanced beyond them.
@@ -219,14 +251,11 @@ impl ReadoutStream {
         self.late
     }
 
-    /// The number of detections with an input outside the range that it had in training; `None` if that range is not
-    /// known.
+    /// The number of detections of neurons with an input outside the range that it had in training; `None` without
+    /// neurons, or if that range is not known.
     #[must_use]
     pub fn outside(&self) -> Option<u64> {
-        match &self.decides {
-            Decides::Neurons(neurons) => neurons.outside(),
-            Decides::Rule(_) => None,
-        }
+        self.ways.iter().find_map(Way::neurons).and_then(DelayedNeurons::outside)
     }
 
     /// The time up to which all detections are final, us; `None` before any input.
@@ -237,11 +266,7 @@ impl ReadoutStream {
 
     /// The label and present potential of each neuron, mV; a plain rule has none.
     pub fn potentials(&self) -> impl Iterator<Item = (&str, f64)> {
-        let neurons = match &self.decides {
-            Decides::Neurons(neurons) => Some(neurons),
-            Decides::Rule(_) => None,
-        };
-        neurons.into_iter().flat_map(DelayedNeurons::potentials)
+        self.ways.iter().filter_map(Way::neurons).flat_map(DelayedNeurons::potentials)
     }
 
     /// Processes a recording of events, checking `stop` between pieces.
@@ -278,11 +303,11 @@ impl ReadoutStream {
         Ok(out)
     }
 
-    /// Passes events to the encoder in order of time, and zeroes taxels at their times in between.
+    /// Passes events to the encoders in order of time, and zeroes taxels at their times in between.
     fn encode(&mut self, events: EventsView<'_>) -> Result<()> {
         let array = self.array.clone();
         let events = if self.smaller.is_some() { EventsView { array: &array, ..events } } else { events };
-        self.repairs.note(events);
+        self.ways.iter_mut().for_each(|way| way.repairs.note(events));
         let mut from = 0;
         while let Some(zeroing) = self.zeroings.front() {
             let upto = events.t.partition_point(|&t| t <= zeroing.t);
@@ -290,12 +315,16 @@ impl ReadoutStream {
                 break;
             }
             if upto > from {
-                self.encoder.push_events(events.piece(from..upto), &mut self.emitted)?;
+                self.push_piece(events.piece(from..upto))?;
                 from = upto;
             }
             self.zero_before(events.t[upto]);
         }
-        self.encoder.push_events(events.piece(from..events.len()), &mut self.emitted)
+        self.push_piece(events.piece(from..events.len()))
+    }
+
+    fn push_piece(&mut self, events: EventsView<'_>) -> Result<()> {
+        self.ways.iter_mut().try_for_each(|way| way.encoder.push_events(events, &mut way.emitted))
     }
 
     /// Sets the rests of zeroings before `t` us.
@@ -304,29 +333,24 @@ impl ReadoutStream {
         for zeroing in self.zeroings.drain(..over) {
             let at = self.now.map_or(zeroing.t, |now| now.max(zeroing.t));
             let taxel = self.array.index(zeroing.x, zeroing.y);
-            self.encoder.set_rest(at, taxel, zeroing.rest, &mut self.emitted);
+            for way in &mut self.ways {
+                way.encoder.set_rest(at, taxel, zeroing.rest, &mut way.emitted);
+            }
         }
     }
 
-    /// Passes the encoder's spikes on, up to `until` us, before which every spike is known.
+    /// Appends the detections that are known up to `until` us, before which all input is known, in the order in which they
+    /// become known.
     fn settle(&mut self, until: i64, out: &mut Vec<Detection>) -> Result<()> {
         self.now = Some(self.now.map_or(until, |now| now.max(until)));
-        let emitted = std::mem::take(&mut self.emitted);
-        let spikes = emitted.into_iter().map(|spike| (spike, self.repairs.may_repair(spike.t)));
-        match &mut self.decides {
-            Decides::Neurons(neurons) => {
-                neurons.receive(spikes, self.encoder.trains(), self.encoder.kind());
-                // The encoder has emitted all spikes before `until`, so repairs too far in the past no longer matter.
-                self.repairs.forget_before(ms(until));
-                neurons.settle(ms(until), &self.clock, self.begin, out)
-            }
-            Decides::Rule(rule) => {
-                rule.receive(spikes);
-                self.repairs.forget_before(ms(until));
-                rule.settle(until, &self.clock, self.begin, out);
-                Ok(())
-            }
+        let from = out.len();
+        for way in &mut self.ways {
+            way.settle(until, &self.clock, self.begin, out)?;
         }
+        if self.ways.len() > 1 {
+            out[from..].sort_by_key(|found| found.known);
+        }
+        Ok(())
     }
 
     fn check_shape(&self, array: &Array) -> Result<()> {

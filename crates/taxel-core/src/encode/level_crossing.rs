@@ -147,14 +147,17 @@ struct ChannelLevel {
     since: i64,
 }
 
+/// The levels of all channels.
 #[derive(Clone)]
-struct LevelCrossings {
+pub(super) struct LevelCrossings {
     channels: usize,
     levels: Vec<f64>,
     releases: Vec<f64>,
     hold: i64,
     /// Indexed by `channel * levels + level`.
     states: Vec<ChannelLevel>,
+    /// The number of these that are above.
+    above: usize,
     bracket: Bracket,
     /// Crossings that have not lasted for the minimum duration: the time when they will have, and their index. The
     /// duration is the same for all, so the queue is ordered by time.
@@ -175,7 +178,8 @@ struct Tonic {
 }
 
 impl LevelCrossings {
-    fn new(parameters: &LevelCrossing, channels: usize) -> Result<Self> {
+    /// Levels that all channels are below.
+    pub(super) fn new(parameters: &LevelCrossing, channels: usize) -> Result<Self> {
         parameters.check()?;
         let levels = parameters.levels.clone();
         let releases: Vec<f64> = levels.iter().map(|&l| parameters.release(l)).collect();
@@ -200,6 +204,7 @@ impl LevelCrossings {
             channels,
             hold: if parameters.hold_ms == 0.0 { 0 } else { micros("hold_ms", parameters.hold_ms)? },
             states,
+            above: 0,
             bracket: Bracket::new(blocks(channels)),
             trials: VecDeque::new(),
             tonic,
@@ -209,18 +214,30 @@ impl LevelCrossings {
         })
     }
 
+    /// The number of levels, of all channels, that are above: between 0 and channels times levels.
+    pub(super) fn above(&self) -> usize {
+        self.above
+    }
+
     /// Rescales the levels to the running ranges; a channel whose range is empty stays below all levels.
     fn scale(&mut self, ranges: &[(f64, f64)]) {
-        for (states, &(low, high)) in self.states.chunks_mut(self.levels.len()).zip(ranges) {
-            for ((state, level), release) in states.iter_mut().zip(&self.levels).zip(&self.releases) {
-                (state.on_at, state.off_at) = if high > low {
-                    ((low + level * (high - low)) as f32, (low + release * (high - low)) as f32)
-                } else {
-                    (f32::INFINITY, f32::INFINITY)
-                };
-            }
+        for (channel, &(low, high)) in ranges.iter().enumerate().take(self.channels) {
+            self.place(channel, low, high - low);
         }
-        (0..self.channels).for_each(|channel| self.set_bracket(channel));
+    }
+
+    /// Puts the levels of a channel above `low`, in units of `span`; without a span above 0 it stays below all levels.
+    pub(super) fn place(&mut self, channel: usize, low: f64, span: f64) {
+        let levels = self.levels.len();
+        let states = &mut self.states[channel * levels..(channel + 1) * levels];
+        for ((state, level), release) in states.iter_mut().zip(&self.levels).zip(&self.releases) {
+            (state.on_at, state.off_at) = if span > 0.0 {
+                ((low + level * span) as f32, (low + release * span) as f32)
+            } else {
+                (f32::INFINITY, f32::INFINITY)
+            };
+        }
+        self.set_bracket(channel);
     }
 
     fn set_bracket(&mut self, channel: usize) {
@@ -251,6 +268,7 @@ impl LevelCrossings {
             }
             self.set_bracket(channel);
         }
+        self.above = self.states.iter().filter(|state| state.above).count();
     }
 
     #[inline(always)]
@@ -279,6 +297,7 @@ impl LevelCrossings {
             if above != state.above {
                 state.above = above;
                 state.since = t;
+                self.above = if above { self.above + 1 } else { self.above - 1 };
                 if self.hold == 0 {
                     self.report_level(t, train, out);
                 } else if above != state.reported {

@@ -2,7 +2,7 @@
 
 use super::blocks::{BLOCK, Block, blocks};
 use super::tare::Tare;
-use crate::rest::{Rest, touched_from};
+use crate::rest::{Rest, Value, touched_from};
 use crate::vectors::wide;
 use crate::{Array, Hint, Result, problem};
 
@@ -201,6 +201,13 @@ impl Loaded {
     /// the time where noise alone would load taxels in each frame.
     pub(super) fn never(subject: &str, array: &Array, tare: Option<&Tare>) -> Result<Self> {
         Self::new(subject, array, tare, f64::INFINITY)
+    }
+
+    /// Has no rest of any taxel: none is ever loaded.
+    pub(super) fn without_rest(array: &Array) -> Self {
+        let paired = Paired::new(usize::from(array.rows), usize::from(array.columns));
+        let rest = Rest::measured(vec![f64::NO_REST; array.len()]);
+        Self { paired, noise_floor: f64::INFINITY, noise: vec![], rest }
     }
 
     /// Changes the rest of a taxel; the caller must pass its value again.

@@ -155,7 +155,7 @@ fn same(a: &Detection, b: &Detection) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
+    use std::collections::{BTreeMap, BTreeSet};
 
     use rand::rngs::StdRng;
     use rand::{Rng, SeedableRng};
@@ -180,6 +180,8 @@ mod tests {
             pads: false,
             delays_ms: vec![0.0],
             neurons: [("touch".to_owned(), cell)].into(),
+            rules: BTreeMap::new(),
+            by_rule: BTreeSet::new(),
             seen: BTreeMap::new(),
             training: None,
         };

@@ -57,7 +57,7 @@ def _scores(result: dict[str, Any]) -> Iterator[tuple[str, bool, int, int, int, 
     """Yield the scores of each label, of the neuron and of the plain rule, of a training as plain values."""
     plain = result["plain_rule"]
     for label in result["labels"]:
-        rows = [(False, result["score"])]
+        rows = [(False, result["neurons"])]
         if plain is not None and plain["score"] is not None and plain["rules"].get(label) is not None:
             rows.append((True, plain["score"]))
         for is_plain_rule, score in rows:

@@ -28,6 +28,8 @@ fn readout() -> Readout {
         pads: false,
         delays_ms: vec![0.0],
         neurons: [("contact".to_owned(), cell(0.2, 3.0)), ("lift".to_owned(), cell(0.5, -0.1))].into(),
+        rules: BTreeMap::new(),
+        by_rule: BTreeSet::new(),
         seen: BTreeMap::new(),
         training: None,
     }

@@ -60,12 +60,9 @@ fn stream(neuron: &Neuron, latency_ms: f64, period_us: f64) -> ReadoutStream {
         let cell = TrainedNeuron { neuron: neuron.clone(), inputs: vec![], weights, delay_ms };
         NamedNeuron::new(label, &cell, 0.9, latency_ms, ReceivedTrains::new(None, 1))
     });
-    ReadoutStream::new(
-        Box::new(Plain { latency_ms }),
-        array(),
-        FrameClock::new(period_us).unwrap(),
-        DelayedNeurons::new(neurons.collect(), vec![0.0]),
-    )
+    let neurons = DelayedNeurons::new(neurons.collect(), vec![0.0]);
+    let way = Way::of_neurons(Box::new(Plain { latency_ms }), neurons);
+    ReadoutStream::new(vec![way], array(), FrameClock::new(period_us).unwrap())
 }
 
 /// Events with the stamps of 192 us frames; some frames have many events, some pauses are long.

@@ -1,0 +1,124 @@
+"""A readout that detects a label by its neuron or by its plain rule: what runs, its file, and what is better."""
+
+import json
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from refusal import refused
+from test_plain_rule import ARRAY, FLOOR, clocks, events, tare
+
+import taxel
+from taxel import Detections, Frames, Neuron, Readout, SpikeTrains
+from taxel.detect import Example, PlainRule, Recipe, judge, run, score
+from taxel.detect.folds import by_rule, chosen_of
+from taxel.encode import ContactArea, LevelCrossing
+
+NEURON = Neuron(tau=0.5, refractory=1.0, kernel="exponential", after_spike="reset", time="grid", step_ms=0.1)
+RULES = {
+    "on": PlainRule("count", 3, 0.5, levels=[1.0, 2.5], dated_at=2.0, labels=("on", None), noise_floor=FLOOR),
+    "off": PlainRule("area", 2, labels=(None, "off"), noise_floor=FLOOR),
+    "small": PlainRule("total", 7.25, age_ms=0.5, labels=("small", "large"), noise_floor=FLOOR),
+}
+
+
+def readout(by=()):
+    encoder = ContactArea(levels=[2, 3], noise_floor=FLOOR)
+    weights = {"on": [1.0, 0, 0, 0], "off": [0, 0, 1.0, 0], "small": [0, 1.0, 0, 0], "gone": [0, 0, 0, 1.0]}
+    neurons = {label: (NEURON, np.array(each), 0.1) for label, each in weights.items()}
+    return Readout(encoder, neurons, array=ARRAY, rules=RULES, by_rule=by)
+
+
+@settings(deadline=None)
+@given(events(), st.sets(st.sampled_from(["on", "off", "small", "gone"])), clocks, st.data())
+def test_pieces_give_what_the_whole_gives_and_each_label_what_its_way_gives(source, by, clock, data):
+    frame_us, version = clock
+    how = {"frame_us": frame_us, "wire_version": version, "tare": tare()}
+    chosen = readout(sorted(by))
+    whole = run(chosen, source, **how)
+    alone = [run(chosen.using("neuron"), source, **how)[label] for label in sorted(set(chosen.labels) - by)]
+    alone += [run(RULES[label], source, **how)[label] for label in sorted(by & set(RULES))]
+    for found in alone:
+        for label in found.labels:
+            assert whole[label] == found[label]
+    assert len(whole) == sum(map(len, alone))
+    assert (np.diff(whole.known) >= 0).all()
+    stream, parts = chosen.stream(frame_us=frame_us, wire_version=version, tare=tare()), []
+    cuts = sorted(data.draw(st.sets(st.integers(0, len(source)))))
+    for start, stop in pairwise([0, *cuts, len(source)]):
+        parts.append(stream.push(source[start:stop]))
+        if 0 < stop < len(source) and data.draw(st.booleans()):
+            latest, following = int(source.t[:stop].max()), int(source.t[stop:].min())
+            if following > latest:
+                parts.append(stream.advance(data.draw(st.integers(latest, following))))
+    parts.append(stream.advance(int(source.t.max()) + 2_000_000))
+    joined = sum(parts[1:], parts[0])
+    assert joined[: len(whole)] == whole
+
+
+def test_its_file_holds_both_and_what_runs(tmp_path):
+    chosen = readout(["on", "gone"])
+    again = Readout.load(chosen.save(tmp_path / "both.json"))
+    assert again == chosen
+    assert (again.by_rule, again.rules) == (("gone", "on"), RULES)
+    kept = json.loads((tmp_path / "both.json").read_text())
+    assert kept["rules"]["on"]["levels"] == [1.0, 2.5]
+    assert again.using("better") == again
+    assert again.using("rule").by_rule == tuple(sorted(again.labels))
+    assert again.using("neuron").by_rule == ()
+    with refused(taxel.ProblemError, argument="use"):
+        again.using("best")
+    for wrong in ({"by_rule": ["never"]}, {"rules": {"on": RULES["off"]}}, {"rules": {"never": RULES["off"]}}):
+        with pytest.raises(taxel.ProblemError):
+            Readout(LevelCrossing([1.0]), {"on": (Neuron(), [1.0, 0.0])}, **wrong)
+
+
+def test_what_runs_says_whether_it_needs_a_rest():
+    frames = Frames(np.zeros((200, 1, 2)), 100_000 * np.arange(200), array=taxel.Array(1, 2))
+    free = PlainRule("range_count", 2, levels=[0.5], labels=("on", None))
+    neurons = {"on": (Neuron(), [1.0, 0.0, 0.0, 0.0])}
+    by_rule_alone = Readout(LevelCrossing([1.0]), neurons, rules={"on": free}, by_rule=["on"])
+    assert not by_rule_alone._needs_tare
+    assert len(run(by_rule_alone, frames)) == 0
+    tared = Readout(LevelCrossing([1.0]), neurons, rules={"on": PlainRule("area", 2, labels=("on", None))})
+    assert not tared._needs_tare
+    assert tared.using("rule")._needs_tare
+    with pytest.raises(taxel.ProblemError):
+        run(tared.using("rule"), SpikeTrains.from_lists([[1.0]] * 4))
+
+
+def scored(wrong: int, known: int):
+    """The score of ten labels of which some are missed, each known so much later."""
+    t = 1_000_000 * np.arange(1, 11)
+    found = Detections(["on"] * (10 - wrong), t[wrong:], t[wrong:] + known)
+    return score(found, {"on": t})
+
+
+def test_fewer_mistakes_are_better_and_of_as_many_what_is_known_earlier():
+    assert by_rule(["on"], [(scored(2, 10), scored(1, 900))]) == ("on",)
+    assert by_rule(["on"], [(scored(1, 900), scored(2, 10))]) == ()
+    assert by_rule(["on"], [(scored(1, 900), scored(1, 800))]) == ("on",)
+    assert by_rule(["on"], [(scored(1, 900), scored(1, 900))]) == ()
+    # All folds count together.
+    assert by_rule(["on"], [(scored(2, 10), scored(0, 10)), (scored(0, 10), scored(1, 10))]) == ("on",)
+    assert by_rule(["on"], []) == ()
+    both = chosen_of(Detections(["a", "b"], [1, 5], [2, 6]), Detections(["a", "b"], [3, 4], [3, 4]), ["b"])
+    assert (both.label.tolist(), both.t.tolist()) == (["a", "b"], [1, 4])
+
+
+def test_each_fold_is_scored_by_what_was_better_in_the_others():
+    draw, examples = np.random.default_rng(2), []
+    for _ in range(4):
+        values = np.zeros((600, 1, 2))
+        begins = 50 + 60 * np.arange(9) + draw.integers(0, 20, 9)
+        for begin in begins:
+            values[begin : begin + 20] = 9.0
+        frames = Frames(values, 10_000 * np.arange(600), unit="N", array=taxel.Array(1, 2))
+        examples.append(Example(frames, {"on": 10_000 * begins}, taxel.Tare.take(frames, stop_us=400_000)))
+    # Levels that nothing reaches: its neuron never fires.
+    recipe = Recipe(LevelCrossing([5.0]), {"tau": 2.0, "ub": 0.0, "lb": 0.0, "delay_ms": 1.0})
+    judged = judge(examples, recipe, 4)
+    assert judged.by_rule == ("on",)
+    assert (judged.neurons.found, judged.plain.together.found, judged.together.found) == (0, 36, 36)
