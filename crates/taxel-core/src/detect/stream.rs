@@ -66,7 +66,7 @@ pub(super) struct Way {
 #[derive(Clone)]
 enum Decides {
     Neurons(DelayedNeurons),
-    Rule(LabelledRule),
+    Rule(Box<LabelledRule>),
 }
 
 impl Way {
@@ -77,7 +77,7 @@ impl Way {
 
     /// That of a plain rule: `loads` emits the changes of its quantities.
     pub(super) fn of_rule(loads: Box<dyn Stream>, rule: RunningRule, labels: [Option<String>; 2]) -> Self {
-        Self::new(loads, Decides::Rule(LabelledRule::new(rule, labels)))
+        Self::new(loads, Decides::Rule(Box::new(LabelledRule::new(rule, labels))))
     }
 
     fn new(encoder: Box<dyn Stream>, decides: Decides) -> Self {
