@@ -267,6 +267,7 @@ VALUES: dict[str, Callable[[], Any]] = {
     "trials": lambda: [information.LabelledTrial(PRESSES, "ab"[k % 2], k * 10_000) for k in range(8)],
     "truth": lambda: {"a": [10], "b": [25]},
     "unit": lambda: "N",
+    "use": lambda: "better",
     "value": lambda: 300,
     "values": lambda: [1.0, 9.0],
     "version": lambda: 2,
