@@ -1,10 +1,7 @@
-"""Draw the pictures of the page and of trained results: each page of *Start here* is walked, and looked at.
+"""Draw the pictures of the page: python docs/page_pictures.py.
 
-    python docs/page_pictures.py [start-insole ...]
-
-The commands and the Python of a page run in a new folder. Then its recording is opened in Chromium, with its labels and
-its readout: `docs/pictures/NAME.png` is what is seen; the first tables of its training's report are `NAME-report.png`.
-The board is seen while it runs, and its recording as `panel.png`, for the README.
+The commands of the event board on *Start here* run in a new folder. `docs/pictures/panel.png` is their recording in
+Chromium, with its labels and what the readout detects; `board-live.png` is the board while it runs.
 """
 
 from __future__ import annotations
@@ -24,18 +21,8 @@ sys.path[:0] = [str(DOCS.parent), str(DOCS.parent / "tests")]  # the tests walk 
 
 from tests.panel.browser import CHROMIUM, FLAGS, running
 from tests.panel.pages import clock, shows, until
-from tests.test_start import Shell, blocks, waits_for_another
+from tests.test_start import PAGE, Shell, blocks, waits_for_another
 
-#: What each page shows: the arguments of taxel view, and the readout that is chosen.
-SHOWN = {
-    "start-board": (["ball.mcap"], "touch.json"),
-    "start-camera": (["skin.raw"], "burst.json"),
-    "start-insole": (["walk.npz"], "gait.json"),
-    "start-nothing": (["disc.npz"], ""),
-    "start-numbers": (["mat.mcap"], "press.json"),
-    "start-plate": (["plate.npz"], "plate.json"),
-    "start-robot": (["grasps", "--topic", "/finger", "--field", "data", "--array", "8x8"], "grasp.json"),
-}
 #: Loaded taxels from which on the board is drawn.
 TOUCHED = 60
 #: From this time of the board, s.
@@ -63,31 +50,18 @@ def seen(browser: Any, folder: Path, *arguments: str) -> Iterator[Any]:
     page.context.close()
 
 
-def walk(name: str) -> None:
-    """Run the commands and the Python of a page in the folder in which the caller is."""
-    shell = Shell(Path.cwd())
-    for language, text in blocks(DOCS / f"{name}.md"):
-        lines = text.splitlines()
-        if language == "python":
-            exec(compile(text, name, "exec"), {"__name__": name})
-        elif not language:
-            shell.beside(*lines) if waits_for_another(lines[0]) else [shell.run(line) for line in lines]
-
-
-def draw_recording(browser: Any, name: str, picture: str) -> None:
-    """Draw a page's recording with its labels and what its readout detects."""
-    (file, *options), readout = SHOWN[name]
-    with seen(browser, Path.cwd(), "view", file, *options, "--no-open") as page:
+def draw_recording(browser: Any) -> None:
+    """Draw the recording with its labels and what its readout detects."""
+    with seen(browser, Path.cwd(), "view", "ball.mcap", "--no-open") as page:
         shows(page, "state-word", "^Replay$")
-        if readout:
-            page.locator("#readout").select_option(readout)
-            until(lambda: page.locator("#detection-list li").count(), "its detections")
-            page.wait_for_timeout(1000)
-            if page.locator("#notice-close").is_visible():
-                page.locator("#notice-close").click()
+        page.locator("#readout").select_option("touch.json")
+        until(lambda: page.locator("#detection-list li").count(), "its detections")
+        page.wait_for_timeout(1000)
+        if page.locator("#notice-close").is_visible():
+            page.locator("#notice-close").click()
         page.mouse.move(700, 5)
         page.wait_for_timeout(3000)
-        save(page, picture)
+        save(page, "panel")
 
 
 def draw_board(browser: Any) -> None:
@@ -110,27 +84,24 @@ def draw_board(browser: Any) -> None:
             arg=TOUCHED,
         )
         page.wait_for_timeout(500)
-        save(page, "start-board")
+        save(page, "board-live")
 
 
-def main(names: list[str]) -> None:
-    """Draw the pictures of some pages."""
+def main() -> None:
+    """Walk the board's commands of the page, and draw both pictures."""
+    shell = Shell(Path.cwd())
+    for language, text in blocks(PAGE):
+        lines = text.splitlines()
+        if language or not ("ball.mcap" in text or "touch.json" in text):
+            continue
+        shell.beside(*lines) if waits_for_another(lines[0]) else [shell.run(line) for line in lines]
     with sync_playwright() as started:
         browser = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        for name in names:
-            with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-                walk(name)
-                draw_recording(browser, name, "panel" if name == "start-board" else name)
-                if name == "start-board":
-                    draw_board(browser)
-                report = Path("training/report.html") if SHOWN[name][1] else Path("demo/report.html")
-                page = browser.new_context(viewport={"width": 1020, "height": 760}).new_page()
-                page.goto(report.resolve().as_uri())
-                page.wait_for_timeout(1000)
-                save(page, f"{name}-report")
-                page.context.close()
+        draw_recording(browser)
+        draw_board(browser)
         browser.close()
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or list(SHOWN))
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        main()

@@ -1,19 +1,17 @@
-"""The pages of *Start here* and the way of the README do what they say, each page in its own folder.
+"""The page *Start here* and the way of the README do what they say, in one folder.
 
-What a page prints are whole lines, or their beginning before "...".
+What the page prints are whole lines, or their beginning before "...".
 """
 
 from __future__ import annotations
 
 import contextlib
-import functools
 import os
 import re
 import shlex
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -22,9 +20,7 @@ from loopback import free_port
 from tests.test_readme import README, shell_lines
 
 DOCS = Path(__file__).parent.parent / "docs"
-PAGES = sorted(DOCS.glob("start-*.md"))
-#: What the page of a camera makes of a file, and what is true of it.
-TOLD = ("told.csv", "unseen-kinds.csv")
+PAGE = DOCS / "start.md"
 #: Commands that wait for another one beside them.
 LISTENING = ("taxel record", "taxel live")
 WAY = [
@@ -89,47 +85,39 @@ def command(line: str) -> str:
     return re.sub(r"\s+#.*| --report \S+", "", line).strip()
 
 
-Played = Callable[[Path], tuple[Path, dict[str, str]]]
-
-
 @pytest.fixture(scope="module")
-def played(tmp_path_factory: pytest.TempPathFactory) -> Played:
-    """Does what a page says, once: returns its folder, and what each of its commands printed."""
-
-    @functools.cache
-    def play(page: Path) -> tuple[Path, dict[str, str]]:
-        folder, by_line, printed = tmp_path_factory.mktemp(page.stem), {}, ""
-        shell = Shell(folder)
-        for language, text in blocks(page):
-            lines = text.splitlines()
-            if language == "python":
-                with contextlib.chdir(folder):
-                    exec(compile(text, page.name, "exec"), {"__name__": page.stem})
-            elif language == "text":
-                said = {" ".join(line.split()) for line in printed.splitlines()}
-                for line in lines:
-                    whole, cut, _ = " ".join(line.split()).partition(" ...")
-                    found = whole in said or (cut and any(one.startswith(whole) for one in said))
-                    assert found, f"{page.name}: {line!r} is not in\n{printed}"
-            elif waits_for_another(lines[0]):
-                printed = by_line[command(lines[0])] = shell.beside(*lines)
-                by_line[command(lines[1])] = ""
-            else:
-                by_line |= {command(line): shell.run(line) for line in lines}
-                printed = "".join(by_line[command(line)] for line in lines)
-        return folder, by_line
-
-    return play
+def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
+    """What the page says was done: the folder, and what each of its commands printed."""
+    folder, by_line, printed = tmp_path_factory.mktemp("start"), {}, ""
+    shell = Shell(folder)
+    for language, text in blocks(PAGE):
+        lines = text.splitlines()
+        if language == "python":
+            with contextlib.chdir(folder):
+                exec(compile(text, PAGE.name, "exec"), {"__name__": "start"})
+        elif language == "text":
+            said = {" ".join(line.split()) for line in printed.splitlines()}
+            for line in lines:
+                whole, cut, _ = " ".join(line.split()).partition(" ...")
+                found = whole in said or (cut and any(one.startswith(whole) for one in said))
+                assert found, f"{line!r} is not in\n{printed}"
+        elif waits_for_another(lines[0]):
+            printed = by_line[command(lines[0])] = shell.beside(*lines)
+            by_line[command(lines[1])] = ""
+        else:
+            by_line |= {command(line): shell.run(line) for line in lines}
+            printed = "".join(by_line[command(line)] for line in lines)
+    return folder, by_line
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_a_page_works_as_printed(page: Path, played: Played) -> None:
-    played(page)
+def test_the_page_works_as_printed(played: tuple[Path, dict[str, str]]) -> None:
+    folder, _ = played
+    assert {"touch.json", "press.json", "gait.json", "grasp.json"} <= {file.name for file in folder.iterdir()}
 
 
-def test_the_readmes_way_works_as_printed(played: Played, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its commands are those of the page of an event board; then its Python, in the same folder."""
-    folder, printed = played(DOCS / "start-board.md")
+def test_the_readmes_way_works_as_printed(played: tuple[Path, dict[str, str]], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its commands are those of an event board; then its Python, in the same folder."""
+    folder, printed = played
     record, _, info, train, detect, live = WAY
     assert [line.split()[1] for line in WAY] == ["record", "emulate", "info", "train", "detect", "live"]
     assert set(WAY) <= printed.keys()
@@ -148,17 +136,3 @@ def test_the_readmes_way_works_as_printed(played: Played, monkeypatch: pytest.Mo
     for number, piece in enumerate(pieces):
         exec(compile(piece, f"README, piece {number}", "exec"), {"__name__": "readme"})
     assert os.path.getsize(folder / "ball.mcap") > 1_000_000
-
-
-def test_the_page_of_a_camera_tells_contacts_from_lifts(played: Played) -> None:
-    folder, _ = played(DOCS / "start-camera.md")
-    told, true = ([line.split(",") for line in (folder / name).read_text().split()[1:]] for name in TOLD)
-    assert [label for label, _ in told] == [label for label, _ in true]
-    assert all(abs(int(t) - int(at)) < 50_000 for (_, t), (_, at) in zip(told, true, strict=True))
-
-
-def test_each_page_is_named_where_a_reader_begins() -> None:
-    begin = (DOCS / "start.md").read_text()
-    assert len(PAGES) == 7
-    for page in PAGES:
-        assert f"]({page.name})" in begin
