@@ -223,7 +223,6 @@ VALUES: dict[str, Callable[[], Any]] = {
     "pattern": lambda: 0,
     "patterns": lambda: [PLAIN],
     "period_us": lambda: 20.0,
-    "person": lambda: "anna",
     "place": serial_line,
     "preset": lambda: "5.2 kHz",
     "problem": lambda: REFUTED.problem_,
@@ -288,7 +287,6 @@ VALUES: dict[str, Callable[[], Any]] = {
     "Tare.from_json.text": TARE.to_json,
     "PlainRule.from_json.text": RULE.to_json,
     "Encoder.from_json.text": LEVELS.to_json,
-    "Trial.source": lambda: "a plate",
     "notes_as_trials.recordings": lambda: [taxel.open("here_events.npz").with_notes([taxel.Note("ball", 0, 0)])],
     "pairwise.metric": lambda: "victor_purpura",
     "record.start": lambda: True,
@@ -342,7 +340,6 @@ VALUES: dict[str, Callable[[], Any]] = {
     "SpikeTrains.load.path": lambda: "here.npz",
     "SpikeTrains.select.trains": lambda: [1],
     "Tare.load.path": lambda: "here_tare.json",
-    "Trial.truth": lambda: {"contact": np.array([100])},
     "calibrate.recording": lambda: taxel.open("pressed.npz"),
     "convert.target": lambda: "there.npz",
     "detect.readout": lambda: RULE,
@@ -360,7 +357,6 @@ VALUES: dict[str, Callable[[], Any]] = {
     "region.x": lambda: slice(0, 2),
     "region.y": lambda: slice(0, 2),
     "rest.recording": lambda: taxel.open("pressed.npz"),
-    "trials.path": lambda: "pdb",
     "zero_test.found": lambda: 1.0,
 }
 

@@ -1,56 +1,39 @@
-"""The example of CONTRIBUTING works: added to a copy it gives a format."""
+"""The example of CONTRIBUTING works: installed beside taxel it gives a format."""
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
-import subprocess
-import sys
+from importlib import invalidate_caches
 from pathlib import Path
 
 import pytest
 
+import taxel
+from taxel.recording import opening
+
 ROOT = Path(__file__).resolve().parents[1]
-FORMAT = ROOT / "tests" / "contributing" / "format"
-TESTS = ["tests/formats/test_registry.py", "tests/formats/test_channel.py"]
 
 
-def add(root: Path, path: str, after: str, text: str) -> None:
-    """Add a fenced piece of CONTRIBUTING to the file and at the place that its first line names."""
-    there = (root / path).read_text().splitlines(keepends=True)
-    anchor = after.removeprefix("after ").strip('"')
-    at = len(there) if after == "at the end" else 1 + next(k for k, line in enumerate(there) if anchor in line)
-    gap = "\n\n" if after == "at the end" else ""
-    (root / path).write_text("".join([*there[:at], gap, text, *there[at:]]))
-
-
-@pytest.fixture
-def copy(tmp_path: Path) -> Path:
-    """A copy of the package, its tests of formats and their settings."""
-    unneeded = shutil.ignore_patterns("__pycache__", "*.so", ".hypothesis")
-    shutil.copytree(ROOT / "python", tmp_path / "python", ignore=unneeded)
-    for compiled in (ROOT / "python" / "taxel").glob("*.so"):
-        (tmp_path / "python" / "taxel" / compiled.name).symlink_to(compiled)
-    for room in ("formats", "recording"):
-        shutil.copytree(ROOT / "tests" / room, tmp_path / "tests" / room, ignore=unneeded)
-    for shared in (ROOT / "tests").glob("*.py"):
-        shutil.copy(shared, tmp_path / "tests")
-    for settings in ("pyproject.toml", "conftest.py"):
-        shutil.copy(ROOT / settings, tmp_path)
-    shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("_build", "pictures"))
-    return tmp_path
-
-
-def test_what_contributing_says_is_enough(copy: Path) -> None:
+def test_what_contributing_says_of_a_format_is_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     page = (ROOT / "CONTRIBUTING.md").read_text()
-    pieces = re.findall(r"^```python\n# (\S+?), (at the end|after [^\n]+?)\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
-    assert len(pieces) == 2
-    shutil.copytree(FORMAT, copy, dirs_exist_ok=True)
-    for piece in pieces:
-        add(copy, *piece)
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *TESTS, "-k", "test_channel or registry"]
-    environment = os.environ | {"PYTHONPATH": str(copy / "python")}
-    done = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
-    assert " passed" in done.stdout
+    found = re.search(r'\[project\.entry-points\."(.*)"\]\n(\w+) = "(\w+)"\n', page)
+    assert found is not None
+    group, name, module = found.groups()
+    (tmp_path / f"{module}.py").write_text((ROOT / "tests" / "contributing" / "channel.py").read_text())
+    about = tmp_path / f"{module}-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {module}\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(f"[{group}]\n{name} = {module}\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    invalidate_caches()
+    opening._from_elsewhere.cache_clear()
+    try:
+        path = tmp_path / "walk.channel"
+        path.write_text("t_us force_n\n" + "".join(f"{2000 * k} {k % 7}\n" for k in range(100)))
+        recording = taxel.open(path)
+        assert (recording.kind, recording.frames().values[3, 0, 0]) == (name, 3.0)
+        path.write_text("t_us force_n\n0 four\n")
+        with pytest.raises(taxel.FormatError, match=r"walk\.channel"):
+            taxel.open(path)
+    finally:
+        opening._from_elsewhere.cache_clear()

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import strange
 from rich.progress import Progress, TextColumn
@@ -121,11 +120,10 @@ def test_what_python_shows_of_them_is_escaped(places: dict[str, Path]) -> None:
     readout, labels = taxel.Readout.load(places["readout"]), taxel.Labels(places["labels"])
     found = taxel.detect.run(readout, opened)
     score = taxel.detect.score(opened.detections, {NAME: [500_000]}, window_ms=50)
-    trial = taxel.formats.Trial(NAME, NAME, strange.frames(), {NAME: np.array([3])}, NAME)
     tare = taxel.Tare.take(strange.frames(), stop_us=300_000, note=NAME)
     rule = taxel.detect.PlainRule("area", 2, labels=[NAME, None])
     for noun in (opened, opened.frames(), opened.array, opened.detections, opened.notes, readout, labels, found, score,
-                 trial, tare, rule, opened.verdict):  # fmt: skip
+                 tare, rule, opened.verdict):  # fmt: skip
         assert not strange.wrong(repr(noun)), type(noun)
     for noun in (opened, opened.frames(), opened.detections):
         assert not strange.wrong(noun._repr_html_()), type(noun)

@@ -33,9 +33,9 @@ from typing import Any
 import numpy as np
 
 import taxel
-from taxel.formats import plate
 from taxel_benchmarks._goals import Goal, at_most
 from taxel_benchmarks._rounds import stamp
+from taxel_studies.datasets import plate
 
 PERSON, WALKER = "subj000", "GaPt23"
 #: Rows of the longest footfall, and the time between the samples of a stride, us.

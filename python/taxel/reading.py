@@ -251,6 +251,8 @@ class Facts:
         Whether the last data are missing.
     layout : str
         The text of a layout file by which a table or array of another program was read, complete.
+    labels_of : str
+        The quantity of plain rules whose thresholds its notes are, as they were derived from it; "" if they were not.
     """
 
     path: Path = Path()
@@ -272,6 +274,7 @@ class Facts:
     lost: tuple[str, ...] = ()
     truncated: bool = False
     layout: str = ""
+    labels_of: str = ""
 
     def __post_init__(self) -> None:
         if not self.name:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from taxel import Array, Frames, ProblemError, SpikeTrains
-from taxel.formats import Trial
+from taxel_studies.datasets import Trial
 from taxel_studies.gait import insole, protocols, rules
 from taxel_studies.gait.pieces import Piece, joined
 
@@ -27,7 +27,7 @@ def footfall(shift: int = 0, late: float = 1.0) -> Trial:
     return Trial(
         name="x/1",
         person="x",
-        recorded=Frames(values, np.arange(60) * 2000, unit="counts", array=Array(40, 30, 5.08)),
+        frames=Frames(values, np.arange(60) * 2000, unit="counts", array=Array(40, 30, 5.08)),
         truth={"contact": np.array([0])},
         source="made here",
         about={"row_mm": 7.62, "column_mm": 5.08},

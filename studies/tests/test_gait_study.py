@@ -307,7 +307,9 @@ def test_a_file_that_cannot_be_read_is_left_out_and_said(ran, damaged, tmp_path,
     out, error = capsys.readouterr()
     assert error.startswith("gait: reading the recordings in ")
     assert "left out, because it could not be read: insole_gaitpdb/GaPt99_01.txt: line" in out
-    assert "left out, because it could not be read: pressure_formats/pliance.asc: the line of column names" in out
+    assert (
+        "left out, because it could not be read: pressure_formats/pliance.asc: must have a line of column names" in out
+    )
     section = json.loads((tmp_path / "report" / "gait" / "summary.json").read_text())
     assert list(section["unread"]) == ["insole_gaitpdb/GaPt99_01.txt", "pressure_formats/pliance.asc"]
     assert "pliance.asc" in (tmp_path / "report" / "index.html").read_text()
@@ -325,7 +327,7 @@ def test_strict_ends_at_a_file_that_cannot_be_read_before_anything_is_reckoned(d
 
 
 def test_a_folder_in_which_nothing_can_be_read_is_refused(damaged, tmp_path):
-    with pytest.raises(FormatError, match=r"pressure_formats/pliance\.asc: the line of column names"):
+    with pytest.raises(FormatError, match=r"pressure_formats/pliance\.asc: must have a line of column names"):
         study(damaged, tmp_path / "report", sources=["pedar"])
     (damaged / "insole_gaitpdb").rename(damaged / "elsewhere")
     (damaged / "insole_gaitpdb").mkdir()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from formats.making import write_gaitpdb
+from formats.making import write_pedar
 
 import taxel
 from taxel.detect import Example, Fold, Part, Recipe, judge
@@ -90,9 +90,8 @@ def test_levels_that_a_user_states_stay(tmp_path: Path) -> None:
 
 
 def test_the_kept_recordings_keep_the_recipes_levels(tmp_path: Path) -> None:
-    examples = [
-        Example(each.frames(), {"contact": [note.t for note in each.notes if note.text == "contact"]})
-        for each in taxel.open_all(write_gaitpdb(tmp_path))
-    ]
+    contacts = [100_000 * k for k in range(1, 6)]
+    walk = taxel.open(write_pedar(tmp_path))
+    examples = [Example(each.frames(), {"contact": contacts}) for each in walk.sources.values()]
     [trained] = judge(examples, Recipe.load("gait_insole", labels=["contact"]), [Fold([Part(0)], [Part(1)])]).trained
     assert trained.readout.encoder.levels == recipe().encoder.levels

@@ -17,9 +17,9 @@ from typer.testing import CliRunner
 import taxel
 from taxel import Array, Events, FormatError, Frames, Places
 from taxel.cli import app
-from taxel.formats.layout import Layout, load_packaged
+from taxel.formats.layout import Layout
 
-from .making import write_gaitpdb
+from .making import write_pedar
 from .tables import VALUES, lines, table
 
 
@@ -300,19 +300,6 @@ def test_a_folder_of_tables_opens_by_its_one_layout(tmp_path: Path) -> None:
     assert [len(one.notes) for one in opened] == [1, 0]
 
 
-def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) -> None:
-    left, right = taxel.open_all(write_gaitpdb(tmp_path))
-    assert (left.side, right.side) == ("left", "right")
-    for foot, sign in ((left, -1), (right, 1)):
-        places = foot.array.places
-        assert places is not None
-        # Sensor 1 is the heel (y forwards is -800 there), sensor 8 the front.
-        assert places.x.ravel().tolist() == [sign * x for x in (500, 700, 300, 700, 300, 700, 300, 500)]
-        assert places.y.ravel().tolist() == [800, 400, 400, 0, 0, -400, -400, -800]
-        assert (places.unit, foot.array.centre_unit) == (None, "places")
-    assert load_packaged("gaitpdb").heel == "bottom"
-
-
 @pytest.mark.parametrize(
     ("layout", "match"),
     [
@@ -361,7 +348,7 @@ def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) ->
         ("zeros_before_s = 0", "zeros_before_s is 0: must be from 1e-06 to 60"),
         ("table = 3", "table"),
         ("[table]\nseparator = ', '", "separator is ', ': must be one character"),
-        ("[table]\nskip_lines = 40", "no line follows the 40 skipped lines"),
+        ("[table]\nskip_lines = 40", "no line of numbers"),
         ("[table]\ntime_column = 'when'", "column 'when' of time_column is missing"),
         ("[table]\ntime_column = 9", "time_column is 9, but the table has 6 columns"),
         ("rows = [", "not TOML"),
@@ -378,7 +365,7 @@ def test_a_layout_that_makes_no_sense_is_refused_in_one_line(tmp_path: Path, lay
 @pytest.mark.parametrize("head", ["", "heel, N\n"])
 def test_a_table_of_another_separator_is_named(tmp_path: Path, stated: str, there: str, head: str) -> None:
     head = head.replace(", ", there)
-    with pytest.raises(FormatError, match=r"line 1: the separator .*write the right separator"):
+    with pytest.raises(FormatError, match=r"line 1: no line of numbers between separators"):
         table(tmp_path, head + lines(VALUES, there), f'rate_hz = 50\n[table]\nseparator = "{stated}"')
 
 
@@ -474,9 +461,9 @@ def test_a_layout_for_tables_says_nothing_of_a_board_s_recording_in_the_same_fol
 
 
 def test_a_layout_for_another_count_of_channels_of_a_trial_is_refused(tmp_path: Path) -> None:
-    write_gaitpdb(tmp_path)
+    write_pedar(tmp_path)
     (tmp_path / "layout.toml").write_text("[places]\nx = [1, 2]\ny = [1, 2]\n")
-    with pytest.raises(FormatError, match=r"layout\.toml: .*must be \(1, 8\), one per taxel"):
+    with pytest.raises(FormatError, match=r"layout\.toml: .*must be \(1, 5\), one per taxel"):
         taxel.open_all(tmp_path)
 
 

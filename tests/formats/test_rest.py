@@ -41,7 +41,7 @@ def _each(name: str) -> list[taxel.Recording]:
         pytest.skip(f"no {name} in {SHARED}: set TAXEL_DATA")
     endings = (".h5", ".txt", ".asf")
     files = sorted(one for one in place.iterdir() if one.suffix in endings) if place.is_dir() else []
-    return [one for file in files or [place] for one in taxel.open_all(file)]
+    return [one for file in files or [place] for each in taxel.open_all(file) for one in each.sources.values()]
 
 
 @pytest.mark.parametrize("name", EXPECTED)

@@ -83,7 +83,7 @@ def test_a_frame_of_any_kind_of_file_is_shown_in_its_unit(tmp_path, ending):
 
 def test_both_feet_stand_side_by_side(tmp_path):
     file = write_pedar(tmp_path)
-    [both] = TextOptions().open_joined(file)
+    [both] = TextOptions().open_trials(file)
     left, right = (both.sources[foot].frames() for foot in ("left", "right"))
     columns = left.array.columns
     with Panel(file) as panel, Client(panel) as page:
@@ -100,9 +100,8 @@ def test_both_feet_stand_side_by_side(tmp_path):
         assert page.ask("mark", label="turn", t_us=90_000)["type"] == "done"
         assert page.ask("cut", start_us=0, stop_us=100_000, name="cut.mcap")["type"] == "done"
     assert (tmp_path / "walk.notes.csv").read_text() == "label,t_us,source\nheel,50000,left\nturn,90000,\n"
-    again = taxel.open_all(file)
-    said = [[note.text for note in one.notes if note.text in ("heel", "turn")] for one in again]
-    assert said == [["heel", "turn"], ["turn"]]
+    again = taxel.open(file).sources.values()
+    assert [[note.text for note in one.notes] for one in again] == [["heel", "turn"], ["turn"]]
     part = taxel.open(tmp_path / "cut.mcap")
     assert part.sources["right"].frames() == right.between(0, 100_000)
 
@@ -162,7 +161,7 @@ def test_spikes_of_frames_are_those_of_the_encoder(tmp_path, encoder):
 
 def test_spikes_of_both_feet_are_those_of_each(tmp_path):
     file = write_pedar(tmp_path)
-    [both] = TextOptions().open_joined(file)
+    [both] = TextOptions().open_trials(file)
     encoder = taxel.encode.ChangeEvents(noise_floor=1.0)
     expected = []
     for n, foot in enumerate(("left", "right")):
@@ -261,7 +260,7 @@ def test_a_large_table_is_shown_from_its_beginning_and_then_whole(tmp_path, monk
         return reading(self, path, trial)
 
     monkeypatch.setattr(shown_files.ShownFiles, "opened", slowly)
-    [whole] = TextOptions().open_joined(file)
+    [whole] = TextOptions().open_trials(file)
     frames = sum(len(one.frames()) for one in whole.sources.values())
     with Panel(file) as panel, Client(panel) as page:
         first = opened(page, file.name)
@@ -385,7 +384,7 @@ def test_each_foot_has_a_sum_and_a_centre(tmp_path, column_us):
         return ["\t".join(f"{cell:.6g}" for cell in row) for row in table]
 
     file = write_gaitpdb(tmp_path, change=walked)
-    [both] = TextOptions().open_joined(file)
+    [both] = TextOptions().open_trials(file)
     feet = [both.sources[foot].frames() for foot in ("left", "right")]
     with Panel(file) as panel, Client(panel) as page:
         about = opened(page, file.name)

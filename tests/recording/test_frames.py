@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from formats.making import write_gaitpdb, write_icub, write_moticon, write_pedar
+from formats.making import write_icub, write_moticon, write_pedar
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -24,7 +24,6 @@ from taxel.detect import Example, Part, Recipe, judge
 from taxel.detect.folds import _split
 from taxel.encode import LevelCrossing
 from taxel.reading import Facts, InMemory, Marks
-from taxel.recording.opening import join_feet
 from taxel.recording.text_options import TextOptions
 from taxel.tasks.labels import references
 
@@ -209,13 +208,12 @@ def test_encoders_find_the_same_in_a_mcap_as_in_its_source(tmp_path: Path) -> No
     assert encoder.encode(taxel.open(tmp_path / "a.mcap")) == encoder.encode(frames)
 
 
-@pytest.mark.parametrize("make", [write_pedar, write_gaitpdb, write_moticon])
+@pytest.mark.parametrize("make", [write_pedar, write_moticon])
 def test_both_feet_of_a_file_become_sources_left_and_right(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], make: Callable[[Path], Path]
 ) -> None:
     file = make(tmp_path)
-    file = next(tmp_path.iterdir()) if file.is_dir() else file
-    trials = taxel.open_all(file)
+    trials = list(taxel.open(file).sources.values())
     assert [one.name.rsplit(" ")[-1] for one in trials] == ["left", "right"]
     assert call(capsys, "convert", file, tmp_path / "both.mcap")[0] == 0
     both = taxel.open(tmp_path / "both.mcap")
@@ -263,10 +261,8 @@ def test_a_tare_in_which_something_lay_names_the_source(tmp_path: Path, capsys: 
     feet = []
     for foot, values in (("left", quiet), ("right", pressed)):
         frames = Frames(values, np.arange(400) * 10_000, array=array)
-        facts = Facts(path=tmp_path / "a.asc", array=array, kind="pedar", name=f"a {foot}", label=foot)
-        feet.append(taxel.Recording.of(InMemory(facts, frames)))
-    [both] = join_feet(feet)
-    taxel.convert(both, tmp_path / "a.mcap")
+        feet.append(InMemory(Facts(path=tmp_path / "a.asc", array=array, kind="pedar", label=foot), frames))
+    taxel.convert(taxel.Recording.of(*feet), tmp_path / "a.mcap")
     code, _, errors = call(capsys, "info", tmp_path / "a.mcap", "--tare", "0.5")
     assert code == 0
     assert re.search(r"warning: tare is 0\.5: the beginning of .*a\.mcap right is not quiet but contains", errors)
@@ -275,12 +271,11 @@ def test_a_tare_in_which_something_lay_names_the_source(tmp_path: Path, capsys: 
 def test_labels_are_of_one_source_or_of_all(tmp_path: Path) -> None:
     array = Array(1, 2)
     frames = Frames(np.ones((5, 1, 2)), np.arange(5) * 10_000, unit="N", array=array)
-    feet = []
-    for foot in ("left", "right"):
-        facts = Facts(path=tmp_path / "walk.asc", array=array, kind="pedar", name=f"walk {foot}", label=foot)
-        feet.append(taxel.Recording.of(InMemory(facts, frames)))
-    [both] = join_feet(feet)
-    taxel.convert(both, tmp_path / "walk.mcap")
+    feet = [
+        InMemory(Facts(path=tmp_path / "walk.asc", array=array, kind="pedar", label=foot), frames)
+        for foot in ("left", "right")
+    ]
+    taxel.convert(taxel.Recording.of(*feet), tmp_path / "walk.mcap")
     (tmp_path / "walk.notes.csv").write_text("label,t_us,source\nheel,10000,left\nturn,20000,\ntoe,30000,right\n")
     back = taxel.open(tmp_path / "walk.mcap")
     said = {name: [note.text for note in one.notes] for name, one in back.sources.items()}
@@ -360,7 +355,7 @@ def test_a_folder_of_many_trials_becomes_a_folder_of_recordings(
     write_pedar(source)
     assert call(capsys, "convert", source, out)[0] == 0
     names = sorted(file.name for file in out.iterdir())
-    assert len(names) == len(TextOptions().open_joined(source)) == 2
+    assert len(names) == len(TextOptions().open_trials(source)) == 2
     assert "again.mcap" in names
     assert list(taxel.open(out / "again.mcap").sources) == ["left", "right"]
 

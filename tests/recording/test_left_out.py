@@ -72,8 +72,8 @@ def test_labels_without_a_recording_are_not_given_to_the_only_one_that_is_left(t
 def test_a_damaged_file_of_another_format_or_program_is_left_out(tmp_path: Path) -> None:
     (tmp_path / "pedar").mkdir()
     file = write_pedar(tmp_path / "pedar")
-    file.with_name("second.asc").write_bytes(file.read_bytes() + b"0.5 oh\n")
-    with pytest.warns(UserWarning, match=r"^left out, because it cannot be read: second\.asc, line"):
+    file.with_name("second.asc").write_bytes(file.read_bytes()[:200])
+    with pytest.warns(UserWarning, match=r"^left out, because it cannot be read: .*second\.asc"):
         assert {each.path.stem for each in taxel.open_all(tmp_path / "pedar")} == {file.stem}
     (tmp_path / "tables").mkdir()
     (tmp_path / "tables/layout.toml").write_text("rows = 1\ncolumns = 2\nrate_hz = 10\n")

@@ -357,16 +357,10 @@ def test_a_finished_writer_takes_no_more_and_nonsense_is_refused(tmp_path: Path)
             call()
 
 
-def test_one_recording_is_opened_and_of_several_the_error_names_the_function_for_all(tmp_path: Path) -> None:
-    place = foreign.write_pedar(tmp_path)
-    left, right = taxel.open_all(place)
-    assert (left.side, right.side) == ("left", "right")
-    with pytest.raises(
-        ProblemError,
-        match=r"2 recordings \(.* left, .* right\); to write each to a file of taxel, run taxel convert .* FOLDER",
-    ):
-        taxel.open(place)
-    taxel.convert(left, tmp_path / "left.npz")
+def test_one_recording_is_opened_and_of_a_folder_all(tmp_path: Path) -> None:
+    both = taxel.open(foreign.write_pedar(tmp_path))
+    assert [each.side for each in both.sources.values()] == ["left", "right"]
+    taxel.convert(both.sources["left"], tmp_path / "left.npz")
     assert taxel.open(tmp_path / "left.npz").frames() == taxel.open_all(tmp_path / "left.npz")[0].frames()
     with pytest.raises(ProblemError, match=r": is a folder; name one of its recordings"):
         taxel.open(tmp_path)

@@ -14,7 +14,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from formats import making
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shell import run
@@ -53,13 +52,7 @@ def test_another_program_reads_a_h5_as_the_layout_says(tmp_path: Path) -> None:
         assert h5["markers"].shape == (2, 2)
 
 
-def test_other_peoples_h5_is_a_list_of_trials_whose_truth_is_notes(tmp_path: Path) -> None:
-    opened = taxel.open_all(making.write_plate(tmp_path))
-    trials = list(taxel.formats.trials(tmp_path))
-    assert [rec.name for rec in opened] == [trial.name for trial in trials]
-    for rec, trial in zip(opened, trials, strict=True):
-        assert rec.frames() == trial.frames
-        assert {n.text: n.t for n in rec.notes} == {e: int(t[0]) for e, t in trial.truth.items()}
+def test_another_h5_names_its_arrays(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "other.h5", "w") as h5:
         h5["t"] = [1]
     with pytest.raises(FormatError, match=r"contains t \(1\); name the array of frames"):
@@ -86,13 +79,6 @@ def test_a_folder_is_a_list_in_the_order_of_the_names_with_its_labels_as_notes(t
     (tmp_path / "labels.csv").write_text("recording,label,t_us\nrun,heel,700\n")
     with pytest.raises(FormatError, match=r"run is not a recording of this folder; must be one of a\.h5, walk1\.csv"):
         taxel.open_all(tmp_path)
-
-
-@pytest.mark.parametrize("name", taxel.formats.FORMATS)
-def test_a_folder_of_other_peoples_files_is_its_trials(tmp_path: Path, name: str) -> None:
-    getattr(making, f"write_{name}")(tmp_path)
-    opened = taxel.open_all(tmp_path)
-    assert {rec.name for rec in opened} == {trial.name for trial in taxel.formats.trials(tmp_path)}
 
 
 def test_a_folder_without_a_recording_says_what_there_is_to_read(tmp_path: Path) -> None:

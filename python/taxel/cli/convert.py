@@ -59,7 +59,7 @@ def convert(
         check_writable(target, overwrite=overwrite)
     with progress(quiet=True), bar(as_json) as show:  # the first prints warnings
         show(f"reading {source}", 0, 0)
-        opened = [of_source(recording, part) for recording in files.opener.open_joined(source)]
+        opened = [of_source(recording, part) for recording in files.opener.open_trials(source)]
         if target.suffix and len(opened) > 1:
             raise ProblemError(
                 f"{source}: contains {len(opened)} recordings; {target} must be a folder, so its name must have no "

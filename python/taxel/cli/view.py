@@ -85,7 +85,7 @@ def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> C
         return None
 
     def opens(file: Path) -> list[Recording]:
-        opened = files.opener.open_joined(file)
+        opened = files.opener.open_trials(file)
         if calibration is None:
             return opened
         return [sensor._calibrated_by(calibration) for sensor in opened]

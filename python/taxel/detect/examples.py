@@ -1,7 +1,7 @@
 """The labelled example, on which a readout is trained and scored, and the outcome of one.
 
-Neighbours that differ: `taxel.formats.Trial` is a recording of a published data set, with its subject and condition;
-`taxel.information.LabelledTrial` a stretch of time with one label as a whole, which a classifier tells from others.
+A neighbour that differs: `taxel.information.LabelledTrial` is a stretch of time with one label as a whole, which a
+classifier tells from others.
 """
 
 from __future__ import annotations

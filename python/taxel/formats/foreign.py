@@ -14,7 +14,7 @@ from taxel.formats.layout import Layout
 from taxel.formats.layout_text import of_layout
 from taxel.formats.table import ENDINGS as TABLES
 from taxel.formats.table import read_table
-from taxel.formats.table_form import guess
+from taxel.formats.table_form import form_of
 from taxel.formats.table_text import Text
 from taxel.labels import Note, source_of
 from taxel.reading import Facts, InMemory, Marks
@@ -97,7 +97,7 @@ def check_foreign(path: Path, layout: Layout | None) -> None:
     if path.suffix.lower() in ARRAYS:
         look(path, how)
     else:
-        guess(Text(path), how)
+        form_of(Text(path), how)
 
 
 def refuse_container(path: Path) -> None:

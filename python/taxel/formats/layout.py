@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +22,11 @@ from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array, Places
 from taxel.formats.column_names import AXES
-from taxel.formats.event_camera.reduction import Reduction
+from taxel.formats.event_camera import Reduction
 from taxel.formats.lines import KINDS
 from taxel.formats.times import ISO, UNITS_US
 
-__all__ = ["Data", "Layout", "PrintedFrames", "Table", "advice", "load_packaged"]
+__all__ = ["Data", "Layout", "PrintedFrames", "Table", "advice"]
 
 
 @dataclass(frozen=True)
@@ -556,9 +555,3 @@ def as_size(value: object) -> str:
     if size is None:
         return ""
     return f"rows = {size[1]}, columns = {size[2]}" + (f", pitch_mm = {size[3]}" if size[3] else "")
-
-
-@cache
-def load_packaged(name: str) -> Layout:
-    """Return the layout that taxel includes for a format whose source states where its sensors are."""
-    return Layout.read(Path(__file__).parent / "layouts" / f"{name}.layout.toml")

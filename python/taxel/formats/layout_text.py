@@ -8,15 +8,17 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from taxel._base.arguments import shown
-from taxel._base.errors import refused
+from taxel._base.errors import refused, unreadable
 from taxel._core import FormatError, ProblemError
 from taxel.array import Places, of_size
-from taxel.formats.layout import Layout
+from taxel.formats.layout import Layout, advice
 
-__all__ = ["of_layout", "of_source", "with_keys"]
+__all__ = ["of_layout", "of_source", "refuse_to_choose", "with_keys"]
+
+_RATE_NOT_SAID = "# rate_hz = 100  # frames per second, which the file does not state"
 
 #: Keys of a source that are whole numbers, and those that are lists.
 _WHOLE, _LISTS = ("baud", "frame_lines"), ("columns", "leave_out")
@@ -64,6 +66,24 @@ def _lines(values: Any) -> list[str]:
     return [
         f"{name} = {_written(value)}" for name, value, default in stated if value != default and value not in ([], ())
     ]
+
+
+def refuse_to_choose(path: Path, why: str, choices: Mapping[str, Layout]) -> NoReturn:
+    """Refuse a file that can be read in several ways, with the layout of each and what tells it from the others.
+
+    Raises
+    ------
+    FormatError : always (the layouts are below its first line)
+    """
+    lines = list[str]()
+    for number, (name, layout) in enumerate(choices.items(), 1):
+        times = (getattr(layout.table, "time_column", None), getattr(layout.table, "frame_time", None))
+        timed = any(each is not None for each in (*times, layout.rate_hz, getattr(layout.data, "time", None)))
+        lines += [f"# {number}. {name}", *([] if timed else [_RATE_NOT_SAID]), of_layout(layout)]
+    right = advice(path, f"write {'one of these' if len(choices) > 1 else 'this'}")
+    error = unreadable(f"{why}; {right}:", path)
+    error.args = (*error.args, "\n".join(lines).rstrip())
+    raise error
 
 
 def of_source(text: str) -> str:

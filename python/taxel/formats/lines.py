@@ -80,6 +80,12 @@ class OddLines:
         self.counts[kind] += count
         self.first.setdefault(kind, number)
 
+    def rename_last(self, kind: str, name: str, number: int) -> None:
+        """Count a line by another kind, if it is the first of its kind."""
+        if self.first.get(kind) == number:
+            del self.counts[kind], self.first[kind]
+            self.add(name, number)
+
     @property
     def total(self) -> int:
         """Number of odd lines."""

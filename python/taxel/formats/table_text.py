@@ -14,7 +14,7 @@ from typing import IO, Any, cast
 from taxel._base.errors import damaged, unreadable
 from taxel._base.messages import first_line, installing
 
-__all__ = ["SHEETS", "TEXTS", "Text"]
+__all__ = ["SHEETS", "TEXTS", "Text", "beginning"]
 
 #: The endings of tables of text, also compressed by gzip, and of tables that pandas reads as a whole.
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".json", ".jsonl", ".ndjson")
@@ -22,6 +22,14 @@ SHEETS = (".xlsx", ".xlsm", ".ods", ".parquet")
 #: Characters of the beginning that are looked at, and more if these are few lines.
 _HEAD, _MORE = 1 << 16, 1 << 22
 _FEW_LINES = 24
+
+
+def beginning(path: Path, count: int = _HEAD) -> bytes:
+    """Return the first bytes of a file; none of anything else, as a folder may hold pipes, sockets and folders too."""
+    if not path.is_file():
+        return b""
+    with open(path, "rb") as file:
+        return file.read(count)
 
 
 class Text:

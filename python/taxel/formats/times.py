@@ -6,16 +6,21 @@ import re
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.arguments import shown
+from taxel._base.errors import unreadable
 from taxel._base.limits import TIME_US
 from taxel._base.messages import counted
 
-__all__ = ["ISO", "UNITS_US", "Repaired", "is_day", "is_time", "repaired", "us_of"]
+__all__ = ["FEW_ODD", "ISO", "ODD", "UNITS_US", "Repaired", "in_order", "is_day", "is_time", "repaired", "us_of"]
 
+#: So many odd lines, or times, are left out or repaired in any file, and of longer ones this share.
+FEW_ODD, ODD = 2, 0.1
 #: Times in units of these, us.
 UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
 #: The unit of times that are texts: dates with times, or times of a day.
@@ -146,6 +151,39 @@ def repaired(t: NDArray[np.int64], unit_us: float = 1.0, *, of_day: bool = False
         t = _spread(t, usual)
         said.append(f"{counted(repeats, 'time')} repeated, spread evenly")
     return Repaired(t, order, tuple(said), wrong)
+
+
+def in_order(
+    path: Path, column: Any, unit: str, said: list[str], noun: str = "the times"
+) -> tuple[NDArray[np.int64], NDArray[np.intp] | None]:
+    """Return times of a file in us that ascend, and the order of its frames, if it is another.
+
+    Parameters
+    ----------
+    path : Path
+    column : Series
+        As of `us_of`.
+    unit : str
+    said : list of str
+        What was repaired is added to it.
+    noun : str
+        The name of the times in errors.
+
+    Raises
+    ------
+    FormatError : a time is missing or farther from 0 than 142 years, or many are out of order
+    """
+    us = us_of(column, unit)
+    if us.dtype.kind == "f":
+        bad = int(np.flatnonzero(np.isnan(us))[0])
+        right = "must be like 2024-05-01T10:00:00.25" if unit == ISO else "must be within 142 years of 0"
+        raise unreadable(f"{noun}: that of frame {bad} is {shown(str(column.iloc[bad]))}; {right}", path)
+    is_of_day = unit == ISO and bool((us >= 0).all() and (us < _DAY_US).all())
+    found = repaired(us, UNITS_US.get(unit, 1.0), of_day=is_of_day)
+    if found.wrong > max(FEW_ODD, ODD * len(us)):
+        raise unreadable(f"{noun}: {found.wrong} of {len(us)} are out of order: {'; '.join(found.said)}", path)
+    said += found.said
+    return found.t, found.order
 
 
 def _begins_again(t: NDArray[np.int64], k: int) -> bool:

@@ -125,13 +125,13 @@ class Opening:
         frames.
     """
 
-    opens: Callable[[Path], Sequence[Recording]] = TextOptions().open_joined
+    opens: Callable[[Path], Sequence[Recording]] = TextOptions().open_trials
     file: Path | None = None
     options: TextOptions = field(default_factory=TextOptions)
 
     def open(self, file: Path) -> Sequence[Recording]:
         """Open a file."""
-        return self.opens(file) if self.file in (None, file) else TextOptions().open_joined(file)
+        return self.opens(file) if self.file in (None, file) else TextOptions().open_trials(file)
 
     def is_recording(self, file: Path) -> bool:
         """Return whether a file is a recording by its name, its first bytes and its layout."""

@@ -51,7 +51,7 @@ class Panel:
         panel's address can see the board and set registers, over a connection that is not encrypted.
     opens : function of a path, optional
         Opens the recording that is shown first, or each file of a folder, and returns its trials; it must use
-        `options`. Default: `TextOptions.open_joined`.
+        `options`. Default: `TextOptions.open_trials`.
     options : taxel.recording.text_options.TextOptions, optional
         Facts that the files do not hold; the page uses them for training too. If `rate_hz` gives the times of frames,
         labels are saved as numbers of frames.
@@ -91,7 +91,7 @@ class Panel:
             if folder is not None:
                 raise refused("folder", ": must be left out, because a recording is shown with its folder")
             folder, opened = _folder_and_name(shown_path, how)
-            opens = how.open_joined if opens is None and how.given() else opens
+            opens = how.open_trials if opens is None and how.given() else opens
             shown = None if is_folder(shown_path) else folder / opened
         if how.rate_hz is not None:
             period_us("rate_hz", how.rate_hz)

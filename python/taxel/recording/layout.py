@@ -16,7 +16,7 @@ from taxel._base.errors import refused
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
-from taxel.formats.layout import Layout, load_packaged
+from taxel.formats.layout import Layout
 from taxel.frames import Frames
 from taxel.recording.frames import times_at
 from taxel.recording.source import SourceView
@@ -115,7 +115,7 @@ def _apply_layout(source: SourceView, layout: Layout, *, given: bool) -> SourceV
 def _array(source: SourceView, layout: Layout) -> Array:
     """Return the sensor of a recording as its layout says, which may not contradict the file."""
     facts = source.facts
-    stated, kind = facts.array, facts.kind
+    stated = facts.array
     array = layout.array(stated.rows * stated.columns, stated, facts.side)
     if facts.has_events and array.shape != stated.shape:
         raise ProblemError(
@@ -130,14 +130,9 @@ def _array(source: SourceView, layout: Layout) -> Array:
             stated if array.shape == stated.shape else replace(array, pitch_mm=stated.pitch_mm, name=stated.name)
         )
         return with_names if stated.places is None or array.shape == stated.shape else array
-    along = kind in _ALONG and stated.places == load_packaged(kind).array(stated.columns, stated, facts.side).places
-    if stated._is_measured and not along and (stated.pitch_mm, stated.places) != (array.pitch_mm, array.places):
+    if stated._is_measured and (stated.pitch_mm, stated.places) != (array.pitch_mm, array.places):
         raise ProblemError(f"the layout states taxels {array._apart()}; the file states {stated._apart()}")
     return array
-
-
-#: Formats with a layout that comes along, which another layout may replace.
-_ALONG = ("gaitpdb",)
 
 
 #: Kinds of files of one recording, whose times no other one has.

@@ -12,7 +12,7 @@ from pathlib import Path
 from shlex import quote
 from typing import TypeAlias
 
-from taxel import _core, formats
+from taxel import _core
 from taxel._base import arguments
 from taxel._base.arguments import checked_path, flag, instance, shown, text
 from taxel._base.arrays import fields_of, stored_names
@@ -23,14 +23,14 @@ from taxel._base.options import with_fields_of
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats import Trial, event_camera, xdf
+from taxel.formats import emed, event_camera, moticon, pedar, tekscan, xdf
 from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction, reduced
 from taxel.formats.foreign import ARRAYS, TABLES, check_foreign, read_foreign, refuse_container
 from taxel.formats.layout import Layout, advice
 from taxel.formats.ros import Topics, is_bag, read_ros
-from taxel.labels import Labels, Note, trial_of
-from taxel.reading import ENDINGS, Facts, InMemory, Marks, Reader
+from taxel.labels import Labels, trial_of
+from taxel.reading import ENDINGS, Facts, InMemory, Reader
 from taxel.recording.beside import LABELS, first_lines, is_label_table, labels_for
 from taxel.recording.layout import apply_layout, check_size
 from taxel.recording.readers.columns import EVENTS, SENSOR, is_h5_of_taxel, is_table, read_columns, read_records
@@ -40,10 +40,10 @@ from taxel.recording.readers.mcap import read_mcap
 from taxel.recording.recording import Recording
 from taxel.recording.source import SourceView
 
-#: The sources of a trial of both feet.
-FEET = ("left", "right")
 #: A layout, the path of one, or None for the layout file beside a recording, if there is one.
 GivenLayout: TypeAlias = str | os.PathLike[str] | Layout | None
+#: Files of makers and of recorders, and what reads them.
+MAKERS = {"moticon": moticon, "pedar": pedar, "emed": emed, "tekscan": tekscan, "xdf": xdf}
 #: Kinds of files of other programs, which a layout may describe.
 _FOREIGN = ("table", "arrays")
 #: The endings of those that may be tables of labels.
@@ -266,7 +266,8 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
     def read_camera(path: Path, layout: Layout | None) -> Sequence[Reader]:
         reduction = how.reduction.but(None if layout is None else layout.event_camera)
         size = layout.grid() if array is None and layout is not None else array
-        return [reader_of(trial, path, "event_camera") for trial in event_camera.trials(path, reduction, size)]
+        table = event_camera.read_events(path, reduction, size)
+        return [InMemory(Facts(path=path, array=table.array, kind="event_camera"), table)]
 
     def read_bag(path: Path, layout: Layout | None) -> Sequence[Reader]:
         grid = layout.grid() if how.array is None and layout is not None else how.array
@@ -291,9 +292,8 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
     }.items()
     yield from _from_elsewhere().items()
     yield from {
-        **{name: _of_maker(name, maker) for name, maker in formats.FORMATS.items() if name != "event_camera"},
-        "event_camera": Kind(lambda path: bool(event_camera.files(path)), read_camera),
-        "xdf": Kind(xdf.knows, xdf.read),
+        **{name: Kind(maker.knows, maker.read) for name, maker in MAKERS.items()},
+        "event_camera": Kind(event_camera.knows, read_camera),
         "npz": Kind(_is_npz, read_npz),
         "arrays": Kind(lambda path: _ending(*ARRAYS)(path) and not are_spike_trains(path), read_arrays),
         "table": Kind(_is_table, read_arrays),
@@ -309,13 +309,6 @@ def _from_elsewhere() -> dict[str, Kind]:
 def _ending(*endings: str) -> Callable[[Path], bool]:
     """Return a function of whether a file, perhaps compressed by gzip, has one of some endings."""
     return lambda path: path.is_file() and Path(path.name.removesuffix(".gz")).suffix.lower() in endings
-
-
-def _of_maker(name: str, maker: formats.Format) -> Kind:
-    return Kind(
-        lambda path: bool(maker.files(path)),
-        lambda path, _: [reader_of(trial, path, name) for trial in maker.trials(path)],
-    )
 
 
 def _is_mcap(path: Path) -> bool:
@@ -358,26 +351,6 @@ def _on_given(reader: InMemory, array: Array | None) -> Reader:
         check_size(reader.facts.path, stated.shape, array)
     says_more = array.shape != stated.shape or (array._is_measured and not stated._is_measured)
     return replace(reader, data=table._on(replace(array, names=array.names or stated.names))) if says_more else reader
-
-
-def reader_of(trial: Trial, path: Path, kind: str) -> Reader:
-    """Return a reader of a trial of another format, with its reference events as notes."""
-    notes = sorted(
-        (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
-    )
-    unread = [*trial.series, *trial.unread]
-    facts = Facts(
-        path=path if path.is_file() else path / trial.name,
-        array=trial.recorded.array,
-        kind=kind,
-        name=trial.name,
-        label=trial.foot if trial.foot and trial.name.endswith(f" {trial.foot}") else "board",
-        source=trial.source,
-        side=trial.foot,
-        timed=trial.timed,
-        lost=(f"columns that are not taxels: {', '.join(unread)}",) * bool(unread),
-    )
-    return InMemory(facts, trial.recorded, Marks(notes=tuple(notes)))
 
 
 def kind_of(path: Path) -> str | None:
@@ -515,7 +488,12 @@ def _open(path: Path, options: OpenOptions) -> list[Recording]:
     if is_folder(path):
         return _open_folder(path, options)
     opened = _open_file(path, options, layout_of(path, options.layout))
-    return [labels_for(each, Path(each.name if each.kind in formats.FORMATS else path.name)) for each in opened]
+    return [labels_for(each, name) for name, each in _named(opened, Path(path.name))]
+
+
+def _named(opened: Sequence[Recording], name: Path) -> list[tuple[Path, Recording]]:
+    """Return recordings of a file with what tables of labels call them: its name, or, of several, those of trials."""
+    return [(name if len(opened) == 1 else Path(each.name), each) for each in opened]
 
 
 def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[Recording]:
@@ -573,16 +551,13 @@ def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
         raise FormatError(f"{folder}: contains several formats ({', '.join(sorted(whole))}): name one file")
     if not found:
         _refuse_folder(folder)
-    # The feet of one trial are one recording; a layout file that cannot be read is no damage of one recording.
+    # A layout file that cannot be read is no damage of one recording.
     layouts = {file: layout_of(file, options.layout) for file in found}
     opened: list[tuple[Path, Recording]] = []
     errors: dict[Path, FormatError | OSError] = {}
     for file in found:
         try:
-            opened += [
-                (Path(each.name) if whole else file.relative_to(folder), each)
-                for each in _open_file(file, options, layouts[file])
-            ]
+            opened += _named(_open_file(file, options, layouts[file]), file.relative_to(folder))
         except (FormatError, OSError) as error:
             # One that names an argument is no damage of a file.
             if isinstance(error, FormatError) and error.argument is not None:
@@ -611,7 +586,7 @@ def _refuse_folder(folder: Path) -> None:
     ]
     hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} contain recordings: name these folders"
     known = (
-        f"taxel reads {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(formats.FORMATS)}, and "
+        f"taxel reads {', '.join(ENDINGS)}, ROS bags (.bag, .mcap, .db3), {', '.join(MAKERS)}, event cameras, and "
         "arrays and tables of other programs, for example .npy and .txt (docs/files.md)"
     )
     raise FormatError(f"{folder}: contains no recording; {hint if deeper else known}")
@@ -632,34 +607,6 @@ def _check_labels(
             f"{labels.path}: does not state the recording of each label, but there are {count} recordings; state it in "
             f"the column recording; the columns are {', '.join(map(shown, labels._columns))}"
         )
-
-
-def join_feet(opened: Sequence[Recording]) -> list[Recording]:
-    """Return recordings with the feet of each trial joined as its sources, `left` and `right`.
-
-    Parameters
-    ----------
-    opened : sequence of Recording
-        As `open_all` returns them, where each foot is a trial.
-
-    Returns
-    -------
-    list of Recording
-        In their order; all others unchanged.
-    """
-    groups: dict[tuple[str, str], dict[str, SourceView]] = {}
-    for recording in opened:
-        for label, source in recording._sources.items():
-            # In a folder the path of a trial ends with its name, and so with its foot.
-            key = (str(recording.path).removesuffix(f" {label}"), source.facts.name.removesuffix(f" {label}"))
-            groups.setdefault(key, {})[label] = source
-    together: list[Recording] = []
-    for (path, _), feet in groups.items():
-        if set(feet) == set(FEET):
-            together.append(Recording({foot: feet[foot].stated(path=Path(path)) for foot in FEET}))
-        else:
-            together.append(Recording(feet))
-    return together
 
 
 def sensors(recording: Recording) -> list[Recording]:

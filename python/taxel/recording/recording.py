@@ -50,8 +50,7 @@ class Recording:
     name : str
         The file's name; for a trial in a file of another format its name in that file.
     kind : str
-        "mcap", "lsa", "npz", "csv" or "h5"; one of `taxel.formats.FORMATS` for another format; "merged" for the
-        result of `taxel.merge`.
+        "mcap", "lsa", "npz", "csv" or "h5"; the name of another format; "merged" for the result of `taxel.merge`.
     array : Array
         The sensor.
     source : str

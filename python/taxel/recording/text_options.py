@@ -14,7 +14,7 @@ from taxel._core import ProblemError
 from taxel.array import Array, of_size
 from taxel.formats.layout import Layout, layout_name
 from taxel.recording.layout import is_row_of, on_array
-from taxel.recording.opening import SharedOptions, files_in, is_folder, join_feet, kind_of, open_all, sensors
+from taxel.recording.opening import SharedOptions, files_in, is_folder, kind_of, open_all, sensors
 from taxel.recording.recording import Recording
 
 #: How an option is typed of whose name a command may have another one.
@@ -110,10 +110,6 @@ class TextOptions(SharedOptions):
         wire = of_size(self.array[0])
         return _on_sensor(recording, Array(*stated.shape, wire.pitch_mm, stated.exists, wire.name))
 
-    def open_joined(self, path: str | os.PathLike[str]) -> list[Recording]:
-        """Open a file or a folder, with the feet of each trial joined as its sources."""
-        return join_feet(self.open_trials(path))
-
     def open_sensors(self, paths: Sequence[str | os.PathLike[str]]) -> list[Recording]:
         """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
 
@@ -123,13 +119,13 @@ class TextOptions(SharedOptions):
         return [sensor for trial in trials for sensor in sensors(trial)]
 
     def open_one(self, path: str | os.PathLike[str]) -> Recording:
-        """Open a file that holds one recording, with its feet joined.
+        """Open a file that holds one recording.
 
         Raises
         ------
         ProblemError : it holds several
         """
-        recordings = self.open_joined(path)
+        recordings = self.open_trials(path)
         if len(recordings) != 1:
             some = ", ".join(recording.name for recording in recordings[:3]) + ", ..." * (len(recordings) > 3)
             raise ProblemError(f"{path}: contains {len(recordings)} recordings ({some}); must contain one")

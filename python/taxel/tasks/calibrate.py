@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import checked_path, finite, flag, instance, several
+from taxel._base.arguments import checked_path, finite, flag, instance, several, shown
 from taxel._base.arguments import text as checked_text
-from taxel._base.errors import helped
+from taxel._base.errors import helped, unreadable
+from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.messages import collected
+from taxel._base.number_text import float_of
 from taxel._base.times import beginning_us
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.calibration import Calibration, Load
-from taxel.formats import text
 from taxel.frames import Frames
 from taxel.recording import Recording
 from taxel.recording.analysis.pressure import readings
@@ -252,11 +253,10 @@ def read_loads(path: str | os.PathLike[str]) -> list[KnownLoad]:
     FormatError : a file that is not a table (names the line)
     """
     path, loads = Path(checked_path("path", path)), []
-    for row in text.table(path, ["load", "unit", "from_s", "to_s"]):
-        line = int(row["line"])
+    for line, row in _rows(path, ["load", "unit", "from_s", "to_s"]):
 
         def value(name: str, row: dict[str, str] = row, line: int = line) -> float:
-            return text.number(row[name], path, line, name)
+            return _number(path, line, name, row[name])
 
         location = f"{path.name}, line {line}"
         if row["unit"].strip() not in {"N", "kPa"}:
@@ -274,13 +274,29 @@ def read_loads(path: str | os.PathLike[str]) -> list[KnownLoad]:
     return loads
 
 
+def _rows(path: Path, columns: Sequence[str]) -> list[tuple[int, dict[str, str]]]:
+    """Return the line and the cells of each row of a table, which must have these columns."""
+    table = HeaderTable.read(path.name, text_of(path))
+    table.has(columns)
+    return list(table)
+
+
+def _number(path: Path, line: int, name: str, cell: str) -> float:
+    try:
+        return finite(name, float_of(cell))
+    except (ValueError, ProblemError):
+        raise unreadable(f"{name} is {shown(cell)}; must be a number", path.name, line=line) from None
+
+
 def _points(path: Path, array: Array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Read a table of readings and values, for all taxels or, with columns x and y, for each that exists."""
-    rows = text.table(path, ["reading", "value"])
-    pairs = text.numbers([[row["reading"], row["value"]] for row in rows], path, 2, ["reading", "value"])
-    if not rows or "x" not in rows[0] or "y" not in rows[0]:
+    rows = _rows(path, ["reading", "value"])
+    columns = [name for name in ("reading", "value", "x", "y") if not rows or name in rows[0][1]]
+    cells = [[_number(path, line, name, row[name]) for name in columns] for line, row in rows]
+    numbers = np.array(cells).reshape(-1, len(columns))
+    pairs, taxels = numbers[:, :2], numbers[:, 2:]
+    if taxels.shape[1] != 2 or not rows:
         return pairs[:, 0], pairs[:, 1]
-    taxels = text.numbers([[row["x"], row["y"]] for row in rows], path, 2, ["x", "y"])
     exists = array._there()
     values = np.unique(pairs[:, 1])
     # Taxels that do not exist get rising values, which are never used.

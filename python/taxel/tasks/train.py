@@ -25,7 +25,6 @@ from taxel.detect.loads import clock_of
 from taxel.detect.readout import run_counting
 from taxel.detect.scoring import many_wrong
 from taxel.events import Events
-from taxel.formats import FORMATS
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.recording import Recording
@@ -142,7 +141,8 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     examples = _examples(opened, labelled, without, options.tare, plan)
     if labels == "notes":
         examples = [
-            example._replace(labels_of=_labels_of(each)) for example, each in zip(examples, opened, strict=True)
+            example._replace(labels_of=each._main.facts.labels_of)
+            for example, each in zip(examples, opened, strict=True)
         ]
     if sizes := sizes_of(examples):
         smallest, largest = ("{} x {}".format(*extreme) for extreme in (sizes[0], np.max(sizes, axis=0)))
@@ -152,11 +152,6 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     plan = options._plan(names, measured_floor(examples))
     assert plan is not None
     return replace(_Work(opened, examples, options, update).training(plan), unlabelled=unlabelled)
-
-
-def _labels_of(recording: Recording) -> str:
-    """Return the quantity whose thresholds the reference events of a recording's format are; "" if there is none."""
-    return FORMATS[recording.kind].labels_of if recording.kind in FORMATS else ""
 
 
 def _named(labels: GivenLabels) -> str:

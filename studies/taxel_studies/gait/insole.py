@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from taxel import ProblemError
 from taxel.array import Array
-from taxel.formats import Trial
 from taxel.frames import Frames
+from taxel_studies.datasets import Trial
 
 __all__ = ["CELLS", "HEEL", "TAXELS", "TOES", "Footprint", "Placement", "cut", "footprint", "placement"]
 

@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import FormatError, formats
+from taxel import FormatError
 from taxel.array import Array
 from taxel.encode import Encoder, RunningRange
-from taxel.formats import Trial, plate
 from taxel.frames import Frames
 from taxel.spikes import to_ms
+from taxel_studies.datasets import Trial, data_set, plate
+from taxel_studies.datasets import files as files_of
 from taxel_studies.gait import insole
 from taxel_studies.gait.pieces import Piece
 from taxel_studies.gait.recipes import RULE_ENCODERS
@@ -126,7 +127,7 @@ def _present(folder: Path, wanted: Sequence[str]) -> dict[str, Path]:
     folders = {}
     for name in [one_of("sources", name, SOURCES) for name in wanted]:
         place = folder / SOURCES[name].folder
-        if place.is_dir() and formats.FORMATS[name].files(place):
+        if place.is_dir() and files_of(data_set(name), place):
             folders[name] = place
     return folders
 
@@ -151,15 +152,15 @@ class Readings:
 @lru_cache(maxsize=8)
 def readings(folder: Path, name: str) -> Readings:
     """Read all of a source's files, once; what cannot be read, or is too short to be encoded, is left out."""
-    kind, least_s = formats.FORMATS[name], _least_s(name)
+    source, least_s = data_set(name), _least_s(name)
     trials: list[Trial] = []
     read, unread = [], {}
-    for file in kind.files(folder):
+    for file in files_of(source, folder):
         try:
-            own = list(kind.trials(file))
+            own = list(source.trials(file))
         except (FormatError, OSError) as error:
             why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-            unread[f"{folder.name}/{file.name}"] = why.removeprefix(f"{file.name}: ").removeprefix(f"{file.name}, ")
+            unread[f"{folder.name}/{file.name}"] = why.removeprefix(str(file)).removeprefix(file.name).lstrip(":, ")
         else:
             long = [trial for trial in own if _lasts_s(trial) >= least_s]
             short = [trial for trial in own if _lasts_s(trial) < least_s]
@@ -264,7 +265,6 @@ def _walks(folder: Path, name: str, encoder: Encoder, _placed: str) -> list[Piec
         start, stop = (to_ms(float(t)) for t in (trial.frames.t[0], trial.frames.t[-1]))
         spikes = encoder.encode(trial.frames).split_by_sign()
         spikes = _moved(spikes, -start, stop - start)
-        assert trial.scored is not None
         pieces.append(
             Piece(
                 name=trial.name,
@@ -357,7 +357,7 @@ def _boxed(trial: Trial) -> Trial:
     loaded = np.any(trial.frames.values, axis=0)
     rows, columns = np.flatnonzero(np.any(loaded, axis=1)), np.flatnonzero(np.any(loaded, axis=0))
     y, x = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
-    return replace(trial, recorded=trial.frames.region(x, y))
+    return replace(trial, frames=trial.frames.region(x, y))
 
 
 def _moved(spikes: Any, by: float, stop: float) -> Any:

@@ -10,10 +10,9 @@ from matplotlib.figure import Figure
 
 from taxel.array import Array
 from taxel.encode import ChangeEvents
-from taxel.formats import plate
-from taxel.formats.trial import Trial
 from taxel.frames import Frames
 from taxel.information import LabelledTrial, answer
+from taxel_studies.datasets import Trial, plate, trials
 from taxel_studies.study import Parameters, Statement, Summary, Table
 
 __all__ = ["ASKS", "USES", "draw", "footfalls", "realise", "statements", "tables"]
@@ -46,8 +45,8 @@ def footfalls(folder: Path, ask: str, most: int = 0) -> list[LabelledTrial]:
     most : int
         Of each person; all where it is 0.
     """
-    trials, count = [], dict[str, int]()
-    for trial in plate.trials(folder):
+    labelled, count = [], dict[str, int]()
+    for trial in trials(plate, folder):
         count[trial.person] = count.get(trial.person, 0) + 1
         if most and count[trial.person] > most:
             continue
@@ -55,10 +54,10 @@ def footfalls(folder: Path, ask: str, most: int = 0) -> list[LabelledTrial]:
         label = trial.person if ask == "person" else condition
         group = "" if ask == "person" else trial.person
         frames, contact = _placed(trial)
-        trials.append(
+        labelled.append(
             LabelledTrial(frames, label, contact, int(trial.truth["foot_off"][0]), group, {}, name=trial.name)
         )
-    return trials
+    return labelled
 
 
 def _placed(trial: Trial) -> tuple[Frames, int]:

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.encode import ChangeEvents
-from taxel.formats import icub
 from taxel.frames import Frames
 from taxel.information import estimate, nested_predictions, zero_test
+from taxel_studies.datasets import icub, trials
 from taxel_studies.discriminants import GramLDA
 from taxel_studies.study import Parameters, Statement, Summary, Table
 
@@ -31,7 +31,7 @@ def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
     """Estimate the bits of frames and events since the first slice, of that slice, and of the number of slices."""
     values, labels, order = [], [], []
     count: dict[str, int] = {}
-    for trial in icub.trials(folder):
+    for trial in trials(icub, folder):
         name = str(trial.about["object"])
         count[name] = count.get(name, 0) + 1
         if not params["most_trials"] or count[name] <= params["most_trials"]:

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from taxel.formats import popu
 from taxel.information import estimate, nested_predictions, zero_test
+from taxel_studies.datasets import popu, trials
 from taxel_studies.study import Parameters, Statement, Summary, Table
 
 __all__ = ["ASKS", "USES", "draw", "realise", "statements", "tables"]
@@ -22,7 +22,7 @@ USES = ("mat_taxels", "draws", "shuffles", "most_trials")
 def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
     """Estimate the bits on the posture, whole poses with all their variants left out."""
     values, labels, groups = [], [], []
-    for trial in popu.trials(folder):
+    for trial in trials(popu, folder):
         if trial.about["posture"] == "empty":
             continue
         # The person does not move during the ten frames of a trial, so their mean is one sample.

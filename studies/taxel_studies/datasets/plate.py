@@ -10,32 +10,23 @@ import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base import arguments
-from taxel._base.arrays import datasets, hdf5, read_dataset
-from taxel._base.columns import frozen
-from taxel._base.errors import refused
-from taxel._core import FormatError
-from taxel.array import Array
-from taxel.formats import text
-from taxel.formats.checks import candidates, files_at
-from taxel.formats.trial import Trial
-from taxel.frames import Frames
+from taxel import Array, FormatError, Frames
+from taxel.reading import InMemory
+from taxel_studies.datasets import Trial, readers, table
 
-if TYPE_CHECKING:
-    import h5py
-
-__all__ = ["COLUMN_MM", "FRAME_US", "ROW_MM", "events", "files", "sensor_rows", "trials"]
+__all__ = ["COLUMN_MM", "FRAME_US", "ROW_MM", "events", "knows", "read", "sensor_rows", "trials"]
 
 #: Time between frames, us.
 FRAME_US = 2000
 #: Pitch of the sensors along the walk and across it, mm: that of the usual footscan plate, inferred from the
 #: interpolation of three rows from two.
 ROW_MM, COLUMN_MM = 7.62, 5.08
+_EVENTS = ("contact", "heel_off", "foot_off")
 
 _SOURCE = (
     "the full plate: contact and foot-off are the first and the last loaded frame; heel-off is the time when the "
@@ -43,21 +34,26 @@ _SOURCE = (
 )
 
 
-def files(path: Path) -> list[Path]:
-    """Find the files of this format: ``subj*.h5``."""
-    return [f for f in candidates(path, "subj*.h5") if re.fullmatch(r"subj\w+\.h5", f.name)]
+#: The file's numbers of conditions.
+_SPEEDS = {1: "slow", 2: "normal", 3: "fast"}
 
 
-def trials(path: str | Path) -> Iterator[Trial]:
-    """Yield the footfalls of one person's file, or of all in a folder.
+def knows(path: Path) -> bool:
+    """Return whether a file is one of the data set: ``subjNNN.h5``."""
+    return re.fullmatch(r"subj\w+\.h5", path.name) is not None and path.is_file()
+
+
+def read(path: Path, _layout: Any = None) -> list[InMemory]:
+    """Return a reader of each footfall, for `taxel.open`."""
+    return readers(path, "plate", trials(path))
+
+
+def trials(path: Path) -> Iterator[Trial]:
+    """Yield the footfalls of one person's file.
 
     Frames are of the plate's own sensors (7.62 mm along the walk, 5.08 mm across), from the first frame to the one
     after foot-off. Reference events are those of ``events.csv`` if the folder has it, else computed by `events` (by the
     same rules).
-
-    Parameters
-    ----------
-    path : str or Path
 
     Yields
     ------
@@ -67,54 +63,50 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that breaks the format
     """
-    paths = files_at(path, files, "file subjNNN.h5")
-    folder = paths[0].parent
-    known, about = _events_table(folder / "events.csv"), _trials_table(folder / "trials.csv")
-    for file in paths:
-        person = file.stem
-        with hdf5(file) as h5:
-            for name in sorted(datasets(h5)):
-                match = re.fullmatch(r"img([0-9]{1,18})", name)
-                if match is None:
-                    raise FormatError(f"{file.name}: the data set {name!r} must have a name like imgNNN")
-                number, image = int(match[1]), _image(h5, name, file)
-                yield _trial(person, number, image, file, known.get((person, number)), about.get((person, number)))
-
-
-def _image(h5: h5py.File, name: str, file: Path) -> NDArray[np.int32]:
-    values = read_dataset(h5, name)
-    if values.dtype.kind not in "ui" or values.ndim != 3 or 0 in values.shape:
-        raise FormatError(f"{file.name}, {name}: must contain whole numbers, rows x columns x frames")
-    image: NDArray[np.int32] = arguments.numbers(f"{file.name}: {name}", values, np.int32)
-    if image.min() < 0 or not image.any():
-        raise FormatError(f"{file.name}, {name}: {'counts are below 0' if image.min() < 0 else 'no count is above 0'}")
-    return image
-
-
-def _trial(
-    person: str,
-    number: int,
-    image: NDArray[np.int32],
-    file: Path,
-    known: dict[str, int] | None,
-    about: dict[str, str | float] | None,
-) -> Trial:
-    frame = known or events(image)
-    end = min(frame["foot_off"] + 1, image.shape[2])
-    try:
-        sensors = sensor_rows(image)[:, :, :end]
-    except FormatError as error:
-        raise FormatError(f"{file.name}, img{number:03d}: {error}") from None
-    values = np.ascontiguousarray(sensors.transpose(2, 0, 1), np.float32)
-    array = Array(values.shape[1], values.shape[2], (ROW_MM, COLUMN_MM), name="footscan plate")
-    return Trial(
-        name=f"{person}/{number:02d}",
-        person=person,
-        recorded=Frames(frozen(values), np.arange(end) * FRAME_US, unit="counts", array=array),
-        truth={e: np.array([frame[e] * FRAME_US]) for e in ("contact", "heel_off", "foot_off")},
-        source=_SOURCE,
-        about={"row_mm": ROW_MM, "column_mm": COLUMN_MM, **(about or {})},
+    known, about = (
+        {(row["subject"], row["trial"]): row for row in table(path.parent / name).to_dict("records")}
+        for name in ("events.csv", "trials.csv")
     )
+    for name, stored in _images(path):
+        is_counts = stored.dtype.kind in "ui" and stored.ndim == 3 and stored.any() and stored.min() >= 0
+        if not re.fullmatch(r"img[0-9]+", name) or not is_counts:
+            raise FormatError(
+                f"{path.name}, {name}: must be imgNNN, with counts, rows x columns x frames, some above 0"
+            )
+        key, image = (path.stem, int(name[3:])), stored.astype(np.int32)
+        told = known.get(key)
+        frame = events(image) if told is None else {event: int(told[f"{event}_frame"]) for event in _EVENTS}
+        end = min(frame["foot_off"] + 1, image.shape[2])
+        try:
+            sensors = sensor_rows(image)[:, :, :end]
+        except FormatError as error:
+            raise FormatError(f"{path.name}, {name}: {error}") from None
+        values = np.ascontiguousarray(sensors.transpose(2, 0, 1), np.float32)
+        array = Array(values.shape[1], values.shape[2], (ROW_MM, COLUMN_MM), name="footscan plate")
+        row = about.get(key)
+        spoken = {} if row is None else {"condition": _SPEEDS.get(row["condition"], ""), "speed_m_s": row["speed_m_s"]}
+        truth = {event: np.array([frame[event] * FRAME_US]) for event in _EVENTS}
+        yield Trial(
+            name=f"{path.stem}/{key[1]:02d}",
+            person=path.stem,
+            frames=Frames(values, np.arange(end) * FRAME_US, unit="counts", array=array),
+            truth=truth,
+            source=_SOURCE,
+            scored=(0, (end - 1) * FRAME_US),
+            about={"row_mm": ROW_MM, "column_mm": COLUMN_MM, **spoken},
+        )
+
+
+def _images(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield each data set of a file, one after the other, by its name."""
+    import h5py  # noqa: PLC0415  takes long
+
+    try:
+        with h5py.File(path) as h5:
+            for name in sorted(h5):
+                yield name, h5[name][...]
+    except OSError as error:
+        raise FormatError(f"{path.name}: the HDF5 file is damaged: {error}") from None
 
 
 def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -132,7 +124,6 @@ def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
     Raises
     ------
     FormatError : the rows were not made three from two
-    ProblemError : not counts of shape (rows, columns, frames), or no count above 0
 
     Notes
     -----
@@ -140,7 +131,7 @@ def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
     linearly interpolated to S[2k+1] and from there to S[2k+2], rounded down to whole counts. The phase is the one of
     three under which the fewest cells violate |3 (b - c) - (a - d)| <= 3, over the whole trial.
     """
-    frames = _check_image(image)
+    frames = image
     # Cells outside of the box of all loaded columns and frames are 0 and are on every line.
     box = tuple(_span(np.flatnonzero(frames.any(axis=axes))) for axes in ((0, 2), (0, 1)))
     y = frames[:, *box]
@@ -187,12 +178,7 @@ def events(image: NDArray[np.int32]) -> dict[str, int]:
         after the last in which the first 30 % of the rows ever loaded carry at least 5 % of their largest sum;
         ``p5``, ``p10``: the first frame with 5 %, 10 % of the largest sum, ``peak_sum``; ``flicker``: 1 if a frame in
         between has no load at all.
-
-    Raises
-    ------
-    ProblemError : not counts of shape (rows, columns, frames), or no count above 0
     """
-    image = _check_image(image)
     total = image.sum(axis=(0, 1), dtype=np.int64)
     loaded = np.flatnonzero(total > 0)
     rows = np.flatnonzero(image.any(axis=(1, 2)))
@@ -207,38 +193,4 @@ def events(image: NDArray[np.int32]) -> dict[str, int]:
         "foot_off": int(loaded[-1]) + 1,
         "peak_sum": peak,
         "flicker": int(len(loaded) < loaded[-1] - loaded[0] + 1),
-    }
-
-
-def _check_image(image: NDArray[np.int32]) -> NDArray[np.int32]:
-    counts: NDArray[np.int32] = arguments.numbers("image", image, np.int32)
-    if counts.ndim != 3 or not counts.any() or counts.min() < 0:
-        raise refused(
-            "image",
-            f" has shape {counts.shape}: must be counts of 0 or more, rows x columns x frames, at least one of "
-            f"them above 0",
-        )
-    return counts
-
-
-def _events_table(path: Path) -> dict[tuple[str, int], dict[str, int]]:
-    columns = {e: f"{e}_frame" for e in ("contact", "heel_off", "foot_off")}
-    rows = text.table(path, ["subject", "trial", *columns.values()], optional=True)
-    numbers = [
-        {c: int(text.number(row[c], path, int(row["line"]), c)) for c in ("trial", *columns.values())} for row in rows
-    ]
-    return {
-        (row["subject"], cells["trial"]): {event: cells[c] for event, c in columns.items()}
-        for row, cells in zip(rows, numbers, strict=True)
-    }
-
-
-def _trials_table(path: Path) -> dict[tuple[str, int], dict[str, str | float]]:
-    names = {"1": "slow", "2": "normal", "3": "fast"}
-    return {
-        (row["subject"], int(text.number(row["trial"], path, int(row["line"]), "trial"))): {
-            "condition": names.get(row["condition"], row["condition"]),
-            "speed_m_s": text.number(row["speed_m_s"], path, int(row["line"]), "speed_m_s"),
-        }
-        for row in text.table(path, ["subject", "trial", "condition", "speed_m_s"], optional=True)
     }

@@ -1,0 +1,197 @@
+"""Published data sets: each trap of a format on files made here, and the recordings as published where those are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.formats import making
+from tests.formats.making import footfall, interpolated, pack_212, shared
+
+import taxel
+from taxel import FormatError
+from taxel_studies.datasets import data_set, files, gaitndd, gaitpdb, icub, plate, popu, trials
+
+MODULES = {"plate": plate, "gaitpdb": gaitpdb, "gaitndd": gaitndd, "icub": icub, "popu": popu}
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_taxel_opens_a_data_set_by_its_entry_point_with_its_truth_as_notes(name: str, tmp_path: Path) -> None:
+    path = getattr(making, f"write_{name}")(tmp_path)
+    assert files(data_set(name), tmp_path) == [path]
+    found, opened = list(trials(MODULES[name], tmp_path)), taxel.open_all(path)
+    sensors = [source for each in opened for source in each.sources.values()]
+    assert [each.kind for each in opened] == [name] * len(opened)
+    assert [each.frames() for each in sensors] == [trial.frames for trial in found]
+    for each, trial in zip(sensors, found, strict=True):
+        expected = sorted((int(t), event) for event, times in trial.truth.items() for t in times)
+        assert sorted((note.t, note.text) for note in each.notes) == expected
+        assert each.side == trial.foot
+
+
+@pytest.mark.parametrize("name", MODULES)
+@given(at=st.integers(0, 30_000), byte=st.integers(0, 255), cut=st.booleans())
+def test_a_damaged_file_is_read_or_one_clear_error(
+    name: str, tmp_path_factory: pytest.TempPathFactory, at: int, byte: int, cut: bool
+) -> None:
+    path = getattr(making, f"write_{name}")(tmp_path_factory.mktemp("damaged"))
+    data = bytearray(path.read_bytes())
+    data[at % len(data)] = byte
+    path.write_bytes(data[: at % len(data)] if cut else data)
+    said = path.stem
+    try:
+        taxel.open_all(path)
+    except taxel.Error as error:
+        said = str(error)
+    assert path.stem in said
+
+
+@given(seed=st.integers(0, 2**32 - 1), start=st.integers(0, 8), sensors=st.integers(8, 20))
+def test_interpolated_rows_come_back_within_one_count(seed: int, start: int, sensors: int) -> None:
+    rng = np.random.default_rng(seed)
+    true = rng.integers(2, 600, (sensors, 5, 6))
+    found = plate.sensor_rows(interpolated(true, start, 45))
+    used = found[: len(true)]
+    assert np.abs(used - true[: len(used)])[: len(true) // 2 * 2 - 2].max() <= 1
+    # Columns and frames without any load stay so, and change no other.
+    around = [(0, 0), tuple(rng.integers(0, 4, 2)), tuple(rng.integers(0, 4, 2))]
+    padded = plate.sensor_rows(np.pad(interpolated(true, start, 45), around))
+    assert np.array_equal(padded, np.pad(found, around))
+
+
+def test_rows_that_were_not_interpolated_are_refused() -> None:
+    with pytest.raises(FormatError):
+        plate.sensor_rows(np.random.default_rng(1).integers(0, 500, (30, 8, 8)))
+
+
+def test_the_truth_of_the_plate_follows_its_rules_or_a_table(tmp_path: Path) -> None:
+    path = making.write_plate(tmp_path)
+    derived = next(iter(plate.trials(path)))
+    loaded = np.flatnonzero(footfall(0).sum(axis=(0, 1)))
+    contact, heel_off, foot_off = (derived.truth[event][0] for event in ("contact", "heel_off", "foot_off"))
+    assert (contact, foot_off) == (2000 * loaded[0], 2000 * (loaded[-1] + 1))
+    assert contact < heel_off < foot_off
+    assert len(derived.frames) == loaded[-1] + 2  # the padding after the end is gone
+    (tmp_path / "events.csv").write_text(
+        "subject,trial,contact_frame,heel_off_frame,foot_off_frame\nsubj900,1,3,20,33\n"
+    )
+    first, told = plate.trials(path)
+    assert first.truth["contact"] == contact
+    assert told.truth["contact"].tolist() == [6000]
+
+
+@pytest.mark.parametrize("name", ["GaCo99_01.txt", "SiPt01_01.txt.gz"])
+def test_gaitpdb_gives_both_feet(tmp_path: Path, name: str) -> None:
+    left, right = gaitpdb.trials(making.write_gaitpdb(tmp_path, name))
+    assert (left.foot, right.foot) == ("left", "right")
+    assert left.group == ("healthy" if "Co" in name else "patient")
+    assert left.frames.values.shape == (600, 1, 8)
+    assert left.truth["contact"].tolist() == [1_000_000 * k for k in range(1, 6)]  # the first is cut by the start
+    assert left.truth["foot_off"].tolist() == [1_000_000 * k + 600_000 for k in range(1, 6)]
+    for foot, sign in ((left, -1), (right, 1)):
+        places = foot.frames.array.places
+        assert places is not None
+        # Sensor 1 is the heel (y forwards is -800 there), sensor 8 the front.
+        assert places.x.ravel().tolist() == [sign * x for x in (500, 700, 300, 700, 300, 700, 300, 500)]
+        assert places.y.ravel().tolist() == [800, 400, 400, 0, 0, -400, -400, -800]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("0.06\t", "0,06\t"), ("0.06\t", "\t"), ("0.06\t", "x\t"), ("0.06\t", "0.02\t"), ("0.06", "0.06\t1")],
+)
+def test_a_spoilt_line_of_gaitpdb_is_refused(tmp_path: Path, old: str, new: str) -> None:
+    path = making.write_gaitpdb(
+        tmp_path, change=lambda rows: [row.replace(old, new) if k == 6 else row for k, row in enumerate(rows)]
+    )
+    with pytest.raises(FormatError, match="GaCo99_01"):
+        list(gaitpdb.trials(path))
+
+
+def test_short_stances_do_not_count() -> None:
+    total = np.zeros(300)
+    total[50:69], total[100:120] = 60.0, 60.0
+    assert gaitpdb.contacts(total).tolist() == [[100, 120]]
+
+
+@given(st.lists(st.integers(-2048, 2047), min_size=2, max_size=40).filter(lambda v: len(v) % 2 == 0))
+def test_format_212_round_trip(values: list[int]) -> None:
+    assert gaitndd.format_212(pack_212(np.array(values))).tolist() == values
+
+
+def test_gaitndd_gives_step_times_and_leaves_out_invalid_samples(tmp_path: Path) -> None:
+    left, right = gaitndd.trials(making.write_gaitndd(tmp_path))
+    assert left.truth["contact"].tolist() == [1_000_000 * k for k in range(2, 9)]
+    assert left.truth["foot_off"].tolist() == [1_000_000 * k - 400_000 for k in range(3, 9)]
+    assert (len(left.frames), len(right.frames)) == (3000, 2999)
+    assert right.truth == {}
+    assert right.frames.t[0] == 3333
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        (".hea", " 212 ", " 16 "),
+        (".hea", "300 3000\r", "300 3001\r"),
+        (".hea", " 0 500 ", " 0 501 "),
+        (".ts", "5.0000\t1.0000", "5,0000\t1.0000"),
+        (".ts", "5.0000\t1.0000", "4.0000\t1.0000"),
+        (".let", "\x11", "\x12"),
+    ],
+)
+def test_a_spoilt_file_of_gaitndd_is_refused(tmp_path: Path, file: str, old: str, new: str) -> None:
+    path = making.write_gaitndd(tmp_path)
+    content = path.with_suffix(file).read_bytes()
+    assert old.encode() in content
+    path.with_suffix(file).write_bytes(content.replace(old.encode(), new.encode(), 1))
+    with pytest.raises(FormatError, match="control99"):
+        list(gaitndd.trials(path))
+
+
+def test_grasps_rise_with_pressure_and_count_slices(tmp_path: Path) -> None:
+    raw = np.arange(120).reshape(2, 60)
+    making.write_icub(tmp_path, "ball", {1: raw, 4: raw[:1]})
+    making.write_icub(tmp_path, "edge", {1: raw}, packed=False)
+    found = list(trials(icub, tmp_path))
+    assert [trial.name for trial in found] == ["ball/1", "ball/4", "edge/1"]
+    assert np.array_equal(found[0].frames.values, 255 - raw.reshape(2, 5, 12))
+    assert found[0].frames.t.tolist() == [0, 1]
+    assert found[0].series["joint7"].tolist() == [1.5, 1.5]
+    assert [trial.about["object"] for trial in found] == ["ball", "ball", "edge"]
+
+
+def test_postures_have_their_pose_and_variant(tmp_path: Path) -> None:
+    readings = np.random.default_rng(1).integers(0, 90, (3, 4, 6, 5))
+    found = list(popu.trials(making.write_popu(tmp_path, readings, ["left2_0", "left2_1", "empty1"])))
+    assert np.array_equal(np.stack([trial.frames.values for trial in found]), readings)
+    assert [(trial.about["posture"], trial.about["pose"], trial.about["variant"]) for trial in found] == [
+        ("left", "left2", "0"),
+        ("left", "left2", "1"),
+        ("empty", "empty1", ""),
+    ]
+
+
+@pytest.mark.parametrize(("name", "folder", "count"), [("gaitpdb", "insole_gaitpdb", 48), ("plate", "plate", 360)])
+def test_derived_truth_equals_the_table_of_the_published_recordings(
+    name: str, folder: str, count: int, tmp_path: Path
+) -> None:
+    source = data_set(name)
+    for file in files(source, shared(folder)):
+        (tmp_path / file.name).symlink_to(file)
+    pairs = list(zip(trials(source, tmp_path), trials(source, shared(folder)), strict=True))
+    assert len(pairs) == count
+    assert all(np.array_equal(derived.truth[e], told.truth[e]) for derived, told in pairs for e in told.truth)
+
+
+def test_interpolating_the_plates_sensors_again_gives_the_image_back() -> None:
+    with h5py.File(files(plate, shared("plate"))[0]) as h5:
+        for name in list(h5)[:10]:
+            image = h5[name][...].astype(np.int64)
+            sensors = plate.sensor_rows(image)
+            first = int(np.flatnonzero(image.any(axis=(1, 2)))[0])
+            again = (interpolated(sensors, first - k, image.shape[0]) for k in range(min(first, 2) + 1))
+            assert min(np.abs(each - image).max() for each in again) <= 1
