@@ -1,4 +1,4 @@
-"""Draw the diagrams of the pages of the sensor and of the analogue side: python docs/diagrams.py."""
+"""Draw the diagrams of the page of the sensor and its analogue side: python docs/diagrams.py."""
 
 from __future__ import annotations
 

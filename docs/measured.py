@@ -1,6 +1,8 @@
-"""Write the page of everything measured, docs/measured.md, from the kept results: python docs/measured.py.
+"""Write two pages from the kept results: python docs/measured.py.
 
-The page's text is in measured.md.j2, with the few measurements that have no kept result.
+docs/measured.md has all of them, and is built with the other pages; docs/results.md has those that other pages cite and
+the missed goals, and is committed. The pages' texts are in measured.md.j2 and results.md.j2, with the few measurements
+that have no kept result.
 """
 
 from __future__ import annotations
@@ -11,36 +13,92 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from taxel_benchmarks._command import doubts_of, goals_of
 from taxel_studies import STUDIES
 
 DOCS = Path(__file__).resolve().parent
-PAGE = DOCS / "measured.md"
 BENCHMARKS = DOCS.parent / "benchmarks"
 RESULTS = BENCHMARKS / "results"
 VERDICTS = {True: "yes", False: "**no**", None: ""}
 KNOWN = "known at first impacts, ms"
+#: The array of the benchmark of latency that other pages cite.
+ARRAY = "64 x 64 at 5.2 kHz"
 
 
-def page() -> str:
-    """Return the page's text."""
-    figures = [RESULTS / "figures" / f"{name}.json" for name in STUDIES]
-    template = Environment(
-        loader=FileSystemLoader(DOCS), undefined=StrictUndefined, trim_blocks=True, keep_trailing_newline=True
-    ).get_template("measured.md.j2")
-    return template.render(
-        benchmarks=[benchmark(file) for file in sorted(RESULTS.glob("*.json"))],
-        studies=[study(file) for file in figures if file.exists()],
+def measured() -> str:
+    """Return the text of the page of everything measured."""
+    return _template("measured.md.j2").render(benchmarks=_benchmarks(), studies=_studies())
+
+
+def results() -> str:
+    """Return the text of the page of results that other pages cite."""
+    rows = [(one["name"], row) for one in _benchmarks() for row in one["rows"]]
+    figures = {(name, row[0]): row[1] for name, row in rows}
+    goals = [[name, row[0], row[1], row[3]] for name, row in rows if row[4]]
+    missed = [[name, row[0], row[1], row[3]] for name, row in rows if row[4] == VERDICTS[False]]
+    verdicts = {one["name"]: [statement["holds"] for statement in one["statements"]] for one in _studies()}
+    judged = [holds for study in verdicts.values() for holds in study if holds is not None]
+    return _template("results.md.j2").render(
+        speed=_speed(figures),
+        detections=_detections(figures),
+        failing=[name for name, holds in verdicts.items() if False in holds],
+        holds=sum(judged),
+        judged=len(judged),
+        goals=len(goals),
+        reached=len(goals) - len(missed),
+        missed=missed,
     )
 
 
 def write() -> None:
-    """Write the page where it has changed."""
-    text = page()
-    if not PAGE.exists() or PAGE.read_text(encoding="utf-8") != text:
-        PAGE.write_text(text, encoding="utf-8")
+    """Write the pages where they have changed."""
+    for name, text in (("measured.md", measured()), ("results.md", results())):
+        page = DOCS / name
+        if not page.exists() or page.read_text(encoding="utf-8") != text:
+            page.write_text(text, encoding="utf-8")
+
+
+def _template(name: str) -> Template:
+    environment = Environment(
+        loader=FileSystemLoader(DOCS), undefined=StrictUndefined, trim_blocks=True, keep_trailing_newline=True
+    )
+    return environment.get_template(name)
+
+
+def _benchmarks() -> list[dict[str, Any]]:
+    return [benchmark(file) for file in sorted(RESULTS.glob("*.json"))]
+
+
+def _studies() -> list[dict[str, Any]]:
+    figures = [RESULTS / "figures" / f"{name}.json" for name in STUDIES]
+    return [study(file) for file in figures if file.exists()]
+
+
+def _speed(rows: dict[tuple[str, str], str]) -> list[tuple[str, str, str]]:
+    """Return what takes how long, and the benchmark that measured it; rows are figures by benchmark and name."""
+    kept = json.loads((RESULTS / "latency.json").read_text(encoding="utf-8"))["results"]["at rest"]
+    known = {array: f"{of['callback_us_from']['last byte']['p50'] / 1000:.2f} ms" for array, of in kept.items()}
+    return [
+        ("from a frame's last byte to the detection, version 2 of the wire, median", known[ARRAY], "latency"),
+        ("the same, version 1", known[f"version 1, {ARRAY}"], "latency"),
+        ("a training of ten minutes", f"{rows['training', 'training of ten minutes, wall s']} s", "training"),
+        ("`taxel information` of 60 footfalls", f"{rows['information', 'footfalls, s']} s", "information"),
+    ]
+
+
+def _detections(rows: dict[tuple[str, str], str]) -> list[list[str]]:
+    """Return what neurons and tuned plain rules find and miss in the benchmark of training."""
+    trainings = json.loads((RESULTS / "training.json").read_text(encoding="utf-8"))["trainings"]
+    touches = sum(training["neuron"]["touches"] for training in trainings)
+    kinds = {
+        f"contacts and lifts of ten trainings: found, of {touches}": "as played, found",
+        "the same: false": "as played, false",
+        f"a worn sensor: wrong, of {rows['training', 'worn, touches']} contacts and lifts": "worn, wrong",
+        f"an object stays: wrong, of {rows['training', 'an object stays, touches']}": "an object stays, wrong",
+    }
+    return [[what, *(rows["training", f"{of}, {who}"] for who in ("neuron", "rule"))] for what, of in kinds.items()]
 
 
 def benchmark(file: Path) -> dict[str, Any]:
@@ -64,6 +122,7 @@ def benchmark(file: Path) -> dict[str, Any]:
         "question": result.get("question") or result.get("about", "").partition("\n")[0] or f"`{result['what']}`",
         "goals": f"{sum(reached)} of {len(reached)}" if reached else "none",
         "doubts": doubts_of(result) if isinstance(result["machine"], dict) else [],
+        "rows": rows,
         "tables": [table(*part) for part in [*main, *MORE.get(name, lambda _: [])(result)]],
     }
 

@@ -59,7 +59,7 @@ def test_o_says_where_output_goes_too(capsys) -> None:
 
 
 def test_exit_codes_are_those_of_the_docs() -> None:
-    table = (DOCS / "command-line.md").read_text()
+    table = (DOCS / "howto.md").read_text()
     assert set(re.findall(r"^\| (\d+) \|", table, re.MULTILINE)) == {"0", "1", "2", "3", "130"}
 
 

@@ -431,7 +431,7 @@ leaves the array on one side comes back on the other. Of 64 x 64 taxels each one
 (0, 3) reads 121 and (0, 4) 111.
 
 A board may begin with the pattern after a reset: the Colorlight i9 does where its button is held for two seconds or more
-([](hardware.md)).
+([the board's logic](hardware.md)).
 
 ## FA-1 on the board
 

@@ -1,6 +1,6 @@
 """Time of `taxel information`, from the command to the written page: 60 footfalls, and 144 strides of 8 channels.
 
-Two tables of labelled trials of published recordings (docs/recordings.md; TAXEL_DATA names their folder, else
+Two tables of labelled trials of published recordings (docs/files.md; TAXEL_DATA names their folder, else
 ../shared/data beside the checkout; without it both are left out):
 
 - footfalls: the 60 of subj000 on the plate, 42 x 33 taxels at 500 Hz; the label is the class of speed that

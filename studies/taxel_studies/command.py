@@ -289,7 +289,7 @@ def gait(
     SpeedPP2DS (plate; GPL-3.0); physionet.org/content/gaitpdb/1.0.0 (insole_gaitpdb; ODC-By 1.0);
     physionet.org/content/gaitndd/1.0.0 (insole_gaitndd; ODC-By 1.0); github.com/moticon-rego/moticon-opengo,
     tests/testdata (insole_moticon; Apache-2.0); github.com/Telfer/pressuRe, inst/extdata (pressure_formats; MIT). By
-    whom, and what their truth is: docs/recordings.md.
+    whom, and what their truth is: docs/files.md.
 
     Example: taxel study gait --data recordings --jobs 2 --report figures
     """

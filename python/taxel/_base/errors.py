@@ -77,7 +77,9 @@ place : Place or None
 argument : str or None
     The argument that is wrong, or that helps; None if the error concerns no single argument.
 hint : str or None
-    The remedy that the text ends with, as one word such as "give"; None if there is none.
+    The remedy that the text ends with, in one word; None if there is none. "give": pass the argument; "lay_out" or
+    "lay_out_camera": state rows and columns; "pitch": state the distance of the taxels; "unfelt": check the labels,
+    as the sensor felt nothing near them.
 
 Examples
 --------

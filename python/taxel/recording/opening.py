@@ -466,7 +466,7 @@ def are_spike_trains(path: Path) -> bool:
 def _unknown(path: Path) -> FormatError:
     """Return the error of a path that no format knows."""
     if path.suffix.lower() in _LABELS and is_label_table(path):
-        return FormatError(f"{path}, line 1: a table of labels (docs/command-line.md), not a recording")
+        return FormatError(f"{path}, line 1: a table of labels (docs/howto.md), not a recording")
     if are_spike_trains(path):
         return FormatError(
             f"{path}: contains spike trains, not a recording; to describe them, run taxel info; to read them in "
