@@ -57,3 +57,21 @@ def test_the_paths_and_make_targets_of_a_page_exist(page: Path) -> None:
             assert known or (ROOT / path).exists() or (page.parent / path).exists(), f"{page.name}: no file {path}"
         for target in re.findall(r"\bmake ([a-z][\w-]*)", code):
             assert target in TARGETS, f"{page.name}: no target {target} in the Makefile"
+
+
+def headings(page: Path) -> set[str]:
+    """Return the anchors of a page's headings, as GitHub makes them."""
+    prose = re.sub(r"^ *```.*?^ *```", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    return {re.sub(r"[^\w -]", "", line).lower().replace(" ", "-") for line in re.findall(r"^#+ (.+)$", prose, re.M)}
+
+
+@pytest.mark.parametrize("page", PROSE, ids=lambda page: str(page.relative_to(ROOT)))
+def test_the_links_of_a_page_lead_somewhere_on_github_too(page: Path) -> None:
+    prose = re.sub(r"^ *```.*?^ *```", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    assert not re.findall(r"\{(?:doc|ref|term|py:\w+)\}`", prose), "a role, which GitHub shows as raw text"
+    for link in re.findall(r"\]\(([^)\s]+)\)", prose):
+        path, _, anchor = link.partition("#")
+        target = page.parent / path if path else page
+        if not link.startswith("http"):
+            assert target.exists(), link
+            assert not anchor or target.suffix != ".md" or anchor in headings(target), link
