@@ -423,13 +423,12 @@ USES: dict[str, Callable[[Any], Any]] = {
     "RunningRange": lambda running: taxel.encode.LevelCrossing([0.5], running_range=running),
     "Scene": lambda scene: scene.motion(),
     "Silence": lambda silence: simulate.play([silence], seed=1, tare_ms=3.0),
-    "trials": list,
 }
 
 #: What is not called, by name: what only taxel makes, and what needs a live board.
 LEFT_OUT = {
     *("BoardChange", "Clock", "Datagrams", "Detection", "Health", "Recording", "Zeroing", "Certificate", "Checked"),
-    *("Margin", "Multipliers", "Row", "Summary", "Matching", "TakenRest", "Status", "Received", "Format"),
+    *("Margin", "Multipliers", "Row", "Summary", "Matching", "TakenRest", "Status", "Received"),
     *("BoardCheck", "Difference", "Finding", "PatternCheck", "RestCheck", "Greeting", "Port", "Training.command"),
     "check_board",
     *("Device.apply", "Device.record", "Live.source_address", "Live.zero", "Live.record", "Live.sample", "Live.note"),

@@ -17,6 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from refusal import refused
 
+import taxel
 from taxel import Array, Events, FormatError, Frames
 from taxel._base.errors import Place
 from taxel.formats.layout import Layout
@@ -259,6 +260,26 @@ def test_a_column_becomes_labels_where_its_value_changes(tmp_path: Path) -> None
         assert frames(found)[1] == [[3], [4], [5], [5]]
 
 
+def test_a_column_of_labels_is_chosen_by_an_option_and_named_where_it_is_a_channel(tmp_path: Path) -> None:
+    random = np.random.default_rng(1)
+    slipped = [int(k % 100 >= 50) for k in range(1200)]
+    rows = (f"{10 * k},{random.integers(9) + 90 * slipped[k]},{random.integers(9)},{slipped[k]}\n" for k in range(1200))
+    (tmp_path / "a.csv").write_text("t_ms,a,b,slipped\n" + "".join(rows))
+    recording = taxel.open(tmp_path / "a.csv", label_column="slipped")
+    assert recording.array.names == ("a", "b")
+    assert {note.text for note in recording.notes} == {"slipped 0", "slipped 1"}
+    assert [note.t for note in recording.notes] == [500_000 * k for k in range(1, 24)]
+    layout = tmp_path / "all.layout.toml"
+    layout.write_text('[table]\ntime_column = 1\ntime_unit = "ms"\n')
+    events = [{"slip": [note.t for note in recording.notes if note.text == "slipped 1"]}]
+    warned = taxel.train(taxel.open(tmp_path / "a.csv", layout=layout), events).warnings
+    assert any("slipped changes with the labels" in line for line in warned)
+    assert not any("with the labels" in line for line in taxel.train(recording, events).warnings)
+    np.save(tmp_path / "b.npy", np.zeros((9, 2)))
+    with refused(taxel.ProblemError, "label_column"):
+        taxel.open(tmp_path / "b.npy", layout=layout, label_column="slipped")
+
+
 @pytest.mark.parametrize(
     ("text", "layout", "line"),
     [
@@ -396,6 +417,90 @@ def test_what_was_written_is_read_and_the_printed_layout_reads_it_again(
     times, values = frames(found)
     assert times == [1000 * step_ms * k for k in range(count)]
     np.testing.assert_array_equal(values, np.array(rows, np.float32))
+
+
+#: Columns that are no taxels, by what they are: a name, and the cell of a line.
+BESIDE: dict[str, tuple[str, Callable[[int], str]]] = {
+    "a counter": ("seq", str),
+    "labels": ("slipped", lambda k: str(k // 7 % 2)),
+    "another quantity": ("Battery [%]", lambda k: str(87 - k % 3)),
+    "a remark": ("note", lambda k: "ok" if k % 9 else "wet"),
+    "empty": ("spare", lambda k: ""),
+}
+BEGIN = datetime(2024, 5, 1, 10, 0, 0)
+EPOCH_US = 1_714_557_600_000_000
+#: How a time in us after the beginning is written, by the name of its column, and that of the beginning, us.
+TIMES: dict[str, tuple[str, int, Callable[[int], str]]] = {
+    "s": ("Zeit [s]", 0, lambda us: f"{us / 1e6:.3f}"),
+    "ms": ("time_ms", 0, lambda us: f"{us / 1e3:g}"),
+    "us": ("micros", 0, str),
+    "epoch": ("t", EPOCH_US, lambda us: f"{(EPOCH_US + us) / 1e6:.3f}"),
+    "iso": ("timestamp", EPOCH_US, lambda us: (BEGIN + timedelta(microseconds=us)).isoformat(timespec="milliseconds")),
+    "day": ("Uhrzeit", 36_000_000_000, lambda us: (BEGIN + timedelta(microseconds=us)).strftime("%H:%M:%S.%f")),
+    "German": ("Zeit", EPOCH_US, lambda us: (BEGIN + timedelta(microseconds=us)).strftime("%d.%m.%Y %H:%M:%S.%f")),
+}
+
+
+@st.composite
+def whole_tables(draw: st.DrawFn) -> tuple[str, list[int], list[list[float]]]:
+    """Draw a table of a time, taxels and other columns in any order, its times and its readings."""
+    count, taxels, step_us = draw(st.integers(24, 40)), draw(st.integers(2, 4)), draw(st.sampled_from([5000, 20_000]))
+    rows = draw(st.lists(st.lists(NUMBERS, min_size=taxels, max_size=taxels), min_size=count, max_size=count))
+    name, begin, write = TIMES[draw(st.sampled_from([*TIMES]))]
+    separator, decimal = draw(st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")]))
+    columns = [(name, [write(step_us * k) for k in range(count)])]
+    for k in range(taxels):
+        columns.append((f"Zehe{k}", [f"{row[k]:g}".replace(".", decimal) for row in rows]))
+        rows = [[*row[:k], float(f"{row[k]:g}"), *row[k + 1 :]] for row in rows]
+    beside = [BESIDE[kind] for kind in draw(st.sets(st.sampled_from([*BESIDE]), max_size=3))]
+    columns += [(called, list(map(cell, range(count)))) for called, cell in beside]
+    columns[0] = name, [cell.replace(".", decimal) if name in ("Zeit [s]", "t") else cell for cell in columns[0][1]]
+    at = draw(st.permutations(range(len(columns))))
+    order = [k for k in at if not 1 <= k <= taxels]
+    place = draw(st.integers(0, len(order)))
+    order[place:place] = range(1, taxels + 1)
+    lines = [separator.join(columns[k][0] for k in order)]
+    lines += [separator.join(columns[k][1][line] for k in order) for line in range(count)]
+    t = [begin + step_us * k for k in range(count)]
+    match draw(st.sampled_from(["", "again", "text", "torn", "swapped", "head"])):
+        case "again":
+            lines.insert(9, lines[0])
+        case "text":
+            lines.insert(9, "Sensor ready")
+        case "torn":
+            lines.append(lines[9][:1])
+        case "swapped":
+            lines[9], lines[10] = lines[10], lines[9]
+        case "head":
+            lines[:0] = ["Messung 7", ""]
+    return "\n".join(lines) + "\n" * (lines[-1] != lines[9][:1]), t, rows
+
+
+@given(drawn=whole_tables())
+def test_a_table_with_other_columns_in_any_order_is_read_or_asked_and_its_layouts_read_it_again(
+    drawn: tuple[str, list[int], list[list[float]]], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    text, t, rows = drawn
+    found = frames(opened(tmp_path_factory.mktemp("drawn"), text))
+    assert found[0] == t
+    np.testing.assert_array_equal(found[1], np.array(rows, np.float32))
+
+
+@given(
+    values=st.lists(st.lists(st.integers(0, 9), min_size=6, max_size=6), min_size=4, max_size=9),
+    above=st.sampled_from(["Frame {k} ({t:.2f} ms)", "frame {k}, t={t:g}ms", "Bild {k} {t:g} ms"]),
+    separator=st.sampled_from(", ;\t"),
+)
+def test_frames_of_lines_below_a_line_of_text_are_read_and_their_layout_reads_them_again(
+    values: list[list[int]], above: str, separator: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    text = ""
+    for k, frame in enumerate(values):
+        lines = [separator.join(map(str, frame[begin : begin + 3])) for begin in (0, 3)]
+        text += "\n".join([above.format(k=k, t=20 * k), *lines]) + "\n"
+    found = opened(tmp_path_factory.mktemp("drawn"), text)
+    assert frames(found) == ([20_000 * k for k in range(len(values))], values)
+    assert found.sources[""].array.shape == (2, 3)
 
 
 @given(

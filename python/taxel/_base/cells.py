@@ -18,7 +18,7 @@ _UNIT_OF_TIME = "|".join(word for words in _UNITS_OF_TIME.values() for word in w
 _TIME = (
     r"t|ts|(?:%|rel|abs|host|device|sample|frame|recv|unix|epoch|system|header)?[ ._]*(?:time|stamp|time[ _]?stamp)s?"
     r"|elapsed(?:[ _]time)?|(?:mess|uhr|system)?zeit(?:stempel|punkt)?|temps|tiempo|tempo|tijd|tid"
-    r"|datetime|date[ _]time|clock|millis|micros"
+    r"|datetime|date[ _]time|clock|millis|micros|ms|msec|us|usec|secs?|seconds|sekunden"
 )
 #: Names of columns that hold times, with or without a unit: time, timestamp_us, Time (ms), t [s].
 _TIMES = re.compile(
@@ -39,9 +39,8 @@ def time_unit(name: str) -> str | None:
     found = _TIMES.fullmatch(last_part(name))
     if found is None:
         return None
-    word = (found["within"] or found["after"] or "").lower()
-    alone = {"millis": "ms", "micros": "us"}.get(name.strip("\"' ").lower(), "")
-    return next((unit for unit, words in _UNITS_OF_TIME.items() if word in words), alone)
+    word = (found["within"] or found["after"] or name.strip("\"' ")).lower()
+    return next((unit for unit, words in _UNITS_OF_TIME.items() if word in words), "")
 
 
 def last_part(name: str) -> str:

@@ -85,6 +85,12 @@ class FileOptions:
         str | None,
         typer.Option(metavar="NAME", help="Which events of an event camera are read: both (default), on or off."),
     ] = None
+    label_column: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Column of a table whose value becomes a label where it changes; it is no taxel."
+        ),
+    ] = None
     rate_hz: Annotated[
         float | None,
         typer.Option(metavar="HZ", help="Frames per second, for recordings whose frames have no times."),

@@ -35,14 +35,15 @@ _LABELS = re.compile(
     re.IGNORECASE,
 )
 _KEYS = re.compile(
-    r"(?:hand|foot|side|finger|sensor|device|board|insole|limb|topic|channel|source|node|module)"
+    r"(?:hand|foot|side|finger|sensor|device|board|insole|limb|topic|channel|source|node|module"
+    r"|trial|session|run|subject|person|participant|versuch|proband)"
     r"(?:[ ._]?(?:id|name|no|nr))?",
     re.IGNORECASE,
 )
 _OTHERS = re.compile(
     r"(?:[agm][ ._]?[xyz])|(?:.*[ ._])?"
     r"(?:acc(?:el(?:eration)?)?|gyro?(?:scope)?|mag(?:netometer)?|imu|temp(?:erature)?|temperatur|"
-    r"batt?(?:ery)?|akku|vbat|hum(?:idity)?|lat(?:itude)?|lon(?:gitude)?|quat(?:ernion)?|roll|pitch|yaw|crc|checksum|cop)"
+    r"batt?(?:ery)?|akku|vbat|hum(?:idity)?|lat(?:itude)?|lon(?:gitude)?|quat(?:ernion)?|roll|pitch|yaw|crc|checksum|cop|total|sum|summe)"
     r"(?:[ ._\[(]*(?:x|y|z|w|\d+)[\])]?)?(?:[ ._]?[\[(][^\])]*[\])])?",
     re.IGNORECASE,
 )

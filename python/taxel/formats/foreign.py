@@ -45,7 +45,9 @@ CONTAINERS = {
 }
 
 
-def read_foreign(path: Path, layout: Layout | None, array: Array | None = None) -> Sequence[InMemory]:
+def read_foreign(
+    path: Path, layout: Layout | None, array: Array | None = None, label_column: str | int | None = None
+) -> Sequence[InMemory]:
     """Return a reader of each source of a table or a file of arrays.
 
     Parameters
@@ -55,6 +57,8 @@ def read_foreign(path: Path, layout: Layout | None, array: Array | None = None) 
         What it does not say of a table or of axes is found in the file.
     array : Array, optional
         The sensor of events, where the layout does not say it; default: one large enough for them.
+    label_column : str or int, optional
+        The column of a table whose value becomes a label where it changes.
 
     Raises
     ------
@@ -62,7 +66,7 @@ def read_foreign(path: Path, layout: Layout | None, array: Array | None = None) 
     """
     how = Layout(path) if layout is None else layout
     is_arrays = path.suffix.lower() in ARRAYS
-    found = read_array_file(path, how) if is_arrays else read_table(path, how, array)
+    found = read_array_file(path, how) if is_arrays else read_table(path, how, array, label_column)
     if found.said:
         warn(found.said, stacklevel=6)
     notes = tuple(Note(label, t, 0) for label, t in found.labels)

@@ -81,7 +81,7 @@ class _Rows:
         self.labels, self.keys = ([column[k] for k in rows] if column else [] for column in (self.labels, self.keys))
 
 
-def read_table(path: Path, layout: Layout, array: Array | None = None) -> Opened:
+def read_table(path: Path, layout: Layout, array: Array | None = None, label_column: str | int | None = None) -> Opened:
     """Read a table of frames or of events.
 
     Parameters
@@ -91,6 +91,8 @@ def read_table(path: Path, layout: Layout, array: Array | None = None) -> Opened
         What it does not say of a table is found in the text, if it has no [table].
     array : Array, optional
         The sensor of events, where the layout does not say it; default: one large enough for them.
+    label_column : str or int, optional
+        The column whose value becomes a label where it changes, instead of that of the layout.
 
     Raises
     ------
@@ -98,7 +100,7 @@ def read_table(path: Path, layout: Layout, array: Array | None = None) -> Opened
     ImportError : the extra ``tables`` is not installed
     """
     text = Text(path)
-    form = form_of(text, layout)
+    form = form_of(text, layout, label_column)
     full, how = form.layout, form.layout.table or Table()
     columns = _columns(path, form, how)
     rows = _read(text, columns, how)

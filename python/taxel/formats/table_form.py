@@ -53,6 +53,7 @@ _ABOVE_FRAME = re.compile(
     r"(?:[ \t,;:@(\[]+(?:t|time)?[ \t=:]*(?P<time>\d+(?:[.,]\d+)?)[ \t]*(?P<time_unit>[mun]?s)?[)\]]?)?[ \t,;]*",
     re.IGNORECASE,
 )
+_PLACE_IN_LIST = re.compile(r"\[\d+\]")
 _HEX = re.compile(r"(?:0x)?(?:[0-9A-Fa-f]{2})+")
 _HEX_LETTER = re.compile(r"(?<![\w.])(?:0x)?[0-9]*[A-Fa-f][0-9A-Fa-f]*(?![\w.])")
 #: Names of the columns of events.
@@ -162,8 +163,15 @@ class _Reading:
         self.table = replace(self.table, **keys)
 
 
-def form_of(text: Text, layout: Layout) -> Form:
+def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -> Form:
     """Return how a table is read: as its layout says, or, if it says nothing of the table, as its first lines look.
+
+    Parameters
+    ----------
+    text : Text
+    layout : Layout
+    label_column : str or int, optional
+        As of `taxel.formats.layout.Table`.
 
     Raises
     ------
@@ -171,7 +179,8 @@ def form_of(text: Text, layout: Layout) -> Form:
         the layout of each)
     """
     if layout.table is not None:
-        return _stated(text, layout, layout.table)
+        how = layout.table if label_column is None else replace(layout.table, label_column=label_column)
+        return _stated(text, replace(layout, table=how), how)
     lines = text.head
     if text.path.suffix.lower() == ".json" and not any(read_line(line, "json") for line in lines[:3]):
         raise unreadable("is one document of JSON; save a line of JSON per frame, or a .csv", text.path)
@@ -198,6 +207,7 @@ def form_of(text: Text, layout: Layout) -> Form:
         )
     _frames(reading, lines, is_begin, begin, time_of_begin)
     stated = layout.rows is not None or layout.rate_hz is not None or layout.path != text.path
+    reading.set(label_column=label_column)
     time = _time(reading, is_stated=stated)
     if time is None and reading.table.frame_time is None and not stated:
         _without_times(reading, text)
@@ -324,6 +334,8 @@ def _reading(fit: _Fit, lines: Sequence[str]) -> _Reading:
     if fit.kind != "plain":
         table = replace(table, separator=fit.separator if fit.kind == "hex" else ",")
         own = fit.lines[fit.body[0]][1].names
+        # The places in a list are no names.
+        own = () if all(map(_PLACE_IN_LIST.fullmatch, own)) else own
         names = own if any(own) else _names_above_marks(fit, lines)
         if not any(own) and any(names):
             table = replace(table, columns=list(names))
@@ -555,12 +567,13 @@ def _without_times(reading: _Reading, text: Text) -> None:
 
 def _taxels(reading: _Reading, time: int | None) -> list[int]:
     """Return the columns of readings, and say why the others are none."""
-    fit, names, left = reading.fit, reading.names, reading.left
+    fit, names, left, label = reading.fit, reading.names, reading.left, reading.table.label_column
+    known = {time, names.index(label) if label in names else label - 1 if isinstance(label, int) else None}
     for k in range(len(names)):
-        why = "" if k == time or k in left else next(filter(None, _reasons(reading, k, first=int(time == 0))), "")
+        why = "" if k in known or k in left else next(filter(None, _reasons(reading, k, first=int(time == 0))), "")
         if why:
             left[k] = why
-    taxels = [k for k in range(len(names)) if k != time and k not in left]
+    taxels = [k for k in range(len(names)) if k not in known and k not in left]
     if not taxels:
         # A sensor may have one taxel, and its name be that of a state.
         taxels = [k for k in left if fit.types[k] == "number" and left[k].startswith(("labels", "another quantity"))]
@@ -587,11 +600,14 @@ def _reasons(reading: _Reading, column: int, first: int) -> Iterator[str]:
         yield "another time"
     numbers = fit.numbers(column)
     whole = bool((numbers[np.isfinite(numbers)] % 1 == 0).all())
-    counts = not name and column == first and len(fit.body) >= _COUNTS and kind == "number" and fit.counts(column)
+    # An unnamed column that counts lines, among columns with names or in many lines.
+    is_sure = len(fit.body) >= (2 if any(reading.names) else _COUNTS)
+    counts = not name and column == first and is_sure and kind == "number" and fit.counts(column)
     if counts or (column_names.is_counter(name) and whole):
         yield "a counter"
     yield f"labels{reads}" * (column_names.is_label(name) and few)
-    yield _key(reading, column) if column_names.is_key(name) and whole and few else ""
+    if column_names.is_key(name) and whole:
+        yield _key(reading, column) if few else "a counter"
     yield "another quantity" * column_names.is_other(name)
 
 
@@ -701,6 +717,8 @@ def _said(reading: _Reading, time: int | None) -> Iterator[str]:
         yield f"time {reading.called(time)!r} in {table.time_unit}"
     else:
         yield "no times" if table.frame_time is None else f"time in {table.frame_time} above each frame"
+    if table.label_column is not None:
+        yield f"labels {table.label_column!r}"
     used = [reading.units[k] for k in range(len(reading.units)) if k not in reading.left and k != time]
     yield from (f"unit {unit}" for unit in sorted(filter(None, used))[:1])
     reasons: dict[str, list[str]] = {}

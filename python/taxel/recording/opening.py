@@ -65,6 +65,7 @@ class SharedOptions:
     bin: int | None = None
     window_ms: float | None = None
     polarity: str | None = None
+    label_column: str | int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,6 +97,8 @@ class OpenOptions(SharedOptions):
         flag("differences", self.differences)
         if self.topics.are_given and kind != "ros":
             raise ProblemError(f"{path}: is not a ROS bag; topic, field and ros are only for ROS bags")
+        if self.label_column is not None and kind != "table":
+            raise refused("label_column", f" is {shown(self.label_column)}: is only for tables; {path} is none")
 
 
 def _no_camera(path: Path) -> ProblemError:
@@ -134,6 +137,9 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
         "100:420,60:300", where the last are not included. `bin`: side of the square of pixels that becomes a taxel.
         `window_ms`: read frames of counts, each over a window of this length, at its beginning. `polarity`: only "on"
         or "off" events, or "both".
+    label_column : str or int, optional
+        For a table: the column, by its name or number from 1, whose value becomes a label where it changes; it is no
+        taxel.
     pairing : {"direct", "taxel"}
         The change that an intensity belongs to: the change directly before it, or the latest change of that taxel.
     differences : bool
@@ -195,7 +201,7 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
         A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as for `taxel.open`.
     array, layout, topic, field, ros
         As in `taxel.open`.
-    region, bin, window_ms, polarity : str, int, float (ms) and str, optional
+    region, bin, window_ms, polarity, label_column : str, int, float (ms), str and str or int, optional
         As in `taxel.open`.
     pairing, differences
         As in `taxel.open`.
@@ -261,7 +267,7 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
     array = None if how.array is None or of_topics else Array._given(how.array)
 
     def read_arrays(path: Path, layout: Layout | None) -> Sequence[Reader]:
-        return [_on_given(each, array) for each in read_foreign(path, layout, array)]
+        return [_on_given(each, array) for each in read_foreign(path, layout, array, how.label_column)]
 
     def read_camera(path: Path, layout: Layout | None) -> Sequence[Reader]:
         reduction = how.reduction.but(None if layout is None else layout.event_camera)

@@ -29,7 +29,7 @@ class TextOptions(SharedOptions):
     ----------
     array : sequence of str, optional
         Rows, columns and pitch (mm) of the sensor, as "24x20x5"; of a ROS bag one for each topic, or one for all.
-    layout, topic, field, ros, region, bin, window_ms, polarity
+    layout, topic, field, ros, region, bin, window_ms, polarity, label_column
         As in `taxel.open`.
     rate_hz : float, Hz, optional
         Frames a second, for recordings without times.

@@ -48,6 +48,8 @@ from taxel.tasks.train_result import Training, TrainOptions
 
 #: Work that takes longer says so before it begins, s.
 _LONG_S = 60.0
+#: Sensors of more taxels are no columns of a table.
+_CHANNELS = 256
 #: So many lines say what was measured of labels and sensor.
 _LINES = 4
 
@@ -122,6 +124,10 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
                 "the events have no intensities, but the recipe touch and its encoders need them: for an event camera, "
                 "use frames of counts (--count-ms 5; in Python: window_ms=5) and the recipe event_counts"
             )
+    for each, events in zip(opened, labelled, strict=True):
+        if like := _like_labels(recorded(each), events):
+            right = "if they hold labels, not readings, leave them out (leave_out in a layout file)"
+            warn(f"{each.name}: {', '.join(like)} changes with the labels and hardly else; {right}")
     unlabelled = sources_without(labels, opened, labelled)
     labelled = [moved(events, each, options.shift_ms) for events, each in zip(labelled, opened, strict=True)]
     names = sorted({label for events in labelled for label in events})
@@ -152,6 +158,19 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     plan = options._plan(names, measured_floor(examples))
     assert plan is not None
     return replace(_Work(opened, examples, options, update).training(plan), unlabelled=unlabelled)
+
+
+def _like_labels(table: Events | Frames, events: Mapping[str, NDArray[np.int64]]) -> list[str]:
+    """Return the channels that change at each label, and hardly else: they are columns of labels or states."""
+    t = np.concatenate([*events.values(), np.empty(0, np.int64)])
+    if not isinstance(table, Frames) or not 1 < table.array.taxels <= _CHANNELS or len(table) < 2 or not len(t):
+        return []
+    changes = np.diff(table.values.reshape(len(table), -1), axis=0) != 0
+    few = np.flatnonzero((changes.sum(axis=0) >= len(t)) & (changes.sum(axis=0) <= 2 * len(t) + 2))
+    step = float(np.median(np.diff(table.t)))
+    names = table.array.names or [f"channel {k + 1}" for k in range(changes.shape[1])]
+    at = {k: table.t[1:][changes[:, k]] for k in few.tolist()}
+    return [names[k] for k, own in at.items() if np.abs(own[:, None] - t).min(axis=0).max() <= 1.5 * step]
 
 
 def _named(labels: GivenLabels) -> str:
