@@ -15,7 +15,7 @@ help:
 	@echo "make lint   format, lint, types, layers     make bench  ratios against peers, to benchmarks/results/"
 	@echo "make docs   the documentation, without warnings"
 	@echo "make build  .venv and the extension, after a change in crates/     make format  formats"
-	@echo "make lock   requirements.lock, the versions of Python packages that make installs; UPGRADE=--upgrade takes the newest"
+	@echo "make lock   requirements.lock, the versions of Python packages that make installs, and the licences of crates; UPGRADE=--upgrade takes the newest"
 	@echo "make dist   wheels for machines without cargo (Linux on x86-64 and ARM, Windows), and the source package, to dist/"
 	@echo "make platforms  the wheels on emulated ARM and on Windows by wine, in trees of Debian: 90 minutes, as root"
 
@@ -123,6 +123,7 @@ lint: $(VENV)/.for-test $(VENV)/.for-lint
 	$(BIN)/python -m pytest -q tests/test_layers.py
 	$(BIN)/python -m mypy.stubtest taxel._core taxel_rules._rules --allowlist tests/stubtest-allowed.txt
 	$(BIN)/python tools/messages.py --check
+	$(BIN)/python tools/licences.py --check
 	$(BIN)/python tools/page_types.py
 	$(BIN)/python tools/lines.py --grown
 	$(BIN)/python tools/quotes.py
@@ -191,6 +192,7 @@ rtl-bitstream: $(RTL)/.installed
 # Versions that fit all systems and all Pythons that taxel supports; benchmarks' peers, of which one wants an older NumPy, are not among them.
 lock: $(VENV)/.for-dist
 	@$(wanted) $(EXTRAS_test) $(EXTRAS_lint) $(EXTRAS_docs) $(EXTRAS_dist) | $(BIN)/uv pip compile - --universal --python-version 3.11 --no-annotate --no-header --quiet $(UPGRADE) --output-file requirements.lock
+	@$(BIN)/python tools/licences.py
 
 # Benchmarks have an environment of their own, taxel beside its peers: these are large, and one wants an older NumPy.
 PEERS := .venv-peers
