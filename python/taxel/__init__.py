@@ -41,8 +41,6 @@ if TYPE_CHECKING:
     from taxel.recording.merge import merge
     from taxel.tasks.train import train
 
-__version__ = "0.1.0"
-
 __all__ = [
     "Array",
     "BoardChange",
@@ -115,6 +113,8 @@ draw_by(lambda: import_module("taxel.plot"))
 
 def __getattr__(name: str) -> Any:
     """Import a subpackage, or a name from one, at its first access."""
+    if name == "__version__":
+        return import_module("importlib.metadata").version("taxel")
     if name in _ROOMS:
         return import_module(f"taxel.{name}")
     if name in _ELSEWHERE:

@@ -6,7 +6,7 @@ import ast
 import pkgutil
 import re
 import tomllib
-from importlib import import_module
+from importlib import import_module, metadata
 from pathlib import Path
 from types import ModuleType
 
@@ -87,17 +87,9 @@ def test_taxel_imports_none() -> None:
     assert [str(file.relative_to(ROOT)) for file in product if importing.search(file.read_text())] == []
 
 
-def test_all_distributions_have_one_version_and_want_each_other() -> None:
-    version = taxel.__version__
-    ours, *theirs = (
-        tomllib.loads((ROOT / folder / "pyproject.toml").read_text())["project"] for folder in ("", *BESIDE)
-    )
-    assert {project["version"] for project in (ours, *theirs)} == {version}
-    assert all(f"taxel=={version}" in project["dependencies"] for project in theirs)
-    assert {f"taxel_studies=={version}", f"taxel_bridge=={version}"} <= {*theirs[1]["dependencies"]}
-    assert f"taxel_rules=={version}" in theirs[0]["dependencies"]
-    extras = {"studies": "taxel_studies", "cluster": "taxel_studies[cluster]"}
-    extras |= {"rerun": "taxel_viewers[rerun]"}
-    assert {name: ours["optional-dependencies"][name] for name in extras} == {
-        name: [f"{distribution}=={version}"] for name, distribution in extras.items()
-    }
+def test_the_version_stands_in_one_place_and_all_distributions_have_it() -> None:
+    version = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["version"]
+    projects = [tomllib.loads((ROOT / folder / "pyproject.toml").read_text())["project"] for folder in ("", *BESIDE)]
+    assert all(project["dynamic"] == ["version"] for project in projects)
+    assert {metadata.version(project["name"]) for project in projects} == {taxel.__version__} == {version}
+    assert all("taxel" in project["dependencies"] for project in projects[1:])
