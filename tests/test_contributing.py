@@ -1,4 +1,4 @@
-"""The example of CONTRIBUTING works: installed beside taxel it gives a format."""
+"""The examples of CONTRIBUTING work: put where it says they do what it says."""
 
 from __future__ import annotations
 
@@ -6,20 +6,32 @@ import re
 from importlib import invalidate_caches
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import taxel
+import taxel_studies
 from taxel.recording import opening
 
 ROOT = Path(__file__).resolve().parents[1]
+EXAMPLES = ROOT / "tests" / "contributing"
+#: Lines of the longest example.
+LONGEST = 60
+
+
+def test_an_example_is_short_and_named_in_contributing() -> None:
+    page = (ROOT / "CONTRIBUTING.md").read_text()
+    for example in EXAMPLES.glob("*.*"):
+        assert f"`tests/contributing/{example.name}`" in page
+        assert len(example.read_text().splitlines()) <= LONGEST, example
 
 
 def test_what_contributing_says_of_a_format_is_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     page = (ROOT / "CONTRIBUTING.md").read_text()
-    found = re.search(r'\[project\.entry-points\."(.*)"\]\n(\w+) = "(\w+)"\n', page)
+    found = re.search(r'\[project\.entry-points\."(taxel\.formats)"\]\n(\w+) = "(\w+)"\n', page)
     assert found is not None
     group, name, module = found.groups()
-    (tmp_path / f"{module}.py").write_text((ROOT / "tests" / "contributing" / "channel.py").read_text())
+    (tmp_path / f"{module}.py").write_text((EXAMPLES / "channel.py").read_text())
     about = tmp_path / f"{module}-1.0.dist-info"
     about.mkdir()
     (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {module}\nVersion: 1.0\n")
@@ -37,3 +49,22 @@ def test_what_contributing_says_of_a_format_is_enough(tmp_path: Path, monkeypatc
             taxel.open(path)
     finally:
         opening._from_elsewhere.cache_clear()
+
+
+def test_what_contributing_says_of_a_study_is_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(taxel_studies.STUDIES, "quiet", "how many inputs an untrained neuron needs until it fires")
+    monkeypatch.setattr(taxel_studies, "__path__", [*taxel_studies.__path__, str(EXAMPLES)])
+    section = taxel_studies.load("quiet").run(tmp_path, size="toy", quiet=True)
+    assert [statement["holds"] for statement in section["statements"]] == [True]
+    assert (tmp_path / "quiet" / "figure.svg").exists()
+
+
+def test_what_contributing_says_of_a_recipe_is_enough() -> None:
+    values = np.zeros((600, 1, 1))
+    begins = range(100, 500, 100)
+    for k in begins:
+        values[k : k + 20] = 9.0
+    frames = taxel.Frames(values, 1000 * np.arange(600), unit="N")
+    recipe = taxel.detect.Recipe.load(EXAMPLES / "threshold.toml", labels=["press"])
+    readout = taxel.detect.fit([taxel.detect.Example(frames, {"press": [1000 * k for k in begins]})], recipe)
+    assert taxel.detect.run(readout, frames).t.tolist() == [1000 * k for k in begins]
