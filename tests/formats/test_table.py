@@ -20,6 +20,7 @@ from refusal import refused
 import taxel
 from taxel import Array, Events, FormatError, Frames
 from taxel._base.errors import Place
+from taxel.formats.foreign import read_foreign
 from taxel.formats.layout import Layout
 from taxel.formats.layout_text import of_layout
 from taxel.formats.lines import KINDS, read_line
@@ -303,6 +304,31 @@ def test_what_is_no_table_or_another_one_than_its_layout_says_is_refused(
 ) -> None:
     with refused(FormatError, place=Place("a.csv", line)):
         opened(tmp_path, text, layout)
+
+
+def test_a_file_that_changes_while_it_is_read_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t_ms,a\n0,1\n10,2\n")
+
+    def grows(*given: Any) -> Any:
+        found = read_foreign(*given)
+        path.write_text(path.read_text() + "20,3\n")
+        return found
+
+    monkeypatch.setattr("taxel.recording.opening.read_foreign", grows)
+    with pytest.raises(FormatError, match=r"a\.csv: the file changed while it was read"):
+        taxel.open(path)
+    monkeypatch.undo()
+    assert len(taxel.open(path).frames()) == 3
+
+
+def test_a_size_that_lines_with_times_do_not_have_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "layout.toml").write_text("rows = 3\ncolumns = 4\n")
+    (tmp_path / "a.csv").write_text("t_ms,a,b\n0,1,2\n10,3,4\n20,5,6\n")
+    (tmp_path / "b.csv").write_text("1,2\n3,4\n5,6\n")
+    for name in ("a.csv", "b.csv"):
+        with pytest.raises(FormatError, match=name.replace(".", r"\.")):
+            taxel.open(tmp_path / name)
 
 
 def test_half_a_frame_is_never_read(tmp_path: Path) -> None:

@@ -80,7 +80,9 @@ def look(path: Path, layout: Layout) -> tuple[Data, list[str], dict[str, tuple[i
     stored = shapes(path)
     if not stored:
         struct = "; if the data are in a struct, save its fields: save('FILE.mat', '-struct', 'NAME')"
-        raise unreadable(f"contains no numbers{struct * (path.suffix.lower() == '.mat')}", path)
+        raise unreadable(
+            f"contains no numbers; must hold an array of numbers{struct * (path.suffix.lower() == '.mat')}", path
+        )
     how = _named(path, layout.data or Data(), stored)
     if how.axes is not None:
         return how, [], stored

@@ -336,6 +336,8 @@ def _frames_of_lines(path: Path, layout: Layout, how: Table, rows: _Rows, said: 
         if within is not None or odd:
             number = min(rows.odd.first.values()) if within is None else rows.numbers[within]
             raise unreadable(f"an empty or odd line is within a frame of {lines} lines", path, line=number)
+        if count < lines:
+            raise unreadable(f"contains {counted(count, 'line')}; a frame has {lines}", path)
         if count % lines:
             said.append(f"{counted(count % lines, 'line')} at the end left out: not a whole frame")
     else:

@@ -698,9 +698,9 @@ def _with_size(layout: Layout, reading: _Reading, taxels: Sequence[int]) -> Layo
     places = column_names.places_of(names) if any(names) and not layout.rows else None
     if places is not None and min(places) > 1:
         full = replace(full, rows=places[0], columns=places[1])
-    # Lines that are parts of a frame whose size is known.
-    size = (layout.rows or 0) * (layout.columns or 0)
-    if size > len(taxels) and size % len(taxels) == 0 and not reading.table.has_lines:
+    # Lines that are parts of a frame whose size is known; a line with a time of its own is a frame.
+    size, is_part = (layout.rows or 0) * (layout.columns or 0), reading.table.time_column is None
+    if is_part and size > len(taxels) and size % len(taxels) == 0 and not reading.table.has_lines:
         full = replace(full, table=replace(reading.table, frame_lines=size // len(taxels)))
     return full
 

@@ -508,10 +508,15 @@ def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[
     if kind is None:
         raise _unknown(path)
     options.check(path, kind)
+    before = path.stat()
     try:
         readers = next(each for name, each in kinds(options) if name == kind).read(path, layout)
     except MemoryError:
         raise FormatError(f"{path}: needs more memory than is available ({available()} bytes)") from None
+    after = path.stat()
+    in_memory = path.is_file() and all(isinstance(reader, InMemory) for reader in readers)
+    if in_memory and (after.st_size, after.st_mtime_ns) != (before.st_size, before.st_mtime_ns):
+        raise FormatError(f"{path}: the file changed while it was read; open it again when it is complete")
     by_name: dict[str, list[Reader]] = {}
     for reader in readers:
         by_name.setdefault(reader.facts.name, []).append(reader)
