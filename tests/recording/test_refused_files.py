@@ -16,7 +16,6 @@ import taxel
 from taxel import FormatError
 from taxel._base import limits
 from taxel._base.arrays import datasets, hdf5, read_arrays, shapes
-from taxel._base.columns import Growing
 from taxel._base.errors import Place
 
 from .making import record, some_events
@@ -182,15 +181,3 @@ def test_a_value_that_a_column_of_events_does_not_hold_is_refused_with_its_place
     with refused(FormatError, place=Place(path.name)) as caught:
         taxel.open(path)
     assert f"{column}[149]" in caught.value.args[0]
-
-
-@pytest.mark.parametrize("pieces", [[0], [1] * 50, [7, 0, 300, 2], [10_000]])
-def test_columns_that_grow_are_what_was_added(pieces: list[int]) -> None:
-    rng = np.random.default_rng(3)
-    read = Growing("a", t=((), np.int64), values=((2, 3), np.float32))
-    parts = [(rng.integers(0, 9, n), rng.random((n, 2, 3)).astype(np.float32)) for n in pieces]
-    for t, values in parts:
-        read.add(t=t, values=values)
-    assert len(read) == sum(pieces)
-    np.testing.assert_array_equal(read.column("t"), np.concatenate([t for t, _ in parts]))
-    np.testing.assert_array_equal(read.column("values"), np.concatenate([values for _, values in parts]))

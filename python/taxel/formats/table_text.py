@@ -73,13 +73,15 @@ class Text:
         if not self.is_file:
             yield from self._sheet.splitlines()
             return
-        with self._bytes() as file, io.TextIOWrapper(file, self.encoding) as text:
-            try:
-                for line in text:
-                    yield line.rstrip("\n")
-            except UnicodeDecodeError as error:
-                why = f"not text in {self.encoding.upper()} ({error.reason}); save it as UTF-8"
-                raise unreadable(why, self.path) from None
+        with self._opened() as text:
+            for line in text:
+                yield line.rstrip("\n")
+
+    def blocks(self, size: int) -> Iterator[str]:
+        """Yield the text of a file in parts of about so many characters, each of whole lines."""
+        with self._opened() as text:
+            while block := text.read(size):
+                yield block + text.readline()
 
     @cached_property
     def head(self) -> list[str]:
@@ -111,6 +113,15 @@ class Text:
             yield from self.lines()
         except UnicodeError:
             self.as_latin_1()
+
+    @contextmanager
+    def _opened(self) -> Iterator[io.TextIOWrapper]:
+        with self._bytes() as file, io.TextIOWrapper(file, self.encoding) as text:
+            try:
+                yield text
+            except UnicodeDecodeError as error:
+                why = f"not text in {self.encoding.upper()} ({error.reason}); save it as UTF-8"
+                raise unreadable(why, self.path) from None
 
     @contextmanager
     def _bytes(self) -> Iterator[IO[bytes]]:

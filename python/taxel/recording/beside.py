@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 from pathlib import Path
 
-from taxel._base.encodings import as_utf_8
 from taxel._base.files import beside as beside_file
 from taxel._base.files import named
 from taxel._base.times import SINCE_1970_US
 from taxel._core import FormatError
 from taxel.event_table import are_of_events, is_of_track
+from taxel.formats.table_text import Text
 from taxel.labels import Labels, Note, ahead_us, beside, trial_of
 from taxel.recording.readers.csv import names_in
 from taxel.recording.recording import Recording
@@ -114,9 +115,13 @@ def _begin_of(sources: Mapping[str, SourceView], labels: Labels) -> Callable[[],
 
 def is_label_table(path: Path) -> bool:
     """Return whether a text is a table of labels (`taxel.Labels`): by its first lines, or empty by its name."""
-    first, second = first_lines(path)
-    names, cells, is_named = names_in(first), names_in(second), path.name.endswith(TABLES[:-1])
-    if {"label", "t_us"} <= set(names) or is_of_track(first.decode(errors="replace")):
+    try:
+        first, second = [*islice(Text(path).lines(), 2), "", ""][:2]
+    except FormatError:
+        # The reader of tables reports what is no text.
+        return False
+    (names, _), (cells, _), is_named = names_in(first), names_in(second), path.name.endswith(TABLES[:-1])
+    if {"label", "t_us"} <= set(names) or is_of_track(first):
         return True
     is_empty = names == [""] and (is_named or path.name == LABELS or path.name.endswith(".notes.csv"))
     return is_empty or are_of_events(names, cells, named=is_named)
@@ -126,14 +131,3 @@ def label_tables(recording: Path) -> list[Path]:
     """Return the tables of labels that other programs wrote beside a recording, by its name: `walk_events.csv` ..."""
     tables = [beside_file(recording, f"{named(recording).stem}{ending}") for ending in TABLES]
     return [table for table in tables if table != recording and table.is_file() and is_label_table(table)]
-
-
-def first_lines(path: Path) -> tuple[bytes, bytes]:
-    """Return the first line of a table, and the second, as far as they are within 64 kB."""
-    with open(path, "rb") as file:
-        try:
-            text = as_utf_8(path.name, file)
-            return text.readline(1 << 16), text.readline(1 << 16)
-        except FormatError:
-            # The reader of tables reports what is no text.
-            return b"", b""

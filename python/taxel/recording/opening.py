@@ -31,10 +31,10 @@ from taxel.formats.layout import Layout, advice
 from taxel.formats.ros import Topics, is_bag, read_ros
 from taxel.labels import Labels, trial_of
 from taxel.reading import ENDINGS, Facts, InMemory, Reader
-from taxel.recording.beside import LABELS, first_lines, is_label_table, labels_for
+from taxel.recording.beside import LABELS, is_label_table, labels_for
 from taxel.recording.layout import apply_layout, check_size
 from taxel.recording.readers.columns import EVENTS, SENSOR, is_h5_of_taxel, is_table, read_columns, read_records
-from taxel.recording.readers.csv import check_head, names_in, read_csv
+from taxel.recording.readers.csv import check_head, is_of_taxel, read_csv
 from taxel.recording.readers.lsa import read_lsa
 from taxel.recording.readers.mcap import read_mcap
 from taxel.recording.recording import Recording
@@ -329,8 +329,7 @@ def _is_csv(path: Path) -> bool:
     """Return whether the first line of a .csv begins as taxel's own recordings do; a table of labels is none."""
     if not _ending(".csv")(path) or path.suffix.lower() != ".csv" or is_label_table(path):
         return False
-    names = names_in(first_lines(path)[0])
-    return names[0] == "t_us" and len(names) > 1
+    return is_of_taxel(path)
 
 
 def _is_npz(path: Path) -> bool:
