@@ -12,14 +12,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import typer
 from docutils import nodes
 from docutils.parsers.rst import Directive
 from docutils.statemachine import StringList
 from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
 
-from taxel.cli import app as command_line
+from taxel.cli._commands import OWN, plugins
+from taxel.cli._commands import command as imported
+from taxel.cli.app import about, own_commands, rows
 from taxel_studies import STUDIES
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -129,9 +130,7 @@ class Commands(FromProgram):
 
     def lines(self) -> list[str]:
         """Return a section a command."""
-        group = typer.main.get_command(command_line)
-        commands = {name: group.get_command(None, name) for name in sorted(group.list_commands(None))}
-        return [line for name, one in commands.items() for line in command(f"taxel {name}", one)]
+        return [line for name in sorted([*OWN, *plugins()]) for line in command(f"taxel {name}", imported(name))]
 
 
 class Keys(FromProgram):
@@ -148,33 +147,20 @@ def keys() -> list[tuple[str, str]]:
     return re.findall(KEY, KEYS.read_text())
 
 
-def command(name: str, one: Any) -> list[str]:
+def command(name: str, app: Any) -> list[str]:
     """Return a command's section, and those of its own commands; studies alike are shown once."""
-    lines = [*heading(name), *paragraphs(one.help or ""), ""]
-    rows = []
-    for parameter in one.params:
-        if parameter.param_type_name == "option":
-            said = ", ".join(f"``{option}``" for option in [*parameter.opts, *parameter.secondary_opts])
-            default = parameter.default
-            shown = "" if default in (None, False, True, "") or callable(default) else f" [{default}]"
-            rows.append([said, f"{parameter.help or ''}{shown}"])
-        else:
-            rows.append([f"``{parameter.name}``", getattr(parameter, "help", "") or ""])
-    lines += table(["", ""], rows, "30 70") if rows else []
-    if hasattr(one, "commands"):
-        seen: list[list[str]] = []
-        for inner, each in ((name, each) for name, each in one.commands.items() if not each.hidden):
-            options = [option for parameter in each.params for option in parameter.opts]
-            if options not in seen:
-                seen.append(options)
-                alike = [
-                    other
-                    for other, its in one.commands.items()
-                    if not its.hidden and [o for p in its.params for o in p.opts] == options
-                ]
-                lines += command(f"{name} {inner}" if len(alike) == 1 else f"{name} NAME", each)
-                if len(alike) > 1:
-                    lines += ["", f"NAME is one of {', '.join(f'``{other}``' for other in alike)}.", ""]
+    lines = [*heading(name), *paragraphs(about(app)), ""]
+    cells = [[", ".join(f"``{word}``" for word in row.names), row.about] for row in rows(app)]
+    lines += table(["", ""], cells, "30 70") if cells else []
+    seen: list[list[Any]] = []
+    own = {inner: (each, rows(each)) for inner, each in own_commands(app).items()}
+    for inner, (each, options) in own.items():
+        if options not in seen:
+            seen.append(options)
+            alike = [other for other, (_, its) in own.items() if its == options]
+            lines += command(f"{name} {inner}" if len(alike) == 1 else f"{name} NAME", each)
+            if len(alike) > 1:
+                lines += ["", f"NAME is one of {', '.join(f'``{other}``' for other in alike)}.", ""]
     return lines
 
 
@@ -183,14 +169,14 @@ def heading(text: str) -> list[str]:
     return ["", text, "-" * len(text), ""]
 
 
-def paragraphs(text: str) -> list[str]:
+def paragraphs(parts: list[str]) -> list[str]:
     """Return a help text; its examples as code."""
     lines: list[str] = []
-    for part in text.replace("\b\n", "").split("\n\n"):
+    for part in parts:
         if part.startswith("Example: "):
             lines += ["::", "", *(f"   {line.removeprefix('Example: ')}" for line in part.splitlines()), ""]
         else:
-            lines += [literal(" ".join(part.split())), ""]
+            lines += [literal(part), ""]
     return lines
 
 

@@ -7,22 +7,15 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-import typer
-from refusal import refused
-from shell import call
+from shell import call, commands
 
 import taxel
-from taxel.cli import app
 from taxel.cli._commands import OWN, plugins
-from taxel.cli._opening import FileOptions
-from taxel.recording.text_options import TYPED, TextOptions
+from taxel.cli.app import rows
 
 DOCS = Path(__file__).parent.parent / "docs"
 
@@ -111,7 +104,8 @@ try:
     main(sys.argv[1:])
 finally:
     loaded = {name.rpartition(".")[2] for name in sys.modules if name.startswith("taxel.cli.")}
-    print(*sorted(name for name in loaded if not name.startswith("_") and name != "console"), file=sys.stderr)
+    shared = {"app", "console"}
+    print(*sorted(name for name in loaded - shared if not name.startswith("_")), file=sys.stderr)
     print(*sorted({"taxel_studies", "taxel_benchmarks", "scipy", "matplotlib"} & sys.modules.keys()), file=sys.stderr)
 """
 
@@ -144,7 +138,9 @@ def stranger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "[taxel.commands]\nwave = stranger:app\nnod = stranger:absent\ntrain = stranger:app\n"
     )
     module = tmp_path / "stranger.py"
-    module.write_text("import typer\napp = typer.Typer()\n@app.command()\ndef greet():\n    print('hello')\n")
+    module.write_text(
+        "from cyclopts import App\napp = App(name='wave')\n@app.default\ndef greet():\n    print('hello')\n"
+    )
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "stranger", raising=False)
     return module
@@ -160,31 +156,16 @@ def test_a_command_of_another_distribution_is_listed_and_runs(stranger: Path, ca
     assert "taxel train a" in call(capsys, "train", "--help")[1], "ours"
 
 
-def test_each_option_of_opening_is_typed_by_its_name() -> None:
-    typed = {TYPED.get(option.name, option.name) for option in fields(TextOptions)}
-    assert {option.name for option in fields(FileOptions)} == typed
-
-
-def _commands(group: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Yield each command with the words that name it."""
-    context = typer.Context(group)
-    for name in group.list_commands(context):
-        _, command, _ = group.resolve_command(context, [name])
-        if hasattr(command, "list_commands"):
-            yield from _commands(command, (*path, name))
-        else:
-            yield (*path, name), command
-
-
-def test_an_option_of_one_value_is_refused_where_it_is_given_twice() -> None:
-    options = [
-        (words, command, option)
-        for words, command in _commands(typer.main.get_command(app))
-        for option in command.params
-        if option.param_type_name == "option" and not option.is_flag and not option.multiple
-    ]
+def test_each_option_has_a_text_and_a_name_of_its_own() -> None:
+    options = [(path, row) for path, app in commands().items() for row in rows(app)]
     assert len(options) > 100
-    for words, command, option in options:
-        for typed in option.opts:
-            with refused():
-                command.make_context(words[-1], [typed, "a", typed, "b"])
+    assert [(path, row.names) for path, row in options if not row.about] == []
+    for path, app in commands().items():
+        names = [name for row in rows(app) for name in row.names]
+        assert len(names) == len(set(names)), path
+
+
+def test_an_option_of_one_value_is_refused_where_it_is_given_twice(capsys) -> None:
+    code, out, error = call(capsys, "train", "a.mcap", "--folds", "2", "--folds=3")
+    assert (code, out) == (2, "")
+    assert error == "taxel: --folds is given twice; see taxel train --help\n"

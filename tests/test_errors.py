@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shell import commands
 
 import taxel
 from taxel import _core
@@ -17,7 +18,7 @@ from taxel._base.arguments import finite, integer
 from taxel._base.errors import Place, helped, placed, refused
 from taxel._base.parameters import described
 from taxel.cli import main
-from taxel.cli._commands import OWN, Commands
+from taxel.cli.app import Limits
 
 #: Values of encoders' parameters that have no default.
 REQUIRED = {"levels": "[1.0]"}
@@ -127,23 +128,24 @@ def test_the_command_line_names_the_option_of_a_parameter(
 
 def limited() -> Iterator[Any]:
     """Every option of every command that the parser checks for limits."""
-    group = Commands()
-    for name in OWN:
-        command: Any = group.get_command(None, name)
-        every = {name: command} | {f"{name} {own}": one for own, one in getattr(command, "commands", {}).items()}
-        for path, one in every.items():
-            for option in one.params:
-                if getattr(option, "min", None) is not None or getattr(option, "max", None) is not None:
-                    yield pytest.param(path, option, id=f"{path} {option.name}".replace(" ", "-"))
+    for path, app in commands().items():
+        collection = app.assemble_argument_collection()
+        each = [one for one in collection if one.required and not one.children]
+        needed = [word for one in each for word in (["x"] if one.index is not None else [one.name, "x"])]
+        for argument in collection:
+            for limits in argument.parameter.validator:
+                if isinstance(limits, Limits) and limits != Limits():
+                    yield pytest.param(path, argument, limits, needed, id=f"{path} {argument.name}".replace(" ", "-"))
 
 
-@pytest.mark.parametrize(("command", "option"), list(limited()))
-def test_limits_have_one_voice(command: str, option: Any, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(("command", "argument", "limits", "needed"), list(limited()))
+def test_limits_have_one_voice(
+    command: str, argument: Any, limits: Limits, needed: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
     """What the parser refuses it refuses in the words of the checks of all arguments, and with their exit code."""
-    name = max(option.opts, key=len)
-    for value in [end + by for end, by in ((option.min, -1), (option.max, 1)) if end is not None]:
-        line = line_of(capsys, *command.split(), f"{name}={value}")
-        limits = {key: end for key, end in (("least", option.min), ("most", option.max)) if end is not None}
+    for value in [end + by for end, by in ((limits.least, -1), (limits.most, 1)) if end is not None]:
+        line = line_of(capsys, *command.split(), *needed, f"{argument.name}={value}")
+        ends = {key: end for key, end in vars(limits).items() if end is not None}
         with pytest.raises(taxel.ProblemError) as caught:
-            (integer if option.type_descriptor.annotation is int else finite)(name, value, **limits)
+            (integer if argument.resolved_hint is int else finite)(argument.name, value, **ends)
         assert line == str(caught.value)

@@ -1,15 +1,14 @@
 """Shell commands of README and docs: commands and options exist. `test_start.py` runs those of a reader's begin."""
 
-import functools
 import re
 import shlex
 from pathlib import Path
 
+import cyclopts
 import pytest
-import typer
-from typer.core import TyperCommand, TyperGroup
 
-from taxel.cli import app
+from taxel.cli._commands import command
+from taxel.cli.app import own_commands, rows
 
 ROOT = Path(__file__).parent.parent
 README = ROOT / "README.md"
@@ -32,11 +31,6 @@ def inline(page: Path) -> list[str]:
 CASES = [(page, line) for page in PAGES for line in [*shell_lines(page), *inline(page)]]
 
 
-@functools.cache
-def commands() -> TyperGroup | TyperCommand:
-    return typer.main.get_command(app)
-
-
 @pytest.mark.parametrize(("page", "line"), CASES, ids=[f"{page.stem}: {line}" for page, line in CASES])
 def test_a_line_to_type_names_a_command_and_options_that_exist(page: Path, line: str) -> None:
     program, *arguments = shlex.split(line.split(" | ", maxsplit=1)[0])
@@ -44,21 +38,25 @@ def test_a_line_to_type_names_a_command_and_options_that_exist(page: Path, line:
         targets = re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
         assert {argument for argument in arguments if "=" not in argument} <= set(targets), page
     elif program.endswith("taxel"):
-        check(commands(), arguments, in_full=line in shell_lines(page))
+        check(arguments, in_full=line in shell_lines(page))
 
 
-def check(command: TyperGroup | TyperCommand, arguments: list[str], *, in_full: bool) -> None:
+def check(arguments: list[str], *, in_full: bool) -> None:
     """Parse arguments as the command line does; what only names a command need not have all that it wants."""
-    while isinstance(command, TyperGroup) and arguments and arguments[0] not in ("NAME", "--version", "--help"):
-        # `taxel study` is found by an entry point, when it is asked for.
-        found = command.get_command(command.make_context("taxel", [], resilient_parsing=True), arguments[0])
-        assert found is not None, arguments
-        command, arguments = found, arguments[1:]
-    if isinstance(command, TyperGroup):
+    if arguments[0] in ("NAME", "--version", "--help"):
         return
-    if in_full:
-        command.make_context("taxel", list(arguments))
+    app, words = command(arguments[0]), arguments[1:]
+    assert app is not None, arguments
+    while own_commands(app) and words and words[0] in app:
+        app, words = app[words[0]], words[1:]
+    if app.default_command is None:
+        assert not words or words[0] in ("NAME", "--help"), arguments
+    elif in_full:
+        try:
+            app.parse_args(words, exit_on_error=False, print_error=False)
+        except cyclopts.CycloptsError as error:
+            pytest.fail(str(error))
     else:
-        every = {option for one in command.params for option in (*one.opts, *one.secondary_opts)}
-        options = every | {"--help", "-h"}
-        assert {argument for argument in arguments if argument.startswith("-")} <= options, arguments
+        options = {name for row in rows(app) for name in row.names} | {"--help", "-h"}
+        typed = {word.partition("=")[0] for word in words if word.startswith("-")}
+        assert typed <= options | {f"--no-{name[2:]}" for name in options}, arguments

@@ -37,7 +37,7 @@ PRODUCT = {
     "detect": (2_400, "detect"),
     "information": (1_300, "information"),
     "simulate": (870, "simulate"),
-    "tasks": (1_400, "tasks"),
+    "tasks": (1_400, "tasks options"),
     "live, panel": (2_650, "live panel device board_check"),
     "report, demo": (550, "report demo"),
     "command line": (2_000, "cli __main__"),

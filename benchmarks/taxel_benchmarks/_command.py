@@ -14,18 +14,17 @@ from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO
+from typing import Any, BinaryIO
 
 import psutil
-import typer
 
 import taxel_benchmarks
 from taxel import ProblemError
-from taxel.cli import App, say
+from taxel.cli.app import App, JsonOption, say
 
 __all__ = ["app", "bench", "doubts_of", "goals_of", "load"]
 
-app = App()
+app = App(name="bench")
 
 #: How the rows begin that were measured with AVX2 alone (`_instructions`).
 _AVX2 = "AVX2: "
@@ -38,30 +37,34 @@ RESULTS = Path("benchmarks/results")
 _BUSY = 0.1
 
 
-@app.command()
+@app.default
 def bench(
-    name: Annotated[
-        str | None,
-        typer.Argument(help="The name of a benchmark, or all; lists them if left out."),
-    ] = None,
-    results: Annotated[Path, typer.Option(help="Folder of the saved results: of a checkout of taxel.")] = RESULTS,
-    quick: Annotated[bool, typer.Option(help="Run few rounds, as a test; writes no result.")] = False,
-    goals: Annotated[
-        bool,
-        typer.Option(
-            "--goals",
-            help="List the goals of the saved results, and what speaks against times; exit code 1 where a goal is not "
-            "reached or not measured.",
-        ),
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
-) -> None:
+    name: str | None = None,
+    /,
+    *,
+    results: Path = RESULTS,
+    quick: bool = False,
+    goals: bool = False,
+    as_json: JsonOption = False,
+) -> int:
     """Compare the speed of taxel with other libraries, in one run; save the ratios.
 
     Peers that are not installed are left out, and named; a result that has them is then kept. Without NAME, the
     benchmarks are listed, with what each took last.
 
     Example: taxel bench wire_decode
+
+    Parameters
+    ----------
+    name
+        The name of a benchmark, or all; lists them if left out.
+    results
+        Folder of the saved results: of a checkout of taxel.
+    quick
+        Run few rounds, as a test; writes no result.
+    goals
+        List the goals of the saved results, and what speaks against times; exit code 1 where a goal is not reached or
+        not measured.
     """
     from taxel.report import write_whole  # noqa: PLC0415  the command line starts quickly
     from taxel_studies.commit import code_version  # noqa: PLC0415
@@ -70,16 +73,14 @@ def bench(
     files = {path.stem: path for folder in taxel_benchmarks.__path__ for path in sorted(Path(folder).glob("[!_]*.py"))}
     if name is None and not goals:
         say(*(line for stem, file in files.items() for line in _listed(results, stem, file)))
-        return
+        return 0
     if name not in (None, "all", *files):
         raise ProblemError(f"no benchmark {name!r}: there are {', '.join(files)} and all")
     names = [str(name)] if name in files else list(files)
     if not (quick or results.is_dir()):
         raise ProblemError(f"{results}: no such folder; run this in a checkout of taxel, or name it by --results")
     if goals:
-        if not _list_goals(results, names):
-            raise typer.Exit(1)
-        return
+        return 0 if _list_goals(results, names) else 1
     if not quick and "with local changes" in code_version("taxel", "taxel_benchmarks"):
         raise ProblemError("local changes since the last commit, which a result names: commit first, or give --quick")
     for stem in names:
@@ -103,6 +104,7 @@ def bench(
             say(json.dumps(result))
         else:
             say(*_table(stem, result, benchmark))
+    return 0
 
 
 def goals_of(benchmark: Any, result: Mapping[str, Any]) -> list[Any]:

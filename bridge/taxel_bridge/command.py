@@ -4,38 +4,34 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
+from cyclopts import Parameter
 
-from taxel.cli import App, SecondsOption, say
+from taxel.cli.app import App, SecondsOption, say
 from taxel.live import PORT
 from taxel_bridge.carrying import PLACE, Bridge
 
 __all__ = ["app", "publish", "receive"]
 
-app = App(no_args_is_help=True, help="Carry a board's datagrams to other computers, over Zenoh.")
+app = App(name="bridge", help="Carry a board's datagrams to other computers, over Zenoh.")
 
-NameOption = Annotated[str, typer.Option(help="The board's name, the same at both ends: letters, digits, - _ or .")]
+NameOption = Annotated[str, Parameter(help="The board's name, the same at both ends: letters, digits, - _ or .")]
 ConnectOption = Annotated[
-    list[str] | None, typer.Option(metavar="tcp/HOST:PORT", help="An end, or a Zenoh router, to connect to.")
+    list[str] | None, Parameter(metavar="tcp/HOST:PORT", help="An end, or a Zenoh router, to connect to.")
 ]
 ListenOption = Annotated[
-    list[str] | None, typer.Option(metavar="tcp/HOST:PORT", help="An address of this computer to listen on.")
+    list[str] | None, Parameter(metavar="tcp/HOST:PORT", help="An address of this computer to listen on.")
 ]
-
-
-@app.callback()
-def _bridge() -> None:
-    """Carry a board's datagrams to other computers, over Zenoh."""
 
 
 def _say(line: str) -> None:
     say(line, err=True)
 
 
-@app.command(short_help="Publish a board that sends to this computer.")
+@app.command
 def publish(
-    host: Annotated[str, typer.Option(help="The address of this machine to listen on for the board.")] = "0.0.0.0",
-    port: Annotated[int, typer.Option(min=0, max=65_535, help="The UDP port that the board sends to.")] = PORT,
+    *,
+    host: str = "0.0.0.0",
+    port: int = PORT,
     name: NameOption = "board",
     listen: ListenOption = None,
     connect: ConnectOption = None,
@@ -47,15 +43,23 @@ def publish(
     protected by a password.
 
     Example: taxel bridge publish --name left --listen tcp/192.168.1.5:7447
+
+    Parameters
+    ----------
+    host
+        The address of this machine to listen on for the board.
+    port
+        The UDP port that the board sends to.
     """
     places = listen or ([] if connect else [PLACE])
     bridge = Bridge(name, _say, listen=places, connect=connect or [])
     say(f"{bridge.publish(host, port, seconds):,} datagrams published")
 
 
-@app.command(short_help="Receive a board of another computer.")
+@app.command
 def receive(
-    port: Annotated[int, typer.Option(min=1, max=65_535, help="The UDP port of this computer to send to.")] = PORT,
+    *,
+    port: int = PORT,
     name: NameOption = "board",
     connect: ConnectOption = None,
     listen: ListenOption = None,
@@ -66,6 +70,11 @@ def receive(
     taxel record and taxel live receive it there as from a board; times of arrival are those of this computer.
 
     Example: taxel bridge receive --name left --connect tcp/192.168.1.5:7447
+
+    Parameters
+    ----------
+    port
+        The UDP port of this computer to send to.
     """
     places = connect or ([] if listen else [PLACE])
     bridge = Bridge(name, _say, listen=listen or [], connect=places)

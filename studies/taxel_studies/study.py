@@ -25,7 +25,7 @@ from taxel import FormatError, ProblemError, __version__
 from taxel.report import write_whole
 from taxel_studies.commit import code_version
 from taxel_studies.durations import forecast
-from taxel_studies.runner import HERE, Results, SharedFolder, Task, Workers, one_of, run, whole
+from taxel_studies.runner import Results, SharedFolder, Task, Workers, one_of, run, whole
 
 __all__ = [
     "Parameters",
@@ -231,7 +231,7 @@ class Study:
         size: str = "full",
         changes: Mapping[str, Any] | None = None,
         data: Path | None = None,
-        workers: Workers = HERE,
+        workers: Workers | None = None,
         strict: bool = False,
         quiet: bool = False,
     ) -> Section:
@@ -249,7 +249,8 @@ class Study:
             Parameters that differ from the size's.
         data : Path, optional
             Where the recordings lie, for the studies that need some.
-        workers : Workers
+        workers : Workers, optional
+            Default: this process alone.
         strict : bool
             A file of recordings that cannot be read ends the study before it begins; else it is left out, and named.
         quiet : bool
@@ -264,6 +265,7 @@ class Study:
         ProblemError : an unknown size or parameter; a module that is not installed
         FormatError : recordings that it needs are not there, or cannot be read (none of them; one, with `strict`)
         """
+        workers = Workers() if workers is None else workers
         parameters = self.set(size, **(changes or {}))
         if self.lacks is not None:
             raise ProblemError(f"{self.name}: {self.lacks}")

@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 from matplotlib.container import BarContainer
-from typer.testing import CliRunner
 
 from taxel import FormatError, ProblemError
 from taxel_studies import kept, load
@@ -131,16 +130,17 @@ def scaled(value: Any, by: float) -> Any:
     return value * by if isinstance(value, float) else value
 
 
-def test_all_kept_figures_are_tried_and_those_that_moved_named(figure: Path) -> None:
+def test_all_kept_figures_are_tried_and_those_that_moved_named(
+    figure: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     for name in ("fig6.2", "fig6.1"):
         section = json.loads((figure / "fig6.1.json").read_text()) | {"name": name}
         (figure / f"{name}.json").write_text(json.dumps(section))
         kept.keep_toy(name, figure)
     spoil(figure / "toy" / "fig6.1.json", lambda result: result["said"].update({"spikes": [1.0]}))
-    ended = CliRunner().invoke(app, ["all", "--confirm", "--figures", str(figure)])
-    assert isinstance(ended.exception, ProblemError)
-    assert "not confirmed: fig6.1;" in str(ended.exception)
-    assert "fig6.2: confirmed" in ended.output
+    with pytest.raises(ProblemError, match=r"not confirmed: fig6\.1;"):
+        app(["all", "--confirm", "--figures", str(figure)], result_action="return_value")
+    assert "fig6.2: confirmed" in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -86,7 +86,7 @@ def test_a_child_runs_no_code_of_the_current_folder(here: Path) -> None:
 
 
 def test_a_command_runs_no_code_of_the_current_folder(here: Path) -> None:
-    for name in ("sitecustomize", "numpy", "typer", "h5py", "taxel", "pathlib"):
+    for name in ("sitecustomize", "numpy", "cyclopts", "h5py", "taxel", "pathlib"):
         (here / f"{name}.py").write_text(f"open({str(here / 'RAN')!r}, 'w')")
     variables = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     subprocess.run([Path(sys.executable).with_name("taxel"), "--version"], env=variables, check=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from markupsafe import escape
-from shell import call
+from shell import call, run
 from test_readout import ARRAY, recipe, tare, touches
 
 import taxel
@@ -462,13 +462,15 @@ def test_a_damaged_recording_is_said_beside_its_detections(
     damaged, data = tmp_path / "damaged.lsa", (tmp_path / "whole.lsa").read_bytes()
     damaged.write_bytes(data[: len(data) // 2] + b"\xff\xff\xff" + data[len(data) // 2 :])
     for name, warned in (("whole", False), ("damaged", True)):
-        words = ["detect", tmp_path / f"{name}.lsa", "--readout", trained, "--tare", folder / "tare.json", "--json"]
+        file = tmp_path / f"{name}.mcap"
+        size = f"{ARRAY.rows}x{ARRAY.columns}"
+        assert run("convert", tmp_path / f"{name}.lsa", file, "--array", size).returncode == 0
+        words = ["detect", file, "--readout", trained, "--tare", folder / "tare.json", "--json"]
         with pytest.raises(SystemExit) as ended:
-            main([*map(str, words), "--array", f"{ARRAY.rows}x{ARRAY.columns}"])
+            main([*map(str, words)])
         said = capsys.readouterr()
         assert ended.value.code in (0, None), said.err
-        assert ("damaged.lsa: " in said.err and "in the bytes that arrived" in said.err) == warned
-        result, verdict = json.loads(said.out), taxel.open(tmp_path / f"{name}.lsa").verdict
+        assert ("damaged.mcap: " in said.err and "in the bytes that arrived" in said.err) == warned
+        result, verdict = json.loads(said.out), taxel.open(file).verdict
         assert (result["verdict"], result["verdict_details"]) == (verdict, verdict.to_dict())
-        # There is no damaged.lss.
         assert (verdict.status, bool(verdict.damaged)) == (("unfinished", True) if warned else ("unknown", False))

@@ -5,12 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusal import refused
-from typer.testing import CliRunner
+from shell import run
 
 import taxel
 from taxel import Array, Events, Frames, Tare
 from taxel._base.errors import Place
-from taxel.cli import app
 from taxel.encode import SA1, SA2
 
 from .scenes import spikes_of, touch
@@ -133,8 +132,8 @@ def test_the_command_takes_the_rest_from_afferents_that_feel_held_pressure(encod
             "--tare",
             "0.2",
         ]
-        done = CliRunner().invoke(app, [str(word) for word in said])
-        assert done.exit_code == 0, done.output
+        done = run(*said)
+        assert done.returncode == 0, done.stderr
         spikes.append(taxel.SpikeTrains.load(tmp_path / f"{name}-spikes.npz"))
     flat, rested = ([list(trains[k]) for k in range(len(trains))] for trains in spikes)
     assert rested == flat

@@ -192,9 +192,10 @@ def test_texts_count_from_the_recordings_beginning_and_json_from_1970(tmp_path: 
     quiet = json.loads(call(capsys, *info, "--json")[1])["rest"]["quiet_us"]
     assert begin <= quiet[0] < quiet[1] <= begin + 1_990_000
     labels = tmp_path / "labels.csv"
+    (tmp_path / "a.layout.toml").write_text('[ros]\ntopic = "/a"\n')
     for t in (6_000_000, begin + 10**7):
         labels.write_text(f"label,t_us\ncontact,{t}\n")
-        wrong = call(capsys, "train", bag, "--topic", "/a", "--labels", labels, "-o", tmp_path / "r.json")[2]
+        wrong = call(capsys, "train", bag, "--labels", labels, "-o", tmp_path / "r.json")[2]
         assert "none within" in wrong
         assert f"it begins 2026-11-18 11:06:40.000 UTC, {begin} us since 1970" in wrong
 
@@ -366,16 +367,18 @@ def test_from_a_bag_to_a_detection_on_the_command_line(tmp_path: Path, monkeypat
     bags.write(tmp_path / "grasp", several)
     rows = [f"contact,{BEGIN_NS // 1000 + 10_000 * k}\n" for k in begins]
     Path("labels.csv").write_text("label,t_us\n" + "".join(rows))
-    finger = ("--topic", "/skin", "--field", "patches.taxels", "--array", "2x3")
+    given = ("--topic", "/skin", "--field", "patches.taxels", "--array", "2x3")
+    Path("finger.toml").write_text('rows = 2\ncolumns = 3\n[ros]\ntopic = "/skin"\nfield = "patches.taxels"\n')
+    finger = ("--layout", "finger.toml")
     assert "--topic /skin --field patches.taxels --array ROWSxCOLUMNS" in call(capsys, "info", "grasp")[1]
-    facts = json.loads(call(capsys, "info", "grasp", *finger, "--json")[1])
+    facts = json.loads(call(capsys, "info", "grasp", *given, "--json")[1])
     assert (facts["kind"], facts["frames"], facts["frames_per_s"]) == ("ros", 600, 100.0)
     train = call(capsys, "train", "grasp", *finger, "--labels", "labels.csv", "--folds", 0, "-o", "touch.json")
     assert train[0] == 0, train
     detect = ("--readout", "touch.json", "--tare", ".5", "--truth", "labels.csv", "--json")
     score = json.loads(call(capsys, "detect", "grasp", *finger, *detect)[1])["score"]
     assert (score["found"], score["missed"], score["false"]) == (len(begins), 0, 0)
-    assert call(capsys, "convert", "grasp", "grasp.npz", *finger)[0] == 0
+    assert call(capsys, "convert", "grasp", "grasp.npz", *given)[0] == 0
     assert np.array_equal(taxel.open("grasp.npz").frames().values.reshape(600, 6), values.astype(np.float32))
     levels = ("--encoder", "level_crossing", "--set", "levels=[4, 8]")
     assert call(capsys, "encode", "grasp", "spikes.npz", *finger, *levels)[0] == 0

@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rich.console import Console
-from typer.testing import CliRunner
+from shell import run
 
 import taxel
 from taxel import _core
-from taxel.cli import app
 from taxel.cli.board import counters_table, doubts
 from taxel.clock import doubt
 from taxel.live import Live
@@ -58,8 +57,8 @@ def recorded(path: Path, drift_ppm: float, delay_s: float) -> Path:
 )
 def test_info_says_which_clocks_cannot_be(tmp_path: Path, drift_ppm: float, delay_s: float, said: str | None) -> None:
     file = recorded(tmp_path / "board.mcap", drift_ppm, delay_s)
-    facts = json.loads(CliRunner().invoke(app, ["info", str(file), "--json"]).stdout)
-    page = CliRunner().invoke(app, ["info", str(file)]).stdout
+    facts = json.loads(run("info", file, "--json").stdout)
+    page = run("info", file).stdout
     if abs(drift_ppm) < 20_000 and not delay_s:
         assert facts["drift_ppm"] == pytest.approx(drift_ppm, abs=5)
     if said is None:

@@ -342,7 +342,9 @@ def test_frames_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest.C
     spikes = tmp_path / "spikes.npz"
     encode = ["encode", tmp_path / "one.mcap", spikes, "--encoder", "level_crossing", "--set", "levels=[100]"]
     assert "--rate-hz" in call(capsys, *encode)[2]
-    assert call(capsys, *encode, "--rate-hz", "40")[0] == 0
+    assert call(capsys, "convert", tmp_path / "one.mcap", tmp_path / "timed.mcap", "--rate-hz", "40")[0] == 0
+    encode[1] = tmp_path / "timed.mcap"
+    assert call(capsys, *encode)[0] == 0
 
 
 def test_a_folder_of_many_trials_becomes_a_folder_of_recordings(

@@ -185,7 +185,7 @@ def test_a_command_that_fills_the_disk_with_hdf5_ends_with_one_line_and_exit_cod
     )
     # A module's compiled code that does not fit either would stay cut off, and break later commands.
     variables = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
-    for arguments in (["convert", "a.npz", "b.h5"], ["cut", "a.npz", "b.h5", "--from", "0.001", "--to", "9"]):
+    for arguments in (["convert", "a.npz", "b.h5", "--json"], ["cut", "a.npz", "b.h5", "--from", "0.001", "--to", "9"]):
         done = subprocess.run(
             [sys.executable, "-c", code, *arguments],
             cwd=tmp_path,

@@ -8,13 +8,13 @@ import time
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from cyclopts import Parameter
 
-from taxel.cli import App, SecondsOption, say
+from taxel.cli.app import App, SecondsOption, say
 
 __all__ = ["app", "show"]
 
-app = App()
+app = App(name="show")
 
 #: Interval of the frames of a running sensor, s.
 _EVERY_S = 0.1
@@ -23,24 +23,28 @@ _EVERY_S = 0.1
 _SOURCE = re.compile(r"([^=:]+=)?[a-z+]{2,}:")
 
 
-@app.command()
+@app.default
 def show(
-    shows: Annotated[
-        str,
-        typer.Argument(metavar="FILE|SOURCE", help="A recording; or a source, as taxel live --source names it."),
-    ],
-    viewer: Annotated[
-        str, typer.Argument(metavar="VIEWER", help="rerun or rerun:HOST:PORT: a viewer that you have started.")
-    ],
-    tare: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Show values above this rest, a file that Tare.save wrote.")
-    ] = None,
+    shows: str,
+    viewer: str,
+    /,
+    *,
+    tare: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     seconds: SecondsOption = None,
 ) -> None:
     """Show a recording, or what a running sensor holds ten times a second, in Rerun.
 
     Example: taxel show walk.mcap rerun
     Example: taxel show board:127.0.0.1:5208 rerun
+
+    Parameters
+    ----------
+    shows
+        A recording; or a source, as taxel live --source names it.
+    viewer
+        rerun or rerun:HOST:PORT: a viewer that you have started.
+    tare
+        Show values above this rest, a file that Tare.save wrote.
     """
     import taxel  # noqa: PLC0415  the command line starts quickly
     from taxel.live import Live  # noqa: PLC0415

@@ -1,7 +1,7 @@
 """The commands: ours and those of other distributions, each imported only when it is used.
 
-A command of another distribution is an entry point of the group ``taxel.commands`` that names a `typer.Typer`; its line
-in the list of commands is the distribution's description, for which nothing is imported.
+A command of another distribution is an entry point of the group ``taxel.commands`` that names an `App`; its line in the
+list of commands is the distribution's description, for which nothing is imported.
 """
 
 from __future__ import annotations
@@ -9,13 +9,14 @@ from __future__ import annotations
 from difflib import get_close_matches
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
-
-import typer
-from typer.core import TyperGroup
+from typing import TYPE_CHECKING
 
 from taxel._base.messages import escaped, first_line
 from taxel._core import ProblemError
+from taxel.cli._say import table
+
+if TYPE_CHECKING:
+    import cyclopts
 
 #: Our commands, each a module of this name, and what they do, in the order of the work.
 OWN = {
@@ -38,62 +39,59 @@ OWN = {
     "information": "Estimate how many bits of information labelled touches give.",
 }
 
+#: What the page of help of `taxel` begins with.
+ABOUT = [
+    "Usage: taxel COMMAND [OPTIONS]",
+    "",
+    "Touch as events: from the bytes of a tactile array to detections with exact times.",
+]
+
 
 def plugins() -> dict[str, EntryPoint]:
     """Return the commands of other distributions by name; none has the name of ours."""
     return {point.name: point for point in sorted(entry_points(group="taxel.commands")) if point.name not in OWN}
 
 
-class Commands(TyperGroup):
-    """All commands; each imports what it needs when it is used."""
+def listing() -> list[str]:
+    """Return a line a command, without importing it: ours first, in the order of the work."""
+    options = [("--version", "Print the version and end."), ("--help, -h", "Show this page and end.")]
+    commands = [*OWN.items(), *((name, _description(point)) for name, point in plugins().items())]
+    begin = "Begin with: taxel demo. docs/start.md in the repository shows which page to read for your data."
+    return [*table("Options", options), *table("Commands", commands), "", begin]
 
-    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002  click's argument
-        """Name all commands, ours first, in the order of the work."""
-        return [*OWN, *plugins()]
 
-    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002  click's arguments
-        """Write a line a command, without importing it."""
-        with formatter.section("Commands"):
-            formatter.write_dl([*OWN.items(), *((name, _description(point)) for name, point in plugins().items())])
+def nearest(name: str) -> str:
+    """Return the question for the commands of about this name, if there are any."""
+    near = ", ".join(map(repr, get_close_matches(name, [*OWN, *plugins()])))
+    return f". Did you mean {near}?" * bool(near)
 
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Import the command that was typed, and call what waits for that, which is the context's object.
 
-        The error for an unknown name suggests close ones, without importing any.
-        """
-        typed = args[0]
-        if typed not in OWN and typed not in (names := self.list_commands(ctx)):
-            near = ", ".join(map(repr, get_close_matches(typed, names)))
-            ctx.fail(f"No such command {typed!r}." + f" Did you mean {near}?" * bool(near))
-        resolved = super().resolve_command(ctx, args)
-        if ctx.obj is not None:
-            ctx.obj()
-        return resolved
+def command(name: str) -> cyclopts.App | None:
+    """Import a command; None where there is none of this name.
 
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002  click's argument
-        """Import a command.
-
-        Raises
-        ------
-        ProblemError : a command of another distribution that cannot be imported
-        """
-        if cmd_name in OWN:
-            command = typer.main.get_command(import_module(f"taxel.cli.{cmd_name}").app)
-        elif point := plugins().get(cmd_name):
-            command = _import(point)
-        else:
-            return None
-        command.name = cmd_name
-        return command
+    Raises
+    ------
+    ProblemError : a command of another distribution that cannot be imported
+    """
+    if name in OWN:
+        own: cyclopts.App = import_module(f"taxel.cli.{name}").app
+        return own
+    point = plugins().get(name)
+    return None if point is None else _import(point)
 
 
 def _description(point: EntryPoint) -> str:
     return escaped((point.dist and point.dist.metadata["Summary"]) or "")
 
 
-def _import(point: EntryPoint) -> Any:
+def _import(point: EntryPoint) -> cyclopts.App:
+    import cyclopts  # noqa: PLC0415  the list of commands is there at once
+
     try:
-        return typer.main.get_command(point.load())
+        app = point.load()
+        if not isinstance(app, cyclopts.App):
+            raise TypeError(f"must be a cyclopts.App, not a {type(app).__name__}")
+        return app
     except Exception as error:  # another distribution's code may raise any error
         source = f" of {point.dist.name} {point.dist.version}" if point.dist else ""
         raise ProblemError(

@@ -6,20 +6,23 @@ import ipaddress
 import webbrowser
 from typing import Annotated
 
-import typer
+from cyclopts import Parameter
 
+from taxel.cli.app import Limits
 from taxel.cli.console import Console
 from taxel.live import Panel
 
 PanelHostOption = Annotated[
     str,
-    typer.Option(
+    Parameter(
         help="The address of this machine on which the panel listens; a warning is printed for every address except "
         "loopback."
     ),
 ]
-PanelPortOption = Annotated[int, typer.Option(min=0, max=65_535, help="The panel's TCP port; 0 finds a free one.")]
-OpenOption = Annotated[bool, typer.Option("--open/--no-open", help="Open the panel in a browser.")]
+PanelPortOption = Annotated[
+    int, Parameter(validator=Limits(0, 65_535), help="The panel's TCP port; 0 finds a free one.")
+]
+OpenOption = Annotated[bool, Parameter(name="--open", negative="--no-open", help="Open the panel in a browser.")]
 
 
 def announce(panel: Panel, opens: bool, console: Console) -> None:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-import typer
+import sys
+import textwrap
 
 from taxel._base.messages import escaped
+
+#: Widest line of a page of help, characters, and the column of its texts.
+WIDTH, _COLUMN = 100, 26
 
 
 def say(*lines: object, err: bool = False) -> None:
@@ -18,4 +22,17 @@ def say(*lines: object, err: bool = False) -> None:
         Whether it is printed to standard error.
     """
     for line in lines:
-        typer.echo(escaped(line), err=err)  # noqa: TID251  the place where it is allowed
+        print(escaped(line), file=sys.stderr if err else sys.stdout, flush=True)
+
+
+def table(title: str, cells: list[tuple[str, str]], width: int = WIDTH) -> list[str]:
+    """Return names and texts in two columns under a title; nothing of none."""
+    lines = ["", f"{title}:"] if cells else []
+    for name, text in cells:
+        begins = f"  {name}".ljust(_COLUMN)
+        indent = " " * _COLUMN
+        if len(begins) > _COLUMN or not begins.endswith(" "):
+            lines.append(begins.rstrip())
+            begins = indent
+        lines += textwrap.wrap(text, width, initial_indent=begins, subsequent_indent=indent) or [begins.rstrip()]
+    return lines

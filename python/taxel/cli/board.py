@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import Field, fields
@@ -9,7 +10,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+from cyclopts import Parameter
 from rich.table import Table
 
 from taxel._base.arguments import shown
@@ -18,7 +19,7 @@ from taxel._base.number_text import float_of
 from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.array import Array, of_size
-from taxel.cli._app import OUTSIDE, WRONG_INPUT, as_command
+from taxel.cli.app import OUTSIDE, WRONG_INPUT, Limits
 from taxel.cli.console import Console
 from taxel.detect import load
 from taxel.live import Summary, delays
@@ -39,14 +40,15 @@ REDRAW_S = 0.1
 
 RateOption = Annotated[
     float | None,
-    typer.Option(
-        min=0.0,
+    Parameter(
+        validator=Limits(0.0),
         help="Frames per second of your own sensor, if taxel.live.Source sends its events. Give --bits too: both set "
         "the same registers as the Source.",
     ),
 ]
 BitsOption = Annotated[
-    int | None, typer.Option(min=1, max=16, help="With --rate-hz: bits of the sensor's values, as given to the Source.")
+    int | None,
+    Parameter(validator=Limits(1, 16), help="With --rate-hz: bits of the sensor's values, as given to the Source."),
 ]
 
 
@@ -69,13 +71,14 @@ def _parameter(field: Field[Any]) -> inspect.Parameter:
         read = Path | None
     elif "Sequence" in kind or "Mapping" in kind:
         read = list[str] | None
-    option = typer.Option(flag, metavar=words.get("metavar"), help=help_, **described)
+    limits = Limits(described.get("min"), described.get("max"))
+    option = Parameter(name=flag, metavar=words.get("metavar"), help=help_, validator=limits)
     return inspect.Parameter(
         field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[read, option]
     )
 
 
-def with_live_options(command: str, *names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def with_live_options(command: str, *names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Return a decorator that gives a command options of `Live`, in its argument `options`, by name.
 
     Parameters
@@ -90,14 +93,19 @@ def with_live_options(command: str, *names: str) -> Callable[[Callable[..., None
         field for field, commands in commands_of.items() if command in commands and (not names or field.name in names)
     ]
 
-    def decorate(work: Callable[..., None]) -> Callable[..., None]:
-        def call(**typed: Any) -> None:
-            options = {field.name: typed.pop(field.name) for field in chosen}
-            work(options=options, **typed)
+    own = [_parameter(field) for field in chosen]
+
+    def decorate(work: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any, **typed: Any) -> Any:
+            options = {one.name: typed.pop(one.name, one.default) for one in own}
+            return work(*arguments, options=options, **typed)
 
         parameters = inspect.signature(work, eval_str=True).parameters.items()
-        each = [map(_parameter, chosen) if name == "options" else [parameter] for name, parameter in parameters]
-        return as_command(call, work, chain.from_iterable(each))
+        each = [own if name == "options" else [parameter] for name, parameter in parameters]
+        functools.update_wrapper(call, work)
+        call.__signature__ = inspect.Signature([*chain.from_iterable(each)])  # type: ignore[attr-defined]
+        call.__annotations__ = {}  # those of `work`, which the signature replaces
+        return call
 
     return decorate
 

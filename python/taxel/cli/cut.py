@@ -2,61 +2,43 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-import typer
+from cyclopts import Parameter
 
 import taxel
 from taxel import _core
 from taxel._base.messages import plain
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
-from taxel.cli._app import App, JsonOption, OverwriteOption, with_out
-from taxel.cli._opening import FileOptions
-from taxel.cli._recordings import READ_HELP, of_source
-from taxel.cli._say import say
+from taxel.cli._task import OutArgument, Output, Reading, SourceOption, of_source
+from taxel.cli.app import App, Flat, Limits
 
 if TYPE_CHECKING:
     from taxel.recording import Recording
 
-app = App()
+app = App(name="cut")
 
 
-@app.command()
-@with_out("out")
+@app.default
 def cut(
-    recording: Annotated[Path, typer.Argument(help=f"A recording: {READ_HELP}.")],
-    out: Annotated[
-        Path,
-        typer.Argument(
-            help="The new file; its extension gives the format. With --label a number is appended to the name."
-        ),
-    ],
-    files: FileOptions,
-    start: Annotated[
-        float | None, typer.Option("--from", metavar="S", help="Start of the part, s, on the time scale of taxel info.")
-    ] = None,
-    stop: Annotated[
-        float | None, typer.Option("--to", metavar="S", help="End of the part, s, on the time scale of taxel info.")
-    ] = None,
-    columns: Annotated[str | None, typer.Option(metavar="A:B", help="Columns A to B - 1, for example 0:32.")] = None,
-    rows: Annotated[str | None, typer.Option(metavar="A:B", help="Rows A to B - 1, for example 10:20.")] = None,
-    label: Annotated[str | None, typer.Option(help="Cut a part around each note with this text.")] = None,
-    before: Annotated[
-        float, typer.Option(min=0.0, metavar="S", help="With --label: start this long before the note, s.")
-    ] = 0.5,
-    after: Annotated[
-        float, typer.Option(min=0.0, metavar="S", help="With --label: end this long after the note, s.")
-    ] = 0.5,
-    source: Annotated[
-        str | None, typer.Option("--source", metavar="NAME", help="The source to cut, if the recording has several.")
-    ] = None,
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    recording: Path,
+    /,
+    out: OutArgument,
+    *,
+    start: Annotated[float | None, Parameter(name="--from", metavar="S")] = None,
+    stop: Annotated[float | None, Parameter(name="--to", metavar="S")] = None,
+    columns: Annotated[str | None, Parameter(metavar="A:B")] = None,
+    rows: Annotated[str | None, Parameter(metavar="A:B")] = None,
+    label: str | None = None,
+    before: Annotated[float, Parameter(metavar="S", validator=Limits(0.0))] = 0.5,
+    after: Annotated[float, Parameter(metavar="S", validator=Limits(0.0))] = 0.5,
+    source: SourceOption = None,
+    reading: Flat[Reading] = Reading(),
+    output: Flat[Output] = Output(),
 ) -> None:
     """Cut a recording by time, by region or by label.
 
@@ -64,10 +46,31 @@ def cut(
     beginning.
 
     Example: taxel cut walk.mcap heel.mcap --from 1.5 --to 3 --rows 0:20
+
+    Parameters
+    ----------
+    recording
+        A recording: .mcap, .lsa, .npz, .csv or .h5, a ROS bag or a file of a sensor's maker.
+    out
+        The new file; its extension gives the format. With --label a number is appended to the name.
+    start
+        Start of the part, s, on the time scale of taxel info.
+    stop
+        End of the part, s, on the time scale of taxel info.
+    columns
+        Columns A to B - 1, for example 0:32.
+    rows
+        Rows A to B - 1, for example 10:20.
+    label
+        Cut a part around each note with this text.
+    before
+        With --label: start this long before the note, s.
+    after
+        With --label: end this long after the note, s.
     """
     if start is not None and stop is not None and start > stop:
         raise ProblemError(f"--from {plain(start)} --to {plain(stop)}: the part must not end before it begins")
-    source_recording = of_source(files.opener.open_one(recording), source)
+    source_recording = of_source(reading.opener.open_one(recording), source)
     start_us, stop_us = _stretch_us(source_recording, start, stop)
     parts = taxel.cut(
         source_recording,
@@ -81,15 +84,13 @@ def cut(
     )
     if not parts:
         raise ProblemError(f"{recording}: has no note {label!r} with a time; taxel info --json lists the notes")
-    written = []
+    written, lines = [], []
     for k, part in enumerate(parts, start=1):
         file = out if label is None else Path(_core.numbered_path(out, k))
-        lost = taxel.convert(part, file, overwrite=overwrite)
+        lost = taxel.convert(part, file, overwrite=output.overwrite)
         written.append({"file": str(file), "lost": lost})
-        if not as_json:
-            say(f"written to {file}: {part!r}", *(f"  lost: {loss}" for loss in lost))
-    if as_json:
-        say(json.dumps({"recording": str(recording), "written": written}))
+        lines += [f"written to {file}: {part!r}", *(f"  lost: {loss}" for loss in lost)]
+    output.say({"recording": str(recording), "written": written}, *lines)
 
 
 def _stretch_us(recording: Recording, start: float | None, stop: float | None) -> tuple[float, float]:

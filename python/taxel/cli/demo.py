@@ -8,38 +8,31 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from cyclopts import Parameter
 
 from taxel._base.files import check_writable
 from taxel._base.messages import counted
-from taxel.cli._app import App, JsonOption
-from taxel.cli._recordings import progress
 from taxel.cli._say import say
+from taxel.cli._task import progress
+from taxel.cli.app import App, JsonOption, Limits
 from taxel.demo.script import TRAINING_SEED
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
     from taxel.detections import Detection
 
-app = App()
+app = App(name="demo")
 
 
-@app.command()
+@app.default
 def demo(
-    scenes: Annotated[int, typer.Option(min=1, help="Number of scenes.")] = 12,
-    seed: Annotated[
-        int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Seed of the random numbers. Default: random.")
-    ] = None,
-    no_clock: Annotated[
-        bool, typer.Option("--no-clock", help="Simulate as fast as possible instead of in real time, without a socket.")
-    ] = False,
-    readout: Annotated[
-        Path | None, typer.Option(help="A readout to use instead of the one that comes with taxel.")
-    ] = None,
-    folder: Annotated[Path | None, typer.Option(help="A new folder for the report.")] = None,
-    train_to: Annotated[
-        Path | None, typer.Option("--train", help="Train the demo's readout, write it to this file, and end.")
-    ] = None,
+    *,
+    scenes: Annotated[int, Parameter(validator=Limits(1))] = 12,
+    seed: Annotated[int | None, Parameter(validator=Limits(0, TRAINING_SEED - 1))] = None,
+    no_clock: bool = False,
+    readout: Path | None = None,
+    folder: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,
+    train_to: Annotated[Path | None, Parameter(name="--train")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Play scenes on the emulated board, detect contact and lift-off while they run, and write a report.
@@ -50,6 +43,21 @@ def demo(
 
     Example: taxel demo --seed 1
     Example: taxel demo --scenes 100 --no-clock --folder demo
+
+    Parameters
+    ----------
+    scenes
+        Number of scenes.
+    seed
+        Seed of the random numbers. Default: random.
+    no_clock
+        Simulate as fast as possible instead of in real time, without a socket.
+    readout
+        A readout to use instead of the one that comes with taxel.
+    folder
+        A new folder for the report.
+    train_to
+        Train the demo's readout, write it to this file, and end.
     """
     from taxel.demo.playing import play_live, play_simulated  # noqa: PLC0415  the command line starts quickly
     from taxel.demo.shipped import shipped, trained  # noqa: PLC0415

@@ -4,119 +4,95 @@ from __future__ import annotations
 
 import csv
 import io
-import json
+from collections.abc import Sequence
 from dataclasses import replace
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from cyclopts import Parameter
 
 import taxel
-from taxel._base.files import check_writable, write_whole
+from taxel._base.files import write_whole
 from taxel._base.messages import collected, of_names
 from taxel._base.times import begun
-from taxel.cli._app import App, JsonOption, OverwriteOption
-from taxel.cli._opening import FileOptions
-from taxel.cli._recordings import (
-    READ_HELP,
-    ReportOption,
-    one_or_several,
-    paths_text,
-    progress,
-    say_warnings,
-    tare_option,
-    try_report,
-)
 from taxel.cli._say import say
+from taxel.cli._task import OutOption, Output, Reading, one_or_several, paths_text, progress, say_warnings
+from taxel.cli.app import App, Flat
 from taxel.detections import Detections
+from taxel.options import DetectOptions
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from taxel.detect import Outcome, PlainRule, Readout
     from taxel.tasks import Detected, Detecting
 
-app = App()
+app = App(name="detect")
 
 #: Rows of the table that is printed without --list; all go to --out and --json.
 _ROWS = 40
 
 
-@app.command()
+@app.default
 def detect(
-    recordings: Annotated[list[Path], typer.Argument(help=f"Recordings: {READ_HELP}, or folders of them.")],
-    readout: Annotated[Path, typer.Option(help="A file that taxel train wrote: a readout or a plain rule.")],
-    files: FileOptions,
-    tare: Annotated[str | None, tare_option("Default: 0 for force and pressure, else the first quiet stretch.")] = None,
-    frame_us: Annotated[
-        float | None,
-        typer.Option(help="Length of the board's frame, us. Default: from the registers or the frames, else 192."),
-    ] = None,
-    truth: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Score against a CSV with the columns label,t_us or recording,label,t_us, or (notes) against the "
-            "recordings' notes. May be repeated, as --labels of taxel train.",
-        ),
-    ] = None,
-    window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
-    shift_ms: Annotated[
-        float,
-        typer.Option(
-            help="First move all labels of --truth by this many ms, for example if their times are of another clock."
-        ),
-    ] = 0.0,
-    use: Annotated[
-        str,
-        typer.Option(
-            metavar="better|rule|neuron",
-            help="What detects each label: the better one in training, its plain rule, or its neuron. A label with no "
-            "rule is not detected by rule.",
-        ),
-    ] = "better",
-    lists: Annotated[
-        bool,
-        typer.Option(
-            "--list", help="Print all detections. Default: the first 40 of each recording, and with --truth none."
-        ),
-    ] = False,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Write the detections to this .csv.")] = None,
-    report: ReportOption = None,
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    recordings: list[Path],
+    /,
+    *,
+    readout: Annotated[Path, Parameter(metavar="FILE")],
+    truth: Annotated[Sequence[str], Parameter(metavar="FILE")] = (),
+    lists: Annotated[bool, Parameter(name="--list")] = False,
+    out: OutOption = None,
+    report: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,
+    options: Flat[DetectOptions] = DetectOptions(),
+    reading: Flat[Reading] = Reading(),
+    output: Flat[Output] = Output(),
 ) -> None:
     """Detect events in recordings, or in each of a folder, by a trained readout or a plain rule.
 
     Example: taxel detect walk.mcap --readout gait.json --truth steps.csv -o found.csv
     Example: taxel detect monday/ friday.mcap --readout gait.json --truth steps.csv
+
+    Parameters
+    ----------
+    recordings
+        Recordings: .mcap, .lsa, .npz, .csv or .h5, a ROS bag or a file of a sensor's maker, or folders of them.
+    readout
+        A file that taxel train wrote: a readout or a plain rule.
+    truth
+        Score against a CSV with the columns label,t_us or recording,label,t_us, or (notes) against the recordings'
+        notes. May be repeated, as --labels of taxel train.
+    lists
+        Print all detections. Default: the first 40 of each recording, and with --truth none.
+    out
+        Write the detections to this .csv.
+    report
+        Write a report to this folder, with potential, weights, errors and the worst events.
     """
-    if out is not None:
-        check_writable(out, overwrite=overwrite)
-    if report is not None:
-        try_report(report, overwrite=overwrite)
+    output.check(out)
+    output.check_report(report)
     given = one_or_several(truth) if truth else None
-    options = taxel.tasks.DetectOptions(tare, frame_us, window_ms, shift_ms, use)
     loaded = taxel.detect.load(readout)
-    with progress(as_json) as update:
+    with progress(output.json) as update:
         update(f"reading {paths_text(recordings)}", 0, 0)
         with collected() as unread:
-            opened = files.opener.open_sensors(recordings)
+            opened = reading.opener.open_sensors(recordings)
         found = taxel.tasks.detect(loaded, opened, given, options, progress=update)
         found = replace(found, warnings=(*unread, *found.warnings))
-    used = loaded.using(use) if isinstance(loaded, taxel.Readout) else loaded
+    used = loaded.using(options.use) if isinstance(loaded, taxel.Readout) else loaded
     if out is not None:
-        write_whole(out, lambda file: file.write(_table(found.outcomes).encode()), overwrite=overwrite)
+        write_whole(out, lambda file: file.write(_table(found.outcomes).encode()), overwrite=output.overwrite)
     say_warnings(found.warnings)
     against = paths_text(list(map(Path, truth))) if truth else None
-    printed = list(_lines(found, used, recordings, against, given=tare is not None, lists=lists))
-    if as_json:
-        written = {"written": out, "report": None if report is None else report / "report.html"}
-        files_written = {name: str(path) for name, path in written.items() if path is not None}
-        say(json.dumps(_result(recordings, readout, found.to_dict()) | files_written))
-    else:
-        say(*printed, *[] if out is None else [f"written to {out}"])
+    printed = list(_lines(found, used, recordings, against, given=options.tare is not None, lists=lists))
+    written = {"written": out, "report": None if report is None else report / "report.html"}
+    files_written = {name: str(path) for name, path in written.items() if path is not None}
+    output.say(
+        _result(recordings, readout, found.to_dict()) | files_written,
+        *printed,
+        *[] if out is None else [f"written to {out}"],
+    )
     if report is not None:  # last, so that nothing is lost where it fails
         place = taxel.report.write_detections(
             report,
@@ -125,9 +101,9 @@ def detect(
             title=f"Detections of {readout} in {paths_text(recordings)}",
             warnings=[*found.unreliable, *found.warnings, *_remarks(found)],
             printed=printed,
-            overwrite=overwrite,
+            overwrite=output.overwrite,
         )
-        say(*[] if as_json else [f"report: {place}"])
+        say(*[] if output.json else [f"report: {place}"])
 
 
 def _lines(

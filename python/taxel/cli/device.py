@@ -8,7 +8,7 @@ import time
 from dataclasses import asdict
 from typing import Annotated, Any
 
-import typer
+from cyclopts import Parameter
 from rich.table import Table
 
 from taxel._base.arguments import text
@@ -17,27 +17,22 @@ from taxel._base.number_text import float_of
 from taxel._core import ProblemError
 from taxel.array import of_size
 from taxel.board_check import check_board
-from taxel.cli._app import OUTSIDE, App, JsonOption, SecondsOption
 from taxel.cli._say import say
+from taxel.cli.app import OUTSIDE, App, JsonOption, Limits, SecondsOption
 from taxel.cli.console import Console
 from taxel.device import Device, ports
 from taxel.live.sending import PORT
 from taxel.wire import PRESETS, Registers, described
 from taxel.wire.registers import QUOTED_PRESETS
 
-app = App(no_args_is_help=True, help="Find a board on its serial line, set its registers by name, and read them back.")
+app = App(name="device", help="Find a board on its serial line, set its registers by name, and read them back.")
 
-PlaceArgument = Annotated[str, typer.Argument(help="A serial port (COM3, /dev/ttyACM0), or host:port.")]
-BaudOption = Annotated[int, typer.Option(help="Baud rate of the serial line.")]
-
-
-@app.callback()
-def _root() -> None:
-    """Find a board on its serial line, set its registers by name, and read them back."""
+PlaceArgument = Annotated[str, Parameter(help="A serial port (COM3, /dev/ttyACM0), or host:port.")]
+BaudOption = Annotated[int, Parameter(help="Baud rate of the serial line.")]
 
 
-@app.command("ports")
-def listed(as_json: JsonOption = False) -> None:
+@app.command(name="ports")
+def listed(*, as_json: JsonOption = False) -> None:
     """List the serial ports of this machine.
 
     Example: taxel device ports
@@ -53,8 +48,8 @@ def listed(as_json: JsonOption = False) -> None:
         say("no serial port was found: is the cable plugged in, and are you allowed to open the port?", err=True)
 
 
-@app.command()
-def show(place: PlaceArgument, baud: BaudOption = 115_200, as_json: JsonOption = False) -> None:
+@app.command
+def show(place: PlaceArgument, /, *, baud: BaudOption = 115_200, as_json: JsonOption = False) -> None:
     """Show a board's identity, and every register with its unit.
 
     Example: taxel device show /dev/ttyACM0
@@ -63,15 +58,12 @@ def show(place: PlaceArgument, baud: BaudOption = 115_200, as_json: JsonOption =
         _print(device, device.registers, as_json)
 
 
-@app.command("set", short_help="Set registers by name, and print what changed.")
+@app.command(name="set")
 def set_registers(
     place: PlaceArgument,
-    fields: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="NAME=VALUE...", help="Registers and values, for example ramp=140 noise_floor=4; times in us."
-        ),
-    ],
+    fields: Annotated[list[str], Parameter(help="NAME=VALUE, for example ramp=140 noise_floor=4; times in us.")],
+    /,
+    *,
     baud: BaudOption = 115_200,
     as_json: JsonOption = False,
 ) -> None:
@@ -95,10 +87,12 @@ def set_registers(
             say(f"warning: {warning}", err=True)
 
 
-@app.command(short_help="Set a board to a preset, and read it back.")
+@app.command
 def apply(
     place: PlaceArgument,
-    preset: Annotated[str, typer.Argument(help=f"One of {QUOTED_PRESETS}.")],
+    preset: Annotated[str, Parameter(help=f"One of {QUOTED_PRESETS}.")],
+    /,
+    *,
     baud: BaudOption = 115_200,
     as_json: JsonOption = False,
 ) -> None:
@@ -111,10 +105,12 @@ def apply(
         _print(device, device.apply(preset), as_json)
 
 
-@app.command(short_help="Make a board mark the start or stop of a recording.")
+@app.command
 def record(
     place: PlaceArgument,
-    mark: Annotated[str, typer.Argument(metavar="WHAT", help="The mark: start or stop.")],
+    mark: Annotated[str, Parameter(help="The mark: start or stop.")],
+    /,
+    *,
     baud: BaudOption = 115_200,
     as_json: JsonOption = False,
 ) -> None:
@@ -128,14 +124,14 @@ def record(
         _print(device, device.record(mark == "start"), as_json)
 
 
-@app.command(short_help="Print the faults that a board reports, as they come.")
+@app.command
 def watch(
     place: PlaceArgument,
+    /,
+    *,
     seconds: SecondsOption = None,
     baud: BaudOption = 115_200,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print one line of JSON for each change, and nothing else.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Print the faults that a board reports, as they come; waits for a cable that was pulled.
 
@@ -155,31 +151,24 @@ def watch(
             time.sleep(_POLL_S)
 
 
-@app.command(short_help="Check a board: its link by a pattern, then its comparators at rest.")
+@app.command
 def check(
-    place: Annotated[
-        str | None,
-        typer.Argument(
-            help="The serial port, or host:port. Without it, taxel checks only the pattern, which the board "
-            "must send already."
-        ),
-    ] = None,
-    port: Annotated[int, typer.Option(min=1, max=65_535, help="The UDP port that the board sends to.")] = PORT,
-    host: Annotated[str, typer.Option(help="The address of this machine to listen on; 0.0.0.0: all.")] = "0.0.0.0",
-    array: Annotated[
-        str | None,
-        typer.Option(metavar="ROWSxCOLUMNS", help="Without a serial line: the size of the sensor. Default: 64x64."),
-    ] = None,
+    place: str | None = None,
+    /,
+    *,
+    port: Annotated[int, Parameter(validator=Limits(1, 65_535))] = PORT,
+    host: str = "0.0.0.0",
+    array: Annotated[str | None, Parameter(metavar="ROWSxCOLUMNS")] = None,
     preset: Annotated[
         str | None,
-        typer.Option(
+        Parameter(
             help=f"Without a serial line: the board's preset, one of {QUOTED_PRESETS}. Default: the preset that "
             "explains the values best."
         ),
     ] = None,
-    seconds: Annotated[float, typer.Option(min=0.1, help="Duration of each part of the check, s.")] = 4.0,
+    seconds: Annotated[float, Parameter(validator=Limits(0.1))] = 4.0,
     as_json: JsonOption = False,
-) -> None:
+) -> int:
     """Check a board: its link by a pattern that it makes itself, then its comparators at rest.
 
     With its serial line the command switches the pattern on, compares every value that arrives, and checks the
@@ -188,6 +177,19 @@ def check(
     check found a fault.
 
     Example: taxel device check /dev/ttyACM0
+
+    Parameters
+    ----------
+    place
+        The serial port, or host:port. Without it, taxel checks only the pattern, which the board must send already.
+    port
+        The UDP port that the board sends to.
+    host
+        The address of this machine to listen on; 0.0.0.0: all.
+    array
+        Without a serial line: the size of the sensor. Default: 64x64.
+    seconds
+        Duration of each part of the check, s.
     """
     result = check_board(
         place,
@@ -200,8 +202,7 @@ def check(
     )
     if as_json:
         say(json.dumps({"good": result.good, "findings": [asdict(finding) for finding in result.findings]}))
-    if not result.good:
-        raise typer.Exit(OUTSIDE)
+    return 0 if result.good else OUTSIDE
 
 
 #: Interval at which `watch` reads the faults, s.

@@ -13,7 +13,7 @@ from itertools import count
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-import typer
+from cyclopts import Parameter
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from taxel._base.files import check_writable
@@ -21,9 +21,9 @@ from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._base.options import about
 from taxel._core import ProblemError
-from taxel.cli._app import App
-from taxel.cli._recordings import pairs, progress
 from taxel.cli._say import say
+from taxel.cli._task import pairs, progress
+from taxel.cli.app import App, Flat, JsonOption, Limits
 from taxel.cli.console import Console
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
 from taxel.live.sending import PORT
@@ -35,92 +35,92 @@ from taxel.simulate.circuit import Circuit, Converter, VirtualGround
 from taxel.simulate.options import EmulateOptions
 from taxel.spikes import to_ms
 
-app = App()
+app = App(name="emulate")
 
 
-def _option(name: str, *flags: str, options: type = EmulateOptions, metavar: str | None = None) -> Any:
+def _option(name: str, options: type = EmulateOptions, metavar: str | None = None) -> Any:
     """Return the option of the command line that sets an option of `emulate`: its text and range."""
-    return typer.Option(*flags, metavar=metavar, **about(options, name))
+    described = about(options, name)
+    limits = Limits(described.get("min"), described.get("max"))
+    return Parameter(help=described["help"], metavar=metavar, validator=limits)
 
 
 def _in_ms(name: str) -> Any:
     """Return the option of the command line, ms, that sets an option of version 2, us."""
     described = about(Version2, name)
-    return typer.Option(help=described["help"], min=to_ms(described["min"]), max=to_ms(described["max"]))
+    return Parameter(help=described["help"], validator=Limits(to_ms(described["min"]), to_ms(described["max"])))
 
 
 @dataclass(frozen=True)
 class _EmulateArguments:
-    """Hold the options of the command."""
+    """Hold the options of the command.
 
-    port: Annotated[int, typer.Option(min=1, max=65_535, help="The UDP port to send to.")] = PORT
-    host: Annotated[str, typer.Option(help="The machine to send to, by name or address.")] = "127.0.0.1"
-    scenes: Annotated[int | None, typer.Option(min=0, help="Number of scenes. Default: play until Ctrl-C.")] = None
-    scene: Annotated[
-        Path | None, typer.Option(help="Play the scene of this .toml, repeatedly, instead of random scenes.")
+    Parameters
+    ----------
+    port
+        The UDP port to send to.
+    host
+        The machine to send to, by name or address.
+    scenes
+        Number of scenes. Default: play until Ctrl-C.
+    scene
+        Play the scene of this .toml, repeatedly, instead of random scenes.
+    replay
+        Play a recording instead of scenes.
+    speed
+        With --replay: playback speed; 2 takes half the time. Default: 1.
+    pipe
+        Send events of another sensor, whose frames come on standard input.
+    noise_floor
+        With --pipe: a value that changes by more than this makes an event. Default: 3.
+    tare
+        How long the noise floor is 0 before the start marker, s. Default: as in the scene's file, or 0.05.
+    session
+        Version 2 of the wire: the number of the first session. Default: random.
+    rest
+        Let the ball bounce until it rests, instead of catching it.
+    labels
+        Write the true times of the touches to this CSV, label,t_us,host_ns, as they happen.
+    """
+
+    port: Annotated[int, Parameter(validator=Limits(1, 65_535))] = PORT
+    host: str = "127.0.0.1"
+    scenes: Annotated[int | None, Parameter(validator=Limits(0))] = None
+    scene: Path | None = None
+    seed: Annotated[
+        int | None, Parameter(help=about(EmulateOptions, "seed")["help"], validator=Limits(0, TRAINING_SEED - 1))
     ] = None
-    seed: Annotated[int | None, typer.Option(max=TRAINING_SEED - 1, **about(EmulateOptions, "seed"))] = None
-    replay: Annotated[Path | None, typer.Option(help="Play a recording instead of scenes.")] = None
-    speed: Annotated[
-        float | None, typer.Option(help="With --replay: playback speed; 2 takes half the time. Default: 1.")
-    ] = None
-    pipe: Annotated[
-        bool, typer.Option("--pipe", help="Send events of another sensor, whose frames come on standard input.")
-    ] = False
-    noise_floor: Annotated[
-        int | None,
-        typer.Option(
-            min=0, max=255, help="With --pipe: a value that changes by more than this makes an event. Default: 3."
-        ),
-    ] = None
-    tare: Annotated[
-        float | None,
-        typer.Option(
-            min=0,
-            max=60,
-            help="How long the noise floor is 0 before the start marker, s. Default: as in the scene's file, or 0.05.",
-        ),
-    ] = None
+    replay: Path | None = None
+    speed: float | None = None
+    pipe: bool = False
+    noise_floor: Annotated[int | None, Parameter(validator=Limits(0, 255))] = None
+    tare: Annotated[float | None, Parameter(metavar="SECONDS", validator=Limits(0, 60))] = None
     preset: Annotated[str | None, _option("preset")] = None
     wire: Annotated[int | None, _option("wire")] = None
     board: Annotated[int, _option("board", options=Version2)] = Version2.board
-    session: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            max=65_535,
-            help="Version 2 of the wire: the number of the first session. Default: random.",
-        ),
-    ] = None
+    session: Annotated[int | None, Parameter(validator=Limits(0, 65_535))] = None
     hold: Annotated[float, _in_ms("hold_us")] = to_ms(Version2.hold_us)
     heartbeat: Annotated[float, _in_ms("heartbeat_us")] = to_ms(Version2.heartbeat_us)
     states: Annotated[float, _in_ms("states_us")] = to_ms(Version2.states_us)
     reset_every: Annotated[float | None, _option("reset_every_s")] = EmulateOptions.reset_every_s
     drift: Annotated[float, _option("drift_ppm")] = EmulateOptions.drift_ppm
     circuit: Annotated[list[str] | None, _option("circuit", metavar="NAME=VALUE")] = None
-    asynchronous: Annotated[bool, _option("asynchronous", "--asynchronous")] = EmulateOptions.asynchronous
+    asynchronous: Annotated[bool, _option("asynchronous")] = EmulateOptions.asynchronous
     flaw: Annotated[list[str] | None, _option("flaws", metavar="NAME=SIZE[:SEED]")] = None
     fault: Annotated[list[str] | None, _option("faults", metavar="NAME=SHARE")] = None
-    control: Annotated[int | None, typer.Option(help=about(EmulateOptions, "control")["help"])] = None
+    control: Annotated[int | None, _option("control")] = None
     line: Annotated[Path | None, _option("line")] = None
     baud: Annotated[int | None, _option("baud")] = None
     sync: Annotated[Path | None, _option("sync")] = None
     source_port: Annotated[int, _option("source_port")] = EmulateOptions.source_port
-    rest: Annotated[
-        bool, typer.Option("--rest", help="Let the ball bounce until it rests, instead of catching it.")
-    ] = False
-    labels: Annotated[
-        Path | None,
-        typer.Option(
-            "--truth", help="Write the true times of the touches to this CSV, label,t_us,host_ns, as they happen."
-        ),
-    ] = None
-    overwrite: Annotated[bool, _option("overwrite", "--overwrite")] = EmulateOptions.overwrite
-    as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON, and nothing else.")] = False
+    rest: bool = False
+    labels: Annotated[Path | None, Parameter(name="--truth", metavar="FILE")] = None
+    overwrite: Annotated[bool, _option("overwrite")] = EmulateOptions.overwrite
+    as_json: JsonOption = False
 
 
-@app.command()
-def emulate(typed: _EmulateArguments) -> None:
+@app.default
+def emulate(*, typed: Flat[_EmulateArguments] = _EmulateArguments()) -> None:
     """Emulate a board that sends its events by UDP, in real time, until Ctrl-C.
 
     In each scene a ball is dropped on foam over 64 x 64 taxels, caught in flight, pressed by hand and lifted. The board

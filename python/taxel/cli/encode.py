@@ -2,48 +2,45 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 import taxel
-from taxel._base.files import check_writable
-from taxel._core import ProblemError, encoder_names
-from taxel.cli._app import App, JsonOption, OverwriteOption, with_out
-from taxel.cli._opening import FileOptions
-from taxel.cli._recordings import SET_HELP, assignments, progress, say_warnings, tare_option
-from taxel.cli._say import say
+from taxel._core import ProblemError
+from taxel.cli._task import OutArgument, Output, Reading, progress, say_warnings
+from taxel.cli.app import App, Flat
+from taxel.options import EncodeOptions
 
-app = App()
+app = App(name="encode")
 
 
-@app.command()
-@with_out("out")
+@app.default
 def encode(
-    recording: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz or .csv.")],
-    out: Annotated[Path, typer.Argument(help="The new file, a .npz that SpikeTrains.load reads.")],
-    encoder: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(encoder_names())}.")],
-    files: FileOptions,
-    values: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=SET_HELP)] = None,
-    tare: Annotated[str | None, tare_option()] = None,
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    recording: Path,
+    /,
+    out: OutArgument,
+    *,
+    options: Flat[EncodeOptions],
+    reading: Flat[Reading] = Reading(),
+    output: Flat[Output] = Output(),
 ) -> None:
     """Encode a recording as spike trains.
 
     Example: taxel encode walk.mcap walk.npz --encoder level_crossing --set "levels=[40, 80]" --set hold_ms=2
+
+    Parameters
+    ----------
+    recording
+        A recording: .mcap, .lsa, .npz or .csv.
+    out
+        The new file, a .npz that SpikeTrains.load reads.
     """
     if out.suffix != ".npz":
         raise ProblemError(f"{out}: the name of the spikes' file must end in .npz")
-    check_writable(out, overwrite=overwrite)
-    options = taxel.tasks.EncodeOptions(encoder, assignments(values or []), tare)
-    with progress(as_json) as update:
+    output.check(out)
+    with progress(output.json) as update:
         update(f"reading {recording}", 0, 0)
-        encoded = taxel.tasks.encode(files.opener.open_one(recording), options, progress=update)
-    encoded.trains.save(out, overwrite=overwrite)
+        encoded = taxel.tasks.encode(reading.opener.open_one(recording), options, progress=update)
+    encoded.trains.save(out, overwrite=output.overwrite)
     say_warnings(encoded.warnings)
     result = {"recording": str(recording), **encoded.to_dict(), "written": str(out)}
-    lines = [f"{encoded.trains!r}, {result['silent_trains']} silent", f"written to {out}"]
-    say(*([json.dumps(result)] if as_json else lines))
+    output.say(result, f"{encoded.trains!r}, {result['silent_trains']} silent", f"written to {out}")

@@ -2,51 +2,46 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from cyclopts import Parameter
 
 import taxel
 from taxel._base.messages import installing
 from taxel._core import Error
-from taxel.cli._app import App, JsonOption, OverwriteOption, with_out
-from taxel.cli._say import say
+from taxel.cli._task import OutArgument, Output
+from taxel.cli.app import App, Flat
 
-app = App(no_args_is_help=True, help="Write a readout for other simulators and for chips.")
-
-
-@app.callback()
-def _root() -> None:
-    """Write a readout for other simulators and for chips."""
+app = App(name="export", help="Write a readout for other simulators and for chips.")
 
 
-@app.command()
-@with_out("out")
+@app.command
 def nir(
-    readout: Annotated[Path, typer.Argument(help="A readout, as taxel train writes it.")],
-    out: Annotated[Path, typer.Argument(help="The new file, a .nir.")],
-    spike_ms: Annotated[
-        float | None,
-        typer.Option(
-            metavar="MS",
-            help="Time step (ms) of the simulator that will read the file, if an input spike is a 1 that lasts one "
-            "time step (snnTorch: 0.1).",
-        ),
-    ] = None,
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    readout: Path,
+    /,
+    out: OutArgument,
+    *,
+    spike_ms: Annotated[float | None, Parameter(metavar="MS")] = None,
+    output: Flat[Output] = Output(),
 ) -> None:
     """Write a readout as a NIR graph, in SI units, and report what the graph cannot represent.
 
     Example: taxel export nir walk.json walk.nir
+
+    Parameters
+    ----------
+    readout
+        A readout, as taxel train writes it.
+    out
+        The new file, a .nir.
+    spike_ms
+        Time step (ms) of the simulator that will read the file, if an input spike is a 1 that lasts one time step
+        (snnTorch: 0.1).
     """
     try:
-        lost = taxel.Readout.load(readout).to_nir(out, spike_ms=spike_ms, overwrite=overwrite)
+        lost = taxel.Readout.load(readout).to_nir(out, spike_ms=spike_ms, overwrite=output.overwrite)
     except ModuleNotFoundError as error:
         raise Error(f"{error}: {installing('nir')}") from None
-    if as_json:
-        say(json.dumps({"readout": str(readout), "written": str(out), "lost": lost}))
-        return
-    say(f"written to {out}", *(f"  not in NIR: {loss}" for loss in lost))
+    result = {"readout": str(readout), "written": str(out), "lost": lost}
+    output.say(result, f"written to {out}", *(f"  not in NIR: {loss}" for loss in lost))

@@ -12,20 +12,18 @@ from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import typer
+from cyclopts import Parameter
 
 import taxel
-from taxel._base.files import check_writable, write_whole
+from taxel._base.files import write_whole
 from taxel._base.messages import are, counted, plain
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.cli._app import App, JsonOption, OverwriteOption
-from taxel.cli._bar import bar
-from taxel.cli._opening import FileOptions
-from taxel.cli._recordings import progress, say_warnings, tare_option
 from taxel.cli._say import say
+from taxel.cli._task import FullReading, Output, progress, say_warnings
 from taxel.cli._topics import list_topics
+from taxel.cli.app import App, Flat
 from taxel.clock import doubt
 from taxel.spikes import SpikeTrains, to_ms
 
@@ -33,7 +31,7 @@ if TYPE_CHECKING:
     from taxel.recording import Recording
     from taxel.recording.analysis.pressure import Series
 
-app = App()
+app = App(name="info")
 
 _PICTURES = (".png", ".svg", ".pdf")
 #: Verdicts that name no fault.
@@ -42,25 +40,17 @@ _SOUND = ("complete", "complete after arrival", "unknown")
 _TAXELS = ("dead", "stuck", "noisy")
 
 
-@app.command()
+@app.default
 def info(
-    file: Annotated[
-        Path,
-        typer.Argument(help="A recording, a file of a sensor's maker, or a folder."),
-    ],
-    files: FileOptions,
-    picture: Annotated[
-        Path | None,
-        typer.Option(help="Write rates, a map of the taxels and the pressure over time to this .png, .svg or .pdf."),
-    ] = None,
-    table: Annotated[
-        Path | None,
-        typer.Option(help="Write contact area, peak, sum and centre of pressure over time to this .csv."),
-    ] = None,
-    tare: Annotated[str | None, tare_option("Default: measured in a quiet part of the recording.")] = None,
-    each: Annotated[bool, typer.Option("--each", help="Print all facts about each recording of a folder.")] = False,
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    file: Path,
+    /,
+    *,
+    picture: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    table: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    tare: Annotated[str | None, Parameter(metavar="SECONDS|FILE")] = None,
+    each: bool = False,
+    reading: Flat[FullReading] = FullReading(),
+    output: Flat[Output] = Output(),
 ) -> None:
     """Summarise a recording: contents, losses, rates, pressure, and dead, stuck or noisy taxels.
 
@@ -72,6 +62,20 @@ def info(
 
     Example: taxel info walk.mcap --picture walk.png --table walk.csv
     Example: taxel info grasp.db3 --topic /palm --field taxels --array 24x32
+
+    Parameters
+    ----------
+    file
+        A recording, a file of a sensor's maker, or a folder.
+    picture
+        Write rates, a map of the taxels and the pressure over time to this .png, .svg or .pdf.
+    table
+        Write contact area, peak, sum and centre of pressure over time to this .csv.
+    tare
+        The rest of the taxels: a saved tare, a recording of the sensor at rest (taxel cut makes one), or the seconds at
+        rest at the beginning. Default: measured in a quiet part of the recording.
+    each
+        Print all facts about each recording of a folder.
     """
     from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
     from taxel.recording.opening import are_spike_trains  # noqa: PLC0415
@@ -81,18 +85,17 @@ def info(
         raise ProblemError(f"{picture}: the name of a picture must end in {', '.join(_PICTURES)}")
     if table is not None and table.suffix.lower() != ".csv":
         raise ProblemError(f"{table}: the name of a table must end in .csv")
-    for target in (picture, table):
-        if target is not None:
-            check_writable(target, overwrite=overwrite)
+    output.check(picture, table)
+    as_json, overwrite = output.json, output.overwrite
     if are_spike_trains(file):
         say(*_spikes(file, as_json, drawn=picture is not None or table is not None))
         return
-    with progress(quiet=True), bar(as_json) as show:  # the first prints warnings
+    with progress(as_json) as show:
         show(f"reading {file}", 0, 0)
-        if file.exists() and is_bag(file) and not files.opener._names_topic(file):
-            say(*list_topics(file, topics(file, files.ros), as_json))
+        if file.exists() and is_bag(file) and not reading.opener._names_topic(file):
+            say(*list_topics(file, topics(file, reading.ros), as_json))
             return
-        recordings = files.opener.open_trials(file)
+        recordings = reading.opener.open_trials(file)
         recording = recordings[0]
         if len(recordings) > 1 or len(recording.sources) > 1:
             if table is not None:
@@ -109,7 +112,7 @@ def info(
             return
         found = taxel.tasks.info(recording, tare)
         facts, pressed = found.facts, found.pressed
-        facts["array_assumed"] &= not files.array
+        facts["array_assumed"] &= not reading.array
     say_warnings(found.warnings)
     if table is not None:
         if pressed is None:

@@ -2,126 +2,70 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated
 
-import typer
+from cyclopts import Parameter
 
 import taxel
-from taxel._base.files import check_writable
 from taxel._base.messages import counted
-from taxel._base.number_text import float_of, int_of
 from taxel._core import ProblemError
-from taxel.cli._app import App, JsonOption, OverwriteOption
-from taxel.cli._bar import bar
-from taxel.cli._opening import FileOptions
-from taxel.cli._recordings import SET_HELP, assignments, progress, say_warnings
 from taxel.cli._say import say
+from taxel.cli._task import Output, Reading, progress, say_warnings
+from taxel.cli.app import App, Flat
+from taxel.options import InformationOptions
 
 if TYPE_CHECKING:
     from taxel.information import Answer, Estimate, Point
 
-app = App()
-
-_Number = TypeVar("_Number", int, float)
+app = App(name="information")
 
 
-@app.command()
+@app.default
 def information(
-    recordings: Annotated[
-        list[Path], typer.Argument(help="Recordings, or folders of them: .mcap, .lsa, .npz, .csv, other makers' files.")
-    ],
-    files: FileOptions,
-    labels: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE",
-            help="A CSV with a row for each trial: recording,t_us,label[,stop_us][,group] and columns of parameters; "
-            "for a single recording the column recording may be left out. Or the word notes: each note of the "
-            "recordings is a trial that begins at the time of the note, and the text of the note is the label. "
-            "Default: each recording is a trial, and its folder's name is the label.",
-        ),
-    ] = None,
-    window_ms: Annotated[
-        float | None,
-        typer.Option(
-            metavar="MS", help="Time after contact in which events count, ms; needed if trials have no stop_us."
-        ),
-    ] = None,
-    windows_ms: Annotated[
-        str | None, typer.Option("--windows", help="Further windows: times after contact, ms, for example 10,20,50.")
-    ] = None,
-    periods_ms: Annotated[
-        str | None, typer.Option("--periods", help="Sampling periods, ms, for example 1,2,5.")
-    ] = None,
-    taxels: Annotated[
-        str | None, typer.Option(help="Sizes of subsets of taxels, drawn at random, for example 10,30,100.")
-    ] = None,
-    pools: Annotated[
-        str | None, typer.Option(help="Sides of squares of taxels, each averaged to one taxel, for example 2,4.")
-    ] = None,
-    encoder: Annotated[str, typer.Option(help="The encoder: change_events or fa1.")] = "change_events",
-    values: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help=SET_HELP)] = None,
-    classifiers: Annotated[
-        str,
-        typer.Option(
-            "--also", help="Further classifiers: neighbours, cone_r, and, if taxel_rules is installed, tempotron."
-        ),
-    ] = "neighbours",
-    draws: Annotated[
-        int, typer.Option(help="Number of random phases of the sampling; the results are means over these phases.")
-    ] = 5,
-    folds: Annotated[int, typer.Option(help="Number of folds; all trials of a group are in the same fold.")] = 10,
-    shuffles: Annotated[int, typer.Option(help="Number of shuffles of the labels, for the test against zero.")] = 20,
-    seed: Annotated[int, typer.Option(help="Seed of the random phases, folds, taxels and bootstrap.")] = 0,
-    report: Annotated[Path, typer.Option(help="The report to write, an .html with pictures.")] = Path(
-        "information.html"
-    ),
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    recordings: list[Path],
+    /,
+    *,
+    labels: Annotated[str | None, Parameter(metavar="FILE")] = None,
+    report: Annotated[Path, Parameter(metavar="FILE")] = Path("information.html"),
+    options: Flat[InformationOptions] = InformationOptions(),
+    reading: Flat[Reading] = Reading(),
+    output: Flat[Output] = Output(),
 ) -> None:
     """Estimate how many bits labelled touches give, by sampling period, time, number of taxels and data rate.
 
     Example: taxel information drops.mcap --labels drops.csv --window-ms 50
+
+    Parameters
+    ----------
+    recordings
+        Recordings, or folders of them: .mcap, .lsa, .npz, .csv, other makers' files.
+    labels
+        A CSV with a row for each trial: recording,t_us,label[,stop_us][,group] and columns of parameters; for a single
+        recording the column recording may be left out. Or the word notes: each note of the recordings is a trial that
+        begins at the time of the note, and the text of the note is the label. Default: each recording is a trial, and
+        its folder's name is the label.
+    report
+        The report to write, an .html with pictures.
     """
     if report.suffix != ".html":
         raise ProblemError(f"--report {report}: the name of the report must end in .html")
-    check_writable(report, overwrite=overwrite)
-    options = taxel.tasks.InformationOptions(
-        encoder,
-        assignments(values or []),
-        window_ms,
-        _parse_numbers("--windows", windows_ms, float_of, "numbers, for example 1,2,5"),
-        _parse_numbers("--periods", periods_ms, float_of, "numbers, for example 1,2,5"),
-        _parse_numbers("--taxels", taxels, int_of, "whole numbers, for example 10,30"),
-        _parse_numbers("--pools", pools, int_of, "whole numbers, for example 10,30"),
-        draws,
-        shuffles,
-        folds,
-        seed,
-        [name for name in classifiers.split(",") if name],
-    )
+    output.check(report)
     known = _KnownBits()
     try:
-        # `progress` prints the warnings; the bar shows the steps.
-        with progress(quiet=True), bar(as_json) as update:
+        with progress(output.json) as update:
             opened = []
             for path in recordings:
                 update(f"reading {path}", 0, 0)
-                opened += files.opener.open_sensors([path])
+                opened += reading.opener.open_sensors([path])
             result = taxel.tasks.information(opened, labels, options, progress=update, watch=known.add)
             update("drawing", 0, 0)
-            taxel.report.write_information(report, result.answer, overwrite=overwrite)
+            taxel.report.write_information(report, result.answer, overwrite=output.overwrite)
     except KeyboardInterrupt:
-        say(known.line(draws), err=True)
+        say(known.line(options.draws), err=True)
         raise
     say_warnings(result.warned)
-    if as_json:
-        say(json.dumps({**result.to_dict(), "report": str(report)}))
-        return
-    say(*lines(result.answer), f"written to {report}")
+    output.say({**result.to_dict(), "report": str(report)}, *lines(result.answer), f"written to {report}")
 
 
 class _KnownBits:
@@ -218,13 +162,3 @@ def _bits(estimate: Estimate | None) -> str:
 def _interval(estimate: Estimate) -> str:
     low, high = estimate.interval
     return f"{estimate.bits:.2f} of {estimate.most:.2f} bits [{low:.2f} {high:.2f}]"
-
-
-def _parse_numbers(
-    option: str, text: str | None, number_of: Callable[[str], _Number], must: str
-) -> list[_Number] | None:
-    """Return numbers between commas; None without any."""
-    try:
-        return None if text is None else [number_of(cell) for cell in text.split(",")]
-    except ValueError:
-        raise ProblemError(f"{option} {text}: must be {must}") from None

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-import typer
+from cyclopts import Parameter
 from rich.console import Group
 from rich.live import Live as Display
 from rich.text import Text
@@ -20,10 +20,10 @@ from taxel._base.messages import counted, plain
 from taxel._base.stopping import asked_to_end
 from taxel._core import FIREWALL, ProblemError
 from taxel.array import Array
-from taxel.cli._app import App, SecondsOption
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
-from taxel.cli._recordings import try_report
 from taxel.cli._say import say
+from taxel.cli._task import Output
+from taxel.cli.app import App, Flat, SecondsOption
 from taxel.cli.board import (
     REDRAW_S,
     BitsOption,
@@ -46,7 +46,7 @@ from taxel.spikes import to_ms
 from taxel.tare import Tare
 from taxel.wire import Registers
 
-app = App()
+app = App(name="live")
 
 #: How long a board may take to send its first datagram, s.
 _FIRST_WITHIN_S = 1.0
@@ -54,37 +54,39 @@ _FIRST_WITHIN_S = 1.0
 
 @dataclass(frozen=True)
 class _LiveArguments:
-    """Hold the options of the command."""
+    """Hold the options of the command.
+
+    Parameters
+    ----------
+    control
+        The board's serial line (COM3, /dev/ttyACM0, host:port), on which the panel sets registers, and taxel sets a
+        noise floor of 0 while it takes a tare.
+    save_tare
+        Save the fresh tare in a new file (JSON).
+    report
+        With --record: write a report to this folder, with potential, weights, errors and the worst events.
+    panel
+        Show the board in a browser.
+    folder
+        With --panel: the folder of the recordings. Default: the current folder.
+    """
 
     rate_hz: RateOption = None
     bits: BitsOption = None
-    control: Annotated[
-        str | None,
-        typer.Option(
-            help="The board's serial line (COM3, /dev/ttyACM0, host:port), on which the panel sets registers, and "
-            "taxel sets a noise floor of 0 while it takes a tare."
-        ),
-    ] = None
-    save_tare: Annotated[Path | None, typer.Option(help="Save the fresh tare in a new file (JSON).")] = None
+    control: str | None = None
+    save_tare: Annotated[Path | None, Parameter(metavar="FILE")] = None
     seconds: SecondsOption = None
-    report: Annotated[
-        Path | None,
-        typer.Option(
-            help="With --record: write a report to this folder, with potential, weights, errors and the worst events."
-        ),
-    ] = None
-    panel: Annotated[bool, typer.Option("--panel", help="Show the board in a browser.")] = False
+    report: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
+    panel: bool = False
     panel_host: PanelHostOption = "127.0.0.1"
     panel_port: PanelPortOption = 0
-    folder: Annotated[
-        Path | None, typer.Option(help="With --panel: the folder of the recordings. Default: the current folder.")
-    ] = None
+    folder: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
     opens: OpenOption = False
 
 
-@app.command()
+@app.default
 @with_live_options("live")
-def live(options: dict[str, Any], typed: _LiveArguments) -> None:
+def live(*, options: dict[str, Any], typed: Flat[_LiveArguments] = _LiveArguments()) -> int:
     """Receive a board's events, or frames of numbers, and print what a readout detects, live; with --panel, show them.
 
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
@@ -107,7 +109,7 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
     if typed.report is not None:
         if record is None or record.suffix != ".mcap":
             raise ProblemError("--report needs a recording: give --record FILE.mcap")
-        try_report(typed.report, overwrite=options["overwrite"])
+        Output(overwrite=options["overwrite"]).check_report(typed.report)
     console = Console(stderr=True)
     with contextlib.ExitStack() as at_rest:
         if typed.control is not None and isinstance(rest, float):
@@ -152,7 +154,7 @@ def live(options: dict[str, Any], typed: _LiveArguments) -> None:
         raise ProblemError(
             f"--tare {given_tare}: the tare was not complete after {seconds:.1f} s; {typed.save_tare} was not written"
         )
-    raise typer.Exit(exit_code(summary, pipeline.array))
+    return exit_code(summary, pipeline.array)
 
 
 def _show(

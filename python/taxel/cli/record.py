@@ -10,15 +10,16 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+from cyclopts import Parameter
 from rich.live import Live as Display
 
 from taxel import _core
 from taxel._base.messages import counted
 from taxel._core import FIREWALL, ProblemError
-from taxel.cli._app import OUTSIDE, App, SecondsOption, with_out
 from taxel.cli._noting import noting
 from taxel.cli._say import say
+from taxel.cli._task import OutArgument
+from taxel.cli.app import OUTSIDE, App, Flat, JsonOption, Limits, SecondsOption
 from taxel.cli.board import (
     REDRAW_S,
     BitsOption,
@@ -37,7 +38,7 @@ from taxel.cli.board import (
 from taxel.cli.console import Console
 from taxel.live import Live, Summary
 
-app = App()
+app = App(name="record")
 
 #: With --trials: the number of empty trials in a row that ends the command.
 _EMPTY = 3
@@ -45,38 +46,41 @@ _EMPTY = 3
 
 @dataclass(frozen=True)
 class _RecordArguments:
-    """Hold for how long, how often and until which mark is recorded."""
+    """Hold for how long, how often and until which mark is recorded.
+
+    Parameters
+    ----------
+    markers
+        End at the board's stop marker.
+    length
+        Automatic mode: record trials of this length, s.
+    countdown
+        Automatic mode: countdown before each trial, s.
+    start_index
+        Automatic mode: the number of the first trial, appended to its name.
+    trials
+        Automatic mode: number of trials. Default: until Ctrl-C.
+    """
 
     rate_hz: RateOption = None
     bits: BitsOption = None
     seconds: SecondsOption = None
-    markers: Annotated[bool, typer.Option("--markers", help="End at the board's stop marker.")] = False
-    length: Annotated[
-        float | None, typer.Option(min=0.001, help="Automatic mode: record trials of this length, s.")
-    ] = None
-    countdown: Annotated[int, typer.Option(min=0, help="Automatic mode: countdown before each trial, s.")] = 3
-    start_index: Annotated[
-        int, typer.Option(min=0, help="Automatic mode: the number of the first trial, appended to its name.")
-    ] = 1
-    trials: Annotated[
-        int | None, typer.Option(min=1, help="Automatic mode: number of trials. Default: until Ctrl-C.")
-    ] = None
-    as_json: Annotated[
-        bool,
-        typer.Option(
-            "--json", help="Print one line of JSON for each recording; texts for people are printed to standard error."
-        ),
-    ] = False
+    markers: bool = False
+    length: Annotated[float | None, Parameter(validator=Limits(0.001))] = None
+    countdown: Annotated[int, Parameter(validator=Limits(0))] = 3
+    start_index: Annotated[int, Parameter(validator=Limits(0))] = 1
+    trials: Annotated[int | None, Parameter(validator=Limits(1))] = None
+    as_json: JsonOption = False
 
 
-@app.command()
+@app.default
 @with_live_options("record")
-@with_out("file")
 def record(
-    file: Annotated[Path, typer.Argument(help="A new file: .mcap (with times, registers, notes) or .lsa (raw bytes).")],
+    file: OutArgument,
+    *,
     options: dict[str, Any],
-    typed: _RecordArguments,
-) -> None:
+    typed: Flat[_RecordArguments] = _RecordArguments(),
+) -> int:
     """Record what a board sends by UDP, and report what was lost.
 
     Ends with Ctrl-C, SIGTERM or SIGHUP, after --seconds, or with the board's stop marker (--markers). With --length it
@@ -92,6 +96,11 @@ def record(
     Example: taxel record --port 5208 walk.mcap
     Example: taxel record walk.mcap --port 5208 --source left=board:0.0.0.0:5209 --source imu=serial:COM3
     Example: taxel record mat.mcap --source serial:/dev/ttyACM0,array=16x16,unit=counts
+
+    Parameters
+    ----------
+    file
+        A new file: .mcap (with times, registers, notes) or .lsa (raw bytes).
     """
     if typed.length is None and typed.trials is not None:
         raise ProblemError("--trials needs --length, the length of each trial: give both")
@@ -105,8 +114,7 @@ def record(
         _print(summary, typed.as_json)
     else:
         code = _automatic(file, live, typed, console)
-    if code:
-        raise typer.Exit(code)
+    return code
 
 
 def _automatic(file: Path, live: dict[str, Any], typed: _RecordArguments, console: Console) -> int:

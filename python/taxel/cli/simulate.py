@@ -2,45 +2,45 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+from cyclopts import Parameter
 
 import taxel
-from taxel._base.files import check_writable, write_whole
+from taxel._base.files import write_whole
 from taxel._base.messages import counted, plain
 from taxel._core import ProblemError
-from taxel.cli._app import App, JsonOption, OverwriteOption
-from taxel.cli._bar import bar
-from taxel.cli._recordings import progress
-from taxel.cli._say import say
+from taxel.cli._task import OutOption, Output, progress
+from taxel.cli.app import App, Flat, Limits
 
-app = App()
+app = App(name="simulate")
 
 
-@app.command()
+@app.default
 def simulate(
-    scene: Annotated[
-        Path, typer.Argument(help="A scene: a .toml, as the page *Scenes* of the documentation describes it.")
-    ],
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", help="Write the recording that a host would make: .mcap, .lsa, .npz, .csv or .h5."),
-    ] = None,
-    labels: Annotated[
-        Path | None, typer.Option("--truth", help="Write the true times of the touches to this CSV, label,t_us.")
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(min=0, help="Seed of taxels and noise. Default: as in the scene's file.")
-    ] = None,
-    overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
+    scene: Path,
+    /,
+    *,
+    out: OutOption = None,
+    labels: Annotated[Path | None, Parameter(name="--truth")] = None,
+    seed: Annotated[int | None, Parameter(validator=Limits(0))] = None,
+    output: Flat[Output] = Output(),
 ) -> None:
     """Simulate a scene on the emulated board, as fast as possible; without -o only check it.
 
     Example: taxel simulate scene.toml -o touch.mcap --truth touch.csv
+
+    Parameters
+    ----------
+    scene
+        A scene: a .toml, as the page *Scenes* of the documentation describes it.
+    out
+        Write the recording that a host would make: .mcap, .lsa, .npz, .csv or .h5.
+    labels
+        Write the true times of the touches to this CSV, label,t_us.
+    seed
+        Seed of taxels and noise. Default: as in the scene's file.
     """
     with progress(quiet=True):
         scene_file = taxel.simulate.SceneFile.open(scene)
@@ -48,14 +48,13 @@ def simulate(
     targets = [path for path in (out, labels) if path is not None]
     if len({path.resolve() for path in targets}) < len(targets):
         raise ProblemError("--out and --truth: must be different files")
-    for path in targets:
-        check_writable(path, overwrite=overwrite)
+    output.check(*targets)
     contacts, force = taxel.simulate.truth(scene_file.acts(), preset=scene_file.preset, array=scene_file.array)
     about: dict[str, Any] = {"scene": str(scene), "seed": seed, "contacts": [contact._asdict() for contact in contacts]}
     about["peak_n"] = float(force.max())
     lines = [f"{scene}: {counted(len(contacts), 'touch', 'touches')}, at most {plain(force.max(), 3)} N"]
     if out is not None:
-        with bar(as_json) as show:
+        with progress(output.json) as show:
             played = taxel.simulate.play(
                 scene_file.acts(),
                 seed=seed,
@@ -63,13 +62,13 @@ def simulate(
                 **scene_file.options,
             )
         about["events"] = len(played.events)
-        lost = taxel.convert(played.events, out, overwrite=overwrite)
+        lost = taxel.convert(played.events, out, overwrite=output.overwrite)
         lines.append(f"{counted(len(played.events), 'event')} written to {out}")
         lines += [f"  lost: {loss}" for loss in lost]
     if labels is not None:
         with_ends = sorted([(c.start_us, "contact") for c in contacts] + [(c.stop_us, "lift") for c in contacts])
         rows = "".join(f"{label},{round(t)}\n" for t, label in with_ends)
-        write_whole(labels, lambda file: file.write(f"label,t_us\n{rows}".encode()), overwrite=overwrite)
+        write_whole(labels, lambda file: file.write(f"label,t_us\n{rows}".encode()), overwrite=output.overwrite)
         lines.append(f"truth written to {labels}")
     about["written"] = [str(path) for path in targets]
-    say(*([json.dumps(about)] if as_json else lines))
+    output.say(about, *lines)

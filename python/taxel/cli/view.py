@@ -9,48 +9,35 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from cyclopts import Parameter
 
 from taxel._core import ProblemError
-from taxel.cli._app import App, SecondsOption
-from taxel.cli._opening import FileOptions
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._say import say
+from taxel.cli._task import FullReading
 from taxel.cli._topics import list_topics
+from taxel.cli.app import App, Flat, JsonOption, SecondsOption
 from taxel.cli.console import Console
 from taxel.formats.ros import is_bag, topics
 from taxel.live import Panel
 from taxel.recording import Recording
 from taxel.recording.opening import is_folder, recordings_in
 
-app = App()
+app = App(name="view")
 
 
-@app.command()
+@app.default
 def view(
-    recording: Annotated[
-        Path,
-        typer.Argument(
-            help="A recording, a file of a sensor's maker, or a folder. If it is a folder, the options apply to each "
-            "of its files. The page can open the other files of the folder."
-        ),
-    ],
-    files: FileOptions,
-    calibration: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Show frames in N or kPa by this calibration (taxel calibrate). Default: the calibration beside the "
-            "recording.",
-        ),
-    ] = None,
+    recording: Path,
+    /,
+    *,
+    calibration: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     panel_host: PanelHostOption = "127.0.0.1",
     panel_port: PanelPortOption = 0,
     opens: OpenOption = True,
     seconds: SecondsOption = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the panel's address as JSON, and nothing else.")
-    ] = False,
+    as_json: JsonOption = False,
+    reading: Flat[FullReading] = FullReading(),
 ) -> None:
     """Show a recording in a browser: play, scrub, label, cut.
 
@@ -59,10 +46,18 @@ def view(
     Example: taxel view walk.mcap
     Example: taxel view grasp.bag --topic /palm --array 24x32
     Example: taxel view press.csv --calibration press.calibration.json
+
+    Parameters
+    ----------
+    recording
+        A recording, a file of a sensor's maker, or a folder. If it is a folder, the options apply to each of its files.
+        The page can open the other files of the folder.
+    calibration
+        Show frames in N or kPa by this calibration (taxel calibrate). Default: the calibration beside the recording.
     """
     console = Console(stderr=True, quiet=as_json)
-    reading = _opening(files, calibration, recording)
-    shown = Panel(recording, host=panel_host, port=panel_port, opens=reading, options=files.opener)
+    opening = _opening(reading, calibration, recording)
+    shown = Panel(recording, host=panel_host, port=panel_port, opens=opening, options=reading.opener)
     # Ctrl-C is the end that is awaited from the moment on at which the address is known.
     with shown as panel, contextlib.suppress(KeyboardInterrupt):
         if as_json:
@@ -72,20 +67,22 @@ def view(
         threading.Event().wait(None if seconds is None else min(seconds, threading.TIMEOUT_MAX))
 
 
-def _opening(files: FileOptions, calibration: Path | None, recording: Path) -> Callable[[Path], list[Recording]] | None:
+def _opening(
+    reading: FullReading, calibration: Path | None, recording: Path
+) -> Callable[[Path], list[Recording]] | None:
     """Return how files are opened where options say it, else None; what they do not fit is refused now."""
-    recordings = recordings_in(recording, files.layout) if is_folder(recording) else [recording]
+    recordings = recordings_in(recording, reading.layout) if is_folder(recording) else [recording]
     if not recordings:
         return None
     first = recordings[0]
     bag = is_bag(first)
-    if bag and not files.opener._names_topic(first):
-        raise ProblemError(*list_topics(first, topics(first, files.ros), as_json=False))
-    if not files.opener.words() and calibration is None and not bag:
+    if bag and not reading.opener._names_topic(first):
+        raise ProblemError(*list_topics(first, topics(first, reading.ros), as_json=False))
+    if not reading.opener.words() and calibration is None and not bag:
         return None
 
     def opens(file: Path) -> list[Recording]:
-        opened = files.opener.open_trials(file)
+        opened = reading.opener.open_trials(file)
         if calibration is None:
             return opened
         return [sensor._calibrated_by(calibration) for sensor in opened]

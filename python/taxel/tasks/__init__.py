@@ -6,28 +6,29 @@ by its own methods. The command line and the page call these functions; ``python
 separate process (`taxel.tasks.__main__`).
 """
 
+from taxel._base.parallel import Workers as Workers
+from taxel.options import CalibrateOptions as CalibrateOptions
+from taxel.options import DetectOptions as DetectOptions
+from taxel.options import EncodeOptions as EncodeOptions
+from taxel.options import InformationOptions as InformationOptions
+from taxel.options import TrainOptions as TrainOptions
 from taxel.tasks.calibrate import Calibrated as Calibrated
-from taxel.tasks.calibrate import CalibrateOptions as CalibrateOptions
 from taxel.tasks.calibrate import KnownLoad as KnownLoad
 from taxel.tasks.calibrate import calibrate as calibrate
 from taxel.tasks.calibrate import read_loads as read_loads
 from taxel.tasks.detect import Detected as Detected
 from taxel.tasks.detect import Detecting as Detecting
-from taxel.tasks.detect import DetectOptions as DetectOptions
 from taxel.tasks.detect import detect as detect
 from taxel.tasks.encode import Encoded as Encoded
-from taxel.tasks.encode import EncodeOptions as EncodeOptions
 from taxel.tasks.encode import encode as encode
 from taxel.tasks.info import Info as Info
 from taxel.tasks.info import info as info
 from taxel.tasks.information import Information as Information
-from taxel.tasks.information import InformationOptions as InformationOptions
 from taxel.tasks.information import information as information
 from taxel.tasks.rest import TakenRest as TakenRest
 from taxel.tasks.rest import rest as rest
 from taxel.tasks.train import train as train
 from taxel.tasks.train_result import Training as Training
-from taxel.tasks.train_result import TrainOptions as TrainOptions
 
 # The imports above say what is public.
 __all__ = [name for name, value in sorted(globals().items()) if callable(value)]

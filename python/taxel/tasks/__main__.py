@@ -50,16 +50,17 @@ from taxel._base.progress import Progress
 from taxel._base.stopping import leave, stop_on_signals
 from taxel._core import Error, ProblemError
 from taxel.detect import load
+from taxel.options import CalibrateOptions, DetectOptions, EncodeOptions, InformationOptions, TrainOptions
 from taxel.recording import Recording
 from taxel.recording.text_options import TextOptions
-from taxel.tasks.calibrate import CalibrateOptions, KnownLoad, calibrate
-from taxel.tasks.detect import DetectOptions, detect
-from taxel.tasks.encode import EncodeOptions, encode
+from taxel.tasks.calibrate import KnownLoad, calibrate
+from taxel.tasks.detect import detect
+from taxel.tasks.encode import encode
 from taxel.tasks.info import info
-from taxel.tasks.information import InformationOptions, information
+from taxel.tasks.information import information
 from taxel.tasks.rest import rest
 from taxel.tasks.train import train
-from taxel.tasks.train_result import Training, TrainOptions
+from taxel.tasks.train_result import Training
 
 __all__ = ["run"]
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import checked_path, finite, flag, instance, several, shown
+from taxel._base.arguments import checked_path, finite, instance, several, shown
 from taxel._base.arguments import text as checked_text
 from taxel._base.errors import helped, unreadable
 from taxel._base.header_table import HeaderTable, text_of
@@ -22,9 +22,10 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.calibration import Calibration, Load
 from taxel.frames import Frames
+from taxel.options import CalibrateOptions, GivenTare
 from taxel.recording import Recording
 from taxel.recording.analysis.pressure import readings
-from taxel.tasks.rest import GivenTare, check_tare, given_tare
+from taxel.tasks.rest import given_tare
 
 
 @dataclass(frozen=True)
@@ -67,52 +68,6 @@ class KnownLoad:
         for name in ("from_s", "to_s"):
             if getattr(self, name) is not None:
                 finite(name, getattr(self, name), "s")
-
-
-@dataclass(frozen=True)
-class CalibrateOptions:
-    """Hold by what and how readings are calibrated, beside known loads.
-
-    Parameters
-    ----------
-    table : path, optional
-        A .csv of reading,value (above rest), with columns x,y for each taxel; loads correct its gain.
-    unit : {"N", "kPa"}
-        Of the calibrated values, at a taxel.
-    each : bool
-        Whether a gain is fitted for each taxel.
-    exponent : float, above 0, optional
-        The exponent, given instead of fitted.
-    tare : Tare, path or float (s), optional
-        The rest of the taxels: a tare, its file, a recording at rest, or the seconds at rest at the beginning.
-        Default: that of a quiet stretch.
-    date, note : str
-        Date of the calibration (default: today), and which sensor and weights.
-
-    Raises
-    ------
-    ProblemError : options that contradict each other, or values that are none
-
-    Examples
-    --------
-    >>> CalibrateOptions(exponent=1.0, unit="kPa").each
-    False
-    """
-
-    table: str | os.PathLike[str] | None = None
-    unit: str = "N"
-    each: bool = False
-    exponent: float | None = None
-    tare: GivenTare | None = None
-    date: str | None = None
-    note: str = ""
-
-    def __post_init__(self) -> None:
-        """Refuse options that contradict each other, before the recording is read."""
-        flag("each", self.each)
-        check_tare(self.tare)
-        if self.table is not None:
-            checked_path("table", self.table)
 
 
 @dataclass(frozen=True, eq=False)

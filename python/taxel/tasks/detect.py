@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from taxel._base.arguments import finite, instance, shown, text
+from taxel._base.arguments import instance, shown
 from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Progress, reporting
@@ -19,11 +19,12 @@ from taxel.detect import Example, Outcome, PlainRule, Readout, Score, drift, rec
 from taxel.detect.clock import off_detections
 from taxel.detect.detector import detector
 from taxel.detect.examples import check_examples, unreliable
-from taxel.detect.readout import USES, run_counting
+from taxel.detect.readout import run_counting
 from taxel.detect.scoring import many_wrong, score_together
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
+from taxel.options import DetectOptions, GivenTare
 from taxel.recorded import recorded, unit_of
 from taxel.recording import Recording
 from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
@@ -32,7 +33,6 @@ from taxel.tasks.info import sensor_line
 from taxel.tasks.labels import (
     GivenLabels,
     are_tables,
-    check_shift,
     few,
     moved,
     references,
@@ -40,7 +40,7 @@ from taxel.tasks.labels import (
     table_names,
     titles_of,
 )
-from taxel.tasks.rest import GivenTare, TakenRest, UnknownRestError, check_tare, rest, zero_by_unit
+from taxel.tasks.rest import TakenRest, UnknownRestError, rest, zero_by_unit
 
 #: So many lines, beside that of each sensor, say what was measured.
 _LINES = 3
@@ -48,49 +48,6 @@ _LINES = 3
 _FEW_BAD = 2
 #: No event.
 _NONE = np.empty(0, np.int64)
-
-
-@dataclass(frozen=True)
-class DetectOptions:
-    """Hold how events are detected and scored.
-
-    Parameters
-    ----------
-    tare : Tare, path or float (s), optional
-        The rest of the taxels: a tare, its file, a recording at rest, or the seconds at rest at the beginning of
-        each recording. Default: as of `taxel.tasks.rest`.
-    frame_us : float, us, optional
-        Length of the board's frame. Default: by the registers or the frames, else 192.
-    window_ms : float, ms
-        Largest distance of a detection from its event.
-    shift_ms : float, ms
-        By how much labels of the truth are moved before all else, as those of another clock; later is positive.
-    use : {"better", "rule", "neuron"}
-        What detects each label of a readout: what was better in training, its plain rule, or its neuron.
-
-    Raises
-    ------
-    ProblemError : values that no recordings could make valid
-
-    Examples
-    --------
-    >>> DetectOptions(tare=0.5).window_ms
-    50.0
-    """
-
-    tare: GivenTare | None = None
-    frame_us: float | None = None
-    window_ms: float = 50.0
-    shift_ms: float = 0.0
-    use: str = "better"
-
-    def __post_init__(self) -> None:
-        """Refuse values that no recordings could make valid, before these are read."""
-        check_tare(self.tare)
-        finite("frame_us", 1.0 if self.frame_us is None else self.frame_us, "us", least=1.0, most=3.6e9)
-        finite("window_ms", self.window_ms, "ms", least=0.0)
-        check_shift(self.shift_ms)
-        text("use", self.use, USES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -406,7 +363,8 @@ def _check_unit(readout: Readout | PlainRule, recording: Recording) -> None:
         window_ms = readout.unit.removesuffix(" ms").rpartition("/")[2]
         raise ProblemError(
             f"these are events, not counts, and the {readout._WHAT} was trained on {readout.unit}: "
-            f"add --count-ms {window_ms}, and the --bin, --region and --polarity of training"
+            f"write window_ms = {window_ms} in [event_camera] of a layout file, and the bin, region and polarity of "
+            "training"
         )
     readout._check_unit(unit_of(source))
 

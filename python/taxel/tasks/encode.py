@@ -3,63 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from taxel._base.arguments import instance, mapping, parameters, text
+from taxel._base.arguments import instance
 from taxel._base.messages import collected, counted
 from taxel._base.progress import Progress, reporting
 from taxel.encode import Encoder
+from taxel.options import EncodeOptions
 from taxel.recording import Recording
 from taxel.spikes import SpikeTrains
-from taxel.tasks.rest import GivenTare, check_tare, given_or_by_unit
+from taxel.tasks.rest import given_or_by_unit
 
-__all__ = ["EncodeOptions", "Encoded", "encode", "encoder_of"]
-
-
-def encoder_of(name: str | None, values: Mapping[str, Any]) -> Encoder:
-    """Return the encoder of a name with its parameters, of which `name` may be one."""
-    return Encoder.from_json(parameters({**mapping("parameters", values), **({"name": name} if name else {})}))
-
-
-@dataclass(frozen=True)
-class EncodeOptions:
-    """Hold how a recording is encoded.
-
-    Parameters
-    ----------
-    encoder : str
-        The encoder's name, as "fa1".
-    parameters : mapping of str to value
-    tare : Tare, path or float (s), optional
-        The rest of the taxels: a tare, its file, a recording at rest, or the seconds at rest at the beginning of
-        the recording. Default: 0 of frames in a unit of force or pressure, else none.
-
-    Raises
-    ------
-    ProblemError : an encoder or parameters that are none
-
-    Examples
-    --------
-    >>> EncodeOptions("level_crossing", {"levels": [40.0, 80.0]}).encoder
-    'level_crossing'
-    """
-
-    encoder: str
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    tare: GivenTare | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse anything but an encoder, before the recording is read."""
-        check_tare(self.tare)
-        self._chosen()
-
-    def _chosen(self) -> Encoder:
-        """Return the encoder, without the tare."""
-        return encoder_of(text("encoder", self.encoder), self.parameters)
+__all__ = ["Encoded", "encode"]
 
 
 @dataclass(frozen=True, eq=False)

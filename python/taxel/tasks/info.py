@@ -11,6 +11,7 @@ from taxel._base.arguments import instance
 from taxel._base.messages import collected, counted
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
+from taxel.options import GivenTare
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.analysis.health import health
@@ -18,7 +19,7 @@ from taxel.recording.analysis.pressure import Series, series
 from taxel.recording.analysis.summary import summary
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
-from taxel.tasks.rest import GivenTare, given_tare, zero_by_unit
+from taxel.tasks.rest import given_tare, zero_by_unit
 
 #: At most so many frames are looked at for dead, stuck and noisy taxels.
 _LOOKS = 2000

@@ -3,76 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from taxel._base.arguments import checked_path, instance, integer, mapping, several, text
+from taxel._base.arguments import checked_path, instance, integer, several
 from taxel._base.errors import helped, refused
 from taxel._base.messages import collected, counted
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
-from taxel.encode import Encoder
 from taxel.information import Answer, LabelledTrial, answer, folds, notes_as_trials, read_trials, recordings_as_trials
+from taxel.options import InformationOptions
 from taxel.recording import Recording
 from taxel.recording.opening import sensors_of
-from taxel.tasks.encode import encoder_of
-
-
-@dataclass(frozen=True)
-class InformationOptions:
-    """Hold how bits are estimated; what is left out is as of `taxel.information.answer`, where each is described.
-
-    Parameters
-    ----------
-    encoder : {"change_events", "fa1"}
-    parameters : mapping of str to value
-        Of the encoder.
-    window_ms : float, ms, optional
-    windows_ms, periods_ms : sequence of float, ms, optional
-    taxels, pools : sequence of int, optional
-    draws, shuffles : int, 1 or more
-    folds : int, 2 or more
-    seed : int, 0 or more
-    classifiers : sequence of {"neighbours", "cone_r"}
-
-    Raises
-    ------
-    ProblemError : an encoder that is none of the two, or parameters that it has not
-
-    Examples
-    --------
-    >>> InformationOptions(window_ms=50.0, classifiers=[]).folds
-    10
-    """
-
-    encoder: str = "change_events"
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    window_ms: float | None = None
-    windows_ms: Sequence[float] | None = None
-    periods_ms: Sequence[float] | None = None
-    taxels: Sequence[int] | None = None
-    pools: Sequence[int] | None = None
-    draws: int = 5
-    shuffles: int = 20
-    folds: int = 10
-    seed: int = 0
-    classifiers: Sequence[str] = ("neighbours",)
-
-    def __post_init__(self) -> None:
-        """Refuse anything but an encoder, before the recordings are read."""
-        self._chosen()
-
-    def _chosen(self) -> Encoder | None:
-        """Return the encoder; None of that which the answer chooses by itself."""
-        if text("encoder", self.encoder) not in ("change_events", "fa1"):
-            raise refused(
-                "encoder", f" is {self.encoder}: must be change_events or fa1, which have one train per taxel"
-            )
-        mapping("parameters", self.parameters)
-        if self.encoder == "change_events" and not self.parameters:
-            return None
-        return encoder_of(self.encoder, self.parameters)
 
 
 @dataclass(frozen=True, eq=False)

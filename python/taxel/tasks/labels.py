@@ -14,7 +14,7 @@ from typing import Any, TypeAlias, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import column, finite, mapping, several, shown
+from taxel._base.arguments import column, mapping, several, shown
 from taxel._base.errors import refused
 from taxel._base.messages import are, counted, warn
 from taxel._base.times import beginning_us, begun
@@ -92,11 +92,6 @@ def _begin_of(recording: Recording, recordings: Sequence[Recording]) -> Callable
     """Return a function that returns the first time (us) of a recording: that of all sources of its file."""
     file = recording.path, trial_name(recording)
     return lambda: min(span_us(each)[0] for each in recordings if (each.path, trial_name(each)) == file)
-
-
-def check_shift(shift_ms: float) -> None:
-    """Refuse a shift of labels that is not a number of ms within 41 days."""
-    finite("shift_ms", shift_ms, "ms", least=-3.6e9, most=3.6e9)
 
 
 def moved(

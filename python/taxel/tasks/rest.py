@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from errno import ENOENT
 from pathlib import Path
 from shlex import quote
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import checked_path, instance, number
+from taxel._base.arguments import checked_path, instance
 from taxel._base.errors import helped, refused
 from taxel._base.messages import collected, counted, warn
-from taxel._base.number_text import float_of
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.detect import Example
@@ -24,6 +22,7 @@ from taxel.detect.floors import TOUCH, held_by_tare
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
+from taxel.options import GivenTare, check_tare, seconds_of
 from taxel.recorded import recorded
 from taxel.recording import Recording, open_one
 from taxel.recording.analysis.preload import free_of_preload, standing, without_preload
@@ -31,9 +30,6 @@ from taxel.recording.analysis.pressure import quiet_rest
 from taxel.recording.analysis.rest import ZEROS_BEFORE, by_unit, of_quiet, quantile
 from taxel.spikes import to_ms
 from taxel.tare import Tare
-
-#: A tare, the file of one, a recording at rest, or how many seconds at the beginning of a recording are at rest.
-GivenTare: TypeAlias = Tare | str | os.PathLike[str] | float
 
 #: How long before the first label the rest ends, and how long it must last at least, us.
 _BEFORE_US, _LEAST_REST_US = 20_000, 10_000
@@ -230,25 +226,6 @@ def tare_of(path: Path, recording: Recording | None = None) -> Tare:
 def _is_json(path: Path) -> bool:
     with path.open("rb") as file:
         return file.read(64).lstrip().startswith(b"{")
-
-
-def check_tare(tare: GivenTare | None) -> None:
-    """Refuse what is neither a tare nor a path nor seconds above 0."""
-    seconds = None if tare is None else seconds_of(tare)
-    if seconds is not None and not 0 < seconds < np.inf:
-        raise refused("tare", f" is {tare}: must be seconds above 0, or a file")
-
-
-def seconds_of(tare: GivenTare) -> float | None:
-    """Return the seconds that a given tare says; None of a tare or a file."""
-    if isinstance(tare, Tare | os.PathLike):
-        return None
-    if not isinstance(tare, str):
-        return number("tare", tare, "s")
-    try:
-        return float_of(tare)
-    except ValueError:
-        return None
 
 
 def given_or_by_unit(tare: GivenTare | None, recording: Recording) -> Tare | None:

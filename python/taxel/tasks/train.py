@@ -26,6 +26,7 @@ from taxel.detect.readout import run_counting
 from taxel.detect.scoring import many_wrong
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.options import GivenTare, TrainOptions
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.analysis.rest import BY_UNIT
@@ -43,8 +44,8 @@ from taxel.tasks.labels import (
     table_names,
     titles_of,
 )
-from taxel.tasks.rest import GivenTare, given_tare, has_rest, tare_before, tare_if_any
-from taxel.tasks.train_result import Training, TrainOptions
+from taxel.tasks.rest import given_tare, has_rest, tare_before, tare_if_any
+from taxel.tasks.train_result import Training
 
 #: Work that takes longer says so before it begins, s.
 _LONG_S = 60.0
@@ -122,7 +123,7 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
         if isinstance(table, Events) and table.intensity is None:
             raise ProblemError(
                 "the events have no intensities, but the recipe touch and its encoders need them: for an event camera, "
-                "use frames of counts (--count-ms 5; in Python: window_ms=5) and the recipe event_counts"
+                "use frames of counts (window_ms = 5 in [event_camera] of a layout file) and the recipe event_counts"
             )
     for each, events in zip(opened, labelled, strict=True):
         if like := _like_labels(recorded(each), events):

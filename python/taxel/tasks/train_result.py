@@ -1,4 +1,4 @@
-"""The options of a training, and its result as lines for people and as plain values."""
+"""The result of a training, as lines for people and as plain values."""
 
 from __future__ import annotations
 
@@ -9,23 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from taxel._base.arguments import finite, integer, mapping, text
-from taxel._base.errors import refused
+from taxel._base.arguments import text
 from taxel._base.messages import collected, counted, three_digits
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
-from taxel.detect import Judged, Outcome, Readout, Recipe, Score, Trained, recipes
+from taxel.detect import Judged, Outcome, Readout, Score, Trained, recipes
 from taxel.detect.examples import unreliable
 from taxel.detect.levels import LEAST_LEVELS
-from taxel.detect.recipe import change_values, with_floor
 from taxel.detect.scoring import score_rows
 from taxel.encode import TouchEnds
+from taxel.options import TrainOptions
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.spikes import to_ms, to_us
 from taxel.tare import Tare
-from taxel.tasks.labels import check_shift
-from taxel.tasks.rest import GivenTare, check_tare, rest
+from taxel.tasks.rest import rest
 
 #: Largest number of unpaired labels that a warning names.
 _NAMED = 5
@@ -37,63 +35,6 @@ _WIDTH = 160
 _RUNS = "; runs"
 #: Readouts know at other times whose delays differ by more, ms.
 _APART_MS = 1.0
-
-
-@dataclass(frozen=True)
-class TrainOptions:
-    """Hold how a readout is trained.
-
-    Parameters
-    ----------
-    recipe : str, optional
-        The name of a recipe, or the path of a TOML or JSON file. Default: that of the encoder in `changes`; without
-        one, the recipe that fits the recordings and labels.
-    changes : mapping of str to value
-        What differs from the recipe, by dotted keys, as "neurons.contact.kappa", "encoder.name" or "align".
-    tare : Tare, path or float (s), optional
-        The rest of the taxels: a tare, its file, a recording at rest, or the seconds at rest at the beginning of
-        each recording. Default: the time before the first label of each.
-    folds : int, optional
-        In how many folds it is scored on held-out data; 0: on the training data. Default: at most 5, as many as the
-        recordings and the rarest label allow.
-    window_ms : float, ms
-        Largest distance of a detection from its event.
-    shift_ms : float, ms
-        By how much labels are moved before all else, as those of another clock; later is positive.
-
-    Raises
-    ------
-    ProblemError : values that no recordings and labels could make valid; a recipe that is none
-
-    Examples
-    --------
-    >>> TrainOptions("touch", {"neurons.contact.kappa": 1.5}, tare=0.05).changes
-    {'neurons.contact.kappa': 1.5}
-    """
-
-    recipe: str | None = None
-    changes: Mapping[str, Any] = field(default_factory=dict)
-    tare: GivenTare | None = None
-    folds: int | None = None
-    window_ms: float = 50.0
-    shift_ms: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Refuse values that no recordings and labels could make valid, before these are read."""
-        mapping("changes", self.changes)
-        check_tare(self.tare)
-        check_shift(self.shift_ms)
-        finite("window_ms", self.window_ms, "ms", least=0.0)
-        if self.folds is not None and integer("folds", self.folds, 0) == 1:
-            raise refused("folds", " is 1: must be 2 or more, or 0 for none")
-        self._plan()
-
-    def _plan(self, labels: Sequence[str] | None = None, noise_floor: float | None = None) -> Recipe | None:
-        """Return the recipe that is named, or that of the encoder that is; None of neither."""
-        if self.recipe is None and "encoder.name" in self.changes:
-            values = change_values({}, self.changes)
-            return Recipe.from_dict(values if noise_floor is None else with_floor(values, noise_floor))
-        return None if self.recipe is None else Recipe.load(self.recipe, self.changes, labels, noise_floor)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,226 @@
+"""What commands share: how recordings are opened, what is printed and written, progress and warnings."""
+
+from __future__ import annotations
+
+import json as to_json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from itertools import chain, repeat
+from pathlib import Path
+from threading import Event, Thread
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from taxel._base.files import check_writable
+from taxel._base.messages import collected, escaped
+from taxel._base.progress import Forecast, Steps
+from taxel._core import ProblemError
+from taxel.cli._say import say
+from taxel.cli.app import Limits
+
+if TYPE_CHECKING:
+    from taxel.recording import Recording
+    from taxel.recording.text_options import TextOptions
+
+#: Without a terminal a line says the step after so long, then after so long again; the last repeats, s.
+_REPORT_S = (0.5, 9.5, 20.0, 30.0)
+
+SourceOption = Annotated[
+    str | None, Parameter(name="--source", metavar="NAME", help="The source, if the recording has several.")
+]
+#: A file that is written: the last argument, or what -o names.
+OutArgument = Annotated[Path, Parameter(name=("--out", "-o"))]
+OutOption = Annotated[Path | None, Parameter(name=("--out", "-o"), metavar="FILE")]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Hold how recordings are opened.
+
+    Parameters
+    ----------
+    layout
+        Layout file with the facts that a recording lacks: sensor, unit, rate, columns of a table. Default:
+        NAME.layout.toml or layout.toml beside the recording.
+    label_column
+        Column of a table whose value becomes a label where it changes; it is no taxel.
+    """
+
+    layout: Annotated[Path | None, Parameter(metavar="FILE")] = None
+    label_column: Annotated[str | None, Parameter(metavar="NAME")] = None
+
+    @property
+    def opener(self) -> TextOptions:
+        """Opener of files with these options."""
+        from taxel.recording.text_options import TextOptions  # noqa: PLC0415  the command line starts quickly
+
+        return TextOptions(**vars(self))
+
+
+@dataclass(frozen=True)
+class FullReading(Reading):
+    """Hold all that can be said of files that do not hold it themselves.
+
+    Parameters
+    ----------
+    array
+        Rows, columns and pitch (mm) of the sensor, for example 24x20x5, for files that do not state them (.csv, .lsa,
+        ROS bags), and for frames of one row that list these taxels row by row. Default: 64x64x2.67, or a larger array
+        if events are outside it; for a bag, the size of its messages. If no pitch is given, it is 2.67 mm for events of
+        the board, otherwise unknown.
+    topic
+        Open this topic of a ROS bag as frames; taxel info lists the topics. May be repeated: each topic is a source;
+        give --field and --array once for all topics, or once for each.
+    field
+        The topic's field, for example left.taxels. Default: the only field with numbers.
+    ros
+        The ROS release, for example humble, whose message definitions are used if the bag lacks them.
+    region
+        Read columns A to B - 1 and rows C to D - 1 of an event camera's file, for example 100:420,60:300.
+    bin
+        Side, in pixels of an event camera, of the square that becomes one taxel.
+    window_ms
+        Read an event camera's file as frames of counts, each over this many ms.
+    polarity
+        Which events of an event camera are read: both (default), on or off.
+    rate_hz
+        Frames per second, for recordings whose frames have no times.
+    """
+
+    array: Annotated[list[str] | None, Parameter(metavar="ROWSxCOLUMNS[xMM]")] = None
+    topic: Annotated[list[str] | None, Parameter(metavar="NAME")] = None
+    field: Annotated[list[str] | None, Parameter(metavar="NAME")] = None
+    ros: Annotated[str | None, Parameter(metavar="NAME")] = None
+    region: Annotated[str | None, Parameter(metavar="A:B,C:D")] = None
+    bin: Annotated[int | None, Parameter(metavar="PIXELS", validator=Limits(1, 65_535))] = None
+    window_ms: Annotated[float | None, Parameter(name="--count-ms", metavar="MS", validator=Limits(0.001, 3.6e6))] = (
+        None
+    )
+    polarity: Annotated[str | None, Parameter(metavar="NAME")] = None
+    rate_hz: Annotated[float | None, Parameter(metavar="HZ")] = None
+
+
+@dataclass(frozen=True)
+class Output:
+    """Hold how a result is printed, and whether it may replace a file.
+
+    Parameters
+    ----------
+    json
+        Print the result as JSON.
+    overwrite
+        Replace output files that exist already.
+    """
+
+    json: bool = False
+    overwrite: bool = False
+
+    def check(self, *files: Path | None) -> None:
+        """Refuse files that cannot be written, before the work."""
+        for file in files:
+            if file is not None:
+                check_writable(file, overwrite=self.overwrite)
+
+    def check_report(self, folder: Path | None) -> None:
+        """Refuse a folder to which a report's page cannot be written, before the work; leave no folder behind."""
+        if folder is None:
+            return
+        missing = [one for one in (folder, *folder.parents) if not one.exists()]
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self.check(folder / "report.html")
+        finally:
+            for one in missing:
+                with suppress(OSError):
+                    one.rmdir()
+
+    def say(self, result: Mapping[str, Any], *lines: object) -> None:
+        """Print a result as lines for people, or as one of JSON."""
+        say(*([to_json.dumps(result)] if self.json else lines))
+
+
+def pairs(option: str, texts: Iterable[str], form: str = "NAME=VALUE") -> Iterator[tuple[str, str]]:
+    """Yield names and values that an option gives as NAME=VALUE."""
+    for text in texts:
+        name, _, value = text.partition("=")
+        if not name or not value:
+            raise ProblemError(f"{option} {text}: must be {form}")
+        yield name, value
+
+
+def one_or_several(texts: Sequence[str]) -> str | list[str]:
+    """Return what an option gives once, or all that it gives."""
+    return texts[0] if len(texts) == 1 else list(texts)
+
+
+def paths_text(paths: Sequence[Path]) -> str:
+    """Return the first three paths in words."""
+    return ", ".join(map(str, paths[:3])) + " ..." * (len(paths) > 3)
+
+
+def _report(steps: Steps, ended: Event) -> None:
+    """Say where a task is on stderr, first after a few seconds and then now and then, until it has ended."""
+    for wait_s in chain(_REPORT_S, repeat(_REPORT_S[-1])):
+        if ended.wait(wait_s):
+            return
+        say(f"taxel: {steps}", err=True)
+
+
+@contextmanager
+def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
+    """Show the current step of a task, and warnings as single lines; on stderr, so that results can be piped.
+
+    Without a terminal a line is printed first after half a second, so that it is there within 2 s of the command's
+    begin, then after 10 s and every 30 s. The duration of the work is printed as a separate line.
+    """
+    from rich.text import Text  # noqa: PLC0415  the command line starts quickly
+
+    from taxel.cli.console import Console  # noqa: PLC0415
+
+    console, steps = Console(stderr=True), Steps()
+    with collected() as texts:
+        if quiet:
+            yield lambda *_: None
+        elif console.is_terminal:
+            with console.status("") as status:
+
+                def show(step: str, done: int, total: int) -> None:
+                    if isinstance(step, Forecast):
+                        console.print(Text(escaped(step)))
+                    steps.update(step, done, total)
+                    status.update(Text(escaped(steps)))
+
+                yield show
+        else:
+            ended = Event()
+            reporting = Thread(target=_report, args=(steps, ended), daemon=True)
+            reporting.start()
+
+            def update(step: str, done: int, total: int) -> None:
+                if isinstance(step, Forecast):
+                    say(f"taxel: {step}", err=True)
+                steps.update(step, done, total)
+
+            try:
+                yield update
+            finally:
+                ended.set()
+                reporting.join()
+    say_warnings(texts)
+
+
+def say_warnings(texts: Iterable[str]) -> None:
+    """Print warnings as single lines on stderr; one that holds for several recordings is there once."""
+    say(*(f"taxel: warning: {text}" for text in texts), err=True)
+
+
+def of_source(recording: Recording, name: str | None) -> Recording:
+    """Return the source that ``--source`` names; without a name the recording itself."""
+    if name is None:
+        return recording
+    sources = recording.sources
+    if name not in sources:
+        raise ProblemError(f"--source {name}: {recording.path} contains only {', '.join(sources)}")
+    return sources[name]

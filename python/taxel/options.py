@@ -1,0 +1,384 @@
+"""The options of the tasks, each declared here and nowhere else: Python, the command line and the page read them.
+
+A field is an option of the command line: its name with hyphens, its default, and the text of the docstring. An
+annotation says how it is typed where that differs. What checks values loads slowly, and is imported when it is needed.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+import numpy as np
+from cyclopts import Parameter
+
+from taxel._base.arguments import checked_path, finite, flag, integer, mapping, number, parameters, short, text
+from taxel._base.documents import of_toml
+from taxel._base.errors import refused
+from taxel._base.number_text import float_of, int_of
+from taxel._core import FormatError, ProblemError, encoder_names
+from taxel.tare import Tare
+
+if TYPE_CHECKING:
+    from taxel.detect import Recipe
+    from taxel.encode import Encoder
+
+#: A tare, the file of one, a recording at rest, or how many seconds at the beginning of a recording are at rest.
+GivenTare: TypeAlias = Tare | str | os.PathLike[str] | float
+
+
+def settings(_: Any, tokens: Sequence[Any]) -> dict[str, Any]:
+    """Return the values of ``--set KEY=VALUE``; a VALUE that is not TOML is text."""
+    values = {}
+    for token in tokens:
+        key, equals, value = token.value.partition("=")
+        if not equals or not key.strip():
+            raise ProblemError(f"--set {short(token.value)}: must be KEY=VALUE")
+        try:
+            values[key.strip()] = of_toml(f"--set {short(key.strip())}", f"value = {value}")["value"]
+        except FormatError:
+            values[key.strip()] = value.strip()
+    return values
+
+
+def _typed(_: Any, tokens: Sequence[Any]) -> str:
+    return str(tokens[0].value)
+
+
+def _between_commas(number_of: Callable[[str], Any], must: str) -> Callable[[Any, Sequence[Any]], list[Any]]:
+    """Return what reads values between commas."""
+
+    def read(_: Any, tokens: Sequence[Any]) -> list[Any]:
+        token = tokens[0]
+        try:
+            return [number_of(cell) for cell in token.value.split(",")]
+        except ValueError:
+            raise ProblemError(f"{token.keyword} {token.value}: must be {must}") from None
+
+    return read
+
+
+def _names(text: str) -> str:
+    return text.strip()
+
+
+#: How the parameters of an encoder or a recipe are typed: ``--set KEY=VALUE``, as often as is needed.
+Settings = Annotated[
+    Mapping[str, Any],
+    Parameter(name="--set", metavar="KEY=VALUE", n_tokens=-1, accepts_keys=False, converter=settings),
+]
+_TypedTare = Annotated[
+    GivenTare | None, Parameter(metavar="SECONDS|FILE", n_tokens=1, accepts_keys=False, converter=_typed)
+]
+_FLOATS = _between_commas(float_of, "numbers, for example 1,2,5")
+_INTS = _between_commas(int_of, "whole numbers, for example 10,30")
+_Path = Annotated[
+    str | os.PathLike[str] | None, Parameter(metavar="FILE", n_tokens=1, accepts_keys=False, converter=_typed)
+]
+
+
+def seconds_of(tare: GivenTare) -> float | None:
+    """Return the seconds that a given tare says; None of a tare or a file."""
+    if isinstance(tare, Tare | os.PathLike):
+        return None
+    if not isinstance(tare, str):
+        return number("tare", tare, "s")
+    try:
+        return float_of(tare)
+    except ValueError:
+        return None
+
+
+def check_tare(tare: GivenTare | None) -> None:
+    """Refuse what is neither a tare nor a path nor seconds above 0."""
+    seconds = None if tare is None else seconds_of(tare)
+    if seconds is not None and not 0 < seconds < np.inf:
+        raise refused("tare", f" is {tare}: must be seconds above 0, or a file")
+
+
+def check_shift(shift_ms: float) -> None:
+    """Refuse a shift of labels that is not a number of ms within 41 days."""
+    finite("shift_ms", shift_ms, "ms", least=-3.6e9, most=3.6e9)
+
+
+def encoder_of(name: str | None, values: Mapping[str, Any]) -> Encoder:
+    """Return the encoder of a name with its parameters, of which `name` may be one."""
+    from taxel.encode import Encoder  # noqa: PLC0415  loads slowly
+
+    return Encoder.from_json(parameters({**mapping("parameters", values), **({"name": name} if name else {})}))
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """Hold how a readout is trained.
+
+    Parameters
+    ----------
+    recipe : str, optional
+        The recipe to start from. touch: for events of a board, and for frames of a grid if labels are not of steps;
+        event_counts: for counts of an event camera; gait_plate, gait_insole, gait_channel: for steps, in counts, in N,
+        and in other units. Or the path (with a dot or a slash) of a TOML or JSON file with [encoder] or
+        [encoders.NAME], [learner], [neurons.LABEL], run_threshold and align. Default: that of the encoder; without
+        one, the recipe that fits the recordings and labels.
+    changes : mapping of str to value
+        What differs from the recipe (TOML), by dotted keys, as neurons.contact.kappa, encoder.name or align. May be
+        repeated.
+    tare : Tare, path or float (s), optional
+        The rest of the taxels: a saved tare, a recording of the sensor at rest (taxel cut makes one), or the seconds at
+        rest at the beginning of each recording. Default: the time before the first label of each.
+    folds : int, optional
+        Number of folds for scores on held-out data: folds of recordings, or of blocks of time in a single recording;
+        0: score on the training data. Default: at most 5, as many as the recordings and the rarest label allow.
+    window_ms : float, ms
+        Largest distance of a detection from its event, ms.
+    shift_ms : float, ms
+        By how many ms all labels are moved before all else, for example if their times are of another clock; later is
+        positive.
+
+    Raises
+    ------
+    ProblemError : values that no recordings and labels could make valid; a recipe that is none
+
+    Examples
+    --------
+    >>> TrainOptions("touch", {"neurons.contact.kappa": 1.5}, tare=0.05).changes
+    {'neurons.contact.kappa': 1.5}
+    """
+
+    recipe: str | None = None
+    changes: Settings = field(default_factory=dict)
+    tare: _TypedTare = None
+    folds: int | None = None
+    window_ms: float = 50.0
+    shift_ms: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse values that no recordings and labels could make valid, before these are read."""
+        mapping("changes", self.changes)
+        check_tare(self.tare)
+        check_shift(self.shift_ms)
+        finite("window_ms", self.window_ms, "ms", least=0.0)
+        if self.folds is not None and integer("folds", self.folds, 0) == 1:
+            raise refused("folds", " is 1: must be 2 or more, or 0 for none")
+        self._plan()
+
+    def _plan(self, labels: Sequence[str] | None = None, noise_floor: float | None = None) -> Recipe | None:
+        """Return the recipe that is named, or that of the encoder that is; None of neither."""
+        if self.recipe is None and "encoder.name" not in self.changes:
+            return None
+        from taxel.detect import Recipe  # noqa: PLC0415  loads slowly
+        from taxel.detect.recipe import change_values, with_floor  # noqa: PLC0415
+
+        if self.recipe is not None:
+            return Recipe.load(self.recipe, self.changes, labels, noise_floor)
+        values = change_values({}, self.changes)
+        return Recipe.from_dict(values if noise_floor is None else with_floor(values, noise_floor))
+
+
+@dataclass(frozen=True)
+class DetectOptions:
+    """Hold how events are detected and scored.
+
+    Parameters
+    ----------
+    tare : Tare, path or float (s), optional
+        The rest of the taxels: a saved tare, a recording of the sensor at rest (taxel cut makes one), or the seconds at
+        rest at the beginning of each recording. Default: 0 for force and pressure, else the first quiet stretch.
+    frame_us : float, us, optional
+        Length of the board's frame, us. Default: from the registers or the frames, else 192.
+    window_ms : float, ms
+        Largest distance of a detection from its event, ms.
+    shift_ms : float, ms
+        By how many ms all labels of the truth are moved before all else, for example if their times are of another
+        clock; later is positive.
+    use : {"better", "rule", "neuron"}
+        What detects each label: better (the better one in training), rule (its plain rule) or neuron. A label with no
+        rule is not detected by rule.
+
+    Raises
+    ------
+    ProblemError : values that no recordings could make valid
+
+    Examples
+    --------
+    >>> DetectOptions(tare=0.5).window_ms
+    50.0
+    """
+
+    tare: _TypedTare = None
+    frame_us: float | None = None
+    window_ms: float = 50.0
+    shift_ms: float = 0.0
+    use: Annotated[str, Parameter(metavar="better|rule|neuron")] = "better"
+
+    def __post_init__(self) -> None:
+        """Refuse values that no recordings could make valid, before these are read."""
+        check_tare(self.tare)
+        finite("frame_us", 1.0 if self.frame_us is None else self.frame_us, "us", least=1.0, most=3.6e9)
+        finite("window_ms", self.window_ms, "ms", least=0.0)
+        check_shift(self.shift_ms)
+        if self.use != "better":
+            from taxel.detect.readout import USES  # noqa: PLC0415  loads slowly
+
+            text("use", self.use, USES)
+
+
+@dataclass(frozen=True)
+class EncodeOptions:
+    """Hold how a recording is encoded.
+
+    Parameters
+    ----------
+    encoder : str
+        The encoder's name, as "fa1".
+    parameters : mapping of str to value
+        A parameter of the encoder and its value (TOML); a key with dots sets a nested parameter. May be repeated.
+    tare : Tare, path or float (s), optional
+        The rest of the taxels: a saved tare, a recording of the sensor at rest (taxel cut makes one), or the seconds at
+        rest at the beginning of the recording. Default: 0 of frames in a unit of force or pressure, else none.
+
+    Raises
+    ------
+    ProblemError : an encoder or parameters that are none
+
+    Examples
+    --------
+    >>> EncodeOptions("level_crossing", {"levels": [40.0, 80.0]}).encoder
+    'level_crossing'
+    """
+
+    encoder: Annotated[str, Parameter(metavar="NAME", help=f"The encoder's name, one of {', '.join(encoder_names())}.")]
+    parameters: Settings = field(default_factory=dict)
+    tare: _TypedTare = None
+
+    def __post_init__(self) -> None:
+        """Refuse anything but an encoder, before the recording is read."""
+        check_tare(self.tare)
+        self._chosen()
+
+    def _chosen(self) -> Encoder:
+        """Return the encoder, without the tare."""
+        return encoder_of(text("encoder", self.encoder), self.parameters)
+
+
+@dataclass(frozen=True)
+class InformationOptions:
+    """Hold how bits are estimated; what is left out is as of `taxel.information.answer`, where each is described.
+
+    Parameters
+    ----------
+    encoder : {"change_events", "fa1"}
+        The encoder: change_events or fa1.
+    parameters : mapping of str to value
+        A parameter of the encoder and its value (TOML). May be repeated.
+    window_ms : float, ms, optional
+        Time after contact in which events count, ms; needed if trials have no stop_us.
+    windows_ms : sequence of float, ms, optional
+        Further windows: times after contact, ms, for example 10,20,50.
+    periods_ms : sequence of float, ms, optional
+        Sampling periods, ms, for example 1,2,5.
+    taxels : sequence of int, optional
+        Sizes of subsets of taxels, drawn at random, for example 10,30,100.
+    pools : sequence of int, optional
+        Sides of squares of taxels, each averaged to one taxel, for example 2,4.
+    draws : int, 1 or more
+        Number of random phases of the sampling; the results are means over these phases.
+    shuffles : int, 1 or more
+        Number of shuffles of the labels, for the test against zero.
+    folds : int, 2 or more
+        Number of folds; all trials of a group are in the same fold.
+    seed : int, 0 or more
+        Seed of the random phases, folds, taxels and bootstrap.
+    classifiers : sequence of {"neighbours", "cone_r"}
+        Further classifiers: neighbours, cone_r, and, if taxel_rules is installed, tempotron.
+
+    Raises
+    ------
+    ProblemError : an encoder that is none of the two, or parameters that it has not
+
+    Examples
+    --------
+    >>> InformationOptions(window_ms=50.0, classifiers=[]).folds
+    10
+    """
+
+    encoder: Annotated[str, Parameter(metavar="NAME")] = "change_events"
+    parameters: Settings = field(default_factory=dict)
+    window_ms: Annotated[float | None, Parameter(metavar="MS")] = None
+    windows_ms: Annotated[Sequence[float] | None, Parameter(name="--windows", n_tokens=1, converter=_FLOATS)] = None
+    periods_ms: Annotated[Sequence[float] | None, Parameter(name="--periods", n_tokens=1, converter=_FLOATS)] = None
+    taxels: Annotated[Sequence[int] | None, Parameter(n_tokens=1, converter=_INTS)] = None
+    pools: Annotated[Sequence[int] | None, Parameter(n_tokens=1, converter=_INTS)] = None
+    draws: int = 5
+    shuffles: int = 20
+    folds: int = 10
+    seed: int = 0
+    classifiers: Annotated[
+        Sequence[str], Parameter(name="--also", n_tokens=1, converter=_between_commas(_names, "names"))
+    ] = ("neighbours",)
+
+    def __post_init__(self) -> None:
+        """Refuse anything but an encoder, before the recordings are read."""
+        self._chosen()
+
+    def _chosen(self) -> Encoder | None:
+        """Return the encoder; None of that which the answer chooses by itself."""
+        if text("encoder", self.encoder) not in ("change_events", "fa1"):
+            raise refused(
+                "encoder", f" is {self.encoder}: must be change_events or fa1, which have one train per taxel"
+            )
+        mapping("parameters", self.parameters)
+        if self.encoder == "change_events" and not self.parameters:
+            return None
+        return encoder_of(self.encoder, self.parameters)
+
+
+@dataclass(frozen=True)
+class CalibrateOptions:
+    """Hold by what and how readings are calibrated, beside known loads.
+
+    Parameters
+    ----------
+    table : path, optional
+        A .csv of reading,value (above rest); with columns x,y for each taxel. Loads, if given, correct the gain of
+        this table.
+    unit : {"N", "kPa"}
+        Unit of the calibrated values: N or kPa, at a taxel.
+    each : bool
+        Fit a gain for each taxel (needs uniform kPa, or loads on single taxels).
+    exponent : float, above 0, optional
+        A fixed exponent, which is then not fitted.
+    tare : Tare, path or float (s), optional
+        The rest of the taxels: a saved tare, a recording of the sensor at rest (taxel cut makes one), or the seconds at
+        rest at the beginning. Default: that of a quiet stretch.
+    date : str, optional
+        Date of the calibration, for example 2026-11-21. Default: today.
+    note : str
+        A note: which sensor, which weights.
+
+    Raises
+    ------
+    ProblemError : options that contradict each other, or values that are none
+
+    Examples
+    --------
+    >>> CalibrateOptions(exponent=1.0, unit="kPa").each
+    False
+    """
+
+    table: _Path = None
+    unit: str = "N"
+    each: bool = False
+    exponent: float | None = None
+    tare: _TypedTare = None
+    date: str | None = None
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse options that contradict each other, before the recording is read."""
+        flag("each", self.each)
+        check_tare(self.tare)
+        if self.table is not None:
+            checked_path("table", self.table)
