@@ -16,7 +16,7 @@ from taxel._base.errors import unreadable
 from taxel._base.messages import counted
 from taxel.events import Events
 from taxel.formats.column_names import AXES, time_unit
-from taxel.formats.layout import Data, Layout, advice, as_size
+from taxel.formats.layout import Data, Layout, advice
 from taxel.formats.layout_text import refuse_to_choose
 from taxel.formats.opened import Opened, size_of, sources_of
 from taxel.formats.table_form import unit_of_times
@@ -115,10 +115,8 @@ def _named(path: Path, how: Data, stored: Mapping[str, tuple[int, ...]]) -> Data
         # A path within a .h5 may begin at its root.
         found = name if name in stored else name.strip("/")
         if is_npy or found not in stored:
-            size = as_size(name)
-            hint = f"; to state a size, write {size}" if size else ""
             there = "its one array has no name" if is_npy else f"its arrays are {_list(stored)}"
-            raise unreadable(f"contains no array {name}, which the layout states as [data] {key}; {there}{hint}", path)
+            raise unreadable(f"contains no array {name}, which the layout states as [data] {key}; {there}", path)
         how = replace(how, **{key: found})
     if how.array is not None or is_npy:
         return how

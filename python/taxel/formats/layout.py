@@ -7,7 +7,6 @@ are listed in docs/files.md.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
@@ -100,39 +99,22 @@ class Table:
             raise refused("separator", f" is {shown(self.separator)}: must be one character")
         if text("decimal", self.decimal, (".", ",")) == self.separator:
             raise refused("decimal", f" is {shown(self.decimal)}, and so is separator: must be different characters")
+        text("lines", self.lines, KINDS)
+        text("time_unit", self.time_unit, (*UNITS_US, ISO))
+        integer("skip_lines", self.skip_lines, 0)
+        _check_columns(self, "time_column", "label_column", "by", "leave_out")
+        for name in ("keep", "missing", "frame_begin"):
+            if getattr(self, name) is not None:
+                text(name, getattr(self, name))
         for column in several("columns", self.columns):
             text("columns", column)
-        _check_end(self)
-        if flag("events", self.events) and (self.time_column is None or self.has_lines):
-            raise refused(
-                "events", " is true: the table must have a time_column and no frame_lines, frame_end or frame_begin"
-            )
-        integer("skip_lines", self.skip_lines, 0)
-        for name in ("time_column", "label_column", "by"):
-            if getattr(self, name) is not None:
-                _column(name, getattr(self, name))
-        text("lines", self.lines, KINDS)
-        if self.keep is not None:
-            text("keep", self.keep)
-        self._check_begin()
-        if isinstance(self.leave_out, str):
-            raise refused("leave_out", f" is {shown(self.leave_out)}: must be a list of columns")
-        for column in several("leave_out", self.leave_out):
-            _column("leave_out", column)
-        text("time_unit", self.time_unit, (*UNITS_US, ISO))
-        if self.missing is not None:
-            text("missing", self.missing)
-
-    def _check_begin(self) -> None:
-        """Refuse a line above each frame that is no text, or is given with another end of frames."""
         if self.frame_time is not None and text("frame_time", self.frame_time, UNITS_US) and self.frame_begin is None:
             raise refused("frame_time", " is given without frame_begin, the line that states it")
-        if self.frame_begin is None:
-            return
-        if not text("frame_begin", self.frame_begin).strip():
+        if self.frame_begin is not None and not self.frame_begin.strip():
             raise refused("frame_begin", f" is {shown(self.frame_begin)}: must be a text")
-        if self.frame_lines is not None or self.frame_end is not None:
-            raise refused("frame_begin", " is given together with frame_lines or frame_end: give only one of them")
+        _check_end(self)
+        if flag("events", self.events) and (self.time_column is None or self.has_lines):
+            raise refused("events", " is true: the table must have a time_column, and a line for each event")
 
     @property
     def has_lines(self) -> bool:
@@ -145,21 +127,25 @@ class Table:
 
 
 def _check_end(how: Table | PrintedFrames) -> None:
-    """Refuse a table that does not state where a frame of several lines ends."""
+    """Refuse a table that does not state in one way where a frame of several lines ends."""
     if how.frame_lines is not None:
         integer("frame_lines", how.frame_lines, 1, 65_535)
     if how.frame_end is not None:
         text("frame_end", how.frame_end, ("blank",))
-        if how.frame_lines is not None:
-            raise refused("frame_end", " is given together with frame_lines: give only one of them")
+    names = ("frame_begin", "frame_end", "frame_lines")
+    given = [name for name in names if getattr(how, name, None) is not None]
+    if len(given) > 1:
+        raise refused(given[0], f" is given together with {given[1]}: give only one of them")
 
 
-def _column(name: str, value: object) -> None:
-    """Refuse anything except the name of a column or its number from 1."""
-    if isinstance(value, str):
-        text(name, value)
-    else:
-        integer(name, value, 1)
+def _check_columns(how: Any, *keys: str) -> None:
+    """Refuse anything except the names of columns or their numbers from 1."""
+    for key in keys:
+        value = getattr(how, key)
+        if key == "leave_out" and isinstance(value, str):
+            raise refused(key, f" is {shown(value)}: must be a list of columns")
+        for column in several(key, value) if key in ("columns", "leave_out") else [value] * (value is not None):
+            text(key, column) if isinstance(column, str) else integer(key, column, 1)
 
 
 @dataclass(frozen=True)
@@ -248,9 +234,7 @@ class PrintedFrames:
         if self.baud is not None:
             integer("baud", self.baud, 1)
         _check_end(self)
-        for name in ("columns", "leave_out"):
-            for column in several(name, getattr(self, name)):
-                _column(name, column)
+        _check_columns(self, "columns", "leave_out")
 
     def options(self) -> dict[str, str]:
         """Return the keys of the source that are stated, except its place."""
@@ -510,10 +494,6 @@ _TABLES: dict[str, type[Any]] = {
 
 #: What axes of an array may count.
 _AXES_OF_ARRAYS = ("time", "trial", "row", "column", "taxel", "axis")
-#: Keys of a live source (`taxel live --source`) that a layout states otherwise.
-_OTHERWISE = {"array": "rows and columns", "rate": "rate_hz"}
-#: What the tables are for that have keys alike.
-_FOR = {"table": ", for recorded tables", "source": ", for taxel live --source", "data": ", for arrays in a file"}
 
 
 def _keys(table: str) -> list[str]:
@@ -526,32 +506,6 @@ def _known(table: str, values: Mapping[str, Any]) -> None:
     """Refuse a key that a table has not, and say where it belongs."""
     names = _keys(table)
     unknown = next((name for name in values if name not in names), None)
-    if unknown is None:
-        return
-    hint = ""
-    if size := as_size(values[unknown]):
-        hint = f"to state a size, write {size}"
-    elif table == "source" and unknown in _OTHERWISE:
-        hint = f"write {_OTHERWISE[unknown]} above the line [source] instead"
-    elif table and unknown in _keys(""):
-        hint = f"write it above the line [{table}]"
-    elif groups := [f"[{group}]{_FOR.get(group, '')}" for group in _TABLES if unknown in _keys(group)]:
-        hint = f"write it in {' or '.join(groups)}"
-    right = hint or f"must be one of {', '.join(names)}"
-    raise ProblemError(f"{table}{'.' * bool(table)}{unknown} is not known: {right}")
-
-
-def as_size(value: object) -> str:
-    """Return the keys that state a size such as "5x12" or "5x12x2.5", for errors; "" of any other value.
-
-    Examples
-    --------
-    >>> as_size("5x12"), as_size("5 x 12 x 2.5"), as_size("palm")
-    ('rows = 5, columns = 12', 'rows = 5, columns = 12, pitch_mm = 2.5', '')
-    """
-    size = (
-        re.fullmatch(r"\s*(\d+)\s*x\s*(\d+)\s*(?:x\s*(\d+(?:\.\d+)?)\s*)?", value) if isinstance(value, str) else None
-    )
-    if size is None:
-        return ""
-    return f"rows = {size[1]}, columns = {size[2]}" + (f", pitch_mm = {size[3]}" if size[3] else "")
+    if unknown is not None:
+        place = f"{table}.{unknown}" if table else unknown
+        raise ProblemError(f"{place} is not known: must be one of {', '.join(names)}")

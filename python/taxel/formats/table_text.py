@@ -49,6 +49,8 @@ class Text:
         self.path = path
         self.is_file = path.suffix.lower() not in SHEETS
         self._encoding = ""
+        #: Whether the last of the lines that were read has an end.
+        self.ends_in_line = True
 
     @property
     def source(self) -> Any:
@@ -75,6 +77,7 @@ class Text:
             return
         with self._opened() as text:
             for line in text:
+                self.ends_in_line = line.endswith("\n")
                 yield line.rstrip("\n")
 
     def blocks(self, size: int) -> Iterator[str]:
@@ -93,20 +96,6 @@ class Text:
             lines.append(line)
             count += len(line) + 1
         return lines
-
-    @cached_property
-    def ends_in_line(self) -> bool:
-        """Whether the last line has an end."""
-        if not self.is_file:
-            return True
-        last = b"\n"
-        with self._bytes() as file:
-            if self.path.suffix.lower() != ".gz" and self.encoding != "utf-16":
-                file.seek(max(0, file.seek(0, io.SEEK_END) - 1))
-                return file.read(1) in b"\r\n"
-            for block in iter(lambda: file.read(1 << 20), b""):
-                last = block[-2:]
-        return last.strip(b"\0") in (b"\n", b"\r\n", b"\r")
 
     def _until_damage(self) -> Iterator[str]:
         try:
