@@ -397,7 +397,7 @@ def run(
     Returns
     -------
     Detections
-        In the order in which they became known; those of a neuron and of a rule at the same time in any order.
+        In the order in which they became known, in which a stream has them too.
 
     Raises
     ------
