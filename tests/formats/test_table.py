@@ -137,6 +137,13 @@ ROWS: dict[str, tuple[str, list[int], list[list[float]]]] = {
     ),
     "another unit": ("t [s]\tleft (N)\tright (N)\tA [g]\n0\t1\t2\t.5\n.01\t1\t3\t.5\n", [0, 10_000], [[1, 2], [1, 3]]),
     "units below": ("time,a,b,c\n[ms],N,N,degC\n0,1,2,20\n10,3,4,20\n", [0, 10_000], [[1, 2], [3, 4]]),
+    "an index of pandas": (",t_s,a,total\n0,0.0,1,1\n1,0.1,3,3\n", [0, 100_000], [[1], [3]]),
+    "a list a line": (
+        "[0, 3, 4]\n[10, 3, 5]\n" + "".join(f"[{k}, 3, 6]\n" for k in range(20, 90, 10)),
+        [*range(0, 90_000, 10_000)],
+        [[3, 4], [3, 5]] + [[3, 6]] * 7,
+    ),
+    "a unit names the time": ("ms,fsr,battery\n0,1,87\n20,2,87\n40,3,86\n", [0, 20_000, 40_000], [[1], [2], [3]]),
     "separators at the end": ("t_s,a,b\n0,1,2,\n1,3,4,\n", [0, 1_000_000], [[1, 2], [3, 4]]),
 }
 
@@ -288,6 +295,9 @@ def test_a_column_of_labels_is_chosen_by_an_option_and_named_where_it_is_a_chann
         ("t_ms,a\n0,1\n10,x\n20,y\n30,z\n40,1\n", "[table]\ntime_column = 1\n", 3),
         ("a,b\n1,2\n", "[table]\ncolumns = ['a', 'b', 'c']", 1),
         ("a b c\nd e f\n", None, None),
+        ('t_s,a\n0.00,"1,201"\n0.01,"1,202"\n', None, None),
+        ('t,a\n"0,00","1,5"\n"0,01","2,5"\n', None, None),
+        ("t_s,a\n" + "0.1,1\n0.2,2\n" * 5 + "t_s,a,b\n" + "0.3,1,2\n0.4,1,2\n" * 5, None, 13),
         ("", None, None),
         ("1,2\n3,4\n", "[table]\nskip_lines = 9", None),
         ("1,2\n3,4\n", "[table]\ntime_column = 3", None),

@@ -15,6 +15,7 @@ __all__ = [
     "is_key",
     "is_label",
     "is_other",
+    "is_slow_time",
     "places_of",
     "time_unit",
     "unit_of",
@@ -47,6 +48,10 @@ _OTHERS = re.compile(
     r"(?:[ ._\[(]*(?:x|y|z|w|\d+)[\])]?)?(?:[ ._]?[\[(][^\])]*[\])])?",
     re.IGNORECASE,
 )
+#: Times in units that taxel does not read.
+_SLOW_TIMES = re.compile(
+    r"(?:elapsed|time|zeit|t)[ _.]*[\[(/_ ] *(?:min|minutes?|minuten|h|hours?|stunden|days?)[\])]?", re.IGNORECASE
+)
 #: A cell that says a unit, as N, [kPa] or (m/s^2).
 _UNITS = re.compile(r"[\[(]?[^\d\s\[\]()]{0,8}[²³2]?[\])]?")
 #: A unit of a force, a pressure or a voltage that ends a name behind a low line or alone: thumb_mN, mV.
@@ -71,6 +76,11 @@ def is_label(name: str) -> bool:
 def is_key(name: str) -> bool:
     """Return whether a column says which sensor a line is of: hand, sensor_id."""
     return _KEYS.fullmatch(last_part(name)) is not None
+
+
+def is_slow_time(name: str) -> bool:
+    """Return whether a column holds times in minutes, hours or days: Time [min]."""
+    return _SLOW_TIMES.fullmatch(last_part(name)) is not None
 
 
 def is_other(name: str) -> bool:

@@ -24,7 +24,7 @@ from taxel.formats.layout import Layout, Table
 from taxel.formats.layout_text import refuse_to_choose
 from taxel.formats.lines import MISSING, Line, has_marks, is_number, read_line
 from taxel.formats.table_text import Text
-from taxel.formats.times import ISO, UNITS_US, is_day, is_time
+from taxel.formats.times import FEW_ODD, ISO, ODD, UNITS_US, is_day, is_time
 
 __all__ = ["EVENT_COLUMNS", "Form", "form_of", "unit_of_times"]
 
@@ -53,6 +53,9 @@ _ABOVE_FRAME = re.compile(
     r"(?:[ \t,;:@(\[]+(?:t|time)?[ \t=:]*(?P<time>\d+(?:[.,]\d+)?)[ \t]*(?P<time_unit>[mun]?s)?[)\]]?)?[ \t,;]*",
     re.IGNORECASE,
 )
+#: What a program quotes because of the comma in it: a number with a decimal comma, or with thousands.
+_QUOTED = re.compile(r'"([^"]*)"')
+_WITH_COMMA = re.compile(r"[-+]?\d+,\d+|[-+]?\d{1,3}(?:,\d{3})+(?:\.\d+)?")
 _PLACE_IN_LIST = re.compile(r"\[\d+\]")
 _HEX = re.compile(r"(?:0x)?(?:[0-9A-Fa-f]{2})+")
 _HEX_LETTER = re.compile(r"(?<![\w.])(?:0x)?[0-9]*[A-Fa-f][0-9A-Fa-f]*(?![\w.])")
@@ -196,6 +199,7 @@ def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -
         why = "contains no table of numbers; if it has one, describe it in [table] of a layout file (docs/files.md)"
         is_empty = not any(line.strip() for line in lines)
         raise unreadable("the file is empty; must be a recording" if is_empty else why, text.path)
+    _refuse_lines_above(text, fits[0])
     reading = _reading(fits[0], shown)
     other = next((fit for fit in fits[1:] if _fits_as_well(fit, fits[0], size)), None)
     if other is not None:
@@ -227,6 +231,15 @@ def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -
     return Form(full, reading.names, any(reading.names), fit.first, (*_said(reading, time), *reading.said))
 
 
+def _refuse_lines_above(text: Text, fit: _Fit) -> None:
+    """Refuse a table above which are many lines of numbers in another number of columns."""
+    rows = [line.cells for _, line in fit.lines[: fit.body[0]]]
+    odd = sum(len(cells) > 1 and 2 * sum(is_number(cell, fit.decimal) for cell in cells) > len(cells) for cells in rows)
+    if odd > max(FEW_ODD, ODD * len(fit.body)):
+        why = f"{odd} lines above have numbers in another number of columns than the {len(fit.body)} from here on"
+        raise unreadable(why, text.path, line=fit.first + 1)
+
+
 def _stated(text: Text, layout: Layout, how: Table) -> Form:
     """Return the names of the columns of a table that a layout describes, and its first line of numbers."""
     shown = ["" if k < how.skip_lines or how.is_between(line) else line for k, line in enumerate(text.head)]
@@ -254,7 +267,7 @@ def _fits(lines: Sequence[str], forms: Sequence[tuple[str, str, str]], missing: 
         marked = separator in (",", ";") if kind != "plain" else separator == " "
         if len(forms) > 1 and (
             (not marked and separator != "," and not any(separator in line for line in few))
-            or (kind == "marked" and 2 * sum(map(has_marks, few)) < len(few))
+            or (kind == "marked" and (2 * sum(map(has_marks, few)) < len(few) or _are_quoted_numbers(few)))
             or (kind == "json" and not any(line.lstrip()[:1] in "{[" for line in few))
         ):
             continue
@@ -266,6 +279,12 @@ def _fits(lines: Sequence[str], forms: Sequence[tuple[str, str, str]], missing: 
         fit = _fit(kind, separator, decimal, cells, len(there), {*MISSING, *missing})
         if fit is not None:
             yield fit
+
+
+def _are_quoted_numbers(lines: Sequence[str]) -> bool:
+    """Return whether all that is quoted is one number with a comma each, which a comma does not split."""
+    quoted = [cell for line in lines for cell in _QUOTED.findall(line) if "," in cell]
+    return bool(quoted) and all(map(_WITH_COMMA.fullmatch, quoted))
 
 
 def _fit(
@@ -596,6 +615,7 @@ def _reasons(reading: _Reading, column: int, first: int) -> Iterator[str]:
         yield "times in a form that taxel does not read" * is_time
         yield _key(reading, column) if is_key and (column_names.is_key(name) or in_turn) else ""
         yield f"texts{reads * (len(set(cells)) > 1)}"
+    yield "times in a form that taxel does not read" * column_names.is_slow_time(name)
     if kind == "time" or is_time or (name and fit.ascends(column) and fit.epoch(column)):
         yield "another time"
     numbers = fit.numbers(column)
