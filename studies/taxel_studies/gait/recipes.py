@@ -1,4 +1,4 @@
-"""The study's parameters as data: the recipes, what may be chosen inside, Table 6.2 as printed, the encoders.
+"""The study's parameters as data: its own recipes, what may be chosen inside, Table 6.2 as printed, the encoders.
 
 A point is a recipe for one neuron, in the notation of `taxel.detect.Recipe`: an encoder, and a learner's parameters
 with the delay. Lambdas are those of 6.14 in its order (l1, l2, B, C, D).
@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from copy import deepcopy
 from typing import Any
-
-from taxel.detect import recipes
 
 __all__ = ["ENCODERS", "FULL", "NOTES", "PRINTED", "RULE_ENCODERS", "SEARCH", "SETTINGS", "TONIC", "Point", "changed"]
 
@@ -38,31 +36,100 @@ def changed(point: Point, **changes: Any) -> Point:
     return new
 
 
-def _points(recipe: str, **encoders: dict[str, Any]) -> dict[str, Point]:
-    """Return a recipe's points by event; an event named here has an encoder of its own."""
-    contents = recipes.read(recipe)
+#: What the neurons of all recipes share.
+_ALL: dict[str, Any] = {"theta_0": 0.3, "refractory": 3.0, "tolerance": 1e-4, "step_ms": 1.0}
+#: What those of one source share: of many taxels, of a few force sensors, and of one channel.
+_PLATE = _ALL | {
+    "theta_plus": 0.2,
+    "after_spike": "reset",
+    "divide_b_by": "targets",
+    "norm": "norm",
+    "margin": 0.0,
+}
+_SENSORS = _ALL | {
+    "tau": 30.0,
+    "theta_plus": 3.0,
+    "tau_rec": 100.0,
+    "after_spike": "keep",
+    "kappa": 2.0,
+    "lb": -0.3,
+    "ub": 0.3,
+    "divide_b_by": "B_max",
+    "norm": "norm",
+    "margin": 0.05,
+    "delay_ms": 8.0,
+}
+_CHANNEL = _ALL | {
+    "theta_plus": 3.0,
+    "tau_rec": 100.0,
+    "after_spike": "keep",
+    "lb": -5.0,
+    "ub": 5.0,
+    "divide_b_by": "targets",
+    "norm": "square",
+    "delay_ms": 9.0,
+}
+
+
+def _of_sensors(contact: dict[str, Any], foot_off: dict[str, Any]) -> dict[str, Point]:
+    """Return the recipe of a few force sensors, with encoders of contact and foot-off."""
+    lambdas = {"contact": [0.0, 1.2, 536.0, 100.0, 879.0], "foot_off": [0.0, 1.2, 1012.0, 100.0, 414.0]}
     return {
-        event: {
-            "encoder": encoders.get(event, contents["encoder"]),
-            "learner": contents["learner"] | {name: value for name, value in own.items() if name != "search"},
-        }
-        for event, own in contents["neurons"].items()
+        event: {"encoder": encoder, "learner": _SENSORS | {"delta_t_ms": delta_t_ms, "lambdas": lambdas[event]}}
+        for event, encoder, delta_t_ms in (("contact", contact, 8.0), ("foot_off", foot_off, 10.0))
     }
 
 
-_ONE, _FOUR = izhikevich(100), izhikevich(1, 60, 200, 500)
+_ONE, _FOUR = izhikevich(100.0), izhikevich(1.0, 60.0, 200.0, 500.0)
+_NEWTONS = crossing(5.0, 10.0, 20.0, 30.0, 40.0, 50.0, release_share=0.7)
+_STRIKE = crossing(
+    *(0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.11, 0.15, 0.2, 0.3, 0.45),
+    release_share=0.7,
+    running_range={"low": 10.0, "high": 95.0, "first_window": "itself"},
+)
 _LIFT = crossing(0.06, release_share=0.7, running_range={"low": 28, "high": 95, "first_window": "itself"})
 _CELLS, _KILOPASCALS = crossing(1, release_share=0.7), crossing(20)
 
 #: The recipes of the trials, tuned on the shared people; some events with an encoder of their own.
 NOTES: dict[str, dict[str, Point]] = {
-    "plate": _points("gait_plate", contact=_ONE),
-    "gaitpdb": _points("gait_insole"),
-    "gaitndd": _points("gait_channel", foot_off=_LIFT),
-    "moticon": _points("gait_insole", contact=_CELLS, foot_off=_CELLS),
-    "pedar": _points("gait_insole", contact=_KILOPASCALS, foot_off=_KILOPASCALS),
+    "plate": {
+        "contact": {
+            "encoder": _ONE,
+            "learner": _PLATE
+            | {"tau": 40.0, "kappa": 1.2, "lambdas": [2.8, 1.2, 100.0, 100.0, 80.0]}
+            | {"lb": -1.0, "ub": 1.0, "delay_ms": 12.0},
+        },
+        "heel_off": {
+            "encoder": _FOUR,
+            "learner": _PLATE
+            | {"tau": 70.0, "kappa": 1.2, "lambdas": [0.0, 4.0, 100.0, 100.0, 80.0]}
+            | {"lb": -0.3, "ub": 0.3, "delay_ms": 12.0},
+        },
+        "foot_off": {
+            "encoder": _FOUR,
+            "learner": _PLATE
+            | {"tau": 190.0, "kappa": 1.3, "lambdas": [0.0, 4.0, 100.0, 100.0, 80.0]}
+            | {"lb": -0.3, "ub": 0.3, "delay_ms": 8.0},
+        },
+    },
+    "gaitpdb": _of_sensors(_NEWTONS, _NEWTONS),
+    "gaitndd": {
+        "contact": {
+            "encoder": _STRIKE,
+            "learner": _CHANNEL
+            | {"tau": 6.0, "kappa": 2.0, "delta_t_ms": 8.0, "margin": 0.05}
+            | {"lambdas": [0.0, 0.32, 63.0, 100.0, 160.0]},
+        },
+        "foot_off": {
+            "encoder": _LIFT,
+            "learner": _CHANNEL
+            | {"tau": 40.0, "kappa": 1.3, "delta_t_ms": 5.0, "margin": 0.0}
+            | {"lambdas": [0.0, 1.9, 384.0, 100.0, 2214.0]},
+        },
+    },
+    "moticon": _of_sensors(_CELLS, _CELLS),
+    "pedar": _of_sensors(_KILOPASCALS, _KILOPASCALS),
 }
-_NEWTONS, _STRIKE = (NOTES[source]["contact"]["encoder"] for source in ("gaitpdb", "gaitndd"))
 
 #: One more input a sensor: a spike each 20 ms while above 20 N, a memory that the crossings lack.
 TONIC: dict[str, dict[str, Point]] = {
