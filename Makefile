@@ -111,7 +111,7 @@ SOURCES_OF_PYTHON := python rules/taxel_rules studies/taxel_studies benchmarks/t
 lint: $(VENV)/.for-test $(VENV)/.for-lint
 	@$(MAKE) --no-print-directory $(if $(wildcard $(VENV)/.released),released,build)
 	cargo fmt --all --check
-	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs rules/src/rules/*.rs  # the registries' macros hide them from cargo
+	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs  # the registries' macros hide them from cargo
 	cargo clippy --workspace --all-targets --all-features --quiet -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
 	$(BIN)/ruff format --check .
@@ -132,7 +132,7 @@ lint: $(VENV)/.for-test $(VENV)/.for-lint
 
 format: $(VENV)/.for-lint
 	cargo fmt --all
-	rustfmt --edition 2024 crates/taxel-core/src/encode/*.rs rules/src/rules/*.rs
+	rustfmt --edition 2024 crates/taxel-core/src/encode/*.rs
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 

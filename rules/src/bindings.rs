@@ -2,15 +2,14 @@
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use taxel_border::convert::{Column, SpikesIn, array, column, slice, to_patterns};
 use taxel_border::enter::{Exclusive, enter, enter_keeping};
 use taxel_border::errors::core;
 use taxel_border::parameters::{Plain, checked, parsed, unknown};
-use taxel_core::parameters::Described;
-use taxel_core::{Result as CoreResult, Stop, problem};
+use taxel_core::{Result as CoreResult, Stop};
 
-use crate::rules::{Batch, Ended, EpochLearner, Learnt, Skim, Stdp, StdpNeuron, Tempotron, Trained};
+use crate::rules::{Ended, EpochLearner, Skim, Stdp, StdpNeuron, Tempotron, Trained};
 
 /// What training found.
 #[pyclass(frozen, get_all, name = "Trained")]
@@ -50,23 +49,17 @@ fn to_targets(targets: &[PyReadonlyArray1<'_, f64>]) -> PyResult<Vec<Vec<f64>>> 
     targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect()
 }
 
-/// A rule with its neuron and its training, from its name and all parameters in one list.
+/// A rule with its neuron and its training, checked, from its name and all parameters in one list.
 fn to_epoch_learner(json: &str) -> PyResult<EpochLearner> {
-    let mut parameters: Map<String, Value> = parsed("rule", json)?;
-    let name = match parameters.remove("name") {
-        Some(Value::String(name)) => name,
-        _ => return Err(core(problem!("rule without a name"))),
-    };
-    let parts = EpochLearner::parts(&name, parameters).map_err(core)?;
-    let learner: EpochLearner = parsed(&name, &parts.to_string())?;
+    let learner = parsed::<EpochLearner>("rule", json)?.filled();
     learner.check().map_err(core)?;
     Ok(learner)
 }
 
 /// The names of all rules by epochs.
 #[pyfunction]
-pub fn rule_names() -> Vec<&'static str> {
-    EpochLearner::names().collect()
+pub fn rule_names() -> [&'static str; 8] {
+    EpochLearner::NAMES
 }
 
 /// Trains a rule's neuron.
@@ -83,9 +76,7 @@ pub fn fit_epochs<'py>(
     let learner = to_epoch_learner(parameters)?;
     let (patterns, targets) = (to_patterns(patterns), to_targets(&targets)?);
     let start = start.as_ref().map(|s| slice("start", s)).transpose()?;
-    train(py, learner.training.max_seconds, progress, |report, stop| {
-        learner.fit(&patterns, &targets, start, report, stop)
-    })
+    train(py, learner.max_seconds, progress, |report, stop| learner.fit(&patterns, &targets, start, report, stop))
 }
 
 /// What one presentation changes, over the learning rate; output spikes.
@@ -163,63 +154,17 @@ pub fn change_tempotron<'py>(
     Ok(array(py, change))
 }
 
-/// The names of all learners that take all examples at once.
+/// Checks patterns for SKIM, with their targets where they are to be learnt; how many rows each has.
 #[pyfunction]
-pub fn batch_names() -> &'static [&'static str] {
-    Batch::NAMES
-}
-
-/// Learns from all examples at once; returns weights, and further results by name.
-#[pyfunction]
-pub fn fit_batch<'py>(
-    py: Python<'py>,
-    name: &str,
+pub fn rows_skim(
+    py: Python<'_>,
     parameters: &str,
     patterns: Vec<SpikesIn>,
-    targets: Vec<PyReadonlyArray1<'py, f64>>,
-) -> PyResult<(Column<f64>, Plain<Value>)> {
-    let batch = Batch::from_json(name, parameters).map_err(core)?;
-    let (patterns, targets) = (to_patterns(patterns), to_targets(&targets)?);
-    let learnt = enter(py, |stop| batch.fit(&patterns, &targets, stop))?;
-    Ok((column(py, learnt.weights), Plain(Value::Object(learnt.results))))
-}
-
-/// Output spikes of such a learner.
-#[pyfunction]
-pub fn run_batch<'py>(
-    py: Python<'py>,
-    name: &str,
-    parameters: &str,
-    weights: PyReadonlyArray1<'py, f64>,
-    results: &str,
-    pattern: SpikesIn,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let batch = Batch::from_json(name, parameters).map_err(core)?;
-    let learnt = Learnt { weights: slice("weights", &weights)?.to_vec(), results: parsed(name, results)? };
-    let fired = enter(py, |stop| batch.run(&learnt, &pattern.0, stop))?;
-    Ok(array(py, fired))
-}
-
-/// The rows of one pattern, one after the other.
-#[pyfunction]
-pub fn rows_skim<'py>(py: Python<'py>, parameters: &str, pattern: SpikesIn) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    targets: Option<Vec<PyReadonlyArray1<'_, f64>>>,
+) -> PyResult<Vec<usize>> {
     let skim: Skim = parsed("SKIM", parameters)?;
-    let rows = enter(py, |stop| skim.rows(&pattern.0, stop))?;
-    Ok(array(py, rows))
-}
-
-/// The output at each row's time.
-#[pyfunction]
-pub fn output_skim<'py>(
-    py: Python<'py>,
-    parameters: &str,
-    weights: PyReadonlyArray1<'py, f64>,
-    pattern: SpikesIn,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let skim: Skim = parsed("SKIM", parameters)?;
-    let weights = slice("weights", &weights)?;
-    let output = enter(py, |stop| skim.output(weights, &pattern.0, stop))?;
-    Ok(array(py, output))
+    let (patterns, targets) = (to_patterns(patterns), targets.as_deref().map(to_targets).transpose()?);
+    enter(py, |_| skim.rows(&patterns, targets.as_deref()))
 }
 
 /// A neuron with spike-timing-dependent plasticity, in one stream of time.
@@ -256,15 +201,14 @@ impl Plastic {
 /// What is known of the parameters of a learner: defaults, what must be given, ranges.
 #[pyfunction]
 pub fn parameters(name: &str) -> PyResult<Plain<Value>> {
-    described(name).map(|d| Plain(d.to_json())).ok_or_else(|| unknown(name))
-}
-
-fn described(name: &str) -> Option<Described> {
-    match name {
-        "stdp" => Some(Stdp::described()),
-        "tempotron" => Some(Tempotron::described()),
-        _ => EpochLearner::described(name).or_else(|| Batch::described(name)),
-    }
+    let described = match name {
+        "stdp" => Stdp::described(),
+        "tempotron" => Tempotron::described(),
+        "skim" => Skim::described(),
+        _ if EpochLearner::NAMES.contains(&name) => EpochLearner::described(name),
+        _ => return Err(unknown(name)),
+    };
+    Ok(Plain(described.to_json()))
 }
 
 /// Checks the parameters of a learner, which are JSON; gives them back with every default filled in.
@@ -273,8 +217,8 @@ pub fn check_parameters(name: &str, parameters: &str) -> PyResult<Plain<Value>> 
     match name {
         "stdp" => checked("STDP", parameters, Stdp::check),
         "tempotron" => checked("Tempotron", parameters, Tempotron::check),
-        _ if EpochLearner::described(name).is_some() => Ok(json!(to_epoch_learner(parameters)?)),
-        _ if Batch::described(name).is_some() => Ok(json!(Batch::from_json(name, parameters).map_err(core)?)),
+        "skim" => checked("skim", parameters, Skim::check),
+        _ if EpochLearner::NAMES.contains(&name) => Ok(json!(to_epoch_learner(parameters)?)),
         _ => Err(unknown(name)),
     }
     .map(Plain)

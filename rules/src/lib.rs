@@ -13,8 +13,8 @@ mod _rules {
 
     #[pymodule_export]
     use crate::bindings::{
-        Plastic, TrainedOut, batch_names, change_epochs, change_tempotron, check_parameters, fit_batch, fit_epochs,
-        fit_tempotron, output_skim, parameters, peak_tempotron, rows_skim, rule_names, run_batch, run_epochs,
+        Plastic, TrainedOut, change_epochs, change_tempotron, check_parameters, fit_epochs, fit_tempotron, parameters,
+        peak_tempotron, rows_skim, rule_names, run_epochs,
     };
 
     #[pymodule_init]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from inspect import Parameter, signature
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import callback, floats, instance, optional
-from taxel._base.parameters import defaults
 from taxel.learn._examples import examples
 from taxel.learn._learner import SpikeLearner
 from taxel.neuron import Neuron
@@ -21,9 +21,6 @@ AfterSpike = Literal["subtract", "membrane", "reset"]
 Updates = Literal["batch", "pattern"]
 #: How a training ended.
 Status = Literal["right", "epochs", "stopped", "assigned"]
-
-#: The defaults of all rules.
-_DEFAULT = defaults("inst", _rules)
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -43,11 +40,11 @@ class EpochLearner(SpikeLearner):
     tau_s: float | None
     theta_0: float
     after_spike: AfterSpike | None
-    step_ms: float = _DEFAULT.step_ms
-    within_ms: float = _DEFAULT.within_ms
-    until_right: bool = _DEFAULT.until_right
-    seed: int = _DEFAULT.seed
-    max_seconds: float | None = _DEFAULT.max_seconds
+    step_ms: float = 0.1
+    within_ms: float = 1.0
+    until_right: bool = True
+    seed: int = 0
+    max_seconds: float | None = None
 
     weights_: NDArray[np.float64] = field(init=False)
     right_: NDArray[np.float64] = field(init=False)
@@ -55,6 +52,17 @@ class EpochLearner(SpikeLearner):
     best_epoch_: int = field(init=False)
     status_: Status = field(init=False)
     neuron_: Neuron | None = field(init=False)
+
+    @classmethod
+    def _described(cls) -> dict[str, Any]:
+        """Return what is known of the parameters: names and defaults are the class's, whose source publishes them."""
+        ranges = super()._described()["ranges"]
+        defaults = {name: entry.default for name, entry in signature(cls).parameters.items()}
+        return {
+            "defaults": {name: default for name, default in defaults.items() if default is not Parameter.empty},
+            "required": [name for name, default in defaults.items() if default is Parameter.empty],
+            "ranges": {name: ranges[name] for name in defaults if name in ranges},
+        }
 
     def _plain(self) -> dict[str, Any]:
         return {"name": self._kind} | super()._plain()
@@ -128,19 +136,19 @@ class EpochLearner(SpikeLearner):
         return change, spikes
 
     def _fitted_neuron(self) -> Neuron | None:
-        stepped = _rules.check_parameters(self._kind, self._json())["neuron"]
-        if stepped["after_spike"] != "reset" or "exponential" not in stepped["current"]:
+        given = _rules.check_parameters(self._kind, self._json())
+        if given["after_spike"] != "reset" or given["tau_s"] is None:
             return None
         return Neuron(
-            tau=stepped["tau"],
+            tau=given["tau"],
             kernel="double_exponential",
-            tau_s=stepped["current"]["exponential"]["tau_s"],
-            theta_0=stepped["theta_0"],
+            tau_s=given["tau_s"],
+            theta_0=given["theta_0"],
             theta_plus=0.0,
             refractory=0.0,
             after_spike="reset",
             time="grid",
-            step_ms=stepped["step_ms"],
+            step_ms=given["step_ms"],
         )
 
 

@@ -5,11 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from taxel._base.parameters import defaults
-from taxel_rules import _rules
 from taxel_rules._epochs import AfterSpike, EpochLearner
-
-_DEFAULT = defaults("chronotron", _rules)
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -82,8 +78,8 @@ class Chronotron(EpochLearner):
     _kind = "chronotron"
 
     rule: Literal["E", "I"]
-    tau: float = _DEFAULT.tau
-    tau_s: float | None = _DEFAULT.tau_s
-    after_spike: AfterSpike | None = _DEFAULT.after_spike
-    tau_q: float | None = _DEFAULT.tau_q
-    gamma_r: float | None = _DEFAULT.gamma_r
+    tau: float = 15.0
+    tau_s: float | None = None
+    after_spike: AfterSpike | None = None
+    tau_q: float | None = None
+    gamma_r: float | None = None

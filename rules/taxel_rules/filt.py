@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from taxel._base.parameters import defaults
-from taxel_rules import _rules
 from taxel_rules.inst import INST
-
-_DEFAULT = defaults("filt", _rules)
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -61,4 +57,4 @@ class FILT(INST):
 
     _kind = "filt"
 
-    tau_q: float = _DEFAULT.tau_q
+    tau_q: float = 10.0

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from taxel._base.parameters import defaults
-from taxel_rules import _rules
 from taxel_rules._epochs import AfterSpike, EpochLearner
-
-_DEFAULT = defaults("fp", _rules)
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -72,4 +68,4 @@ class FP(EpochLearner):
     _kind = "fp"
 
     window_ms: float
-    after_spike: AfterSpike = _DEFAULT.after_spike
+    after_spike: AfterSpike = "reset"

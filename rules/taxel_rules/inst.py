@@ -5,11 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from taxel._base.parameters import defaults
-from taxel_rules import _rules
 from taxel_rules._epochs import AfterSpike, EpochLearner, Updates
-
-_DEFAULT = defaults("inst", _rules)
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -82,11 +78,11 @@ class INST(EpochLearner):
 
     _kind = "inst"
 
-    eta: float | None = _DEFAULT.eta
-    initial: Sequence[float] | None = _DEFAULT.initial
-    epochs: int = _DEFAULT.epochs
-    updates: Updates = _DEFAULT.updates
-    tau: float = _DEFAULT.tau
-    tau_s: float = _DEFAULT.tau_s
-    theta_0: float = _DEFAULT.theta_0
-    after_spike: AfterSpike = _DEFAULT.after_spike
+    eta: float | None = None
+    initial: Sequence[float] | None = None
+    epochs: int = 500
+    updates: Updates = "batch"
+    tau: float = 10.0
+    tau_s: float = 5.0
+    theta_0: float = 15.0
+    after_spike: AfterSpike = "subtract"

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from taxel._base.parameters import defaults
-from taxel_rules import _rules
 from taxel_rules._epochs import AfterSpike, EpochLearner
-
-_DEFAULT = defaults("psd", _rules)
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -74,9 +70,9 @@ class PSD(EpochLearner):
 
     _kind = "psd"
 
-    tau: float = _DEFAULT.tau
-    tau_s: float | None = _DEFAULT.tau_s
-    tau_1: float = _DEFAULT.tau_1
-    tau_2: float = _DEFAULT.tau_2
-    after_spike: AfterSpike = _DEFAULT.after_spike
-    refractory: float = _DEFAULT.refractory
+    tau: float = 10.0
+    tau_s: float | None = None
+    tau_1: float = 10.0
+    tau_2: float = 2.5
+    after_spike: AfterSpike = "membrane"
+    refractory: float = 0.0

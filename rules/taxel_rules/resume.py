@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from taxel._base.parameters import defaults
-from taxel_rules import _rules
 from taxel_rules._epochs import AfterSpike, EpochLearner
-
-_DEFAULT = defaults("resume", _rules)
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -73,7 +69,7 @@ class ReSuMe(EpochLearner):
 
     _kind = "resume"
 
-    after_spike: AfterSpike = _DEFAULT.after_spike
-    a: float = _DEFAULT.a
-    amplitude: float = _DEFAULT.amplitude
-    tau_w: float | None = _DEFAULT.tau_w
+    after_spike: AfterSpike = "membrane"
+    a: float = 0.0
+    amplitude: float = 1.0
+    tau_w: float | None = None

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, Self
+from types import SimpleNamespace
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.signal import lfilter
 
 from taxel._base.arguments import instance, number
+from taxel._base.errors import refused
 from taxel._base.parameters import defaults
-from taxel.learn._learner import patterns_of
+from taxel.learn._examples import examples
+from taxel.learn._learner import SpikeLearner, patterns_of
+from taxel.metrics import matching
 from taxel.spikes import SpikeTrains
 from taxel_rules import _rules
-from taxel_rules._batch import BatchLearner
 
 _DEFAULT = defaults("skim", _rules)
 
+#: Rows that are computed and reduced at once.
+_BLOCK = 4096
+
 
 @dataclass(kw_only=True, eq=False, repr=False)
-class SKIM(BatchLearner):
+class SKIM(SpikeLearner):
     """Learn by SKIM: least squares from filtered inputs to a pulse at each target, and a threshold on the output.
 
     Parameters
@@ -91,6 +98,7 @@ class SKIM(BatchLearner):
     """
 
     _kind = "skim"
+    _compiled: ClassVar[Any] = _rules
 
     tau: float = _DEFAULT.tau
     kernel: Literal["alpha", "double_exponential", "exponential"] = _DEFAULT.kernel
@@ -106,6 +114,7 @@ class SKIM(BatchLearner):
     within_ms: float = _DEFAULT.within_ms
     seed: int = _DEFAULT.seed
 
+    weights_: NDArray[np.float64] = field(init=False)
     residual_: float = field(init=False)
     rows_: int = field(init=False)
     threshold_: float = field(init=False)
@@ -132,8 +141,19 @@ class SKIM(BatchLearner):
         ProblemError : invalid patterns or targets (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second
         """
-        super().fit(patterns, targets)
-        self.scores_ = [tuple(score) for score in self._results["scores"]]
+        parts, wanted = examples(patterns, targets)
+        rows, trains = _rules.rows_skim(self._json(), parts, wanted), patterns_of(patterns)
+        triangle = self._reduced(trains, wanted, rows)
+        factor, right_side = triangle[:, :-1], triangle[:, -1]
+        self.weights_ = np.asarray(np.linalg.lstsq(factor, right_side, rcond=None)[0], np.float64)
+        self.residual_, self.rows_ = float(np.sum((factor @ self.weights_ - right_side) ** 2)), sum(rows)
+        outputs = [self._output(self.weights_, *of_one) for of_one in zip(trains, rows, strict=True)]
+        self.scores_ = []
+        for threshold in self.thresholds:
+            fired = [self._crossings(*of_one, threshold) for of_one in zip(trains, outputs, strict=True)]
+            counts = matching(fired, wanted, window_ms=self.within_ms)
+            self.scores_.append((float(threshold), counts.found, counts.missed, counts.false))
+        self.threshold_ = min(self.scores_, key=lambda score: (score[2] + score[3], score[0]))[0]
         return self
 
     def rows(self, pattern: SpikeTrains) -> NDArray[np.float64]:
@@ -153,8 +173,8 @@ class SKIM(BatchLearner):
         ProblemError : an invalid pattern
         """
         trains = instance("pattern", pattern, SpikeTrains)
-        count = len(trains) if self.branches is None else int(self.branches)
-        return _rules.rows_skim(self._json(), trains._parts()).reshape(-1, max(count, 1))
+        (rows,) = _rules.rows_skim(self._json(), [trains._parts()], None)
+        return np.concatenate(list(self._blocks(trains, rows)))
 
     def output(self, pattern: SpikeTrains) -> NDArray[np.float64]:
         """Return the output at ``start + k * step_ms``.
@@ -178,7 +198,9 @@ class SKIM(BatchLearner):
         >>> int(SKIM(tau=8.0).fit([trains], [[60.0]]).output(trains).argmax())
         63
         """
-        return _rules.output_skim(self._json(), self._fitted(), instance("pattern", pattern, SpikeTrains)._parts())
+        weights, trains = self._fitted(), instance("pattern", pattern, SpikeTrains)
+        (rows,) = _rules.rows_skim(self._json(), [trains._parts()], None)
+        return self._output(weights, trains, rows)
 
     def predict(self, patterns: Sequence[SpikeTrains], *, threshold: float | None = None) -> list[NDArray[np.float64]]:
         """Return the times at which the output reaches the threshold, one array a pattern, ms.
@@ -198,5 +220,118 @@ class SKIM(BatchLearner):
         ProblemError : invalid patterns
         NotFittedError : before `fit`
         """
-        instead = {} if threshold is None else {"threshold": number("threshold", threshold)}
-        return self._fired(patterns_of(patterns), instead)
+        weights = self._fitted()
+        at = vars(self).get("threshold_") if threshold is None else number("threshold", threshold)
+        if at is None:
+            raise refused("threshold", ": must be given, because no fit has chosen one")
+        trains = patterns_of(patterns)
+        rows = _rules.rows_skim(self._json(), [pattern._parts() for pattern in trains], None)
+        outputs = [self._output(weights, *of_one) for of_one in zip(trains, rows, strict=True)]
+        return [self._crossings(*of_one, at) for of_one in zip(trains, outputs, strict=True)]
+
+    def _reduced(
+        self, patterns: Sequence[SpikeTrains], targets: Sequence[NDArray[np.float64]], rows: Sequence[int]
+    ) -> NDArray[np.float64]:
+        """Return the rows, with the wanted output as their last column, brought to triangular form."""
+        given = self._given()
+        columns = len(patterns[0]) if given.branches is None else given.branches
+        triangle = np.zeros((0, columns + 1))
+        for pattern, times, count in zip(patterns, targets, rows, strict=True):
+            wanted, first = np.zeros(count), 0
+            begins, ends = (_first_row(times + later, pattern.start, given.step_ms) for later in (0.0, given.pulse_ms))
+            for begin, end in zip(begins, ends, strict=True):
+                wanted[begin:end] = 1.0
+            for block in self._blocks(pattern, count):
+                more = np.column_stack([block, wanted[first : first + len(block)]])
+                triangle = _upper(np.vstack([triangle, more]))
+                first += len(block)
+        if given.ridge:
+            triangle = _upper(np.vstack([triangle, np.sqrt(given.ridge) * np.eye(columns, columns + 1)]))
+        return triangle
+
+    def _blocks(self, pattern: SpikeTrains, rows: int) -> Iterator[NDArray[np.float64]]:
+        """Yield the rows of a pattern, block by block: two numbers of the last one hold all inputs before it."""
+        given = self._given()
+        step, layer, columns, longest = given.step_ms, None, len(pattern), 0.0
+        if given.branches is not None:
+            random = np.random.default_rng(given.seed)
+            columns, longest = given.branches, given.delay_ms
+            weights = random.uniform(-given.spread, given.spread, (len(pattern), columns))
+            layer = weights, random.uniform(0.0, longest, columns)
+        times, trains = pattern.to_numpy()
+        order = np.argsort(times, kind="stable")
+        times, trains = times[order], trains[order]
+        aa, ba, bb = _decays(given, step)
+        a, b = np.zeros((2, columns))
+        for first in range(0, rows, _BLOCK):
+            count = min(_BLOCK, rows - first)
+            begin, end = pattern.start + step * np.array([first - 2, first + count])
+            near = slice(*np.searchsorted(times, [begin - longest, end]))
+            at, column, weight = _inputs(times[near], trains[near], layer)
+            row = _first_row(at, pattern.start, step)
+            here = (row >= first) & (row < first + count)
+            age = np.maximum(pattern.start + row * step - at, 0.0)[here]
+            place, weight = ((row - first) * columns + column)[here], weight[here]
+            to_a, to_b, alone = _decays(given, age)
+            to_b = alone if given.kernel == "exponential" else to_b
+            added_a, added_b = (
+                np.bincount(place, weight * to, count * columns).reshape(count, columns) for to in (to_a, to_b)
+            )
+            after, _ = lfilter([1.0], [1.0, -aa], added_a, axis=0, zi=aa * a[None])
+            added_b[0] += ba * a
+            added_b[1:] += ba * after[:-1]
+            potential, _ = lfilter([1.0], [1.0, -bb], added_b, axis=0, zi=bb * b[None])
+            a, b = after[-1], potential[-1]
+            yield np.tanh(potential) if layer is not None and given.nonlinearity == "tanh" else potential
+
+    def _output(self, weights: NDArray[np.float64], pattern: SpikeTrains, rows: int) -> NDArray[np.float64]:
+        columns = len(pattern) if self.branches is None else self.branches
+        if len(weights) != columns:
+            raise refused("weights_", f" has {len(weights)} entries: must have {columns}, one per column")
+        return np.concatenate([block @ weights for block in self._blocks(pattern, rows)])
+
+    def _crossings(self, pattern: SpikeTrains, output: NDArray[np.float64], threshold: float) -> NDArray[np.float64]:
+        """Return the times at which the output reaches a threshold from below, ms."""
+        above = output >= threshold
+        rises = above & ~np.concatenate([[False], above[:-1]])
+        return np.asarray(pattern.start + self._given().step_ms * np.flatnonzero(rises), np.float64)
+
+    def _given(self) -> SimpleNamespace:
+        """Return the parameters as plain numbers and words."""
+        return SimpleNamespace(**self._plain())
+
+
+def _upper(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the upper triangle of the QR factors of the rows."""
+    return np.asarray(np.linalg.qr(rows, mode="r"), np.float64)
+
+
+def _first_row(times: NDArray[np.float64], start: float, step: float) -> NDArray[np.int64]:
+    """Return the first row at or after each time, within rounding."""
+    near = np.round((times - start) / step)
+    now = start + near * step
+    return (near + (times > now + np.maximum(1e-9, 4.0 * np.finfo(np.float64).eps * np.abs(now)))).astype(np.int64)
+
+
+def _inputs(
+    times: NDArray[np.float64], trains: NDArray[np.int64], layer: tuple[NDArray[np.float64], NDArray[np.float64]] | None
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+    """Return each input's time, column and weight; a layer, of weights and delays, repeats it in every branch."""
+    if layer is None:
+        return times, trains, np.ones(len(times))
+    weights, delays = layer
+    return (times[:, None] + delays).ravel(), np.tile(np.arange(len(delays)), len(times)), weights[trains].ravel()
+
+
+def _decays(given: SimpleNamespace, ms: Any) -> tuple[Any, Any, Any]:
+    """Return what is left after some time of what drives the potential, what that adds to it, what is left of it."""
+    decay = np.exp(-ms / given.tau)
+    if given.kernel == "alpha":
+        return decay, ms / given.tau * decay, decay
+    if given.kernel == "exponential":
+        return decay, 0.0 * decay, decay
+    tau_s = given.tau / 4.0 if given.tau_s is None else given.tau_s
+    rate = 1.0 / tau_s - 1.0 / given.tau
+    peak = np.log(given.tau / tau_s) / rate
+    scale = 1.0 / (np.exp(-peak / given.tau) - np.exp(-peak / tau_s))
+    return decay, -scale * decay * np.expm1(-ms * rate), np.exp(-ms / tau_s)

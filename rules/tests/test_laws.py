@@ -23,7 +23,7 @@ import taxel_rules
 from taxel import SpikeTrains
 from taxel._base.parameters import Parameters
 from taxel_rules import _rules
-from taxel_rules._epochs import Status
+from taxel_rules._epochs import EpochLearner, Status
 
 ROOT = Path(__file__).parents[1]
 PUBLIC = nonsense.public_of([taxel_rules])
@@ -87,8 +87,7 @@ def test_a_rule_has_a_file_in_each_place_and_nothing_is_left_out() -> None:
     files = {file.stem for file in (ROOT / "taxel_rules").glob("*.py") if not file.stem.startswith("_")}
     kinds = {rule._kind for rule in KINDS}
     assert kinds == files - {"readout"}, "taxel_rules/NAME.py with _kind NAME, a line in taxel_rules/__init__.py"
-    registered = set(_rules.rule_names()) | set(_rules.batch_names())
-    assert kinds - {"stdp", "tempotron"} == registered, "a line in a registry of src/rules.rs"
+    assert kinds - {"skim", "stdp", "tempotron"} == set(_rules.rule_names()), "a name in src/rules/epoch_learner.rs"
     for name in kinds:
         assert (ROOT / f"tests/test_{name}.py").exists(), f"rules/tests/test_{name}.py"
     assert all(issubclass(rule, Parameters) for rule in KINDS)
@@ -123,12 +122,16 @@ def test_moved_in_time_it_learns_the_same(name: str, shift: float) -> None:
         parameters.test_the_words_of_a_choice_are_the_compiled_part_s,
         parameters.test_parameters_go_round,
         parameters.test_a_wrong_value_changes_nothing,
-        parameters.test_python_types_no_default_of_a_parameter,
         parameters.test_python_compares_no_parameter_with_a_number,
     ],
 )
 def test_parameters_are_defined_once(law: Any, kind: type[Parameters]) -> None:
     law(kind)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if not issubclass(kind, EpochLearner)])
+def test_python_types_no_default_of_a_parameter_but_those_of_a_rule_by_epochs(kind: type[Parameters]) -> None:
+    parameters.test_python_types_no_default_of_a_parameter(kind)
 
 
 @each_range

@@ -1,115 +1,21 @@
-//! The Chronotron's two rules (Florian 2012, PLoS ONE 7(8) e40233).
+//! E-learning of the Chronotron (Florian 2012, PLoS ONE 7(8) e40233).
 
-use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use super::epochs::Correction;
 
-use super::epochs::{Correction, Presented, Rule};
-use super::source::Source;
-use super::stepped::{Kernels, SteppedNeuron};
-use taxel_core::allowed::{Range, ranges};
-use taxel_core::{Result, problem};
-
-/// E-learning: down the gradient of a Victor-Purpura distance whose moves cost `(dt / tau_q)^2 / 2`.
+/// Corrections down the gradient of a Victor-Purpura distance whose moves cost `(dt / tau_q)^2 / 2`.
 ///
 /// `eta [sum over targets to be added of L - sum over spikes to be removed of L + gamma_r / tau_q^2 sum over moves of
 /// (t - t~) L(t)]`, L being the potential that an input makes: a late spike raises weights.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ELearning {
-    /// Scale of the cost of a move, ms: pairs up to `2 tau_q` apart are moved.
-    pub tau_q: f64,
-    /// Weight of the moves, ms.
-    pub gamma_r: f64,
-}
-
-/// I-learning: the synaptic currents at targets less those at output spikes, each with the sign of its weight.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ILearning {}
-
-/// The defaults of its source, and of public code where the source could not be read.
-pub(super) const SOURCE: Source = Source {
-    name: "chronotron",
-    of_rule: &["rule", "tau_q", "gamma_r"],
-    ranges: &[ELearning::RANGES],
-    defaults: || json!({ "tau": 15.0, "tau_s": null, "after_spike": null, "tau_q": null, "gamma_r": null }),
-    arrange: |parameters| {
-        let i_learning = match parameters["rule"].as_str() {
-            Some("E") => false,
-            Some("I") => true,
-            _ => return Err(problem!("rule"; " is {}: must be \"E\" or \"I\"", parameters["rule"])),
-        };
-        let Some(tau) = parameters["tau"].as_f64() else {
-            return Err(problem!("tau"; " is {}: must be a number", parameters["tau"]));
-        };
-        let mut fill = |name: &str, value: Value| {
-            if parameters[name].is_null() {
-                parameters.insert(name.to_owned(), value);
+pub(super) fn correct(targets: &[f64], fired: &[f64], tau_q: f64, gamma_r: f64, out: &mut Vec<Correction>) {
+    for edit in edits(fired, targets, tau_q) {
+        out.push(match edit {
+            Edit::Remove(k) => Correction::new(fired[k], -1.0),
+            Edit::Add(k) => Correction::at_target(k, targets[k], 1.0),
+            Edit::Move(from, to) => {
+                let late = fired[from] - targets[to];
+                Correction::new(fired[from], gamma_r / (tau_q * tau_q) * late)
             }
-        };
-        fill("tau_s", json!(tau / 4.0));
-        fill("after_spike", json!(if i_learning { "membrane" } else { "subtract" }));
-        fill("tau_q", json!(tau));
-        let (tau_q, gamma_r) = (parameters["tau_q"].clone(), parameters["gamma_r"].clone());
-        let gamma_r = if gamma_r.is_null() { tau_q.clone() } else { gamma_r };
-        let e_learning = json!({ "e_learning": { "tau_q": tau_q, "gamma_r": gamma_r } });
-        parameters.insert("constants".into(), if i_learning { json!({ "i_learning": {} }) } else { e_learning });
-        Ok(())
-    },
-};
-
-pub(super) struct ERule {
-    kernels: Kernels,
-    tau_q: f64,
-    gamma_r: f64,
-}
-
-pub(super) struct IRule(Kernels);
-
-impl ELearning {
-    ranges! {
-        tau_q: "ms", Range::ABOVE_0;
-        gamma_r: "ms", Range::ABOVE_0;
-    }
-
-    pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<ERule> {
-        self.check_ranges()?;
-        Ok(ERule { kernels: neuron.kernels(), tau_q: self.tau_q, gamma_r: self.gamma_r })
-    }
-}
-
-impl ILearning {
-    pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<IRule> {
-        Ok(IRule(neuron.kernels()))
-    }
-}
-
-impl Rule for ERule {
-    fn factor(&self, since: f64) -> f64 {
-        self.kernels.value(since)
-    }
-
-    fn correct(&self, presented: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
-        for edit in edits(fired, presented.targets, self.tau_q) {
-            out.push(match edit {
-                Edit::Remove(k) => Correction::new(fired[k], -1.0),
-                Edit::Add(k) => Correction::at_target(k, presented.targets[k], 1.0),
-                Edit::Move(from, to) => {
-                    let late = fired[from] - presented.targets[to];
-                    Correction::new(fired[from], self.gamma_r / (self.tau_q * self.tau_q) * late)
-                }
-            });
-        }
-    }
-}
-
-impl Rule for IRule {
-    fn factor(&self, since: f64) -> f64 {
-        self.0.current(since)
-    }
-
-    fn by_sign(&self) -> bool {
-        true
+        });
     }
 }
 

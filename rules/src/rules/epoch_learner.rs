@@ -1,106 +1,171 @@
 //! The rules that learn spike times by epochs, each with its neuron and its training.
 
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value, json};
 
-use super::epochs::{Examples, Trained, Training};
-use super::source::Source;
-use super::stepped::SteppedNeuron;
-use super::{AnyRule, SOURCES};
+use super::epochs::{Examples, Trained, Updates, change_of};
+use super::fp::Fp;
+use super::htp::Htp;
+use super::rule::Rule;
+use super::stepped::{AfterSpike, Current, SteppedNeuron, peak_factor};
 use crate::checks::{check_ungraded, check_untargeted};
-use taxel_core::allowed::one_weight_a_train;
+use taxel_core::allowed::{Parameter, Range, one_weight_a_train, ranges};
+use taxel_core::learn::{check_examples, check_some_target};
 use taxel_core::neuron::Neuron;
 use taxel_core::parameters::Described;
 use taxel_core::{Result, SpikeTrains, Stop, problem};
 
-/// A rule, the neuron that it trains, and how.
+/// The name of a rule.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Name {
+    /// INST.
+    Inst,
+    /// FILT.
+    Filt,
+    /// Chronotron.
+    Chronotron,
+    /// ReSuMe.
+    Resume,
+    /// SPAN.
+    Span,
+    /// PSD.
+    Psd,
+    /// FP-learning.
+    Fp,
+    /// HTP.
+    Htp,
+}
+
+/// Which rule of the Chronotron.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ChronotronRule {
+    /// E-learning.
+    E,
+    /// I-learning.
+    I,
+}
+
+/// A rule, the neuron that it trains, and how, in one list; a rule's class in Python has those that it needs, and what its
+/// source gives for them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EpochLearner {
-    /// The rule.
-    pub rule: AnyRule,
-    /// The neuron.
-    pub neuron: SteppedNeuron,
-    /// How it is trained.
-    pub training: Training,
+    /// Which rule.
+    pub name: Name,
+    /// Learning rate; `None` where the rule has a published one.
+    pub eta: Option<f64>,
+    /// First weights are drawn evenly between these two, mV; `None` where the rule has published ones.
+    pub initial: Option<[f64; 2]>,
+    /// Epochs at most.
+    pub epochs: usize,
+    /// When weights change.
+    pub updates: Updates,
+    /// A pattern is right where its output spikes are as many as its targets, each within this of its own, ms.
+    pub within_ms: f64,
+    /// Whether to end as soon as every pattern is right.
+    pub until_right: bool,
+    /// The seed of the first weights and of the order of patterns.
+    pub seed: u64,
+    /// The time after which the caller requests the best so far, s; this crate reads no clock.
+    pub max_seconds: Option<f64>,
+    /// Membrane time constant, ms.
+    pub tau: f64,
+    /// Synaptic time constant, ms; a quarter of `tau` for a Chronotron without one, and `None` for PSD, whose own current
+    /// then drives the neuron.
+    pub tau_s: Option<f64>,
+    /// Threshold, mV.
+    pub theta_0: f64,
+    /// The effect of an output spike; by its rule for a Chronotron without one.
+    pub after_spike: Option<AfterSpike>,
+    /// How long the membrane stays at 0 after a spike, ms.
+    #[serde(default)]
+    pub refractory: f64,
+    /// Step of the grid, from the pattern's start on, ms.
+    pub step_ms: f64,
+    /// Chronotron: which of its rules.
+    #[serde(default)]
+    pub rule: Option<ChronotronRule>,
+    /// FILT: time constant of the filter, ms. E-learning: scale of the cost of a move, ms, `tau` where left out: pairs up to
+    /// `2 tau_q` apart are moved.
+    #[serde(default)]
+    pub tau_q: Option<f64>,
+    /// E-learning: weight of the moves, ms; `tau_q` where left out.
+    #[serde(default)]
+    pub gamma_r: Option<f64>,
+    /// ReSuMe: the change that every synapse gets, with or without an input.
+    #[serde(default)]
+    pub a: f64,
+    /// ReSuMe: height of the learning window.
+    #[serde(default)]
+    pub amplitude: Option<f64>,
+    /// ReSuMe: its time constant, ms; the membrane's where left out.
+    #[serde(default)]
+    pub tau_w: Option<f64>,
+    /// SPAN: time constant of the filter, ms.
+    #[serde(default)]
+    pub tau_a: Option<f64>,
+    /// PSD: slow time constant of the current, ms.
+    #[serde(default)]
+    pub tau_1: Option<f64>,
+    /// PSD: its fast one, ms.
+    #[serde(default)]
+    pub tau_2: Option<f64>,
+    /// FP: how far from its target a spike may lie, ms. HTP: how long before a target the neuron may fire, ms.
+    #[serde(default)]
+    pub window_ms: Option<f64>,
 }
 
-/// Parameters of the neuron that each rule has, and of its training.
-const NEURON: [&str; 5] = ["tau", "tau_s", "theta_0", "after_spike", "step_ms"];
-const TRAINING: [&str; 8] = ["eta", "epochs", "updates", "initial", "within_ms", "until_right", "seed", "max_seconds"];
-
-/// The defaults that all rules share.
-fn shared() -> Value {
-    json!({ "step_ms": 0.1, "within_ms": 1.0, "until_right": true, "seed": 0, "max_seconds": null })
-}
-
-impl Source {
-    fn named(name: &str) -> Option<&'static Self> {
-        SOURCES.iter().find(|source| source.name == name)
-    }
-
-    /// Names with what the source gives, and names that the caller must give.
-    fn split(&self) -> (Map<String, Value>, Vec<&'static str>) {
-        let mut parameters = Map::new();
-        for defaults in [shared(), (self.defaults)()] {
-            if let Value::Object(defaults) = defaults {
-                parameters.extend(defaults);
-            }
-        }
-        let names = NEURON.iter().chain(&TRAINING).chain(self.of_rule);
-        let required = names.copied().filter(|name| !parameters.contains_key(*name)).collect();
-        (parameters, required)
-    }
-}
+/// The window of FP, which must not be empty.
+const WINDOW: Parameter = Parameter { name: "window_ms", unit: "ms", range: Range::ABOVE_0 };
 
 impl EpochLearner {
-    /// The parameters of a rule, by its name, with those of its neuron and its training, in one list.
+    /// The names of all rules, as [`Name`] has them.
+    pub const NAMES: [&str; 8] = ["inst", "filt", "chronotron", "resume", "span", "psd", "fp", "htp"];
+
+    ranges! {
+        eta: "", Range::ABOVE_0;
+        initial: "mV", Range::FINITE;
+        within_ms: "ms", Range::ABOVE_0;
+        max_seconds: "s", Range::ABOVE_0;
+        tau: "ms", Range::ABOVE_0;
+        tau_s: "ms", Range::ABOVE_0;
+        theta_0: "mV", Range::ABOVE_0;
+        refractory: "ms", Range::FROM_0;
+        step_ms: "ms", Range::ABOVE_0;
+        tau_q: "ms", Range::ABOVE_0;
+        gamma_r: "ms", Range::ABOVE_0;
+        a: "", Range::FINITE;
+        amplitude: "", Range::ABOVE_0;
+        tau_w: "ms", Range::ABOVE_0;
+        tau_a: "ms", Range::ABOVE_0;
+        tau_1: "ms", Range::ABOVE_0;
+        tau_2: "ms", Range::ABOVE_0;
+        window_ms: "ms", Range::FROM_0;
+    }
+
+    /// The ranges of all parameters of all rules; the defaults of each are its class's.
     #[must_use]
-    pub fn described(name: &str) -> Option<Described> {
-        let source = Source::named(name)?;
-        let (defaults, required) = source.split();
-        let mut ranges = [SteppedNeuron::RANGES, Training::RANGES].concat();
-        ranges.push(SteppedNeuron::TIME_CONSTANT);
-        ranges.retain(|range| defaults.contains_key(range.name) || required.contains(&range.name));
-        ranges.extend(source.ranges.iter().copied().flatten());
-        Some(Described { defaults, required, ranges })
+    pub fn described(name: &str) -> Described {
+        let mut ranges = Self::RANGES.to_vec();
+        if name == "fp" {
+            ranges.retain(|range| range.name != WINDOW.name);
+            ranges.push(WINDOW);
+        }
+        Described { defaults: serde_json::Map::new(), required: vec![], ranges }
     }
 
-    /// The names of all rules.
-    pub fn names() -> impl Iterator<Item = &'static str> {
-        SOURCES.iter().map(|source| source.name)
-    }
-
-    /// The parts of a rule, as this crate reads them from JSON, of all its parameters in one list.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` for a name that is not known, or a parameter that is not known or missing.
-    pub fn parts(name: &str, parameters: Map<String, Value>) -> Result<Value> {
-        let Some(source) = Source::named(name) else {
-            let known: Vec<&str> = Self::names().collect();
-            return Err(problem!("rule {name}: must be one of {}", known.join(", ")));
-        };
-        let (mut all, required) = source.split();
-        for key in parameters.keys() {
-            if !all.contains_key(key) && !required.contains(&key.as_str()) {
-                return Err(problem!(key.as_str(); " is not known: {name} has no such parameter"));
-            }
+    /// The same with what is left out filled in.
+    #[must_use]
+    pub fn filled(mut self) -> Self {
+        if self.name == Name::Chronotron {
+            let of_rule =
+                if self.rule == Some(ChronotronRule::I) { AfterSpike::Membrane } else { AfterSpike::Subtract };
+            self.after_spike = self.after_spike.or(Some(of_rule));
+            self.tau_s = self.tau_s.or(Some(self.tau / 4.0));
+            self.tau_q = self.tau_q.or(Some(self.tau));
+            self.gamma_r = self.gamma_r.or(self.tau_q);
         }
-        all.extend(parameters);
-        if let Some(missing) = required.iter().find(|name| !all.contains_key(**name)) {
-            return Err(problem!(*missing; ": must be given, because the rule's publication does not state it"));
-        }
-        (source.arrange)(&mut all)?;
-        let take = |all: &Map<String, Value>, names: &[&str]| -> Value {
-            names.iter().filter_map(|name| all.get(*name).map(|value| ((*name).to_owned(), value.clone()))).collect()
-        };
-        let rule = all.remove("constants").unwrap_or_else(|| json!({ name: take(&all, source.of_rule) }));
-        let current = all.remove("current").unwrap_or_else(|| json!({ "exponential": take(&all, &["tau_s"]) }));
-        let mut neuron = take(&all, &["tau", "theta_0", "after_spike", "step_ms"]);
-        neuron["refractory"] = all.remove("refractory").unwrap_or(json!(0.0));
-        neuron["current"] = current;
-        Ok(json!({ "rule": rule, "neuron": neuron, "training": take(&all, &TRAINING) }))
+        self
     }
 
     /// Checks every parameter.
@@ -109,9 +174,75 @@ impl EpochLearner {
     ///
     /// `Problem`, naming the parameter, its value and what would be right.
     pub fn check(&self) -> Result<()> {
-        self.neuron.check()?;
-        self.training.check()?;
-        self.rule.check(&self.neuron)
+        self.parts().map(drop)
+    }
+
+    /// The rule and its neuron, checked.
+    fn parts(&self) -> Result<(Rule, SteppedNeuron)> {
+        self.check_ranges()?;
+        if let Some([low, high]) = self.initial
+            && low > high
+        {
+            return Err(problem!("initial"; " is {low} to {high} mV: must be two finite weights, the smaller first"));
+        }
+        let current = match (self.name, self.tau_s) {
+            (Name::Psd, None) => {
+                Current::DoubleExponential { tau_1: given("tau_1", self.tau_1)?, tau_2: given("tau_2", self.tau_2)? }
+            }
+            (_, tau_s) => Current::Exponential { tau_s: given("tau_s", tau_s)? },
+        };
+        let neuron = SteppedNeuron {
+            tau: self.tau,
+            current,
+            theta_0: self.theta_0,
+            after_spike: given("after_spike", self.after_spike)?,
+            refractory: self.refractory,
+            step_ms: self.step_ms,
+        };
+        neuron.check()?;
+        Ok((self.rule(&neuron)?, neuron))
+    }
+
+    fn rule(&self, neuron: &SteppedNeuron) -> Result<Rule> {
+        let (kernels, forgets) = (neuron.kernels(), neuron.after_spike == AfterSpike::Reset);
+        Ok(match self.name {
+            Name::Inst => Rule::Inst(kernels),
+            Name::Filt => {
+                let (tau_s, tau_q) = (given("tau_s", self.tau_s)?, given("tau_q", self.tau_q)?);
+                Rule::Filt { eps_0: peak_factor(self.tau, tau_s), tau: self.tau, tau_s, tau_q }
+            }
+            Name::Chronotron => match given("rule", self.rule)? {
+                ChronotronRule::E => {
+                    let (tau_q, gamma_r) = (given("tau_q", self.tau_q)?, given("gamma_r", self.gamma_r)?);
+                    Rule::ELearning { kernels, tau_q, gamma_r }
+                }
+                ChronotronRule::I => Rule::ILearning(kernels),
+            },
+            Name::Resume => Rule::Resume {
+                a: self.a,
+                amplitude: given("amplitude", self.amplitude)?,
+                tau_w: self.tau_w.unwrap_or(self.tau),
+            },
+            Name::Span => Rule::Span { tau_a: given("tau_a", self.tau_a)? },
+            Name::Psd => {
+                let (tau_1, tau_2) = (given("tau_1", self.tau_1)?, given("tau_2", self.tau_2)?);
+                if tau_2 >= tau_1 {
+                    return Err(problem!("tau_2"; " is {tau_2} ms: must be below tau_1, {tau_1} ms"));
+                }
+                Rule::Psd { peak: peak_factor(tau_1, tau_2), tau_1, tau_2 }
+            }
+            Name::Fp => {
+                let window = given(WINDOW.name, self.window_ms)?;
+                WINDOW.check(&window)?;
+                neuron.check_linear("FP")?;
+                Rule::Fp(Fp { kernels, window, forgets })
+            }
+            Name::Htp => {
+                neuron.check_linear("HTP")?;
+                let window = given(WINDOW.name, self.window_ms)?;
+                Rule::Htp(Htp { kernels, window, theta_0: self.theta_0, tau: self.tau, forgets })
+            }
+        })
     }
 
     /// Trains on patterns of the same trains, with one list of targets (ms, ascending) a pattern.
@@ -130,15 +261,11 @@ impl EpochLearner {
         report: &mut dyn FnMut(usize, f64),
         stop: Stop<'_>,
     ) -> Result<Trained> {
-        self.check()?;
-        taxel_core::learn::check_examples(
-            &Neuron { refractory: self.neuron.refractory, ..Neuron::default() },
-            patterns,
-            targets,
-        )?;
-        taxel_core::learn::check_some_target(targets)?;
-        patterns.iter().try_for_each(|pattern| check_ungraded(pattern, self.rule.name()))?;
-        self.rule.train(&self.neuron, &self.training, Examples { patterns, targets, start }, report, stop)
+        let (rule, neuron) = self.parts()?;
+        check_examples(&self.plain_neuron(), patterns, targets)?;
+        check_some_target(targets)?;
+        patterns.iter().try_for_each(|pattern| check_ungraded(pattern, self.reader()))?;
+        self.train(&rule, &neuron, Examples { patterns, targets, start }, report, stop)
     }
 
     /// The change of weights by one presentation, over the learning rate, and the output spikes in it (ms).
@@ -147,16 +274,15 @@ impl EpochLearner {
     ///
     /// `Problem` for parameters, weights, pattern or targets that make no sense.
     pub fn change(&self, weights: &[f64], pattern: &SpikeTrains, targets: &[f64]) -> Result<(Vec<f64>, Vec<f64>)> {
-        self.check()?;
+        let (rule, neuron) = self.parts()?;
         if targets.is_empty() {
             pattern.check()?;
         } else {
-            let neuron = Neuron { refractory: self.neuron.refractory, ..Neuron::default() };
-            taxel_core::learn::check_examples(&neuron, std::slice::from_ref(pattern), &[targets.to_vec()])?;
+            check_examples(&self.plain_neuron(), std::slice::from_ref(pattern), &[targets.to_vec()])?;
         }
-        check_ungraded(pattern, self.rule.name())?;
+        check_ungraded(pattern, self.reader())?;
         one_weight_a_train(weights, pattern.len())?;
-        self.rule.change(&self.neuron, weights, pattern, targets)
+        change_of(&rule, &neuron, weights, pattern, targets)
     }
 
     /// The output spikes of the rule's neuron with these weights, ms.
@@ -165,19 +291,26 @@ impl EpochLearner {
     ///
     /// `Problem` for parameters, weights or a pattern that make no sense; `Interrupted` where the caller stops it.
     pub fn run(&self, weights: &[f64], pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
-        check_ungraded(pattern, self.rule.name())?;
-        self.neuron.run(weights, pattern, stop)
-    }
-}
-
-impl SteppedNeuron {
-    /// The output spikes that weights make of a pattern, ms.
-    fn run(&self, weights: &[f64], pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
-        self.check()?;
+        let (_, neuron) = self.parts()?;
+        check_ungraded(pattern, self.reader())?;
         check_untargeted(pattern)?;
         one_weight_a_train(weights, pattern.len())?;
         let mut fired = Vec::new();
-        self.fire(weights, &self.lay_out(pattern, stop)?, &mut fired);
+        neuron.fire(weights, &neuron.lay_out(pattern, stop)?, &mut fired);
         Ok(fired)
     }
+
+    /// The neuron that says which targets are too close to each other.
+    fn plain_neuron(&self) -> Neuron {
+        Neuron { refractory: self.refractory, ..Neuron::default() }
+    }
+
+    fn reader(&self) -> &'static str {
+        Self::NAMES[self.name as usize]
+    }
+}
+
+/// A parameter that must be given.
+fn given<T>(name: &'static str, value: Option<T>) -> Result<T> {
+    value.ok_or_else(|| problem!(name; " is None: must be given"))
 }

@@ -1,12 +1,14 @@
-//! Exclusive by rules that learn by epochs: present each pattern, compare the output spikes with the targets, correct.
+//! Learning by epochs: present each pattern, compare the output spikes with the targets, correct.
 
 use rand::rngs::StdRng;
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
+use super::epoch_learner::EpochLearner;
+use super::rule::Rule;
 use super::stepped::{Laid, SteppedNeuron};
-use taxel_core::allowed::{Range, one_weight_a_train, ranges};
+use taxel_core::allowed::one_weight_a_train;
 use taxel_core::{Result, SpikeTrains, Stop, problem};
 
 /// When weights change.
@@ -17,28 +19,6 @@ pub enum Updates {
     Batch,
     /// After each pattern, in an order drawn anew each epoch.
     Pattern,
-}
-
-/// How a rule is trained.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Training {
-    /// Learning rate; `None` where the rule has a published one.
-    pub eta: Option<f64>,
-    /// Epochs at most.
-    pub epochs: usize,
-    /// When weights change.
-    pub updates: Updates,
-    /// First weights are drawn evenly between these two, mV; `None` where the rule has published ones.
-    pub initial: Option<[f64; 2]>,
-    /// A pattern is right where its output spikes are as many as its targets, each within this of its own, ms.
-    pub within_ms: f64,
-    /// Whether to end as soon as every pattern is right.
-    pub until_right: bool,
-    /// The seed of the first weights and of the order of patterns.
-    pub seed: u64,
-    /// The time after which the caller requests the best so far, s; this crate reads no clock.
-    pub max_seconds: Option<f64>,
 }
 
 /// How training ended.
@@ -78,42 +58,6 @@ pub(super) struct Correction {
     pub target: Option<usize>,
 }
 
-/// A rule that learns by epochs.
-pub(super) trait Rule {
-    /// The contribution of an input `since` ms before the spike (below 0: after it).
-    fn factor(&self, since: f64) -> f64;
-
-    /// The change that every synapse gets, with or without an input.
-    fn constant(&self) -> f64 {
-        0.0
-    }
-
-    /// Whether a synapse's change has the sign of its weight.
-    fn by_sign(&self) -> bool {
-        false
-    }
-
-    /// How weights shall change after a presentation in which these spikes were fired (ms, ascending); most rules, in the
-    /// form of Widrow and Hoff, add 1 at every target and take 1 off at every output spike.
-    fn correct(&self, presented: &Presented<'_>, weights: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
-        let _ = weights;
-        out.extend(presented.targets.iter().enumerate().map(|(k, &t)| Correction::at_target(k, t, 1.0)));
-        out.extend(fired.iter().map(|&t| Correction::new(t, -1.0)));
-    }
-
-    /// The published learning rate, for `trains` synapses and `targets` targets in all.
-    fn eta(&self, trains: usize, targets: usize) -> Option<f64> {
-        let _ = (trains, targets);
-        None
-    }
-
-    /// The published range of first weights.
-    fn initial(&self, trains: usize) -> Option<[f64; 2]> {
-        let _ = trains;
-        None
-    }
-}
-
 /// The patterns and targets to learn, and the first weights.
 pub(super) struct Examples<'a> {
     pub patterns: &'a [SpikeTrains],
@@ -148,7 +92,7 @@ pub(super) fn is_right(targets: &[f64], fired: &[f64], within: f64) -> bool {
 
 /// The change of weights by one presentation, over the learning rate, and the output spikes in it.
 pub(super) fn change_of(
-    rule: &impl Rule,
+    rule: &Rule,
     neuron: &SteppedNeuron,
     weights: &[f64],
     pattern: &SpikeTrains,
@@ -165,7 +109,7 @@ pub(super) fn change_of(
 
 /// Sums corrections, synapse by synapse. Factors at targets are computed once.
 fn add_up(
-    rule: &impl Rule,
+    rule: &Rule,
     presented: &Presented<'_>,
     weights: &[f64],
     corrections: &[Correction],
@@ -201,33 +145,11 @@ fn step(weights: &mut [f64], eta: f64, change: &[f64]) {
     }
 }
 
-impl Training {
-    ranges! {
-        eta: "", Range::ABOVE_0;
-        initial: "mV", Range::FINITE;
-        within_ms: "ms", Range::ABOVE_0;
-        max_seconds: "s", Range::ABOVE_0;
-    }
-
-    /// Checks every parameter.
-    ///
-    /// # Errors
-    ///
-    /// `Problem`, naming the parameter, its value and what would be right.
-    pub fn check(&self) -> Result<()> {
-        self.check_ranges()?;
-        if let Some([low, high]) = self.initial
-            && low > high
-        {
-            return Err(problem!("initial"; " is {low} to {high} mV: must be two finite weights, the smaller first"));
-        }
-        Ok(())
-    }
-
+impl EpochLearner {
     /// Trains a rule's neuron. Calls `report` with the number of epochs done and the share of patterns right.
     pub(super) fn train(
         &self,
-        rule: &impl Rule,
+        rule: &Rule,
         neuron: &SteppedNeuron,
         Examples { patterns, targets, start }: Examples<'_>,
         report: &mut dyn FnMut(usize, f64),
@@ -237,7 +159,7 @@ impl Training {
         let mut random = StdRng::seed_from_u64(self.seed);
         let eta = self
             .eta
-            .or_else(|| rule.eta(trains, targets.iter().map(Vec::len).sum()))
+            .or_else(|| rule.published_eta(trains, targets.iter().map(Vec::len).sum()))
             .ok_or_else(|| problem!("eta"; ": no learning rate was published for this rule; give one"))?;
         let mut weights = match start {
             Some(start) => {
@@ -245,7 +167,7 @@ impl Training {
                 start.to_vec()
             }
             None => {
-                let [low, high] = self.initial.or_else(|| rule.initial(trains)).ok_or_else(
+                let [low, high] = self.initial.or_else(|| rule.published_initial(trains)).ok_or_else(
                     || problem!("initial"; ": no first weights were published for this rule; give a range"),
                 )?;
                 (0..trains).map(|_| low + (high - low) * random.random::<f64>()).collect()

@@ -1,63 +1,25 @@
 //! HTP, high threshold projection (Memmesheimer, Rubin, Ölveczky and Sompolinsky 2014, Neuron 82:925).
 
-use serde::{Deserialize, Serialize};
-use serde_json::json;
-
-use super::epochs::{Correction, Presented, Rule};
-use super::source::Source;
-use super::stepped::{AfterSpike, Kernels, SteppedNeuron};
-use taxel_core::Result;
-use taxel_core::allowed::{Range, ranges};
+use super::epochs::{Correction, Presented};
+use super::stepped::Kernels;
 
 /// Output spikes are forced at the targets, so resets are known and each demand is linear in the weights: the potential
-/// reaches the threshold at every target, and stays below it at every other grid point, but for the last `window_ms`
+/// reaches the threshold at every target, and stays below it at every other grid point, but for the last `window`
 /// before a target. A perceptron corrects violated demands: it raises where a target is missed, lowers at the peak of every
 /// stretch above the threshold.
 ///
 /// With `after_spike` "reset" and no window these are the rows of CONE-X without bounds and threshold recovery.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Htp {
+pub(super) struct Htp {
+    pub(super) kernels: Kernels,
     /// How long before a target the neuron may fire, ms.
-    pub window_ms: f64,
-}
-
-/// The defaults of its source.
-pub(super) const SOURCE: Source = Source {
-    name: "htp",
-    of_rule: &["window_ms"],
-    ranges: &[Htp::RANGES],
-    defaults: || json!({ "after_spike": "reset" }),
-    arrange: |_| Ok(()),
-};
-
-pub(super) struct HtpRule {
-    kernels: Kernels,
-    window: f64,
-    theta_0: f64,
-    forgets: bool,
-    tau: f64,
+    pub(super) window: f64,
+    pub(super) theta_0: f64,
+    pub(super) tau: f64,
+    /// Whether an output spike discards all inputs before it.
+    pub(super) forgets: bool,
 }
 
 impl Htp {
-    ranges! {
-        window_ms: "ms", Range::FROM_0;
-    }
-
-    pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<HtpRule> {
-        self.check_ranges()?;
-        neuron.check_linear("HTP")?;
-        Ok(HtpRule {
-            kernels: neuron.kernels(),
-            window: self.window_ms,
-            theta_0: neuron.theta_0,
-            forgets: neuron.after_spike == AfterSpike::Reset,
-            tau: neuron.tau,
-        })
-    }
-}
-
-impl HtpRule {
     /// The potential at `t`, given output spikes at the targets before it.
     fn potential(&self, presented: &Presented<'_>, weights: &[f64], t: f64) -> f64 {
         let earlier = || presented.targets.iter().copied().take_while(|&e| e < t);
@@ -81,14 +43,8 @@ impl HtpRule {
         let last = presented.targets.iter().copied().take_while(|&e| e < t).last();
         last.filter(|_| self.forgets).unwrap_or(f64::NEG_INFINITY)
     }
-}
 
-impl Rule for HtpRule {
-    fn factor(&self, since: f64) -> f64 {
-        self.kernels.value(since)
-    }
-
-    fn correct(&self, presented: &Presented<'_>, weights: &[f64], _: &[f64], out: &mut Vec<Correction>) {
+    pub(super) fn correct(&self, presented: &Presented<'_>, weights: &[f64], out: &mut Vec<Correction>) {
         const ROUNDING: f64 = 1e-12;
         for (k, &t) in presented.targets.iter().enumerate() {
             if self.potential(presented, weights, t) < self.theta_0 * (1.0 - ROUNDING) {

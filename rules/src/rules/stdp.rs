@@ -14,6 +14,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::crossing;
 use crate::checks::check_ungraded;
 use taxel_core::allowed::{Range, one_weight_a_train};
 use taxel_core::parameters::parameters;
@@ -206,14 +207,7 @@ impl StdpNeuron {
                 return None;
             }
         }
-        let mut from = 0.0;
-        loop {
-            let middle = 0.5 * (from + until);
-            if middle <= from || middle >= until {
-                return Some(until);
-            }
-            if self.at(middle) < threshold { from = middle } else { until = middle }
-        }
+        Some(crossing(until, |since| self.at(since) >= threshold))
     }
 
     /// The potential `since` ms after `now`.

@@ -2,14 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use taxel_core::allowed::{Parameter, Range, ranges};
 use taxel_core::neuron::{Grid, MOST_LAID_OUT, check_points, points_between};
 use taxel_core::{Result, SpikeTrains, Stop, problem};
 
 /// The current into the membrane after an input.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Current {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Current {
     /// A current `e^{-s/tau_s}`, scaled so that the potential of one input of weight 1 peaks at 1 mV: it is the double
     /// exponential `V0 (e^{-s/tau} - e^{-s/tau_s})` of Tempotron, Chronotron, INST and FILT.
     Exponential {
@@ -38,9 +36,8 @@ pub enum AfterSpike {
 }
 
 /// A leaky membrane, compared with its threshold every `step_ms`; inputs keep their true times.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SteppedNeuron {
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct SteppedNeuron {
     /// Membrane time constant, ms.
     pub tau: f64,
     /// The current that drives it.
@@ -144,30 +141,16 @@ impl Kernels {
 }
 
 impl SteppedNeuron {
-    ranges! {
-        tau: "ms", Range::ABOVE_0;
-        theta_0: "mV", Range::ABOVE_0;
-        refractory: "ms", Range::FROM_0;
-        step_ms: "ms", Range::ABOVE_0;
-    }
-
-    /// A time constant of its current.
-    pub(super) const TIME_CONSTANT: Parameter = Parameter { name: "tau_s", unit: "ms", range: Range::ABOVE_0 };
-
-    /// Checks every parameter.
+    /// Checks what its parameters, each in its range, are to each other.
     ///
     /// # Errors
     ///
     /// `Problem`, naming the parameter, its value and what would be right.
-    pub fn check(&self) -> Result<()> {
-        self.check_ranges()?;
+    pub(super) fn check(&self) -> Result<()> {
         let (names, values) = match self.current {
             Current::Exponential { tau_s } => (["tau", "tau_s"], [self.tau, tau_s]),
             Current::DoubleExponential { tau_1, tau_2 } => (["tau_1", "tau_2"], [tau_1, tau_2]),
         };
-        for (name, value) in names.into_iter().zip(values) {
-            Parameter { name, ..Self::TIME_CONSTANT }.check(&value)?;
-        }
         if values[1] >= values[0] {
             return Err(problem!(names[1]; " is {} ms: must be below {}, {} ms", values[1], names[0], values[0]));
         }

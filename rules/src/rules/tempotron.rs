@@ -6,6 +6,7 @@ use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
+use super::crossing;
 use super::epochs::{Ended, Trained};
 use crate::checks::{check_ungraded, check_untargeted};
 use taxel_core::allowed::{Range, one_weight_a_train};
@@ -126,7 +127,7 @@ impl Tempotron {
                     (best.v_max, best.t_max) = (v, at);
                 }
                 if v >= self.theta_0 {
-                    best.t_spike = Some(t + crossing(shape, state, at - t, self.theta_0));
+                    best.t_spike = Some(t + crossing(at - t, |since| shape.after(state, since).b >= self.theta_0));
                     // Later inputs are shunted, so the potential rises on to its maximum.
                     best.t_max = (t + summit).min(events.stop);
                     best.v_max = shape.after(state, best.t_max - t).b;
@@ -267,19 +268,6 @@ fn summit(shape: &Shape, state: KernelSum) -> f64 {
     let slow = shape.scale * state.a;
     let ratio = (slow - state.b) * shape.tau / (slow * shape.tau_s);
     if slow > 0.0 { ratio.ln() / shape.rate } else { f64::INFINITY }
-}
-
-/// How long after `state` the potential, which rises until `end`, reaches the threshold, ms.
-fn crossing(shape: &Shape, state: KernelSum, end: f64, threshold: f64) -> f64 {
-    let (mut low, mut high) = (0.0, end);
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        if middle <= low || middle >= high {
-            break;
-        }
-        if shape.after(state, middle).b >= threshold { high = middle } else { low = middle }
-    }
-    high
 }
 
 fn check_labelled(patterns: &[SpikeTrains], labels: &[bool]) -> Result<()> {
