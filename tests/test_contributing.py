@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusal import refused
 
 import taxel
 import taxel_studies
@@ -45,7 +46,7 @@ def test_what_contributing_says_of_a_format_is_enough(tmp_path: Path, monkeypatc
         recording = taxel.open(path)
         assert (recording.kind, recording.frames().values[3, 0, 0]) == (name, 3.0)
         path.write_text("t_us force_n\n0 four\n")
-        with pytest.raises(taxel.FormatError, match=r"walk\.channel"):
+        with refused(taxel.FormatError):
             taxel.open(path)
     finally:
         opening._from_elsewhere.cache_clear()
