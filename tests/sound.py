@@ -431,6 +431,7 @@ LEFT_OUT = {
     *("Margin", "Multipliers", "Row", "Summary", "Matching", "TakenRest", "Status", "Received"),
     *("BoardCheck", "Difference", "Finding", "PatternCheck", "RestCheck", "Greeting", "Port", "Training.command"),
     "check_board",
+    "Workers.run",
     *("Device.apply", "Device.record", "Live.source_address", "Live.zero", "Live.record", "Live.sample", "Live.note"),
     *(
         "Live.expect_version",

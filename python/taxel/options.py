@@ -25,6 +25,16 @@ if TYPE_CHECKING:
     from taxel.detect import Recipe
     from taxel.encode import Encoder
 
+__all__ = [
+    "CalibrateOptions",
+    "DetectOptions",
+    "EncodeOptions",
+    "GivenTare",
+    "InformationOptions",
+    "Settings",
+    "TrainOptions",
+]
+
 #: A tare, the file of one, a recording at rest, or how many seconds at the beginning of a recording are at rest.
 GivenTare: TypeAlias = Tare | str | os.PathLike[str] | float
 
@@ -219,7 +229,7 @@ class DetectOptions:
         finite("frame_us", 1.0 if self.frame_us is None else self.frame_us, "us", least=1.0, most=3.6e9)
         finite("window_ms", self.window_ms, "ms", least=0.0)
         check_shift(self.shift_ms)
-        if self.use != "better":
+        if not isinstance(self.use, str) or self.use != "better":
             from taxel.detect.readout import USES  # noqa: PLC0415  loads slowly
 
             text("use", self.use, USES)

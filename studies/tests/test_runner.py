@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from taxel import DeviceError, ProblemError
-from taxel_studies.runner import HERE, Results, Task, Workers, run
+from taxel_studies.runner import Results, Task, Workers, run
 
 CALLS: list[int] = []
 
@@ -32,7 +32,7 @@ def stops_at_three(params: dict, seed: int) -> dict:
 
 def workers(backend: str) -> Workers:
     if backend == "here":
-        return HERE
+        return Workers()
     pytest.importorskip({"loky": "joblib", "dask": "distributed", "ray": "ray"}[backend])
     return Workers(2, backend)
 
@@ -162,8 +162,8 @@ def test_a_dask_scheduler_that_is_not_there_is_told(tmp_path):
 
 @pytest.mark.parametrize("backend", ["dask", "ray"])
 def test_a_backend_that_is_not_installed_names_its_extra(monkeypatch, backend):
-    monkeypatch.setattr("taxel_studies.runner.find_spec", lambda name: None)
-    with pytest.raises(ProblemError, match=r'pip install "taxel\[cluster\]"'):
+    monkeypatch.setattr("taxel._base.parallel.find_spec", lambda name: None)
+    with pytest.raises(ProblemError, match=r"taxel\[cluster\]"):
         Workers(backend=backend)
 
 

@@ -115,24 +115,6 @@ def test_labels_of_a_folder_are_of_the_bag_that_they_name(capsys, tmp_path):
         assert "contact, neuron: 5 of 5 found" in page.since_asked("trained")["text"]
     opened_as = {one.name: [note.t for note in one.notes] for one in taxel.open_all(folder, topic="/palm")}
     assert opened_as == times | {"b.bag": [times["b.bag"][0] + 10_000, *times["b.bag"][1:]]}
-    for words in ((), ("--labels", folder / "labels.csv")):
-        out = ("--folds", 0, "-o", tmp_path / "r.json", "--overwrite")
-        code, said, _ = call(capsys, "train", folder, *words, *how, *out)
-        assert (code, "10 of 10 found" in said) == (0, True)
-    for head, row, reason in (
-        (
-            "label,t_us",
-            f"contact,{times['a.bag'][0]}",
-            "there are 2 recordings; state it in the column recording",
-        ),
-        ("recording,label,t_us", f"c.bag,contact,{times['a.bag'][0]}", "c.bag is not a recording of this folder"),
-        ("recording,label,t_us", "a.bag,contact,480000000", "a.bag: has 1 note, none within"),
-    ):
-        (folder / "b.notes.csv").unlink(missing_ok=True)
-        (folder / "labels.csv").write_text(f"{head}\n{row}\n")
-        code, _, errors = call(capsys, "train", folder, *how, "-o", tmp_path / "r.json", "--overwrite")
-        assert code == 2
-        assert reason in errors
 
 
 def test_a_layout_and_a_rate_are_those_of_the_page(tmp_path):
@@ -241,8 +223,3 @@ def test_labels_of_a_trial_are_its_own_and_training_takes_the_labelled_trials(ca
     assert len(table) == 11
     notes = [len(one.notes) for one in taxel.open_all(file)]
     assert notes == [5, 0, 5, 0]
-    code, said, errors = call(
-        capsys, "train", file, "--labels", "notes", "--rate-hz", 100, "-o", tmp_path / "again.json", "--json"
-    )
-    assert (code, len(json.loads(said)["recordings"])) == (0, 2)
-    assert "left out 2 of its 4 trials" in errors

@@ -126,9 +126,10 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
                 "use frames of counts (window_ms = 5 in [event_camera] of a layout file) and the recipe event_counts"
             )
     for each, events in zip(opened, labelled, strict=True):
-        if like := _like_labels(recorded(each), events):
-            right = "if they hold labels, not readings, leave them out (leave_out in a layout file)"
-            warn(f"{each.name}: {', '.join(like)} changes with the labels and hardly else; {right}")
+        like = _like_labels(recorded(each), events)
+        if len(like) == 1:
+            right = "if it holds labels, not readings, leave it out (leave_out in a layout file)"
+            warn(f"{each.name}: {like[0]} alone changes with the labels and hardly else; {right}")
     unlabelled = sources_without(labels, opened, labelled)
     labelled = [moved(events, each, options.shift_ms) for events, each in zip(labelled, opened, strict=True)]
     names = sorted({label for events in labelled for label in events})

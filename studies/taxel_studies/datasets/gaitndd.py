@@ -63,6 +63,8 @@ def trials(path: Path) -> Iterator[Trial]:
         raise FormatError(f"{path.name}: must state signals of format 212, their rate and samples: {error}") from None
     for name, first, checksum in signals:
         file = path.parent / Path(name).name
+        if not file.is_file():
+            raise FormatError(f"{path.name}: names the signal file {file.name!r}, which is not beside it")
         values = _samples(file, samples, first, checksum)
         valid = np.flatnonzero(values != NO_SAMPLE)
         foot = {".let": "left", ".rit": "right"}.get(file.suffix, "")
