@@ -24,7 +24,7 @@ from taxel.reading import Facts, InMemory, Marks
 __all__ = ["DataSet", "Trial", "data_set", "files", "numbers", "readers", "scored_around", "stances", "table", "trials"]
 
 #: The errors of pandas, NumPy and gzip at a damaged file.
-DAMAGE = (ValueError, KeyError, EOFError, gzip.BadGzipFile, zipfile.BadZipFile, zlib.error)
+DAMAGE = (ValueError, KeyError, EOFError, NotImplementedError, gzip.BadGzipFile, zipfile.BadZipFile, zlib.error)
 #: Detections are scored from this time before the first reference event to this time after the last one, us.
 MARGIN_US = 100_000
 
