@@ -1,6 +1,7 @@
 //! The rules that others published, for comparison: each with its own neuron, as its paper has it.
 
 mod chronotron;
+mod corrections;
 mod epoch_learner;
 mod epochs;
 mod fp;
@@ -11,8 +12,7 @@ mod stdp;
 mod stepped;
 mod tempotron;
 
-pub use epoch_learner::EpochLearner;
-pub use epochs::{Ended, Trained};
+pub use epoch_learner::{Ended, EpochLearner, Trained};
 pub use skim::Skim;
 pub use stdp::{Stdp, StdpNeuron};
 pub use tempotron::Tempotron;

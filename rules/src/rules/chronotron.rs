@@ -1,6 +1,6 @@
 //! E-learning of the Chronotron (Florian 2012, PLoS ONE 7(8) e40233).
 
-use super::epochs::Correction;
+use super::corrections::Correction;
 
 /// Corrections down the gradient of a Victor-Purpura distance whose moves cost `(dt / tau_q)^2 / 2`.
 ///

@@ -2,10 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::epochs::{Examples, Trained, Updates, change_of};
 use super::fp::Fp;
 use super::htp::Htp;
-use super::rule::Rule;
+use super::rule::{Rule, change_of};
 use super::stepped::{AfterSpike, Current, SteppedNeuron, peak_factor};
 use crate::checks::{check_ungraded, check_untargeted};
 use taxel_core::allowed::{Parameter, Range, one_weight_a_train, ranges};
@@ -43,6 +42,47 @@ pub enum ChronotronRule {
     E,
     /// I-learning.
     I,
+}
+
+/// When weights change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Updates {
+    /// Once an epoch, by the sum over its patterns (Gardner and Grüning 2016).
+    Batch,
+    /// After each pattern, in an order drawn anew each epoch.
+    Pattern,
+}
+
+/// How training ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// Every pattern was right.
+    Right,
+    /// All epochs were used up.
+    Epochs,
+    /// The caller requested a stop.
+    Stopped,
+}
+
+/// The result of training.
+#[derive(Debug, Clone)]
+pub struct Trained {
+    /// The weights with most patterns right, the latest such; mV.
+    pub weights: Vec<f64>,
+    /// The share of patterns right after 0, 1, 2 ... epochs.
+    pub right: Vec<f64>,
+    /// After how many epochs the weights were those.
+    pub best_epoch: usize,
+    /// How it ended.
+    pub ended: Ended,
+}
+
+/// The patterns and targets to learn, and the first weights.
+pub(super) struct Examples<'a> {
+    pub patterns: &'a [SpikeTrains],
+    pub targets: &'a [Vec<f64>],
+    pub start: Option<&'a [f64]>,
 }
 
 /// A rule, the neuron that it trains, and how, in one list; a rule's class in Python has those that it needs, and what its

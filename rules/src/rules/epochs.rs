@@ -3,140 +3,17 @@
 use rand::rngs::StdRng;
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
-use serde::{Deserialize, Serialize};
 
-use super::epoch_learner::EpochLearner;
-use super::rule::Rule;
+use super::corrections::Presented;
+use super::epoch_learner::{Ended, EpochLearner, Examples, Trained, Updates};
+use super::rule::{Rule, add_up};
 use super::stepped::{Laid, SteppedNeuron};
 use taxel_core::allowed::one_weight_a_train;
-use taxel_core::{Result, SpikeTrains, Stop, problem};
-
-/// When weights change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Updates {
-    /// Once an epoch, by the sum over its patterns (Gardner and Grüning 2016).
-    Batch,
-    /// After each pattern, in an order drawn anew each epoch.
-    Pattern,
-}
-
-/// How training ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ended {
-    /// Every pattern was right.
-    Right,
-    /// All epochs were used up.
-    Epochs,
-    /// The caller requested a stop.
-    Stopped,
-}
-
-/// The result of training.
-#[derive(Debug, Clone)]
-pub struct Trained {
-    /// The weights with most patterns right, the latest such; mV.
-    pub weights: Vec<f64>,
-    /// The share of patterns right after 0, 1, 2 ... epochs.
-    pub right: Vec<f64>,
-    /// After how many epochs the weights were those.
-    pub best_epoch: usize,
-    /// How it ended.
-    pub ended: Ended,
-}
-
-/// One correction of all weights: `amount (constant + sum over inputs of factor(t - t_ij))`, by the rule's own factor.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Correction {
-    /// When, ms.
-    pub t: f64,
-    /// By how much; above 0 it raises weights.
-    pub amount: f64,
-    /// Only inputs after this count, ms.
-    pub after: f64,
-    /// The number of its target, where it is at one: the factors there are the same each epoch.
-    pub target: Option<usize>,
-}
-
-/// The patterns and targets to learn, and the first weights.
-pub(super) struct Examples<'a> {
-    pub patterns: &'a [SpikeTrains],
-    pub targets: &'a [Vec<f64>],
-    pub start: Option<&'a [f64]>,
-}
-
-/// One pattern, presented to one neuron.
-pub(super) struct Presented<'a> {
-    pub neuron: &'a SteppedNeuron,
-    pub laid: &'a Laid,
-    pub trains: &'a SpikeTrains,
-    pub targets: &'a [f64],
-}
-
-impl Correction {
-    /// A correction that all earlier inputs share in.
-    pub(super) fn new(t: f64, amount: f64) -> Self {
-        Self { t, amount, after: f64::NEG_INFINITY, target: None }
-    }
-
-    /// The same at target `k`.
-    pub(super) fn at_target(k: usize, t: f64, amount: f64) -> Self {
-        Self { target: Some(k), ..Self::new(t, amount) }
-    }
-}
+use taxel_core::{Result, Stop, problem};
 
 /// Whether output spikes are as many as targets, each within `within` ms of its own.
 pub(super) fn is_right(targets: &[f64], fired: &[f64], within: f64) -> bool {
     targets.len() == fired.len() && targets.iter().zip(fired).all(|(t, f)| (t - f).abs() <= within)
-}
-
-/// The change of weights by one presentation, over the learning rate, and the output spikes in it.
-pub(super) fn change_of(
-    rule: &Rule,
-    neuron: &SteppedNeuron,
-    weights: &[f64],
-    pattern: &SpikeTrains,
-    targets: &[f64],
-) -> Result<(Vec<f64>, Vec<f64>)> {
-    let laid = neuron.lay_out(pattern, Stop::never())?;
-    let presented = Presented { neuron, laid: &laid, trains: pattern, targets };
-    let (mut fired, mut corrections, mut change) = (Vec::new(), Vec::new(), vec![0.0; weights.len()]);
-    neuron.fire(weights, &laid, &mut fired);
-    rule.correct(&presented, weights, &fired, &mut corrections);
-    add_up(rule, &presented, weights, &corrections, &mut vec![None; targets.len()], &mut change);
-    Ok((change, fired))
-}
-
-/// Sums corrections, synapse by synapse. Factors at targets are computed once.
-fn add_up(
-    rule: &Rule,
-    presented: &Presented<'_>,
-    weights: &[f64],
-    corrections: &[Correction],
-    at_targets: &mut [Option<Vec<f64>>],
-    change: &mut [f64],
-) {
-    let factor = |n: usize, t: f64, after: f64| {
-        let inputs = presented.trains.train(n).iter().filter(|&&input| input > after);
-        rule.constant() + inputs.map(|input| rule.factor(t - input)).sum::<f64>()
-    };
-    let signed = |n: usize, value: f64| if rule.by_sign() && weights[n] < 0.0 { -value } else { value };
-    for c in corrections {
-        match c.target {
-            Some(k) => {
-                let factors =
-                    at_targets[k].get_or_insert_with(|| (0..change.len()).map(|n| factor(n, c.t, c.after)).collect());
-                for (n, change) in change.iter_mut().enumerate() {
-                    *change += signed(n, c.amount * factors[n]);
-                }
-            }
-            None => {
-                for (n, change) in change.iter_mut().enumerate() {
-                    *change += signed(n, c.amount * factor(n, c.t, c.after));
-                }
-            }
-        }
-    }
 }
 
 fn step(weights: &mut [f64], eta: f64, change: &[f64]) {

@@ -1,6 +1,6 @@
 //! FP-learning: finite precision (Memmesheimer, Rubin, Ölveczky and Sompolinsky 2014, Neuron 82:925).
 
-use super::epochs::Correction;
+use super::corrections::Correction;
 use super::stepped::Kernels;
 
 /// Only the *first* error of a trial changes weights, by the potential that each input makes there; the trial then ends.

@@ -1,6 +1,6 @@
 //! HTP, high threshold projection (Memmesheimer, Rubin, Ölveczky and Sompolinsky 2014, Neuron 82:925).
 
-use super::epochs::{Correction, Presented};
+use super::corrections::{Correction, Presented};
 use super::stepped::Kernels;
 
 /// Output spikes are forced at the targets, so resets are known and each demand is linear in the weights: the potential

@@ -1,10 +1,11 @@
 //! The rules that learn spike times by epochs, ready to compute.
 
 use super::chronotron;
-use super::epochs::{Correction, Presented};
+use super::corrections::{Correction, Presented};
 use super::fp::Fp;
 use super::htp::Htp;
-use super::stepped::Kernels;
+use super::stepped::{Kernels, SteppedNeuron};
+use taxel_core::{Result, SpikeTrains, Stop};
 
 /// A rule with its constants.
 ///
@@ -104,5 +105,54 @@ impl Rule {
 
     fn is_of_gardner(&self) -> bool {
         matches!(self, Self::Inst(_) | Self::Filt { .. })
+    }
+}
+
+/// The change of weights by one presentation, over the learning rate, and the output spikes in it.
+pub(super) fn change_of(
+    rule: &Rule,
+    neuron: &SteppedNeuron,
+    weights: &[f64],
+    pattern: &SpikeTrains,
+    targets: &[f64],
+) -> Result<(Vec<f64>, Vec<f64>)> {
+    let laid = neuron.lay_out(pattern, Stop::never())?;
+    let presented = Presented { neuron, laid: &laid, trains: pattern, targets };
+    let (mut fired, mut corrections, mut change) = (Vec::new(), Vec::new(), vec![0.0; weights.len()]);
+    neuron.fire(weights, &laid, &mut fired);
+    rule.correct(&presented, weights, &fired, &mut corrections);
+    add_up(rule, &presented, weights, &corrections, &mut vec![None; targets.len()], &mut change);
+    Ok((change, fired))
+}
+
+/// Sums corrections, synapse by synapse. Factors at targets are computed once.
+pub(super) fn add_up(
+    rule: &Rule,
+    presented: &Presented<'_>,
+    weights: &[f64],
+    corrections: &[Correction],
+    at_targets: &mut [Option<Vec<f64>>],
+    change: &mut [f64],
+) {
+    let factor = |n: usize, t: f64, after: f64| {
+        let inputs = presented.trains.train(n).iter().filter(|&&input| input > after);
+        rule.constant() + inputs.map(|input| rule.factor(t - input)).sum::<f64>()
+    };
+    let signed = |n: usize, value: f64| if rule.by_sign() && weights[n] < 0.0 { -value } else { value };
+    for c in corrections {
+        match c.target {
+            Some(k) => {
+                let factors =
+                    at_targets[k].get_or_insert_with(|| (0..change.len()).map(|n| factor(n, c.t, c.after)).collect());
+                for (n, change) in change.iter_mut().enumerate() {
+                    *change += signed(n, c.amount * factors[n]);
+                }
+            }
+            None => {
+                for (n, change) in change.iter_mut().enumerate() {
+                    *change += signed(n, c.amount * factor(n, c.t, c.after));
+                }
+            }
+        }
     }
 }

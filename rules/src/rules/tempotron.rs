@@ -7,7 +7,7 @@ use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 use super::crossing;
-use super::epochs::{Ended, Trained};
+use super::epoch_learner::{Ended, Trained};
 use crate::checks::{check_ungraded, check_untargeted};
 use taxel_core::allowed::{Range, one_weight_a_train};
 use taxel_core::neuron::{Kernel, KernelSum, Shape, Step};
