@@ -96,14 +96,6 @@ def serial_line() -> str:
     return os.ttyname(other)
 
 
-def frames_pipe() -> Any:
-    """Return a pipe with the line that describes frames, and no frame."""
-    read, write = os.pipe()
-    with os.fdopen(write, "wb") as end:
-        end.write(b'{"rows": 4, "columns": 4, "rate": 100, "bits": 8}\n')
-    return os.fdopen(read, "rb")
-
-
 @cache
 def live() -> Any:
     """Return what has listened live, once for all calls, and has stopped: `next` then returns at once."""
@@ -144,7 +136,6 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "LocalLoad": lambda: taxel.encode.LocalLoad(tare=TARE),
     "Neuron": taxel.Neuron,
     "OnlineConeR": lambda: learn.OnlineConeR(neuron=taxel.Neuron(tau=5.0), window=3, ub=1.0).fit([PLAIN], [[5.0]]),
-    "Pipe": lambda: simulate.Pipe(frames_pipe()),
     "PlainRule": lambda: RULE,
     "PlainScore": lambda: detect.PlainScore({"a": RULE, "b": None}, SCORE),
     "Readout": lambda: READOUT,
@@ -327,7 +318,6 @@ VALUES: dict[str, Callable[[], Any]] = {
     "Neuron.run_many.weights": lambda: [[1.0, 1.0], [0.5, 0.5]],
     "OnlineConeR.partial_fit.pattern": lambda: PLAIN,
     "OnlineConeR.partial_fit.targets": lambda: [5.0],
-    "Pipe.source": frames_pipe,
     "Places.x": lambda: [0.0, 1.0],
     "Places.y": lambda: [0.0, 0.0],
     "Readout.load.path": lambda: "here_readout.json",

@@ -30,7 +30,6 @@ def test_a_check_of_the_simulated_board_finds_what_is_wrong_and_nothing_else(tmp
             over.set()
             thread.join()
     faults = [finding.name for finding in check.findings if finding.good is False]
-    assert faults == (["ramp end"] if loose else []), check.findings
-    assert check.pattern.events > 200
-    assert check.pattern.speed < 0.5
-    assert check.rest.full.sum() == COLUMNS * len(loose)
+    assert faults == (["rest"] if loose else []), check.findings
+    rest = check.findings[-1].text
+    assert (f"{COLUMNS} taxels stay at the ramp's end" in rest) == bool(loose)

@@ -27,8 +27,6 @@ TYPED = [
     ("record", "--port", "0", "nowhere/a.mcap"),
     ("emulate", "--truth", "nowhere/x.csv"),
     ("emulate", "--speed", "2"),
-    ("emulate", "--noise-floor", "2"),
-    ("emulate", "--baud", "9600"),
     ("info", "nowhere/a.mcap"),
     ("info", "none.mcap"),
     ("info", "walk.npz", "--tare", "0,5"),

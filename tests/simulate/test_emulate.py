@@ -2,7 +2,6 @@
 
 import itertools
 import json
-import os
 import socket
 import subprocess
 import sys
@@ -17,11 +16,9 @@ from shell import run
 
 import taxel
 from taxel import ProblemError, wire
-from taxel._base.errors import Place
 from taxel.cli.emulate import _HELD_S, _TruthTable
 from taxel.demo.script import endless, script
-from taxel.device import Device
-from taxel.simulate import Board, Faults, Flaws, Pipe, Replay, Silence, Version2, emulate, play, truth
+from taxel.simulate import Board, Faults, Flaws, Replay, Silence, Version2, emulate, play, truth
 from taxel.simulate.circuit import Circuit, Converter, VirtualGround
 from taxel.simulate.emulator_report import EmulatorReport
 from taxel.wire import Registers
@@ -216,89 +213,6 @@ def test_frames_are_played_by_the_boards_rules(listener):
     events = wire.decode(b"".join(heard.all()))
     assert [(e.x, e.y, e.intensity) for e in events] == [(4, 3, 75), (4, 3, 150)]
     assert events.t.tolist() == pytest.approx([5000, 10_000], abs=600)
-
-
-def test_another_sensors_frames_come_through_a_pipe(listener, tmp_path):
-    heard = Heard(listener)
-    read, write = os.pipe()
-    rng = np.random.default_rng(2)
-    frames = rng.integers(0, 4096, (30, 5, 3)).astype("<u2")
-    with os.fdopen(read, "rb") as source, os.fdopen(write, "wb") as sink:
-        about = {"rows": 5, "columns": 3, "rate": 100, "bits": 12, "name": "five"}
-        sink.write(json.dumps(about).encode() + b"\n")
-        sink.flush()
-        pipe = Pipe(source, noise_floor=0)
-        assert (pipe.array.shape, pipe.array.name, pipe.shift) == ((5, 3), "five", 0)
-        threading.Thread(target=lambda: (sink.write(frames.tobytes()), sink.close())).start()
-        report = emulate(heard.to, pipe, version_2=Version2(states_us=0))
-    assert report.frames == 30
-    decoder = taxel.wire.Decoder(2, array=pipe.array)
-    shown = []
-    for datagram in heard.all():
-        events = decoder.push(datagram)
-        shown += list(events)
-    times = sorted({e.t for e in shown})
-    assert np.allclose(np.diff(times), 10_000, atol=2)
-    assert (decoder.held == frames[-1]).all()
-    for bad in (b"rows 5\n", b'{"rows": 5}\n', b""):
-        path = tmp_path / "bad"
-        path.write_bytes(bad)
-        with path.open("rb") as source, refused(taxel.FormatError, place=Place("standard input", line=1)):
-            Pipe(source)
-    path.write_bytes(b'{"rows": 5, "columns": 300, "rate": 100, "bits": 12}\n')
-    with path.open("rb") as source, refused(place=Place("standard input", line=1)):
-        Pipe(source)
-    with path.open("wb") as sink:
-        sink.write(json.dumps(about).encode() + b"\n" + frames.tobytes()[:-3])
-    with path.open("rb") as source, refused(taxel.FormatError):
-        emulate(heard.to, Pipe(source))
-
-
-def test_commands_are_answered_while_a_pipe_brings_nothing(tmp_path):
-    line = tmp_path / "line"
-    emulate = [sys.executable, "-m", "taxel", "emulate", "--pipe", "--port", "9", "--control", "0", "--line", str(line)]
-    board = subprocess.Popen(emulate, stdin=subprocess.PIPE, stderr=subprocess.PIPE, stdout=subprocess.PIPE)
-    try:
-        board.stdin.write(b'{"rows": 5, "columns": 3, "rate": 100, "bits": 12}\n')
-        board.stdin.flush()
-        said = iter(board.stderr.readline, b"")
-        control = next(words.split()[-1].decode() for words in said if words.startswith(b"commands are accepted"))
-        places = (control, str(line))
-        for place in places:
-            with Device(place, timeout=60) as device:
-                assert device.array.shape == (5, 3)
-                assert device.set(noise_floor=7).noise_floor == 7
-        # Half a frame is none, and the second is a pause like any other.
-        for piece in (bytes(20), bytes(10 + 7)):
-            board.stdin.write(piece)
-            board.stdin.flush()
-            with Device(control, timeout=60) as device:
-                assert device.registers.noise_floor == 7
-        board.stdin.write(bytes(30 - 7))
-        board.stdin.close()
-        assert board.wait(60) == 0
-        assert b"0 events" in board.stdout.read()
-    finally:
-        board.kill()
-        board.wait()
-
-
-def test_the_sync_line_says_its_edges(listener, tmp_path):
-    heard, path = Heard(listener), tmp_path / "sync.txt"
-    emulate(heard.to, [Silence(40.0)], seed=4, tare_ms=2.0, sync=path)
-    edges = [line.split() for line in path.read_text().splitlines()]
-    assert [level for _, level, _ in edges] == ["0", "1", "0"]
-    events = wire.decode(b"".join(heard.all()))
-    assert [float(t) // 100 * 100 for t, _, _ in edges[1:]] == [float(t) for t, _ in events.markers]
-    host = [int(ns) for _, _, ns in edges]
-    assert host == sorted(host)
-    with pytest.raises(FileExistsError):
-        emulate(heard.to, [Silence(40.0)], seed=4, tare_ms=2.0, sync=path)
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-    with open(os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)) as reader:
-        emulate("127.0.0.1:9", [Silence(40.0)], seed=4, tare_ms=2.0, sync=pipe)
-        assert [line.split()[1] for line in reader.read().splitlines()] == ["0", "1", "0"]
 
 
 def test_a_network_with_faults_is_noticed_by_the_host(listener):

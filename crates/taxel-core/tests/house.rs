@@ -62,7 +62,7 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
     (
         "taxel-python",
         &[
-            &["descriptors", "thread_state", "threaded"],
+            &["thread_state", "threaded"],
             &["cone_x"],
             &[
                 "calibration",

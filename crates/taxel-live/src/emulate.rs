@@ -1,16 +1,12 @@
 //! Runs the emulated board in real time: scans frames, sends datagrams and executes commands.
 
 mod control;
-mod feed;
-mod line;
 mod pace;
 mod replay;
 mod run;
 mod scenes;
-mod sync;
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
 use std::time::Instant;
 
 use serde::Serialize;
@@ -23,13 +19,10 @@ use crate::Result;
 use crate::capture::{SendCounts, Sender};
 use crate::latency::Quantiles;
 use control::CommandPort;
-pub use feed::PipedFrames;
-use line::PseudoTerminal;
 use pace::wake_sharply;
 pub use replay::Replay;
 use run::BoardRun;
 pub use scenes::Scenes;
-use sync::Sync;
 
 /// The input that an emulated board scans: a scene, a replayed recording, noise.
 pub trait Touch: Send {
@@ -40,16 +33,6 @@ pub trait Touch: Send {
     ///
     /// If the input cannot be played; the board then stops too.
     fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> Result<bool>;
-
-    /// Whether the next frame can be written now, or there is none. Waits for it for some milliseconds at most, so that
-    /// a board without a frame still executes its commands.
-    ///
-    /// # Errors
-    ///
-    /// As [`Touch::frame`].
-    fn has_frame(&mut self) -> Result<bool> {
-        Ok(true)
-    }
 
     /// Whether the last written frame is the final one, if that is known.
     ///
@@ -80,10 +63,6 @@ pub struct EmulatorOptions {
     /// Address of the command port: TCP in place of the UART, commands in, status lines out (`None`: no port). Port 0
     /// selects a free one.
     pub control: Option<SocketAddr>,
-    /// The serial line: the path of its name (a link to a pseudo-terminal), and its baud rate.
-    pub line: Option<(PathBuf, u32)>,
-    /// The file to which the sync line is written, and whether an existing file may be replaced.
-    pub sync: Option<(PathBuf, bool)>,
     /// Scheduled commands, each with the frame before which it is executed; ascending.
     pub commands: Vec<(u64, Command)>,
     /// Whether the first frame is scanned without sending ([`Board::arm`]).
@@ -113,8 +92,6 @@ impl EmulatorOptions {
             segment: true,
             real_time: true,
             control: None,
-            line: None,
-            sync: None,
             commands: vec![],
             arms: false,
             marks_stop: false,
@@ -158,7 +135,6 @@ pub struct Emulator {
     array: Array,
     sender: Sender,
     control: CommandPort,
-    sync: Option<Sync>,
     network: Option<Network>,
     crossed: Option<Crossed>,
     flawed: Option<Flawed>,
@@ -170,8 +146,8 @@ impl Emulator {
     ///
     /// # Errors
     ///
-    /// `Socket` where the control port is taken, `File` where line or sync line cannot be opened; `Core(Problem)` where the
-    /// schedule does not ascend, or a fault, flaw, drift or reset makes no sense.
+    /// `Socket` where the control port is taken; `Core(Problem)` where the schedule does not ascend, or a fault, flaw, drift
+    /// or reset makes no sense.
     pub fn open(board: Board, array: &Array, options: EmulatorOptions) -> Result<Self> {
         if let Some(k) = options.commands.windows(2).position(|w| w[1].0 < w[0].0) {
             return Err(taxel_core::problem!(
@@ -193,10 +169,8 @@ impl Emulator {
         let crossed = circuit.map(|chain| Crossed::new(chain, board.registers(), array)).transpose()?;
         let flawed = options.flaws.map(|flaws| Flawed::new(flaws, array)).transpose()?;
         let sender = Sender::open_from(options.source_port, options.to, options.segment)?;
-        let line = options.line.as_ref().map(|(link, baud)| PseudoTerminal::open(link, *baud)).transpose()?;
-        let control = CommandPort::open(options.control, line, &board)?;
-        let sync = options.sync.as_ref().map(|(path, overwrite)| Sync::open(path, *overwrite)).transpose()?;
-        Ok(Self { board, array: array.clone(), sender, control, sync, network, crossed, flawed, options })
+        let control = CommandPort::open(options.control)?;
+        Ok(Self { board, array: array.clone(), sender, control, network, crossed, flawed, options })
     }
 
     /// The address for commands, if any.
@@ -222,9 +196,6 @@ impl Emulator {
         let mut run = self.begin();
         let mut last = false;
         while !last {
-            while !stop.asked() && !touch.has_frame()? {
-                self.control.serve(&mut self.board);
-            }
             last = stop.asked() || !touch.frame(&mut ticks, stop)? || stop.asked();
             if last && !(self.options.marks_stop && self.board.registers().record) {
                 break;
@@ -238,7 +209,6 @@ impl Emulator {
             while let Some(command) = run.next_command(frame) {
                 self.board.command(&command.to_bytes());
             }
-            self.write_sync(since_us);
             // A request to stop is not an error here; the loop checks for it.
             if !last && !self.read_taxels(&mut ticks, since_us, stop)? {
                 continue;
@@ -256,7 +226,6 @@ impl Emulator {
             }
         }
         self.send_delayed()?;
-        self.write_sync(run.since_us(&self.board));
         let report = self.report(&run);
         watch(&report, touch);
         Ok(report)
@@ -281,12 +250,6 @@ impl Emulator {
             self.control.send_greeting(&self.board);
         }
         Ok(())
-    }
-
-    fn write_sync(&mut self, since_us: f64) {
-        if let Some(sync) = &mut self.sync {
-            sync.follow(since_us, self.board.registers().record);
-        }
     }
 
     /// From what the taxels feel to what the board reads of them, through the circuit and the flaws; false where it was stopped.

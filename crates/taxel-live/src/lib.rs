@@ -27,4 +27,3 @@ pub use error::{Error, Result};
 pub use kernel_drops::KernelDrops;
 pub use latency::Quantiles;
 pub use read_at::read_exact_at;
-pub use readable_file::ReadableFile;

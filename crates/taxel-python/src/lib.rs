@@ -2,7 +2,6 @@
 
 #![allow(clippy::too_many_arguments, reason = "Python names them")]
 
-mod descriptors;
 mod held;
 #[cfg(feature = "test-hooks")]
 mod test_hooks;

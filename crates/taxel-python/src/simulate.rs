@@ -1,7 +1,5 @@
 //! Simulated touch, and the board that reads it, as fast as it goes.
 
-use std::path::PathBuf;
-
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
@@ -16,9 +14,8 @@ use taxel_core::wire::Registers;
 use taxel_core::{Array, Error, Result, Stop, reading};
 use taxel_live::address::of_text;
 use taxel_live::capture::Sender;
-use taxel_live::emulate::{Emulator, EmulatorOptions, PipedFrames, Replay, Report, Scenes, Touch};
+use taxel_live::emulate::{Emulator, EmulatorOptions, Replay, Report, Scenes, Touch};
 
-use crate::descriptors::file_of;
 use taxel_border::convert::{ArrayParts, Column, EventsIn, array, column, from_events, slice, to_array};
 use taxel_border::enter::{Exclusive, enter, enter_with_progress};
 use taxel_border::errors::core;
@@ -176,8 +173,6 @@ pub(crate) enum TouchIn<'py> {
     Events(EventsIn<'py>, f64),
     /// us, ticks, speed.
     Frames(PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, u16>, f64),
-    /// A descriptor to read from, bytes that were read from it already, shift, most.
-    Pipe(i32, Vec<u8>, u32, u16),
     /// An iterator of acts.
     Acts(Py<PyAny>),
 }
@@ -193,8 +188,6 @@ struct EmulationOptions {
     intensity: IntensityWord,
     version_2: Version2,
     control: Option<String>,
-    line: Option<(PathBuf, u32)>,
-    sync: Option<(PathBuf, bool)>,
     faults: Option<NetworkFaults>,
     circuit: Option<Chain>,
     asynchronous: bool,
@@ -238,14 +231,6 @@ impl Touch for Felt {
         }
     }
 
-    fn has_frame(&mut self) -> taxel_live::Result<bool> {
-        match self {
-            // They are made ready while those before them are played.
-            Self::Scenes(_) => Ok(true),
-            Self::Other(touch) => touch.has_frame(),
-        }
-    }
-
     fn is_last(&mut self, stop: Stop<'_>) -> taxel_live::Result<bool> {
         match self {
             Self::Scenes(scenes) => scenes.is_last(stop),
@@ -254,8 +239,7 @@ impl Touch for Felt {
     }
 }
 
-/// Plays a touch to an emulated board that sends its datagrams to `to`, in real time (frames of a pipe as they come); gives
-/// the report.
+/// Plays a touch to an emulated board that sends its datagrams to `to`, in real time; gives the report.
 ///
 /// `options` is JSON. `begun` is called with the address for commands once the board is ready, `watch` ten times a second
 /// with a report and the touches that became known. An exception of either ends the play.
@@ -275,7 +259,6 @@ pub fn emulate(
     let chosen: EmulationOptions = parsed("options", options)?;
     let EmulationOptions { registers, tare_ms, version_2, previous, intensity, .. } = chosen;
     let (frame_us, step) = (registers.frame_us(), u16::from(registers.noise_floor) + 1);
-    let real_time = !matches!(touch, TouchIn::Pipe(..));
     let sensor = to_sensor(sensor)?;
     if let (TouchIn::Acts(_), Some(circuit)) = (&touch, &chosen.circuit) {
         Crossed::fits(circuit, &sensor).map_err(core)?;
@@ -293,10 +276,6 @@ pub fn emulate(
             let (t, values) = (slice("t", &t)?.to_vec(), slice("values", &values)?.to_vec());
             Felt::Other(Box::new(enter(py, |_| Replay::frames(&array, t, values, frame_us, speed))?))
         }
-        TouchIn::Pipe(descriptor, ahead, shift, most) => {
-            let from = file_of(py, descriptor)?;
-            Felt::Other(Box::new(PipedFrames::new(array.len(), from, ahead, shift, most)))
-        }
     };
     enter_with_progress(py, |stop, caller| {
         let mut board = Board::new(registers, &array)?.previous(previous).intensity(intensity).version_2(version_2)?;
@@ -304,10 +283,7 @@ pub fn emulate(
             board = board.asynchronous()?;
         }
         let options = EmulatorOptions {
-            real_time,
             control: chosen.control.as_deref().map(of_text).transpose()?,
-            line: chosen.line,
-            sync: chosen.sync,
             commands: tare_ms.map_or(Ok(vec![]), |tare_ms| opening(&registers, tare_ms))?,
             arms: tare_ms.is_some(),
             marks_stop: tare_ms.is_some(),

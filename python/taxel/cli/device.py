@@ -15,7 +15,6 @@ from taxel._base.arguments import text
 from taxel._base.messages import counted
 from taxel._base.number_text import float_of
 from taxel._core import ProblemError
-from taxel.array import of_size
 from taxel.board_check import check_board
 from taxel.cli._say import say
 from taxel.cli.app import OUTSIDE, App, JsonOption, Limits, SecondsOption
@@ -153,53 +152,33 @@ def watch(
 
 @app.command
 def check(
-    place: str | None = None,
+    place: str,
     /,
     *,
     port: Annotated[int, Parameter(validator=Limits(1, 65_535))] = PORT,
     host: str = "0.0.0.0",
-    array: Annotated[str | None, Parameter(metavar="ROWSxCOLUMNS")] = None,
-    preset: Annotated[
-        str | None,
-        Parameter(
-            help=f"Without a serial line: the board's preset, one of {QUOTED_PRESETS}. Default: the preset that "
-            "explains the values best."
-        ),
-    ] = None,
     seconds: Annotated[float, Parameter(validator=Limits(0.1))] = 4.0,
     as_json: JsonOption = False,
 ) -> int:
-    """Check a board: its link by a pattern that it makes itself, then its comparators at rest.
+    """Check a board by a pattern that it makes itself, and then its comparators at rest, while nothing touches it.
 
-    With its serial line the command switches the pattern on, compares every value that arrives, and checks the
-    comparators, while nothing may touch the sensor; at the end the registers are as before. Without the serial line,
-    the board must already make the pattern: hold the button of the Colorlight i9 for two seconds. Exit code 3: the
-    check found a fault.
+    The board sends version 2 of the wire meanwhile; afterwards its registers are as before. Exit code 3: the check
+    found a fault.
 
     Example: taxel device check /dev/ttyACM0
 
     Parameters
     ----------
     place
-        The serial port, or host:port. Without it, taxel checks only the pattern, which the board must send already.
+        The serial port, or host:port.
     port
         The UDP port that the board sends to.
     host
         The address of this machine to listen on; 0.0.0.0: all.
-    array
-        Without a serial line: the size of the sensor. Default: 64x64.
     seconds
         Duration of each part of the check, s.
     """
-    result = check_board(
-        place,
-        port=port,
-        host=host,
-        array=None if array is None else of_size(array, of_wire=True),
-        preset=preset,
-        seconds=seconds,
-        say=None if as_json else say,
-    )
+    result = check_board(place, port=port, host=host, seconds=seconds, say=None if as_json else say)
     if as_json:
         say(json.dumps({"good": result.good, "findings": [asdict(finding) for finding in result.findings]}))
     return 0 if result.good else OUTSIDE

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import secrets
-import sys
 from collections import deque
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
@@ -28,7 +27,7 @@ from taxel.cli.console import Console
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
 from taxel.live.sending import PORT
 from taxel.recording.opening import open_one
-from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Scene, SceneFile, Version2
+from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Replay, Scene, SceneFile, Version2
 from taxel.simulate import emulate as run
 from taxel.simulate.board import fitting
 from taxel.simulate.circuit import Circuit, Converter, VirtualGround
@@ -69,10 +68,6 @@ class _EmulateArguments:
         Play a recording instead of scenes.
     speed
         With --replay: playback speed; 2 takes half the time. Default: 1.
-    pipe
-        Send events of another sensor, whose frames come on standard input.
-    noise_floor
-        With --pipe: a value that changes by more than this makes an event. Default: 3.
     tare
         How long the noise floor is 0 before the start marker, s. Default: as in the scene's file, or 0.05.
     session
@@ -81,6 +76,8 @@ class _EmulateArguments:
         Let the ball bounce until it rests, instead of catching it.
     labels
         Write the true times of the touches to this CSV, label,t_us,host_ns, as they happen.
+    overwrite
+        Replace the file of --truth if it exists.
     """
 
     port: Annotated[int, Parameter(validator=Limits(1, 65_535))] = PORT
@@ -92,8 +89,6 @@ class _EmulateArguments:
     ] = None
     replay: Path | None = None
     speed: float | None = None
-    pipe: bool = False
-    noise_floor: Annotated[int | None, Parameter(validator=Limits(0, 255))] = None
     tare: Annotated[float | None, Parameter(metavar="SECONDS", validator=Limits(0, 60))] = None
     preset: Annotated[str | None, _option("preset")] = None
     wire: Annotated[int | None, _option("wire")] = None
@@ -109,13 +104,10 @@ class _EmulateArguments:
     flaw: Annotated[list[str] | None, _option("flaws", metavar="NAME=SIZE[:SEED]")] = None
     fault: Annotated[list[str] | None, _option("faults", metavar="NAME=SHARE")] = None
     control: Annotated[int | None, _option("control")] = None
-    line: Annotated[Path | None, _option("line")] = None
-    baud: Annotated[int | None, _option("baud")] = None
-    sync: Annotated[Path | None, _option("sync")] = None
     source_port: Annotated[int, _option("source_port")] = EmulateOptions.source_port
     rest: bool = False
     labels: Annotated[Path | None, Parameter(name="--truth", metavar="FILE")] = None
-    overwrite: Annotated[bool, _option("overwrite")] = EmulateOptions.overwrite
+    overwrite: bool = False
     as_json: JsonOption = False
 
 
@@ -128,9 +120,7 @@ def emulate(*, typed: Flat[_EmulateArguments] = _EmulateArguments()) -> None:
     marks the start. --truth writes the labels for taxel train: contact and lift, by the board's clock (t_us) and by
     this machine's (host_ns).
 
-    --scene plays a scene from a file instead of random ones. --replay plays a recording. --pipe reads another
-    sensor's frames from standard input: one line of JSON (rows, columns, rate, bits), then uint16, little-endian, row
-    by row.
+    --scene plays a scene from a file instead of random ones. --replay plays a recording.
 
     Example: taxel emulate --port 5208 --scenes 5 --seed 1 --truth labels.csv
     """
@@ -149,25 +139,18 @@ def emulate(*, typed: Flat[_EmulateArguments] = _EmulateArguments()) -> None:
         summary |= {"wanted_hz": report.wanted_hz, "reached_hz": report.reached_hz}
         say(json.dumps({**summary, **asdict(report)}))
     else:
-        _print(report, in_time=not typed.pipe)
+        _print(report)
 
 
 def _check_options(typed: _EmulateArguments) -> None:
     """Refuse options that do not go together."""
-    others = typed.replay is not None or typed.pipe
-    if typed.replay is not None and typed.pipe:
-        raise ProblemError("--replay and --pipe are both given: give only one of them")
-    if typed.scene is not None and (others or typed.rest):
-        raise ProblemError("--scene: leave out --replay, --pipe and --rest")
-    if others and (typed.scenes is not None or typed.labels is not None or typed.rest):
-        raise ProblemError("--scenes, --truth and --rest are for scenes: leave them out with --replay or --pipe")
-    for name, value, needed, there in (
-        ("--speed", typed.speed, "--replay", typed.replay is not None),
-        ("--noise-floor", typed.noise_floor, "--pipe", typed.pipe),
-        ("--baud", typed.baud, "--line", typed.line is not None),
-    ):
-        if value is not None and not there:
-            raise ProblemError(f"{name} needs {needed}: give both, or neither")
+    replays = typed.replay is not None
+    if typed.scene is not None and (replays or typed.rest):
+        raise ProblemError("--scene: leave out --replay and --rest")
+    if replays and (typed.scenes is not None or typed.labels is not None or typed.rest):
+        raise ProblemError("--scenes, --truth and --rest are for scenes: leave them out with --replay")
+    if typed.speed is not None and not replays:
+        raise ProblemError("--speed needs --replay: give both, or neither")
 
 
 def _touch_of(typed: _EmulateArguments) -> tuple[Any, str, dict[str, Any]]:
@@ -180,7 +163,7 @@ def _touch_of(typed: _EmulateArguments) -> tuple[Any, str, dict[str, Any]]:
     board = scene_file or SceneFile(Scene({}))
     if typed.preset is not None:
         board = replace(board, preset=typed.preset)
-    if typed.replay is None and not typed.pipe:
+    if typed.replay is None:
         fitting(board.preset, board.array)
     tare_ms = board.tare_ms if typed.tare is None else 1e3 * typed.tare
     drawn_seed = secrets.randbelow(TRAINING_SEED) if scene_file is None else scene_file.seed
@@ -201,14 +184,12 @@ def _touch_of(typed: _EmulateArguments) -> tuple[Any, str, dict[str, Any]]:
         "reset_every_s": typed.reset_every,
         "drift_ppm": typed.drift,
         "control": None if typed.control is None else f"127.0.0.1:{typed.control}",
-        "baud": EmulateOptions.baud if typed.baud is None else typed.baud,
+        "asynchronous": typed.asynchronous,
+        "source_port": typed.source_port,
     }
-    options |= {name: getattr(typed, name) for name in ("asynchronous", "line", "sync", "overwrite", "source_port")}
     if typed.replay is not None:
         speed = 1.0 if typed.speed is None else typed.speed
         return Replay(open_one(typed.replay), speed), f"replay of {typed.replay}", options
-    if typed.pipe:
-        return *_open_pipe(3 if typed.noise_floor is None else typed.noise_floor), options
     if scene_file is not None:
         return _from_file(scene_file, typed.scenes, tare_ms), f"{typed.scene}, seed {seed}", options
     return *_scenes(seed, typed.scenes, tare_ms, typed.rest), options
@@ -228,8 +209,6 @@ def _run(typed: _EmulateArguments, touch: Any, board: dict[str, Any], console: C
         def begun(address: str | None) -> None:
             if address is not None:
                 console.print(f"commands are accepted at {address}")
-            if typed.line is not None:
-                console.print(f"the serial line is {typed.line}")
 
         def watch(report: EmulatorReport) -> None:
             last[:] = [report]
@@ -245,14 +224,6 @@ def _run(typed: _EmulateArguments, touch: Any, board: dict[str, Any], console: C
                 raise
         truth.write(last[0])
     return last[0]
-
-
-def _open_pipe(noise_floor: int) -> tuple[Any, str]:
-    """Return the frames of standard input as a touch, and their description."""
-    pipe = Pipe(sys.stdin.buffer, noise_floor)
-    halved = f", values halved {counted(pipe.shift, 'time')}" if pipe.shift else ""
-    rows, columns = pipe.array.shape
-    return pipe, f"{rows} x {columns} taxels from standard input, {pipe.rate_hz:g} frames/s{halved}"
 
 
 def _scenes(seed: int, scenes: int | None, tare_ms: float, rest: bool) -> tuple[Any, str]:
@@ -272,13 +243,12 @@ def _from_file(scene_file: SceneFile, scenes: int | None, tare_ms: float) -> Ite
         yield after
 
 
-def _print(report: EmulatorReport, in_time: bool) -> None:
+def _print(report: EmulatorReport) -> None:
     events, datagrams = counted(report.changes, "event"), counted(report.datagrams, "datagram")
     say(f"{events} in {datagrams}, {counted(report.bytes, 'byte')}")
     if report.network is not None:
         say("network: " + ", ".join(f"{n} {name}" for name, n in report.network.items()))
-    if in_time:
-        say(report.verdict)
+    say(report.verdict)
 
 
 def _pairs(option: str, assignments: Iterable[str], known: Collection[str]) -> dict[str, str]:

@@ -11,7 +11,6 @@ from taxel.simulate.board import NOT_RETURNED, Board, Version2, pattern
 from taxel.simulate.emulator import Played, emulate, play, truth
 from taxel.simulate.emulator_report import EmulatorReport
 from taxel.simulate.layer import Layer, Pressed
-from taxel.simulate.pipe import Pipe
 from taxel.simulate.replay import Replay
 from taxel.simulate.scene_file import SceneFile
 from taxel.simulate.trouble import Faults, Flaws
@@ -27,7 +26,6 @@ __all__ = [
     "FrameSequence",
     "Layer",
     "Motion",
-    "Pipe",
     "Played",
     "Pressed",
     "Replay",

@@ -20,7 +20,6 @@ from taxel.simulate.board import fitting, reading
 from taxel.simulate.circuit import Circuit
 from taxel.simulate.emulator_report import EmulatorReport
 from taxel.simulate.options import EmulateOptions
-from taxel.simulate.pipe import Pipe
 from taxel.simulate.replay import Replay
 from taxel.wire import Registers
 
@@ -162,7 +161,7 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
     ----------
     to : str
         Address and port to send to, for example "127.0.0.1:5208".
-    touch : iterable of Scene, Silence, FrameSequence; Replay; or Pipe
+    touch : iterable of Scene, Silence, FrameSequence; or Replay
         The touch. An iterable of acts may be endless: each act is computed while those before it are played.
     seed : int, 0 or more
         Seed of the spread of the taxels and of the noise.
@@ -173,7 +172,7 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
     tare_ms : float, ms, 0 to 60000
         Time for which the noise floor is 0 before the start marker, if acts are played.
     array : Array, optional
-        The sensor; a Replay or a Pipe has its own sensor. Default: 64 x 64 taxels.
+        The sensor; a Replay has its own sensor. Default: 64 x 64 taxels.
     sensor : mapping, optional
         Parameters that differ from the usual sensor, as in `play`.
     wire : {1, 2}, optional
@@ -200,15 +199,6 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
         How much faster the board's clock runs than this machine's.
     control : str, optional
         Address and port where the board accepts commands by TCP; port 0 finds a free one.
-    line : path, optional
-        A serial line for commands: a link of this name to a pseudo-terminal, with the throughput of `baud`.
-    baud : int, bits/s, from 300 to 4000000
-        Baud rate of `line`.
-    sync : path, optional
-        A new file, or an existing pipe, for the sync line: for each edge a line with board time (us), 1 or 0, host time
-        (ns).
-    overwrite : bool
-        Whether an existing file `sync` may be replaced.
     source_port : int, 0 to 65535
         The UDP port to send from; 0 finds a free one.
     begun : function, optional
@@ -228,7 +218,7 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
     SceneError : an act or a sensor that is invalid
     ProblemError : options that are invalid, or a circuit of another voltage or resistor
     DeviceError : the array has more lines than the preset, or that version of the wire, reads
-    OSError : a socket, line or file cannot be opened
+    OSError : a socket cannot be opened
 
     Examples
     --------
@@ -239,7 +229,7 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
     options = options.completed()
     touch, sensed = options.touch, Array._of(options.array)
     registers = instance("registers", options.registers, Registers)
-    felt: Any = touch._touch(registers) if isinstance(touch, Replay | Pipe) else _checked(touch, sensed)
+    felt: Any = touch._touch(registers) if isinstance(touch, Replay) else _checked(touch, sensed)
 
     def tell(state: dict[str, Any], contacts: list[Any]) -> None:
         if contacts:
@@ -270,7 +260,7 @@ def _checked(acts: Iterable[Act], array: Array) -> Iterator[Any]:
     try:
         return (_part(n, act, array) for n, act in enumerate(iter(acts)))
     except TypeError:
-        raise refused("touch", f" is {shown(acts)}: must be acts, a Replay or a Pipe") from None
+        raise refused("touch", f" is {shown(acts)}: must be acts or a Replay") from None
 
 
 def _parts(acts: Sequence[Act], array: Array) -> list[Any]:

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import KW_ONLY, asdict, dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any, Literal
 
-from taxel._base.arguments import checked_path, flag, instance, integer, number, text
+from taxel._base.arguments import instance, integer, number, text
 from taxel._base.options import option
-from taxel._core import BAUDS
 from taxel.array import Array
 from taxel.simulate.acts import Act, Contact
 from taxel.simulate.board import Version2, fitting, reading
 from taxel.simulate.circuit import Circuit
 from taxel.simulate.emulator_report import EmulatorReport
-from taxel.simulate.pipe import Pipe
 from taxel.simulate.replay import Replay
 from taxel.simulate.trouble import Faults, Flaws
 from taxel.wire import Registers
@@ -30,16 +26,12 @@ def _nothing(_: object) -> None:
     """Do nothing: the default of a callback."""
 
 
-def _path(name: str, path: str | os.PathLike[str]) -> str:
-    return str(Path(checked_path(name, path)))
-
-
 @dataclass(frozen=True)
 class EmulateOptions:
     """Hold the options of `emulate`, which documents each, with their defaults."""
 
     to: str
-    touch: Iterable[Act] | Replay | Pipe
+    touch: Iterable[Act] | Replay
     _: KW_ONLY
     seed: int = option(0, "Seed of scenes, taxels and noise.", least=0)
     preset: str | None = option(
@@ -73,15 +65,6 @@ class EmulateOptions:
     reset_every_s: float | None = option(None, "Interval between resets of the board, s. Default: none.", least=0.001)
     drift_ppm: float = option(0.0, "Error of the board's clock in parts per million; above 0, it runs too fast.")
     control: str | None = option(None, "Accept commands on this TCP port, from this computer only; 0 finds a free one.")
-    line: str | os.PathLike[str] | None = option(
-        None, "Accept commands on a serial line of this name (a link to a pseudo-terminal)."
-    )
-    baud: int = option(115_200, "Baud rate of --line. Default: 115200.", least=BAUDS[0], most=BAUDS[1])
-    sync: str | os.PathLike[str] | None = option(
-        None,
-        "Write the sync line as text to a new file or a pipe, in lines of board time (us), 1 or 0, host time (ns).",
-    )
-    overwrite: bool = option(False, "Replace output files that exist already.")
     source_port: int = option(0, "The UDP port to send from; 0: any.", least=0, most=65_535)
     begun: Callable[[str | None], object] = _nothing
     watch: Callable[[EmulatorReport], object] = _nothing
@@ -90,7 +73,7 @@ class EmulateOptions:
     def completed(self) -> EmulateOptions:
         """Return the options with the array of the touch and the registers that the board begins with."""
         touch, registers = self.touch, self.registers
-        if isinstance(touch, Replay | Pipe):
+        if isinstance(touch, Replay):
             array, preset = touch.array, touch.registers
         else:
             array = Array._of(self.array)
@@ -104,18 +87,15 @@ class EmulateOptions:
     def for_rust(self) -> dict[str, Any]:
         """Return the completed options as Rust reads them."""
         registers = instance("registers", self.registers, Registers)
-        baud, overwrite = integer("baud", self.baud, *BAUDS), flag("overwrite", self.overwrite)
         return {
             "registers": registers._held,
-            "tare_ms": None if isinstance(self.touch, Replay | Pipe) else number("tare_ms", self.tare_ms),
+            "tare_ms": None if isinstance(self.touch, Replay) else number("tare_ms", self.tare_ms),
             "previous": text("previous", self.previous, ("last_sent", "last_sample")),
             "intensity": text("intensity", self.intensity, ("value", "difference", "nothing")),
             "version_2": asdict(
                 instance("version_2", Version2() if self.version_2 is None else self.version_2, Version2)
             ),
             "control": None if self.control is None else text("control", self.control),
-            "line": None if self.line is None else (_path("line", self.line), baud),
-            "sync": None if self.sync is None else (_path("sync", self.sync), overwrite),
             **reading(self.circuit, self.asynchronous),
             "flaws": None if self.flaws is None else instance("flaws", self.flaws, Flaws)._parts(),
             "faults": None if self.faults is None else instance("faults", self.faults, Faults)._parts(),

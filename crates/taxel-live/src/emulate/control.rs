@@ -1,11 +1,10 @@
-//! The emulated board's UART: five-byte commands in, ASCII status lines out, over a TCP port, a pseudo-terminal, or both.
+//! The emulated board's UART: five-byte commands in, ASCII status lines out, over a TCP port.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 
 use taxel_core::board::Board;
 
-use super::line::PseudoTerminal;
 use crate::{Error, Result};
 
 /// Reads commands from the connected host. On the TCP port there is one host at a time, as a UART has one cable: a new connection
@@ -14,12 +13,11 @@ use crate::{Error, Result};
 pub(super) struct CommandPort {
     listener: Option<(TcpListener, SocketAddr)>,
     cable: Option<TcpStream>,
-    line: Option<PseudoTerminal>,
 }
 
 impl CommandPort {
-    pub(super) fn open(address: Option<SocketAddr>, line: Option<PseudoTerminal>, board: &Board) -> Result<Self> {
-        let mut control = Self { listener: None, cable: None, line };
+    pub(super) fn open(address: Option<SocketAddr>) -> Result<Self> {
+        let mut control = Self { listener: None, cable: None };
         if let Some(address) = address {
             let with_address = |error| Error::socket(format!("TCP {address}"))(error);
             let listener = TcpListener::bind(address).map_err(with_address)?;
@@ -27,7 +25,6 @@ impl CommandPort {
             let found = listener.local_addr().map_err(with_address)?;
             control.listener = Some((listener, found));
         }
-        control.send_greeting(board);
         Ok(control)
     }
 
@@ -37,7 +34,7 @@ impl CommandPort {
 
     /// Sends the line that a board sends at reset.
     pub(super) fn send_greeting(&mut self, board: &Board) {
-        self.send(&board.greeting());
+        send(&mut self.cable, &board.greeting());
     }
 
     /// Executes received commands and answers them; never waits.
@@ -49,13 +46,7 @@ impl CommandPort {
             let ready = ready.and_then(|()| cable.write_all(board.greeting().as_bytes()));
             self.cable = ready.is_ok().then_some(cable);
         }
-        let faults = board.faults();
-        self.send(&faults);
-        if let Some(line) = &mut self.line {
-            let bytes = line.read();
-            let answers = board.command(&bytes);
-            line.send(&answers);
-        }
+        send(&mut self.cable, &board.faults());
         let mut bytes = [0; 256];
         while let Some(cable) = &mut self.cable {
             match cable.read(&mut bytes) {
@@ -67,13 +58,6 @@ impl CommandPort {
                 Err(error) if error.kind() == ErrorKind::WouldBlock => return,
                 Err(_) => self.cable = None,
             }
-        }
-    }
-
-    fn send(&mut self, lines: &str) {
-        send(&mut self.cable, lines);
-        if let Some(line) = &mut self.line {
-            line.send(lines);
         }
     }
 }
