@@ -11,10 +11,9 @@ import signal
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -33,6 +32,8 @@ _R = TypeVar("_R")
 #: Where calls may run: in loky's processes on this machine, or on a cluster.
 BACKENDS = ("loky", "dask", "ray")
 
+#: How many calls each worker gets at most: few enough to cost little, many enough to end at about the same time.
+_CALLS_A_WORKER = 8
 #: The variable with which Python adds neither the current folder nor a script's to its path.
 _SAFE_PATH = "PYTHONSAFEPATH"
 #: Interval at which a worker looks whether its parent runs, s.
@@ -104,12 +105,17 @@ class Workers:
             return
         import joblib  # noqa: PLC0415  what runs in one process does not need it
 
-        calls = [joblib.delayed(partial(_numbered, work))(k, one) for k, one in enumerate(each)]
         with self._parallel() as parallel:
+            # A call of a cluster costs a good part of a second: several of `each` share one.
+            workers = joblib.effective_n_jobs(parallel.n_jobs) if parallel.n_jobs < 0 else parallel.n_jobs
+            share = max(len(each) // (_CALLS_A_WORKER * workers), 1)
+            parts = [range(first, min(first + share, len(each))) for first in range(0, len(each), share)]
+            calls = [joblib.delayed(_numbered)(work, part, [each[k] for k in part]) for part in parts]
             # joblib gives Ray's results in a list at the end of a call only: a call for a few of them at a time.
-            size = 8 * parallel.n_jobs if self.backend == "ray" else len(calls)
+            size = workers if self.backend == "ray" else len(calls)
             for first in range(0, len(calls), size):
-                yield from parallel(calls[first : first + size])
+                for results in parallel(calls[first : first + size]):
+                    yield from results
 
     @contextmanager
     def _parallel(self) -> Iterator[joblib.Parallel]:
@@ -137,8 +143,8 @@ class Workers:
 HERE = Workers()
 
 
-def _numbered(work: Callable[[_T], _R], k: int, one: _T) -> tuple[int, _R]:
-    return k, work(one)
+def _numbered(work: Callable[[_T], _R], numbers: Iterable[int], each: Iterable[_T]) -> list[tuple[int, _R]]:
+    return [(k, work(one)) for k, one in zip(numbers, each, strict=True)]
 
 
 @contextmanager

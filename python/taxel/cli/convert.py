@@ -3,19 +3,33 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 import taxel
+from taxel._base.files import check_writable
+from taxel._base.parallel import Workers
 from taxel._core import ProblemError
-from taxel.cli._task import FullReading, OutArgument, Output, SourceOption, of_source, progress
+from taxel.cli._task import (
+    FullReading,
+    OutArgument,
+    Output,
+    SourceOption,
+    of_source,
+    over_files,
+    progress,
+    say_failures,
+)
 from taxel.cli.app import App, Flat
 
 if TYPE_CHECKING:
     from taxel.recording import Recording
+    from taxel.recording.text_options import TextOptions
 
 app = App(name="convert")
 
@@ -29,12 +43,14 @@ def convert(
     frames: Annotated[float | None, Parameter(metavar="HZ")] = None,
     part: SourceOption = None,
     compression: str = "none",
+    workers: Flat[Workers] = Workers(),
     reading: Flat[FullReading] = FullReading(),
     output: Flat[Output] = Output(),
-) -> None:
+) -> int:
     """Convert recordings to another format, and report what the target cannot hold.
 
-    Both feet of a file become sources of one recording, `left` and `right`.
+    Both feet of a file become sources of one recording, `left` and `right`. Files of a folder that cannot be converted
+    are named at the end, with exit code 2; --jobs converts several at once.
 
     Example: taxel convert walk.mcap walk.csv
     Example: taxel convert trials/ recordings/
@@ -51,27 +67,49 @@ def convert(
     compression
         Compression of a .mcap: none, lz4 or zstd.
     """
+    from taxel.recording.opening import is_folder, recordings_in  # noqa: PLC0415  the command line starts quickly
+
+    how: dict[str, Any] = {"frames_hz": frames, "compression": compression, "overwrite": output.overwrite}
+    work = partial(_converted, reading.opener, part, how, target)
+    files = recordings_in(source, reading.layout) if source.exists() and is_folder(source) else []
+    if not target.suffix and len(files) > 1:
+        _refuse_twice([file.stem for file in files], target)
+        with progress(output.json) as show:
+            found = over_files(work, files, workers, show)
+        written = [one for of_file in found if not of_file.failure for one in of_file.result]
+        failed = [{"source": str(f), "error": one.failure} for f, one in zip(files, found, strict=True) if one.failure]
+        output.say({"written": written, "failed": failed}, *_lines(written))
+        return say_failures(files, found)
     if target.suffix:
         output.check(target)
     with progress(output.json) as show:
         show(f"reading {source}", 0, 0)
-        opened = [of_source(recording, part) for recording in reading.opener.open_trials(source)]
-        if target.suffix and len(opened) > 1:
-            raise ProblemError(
-                f"{source}: contains {len(opened)} recordings; {target} must be a folder, so its name must have no "
-                f"extension"
-            )
-        targets = [target] if target.suffix else _targets(opened, target)
-        if not target.suffix:
-            output.check(*targets)
-        written = []
-        for k, (recording, file) in enumerate(zip(opened, targets, strict=True)):
-            show(f"{recording.name} to {file}", k, len(targets) if k else 0)
-            how: dict[str, Any] = {"frames_hz": frames, "compression": compression, "overwrite": output.overwrite}
-            lost = taxel.convert(recording, file, **how)
-            written.append({"source": recording.title, "target": str(file), "lost": lost})
-    lines = [line for one in written for line in (f"written to {one['target']}", *_losses(one["lost"]))]
-    output.say({**written[0], "source": str(source)} if target.suffix else {"written": written}, *lines)
+        written = work(source)
+    output.say({**written[0], "source": str(source)} if target.suffix else {"written": written}, *_lines(written))
+    return 0
+
+
+def _converted(
+    opener: TextOptions, part: str | None, how: Mapping[str, Any], target: Path, source: Path
+) -> list[dict[str, Any]]:
+    """Convert the recordings of a file, to a file or into a folder; return places and what the format lacks."""
+    opened = [of_source(recording, part) for recording in opener.open_trials(source)]
+    if target.suffix and len(opened) > 1:
+        raise ProblemError(
+            f"{source}: contains {len(opened)} recordings; {target} must be a folder, so its name must have no "
+            "extension"
+        )
+    targets = [target] if target.suffix else _targets(opened, target)
+    for file in targets:
+        check_writable(file, overwrite=how["overwrite"])
+    pairs = zip(opened, targets, strict=True)
+    return [
+        {"source": each.title, "target": str(file), "lost": taxel.convert(each, file, **how)} for each, file in pairs
+    ]
+
+
+def _lines(written: Sequence[Mapping[str, Any]]) -> list[str]:
+    return [line for one in written for line in (f"written to {one['target']}", *_losses(one["lost"]))]
 
 
 def _losses(lost: Sequence[str]) -> list[str]:
@@ -83,7 +121,12 @@ def _targets(opened: list[Recording], folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     stems = [Path(each.name).stem if each.path.name == each.name else each.name for each in opened]
     targets = [folder / (re.sub(r"[^\w.-]+", "_", stem) + ".mcap") for stem in stems]
-    twice = next((target for target in targets if targets.count(target) > 1), None)
-    if twice is not None:
-        raise ProblemError(f"{twice}: two recordings have this name; convert them one by one")
+    _refuse_twice([target.stem for target in targets], folder)
     return targets
+
+
+def _refuse_twice(stems: Sequence[str], folder: Path) -> None:
+    """Refuse recordings that would have one name in a folder."""
+    twice = next((stem for stem, count in Counter(stems).items() if count > 1), None)
+    if twice is not None:
+        raise ProblemError(f"{folder / twice}.mcap: two recordings have this name; convert them one by one")

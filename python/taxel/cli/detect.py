@@ -15,6 +15,7 @@ from cyclopts import Parameter
 import taxel
 from taxel._base.files import write_whole
 from taxel._base.messages import collected, of_names
+from taxel._base.parallel import Workers
 from taxel._base.times import begun
 from taxel.cli._say import say
 from taxel.cli._task import OutOption, Output, Reading, one_or_several, paths_text, progress, say_warnings
@@ -46,6 +47,7 @@ def detect(
     out: OutOption = None,
     report: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,
     options: Flat[DetectOptions] = DetectOptions(),
+    workers: Flat[Workers] = Workers(),
     reading: Flat[Reading] = Reading(),
     output: Flat[Output] = Output(),
 ) -> None:
@@ -78,7 +80,7 @@ def detect(
         update(f"reading {paths_text(recordings)}", 0, 0)
         with collected() as unread:
             opened = reading.opener.open_sensors(recordings)
-        found = taxel.tasks.detect(loaded, opened, given, options, progress=update)
+        found = taxel.tasks.detect(loaded, opened, given, options, progress=update, workers=workers)
         found = replace(found, warnings=(*unread, *found.warnings))
     used = loaded.using(options.use) if isinstance(loaded, taxel.Readout) else loaded
     if out is not None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from shlex import quote
@@ -16,12 +17,13 @@ from cyclopts import Parameter
 
 import taxel
 from taxel._base.files import write_whole
-from taxel._base.messages import are, counted, plain
+from taxel._base.messages import are, counted, plain, warn
+from taxel._base.parallel import Workers
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._say import say
-from taxel.cli._task import FullReading, Output, progress, say_warnings
+from taxel.cli._task import FullReading, Output, over_files, progress, say_failures, say_warnings
 from taxel.cli._topics import list_topics
 from taxel.cli.app import App, Flat
 from taxel.clock import doubt
@@ -30,6 +32,7 @@ from taxel.spikes import SpikeTrains, to_ms
 if TYPE_CHECKING:
     from taxel.recording import Recording
     from taxel.recording.analysis.pressure import Series
+    from taxel.recording.text_options import TextOptions
 
 app = App(name="info")
 
@@ -49,16 +52,18 @@ def info(
     table: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     tare: Annotated[str | None, Parameter(metavar="SECONDS|FILE")] = None,
     each: bool = False,
+    workers: Flat[Workers] = Workers(),
     reading: Flat[FullReading] = FullReading(),
     output: Flat[Output] = Output(),
-) -> None:
+) -> int:
     """Summarise a recording: contents, losses, rates, pressure, and dead, stuck or noisy taxels.
 
     For spike trains that taxel encode wrote: number, kind, duration and spikes.
 
     For a ROS bag without --topic: the topics that hold numbers, with shapes and rates.
 
-    For several recordings, such as a folder: a row for each, and their sum.
+    For several recordings, such as a folder: a row for each, and their sum. Files that cannot be read are named at the
+    end, with exit code 2; --jobs reads several at once.
 
     Example: taxel info walk.mcap --picture walk.png --table walk.csv
     Example: taxel info grasp.db3 --topic /palm --field taxels --array 24x32
@@ -78,7 +83,7 @@ def info(
         Print all facts about each recording of a folder.
     """
     from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
-    from taxel.recording.opening import are_spike_trains  # noqa: PLC0415
+    from taxel.recording.opening import are_spike_trains, is_folder, recordings_in  # noqa: PLC0415
     from taxel.tasks.labels import are_trials, trial_name  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
@@ -89,12 +94,15 @@ def info(
     as_json, overwrite = output.json, output.overwrite
     if are_spike_trains(file):
         say(*_spikes(file, as_json, drawn=picture is not None or table is not None))
-        return
+        return 0
+    files = recordings_in(file, reading.layout) if file.exists() and is_folder(file) else []
+    if len(files) > 1 and picture is None and table is None:
+        return _of_files(file, files, partial(_infos, reading.opener, tare), workers, each=each, as_json=as_json)
     with progress(as_json) as show:
         show(f"reading {file}", 0, 0)
         if file.exists() and is_bag(file) and not reading.opener._names_topic(file):
             say(*list_topics(file, topics(file, reading.ros), as_json))
-            return
+            return 0
         recordings = reading.opener.open_trials(file)
         recording = recordings[0]
         if len(recordings) > 1 or len(recording.sources) > 1:
@@ -109,7 +117,7 @@ def info(
                 example = trial_name(recordings[0])
                 say(f"labels of these trials need a column recording with the trial's name, for example {example}")
             say_warnings(dict.fromkeys(text for found in infos for text in found.warnings))
-            return
+            return 0
         found = taxel.tasks.info(recording, tare)
         facts, pressed = found.facts, found.pressed
         facts["array_assumed"] &= not reading.array
@@ -122,6 +130,30 @@ def info(
         facts["table"] = str(table)
     facts |= _draw(picture, [recording], tare, overwrite)
     say(*([json.dumps(facts)] if as_json else _page(facts)))
+    return 0
+
+
+def _infos(opener: TextOptions, tare: str | None, file: Path) -> list[dict[str, Any]]:
+    """Return the facts of the recordings of a file; their warnings are warned of again."""
+    found = [taxel.tasks.info(each, tare) for each in opener.open_trials(file)]
+    for text in (text for one in found for text in one.warnings):
+        warn(text)
+    return [one.facts for one in found]
+
+
+def _of_files(
+    folder: Path, files: Sequence[Path], work: Callable[[Path], Any], workers: Workers, *, each: bool, as_json: bool
+) -> int:
+    """Print the facts of the files of a folder, and which of them cannot be read; return an exit code."""
+    with progress(as_json) as show:
+        found = over_files(work, files, workers, show)
+    facts = [one for of_file in found if not of_file.failure for one in of_file.result]
+    if as_json:
+        failed = [{"file": str(f), "error": one.failure} for f, one in zip(files, found, strict=True) if one.failure]
+        say(json.dumps([*facts, *failed]))
+    elif facts:
+        say(*_of_several(folder, facts, {}, as_json=False, each=each))
+    return say_failures(files, found)
 
 
 def _spikes(file: Path, as_json: bool, *, drawn: bool) -> list[str]:

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from math import isnan
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from taxel._base.arguments import instance, shown
 from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, warn
+from taxel._base.parallel import Workers
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, PlainRule, Readout, Score, drift, recipes, score
@@ -156,6 +158,7 @@ def detect(
     options: DetectOptions | None = None,
     *,
     progress: Progress | None = None,
+    workers: Workers | None = None,
 ) -> Detecting:
     """Detect events in recordings by a trained readout or a plain rule; score them where the truth is given.
 
@@ -171,6 +174,8 @@ def detect(
         Labels to score against, as of `taxel.train`.
     options : DetectOptions, optional
     progress : function of (step, done, all), optional
+    workers : Workers, optional
+        Who detects in the recordings; default: this process alone.
 
     Returns
     -------
@@ -218,17 +223,12 @@ def detect(
             for k, recording in enumerate(opened)
         ]
         left_out = _of_other_arrays(readout, opened)
-        found: list[Detected] = []
-        unknown_rests: dict[str, UnknownRestError] = {}
+        each_one = []
         for recording, labelled in zip(opened, each_labelled, strict=True):
-            if left_out and not readout._accepts(recording.array):
-                continue
-            update(f"detecting in {recording.title}", 0, 0)
-            without = {label for label, sources in unlabelled.items() if not sources or recording.label in sources}
-            try:
-                found.append(_detected(readout, recording, labelled, without, options))
-            except UnknownRestError as error:
-                unknown_rests[recording.title] = error
+            if not left_out or readout._accepts(recording.array):
+                without = {label for label, sources in unlabelled.items() if not sources or recording.label in sources}
+                each_one.append((recording, labelled, without))
+        found, unknown_rests = _in_each(readout, options, each_one, Workers() if workers is None else workers, update)
         if not found and unknown_rests:
             raise next(iter(unknown_rests.values()))
         for unknown_rest in unknown_rests.values():
@@ -320,6 +320,48 @@ def _of_other_arrays(readout: Readout | PlainRule, recordings: Sequence[Recordin
         stacklevel=3,
     )
     return others
+
+
+#: A recording, its labels if the truth is known, and the labels of which nothing is known in it.
+_One: TypeAlias = tuple[Recording, Mapping[str, Any] | None, Collection[str]]
+
+
+def _in_each(
+    readout: Readout | PlainRule, options: DetectOptions, each: Sequence[_One], workers: Workers, update: Progress
+) -> tuple[list[Detected], dict[str, UnknownRestError]]:
+    """Return what is detected in recordings, in their order, and those whose rest is not known, by title."""
+    results: dict[int, tuple[Detected | UnknownRestError, tuple[str, ...]]] = {}
+    for recording, *_ in each[:1]:
+        update(f"detecting in {recording.title}", 0, 0)
+    for k, result in instance("workers", workers, Workers).run(partial(_tried, readout, options), each):
+        results[k] = result
+        update("detecting", len(results), len(each))
+    found: list[Detected] = []
+    unknown: dict[str, UnknownRestError] = {}
+    for k, (recording, *_) in enumerate(each):
+        detected, warned = results[k]
+        for line in warned:
+            warn(line, stacklevel=3)
+        if isinstance(detected, UnknownRestError):
+            unknown[recording.title] = detected
+        else:
+            found.append(detected)
+    return found, unknown
+
+
+def _tried(
+    readout: Readout | PlainRule,
+    options: DetectOptions,
+    one: _One,
+) -> tuple[Detected | UnknownRestError, tuple[str, ...]]:
+    """Return what is detected in a recording, or that its rest is not known, and the warnings."""
+    recording, labels, without = one
+    with collected() as warnings:
+        try:
+            found: Detected | UnknownRestError = _detected(readout, recording, labels, without, options)
+        except UnknownRestError as error:
+            found = error
+    return found, tuple(warnings)
 
 
 def _detected(
