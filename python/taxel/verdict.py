@@ -57,7 +57,6 @@ class Verdict(str):
       flags and by the board's totals.
     - ``dropped_by_kernel``: messages; with ``UDP_GRO`` several datagrams each.
     - ``dropped_by_queue`` ("dropped by taxel's queue"), ``not_recorded`` ("received but not recorded").
-    - ``dropped_or_left_out``: arrival numbers that an unfinished file lacks.
     - ``bytes_in_no_line``: after 65 536 bytes of a line; before the first line, bytes that are not text.
     - ``lost_on_the_way``, ``lost_on_the_way_or_dropped``: lost or damaged. The second: perhaps counted above too, or
       dropped by a kernel that does not count.
@@ -79,13 +78,10 @@ class Verdict(str):
       hundredth of the pause.
     - ``stamps_out_of_order``, ``drifts_from_arrival``: streams: stamps step back, by less than a second; the clock was
       off by more than a second and a hundredth of the time.
-    - ``bad_chunks``, ``large_chunks``, ``skipped_bytes``, ``torn_bytes``, ``repeated_in_file``, ``no_final_counts``:
-      damage in the file; messages there twice are read twice.
+    - ``bad_chunks``, ``large_chunks``, ``skipped_bytes``, ``torn_bytes``, ``repeated_in_file``: damage in the
+      file; messages there twice are read twice.
     - ``bytes_after_end`` ("bytes after the end of the recording not read"): something was appended, as by
       ``cat``: use `taxel.merge`.
-    - ``changed_since_recorded`` ("the content was changed after recording"): checksums differ.
-    - ``no_summary`` ("the summary at the end is missing or damaged"): cut after all data; other programs may refuse the
-      file.
 
     Causes in `noted`:
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from draws import mixed, seeds
+from draws import seeds
 from loopback import until
 from mcap.reader import make_reader
 from mcap.writer import Writer
@@ -163,16 +163,11 @@ def test_the_numbers_of_a_verdict_are_the_losses(seed: int, tmp_path: Path) -> N
     if finish:
         assert damaged.verdict.lost == {**whole.verdict.lost, "lost_in_file": gone}
         assert f"{gone} datagrams lost" in damaged.verdict
-    left, all_of_it = damaged.datagrams().number, whole.datagrams().number
-    if not finish and len(left) and (left[0], left[-1]) == (all_of_it[0], all_of_it[-1]):
-        # Without final counts it is the numbers that the file skips, less what the last counts know to be dropped.
-        assert gone <= damaged.verdict.lost["lost_in_file"] <= gone + told.dropped
+    left = damaged.datagrams()
     assert damaged.counts["lost_in_file"] == damaged.verdict.lost.get("lost_in_file", 0)
-    if len(left):
-        # What was dropped here after the last counts looks as if it had been lost on the way; so do those of the
-        # damaged chunk that overtook the first one that is left.
-        unknown = told.overtaken + (0 if finish else told.dropped)
-        assert damaged.counts["decoder_version_2"]["missing"] <= len(told.lost) + unknown
+    if finish and len(left):
+        # Those of the damaged chunk that overtook the first one that is left look as if lost on the way.
+        assert damaged.counts["decoder_version_2"]["missing"] <= len(told.lost) + told.overtaken
     assert damaged.verdict.damaged["bad_chunks"] == 1
 
 
@@ -245,41 +240,6 @@ def test_what_another_program_left_out_of_a_finished_file_is_lost(keeps: Callabl
     assert verdict.status == ("lost" if left_out else "complete after arrival")
 
 
-@pytest.mark.parametrize("change", ["nothing", "a bit", "emptied", "halved", "its neighbour", "all of one number"])
-@pytest.mark.parametrize("seed", seeds(3, quick=1))
-def test_what_another_program_changed_in_a_finished_file_is_damage(change: str, seed: int, tmp_path: Path) -> None:
-    """Its checksums fit what it wrote; the recorder's own sum says what there was."""
-    draw, told = np.random.default_rng(seed), Told()
-    path = tmp_path / "a.mcap"
-    write(path, on_the_way(sent_by_a_board(120), draw, told), draw, told, finish=True)
-    whole, which = taxel.open(path), set(draw.choice(np.arange(20, 100), 3, replace=False).tolist())
-    before = b""
-
-    def data(number: int, held: bytes) -> bytes:
-        nonlocal before
-        before, neighbour = held, before
-        if number not in which or change == "nothing":
-            return held
-        if change == "a bit":
-            at = int(draw.integers(0, len(held)))
-            return held[:at] + bytes([held[at] ^ 1 << int(draw.integers(0, 8))]) + held[at + 1 :]
-        return {"emptied": b"", "halved": held[: len(held) // 2], "its neighbour": neighbour}.get(change, held)
-
-    number = (lambda _: 7) if change == "all of one number" else (lambda n: n)
-    written_anew(path, tmp_path / "b.mcap", lambda _: 1, number, data=data)
-    anew = taxel.open(tmp_path / "b.mcap")
-    if change in ("nothing", "all of one number"):
-        assert anew.verdict == whole.verdict
-        return
-    assert anew.verdict.damaged.get("changed_since_recorded") == 1, anew.verdict.to_dict()
-    assert anew.verdict.status in ("damaged", "lost")
-    assert "the content was changed after recording" in anew.verdict
-    if change == "its neighbour":
-        assert anew.verdict.lost.get("lost_in_file", 0) > 0
-    taxel.convert(anew, tmp_path / "c.mcap")
-    assert taxel.open(tmp_path / "c.mcap").verdict.to_dict() == anew.verdict.to_dict()
-
-
 @pytest.mark.parametrize("cut", [0, 300])
 @pytest.mark.parametrize(
     ("topic", "keeps", "cause"),
@@ -312,48 +272,11 @@ def test_small_messages_that_another_program_added_are_not_there_twice(tmp_path:
     assert (verdict.lost, verdict.damaged) == ({}, {})
 
 
-@pytest.mark.parametrize(("lines", "dropped", "begins"), mixed([False, True], [3, 0], [0, 2**32 - 20, 2**33 + 7]))
-def test_what_a_file_without_its_end_lacks_is_told_as_dropped_or_left_out(
-    lines: bool, dropped: int, begins: int, tmp_path: Path
-) -> None:
-    """In the middle by the numbers that it skips, at its beginning by the first number that the counts state."""
-    for seed in range(20):
-        draw, path = np.random.default_rng(seed), tmp_path / f"{seed}.mcap"
-        one_by_one = {"rows": 1, "columns": 1, "pitch_mm": 1.0, "name": "numbers"}
-        stream = {"stream": {"columns": ["t_us", "a"], "time": "t_us"}, "array": one_by_one} if lines else {}
-        writer = _core.RecordingWriter(path, json.dumps(HEADER | stream), "none", False)
-        sent = sent_by_a_board()[:100]
-        gone = set(draw.choice(np.arange(10, 80), dropped, replace=False).tolist())
-        for number, one in enumerate(sent):
-            at = START_NS + number * 1_000_000
-            if number in gone:
-                continue
-            if lines:
-                writer.samples(np.array([at]), np.array([begins + number], np.uint64), np.array([number * 1e3, 0.0]))
-            else:
-                writer.datagram(at, begins + number, one)
-            if number in (81, 99):
-                known = {"received": number + 1, "recorded": number + 1 - dropped, "dropped_by_queue": dropped}
-                writer.counts(at, json.dumps(known))
-        del writer
-        first, out = int(draw.integers(0, 9)), set(draw.choice(np.arange(10, 98), 5, replace=False).tolist())
-        topic = "/samples" if lines else "/datagrams"
-        keeps = iter([k >= first and k not in out for k in range(100) if k not in gone])
-        left_out, *_ = written_anew(path, tmp_path / "b.mcap", lambda _: int(next(keeps)), lambda n: n, topic)  # noqa: B023  called at once
-        (tmp_path / "b.mcap").write_bytes((tmp_path / "b.mcap").read_bytes()[:-300])
-        verdict = taxel.open(tmp_path / "b.mcap").verdict
-        expected = {"dropped_by_queue": dropped, "dropped_or_left_out": left_out}
-        assert verdict.lost == {cause: n for cause, n in expected.items() if n}, seed
-        assert left_out == 0 or "dropped by taxel's queue or left out of the file" in verdict
-        assert verdict.status == ("lost" if verdict.lost else "unfinished")
-
-
 @pytest.mark.parametrize(
     ("times", "number"),
     [
         (lambda n: 1 + (n == 5), lambda n: n),
         (lambda _: 2, lambda n: n),
-        (lambda n: 2 * (n != 5), lambda n: n),
         (lambda _: 1, lambda _: 0),
         (lambda n: int(n % 3 != 1), lambda _: 0),
     ],

@@ -32,9 +32,7 @@ pub use damage::{DamageCounts, damage, damage_of_version_1};
 pub use event_previews::EventPreviews;
 pub use frames::{FrameEncoding, FrameProperties, Frames};
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
-pub use mcap_reader::{
-    ArrivalNumbers, Datagrams, DecodedRecording, Message, ReadPosition, Reader, Remarks, Unread, begin_with,
-};
+pub use mcap_reader::{Datagrams, DecodedRecording, Message, ReadPosition, Reader, Remarks, begin_with};
 pub use mcap_writer::{SourceWriter, Writer};
 pub use output::OutputFile;
 pub use stream::{Samples, StreamColumns, StreamFaults};

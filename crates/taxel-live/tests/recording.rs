@@ -61,8 +61,7 @@ fn datagrams(reader: &Reader) -> (Vec<(u64, i64, Vec<u8>)>, u64) {
             }
             Ok(())
         })
-        .unwrap()
-        .chunks;
+        .unwrap();
     (all, bad)
 }
 

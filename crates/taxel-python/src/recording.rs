@@ -141,7 +141,7 @@ impl RecordingReader {
 
     /// What the recording holds beside its data.
     fn remarks(&self, py: Python<'_>) -> PyResult<Remarks> {
-        let (all, unread) = enter(py, |stop| self.reader.remarks(stop))?;
+        let (all, bad_chunks) = enter(py, |stop| self.reader.remarks(stop))?;
         let detections: Vec<_> =
             all.detections.iter().map(|(at, d)| (at, &d.label, d.t, d.known, d.slope, d.repaired)).collect();
         Ok(Remarks {
@@ -151,7 +151,7 @@ impl RecordingReader {
             detections: Plain(json!(detections)),
             zeroings: Plain(json!(all.zeroings)),
             counts: Plain(json!(all.counts)),
-            condition: Plain(json!(self.reader.condition(&all, &unread))),
+            condition: Plain(json!(self.reader.condition(&all, bad_chunks))),
             datagrams: all.datagrams,
             datagram_bytes: all.datagram_bytes,
             samples: all.samples,

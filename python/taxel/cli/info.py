@@ -480,7 +480,7 @@ def _rates(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 def _losses(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     counts = facts["counts"]
-    always = ("datagrams", "bytes", "received", "dropped_by_kernel", "dropped_by_queue", "missing_numbers")
+    always = ("datagrams", "bytes", "received", "dropped_by_kernel", "dropped_by_queue")
     for name in always:
         if counts.get(name) is not None:
             yield name.replace("_", " "), str(counts[name])

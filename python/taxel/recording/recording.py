@@ -510,10 +510,7 @@ class Recording:
 
     @property
     def rebuilt(self) -> dict[str, int]:
-        """Counts of damage found while reading: cut bytes at the end, gaps, bytes skipped, bad and large chunks.
-
-        A missing or damaged summary (`no_summary`) and damaged final counts (`no_end`) count 1.
-        """
+        """Counts of damage found while reading: cut bytes at the end, gaps, bytes skipped, bad and large chunks."""
         return dict(self._main.reader.damage())
 
     def between(self, start: float, stop: float) -> Recording:

@@ -7,7 +7,6 @@
 mod blocks;
 mod message;
 mod remarks;
-mod summary;
 mod walk;
 
 use std::collections::BTreeMap;
@@ -26,9 +25,9 @@ use super::{
 };
 use crate::clock::leaves;
 use crate::{Error, Result};
-use blocks::{Blocks, IndexedChunks};
+use blocks::Blocks;
 pub use message::Message;
-pub use remarks::{ArrivalNumbers, Remarks, begin_with};
+pub use remarks::{Remarks, begin_with};
 use walk::FileWalk;
 
 /// An open recording in the live format.
@@ -58,26 +57,6 @@ impl ReadPosition {
     #[must_use]
     pub fn clone_counts(&self) -> Self {
         Self { bytes: vec![], topics: self.topics.clone(), ..*self }
-    }
-}
-
-/// What of a source's messages could not be read.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Unread {
-    /// Number of chunks that could not be used.
-    pub chunks: u64,
-    /// Number of messages in them and in skipped parts of the file, as far as message indexes list them.
-    pub messages: BTreeMap<Topic, u64>,
-    /// Whether nothing is listed of one of them.
-    pub unknown: bool,
-}
-
-impl Unread {
-    /// Adds what could not be read elsewhere in the file.
-    pub fn add(&mut self, other: &Self) {
-        self.chunks += other.chunks;
-        self.unknown |= other.unknown;
-        other.messages.iter().for_each(|(topic, n)| *self.messages.entry(*topic).or_default() += n);
     }
 }
 
@@ -153,8 +132,8 @@ impl Reader {
         let mut walk = FileWalk::new(path, &file, length);
         walk.magic()?;
         walk.records()?;
-        let FileWalk { begin, end, ending, ends, blocks, skipped, summary, rebuilt, .. } = walk;
-        let blocks = Blocks { path: path.to_owned(), file, length, blocks, skipped, summary };
+        let FileWalk { begin, end, ending, ends, blocks, rebuilt, .. } = walk;
+        let blocks = Blocks { path: path.to_owned(), file, blocks };
         // The copy of the header in the chunk of the datagrams' channel has a checksum; the other copies have none.
         let Some(header) = blocks.header()?.or(end).or(begin) else {
             return Err(Error::format(
@@ -185,9 +164,7 @@ impl Reader {
         };
         let ending = match &self.ending {
             Some(FileEnding::Finished { .. }) if source != 0 => {
-                // A source of which nothing came has no counts.
-                let silent = self.is_silent(source).then(RecordingCounts::default);
-                self.ends.get(name).cloned().or(silent).map(|counts| FileEnding::Finished { counts })
+                self.ends.get(name).cloned().map(|counts| FileEnding::Finished { counts })
             }
             ending => ending.clone(),
         };
@@ -203,13 +180,6 @@ impl Reader {
     /// Refuses more bytes of a source than may be in memory.
     fn fits(&self, subject: &str, size: usize) -> Result<()> {
         limits::in_memory(&self.blocks.path, subject, size as u64, self.memory)
-    }
-
-    /// Whether the summary lists no datagram, line or frame of a source.
-    fn is_silent(&self, source: usize) -> bool {
-        let header = &self.header.sources[source - 1];
-        let totals = self.blocks.summary.as_ref().and_then(|summary| summary.messages.as_ref());
-        totals.is_some_and(|totals| data_of(header).total(totals, source, &header.name).is_none_or(|n| n == 0))
     }
 
     /// The source's header.
@@ -230,59 +200,39 @@ impl Reader {
         self.rebuilt
     }
 
-    /// What is known of the file and of this source's messages, of which `remarks` and `unread` were found.
+    /// What is known of the file and of this source's messages, of which `remarks` were found, with so many bad chunks.
     #[must_use]
-    pub fn condition(&self, remarks: &Remarks, unread: &Unread) -> Condition {
-        let (name, data) = (&self.header().name, data_of(self.header()));
+    pub fn condition(&self, remarks: &Remarks, bad_chunks: u64) -> Condition {
+        let data = data_of(self.header());
         let read = |topic: Topic| remarks.messages.get(&topic).copied().unwrap_or(0);
-        let totals = self.blocks.summary.as_ref().and_then(|summary| summary.messages.as_ref());
-        // Another program may have written the file anew without some messages, and a summary that fits: the recorder's own
-        // counts say how many there were, the last ones before the end how many at least.
-        let total = |topic: Topic| totals.and_then(|totals| topic.total(totals, self.source, name));
-        let recorded = |topic: Topic| match &self.ending {
-            Some(FileEnding::Finished { counts }) if topic == data => Some(counts.recorded),
-            Some(FileEnding::Finished { counts }) => counts.messages.get(&topic).copied(),
-            _ => None,
+        // A source of which nothing came has no counts in a file that was finished.
+        let is_silent = self.source > 0 && read(data) == 0 && !self.rebuilt.unfinished;
+        let silent = is_silent.then(|| FileEnding::Finished { counts: RecordingCounts::default() });
+        let ending = self.ending.clone().or(silent);
+        // The recorder's own counts say how many messages there were, the last ones before the end how many at least.
+        let counts = match &ending {
+            Some(FileEnding::Finished { counts }) => Some(counts),
+            _ => remarks.counts.as_ref(),
         };
-        let so_far = |topic: Topic| remarks.counts.as_ref().and_then(|counts| counts.messages.get(&topic)).copied();
-        let mut unread = unread.clone();
-        if let Some((0, indexed)) = self.blocks.skipped.first() {
-            unread.add(&self.unread_chunks(&ReadPosition::default(), indexed.as_ref(), &IndexedChunks::new()));
-        }
+        let recorded = |topic: Topic| match &ending {
+            Some(FileEnding::Finished { counts }) if topic == data => Some(counts.recorded),
+            _ => counts.and_then(|counts| counts.messages.get(&topic)).copied(),
+        };
         let (mut lost, mut repeated) = (BTreeMap::new(), 0);
         for topic in Topic::ALL.into_iter().filter(|topic| topic.lost_in_file().is_some()) {
-            let (read, total) = (read(topic), total(topic));
-            // Arrival numbers tell which datagrams are there twice, unless who wrote the file gave all of them one number.
-            let again = match topic {
-                Topic::Datagrams if !remarks.numbers.are_one() => remarks.numbers.repeated(),
-                _ if topic == data => recorded(topic).or(total).map_or(0, |listed| read.saturating_sub(listed)),
-                // Another program may have added some.
-                _ => total.map_or(0, |listed| read.saturating_sub(listed)),
-            };
-            repeated += again;
-            let listed = unread.messages.get(&topic).copied().unwrap_or(0);
-            // The summary counts what is there twice.
-            let missing = total.map(|total| total.saturating_sub(read));
-            let not_there = recorded(topic).map(|recorded| recorded.saturating_sub(read - again));
-            let known = missing.max(not_there).unwrap_or(listed);
-            lost.insert(topic, known.max(so_far(topic).map_or(0, |n| n.saturating_sub(read))));
+            if let Some(recorded) = recorded(topic) {
+                lost.insert(topic, recorded.saturating_sub(read(topic)));
+                // Notes may have been added since.
+                repeated += if topic == data { read(topic).saturating_sub(recorded) } else { 0 };
+            }
         }
-        let of_what_came = match &self.ending {
-            Some(FileEnding::Finished { counts }) => counts.sum,
-            _ => None,
-        };
-        let all_there = repeated == 0 && lost.values().all(|n| *n == 0);
         Condition {
-            changed: all_there && of_what_came.is_some_and(|sum| sum != remarks.sum),
-            ending: self.ending.clone(),
+            ending,
             rebuilt: self.rebuilt,
-            bad_chunks: unread.chunks,
+            bad_chunks,
             lost,
-            unknown: unread.unknown && totals.is_none(),
             repeated,
             messages: read(data),
-            skipped_numbers: remarks.numbers.skipped(),
-            before_first: before_first(remarks),
             so_far: remarks.counts.clone(),
             converted: self.header().conversion.converted.clone().map(Box::new),
             decoded: None,
@@ -291,36 +241,18 @@ impl Reader {
         }
     }
 
-    /// The messages of this source that message indexes list beyond those that were read; not known without such indexes.
-    fn unread_chunks(&self, position: &ReadPosition, indexed: Option<&IndexedChunks>, read: &IndexedChunks) -> Unread {
-        let mut unread = Unread { unknown: true, ..Unread::default() };
-        for (channel, n) in indexed.into_iter().flatten() {
-            let n = n.saturating_sub(read.get(channel).copied().unwrap_or(0));
-            unread.unknown &= n == 0;
-            if let Some(topic) = self.topic(position, *channel).filter(|_| n > 0) {
-                *unread.messages.entry(topic).or_default() += n;
-            }
-        }
-        unread
-    }
-
-    /// The topic of a channel, if it belongs to this source.
-    fn topic(&self, position: &ReadPosition, channel: u16) -> Option<Topic> {
-        position.topics.get(&channel).copied().unwrap_or_else(|| Topic::of_number(channel, self.source))
-    }
-
-    /// Passes all messages to `take` in the order of the file; skips bad chunks, and returns what was not read.
+    /// Passes all messages to `take` in the order of the file; skips bad chunks, and returns their number.
     ///
     /// # Errors
     ///
     /// `File` if the file cannot be read, `Core` if `take` returns it or the caller stops.
-    pub fn messages(&self, stop: Stop<'_>, mut take: impl FnMut(Message<'_>) -> Result<()>) -> Result<Unread> {
-        let (mut position, mut unread) = (ReadPosition::default(), Unread::default());
+    pub fn messages(&self, stop: Stop<'_>, mut take: impl FnMut(Message<'_>) -> Result<()>) -> Result<u64> {
+        let (mut position, mut bad) = (ReadPosition::default(), 0);
         for block in 0..self.blocks() {
             stop.check()?;
-            unread.add(&self.block(block, &mut position, &mut take)?);
+            bad += u64::from(!self.block(block, &mut position, &mut take)?);
         }
-        Ok(unread)
+        Ok(bad)
     }
 
     /// Number of blocks (chunks).
@@ -330,7 +262,7 @@ impl Reader {
     }
 
     /// Passes the messages of one block to `take`; `position` is the state after earlier blocks, all or some of them.
-    /// Returns what of the block, and of what was skipped behind it, was not read.
+    /// Returns whether the block is valid.
     ///
     /// # Errors
     ///
@@ -340,20 +272,15 @@ impl Reader {
         block: usize,
         position: &mut ReadPosition,
         mut take: impl FnMut(Message<'_>) -> Result<()>,
-    ) -> Result<Unread> {
-        let skipped = self.blocks.skipped.binary_search_by_key(&(block + 1), |(before, _)| *before);
-        let block = self.blocks.blocks[block];
+    ) -> Result<bool> {
         let ReadPosition { topics, last, bytes } = position;
-        let (mut wrong, mut read) = (None, IndexedChunks::new());
-        let sound = self.blocks.records(block, bytes, |record| {
+        let mut wrong = None;
+        let is_valid = self.blocks.records(self.blocks.blocks[block], bytes, |record| {
             match record {
                 Record::Channel(channel) => {
                     topics.insert(channel.id, Topic::of_name(&channel.topic, self.source, &self.header().name));
                 }
                 Record::Message { header, data } => {
-                    if skipped.is_ok() {
-                        *read.entry(header.channel_id).or_default() += 1;
-                    }
                     let topic = topics.get(&header.channel_id).copied();
                     if let Some(topic) = topic.unwrap_or_else(|| Topic::of_number(header.channel_id, self.source)) {
                         let mut number = u64::from(header.sequence);
@@ -369,29 +296,17 @@ impl Reader {
             }
             wrong.is_none()
         })?;
-        if let Some(wrong) = wrong {
-            return Err(wrong);
-        }
-        let mut unread = match (skipped, sound) {
-            (Ok(k), _) => self.unread_chunks(position, self.blocks.skipped[k].1.as_ref(), &read),
-            (Err(_), true) => Unread::default(),
-            (Err(_), false) => match self.blocks.message_indexes(block)? {
-                Some(indexed) => Unread { unknown: false, ..self.unread_chunks(position, Some(&indexed), &read) },
-                None => Unread { unknown: true, ..Unread::default() },
-            },
-        };
-        unread.chunks = u64::from(!sound);
-        Ok(unread)
+        wrong.map_or(Ok(is_valid), Err)
     }
 
-    /// Collects everything except the datagrams' bytes and the frames; also returns what was not read.
+    /// Collects everything except the datagrams' bytes and the frames; also returns the number of bad chunks.
     ///
     /// # Errors
     ///
     /// `Core` (format) if it is more than may be in memory; otherwise as [`Reader::messages`].
-    pub fn remarks(&self, stop: Stop<'_>) -> Result<(Remarks, Unread)> {
+    pub fn remarks(&self, stop: Stop<'_>) -> Result<(Remarks, u64)> {
         let (mut all, mut size) = (Remarks::default(), 0);
-        let unread = self.messages(stop, |message| {
+        let bad = self.messages(stop, |message| {
             all.add(&message);
             if !message.topic.is_data() && message.topic != Topic::Pressure {
                 size += limits::OBJECTS * message.data.len();
@@ -399,7 +314,7 @@ impl Reader {
             }
             Ok(())
         })?;
-        Ok((all, unread))
+        Ok((all, bad))
     }
 
     /// All datagrams as they arrived.
@@ -509,17 +424,6 @@ impl Reader {
         decoded.version_2 = sender.version_2().counts();
         decoded.found = DamageCounts::from_sender(&sender, header.decoding.origin_us);
         Ok(decoded)
-    }
-}
-
-/// How many datagrams or lines were recorded before the first one in a file, by its last counts.
-fn before_first(remarks: &Remarks) -> u64 {
-    let Some(counts) = &remarks.counts else { return 0 };
-    #[allow(clippy::cast_possible_truncation)]
-    match (counts.first, remarks.numbers.first()) {
-        (Some(first), Some(recorded)) => recorded.saturating_sub(unwrap(recorded, first as u32)),
-        (Some(_), None) => counts.recorded,
-        _ => 0,
     }
 }
 

@@ -1,7 +1,5 @@
 //! The channels of a recording, with their schemas.
 
-use std::collections::BTreeMap;
-
 use serde::{Deserialize, Serialize};
 
 /// A channel of a recording. Its number is the same in every file, so that a file is readable even if its first chunk,
@@ -139,11 +137,6 @@ impl Topic {
     /// The topic of a channel with this name, if the channel belongs to the source.
     pub(super) fn of_name(name: &str, source: usize, named: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|topic| topic.channel_name(source, named) == name)
-    }
-
-    /// The number of messages of the channel, of those of all channels by name.
-    pub(super) fn total(self, totals: &BTreeMap<String, u64>, source: usize, named: &str) -> Option<u64> {
-        totals.get(&self.channel_name(source, named)).copied()
     }
 
     /// The topic of a channel with this number in a file of ours, if the channel belongs to the source.

@@ -25,9 +25,6 @@ const NO_LINE_LOST: &str = "nothing lost after arrival (lines are not numbered, 
 /// The wording where a kernel does not count what it drops, and the board does not number what it sends.
 const UNCOUNTED: &str = "losses unknown: the kernel does not count dropped datagrams";
 
-/// The wording where the record with the final counts is damaged.
-const NO_END: &str = "the final counts are damaged: losses since the last intact counts are unknown";
-
 /// How much of a recording is there, from the best to the worst; of several parts the worst counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -68,9 +65,6 @@ pub struct Verdict {
     pub doubtful_after_us: Option<i64>,
     /// Where times step back, in the order of arrival; of many the largest steps.
     pub steps_back: Vec<StepBack>,
-    /// The name of the recording that this is a stretch of: the losses are those of the recording, and several stretches
-    /// have them once.
-    pub stretch_of: Option<String>,
     /// The verdicts of the recordings or sources that this one is made of, by name.
     pub parts: Vec<(String, Verdict)>,
 }
@@ -94,20 +88,9 @@ pub struct RecordingCounts {
     /// Whether the arrival of a datagram is when it was read from the socket, as the system does not state when it arrived.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub stamped_when_read: bool,
-    /// Datagrams or lines whose arrival numbers a file without its end lacks, but for those dropped by the queue.
-    #[serde(skip)]
-    pub left_out: u64,
-    /// Arrival number of the first datagram or line recorded.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub first: Option<u64>,
     /// Number of the other messages recorded, by channel.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub messages: BTreeMap<Topic, u64>,
-    /// At the end, the sum of the CRC-32 of the datagrams or lines recorded, modulo 2^32: whether what a file holds is what
-    /// was recorded, whoever wrote it since, in whatever order. That of CRC-32C is one number for all intact datagrams of
-    /// version 2, which end with theirs.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sum: Option<u32>,
     /// What the decoder could not use of the bytes received, by cause; see [`damage`](super::damage::damage).
     pub decoder: BTreeMap<String, u64>,
     /// Where times step back.
@@ -147,10 +130,6 @@ pub struct Rebuilt {
     pub skipped_bytes: u64,
     /// Number of chunks that were skipped because the unpacked size that they state exceeds the limit.
     pub large_chunks: u64,
-    /// Whether the summary behind the data of a file that was closed is missing or damaged.
-    pub no_summary: bool,
-    /// Whether the record with the final counts is damaged, as the summary states that there was one.
-    pub no_end: bool,
 }
 
 /// What a verdict is made from.
@@ -169,8 +148,6 @@ pub enum Basis {
     Together(Vec<(String, Verdict)>),
     /// The sources of one file.
     Sources(Vec<(String, Verdict)>),
-    /// Stretches of one recording.
-    Stretches(Vec<(String, Verdict)>),
     /// The recording with this verdict, of which all times are later by so many us.
     Later(i64, Verdict),
 }
@@ -187,18 +164,10 @@ pub struct Condition {
     pub bad_chunks: u64,
     /// Number of messages that the file has lost, as far as they are known, by channel.
     pub lost: BTreeMap<Topic, u64>,
-    /// Whether parts of the file were skipped of which it is not known what they held.
-    pub unknown: bool,
     /// Number of messages that the file holds a second time, as far as they are known.
     pub repeated: u64,
     /// Number of datagrams, lines or frames in the file.
     pub messages: u64,
-    /// Arrival numbers that the file lacks between its first and last datagram.
-    pub skipped_numbers: u64,
-    /// Those that it lacks before its first one, since the recording began.
-    pub before_first: u64,
-    /// Whether the datagrams or lines, of which none is missing, are not those that were recorded.
-    pub changed: bool,
     /// The last counts before the end.
     pub so_far: Option<RecordingCounts>,
     /// The verdict of the recording that this one was converted from, as the header states it.
@@ -233,7 +202,6 @@ impl Verdict {
             }
             Basis::Together(parts) => Self::combine(parts),
             Basis::Sources(parts) => Self::of_sources(parts),
-            Basis::Stretches(parts) => Self::of_stretches(parts),
             Basis::Later(us, verdict) => verdict.shift_by(us),
         }
     }
@@ -254,7 +222,6 @@ impl Verdict {
         let dropped = [
             (counts.dropped_by_kernel.known(), "dropped_by_kernel", "messages dropped by the kernel"),
             (counts.dropped_by_queue, "dropped_by_queue", "datagrams dropped by taxel's queue"),
-            (counts.left_out, LEFT_OUT, "messages dropped by taxel's queue or left out of the file"),
             (
                 counts.received.saturating_sub(counts.dropped_by_queue + counts.recorded),
                 "not_recorded",
@@ -435,25 +402,6 @@ impl Verdict {
         Self::combine_with(parts, |cause, sum, n| if OF_THE_FILE.contains(&cause) { sum.max(n) } else { sum + n })
     }
 
-    /// As [`Self::combine`], of stretches of one recording: what all of them lost is what the whole lost, and counts once.
-    fn of_stretches(parts: Vec<(String, Self)>) -> Self {
-        let mut combined = Self::combine(parts.clone());
-        let all = parts.iter().map(|(_, part)| [&part.lost, &part.damaged, &part.noted]);
-        for (k, sums) in [&mut combined.lost, &mut combined.damaged, &mut combined.noted].into_iter().enumerate() {
-            for (cause, sum) in sums {
-                let least = all.clone().map(|numbers| numbers[k].get(cause).copied().unwrap_or(0)).min();
-                *sum -= least.unwrap_or(0) * (parts.len() as u64).saturating_sub(1);
-            }
-        }
-        for k in (1..combined.steps_back.len()).rev() {
-            if combined.steps_back[..k].contains(&combined.steps_back[k]) {
-                combined.steps_back.remove(k);
-            }
-        }
-        combined.stretch_of = parts.into_iter().find_map(|(_, part)| part.stretch_of);
-        combined
-    }
-
     fn combine_with(parts: Vec<(String, Self)>, add: impl Fn(&str, u64, u64) -> u64) -> Self {
         let numbers = |part: &Self| !(part.lost.is_empty() && part.damaged.is_empty() && part.noted.is_empty());
         if let [(_, first), others @ ..] = &parts[..]
@@ -545,8 +493,5 @@ fn numbered(n: u64, plural: &str) -> String {
 const OF_UNFINISHED_LINES: &str = "bytes of unfinished lines";
 /// The jumps of time before a recording that began while its board was received: all times since are doubtful.
 pub(crate) const JUMPED_BEFORE: &str = "jumps_of_time_before_it";
-/// What a file without its end lacks by its arrival numbers.
-const LEFT_OUT: &str = "dropped_or_left_out";
 /// Damage that is of a file as a whole, and that each of its sources has.
-const OF_THE_FILE: [&str; 7] =
-    ["bad_chunks", "large_chunks", "skipped_bytes", "torn_bytes", "bytes_after_end", "no_summary", "no_final_counts"];
+const OF_THE_FILE: [&str; 5] = ["bad_chunks", "large_chunks", "skipped_bytes", "torn_bytes", "bytes_after_end"];

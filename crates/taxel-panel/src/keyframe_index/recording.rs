@@ -20,7 +20,7 @@ use taxel_core::rest::{LOADED_TICKS, preload, preload_text};
 use taxel_live::clock::{BoardClock, Pace, leaves};
 use taxel_live::pipeline::TaxelChange;
 use taxel_live::recording::{
-    Basis, Condition, DamageCounts, Header, ReadPosition, Reader, Remarks, Topic, Unread, Verdict, begin_with,
+    Basis, Condition, DamageCounts, Header, ReadPosition, Reader, Remarks, Topic, Verdict, begin_with,
     damage_of_version_1,
 };
 use taxel_live::{Error, Result};
@@ -177,7 +177,7 @@ impl RecordingIndex {
         let frame_us = self.header.registers.map_or(0, |registers| registers.frame_us() as i64);
         match (&self.source, &mut *decoding) {
             (OpenedFile::Mcap(reader), RecordingDecoder::Datagrams(decoder)) => {
-                let unread = reader.block(k, position, |message| {
+                let is_valid = reader.block(k, position, |message| {
                     if message.topic == Topic::Datagrams {
                         let before = events.len();
                         let info = decoder.push(message.data, Some(message.at_ns / 1000), events);
@@ -198,7 +198,7 @@ impl RecordingIndex {
                     Ok(())
                 })?;
                 if let Some(contents) = beside {
-                    contents.unread.add(&unread);
+                    contents.bad_chunks += u64::from(!is_valid);
                 }
             }
             (OpenedFile::Lsa(file, length), RecordingDecoder::Bytes(decoder)) => {
@@ -312,7 +312,7 @@ impl RecordingIndex {
             activity: Activity::new(&self.header.array),
             remarks: Remarks::default(),
             clock: BoardClock::default(),
-            unread: Unread::default(),
+            bad_chunks: 0,
             verdict: String::new(),
         };
         for k in 0..self.blocks() {
@@ -369,7 +369,7 @@ impl RecordingIndex {
             }
             RecordingDecoder::Bytes(_) => None,
         };
-        let condition = reader.condition(&contents.remarks, &contents.unread);
+        let condition = reader.condition(&contents.remarks, contents.bad_chunks);
         Verdict::new(Basis::File(Box::new(Condition { decoded, ..condition })))
     }
 }
@@ -392,7 +392,7 @@ struct Contents {
     activity: Activity,
     remarks: Remarks,
     clock: BoardClock,
-    unread: Unread,
+    bad_chunks: u64,
     verdict: String,
 }
 

@@ -180,7 +180,7 @@ class McapReader(Reader):
     def _verdict(self) -> Verdict:
         condition = self._remarks.condition
         has_messages = self._frames is None and condition["messages"]
-        if has_messages and (condition["changed"] or self._must_decode()):
+        if has_messages and self._must_decode():
             found = self._decoded.found if self._stream is None else self._samples.found
             condition = condition | {"decoded": found}
         return Verdict._of({"file": condition})
@@ -241,13 +241,12 @@ class McapReader(Reader):
         of_2 = decoded.version_2
         # Datagrams that this computer dropped or the file lost are missing among the board's numbers too, and are
         # counted separately.
-        skipped = remarks.condition["skipped_numbers"]
-        of_2["missing"] -= min(of_2["missing"], skipped)
+        lost_in_file = self._verdict.lost.get("lost_in_file", 0)
+        of_2["missing"] -= min(of_2["missing"], lost_in_file + (counts.get("dropped_by_queue") or 0))
         return {
             "datagrams": remarks.datagrams,
             "bytes": remarks.datagram_bytes,
-            "missing_numbers": skipped,
-            "lost_in_file": self._verdict.lost.get("lost_in_file", 0),
+            "lost_in_file": lost_in_file,
             **{name: counts.get(name) for name in ("received", "dropped_by_kernel", "dropped_by_queue")},
             "decoder": decoded.counts,
             **({"decoder_version_2": of_2} if of_2["datagrams"] else {}),

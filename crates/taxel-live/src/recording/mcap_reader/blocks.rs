@@ -1,6 +1,5 @@
 //! Reads the chunks of a file one at a time.
 
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -8,7 +7,6 @@ use mcap::parse_record;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::summary::FileSummary;
 use crate::read_at::read_exact_at;
 use crate::recording::{Header, limits};
 use crate::{Error, Result};
@@ -21,26 +19,12 @@ pub(super) struct FileBlock {
     pub(super) bare: bool,
 }
 
-/// Numbers of messages by the number of their channel, as the message indexes behind a chunk list them.
-pub(super) type IndexedChunks = BTreeMap<u16, u64>;
-
-/// The channel and the number of messages that a message index lists, from its first 15 bytes.
-pub(super) fn index_entry(head: &[u8]) -> Option<(u16, u64)> {
-    // Opcode 1, length 8, channel 2, size of the entries 4; an entry has 16 bytes.
-    let (channel, size) = head.get(9..15)?.split_first_chunk::<2>()?;
-    Some((u16::from_le_bytes(*channel), u64::from(u32::from_le_bytes(size.try_into().ok()?)) / 16))
-}
-
 /// Where the messages of a file are.
 #[derive(Debug)]
 pub(super) struct Blocks {
     pub(super) path: PathBuf,
     pub(super) file: File,
-    pub(super) length: u64,
     pub(super) blocks: Vec<FileBlock>,
-    /// For each offset where something was skipped: the number of blocks before it, and what the message indexes around it list.
-    pub(super) skipped: Vec<(usize, Option<IndexedChunks>)>,
-    pub(super) summary: Option<FileSummary>,
 }
 
 impl Blocks {
@@ -59,15 +43,6 @@ impl Blocks {
             }
         }
         Ok(header)
-    }
-
-    /// What the message indexes behind a block list; none if there are none, though the block had messages.
-    pub(super) fn message_indexes(&self, block: FileBlock) -> Result<Option<IndexedChunks>> {
-        // Times of the first and the last message, both 0 in a chunk without messages.
-        let mut times = [0; 16];
-        read_exact_at(&self.file, &mut times, block.offset + 9).map_err(Error::file(&self.path))?;
-        let all = message_indexes_from(&self.path, &self.file, self.length, block.offset + block.length)?;
-        Ok((times == [0; 16] || !all.is_empty()).then_some(all))
     }
 
     /// As [`records`].
@@ -124,16 +99,4 @@ pub(super) fn records(
         }
     }
     Ok(true)
-}
-
-/// What the message indexes from `at` on list, up to the next other record.
-pub(super) fn message_indexes_from(path: &Path, file: &File, length: u64, mut at: u64) -> Result<IndexedChunks> {
-    let (mut all, mut head) = (IndexedChunks::new(), [0; 15]);
-    while at.checked_add(15).is_some_and(|end| end <= length) {
-        read_exact_at(file, &mut head, at).map_err(Error::file(path))?;
-        let Some((channel, messages)) = index_entry(&head).filter(|_| head[0] == op::MESSAGE_INDEX) else { break };
-        *all.entry(channel).or_default() += messages;
-        at += 15 + 16 * messages;
-    }
-    Ok(all)
 }

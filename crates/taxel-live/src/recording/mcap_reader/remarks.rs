@@ -35,10 +35,6 @@ pub struct Remarks {
     pub datagram_bytes: u64,
     /// Times of the first and the last arrival, ns since 1970.
     pub arrivals: Option<(i64, i64)>,
-    /// Arrival numbers of the datagrams or lines.
-    pub numbers: ArrivalNumbers,
-    /// Sum of the CRC-32 of the datagrams or lines, modulo 2^32.
-    pub sum: u32,
     /// Number of messages of each channel.
     pub messages: BTreeMap<Topic, u64>,
     /// Resets of the board, and changes of its version of the wire.
@@ -50,70 +46,16 @@ pub struct Remarks {
     pub held: Option<Vec<u16>>,
 }
 
-/// Arrival numbers that were read.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct ArrivalNumbers {
-    /// The last number of each run of successive ones, by the first.
-    runs: BTreeMap<u64, u64>,
-    repeated: u64,
-}
-
-impl ArrivalNumbers {
-    fn add(&mut self, number: u64) {
-        match self.runs.range_mut(..=number).next_back() {
-            Some((_, last)) if number <= *last => {
-                self.repeated += 1;
-                return;
-            }
-            Some((_, last)) if number == *last + 1 => *last = number,
-            _ => drop(self.runs.insert(number, number)),
-        }
-        let next = number.checked_add(1).and_then(|next| self.runs.remove(&next));
-        if let (Some(end), Some((_, last))) = (next, self.runs.range_mut(..=number).next_back()) {
-            *last = end;
-        }
-    }
-
-    /// Number of messages whose arrival number another one before them has.
-    #[must_use]
-    pub fn repeated(&self) -> u64 {
-        self.repeated
-    }
-
-    /// Whether there are several messages, all with one arrival number.
-    #[must_use]
-    pub fn are_one(&self) -> bool {
-        self.repeated > 0 && self.runs.len() == 1 && self.runs.iter().all(|(first, last)| first == last)
-    }
-
-    /// The least arrival number.
-    #[must_use]
-    pub fn first(&self) -> Option<u64> {
-        self.runs.keys().next().copied()
-    }
-
-    /// Number of arrival numbers that are missing between the first and the last.
-    #[must_use]
-    pub fn skipped(&self) -> u64 {
-        let inner = self.runs.values().zip(self.runs.keys().skip(1));
-        inner.map(|(last, next)| next - last - 1).sum()
-    }
-}
-
 impl Remarks {
     /// Adds a message; datagrams and frames are only counted.
     pub fn add(&mut self, message: &Message<'_>) {
         *self.messages.entry(message.topic).or_default() += 1;
-        if message.topic.is_data() {
-            self.sum = self.sum.wrapping_add(crc32fast::hash(message.data));
-        }
         match message.topic {
             Topic::Datagrams => {
                 self.datagrams += 1;
                 self.datagram_bytes += message.data.len() as u64;
                 let (first, last) = self.arrivals.unwrap_or((message.at_ns, message.at_ns));
                 self.arrivals = Some((first.min(message.at_ns), last.max(message.at_ns)));
-                self.numbers.add(message.number);
             }
             Topic::Pressure | Topic::Frames => {}
             // The checksum of a message that does not parse is valid, so another program wrote the message; it is
@@ -161,10 +103,7 @@ impl Remarks {
                     self.board.push(BoardChange { at_ns: message.at_ns, ..value });
                 }
             }
-            Topic::Samples => {
-                self.samples += 1;
-                self.numbers.add(message.number);
-            }
+            Topic::Samples => self.samples += 1,
             Topic::Counts => self.counts = serde_json::from_slice(message.data).ok().or(self.counts.take()),
         }
     }

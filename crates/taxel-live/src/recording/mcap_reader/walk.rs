@@ -7,8 +7,7 @@ use std::path::Path;
 use mcap::records::{Record, op};
 use mcap::{MAGIC, parse_record};
 
-use super::blocks::{FileBlock, IndexedChunks, index_entry, message_indexes_from, records};
-use super::summary::FileSummary;
+use super::blocks::{FileBlock, records};
 use crate::read_at::read_exact_at;
 use crate::recording::metadata::{BEGIN, CHECK, END, check};
 use crate::recording::{FileEnding, Header, Rebuilt, RecordingCounts, limits};
@@ -19,17 +18,6 @@ const RECORD_HEAD: u64 = 9;
 
 /// Size of a footer and of the magic bytes behind it, with which a file ends.
 const FOOTER: u64 = RECORD_HEAD + 20 + MAGIC.len() as u64;
-
-/// What was skipped between two blocks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-enum Skipped {
-    #[default]
-    Nothing,
-    /// Records that end where one of their lengths says.
-    Records,
-    /// Bytes that are no whole record.
-    Bytes,
-}
 
 /// The state of the walk.
 pub(super) struct FileWalk<'a> {
@@ -42,12 +30,6 @@ pub(super) struct FileWalk<'a> {
     /// The final counts of the other sources.
     pub(super) ends: BTreeMap<String, RecordingCounts>,
     pub(super) blocks: Vec<FileBlock>,
-    /// For each offset where something was skipped: the number of blocks before it, and what the message indexes between these
-    /// blocks and the next one list; none where bytes are missing or too many, as these indexes may be of other chunks.
-    pub(super) skipped: Vec<(usize, Option<IndexedChunks>)>,
-    /// What message indexes list since the last block, and what was skipped since.
-    since: (IndexedChunks, Skipped),
-    pub(super) summary: Option<FileSummary>,
     pub(super) rebuilt: Rebuilt,
 }
 
@@ -63,9 +45,6 @@ impl<'a> FileWalk<'a> {
             ending: None,
             ends: BTreeMap::new(),
             blocks: vec![],
-            skipped: vec![],
-            since: (IndexedChunks::new(), Skipped::Nothing),
-            summary: None,
             rebuilt,
         }
     }
@@ -99,51 +78,27 @@ impl<'a> FileWalk<'a> {
 
     pub(super) fn records(&mut self) -> Result<()> {
         self.data()?;
-        self.next_block();
         // The record that ends a recording is written after all data.
-        let ended = matches!(self.ending, Some(FileEnding::Finished { .. }));
-        self.rebuilt.no_summary = self.summary.is_none() && (ended || !self.rebuilt.unfinished);
-        if ended {
+        if self.ending.is_some() {
             (self.rebuilt.unfinished, self.rebuilt.torn_bytes) = (false, 0);
         }
-        self.rebuilt.no_end = self.ending.is_none() && self.summary.as_ref().is_some_and(|summary| summary.finished);
         Ok(())
-    }
-
-    /// Ends the part of the file that follows the last block.
-    fn next_block(&mut self) {
-        let (indexed, skipped) = std::mem::take(&mut self.since);
-        match skipped {
-            Skipped::Nothing => {}
-            Skipped::Records => self.skipped.push((self.blocks.len(), Some(indexed))),
-            Skipped::Bytes => self.skipped.push((self.blocks.len(), None)),
-        }
     }
 
     /// Where what cannot be read begins: at `at`, or at the chunk that ends there, if that is damaged. In it bytes may be
     /// missing or too many, so that it ends elsewhere.
     fn damage_start(&mut self, at: u64) -> Result<u64> {
-        let Some(&block) = self.blocks.last().filter(|block| !block.bare && block.offset + block.length == at) else {
-            return Ok(at);
-        };
-        if records(self.path, self.file, block, &mut vec![], |_| true)? {
-            return Ok(at);
+        match self.blocks.last() {
+            Some(&block)
+                if !block.bare
+                    && block.offset + block.length == at
+                    && !records(self.path, self.file, block, &mut vec![], |_| true)? =>
+            {
+                self.blocks.pop();
+                Ok(block.offset)
+            }
+            _ => Ok(at),
         }
-        self.blocks.pop();
-        // What follows the block before it.
-        let again = self.skipped.pop_if(|(before, _)| *before == self.blocks.len());
-        self.since = match (again, self.blocks.last()) {
-            (Some((_, indexed)), _) => {
-                let skipped = if indexed.is_some() { Skipped::Records } else { Skipped::Bytes };
-                (indexed.unwrap_or_default(), skipped)
-            }
-            (None, Some(block)) => {
-                let indexed = message_indexes_from(self.path, self.file, self.length, block.offset + block.length)?;
-                (indexed, Skipped::Nothing)
-            }
-            (None, None) => (IndexedChunks::new(), Skipped::Nothing),
-        };
-        Ok(block.offset)
     }
 
     fn data(&mut self) -> Result<()> {
@@ -155,8 +110,6 @@ impl<'a> FileWalk<'a> {
                     Some(next) => {
                         self.rebuilt.gaps += 1;
                         self.rebuilt.skipped_bytes += next - from;
-                        let skipped = if self.ends_at(from, next)? { Skipped::Records } else { Skipped::Bytes };
-                        self.since.1 = self.since.1.max(skipped);
                         at = next;
                         continue;
                     }
@@ -169,23 +122,14 @@ impl<'a> FileWalk<'a> {
             match opcode {
                 op::DATA_END => {
                     self.rebuilt.unfinished = false;
-                    self.summary = FileSummary::read(self.file, at, self.length);
-                    let end = self.summary.as_ref().map_or(self.length, |summary| summary.end);
-                    self.rebuilt.bytes_after_end = self.length - end;
+                    self.rebuilt.bytes_after_end = self.length - self.end(at + RECORD_HEAD + length)?;
                     return Ok(());
                 }
                 op::METADATA => self.metadata(at, length)?,
                 op::CHUNK | op::SCHEMA | op::CHANNEL | op::MESSAGE if size.max(length) > u64::from(limits::CHUNK) => {
                     self.rebuilt.large_chunks += 1;
-                    self.since.1 = self.since.1.max(Skipped::Records);
-                }
-                op::MESSAGE_INDEX => {
-                    if let Some((channel, messages)) = index_entry(&self.bytes(at, 15)?) {
-                        *self.since.0.entry(channel).or_default() += messages;
-                    }
                 }
                 op::CHUNK => {
-                    self.next_block();
                     self.blocks.push(FileBlock { offset: at, length: RECORD_HEAD + length, bare: false });
                 }
                 // Next to chunks such a record is another one, damaged.
@@ -194,7 +138,6 @@ impl<'a> FileWalk<'a> {
                         block.length += RECORD_HEAD + length;
                     }
                     _ => {
-                        self.next_block();
                         self.blocks.push(FileBlock { offset: at, length: RECORD_HEAD + length, bare: true });
                     }
                 },
@@ -205,12 +148,19 @@ impl<'a> FileWalk<'a> {
         Ok(())
     }
 
-    /// Whether one of the lengths that a damaged chunk or record at `at` states says that it ends at `end`.
-    fn ends_at(&self, at: u64, end: u64) -> Result<bool> {
-        let head = self.bytes(at, 80)?;
-        let length = number(&head, 1).and_then(|length| length.checked_add(RECORD_HEAD));
-        let packed = packed_range(&head).and_then(|(before, packed)| packed.checked_add(before));
-        Ok([length, packed].into_iter().flatten().any(|length| at.checked_add(length) == Some(end)))
+    /// Where a file ends by the footer of its summary, which begins at `at`; the end of the file where that is not there.
+    fn end(&self, mut at: u64) -> Result<u64> {
+        loop {
+            let head = self.bytes(at, RECORD_HEAD)?;
+            let (Some(&opcode), Some(length)) = (head.first(), number(&head, 1)) else { return Ok(self.length) };
+            if length >= self.length.saturating_sub(at) {
+                return Ok(self.length);
+            }
+            at += RECORD_HEAD + length;
+            if opcode == op::FOOTER {
+                return Ok(self.length.min(at + MAGIC.len() as u64));
+            }
+        }
     }
 
     /// Opcode and length of the record at `at`, where they make sense, and the size that it states to unpack to.
@@ -247,13 +197,12 @@ impl<'a> FileWalk<'a> {
         Ok(first + 4 + word(&self.bytes(at + first, 4)?))
     }
 
-    /// Whether the record at `at`, which makes sense, is one at which the walk may continue after damage: a chunk, a message
-    /// index before such a record, a metadata record of ours, or the end of the data.
+    /// Whether the record at `at`, which makes sense, is one at which the walk may continue after damage: a chunk, a
+    /// metadata record of ours, or the end of the data.
     fn resumes(&self, at: u64, opcode: u8, length: u64) -> Result<bool> {
         let next = at + RECORD_HEAD + length;
         Ok(match opcode {
             op::CHUNK => true,
-            op::MESSAGE_INDEX => length > 6 && self.readable_record(next)?.is_some(),
             op::METADATA => {
                 length < limits::METADATA && self.bytes(at + RECORD_HEAD + 4, BEGIN.len() as u64)? == BEGIN.as_bytes()
             }
@@ -272,7 +221,7 @@ impl<'a> FileWalk<'a> {
         while at < self.length {
             let window = self.bytes(at, WINDOW)?;
             for (k, &byte) in window.iter().enumerate() {
-                if !matches!(byte, op::CHUNK | op::MESSAGE_INDEX | op::METADATA | op::DATA_END) {
+                if !matches!(byte, op::CHUNK | op::METADATA | op::DATA_END) {
                     continue;
                 }
                 let offset = at + k as u64;

@@ -74,22 +74,16 @@ pub(super) struct Pending {
 pub(super) struct Written {
     /// Number of datagrams, lines and frames.
     pub(super) data: u64,
-    /// Arrival number of the first of them.
-    first: Option<u64>,
     /// Number of other messages whose loss a verdict tells.
     others: BTreeMap<Topic, u64>,
-    /// Sum of the checksums of the datagrams and lines.
-    sum: u32,
     /// Whether bytes arrived that are in no line.
     pub(super) left_out: bool,
 }
 
 impl Written {
-    fn add(&mut self, topic: Topic, number: u64, checksum: u32) {
+    fn add(&mut self, topic: Topic) {
         if topic.is_data() {
             self.data += 1;
-            self.sum = self.sum.wrapping_add(checksum);
-            self.first.get_or_insert(number);
         } else if topic.lost_in_file().is_some() {
             *self.others.entry(topic).or_default() += 1;
         }
@@ -97,12 +91,12 @@ impl Written {
 
     /// Counts that state what a reader must find: all but the number of datagrams, which a caller counts while it records.
     pub(super) fn counts_so_far(&self, counts: RecordingCounts) -> RecordingCounts {
-        RecordingCounts { first: self.first, messages: self.others.clone(), ..counts }
+        RecordingCounts { messages: self.others.clone(), ..counts }
     }
 
     /// The same at the end.
     pub(super) fn at_end(&self, counts: RecordingCounts) -> RecordingCounts {
-        RecordingCounts { recorded: self.data, sum: Some(self.sum), ..self.counts_so_far(counts) }
+        RecordingCounts { recorded: self.data, ..self.counts_so_far(counts) }
     }
 }
 
@@ -141,7 +135,6 @@ impl WriteQueue {
         bytes: &[u8],
         most: usize,
     ) -> Result<()> {
-        let checksum = if topic.is_data() { crc32fast::hash(bytes) } else { 0 };
         let mut state = self.lock();
         while state.begun && state.queue.bytes.len() >= most && state.failure.is_none() {
             self.work.notify_all();
@@ -158,7 +151,7 @@ impl WriteQueue {
         if state.begun && before < CHUNK_BYTES && state.queue.bytes.len() >= CHUNK_BYTES {
             self.work.notify_all();
         }
-        state.written[source].add(topic, number, checksum);
+        state.written[source].add(topic);
         // The number in the format has 32 bits; the reader unwraps it.
         #[allow(clippy::cast_possible_truncation)]
         let number = number as u32;

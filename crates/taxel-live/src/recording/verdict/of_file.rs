@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::{
-    Condition, DamageCounts, FileEnding, JUMPED_BEFORE, NO_END, NO_LINE_LOST, NOTHING_LOST, RecordingCounts,
-    RecordingStatus, Verdict, counted,
+    Condition, DamageCounts, FileEnding, JUMPED_BEFORE, NO_LINE_LOST, NOTHING_LOST, RecordingCounts, RecordingStatus,
+    Verdict, counted,
 };
-use crate::recording::Topic;
 use crate::recording::damage::{BACK, DRIFTS, JUMPS};
 
 impl RecordingCounts {
@@ -24,8 +23,8 @@ impl RecordingCounts {
 impl Verdict {
     /// The verdict on a source of a file.
     pub(super) fn of_file(condition: Condition) -> Self {
-        let Condition { ending, rebuilt, bad_chunks, mut lost, unknown, messages, skipped_numbers, .. } = condition;
-        let Condition { before_first, repeated, changed, so_far, converted, decoded, lines, origin_us, .. } = condition;
+        let Condition { ending, rebuilt, bad_chunks, mut lost, repeated, messages, .. } = condition;
+        let Condition { so_far, converted, decoded, lines, origin_us, .. } = condition;
         let is_converted = converted.is_some();
         let converted = converted.map(|verdict| *verdict);
         let nothing_lost = if lines { NO_LINE_LOST } else { NOTHING_LOST };
@@ -33,14 +32,7 @@ impl Verdict {
         let skipped = rebuilt.gaps + bad_chunks + rebuilt.large_chunks > 0;
         let mut no_counts = false;
         let (mut verdict, why) = match ending {
-            Some(FileEnding::Finished { mut counts }) => {
-                if changed && !skipped {
-                    // What reading lacks beside what had been missing when it was recorded was lost with the change.
-                    let before = counts.missing.unwrap_or(0);
-                    let since = decoded.missing.map_or(0, |missing| missing.saturating_sub(before));
-                    *lost.entry(Topic::Datagrams).or_default() += since;
-                    counts.decoder = counts.decoder_with(&decoded.damage);
-                }
+            Some(FileEnding::Finished { counts }) => {
                 (converted.unwrap_or_else(|| Self::of_counts(&counts, nothing_lost)), None)
             }
             ending => {
@@ -48,7 +40,6 @@ impl Verdict {
                     Some(FileEnding::Stopped(why)) => {
                         format!("stopped by an error ({why}): the end of the recording is missing")
                     }
-                    _ if rebuilt.no_end => NO_END.to_owned(),
                     _ => "not finished: the end of the recording is missing".to_owned(),
                 };
                 let counts = so_far.filter(|counts| counts.received > 0 || counts.decoder.values().any(|n| *n > 0));
@@ -58,18 +49,13 @@ impl Verdict {
                 let counts =
                     counts.unwrap_or_else(|| RecordingCounts { recorded: messages, ..RecordingCounts::default() });
                 let found = if skipped { DamageCounts::default() } else { decoded.clone() };
-                let (inner, before) = if skipped { (0, 0) } else { (skipped_numbers, before_first) };
-                let counted = || Self::of_counts(&counts_with(counts, found, inner, before), nothing_lost);
+                let counted = || Self::of_counts(&counts_with(counts, found), nothing_lost);
                 (converted.unwrap_or_else(counted), Some(why))
             }
         };
         let came_short = !verdict.lost.is_empty();
-        if unknown && why.is_some() {
-            // Numbers that the file skips, and that were not dropped before, or lost in the file that it was converted from.
-            let before = ["dropped_by_queue", "lost_in_file"].iter().filter_map(|cause| verdict.lost.get(*cause)).sum();
-            let datagrams = lost.entry(Topic::Datagrams).or_default();
-            *datagrams = (skipped_numbers + before_first).saturating_sub(before).max(*datagrams);
-        }
+        // What was skipped held something; only final counts say how much.
+        let unknown = skipped && why.is_some();
         if verdict.damaged.contains_key(JUMPED_BEFORE) && !is_converted {
             decoded.doubtful_after_us = Some(origin_us - 1);
         }
@@ -99,18 +85,13 @@ impl Verdict {
                 "bytes_after_end",
                 format!("{} after the end of the recording not read", counted(rebuilt.bytes_after_end, "byte")),
             ),
-            (changed.into(), "changed_since_recorded", "the content was changed after recording".to_owned()),
             (repeated, "repeated_in_file", format!("{} repeated", counted(repeated, "message"))),
-            (rebuilt.no_summary.into(), "no_summary", "the summary at the end is missing or damaged".to_owned()),
         ] {
             if n > 0 {
                 // What it was converted from may have been damaged too.
                 *verdict.damaged.entry(cause.to_owned()).or_default() += n;
                 bad.push(text);
             }
-        }
-        if rebuilt.no_end {
-            verdict.damaged.insert("no_final_counts".to_owned(), 1);
         }
         lost.retain(|_, n| *n > 0);
         for (topic, n) in &lost {
@@ -119,19 +100,18 @@ impl Verdict {
                 bad.push(format!("{} lost", counted(*n, noun)));
             }
         }
-        let lost_here = !lost.is_empty();
+        let lost_here = unknown || !lost.is_empty();
         if unknown {
-            bad.push("further losses in the file are unknown".to_owned());
+            bad.push("what else was lost there is unknown".to_owned());
         }
-        let has_end = why.is_none() || rebuilt.no_end;
         if (why.is_some() || lost_here) && verdict.status == RecordingStatus::NothingArrived {
             // It may have come after what is left of the file, or is lost there.
             verdict.status = RecordingStatus::Complete;
         }
-        if !bad.is_empty() || rebuilt.no_end {
+        if !bad.is_empty() {
             verdict.status = verdict.status.max(RecordingStatus::Damaged);
         }
-        if !has_end || rebuilt.torn_bytes > 0 {
+        if why.is_some() || rebuilt.torn_bytes > 0 {
             verdict.status = verdict.status.max(RecordingStatus::Unfinished);
         }
         if lost_here {
@@ -168,26 +148,17 @@ impl Verdict {
     }
 }
 
-/// The last counts of an unfinished recording, with what decoding found since. The arrival numbers that the file skips, and
-/// those before its first, were dropped by the queue, or another program left their datagrams out.
-fn counts_with(
-    mut counts: RecordingCounts,
-    found: DamageCounts,
-    skipped_numbers: u64,
-    before_first: u64,
-) -> RecordingCounts {
+/// The last counts of an unfinished recording, with what decoding found since.
+fn counts_with(mut counts: RecordingCounts, found: DamageCounts) -> RecordingCounts {
     // If more was received than the file holds, the difference is in its unfinished end.
     counts.received = 0;
-    counts.left_out = (skipped_numbers + before_first).saturating_sub(counts.dropped_by_queue);
     counts.decoder = counts.decoder_with(&found.damage);
-    // What was missing when they were saved may have come since, overtaken. What was dropped after its arrival is missing
-    // among the board's numbers too.
     if !found.steps_back.is_empty() {
         counts.steps_back = found.steps_back;
     }
-    let missing =
-        found.missing.map(|found| found.saturating_sub(skipped_numbers) + counts.dropped_by_queue + counts.left_out);
+    // What was missing when they were saved may have come since, overtaken. What was dropped after its arrival is missing
+    // among the board's numbers too.
     let knows = counts.missing.is_some() && !found.unnumbered;
-    counts.missing = missing.or(counts.missing).filter(|n| knows || *n > 0);
+    counts.missing = found.missing.or(counts.missing).filter(|n| knows || *n > 0);
     counts
 }
