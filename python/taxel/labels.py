@@ -143,12 +143,6 @@ class Labels:
         labels.path, labels.rows, labels.removed, labels._from_beginning = path, tuple(rows), (), False
         return labels
 
-    def _without_sources(self) -> Labels:
-        """Return the labels as those of all sources of their recordings."""
-        labels = copy(self)
-        labels.rows = tuple(replace(row, source="") for row in self.rows)
-        return labels
-
     @property
     def recordings(self) -> tuple[str, ...]:
         """The names of the recordings, in order; empty if the table is of one recording."""

@@ -137,7 +137,7 @@ class TrainOptions:
         repeated.
     tare : Tare, path or float (s), optional
         The rest of the taxels: a saved tare, a recording of the sensor at rest (taxel cut makes one), or the seconds at
-        rest at the beginning of each recording. Default: the time before the first label of each.
+        rest at the beginning of each recording. Default: its first quiet half second.
     folds : int, optional
         Number of folds for scores on held-out data: folds of recordings, or of blocks of time in a single recording;
         0: score on the training data. Default: at most 5, as many as the recordings and the rarest label allow.

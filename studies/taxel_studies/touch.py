@@ -193,7 +193,8 @@ def _learnt(train: Sequence[Drop], labels: Sequence[str]) -> detect.Readout:
     """Return the readout that the recipe gives."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # targets out of reach are counted as missed
-        return fit([drop.example for drop in train], Recipe.load("touch", labels=labels))
+        # Of neurons alone.
+        return fit([drop.example for drop in train], Recipe.load("touch", labels=labels), by_rule=())
 
 
 def _first(readout: detect.Readout, drop: Drop) -> tuple[str, float] | None:

@@ -23,7 +23,7 @@ def test_a_delay_at_which_an_age_begins_is_trained(delay_ms: float) -> None:
     [
         ({}, {"large": {"delay_ms": 5.5}}),
         ({"delay_ms": 4.999}, {"large": {}}),
-        ({}, {"large": {"search": [{"delay_ms": 5.0}, {"delay_ms": 7.0}]}}),
+        ({}, {"large": {"choose": [{"delay_ms": 5.0}, {"delay_ms": 7.0}]}}),
     ],
 )
 def test_a_delay_within_an_age_is_refused(learner: dict, neurons: dict) -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from taxel import Array, Events, Frames, SpikeTrains, Tare
 from taxel.detect import Example, Recipe, judge, run, score
 from taxel.detect.ages import Ages, in_frames, later_us
-from taxel.detect.fitting import fit_aligned
+from taxel.detect.fit import Fitter
 
 KINDS = ("small", "large")
 
@@ -50,7 +50,7 @@ def test_kinds_are_told_at_any_rate(rate: float, jitter: float, rise_s: float, s
     learnt, unseen = (touched(seed, rate, jitter, rise_s, start_us) for seed in (1, 2))
     rest_us = start_us + 1_200_000
     examples = [Example(frames, labels, Tare.take(frames, stop_us=rest_us)) for frames, labels in (learnt, unseen)]
-    readout = fit_aligned(examples[:1], Recipe.load("touch", labels=KINDS, noise_floor=0.012), None).readout
+    readout = Fitter(examples[:1], Recipe.load("touch", labels=KINDS, noise_floor=0.012)).fit().readout
     result = score(run(readout, unseen[0], tare=examples[1].tare), unseen[1])
     assert result.missed + result.false <= 1, result
 
@@ -82,20 +82,10 @@ def test_kinds_are_told_where_a_tenth_of_the_frames_is_lost(seed: int) -> None:
         kept = np.random.default_rng(drawn).uniform(size=len(frames)) > 0.1
         some = Frames(frames.values[kept], frames.t[kept], unit="mV", array=frames.array)
         examples.append(Example(some, labels, Tare.take(some, stop_us=1_200_000)))
-    readout = fit_aligned(examples[:1], Recipe.load("touch", labels=KINDS, noise_floor=0.012), None).readout
+    readout = Fitter(examples[:1], Recipe.load("touch", labels=KINDS, noise_floor=0.012)).fit().readout
     result = score(run(readout, examples[1].source, tare=examples[1].tare), examples[1].labels)
     assert result.missed <= 2, result
     assert result.false == 0, result
-
-
-def test_a_recipe_whose_later_age_was_chosen_is_sound_and_its_search_is_as_it_was() -> None:
-    recipe = Recipe.load("touch", labels=KINDS)
-    later = recipe._choices_of("small")[2]
-    assert later["inputs"] == ["later"]
-    made = recipe._at({"small": later, "large": recipe.points_of("large")[0]})
-    assert made.learner_of("small")[1] == 20.0
-    assert made.points_of("small")[1:] == recipe.points_of("small")[1:]
-    assert made.neurons["large"] == recipe.neurons["large"]
 
 
 @settings(max_examples=settings.default.max_examples // 6)
@@ -108,13 +98,9 @@ def test_each_delay_has_one_frame(frame_ms: float) -> None:
     assert in_frames(made, examples, clocks) == made
     period_ms = float(np.median(np.diff(t))) / 1e3
     neuron = made.neurons["small"]
-    *points, ends, lifts, place = neuron, *neuron["choose"]
-    delays = [one["delay_ms"] for one in points]
+    delays = [one["delay_ms"] for one in (neuron, *neuron["choose"])]
     assert delays == sorted(set(delays))
-    assert (place["inputs"], place["delay_ms"]) == (["places"], delays[0])
-    assert (ends["inputs"], ends["delay_ms"], ends["step_ms"]) == (["ends"], 0.1, 0.1)
-    assert lifts == {**ends, "inputs": ["lifts"]}
-    for part, those in (("moments", delays[:1]), ("later", delays[1:]), ("places", delays[:1])):
+    for part, those in (("moments", delays[:1]), ("later", delays[1:])):
         ages = made.encoder.parts[part].ages_ms
         for delay_ms in those:
             begin = ages.index(delay_ms)

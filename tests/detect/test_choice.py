@@ -13,7 +13,8 @@ from test_plain_rule import ARRAY, FLOOR, clocks, events, tare
 import taxel
 from taxel import Detections, Frames, Neuron, Readout, SpikeTrains
 from taxel.detect import Example, PlainRule, Recipe, judge, run, score
-from taxel.detect.folds import by_rule, chosen_of
+from taxel.detect.fit import Found, better_by_rule
+from taxel.detect.judge import _chosen
 from taxel.encode import ContactArea, LevelCrossing
 
 NEURON = Neuron(tau=0.5, refractory=1.0, kernel="exponential", after_spike="reset", time="grid", step_ms=0.1)
@@ -102,18 +103,21 @@ def scored(wrong: int, known: int):
 
 
 def test_fewer_mistakes_are_better_and_of_as_many_what_is_known_earlier():
-    assert by_rule(["on"], [(scored(2, 10), scored(1, 900))]) == ("on",)
-    assert by_rule(["on"], [(scored(1, 900), scored(2, 10))]) == ()
-    assert by_rule(["on"], [(scored(1, 900), scored(1, 800))]) == ("on",)
-    assert by_rule(["on"], [(scored(1, 900), scored(1, 900))]) == ()
+    assert better_by_rule(["on"], [(scored(2, 10), scored(1, 900))]) == ("on",)
+    assert better_by_rule(["on"], [(scored(1, 900), scored(2, 10))]) == ()
+    assert better_by_rule(["on"], [(scored(1, 900), scored(1, 800))]) == ("on",)
+    assert better_by_rule(["on"], [(scored(1, 900), scored(1, 900))]) == ()
     # All folds count together.
-    assert by_rule(["on"], [(scored(2, 10), scored(0, 10)), (scored(0, 10), scored(1, 10))]) == ("on",)
-    assert by_rule(["on"], []) == ()
-    both = chosen_of(Detections(["a", "b"], [1, 5], [2, 6]), Detections(["a", "b"], [3, 4], [3, 4]), ["b"])
+    assert better_by_rule(["on"], [(scored(2, 10), scored(0, 10)), (scored(0, 10), scored(1, 10))]) == ("on",)
+    assert better_by_rule(["on"], []) == ()
+    nothing = Detections([], [], [])
+    both = _chosen(
+        Found(Detections(["a", "b"], [1, 5], [2, 6]), Detections(["a", "b"], [3, 4], [3, 4]), nothing), ["b"]
+    )
     assert (both.label.tolist(), both.t.tolist()) == (["a", "b"], [1, 4])
 
 
-def test_each_fold_is_scored_by_what_was_better_in_the_others():
+def test_each_fold_is_scored_by_what_is_better_inside_its_training_data():
     draw, examples = np.random.default_rng(2), []
     for _ in range(4):
         values = np.zeros((600, 1, 2))

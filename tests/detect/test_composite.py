@@ -222,7 +222,7 @@ def test_each_neuron_is_trained_on_its_inputs_as_if_they_were_the_encoder() -> N
     single = fit(alone, Recipe(ContactArea(), LEARNER, run_threshold=0.9, align=True))
     assert single.neurons["contact"].weights.tobytes() == readout.neurons["contact"].weights.tobytes()
     new = touches(9)
-    found = run(readout, new.source, tare=REST)
+    found = run(readout.using("neuron"), new.source, tare=REST)
     # A spike at an age acts a step of the grid later at most, a fiftieth of a frame; `t` is the onset all the same.
     for label in ("strong", "weak"):
         late = found[label].t - new.labels[label]
@@ -236,9 +236,9 @@ def test_inputs_are_chosen_among_the_points_and_what_none_uses_is_not_encoded() 
     examples = [touches(seed) for seed in range(4)]
     alone = [one._replace(labels={"contact": one.labels["contact"]}) for one in examples]
     strong = {"name": "contact_area", "noise_floor": 20.0}  # feels half of the touches
-    points = {"contact": {"inputs": ["strong"], "search": [{"inputs": ["area"]}]}}
+    points = {"contact": {"inputs": ["strong"], "choose": [{"inputs": ["area"]}]}}
     plan = recipe(encoders={"area": {"name": "contact_area"}, "strong": strong}, neurons=points)
-    result = judge(alone, plan, [Fold([Part(0), Part(1), Part(2)], [Part(3)])], search=True)
+    result = judge(alone, plan, [Fold([Part(0), Part(1), Part(2)], [Part(3)])])
     assert (result.together["contact"].missed, result.together["contact"].false) == (0, 0)
     assert result.trained[0].recipe.inputs_of("contact") == ("area",)
     assert result.trained[0].readout.encoder == ContactArea()

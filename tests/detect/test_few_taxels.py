@@ -109,7 +109,7 @@ def test_a_smaller_grid_gives_what_its_padded_frames_give() -> None:
     small, large = sized((6, 7), 1), sized((8, 8), 2)
     levels = LevelCrossing([70.0])
     learner = {"tau": 5.0, "ub": 3.0, "lb": -3.0, "delay_ms": 1.0}
-    readout = fit([small, large], Recipe(levels, learner, {"contact": {}, "lift": {}}))
+    readout = fit([small, large], Recipe(levels, learner, {"contact": {}, "lift": {}}), by_rule=())
     assert readout.array.shape == (8, 8)
     assert run(readout, small.source) == run(readout, padded(small, (8, 8)))
     stream = readout.stream(small.source.array, frame_us=10_000)

@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import Phase, assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_readout import recipe, tare, touches
 
@@ -14,8 +14,8 @@ import taxel
 from taxel import SpikeTrains
 from taxel.detect import Example, Fold, Part, Score, fit, judge, run, score
 from taxel.detect import folds as folds_module
-from taxel.detect.folds import _folds as folds
-from taxel.detect.folds import count_of_folds
+from taxel.detect.folds import count_of_folds, split
+from taxel.detect.folds import folds_of as folds
 
 
 def examples(*seeds: int) -> list[Example]:
@@ -29,7 +29,7 @@ def test_whole_recordings_are_judged_by_what_was_trained_on_the_others() -> None
     by_hand = []
     for n, example in enumerate(data):
         readout = fit([one for k, one in enumerate(data) if k != n], recipe())
-        by_hand.append(score(run(readout, example.source, tare=example.tare), example.labels, 10.0))
+        by_hand.append(score(run(readout.using("neuron"), example.source, tare=example.tare), example.labels, 10.0))
     errors = np.concatenate([one.errors_ms for one in by_hand])
     assert np.sort(judged.neurons.errors_ms).tolist() == np.sort(errors).tolist()
     for name in ("missed", "false"):
@@ -98,12 +98,12 @@ def test_folds_are_as_many_as_recordings_and_the_rarest_label_allow(
 def test_a_point_that_finds_nothing_is_not_chosen() -> None:
     plan = recipe()
     neurons = {
-        label: {**own, "ub": 1e-6, "search": [{"ub": own.get("ub", 3.0)}]} for label, own in plan.neurons.items()
+        label: {**own, "ub": 1e-6, "choose": [{"ub": own.get("ub", 3.0)}]} for label, own in plan.neurons.items()
     }
     silent = dataclasses.replace(plan, neurons=neurons)
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # readouts that are not chosen must not warn
-        judged = judge(examples(1, 2), silent, 2, search=True, window_ms=10.0)
+        judged = judge(examples(1, 2), silent, 2, window_ms=10.0)
     for made in judged.trained:
         assert {label: own["ub"] for label, own in made.recipe.neurons.items()} == dict.fromkeys(plan.neurons, 3.0)
     assert judged.together.missed == 0
@@ -168,17 +168,17 @@ def test_events_that_cannot_be_learnt_are_named_from_the_beginning_of_a_recordin
 def test_a_point_that_the_labels_do_not_allow_is_not_chosen() -> None:
     """Two labels lie within its refractory time."""
     plan = recipe()
-    neurons = {label: {**own, "search": [{"refractory": 9000.0}]} for label, own in plan.neurons.items()}
-    judged = judge(examples(1, 2), dataclasses.replace(plan, neurons=neurons), 2, search=True, window_ms=10.0)
+    neurons = {label: {**own, "choose": [{"refractory": 9000.0}]} for label, own in plan.neurons.items()}
+    judged = judge(examples(1, 2), dataclasses.replace(plan, neurons=neurons), 2, window_ms=10.0)
     for made in judged.trained:
         for label in plan.neurons:
             assert made.recipe.learner_of(label)[0].neuron == plan.learner_of(label)[0].neuron, label
-    first = {label: {**own, "refractory": 9000.0, "search": [dict(own)]} for label, own in plan.neurons.items()}
+    first = {label: {**own, "refractory": 9000.0, "choose": [dict(own)]} for label, own in plan.neurons.items()}
     with pytest.raises(
         taxel.ProblemError,
         match=r"contact: .* has a label at \d+ us, \d+ us after .*; labels must be more than 9000 ms",
     ):
-        judge(examples(1, 2), dataclasses.replace(plan, neurons=first), 2, search=True)
+        judge(examples(1, 2), dataclasses.replace(plan, neurons=first), 2)
 
 
 def test_more_folds_than_there_are_recordings_or_events_are_refused() -> None:
@@ -224,26 +224,12 @@ def test_only_what_a_fold_tests_is_scored() -> None:
         ([Fold([Part(0)], [Part(2)])], "not a Part of 2 examples"),
         ([Fold([Part(0)], [Part(1, 5.0, 5.0)])], "must start before it stops"),
         ([Fold([Part(0)], [Part(1)]), Fold([Part(0)], [Part(1, 0.0, 9.0)])], "fold 1: .* is tested twice"),
-        ([Fold([Part(0)], [Part(1)], [Fold([Part(7)], [Part(1)])])], "not a Part of 2 examples"),
         ([((0,), (1,))], "must be a Fold"),
     ],
 )
 def test_folds_that_make_no_sense_are_refused(stated: list[Fold], complaint: str) -> None:
     with pytest.raises(taxel.ProblemError, match=complaint):
         judge(examples(1, 2), recipe(), stated)
-
-
-def test_a_search_chooses_in_the_inner_folds_that_are_stated() -> None:
-    """A point that detects is best where the inner fold has events, one that never does where it has none."""
-    plan = recipe()
-    own = dict(plan.neurons["contact"])
-    plan = dataclasses.replace(plan, neurons={"contact": {**own, "search": [{"ub": 1e-6}]}})
-    data = [one._replace(labels={"contact": one.labels["contact"]}) for one in examples(1, 2, 3, 9)]
-    empty = data[3]._replace(labels={})
-    for inside, ub in ((3, 3.0), (4, 1e-6)):
-        inner = [Fold([Part(0), Part(1)], [Part(inside)])]
-        judged = judge([*data, empty], plan, [Fold([Part(0), Part(1)], [Part(2)], inner)], search=True, window_ms=10.0)
-        assert judged.trained[0].recipe.learner_of("contact")[0].ub == ub
 
 
 def test_spike_trains_are_learnt_and_judged_as_their_events_are() -> None:
@@ -257,29 +243,6 @@ def test_spike_trains_are_learnt_and_judged_as_their_events_are() -> None:
     assert both[0].found == both[1].found == both[0].events
     # On a grid the first step is where the input begins, so a crossing differs by at most one step.
     assert np.abs(both[0].errors_ms - both[1].errors_ms).max() <= 0.2
-
-
-def test_points_that_differ_in_lambdas_alone_come_to_what_each_comes_to_by_itself() -> None:
-    from taxel.detect.fitting import Fitting, encode_examples
-
-    plans = [
-        dataclasses.replace(
-            recipe(), neurons={"lift": {**recipe().neurons["lift"], "lambdas": [l1, 1.0, 1.0, 9.0, 9.0]}}
-        )
-        for l1 in (0.0, 1.0, 4.0)
-    ]
-    data = [one._replace(labels={"lift": one.labels["lift"]}) for one in examples(1, 2)]
-    patterns = encode_examples(data, plans[0], lambda *_: None)
-    rows = Fitting(patterns, plans[0], "lift", None, lambda *_: None)
-    for plan in plans:
-        assert rows.fits(plan)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            together = rows.fit(plan)
-            alone = Fitting(patterns, plan, "lift", None, lambda *_: None).fit(plan)
-        assert together.weights_ == pytest.approx(alone.weights_, abs=1e-3)
-    slower = dataclasses.replace(plans[0], neurons={"lift": {**plans[0].neurons["lift"], "tau": 9.0}})
-    assert not rows.fits(slower)
 
 
 def test_the_better_rank_misses_less_and_then_lies_nearer() -> None:
@@ -313,34 +276,6 @@ def presses(seed: int, rare: int, recordings: int) -> list[Example]:
     return made
 
 
-@settings(max_examples=settings.default.max_examples // 10, phases=[Phase.explicit, Phase.generate])
-@given(st.integers(0, 10_000), st.integers(2, 12), st.integers(1, 4))
-def test_a_search_scores_held_out_data_wherever_the_events_of_a_label_lie(seed: int, rare: int, recordings: int):
-    data = presses(seed, rare, recordings)
-    count, _ = count_of_folds(data)
-    assume(count)
-    ways, _ = folds(data, count)
-    assume(not any(folds_module._lacks(data, way.train, ("press", "release")) for way in ways))
-    plan = {"ub": 1e-6, "search": [{"ub": 2.0}]}
-    searched = taxel.detect.Recipe(
-        taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "delay_ms": 1.0}, dict.fromkeys(("press", "release"), plan)
-    )
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        judged = judge(data, searched, count, search=True)
-    assert judged.together["release"].events == sum(len(one.labels.get("release", ())) for one in data)
-    few = [str(one.message) for one in caught if "too few events to choose" in str(one.message)]
-    assert len(few) <= count
-    for n, made in enumerate(judged.trained):
-        events = sum(
-            len(folds_module._only_inside(only, part))
-            for part in ways[n].train
-            for only in [folds_module._only(data, "release")[part.example]]
-        )
-        chosen = made.recipe.neurons["release"]["ub"]
-        assert chosen == 2.0 or (events < 4 and few), (events, few)
-
-
 @given(st.integers(0, 10_000), st.integers(2, 5), st.integers(2, 4), st.data())
 def test_what_a_fold_of_one_recording_trains_on_is_split_again_by_its_events(seed: int, k: int, inner: int, drawn):
     times = np.cumsum(np.random.default_rng(seed).integers(1, 2_000_000, drawn.draw(st.integers(4 * k * inner, 100))))
@@ -348,7 +283,7 @@ def test_what_a_fold_of_one_recording_trains_on_is_split_again_by_its_events(see
     way = folds(data, k)[0][drawn.draw(st.integers(0, k - 1))]
     events = folds_module._only_inside(data[0], Part(0, way.train[0].start, way.train[-1].stop))
     events = events[[any(part.start <= t < part.stop for part in way.train) for t in events]]
-    again = folds_module._split(data, way.train, inner)
+    again = split(data, way.train, inner)
     assert len(again) == inner
     for fold in again:
         within = [[sum(part.start <= t < part.stop for part in parts) for t in events] for parts in fold[:2]]
@@ -356,13 +291,12 @@ def test_what_a_fold_of_one_recording_trains_on_is_split_again_by_its_events(see
         assert sum(within[1]) >= 2
 
 
-def test_what_a_search_reports_is_in_plain_words() -> None:
+def test_what_a_training_reports_is_in_plain_words() -> None:
     said: list[str] = []
-    plan = {"ub": 1e-6, "search": [{"ub": 2.0}]}
-    searched = taxel.detect.Recipe(taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "delay_ms": 1.0}, {"press": plan})
+    plan = {"ub": 1e-6, "choose": [{"ub": 2.0}]}
+    chosen = taxel.detect.Recipe(taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "delay_ms": 1.0}, {"press": plan})
     data = [one._replace(labels={"press": one.labels["press"]}) for one in presses(1, 0, 1)]
-    judge(data, searched, 2, search=True, progress=lambda step, *_: said.append(step))
-    assert "trying parameters 2 of 2 for press, on part 1 of 3" in said
+    judge(data, chosen, 2, progress=lambda step, *_: said.append(step))
     rounds = [line for line in said if ", round 1: " in line]
     assert rounds
     assert all(re.search(r"weights at most [\d.]+% from the best", line) for line in rounds), rounds

@@ -36,7 +36,7 @@ def touches(sides) -> Example:
 
 def test_detections_of_touches_unlike_those_of_training_are_counted(tmp_path: Path, capsys) -> None:
     trained, unseen = touches([2, 3, 4, 3, 2, 4]), touches([3, 5, 2, 6, 4])
-    readout = fit([trained], RECIPE)
+    readout = fit([trained], RECIPE, by_rule=())
     for one, outside in ((trained, 0), (unseen, 2)):
         found, counted = run_counting(readout, one.source, tare=one.tare)
         assert np.abs(found.t - one.labels["on"]).max() <= 200

@@ -18,10 +18,9 @@ from shell import call
 
 import taxel
 from taxel import Array, Frames, Tare
-from taxel.detect import Example, Recipe, judge, load, recipes, run, score
-from taxel.detect.fitting import fit_aligned
+from taxel.detect import Example, Recipe, fit, judge, load, recipes, run, score
+from taxel.detect.fit import Fitter
 from taxel.detect.floors import measured_floor
-from taxel.detect.followed import follow
 from taxel.encode import ContactArea, LocalLoad
 
 LABELS = ("contact", "lift")
@@ -104,7 +103,9 @@ def test_a_floor_that_the_recipe_or_the_user_states_stays(tmp_path: Path, capsys
     plan = Recipe.load("touch", {"encoders.area.noise_floor": 30.0}, LABELS, 0.5)
     parts = plan.encoder.parts
     assert parts["area"] == ContactArea(noise_floor=30.0)
-    assert parts["load"] == LocalLoad(noise_floor=0.5, least_noise=0.05, local_ms=[50.0, 300.0], period_ms=0.5)
+    assert parts["levels"] == LocalLoad(
+        noise_floor=0.5, least_noise=0.05, levels=[3.0, 4.0, 5.0, 6.0, 8.0], release=0.8
+    )
     assert Recipe.load("gait_plate", None, None, 0.5).encoder == Recipe.load("gait_plate").encoder
     arguments = written(tmp_path, *touched((6, 6), 3, gain=100.0, noise=1.0))
     assert call(capsys, *arguments, "--folds", 0, "--set", "encoders.levels.noise_floor=9")[0] == 0
@@ -194,38 +195,9 @@ def test_an_end_of_touches_is_learnt_by_any_name() -> None:
     frames = Frames(frames.values, frames.t, unit="V", array=frames.array)
     times = {"contact": labels["contact"], "drop": labels["lift"]}
     example = Example(frames, times, Tare.take(frames, stop_us=900_000))
-    readout = fit_aligned([example], Recipe.load("touch", None, list(times), measured_floor([example])), None).readout
+    readout = fit([example], Recipe.load("touch", None, list(times), measured_floor([example])))
+    assert "drop" in readout.by_rule
     assert score(run(readout, frames, tare=example.tare), times).rank[0] == 0
-
-
-def test_the_graded_load_is_encoded_and_followed_only_where_area_and_levels_fail(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    followed, said = [], []
-    monkeypatch.setattr("taxel.detect.fitting.follow", lambda *of: followed.append(of[1]) or follow(*of))
-    frames, labels = touched((8, 8), 6, gain=200.0, noise=1.0)
-    example = Example(frames, labels, Tare.take(frames, stop_us=900_000))
-    judge(
-        [example],
-        Recipe.load("touch", None, LABELS, measured_floor([example])),
-        2,
-        progress=lambda step, *_: said.append(step),
-    )
-    assert ([one for one in said if one.startswith("encoding")], followed) == (["encoding 1 of 1"] * 2, [])
-    # With a floor above every touch area and levels find nothing; two quantities are tried, and followed once; then the
-    # peak, separate loads, and ends of touches.
-    floors = {
-        "encoders.area.noise_floor": 90.0,
-        "encoders.levels.noise_floor": 9e4,
-        "encoders.changes.noise_floor": 9e4,
-        "encoders.lifts.noise_floor": 9e4,
-    }
-    blind = Recipe.load("touch", floors, LABELS, 3.0)
-    said.clear()
-    made = fit_aligned([example], blind, lambda step, *_: said.append(step))
-    assert [one for one in said if one.startswith("encoding")] == ["encoding 1 of 1"] * 6
-    assert sorted(followed) == ["contact", "lift"]
-    assert {one.inputs for one in made.readout.neurons.values()} <= {("area",), ("load",), ()}
 
 
 def test_ctrl_c_while_a_training_reads_or_learns_ends_it_and_leaves_nothing(tmp_path: Path) -> None:
@@ -316,7 +288,7 @@ def test_a_touch_smaller_than_all_that_were_learnt_is_found(sides: list[int], sm
     tare = Tare.take(frames.between(0, 900_000))
     example = Example(frames, labels, tare)
     plan = Recipe.load("touch", labels=LABELS, noise_floor=measured_floor([example]))
-    readout = fit_aligned([example], plan, None).readout
+    readout = Fitter([example], plan).fit().readout
     others, truth = squares([small] * 3)
     judged = score(run(readout, others, tare=tare), truth)
     assert {label: (one.missed, one.false) for label, one in judged.by_label.items()} == dict.fromkeys(LABELS, (0, 0))
@@ -331,21 +303,3 @@ def test_where_the_first_inputs_feel_nothing_others_are_tried() -> None:
     plan = Recipe.load("touch", labels=LABELS, noise_floor=measured_floor([example]))
     judged = judge([example], plan, 2)
     assert {label: one.missed for label, one in judged.together.by_label.items()} == dict.fromkeys(LABELS, 0)
-
-
-@pytest.mark.parametrize(("sides", "count"), [((2, 1), 24), pytest.param((1, 3), 60, marks=pytest.mark.slow)])
-def test_kinds_of_touch_may_be_places_on_the_array(sides: tuple[int, int], count: int) -> None:
-    """Halves of the array, and the middle of three parts of it, whose touches are of all sizes."""
-    random = np.random.default_rng(3)
-    values = random.normal(0, 1, (200 + 100 * count, 12, 12))
-    labels: dict[str, list[int]] = {}
-    for k in range(count):
-        row, column = (int(random.integers(0, side)) * 12 // side for side in sides)
-        at, size = 100 + 100 * k, random.integers(2, 4, 2)
-        values[at : at + 40, row : row + size[0], column : column + size[1]] += random.uniform(100, 400)
-        labels.setdefault(f"{row},{column}", []).append(10_000 * at)
-    frames = Frames(values, np.arange(len(values)) * 10_000, unit="counts")
-    example = Example(frames, labels, Tare.take(frames.between(0, 900_000)))
-    plan = Recipe.load("touch", labels=list(labels), noise_floor=measured_floor([example]))
-    judged = judge([example], plan, 3)
-    assert judged.together.missed + judged.together.false <= 2

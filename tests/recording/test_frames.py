@@ -21,7 +21,7 @@ from shell import call
 import taxel
 from taxel import Array, Frames, Note, ProblemError, SpikeTrains
 from taxel.detect import Example, Part, Recipe, judge
-from taxel.detect.folds import _split
+from taxel.detect.folds import split
 from taxel.encode import LevelCrossing
 from taxel.reading import Facts, InMemory, Marks
 from taxel.recording.text_options import TextOptions
@@ -374,11 +374,11 @@ def test_the_feet_of_one_recording_share_a_fold() -> None:
     assert found.how == "whole recordings, 4 folds"
     with pytest.raises(ProblemError, match="must be at most 4, the number of recordings"):
         judge(walks, recipe, 5)
-    for fold in _split(walks, [Part(n) for n in range(6)], 4):
+    for fold in split(walks, [Part(n) for n in range(6)], 4):
         train, test = ({walks[one.example].group for one in parts} - {""} for parts in (fold.train, fold.test))
         assert not train & test
     # The two feet of one walk: the same stretches of time of both.
-    for fold in _split(walks[:2], [Part(0), Part(1)], 3):
+    for fold in split(walks[:2], [Part(0), Part(1)], 3):
         assert len(fold.test) == 2
         assert fold.test[0][1:] == fold.test[1][1:]
         assert {one.example for one in fold.train} == {0, 1}

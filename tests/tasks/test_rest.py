@@ -18,7 +18,6 @@ from taxel.detect import PlainRule
 from taxel.live._requests.training import TrainingRequests
 from taxel.live._shown_files import Opening, ShownFiles
 from taxel.tasks import detect, rest
-from taxel.tasks.rest import tare_before, tare_if_any
 
 from .recordings import board, mat, trials
 
@@ -49,26 +48,29 @@ def test_no_label_moves_the_rest_nor_a_detection(tmp_path: Path, label_us: int |
 
 
 @pytest.mark.parametrize("begin_us", [0, 1_795_000_000_000_000])
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_training_takes_the_first_quiet_stretch_where_a_touch_comes_before_the_first_label(
-    seed: int, begin_us: int, tmp_path: Path
+def test_a_training_takes_the_rest_of_a_detection_and_where_nothing_is_quiet_the_time_before_its_first_label(
+    begin_us: int, tmp_path: Path
 ) -> None:
-    frames, labels = pressed(seed)
+    frames, labels = pressed(1)
     later = Frames(frames.values, frames.t + begin_us, unit=frames.unit, array=frames.array)
     taxel.convert(later, tmp_path / "a.npz")
-    recording = taxel.open(tmp_path / "a.npz")
-    for chosen in (tare_before, tare_if_any):
-        with collected() as warned:
-            quiet = chosen({"contact": labels["contact"] + begin_us}, recording)
-        assert (quiet.start_us, quiet.stop_us) == (begin_us, begin_us + labels["contact"][0] - 20_000)
-        assert warned == []
-        with collected() as warned:
-            quiet = chosen({"contact": labels["contact"][4:] + begin_us}, recording)
-        assert (quiet.start_us - begin_us, quiet.stop_us - begin_us) == (0, 500_000)
-        (line,) = warned
-        end = (labels["contact"][4] - 20_000) / 1e6
-        assert f"0.000 to {end:.3f} s, before the first label, contains a touch of " in line
-        assert line.endswith("so the tare is that of the first quiet stretch, 0.000 to 0.500 s")
+    recording, own = taxel.open(tmp_path / "a.npz"), {label: t + begin_us for label, t in labels.items()}
+    training = taxel.train(recording, [own], taxel.tasks.TrainOptions(folds=0))
+    assert [taken.to_dict() for taken in training.rests] == [rest(recording).to_dict()]
+    assert "--tare" not in training.command("r.json")
+    values = np.full((300, 4, 4), 50.0)
+    begins = list(range(25, 300, 30))
+    for begin in begins:
+        values[begin : begin + 10, 1:3, 1:3] = 250
+    busy = Frames(values, begin_us + 10_000 * np.arange(300), unit="counts", array=Array(4, 4))
+    taxel.convert(busy, tmp_path / "b.npz")
+    recording, first = taxel.open(tmp_path / "b.npz"), {"contact": busy.t[begins]}
+    taken = rest(recording, labels=first)
+    assert (taken.source, taken.to_dict()["us"]) == ("labels", [begin_us, begin_us + 230_000])
+    training = taxel.train(recording, [first], taxel.tasks.TrainOptions(folds=0))
+    assert training.command("r.json").endswith("--tare 0.23")
+    with pytest.raises(ProblemError):
+        rest(recording, labels={"contact": busy.t[[1]]})
 
 
 @pytest.mark.parametrize("unit", ["N", "kPa"])
@@ -87,7 +89,7 @@ def test_forces_that_do_not_rest_near_0_are_said_with_the_tare_that_takes_that_o
         said = taxel.tasks.info(recording, tare).warnings
         with collected() as of_training:
             if tare is None:
-                tare_before(labels, recording)
+                rest(recording, labels=labels)
         assert tuple(of_training) == said
         return list(said)
 
@@ -143,7 +145,7 @@ def test_where_nothing_is_quiet_it_is_refused_with_what_to_give(tmp_path: Path) 
         values[begin : begin + 10, 1:3, 1:3] = 250
     taxel.convert(Frames(values, 10_000 * np.arange(300), unit="counts", array=Array(4, 4)), tmp_path / "a.npz")
     rule = PlainRule("area", 2, noise_floor=40.0)
-    with pytest.raises(ProblemError, match=r"a\.npz: the values .* because no half second is quiet .*; give tare$"):
+    with pytest.raises(ProblemError, match=r"a\.npz: the values .* because no half second is quiet; give tare$"):
         detect(rule, taxel.open(tmp_path / "a.npz"))
     rule.save(tmp_path / "rule.json")
     refused = run("detect", tmp_path / "a.npz", "--readout", tmp_path / "rule.json")

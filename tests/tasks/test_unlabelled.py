@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from shell import call
 from tests.tasks.recordings import mat
 
 import taxel
-from taxel.detect import Example, judge, tune
-from taxel.detect.recipe import Recipe
 from taxel.reading import Facts, InMemory
-from taxel.tare import Tare
 from taxel.tasks import train
 
 
@@ -44,14 +40,14 @@ def test_a_source_that_no_row_names_is_neither_trained_nor_scored(feet: Path, tm
     training = train(taxel.open(feet), labels)
     assert [each.label for each in training.recordings] == ["left"]
     assert (training.score.found, training.score.false) == (8, 0)
-    assert "contact: neither trained nor scored on right, which no row of labels names" in training.lines()[:3]
-    assert training.to_dict()["unlabelled"] == {"contact": ["right"]}
+    assert "left out, because no row of labels names this source: right" in training.lines()
+    assert training.to_dict()["unlabelled"] == ["right"]
 
 
 def test_where_rows_name_no_source_nothing_happened_where_no_row_is(feet: Path, tmp_path: Path) -> None:
     each = taxel.open_all(feet)
     training = train(each, [{"contact": [10_000 * k for k in BEGINS]}, {}])
-    assert training.unlabelled == {}
+    assert training.unlabelled == ()
     assert len(training.recordings) == 2
     # Rows of another source alone say of this recording's own that nothing happened, as other rows name that source.
     places = [tmp_path / f"{name}.mcap" for name in "ab"]
@@ -64,7 +60,7 @@ def test_where_rows_name_no_source_nothing_happened_where_no_row_is(feet: Path, 
     )
     (tmp_path / "l.csv").write_text(text)
     training = train([source for place in places for source in taxel.open_all(place)], tmp_path / "l.csv")
-    assert training.unlabelled == {}
+    assert training.unlabelled == ()
     assert len(training.recordings) == 4
     assert training.score.events == 24
     assert training.score.false + training.score.missed >= 8
@@ -74,7 +70,7 @@ def test_detections_of_it_are_not_scored(feet: Path, tmp_path: Path, capsys: pyt
     labels, readout = table(tmp_path / "l.csv", rows(BEGINS, "left")), tmp_path / "r.json"
     train(taxel.open(feet), labels).readout.save(readout)
     _, out, _ = call(capsys, "detect", feet, "--readout", readout, "--truth", labels)
-    assert f"not scored, because no row of {labels} names it: contact of right" in out
+    assert f"not scored, because no row of {labels} names it: right" in out
     found = taxel.tasks.detect(taxel.Readout.load(readout), taxel.open(feet), labels)
     assert found.score is not None
     assert found.score.false == 0
@@ -89,24 +85,6 @@ def test_a_name_without_any_label_is_not_scored(tmp_path: Path, capsys: pytest.C
     assert (code, "do not rely on" in out) == (0, False), out
     assert f"not scored, because no row of {labels} names it: lift\n" in out
     found = taxel.tasks.detect(taxel.detect.load(rule), taxel.open(place), labels)
-    assert (found.score.found, found.score.false, found.to_dict()["unlabelled"]) == (8, 0, {"lift": []})
+    assert (found.score.found, found.score.false, found.to_dict()["unlabelled"]) == (8, 0, ["lift"])
     found = taxel.tasks.detect(taxel.detect.load(rule), taxel.open(place), [{"contact": [], "lift": []}])
-    assert (found.score.false, found.unlabelled) == (16, {}), "nothing happened"
-
-
-def test_an_example_is_left_out_of_what_is_not_known_of_it(tmp_path: Path) -> None:
-    frames = taxel.open(mat(tmp_path)).frames()
-    tare, truth = Tare.take(frames, stop_us=900_000), {"contact": [10_000 * k for k in BEGINS]}
-    known, unknown = Example(frames, truth, tare), Example(frames, {}, tare, unlabelled=["contact"])
-    assert tune([known, unknown], ["contact"]) == tune([known], ["contact"])
-    recipe = Recipe.load("touch", labels=["contact"], noise_floor=6.0)
-    more = Example(frames, truth, tare)
-    with_it, without = (judge([known, more, *rest], recipe, 2).together for rest in ([unknown], []))
-    assert with_it.rank == without.rank
-    with pytest.raises(taxel.ProblemError, match="unlabelled names 'contact', which has labels"):
-        tune([Example(frames, truth, tare, unlabelled=["contact"])])
-    assert np.array_equal(known._known(known_detections()).t, [1000])
-
-
-def known_detections() -> taxel.Detections:
-    return taxel.Detections(["contact"], [1000], [1000])
+    assert (found.score.false, found.unlabelled) == (16, ()), "nothing happened"

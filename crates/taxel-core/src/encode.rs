@@ -26,13 +26,12 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-pub use local_load::LargestSum;
+pub use local_load::{LargestOfFrame, LargestSums};
 pub use pieces::Pieces;
 pub use quantity::Quantity;
 pub use running_range::{FirstWindow, RunningRange};
 pub use stream::Stream;
 pub use tare::{Tare, TareBuilder, Zeroing};
-pub(crate) use touch_ends::duration_us;
 
 use encoding::Encoding;
 use side_by_side::SideBySide;
@@ -115,39 +114,14 @@ encoders! {
     moments: Moments,
     /// The largest deviation of a taxel in units of its own noise.
     peak: Peak,
-    /// Begins and ends of loads that are apart.
-    separate_loads: SeparateLoads,
-    /// How long a touch lasted and how large it was, when it ends.
-    touch_ends: TouchEnds,
 }
 
 impl Encoder {
-    /// The train with the duration of each touch as it ends, from which its beginning follows; `None` of encoders whose
-    /// detections do not have that as their time.
-    pub(crate) fn duration_train(&self, array: &Array) -> Option<usize> {
-        match self {
-            Self::TouchEnds(ends) => (!ends.at_end).then_some(touch_ends::DURATION),
-            Self::Composite(encoder) => {
-                let mut first = 0;
-                for part in encoder.parts.values() {
-                    if let Some(train) = part.duration_train(array) {
-                        return Some(first + train);
-                    }
-                    first += part.trains(array) * part.kind().inputs_per_train();
-                }
-                None
-            }
-            _ => None,
-        }
-    }
-
     /// The noise floor above its tare, in the sensor's unit, of a composite the largest; 0 of an encoder without one.
     pub(crate) fn noise_floor(&self) -> f64 {
         match self {
             Self::ContactArea(encoder) => encoder.noise_floor,
             Self::Moments(encoder) => encoder.noise_floor,
-            Self::SeparateLoads(encoder) => encoder.noise_floor,
-            Self::TouchEnds(encoder) => encoder.noise_floor,
             Self::Composite(encoder) => encoder.parts.values().map(Self::noise_floor).fold(0.0, f64::max),
             _ => 0.0,
         }

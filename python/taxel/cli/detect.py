@@ -187,8 +187,8 @@ def _score_lines(found: Detecting, labels: Sequence[str], truth: str | None, *, 
     shift = f", labels moved by {found.shift_ms:+g} ms" if found.shift_ms else ""
     yield f"against {truth} (window {found.window_ms:g} ms{shift}){read}:"
     yield from repr(found.score).split("\n")
-    for label, sources in found.unlabelled.items():
-        yield f"not scored, because no row of {truth} names it: {label}{' of ' * bool(sources)}{', '.join(sources)}"
+    if found.unlabelled:
+        yield f"not scored, because no row of {truth} names it: {', '.join(found.unlabelled)}"
     if found.not_scored:
         yield f"not scored, because the readout has only {', '.join(labels)}: {', '.join(found.not_scored)}"
     if several:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from taxel.array import Array
 from taxel.detect.examples import Example
 from taxel.detect.loads import Clock, frame_ms
-from taxel.detect.recipe import LISTS, Recipe
-from taxel.encode import Composite, Encoder, TouchEnds
+from taxel.detect.recipe import Recipe
+from taxel.encode import Composite, Encoder
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
@@ -63,55 +63,6 @@ def onsets(pattern: SpikeTrains, ages: Ages) -> NDArray[np.float64]:
     begins[1:] = (apart > 1.5 * apart.min(initial=np.inf)) | (np.diff(age) < 0)
     found: NDArray[np.float64] = pooled[begins & (age == 0)] - ages.begin_ms[0]
     return found
-
-
-class EndTrain(NamedTuple):
-    """The train with the duration of each touch as it ends."""
-
-    train: int
-    at_end: bool
-    """Whether the time of a detection is the end of the touch, not its beginning (`TouchEnds`)."""
-
-
-def end_train(encoder: Encoder, array: Array | None) -> EndTrain | None:
-    """Return the train with the duration of each touch as it ends; None of encoders that do not wait for that."""
-    first = 0
-    for part in encoder._each():
-        if isinstance(part, TouchEnds):
-            return EndTrain(first, part.at_end)
-        first += part.trains(array or Array(1, 1)) * (2 if part.signed else 1)
-    return None
-
-
-class EndedTouches(NamedTuple):
-    """The touches that ended: when each began, and how long it lasted, us; in order."""
-
-    begin: NDArray[np.int64]
-    lasted: NDArray[np.int64]
-
-    @classmethod
-    def from_trains(cls, trains: SpikeTrains, duration: int) -> EndedTouches:
-        """Return the touches of the train with their durations."""
-        spikes = slice(trains.offsets[duration], trains.offsets[duration + 1])
-        assert trains.values is not None
-        end, lasted = to_us(trains.times[spikes]), to_us(np.expm1(trains.values[spikes].astype(np.float64)))
-        begin = np.rint(end - lasted).astype(np.int64)
-        return cls(begin, np.rint(end).astype(np.int64) - begin)
-
-    def beginning_near(self, t: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the places of the touches that began nearest to some times, us."""
-        return _nearest(self.begin, t)
-
-    def begin_of(self, end: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return when the touches began that ended nearest to some times, us."""
-        return self.begin[_nearest(self.begin + self.lasted, end)] if len(self.begin) else end
-
-
-def _nearest(sorted_times: NDArray[np.int64], t: NDArray[np.int64]) -> NDArray[np.int64]:
-    after = np.clip(np.searchsorted(sorted_times, t), 1, max(1, len(sorted_times) - 1))
-    after = np.minimum(after, len(sorted_times) - 1)
-    before = np.maximum(after - 1, 0)
-    return np.where(t - sorted_times[before] <= sorted_times[after] - t, before, after)
 
 
 def later_us(pattern: SpikeTrains, ages: Ages, felt_ms: NDArray[np.float64], age_ms: float) -> NDArray[np.int64]:
@@ -207,14 +158,11 @@ def in_frames(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cloc
         return changed
 
     def neuron(values: Mapping[str, Any]) -> dict[str, Any]:
-        first = {name: value for name, value in values.items() if name not in LISTS}
-        changed, under = dict(first), {**recipe.learner, **first}
-        for key in LISTS:
-            seen: dict[int, float] = {}
-            changed |= point(first, recipe.learner, seen) or {}
-            tried = [point(listed, under, seen) for listed in values.get(key, ())]
-            changed |= {key: [point for point in tried if point is not None]} if key in values else {}
-        return changed
+        first = {name: value for name, value in values.items() if name != "choose"}
+        under, seen = {**recipe.learner, **first}, dict[int, float]()
+        changed = point(first, recipe.learner, seen) or dict(first)
+        tried = [point(listed, under, seen) for listed in values.get("choose", ())]
+        return changed | ({"choose": [point for point in tried if point is not None]} if "choose" in values else {})
 
     def encoder(part: Encoder) -> Encoder:
         ages = getattr(part, "ages_ms", None)

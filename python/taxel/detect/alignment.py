@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from taxel._base.arguments import integer
 from taxel._base.messages import counted, escaped
 from taxel._core import ProblemError
-from taxel.detect.ages import Ages, EndedTouches, EndTrain, onsets
-from taxel.detect.followed import off_ms, one_after_another
-from taxel.detect.scoring import Score, score
+from taxel.detect.ages import Ages, onsets
+from taxel.detect.scoring import APART_US, Score, score
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
@@ -103,11 +102,9 @@ def align(
     patterns: Sequence[SpikeTrains],
     label: str,
     given: Sequence[NDArray[np.int64]],
+    by_rule: Sequence[NDArray[np.float64]] | None,
     latency_ms: float,
     ages: Ages | None = None,
-    ends: EndTrain | None = None,
-    *,
-    alone: bool = False,
 ) -> Alignment:
     """Return by how much the labels of one name move to what the sensor felt, which is chosen over all patterns.
 
@@ -123,15 +120,11 @@ def align(
     label : str
     given : sequence of int64, shape (events,), us
         The labels of each pattern, ascending; one or more in all.
+    by_rule : sequence of float64, shape (events,), us, optional
+        When a plain rule felt each of them, NaN of those that it misses: then trains are compared with these times.
     latency_ms : float, ms
     ages : Ages, optional
         The trains of ages, if there are any.
-    ends : EndTrain, optional
-        The train with the duration of each touch as it ends, if there is one: then the begins of these touches, or
-        their ends, alone are compared with the labels.
-    alone : bool
-        Whether the train is to tell the labels alone, of trains that are levels of one quantity: then it is the middle
-        one of those with the fewest missed and false, which is farthest from noise and from what weaker events reach.
 
     Returns
     -------
@@ -144,7 +137,12 @@ def align(
     for k, pattern in enumerate(patterns):
         if len(pattern) != len(patterns[0]):
             raise ProblemError(f"example {k} has {counted(len(pattern), 'train')}, example 0 has {len(patterns[0])}")
-    truth = one_after_another(given, patterns)
+    example = np.repeat(np.arange(len(given)), [len(times) for times in given])
+    labels = np.concatenate([*given])
+    felt = labels.astype(np.float64) if by_rule is None else np.concatenate([*by_rule])
+    known = np.flatnonzero(np.isfinite(felt))
+    starts = np.array([round(float(to_us(pattern.start))) for pattern in patterns])
+    truth = felt[known].astype(np.int64) + (example[known] * APART_US - starts[example[known]])
     counts = np.sum([pattern.counts for pattern in patterns], axis=0)
     if ages is not None:
         counts[list(ages.trains)] = 0
@@ -154,43 +152,18 @@ def align(
     }
     if ages is not None:
         candidates[ages.trains[0]] = [onsets(pattern, ages) for pattern in patterns]
-    if ends is not None and ends.at_end:
-        candidates = {ends.train: [pattern[ends.train] for pattern in patterns]}
-    elif ends is not None:
-        begins = [to_ms(EndedTouches.from_trains(pattern, ends.train).begin) + latency_ms for pattern in patterns]
-        candidates = {ends.train: begins}
     scores = {}
     for train, spikes in candidates.items():
-        fired = one_after_another([np.rint(to_us(ms - latency_ms)).astype(np.int64) for ms in spikes], patterns)
+        times = [np.rint(to_us(ms - latency_ms)).astype(np.int64) for ms in spikes]
+        fired = np.concatenate([t + (k * APART_US - starts[k]) for k, t in enumerate(times)])
         scores[train] = score(Detections([label] * len(fired), fired, fired), {label: truth}, WINDOW_MS)
-    best = _middle(scores) if alone else _best(scores, len(truth))
-    return align_by(label, given, None if best is None else (best, scores[best]))
-
-
-def align_by(label: str, given: Sequence[NDArray[np.int64]], by: tuple[int, Score] | None) -> Alignment:
-    """Return by how much labels move to what a train tells of them; none where there is no such train.
-
-    Parameters
-    ----------
-    label : str
-    given : sequence of int64, shape (events,), us
-        The labels of each pattern, ascending; one or more in all.
-    by : (int, Score), optional
-        A train, and the score of its detections against all labels, one pattern after the other.
-    """
-    example = np.repeat(np.arange(len(given)), [len(times) for times in given])
-    if by is None:
-        return Alignment(label, None, example, np.concatenate([*given]), np.zeros(len(example)))
-    (train, found), moved = by, np.full(len(example), np.nan)
-    moved[found.pairs[:, 1]] = found.errors_ms
-    return Alignment(label, train, example, np.concatenate([*given]), moved)
-
-
-def _middle(scores: Mapping[int, Score]) -> int | None:
-    """Return the middle one of the trains with the fewest missed and false; None where it has no spike near a label."""
-    least = min((score.rank[0] for score in scores.values()), default=0)
-    equal = sorted(train for train, score in scores.items() if score.rank[0] == least and score.found)
-    return equal[(len(equal) - 1) // 2] if equal else None
+    best = _best(scores, len(truth))
+    if best is None:
+        return Alignment(label, None, example, labels, np.zeros(len(example)))
+    moved = np.full(len(example), np.nan)
+    place = known[scores[best].pairs[:, 1]]
+    moved[place] = scores[best].errors_ms + to_ms(felt[place] - labels[place])
+    return Alignment(label, best, example, labels, moved)
 
 
 def _best(scores: Mapping[int, Score], labels: int) -> int | None:
@@ -199,7 +172,7 @@ def _best(scores: Mapping[int, Score], labels: int) -> int | None:
     criteria: list[tuple[Callable[[Score], float], float]] = [
         (lambda score: score.missed + score.false, max(_ALIKE, _ALIKE_SHARE * labels)),
         (lambda score: -score.found, 0),
-        (off_ms, _ALIKE_MS),
+        (lambda score: float(np.median(np.abs(score.errors_ms))) if score.found else np.inf, _ALIKE_MS),
     ]
     for worth, more in criteria:
         least = min(map(worth, left.values()), default=0.0) + more

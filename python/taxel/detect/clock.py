@@ -321,7 +321,7 @@ def off_detections(outcomes: Sequence[Outcome], error_ms: Mapping[str, float]) -
     """
     of_kinds = {}
     for k, outcome in enumerate(outcomes):
-        known = outcome.example._known(outcome.found)
+        known = outcome.compared
         for label, times in outcome.example.labels.items():
             of_label = known.t[np.array([each == label for each in known.label], np.bool_)]
             of_kinds[k, label] = np.asarray(times, np.int64), of_label - round(to_us(error_ms.get(label, 0.0)))

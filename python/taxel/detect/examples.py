@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import column, instance, several, shown, text
+from taxel._base.arguments import column, instance, shown, text
 from taxel._base.errors import refused
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
@@ -45,8 +45,6 @@ class Example(NamedTuple):
         Examples of one group, as the two feet of a walk, share a fold; "": the example is alone.
     name : str
         What errors call it; "": a recording's title, else its number ("example 3").
-    unlabelled : sequence of str
-        The labels of which it is not known when they happened: it is neither trained nor scored for those.
     labels_of : str
         The quantity whose thresholds the labels are, as "total" where a data set derived them from it: a rule of that
         quantity is the labels' own, and stands apart. "" where there is none.
@@ -67,14 +65,7 @@ class Example(NamedTuple):
     tare: Tare | None = None
     group: str = ""
     name: str = ""
-    unlabelled: Sequence[str] = ()
     labels_of: str = ""
-
-    def _known(self, found: Detections) -> Detections:
-        """Return those of some detections of which its labels say whether they are right."""
-        if not self.unlabelled:
-            return found
-        return found[np.array([label not in self.unlabelled for label in found.label], np.bool_)]
 
 
 def name_of(k: int, example: Example) -> str:
@@ -105,6 +96,11 @@ class Outcome(NamedTuple):
     outside: int | None = None
 
     @property
+    def compared(self) -> Detections:
+        """The detections of the labels of which it is known when they happened."""
+        return self.found[np.array([label in self.example.labels for label in self.found.label], np.bool_)]
+
+    @property
     def begin_us(self) -> int:
         """The time that text counts its times from, us: its first if they count from 1970, else 0."""
         source = recorded(self.example.source, hold=False)
@@ -132,7 +128,7 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
         raise refused("examples", f" is {shown(examples)}: must be one Example or more")
     sound = []
     for k, example in enumerate(examples):
-        is_example = isinstance(example, tuple) and len(example) in range(2, 8)
+        is_example = isinstance(example, tuple) and len(example) in range(2, 7)
         source = recorded(example[0]) if is_example else None
         if not isinstance(source, Events | Frames | SpikeTrains):
             raise ProblemError(
@@ -140,19 +136,16 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
                 "and labels"
             )
         _, labels, *rest = example
-        optional: list[Any] = [None, "", "", (), ""]
+        optional: list[Any] = [None, "", "", ""]
         optional[: len(rest)] = rest
-        tare, group, name, unlabelled, labels_of = optional
+        tare, group, name, labels_of = optional
         name = text(f"example {k}: name", name) or str(getattr(example[0], "title", f"example {k}"))
         if not isinstance(labels, Mapping):
             raise ProblemError(f"{name}: labels is {shown(labels)}: must be times (us) by label")
         times = {text("label", label): column(f"labels[{label!r}]", t, np.int64, "us") for label, t in labels.items()}
         tare = None if tare is None else instance(f"{name}: tare", tare, Tare)
-        without = tuple(text(f"{name}: unlabelled", label) for label in several(f"{name}: unlabelled", unlabelled))
-        if both := [label for label in without if label in times]:
-            raise ProblemError(f"{name}: unlabelled names {shown(both[0])}, which has labels")
         group, labels_of = text(f"{name}: group", group), text(f"{name}: labels_of", labels_of)
-        sound.append(Example(source, times, tare, group, name, without, labels_of))
+        sound.append(Example(source, times, tare, group, name, labels_of))
     return _padded(sound)
 
 

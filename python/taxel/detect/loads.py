@@ -77,7 +77,6 @@ class Loads:
         self.names = sorted({name for example in examples for name in example.labels})
         self._examples, self._clocks, self._report = examples, clocks, report
         self._labels = [{name: np.sort(times) for name, times in example.labels.items()} for example in examples]
-        self._unlabelled = [frozenset(example.unlabelled) for example in examples]
         self.whole_examples: list[Stretch] = [(k, -np.inf, np.inf) for k in range(len(examples))]
         self._shift = [k * APART_US - _first(example) for k, example in enumerate(examples)]
         self._frame_ms = max(map(frame_ms, examples))
@@ -191,10 +190,16 @@ class Loads:
         times = np.concatenate(by_example)
         return FoundTimes(times, times, np.zeros(len(times))).between(self.windows(parts)).t
 
-    def labelled(self, names: Iterable[str], parts: Iterable[Stretch]) -> list[Stretch]:
-        """Return the parts of which it is known when each of some labels happened."""
-        each = frozenset(names)
-        return [part for part in parts if not each & self._unlabelled[part[0]]]
+    def inside(self, name: str, away_us: int) -> int:
+        """Return how many labels of a name lie within a load, so far from its begin and its end at least."""
+        if not self.have_rest:
+            return 0
+        rule = EdgeRule("peak", PEAK) if self.are_channels else EdgeRule("area", 1.0)
+        begins, ends = (np.sort(edge.t) for edge in self.edges(rule))
+        times = self.truth(name, self.whole_examples)
+        began = np.searchsorted(begins, times - away_us, side="right") - np.searchsorted(ends, times - away_us, "right")
+        lasts = np.searchsorted(ends, times + away_us) == np.searchsorted(ends, times - away_us, side="right")
+        return int(np.count_nonzero((began > 0) & lasts))
 
     def windows(self, parts: Iterable[Stretch]) -> list[tuple[int, int]]:
         """Return from when to when parts of the examples last on the one clock, us, ascending."""

@@ -34,15 +34,15 @@ class PlainRule(_Detector):
 
     Parameters
     ----------
-    quantity : {"area", "total", "local_load", "peak", "count", "range_count", "duration"}
-        The number of loaded taxels, as `taxel.encode.ContactArea` counts them, of channels as `taxel.encode.TouchEnds`
-        does; the sum of their values above rest in the sensor's unit, as `taxel.encode.Moments` adds them; the largest
-        sum over 3 x 3 taxels above a rest that follows the sensor, in units of its noise, as of
-        `taxel.encode.LocalLoad` ("largest"); the largest value of a taxel above such a rest, in units of that taxel's
-        noise, with what several add, as of `taxel.encode.Peak`; how many taxels are above a level, added up over
-        `levels` above rest in the sensor's unit, or ("range_count") over `levels` in parts of each taxel's running
-        range (`taxel.encode.RunningRange`), which needs no rest; or how long a touch lasts, with the age "end". In
-        single precision.
+    quantity : {"area", "total", "local_load", "local_rise", "local_fall", "peak", "count", "range_count", "duration"}
+        The number of loaded taxels, as `taxel.encode.ContactArea` counts them, each channel alone; the sum of their
+        values above rest in the sensor's unit, as `taxel.encode.Moments` adds them; the largest sum over 3 x 3 taxels
+        above a rest that follows the sensor, in units of its noise, as of `taxel.encode.LocalLoad` ("largest"), or
+        above ("local_rise") or below ("local_fall") their running mean of 50 ms; the largest value of a taxel above
+        such a rest, in units of that taxel's noise, with what several add, as of `taxel.encode.Peak`; how many taxels
+        are above a level, added up over `levels` above rest in the sensor's unit, or ("range_count") over `levels` in
+        parts of each taxel's running range (`taxel.encode.RunningRange`), which needs no rest; or how long a touch
+        lasts, with the age "end". In single precision.
     threshold : float, above 0
         Number of taxels, the sensor's unit, units of noise, or ms.
     release : float, above 0, at most 1
@@ -255,7 +255,8 @@ class PlainRule(_Detector):
     def _named_quantity(self) -> str:
         """The quantity, with the unit of its threshold where that is not a number of taxels."""
         noise = "units of noise"
-        units = {"total": self.unit, "local_load": noise, "peak": noise, "duration": "ms"}
+        units = {"total": self.unit, "peak": noise, "duration": "ms"}
+        units |= dict.fromkeys(("local_load", "local_rise", "local_fall"), noise)
         unit = units.get(self.quantity)
         return self.quantity if unit is None else f"{self.quantity} ({escaped(unit)})"
 

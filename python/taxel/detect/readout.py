@@ -17,7 +17,6 @@ from taxel._base.messages import escaped
 from taxel._base.saved import read
 from taxel._core import NotFittedError, ProblemError
 from taxel.array import Array
-from taxel.detect.ages import EndedTouches, end_train
 from taxel.detect.detector import _Detector, detector, tare_text
 from taxel.detect.exchange import Parts, write_nir
 from taxel.detect.plain_rule import PlainRule
@@ -262,10 +261,25 @@ class Readout(_Detector):
         text("use", use, USES)
         return self if use == "better" else self._with(by_rule=list(self.labels) if use == "rule" else [])
 
-    def _with_rules(self, rules: Mapping[str, PlainRule | None], by_rule: Sequence[str]) -> Readout:
-        """Return the readout with other plain rules, and the labels that these detect."""
-        known = {label: rule for label, rule in rules.items() if rule is not None}
-        return self._with(rules=_rule_parts(known), by_rule=list(by_rule))
+    def _with_rules(self, rules: Mapping[str, PlainRule], by_rule: Sequence[str] = ()) -> Readout:
+        """Return the readout with other plain rules.
+
+        Parameters
+        ----------
+        rules : mapping of str to PlainRule
+            By label.
+        by_rule : sequence of str
+            The labels that their rule detects.
+
+        Returns
+        -------
+        Readout
+
+        Raises
+        ------
+        ProblemError : labels or rules that do not fit
+        """
+        return self._with(rules=_rule_parts(rules), by_rule=[text("by_rule", label) for label in by_rule])
 
     @property
     def _needs_tare(self) -> bool:
@@ -496,9 +510,6 @@ def _run_spikes(readout: Readout, trains: SpikeTrains) -> Detections:
         )
         offset_ms = readout.encoder_of(label).latency_ms + trained.delay_ms
         t, known = (np.rint(to_us(ms)).astype(np.int64) for ms in (spikes - offset_ms, spikes))
-        ends = end_train(readout.encoder_of(label), readout.array)
-        if ends is not None and not ends.at_end:
-            t = EndedTouches.from_trains(inputs, ends.train).begin_of(t)
         detections += Detections([label] * len(spikes), t, known, slopes)
     return detections[np.argsort(detections.known, kind="stable")]
 

@@ -6,7 +6,6 @@ import inspect
 import json
 import os
 from collections.abc import Collection, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,20 +13,16 @@ from taxel._base.arguments import finite, flag, instance, integer, mapping, numb
 from taxel._base.errors import helped, refused
 from taxel._core import ProblemError
 from taxel.detect import recipes
-from taxel.detect.examples import Example
 from taxel.encode import Composite, Encoder
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.spikes import to_us
 
-__all__ = ["LISTS", "Recipe", "change_values", "learner_from", "with_floor"]
+__all__ = ["Recipe", "change_values", "learner_from", "with_floor"]
 
 
 #: Keys of a recipe's file that a recipe does not hold: which recordings it fits, whose parameters other labels have.
 _OF_THE_FILE = ("fits", "also", "other")
-
-#: Keys of a neuron that list other points of it.
-LISTS = ("search", "choose")
 
 
 @dataclass(frozen=True)
@@ -43,10 +38,10 @@ class Recipe:
         trained to fire, the encoder's latency apart. With a composite encoder also `inputs`: the names of the parts
         whose trains a neuron receives, in any order; default: all.
     neurons : mapping of str to mapping
-        The same by label, before those for all; a `search` lists other points, each as changes of that neuron, and
-        `choose` points that every training tries in turn: a point counts if it leaves so many `fewer` events of
-        the training data missed or false than the best point before it, by default three and 5 % of the labels. Where
-        there are any neurons, only these labels are learnt.
+        The same by label, before those for all. `choose` lists other points, each as changes of that neuron, that every
+        training tries in turn: a point counts if it leaves so many `fewer` events of the training data missed or false
+        than the best point before it, by default three and 5 % of the labels. Where there are any neurons, only these
+        labels are learnt.
     run_threshold : float, above 0
         See `taxel.Readout`.
     about, source : str
@@ -95,9 +90,8 @@ class Recipe:
         learner_from("learner", self.learner)
         for label in self.neurons:
             self.learner_of(text("label", label))
-            for key, points in (("search", self.points_of(label)), ("choose", self._choices_of(label))):
-                for point in points:
-                    self._checked(f"neurons.{label}.{key}", {**self.learner, **point})
+            for point in self.points_of(label):
+                self._checked(f"neurons.{label}.choose", {**self.learner, **point})
             self._fewer_of(label)
 
     def learner_of(self, label: str) -> tuple[ConeR, float]:
@@ -139,8 +133,18 @@ class Recipe:
         return learner, delay_ms
 
     def _received(self, values: Mapping[str, Any]) -> Encoder:
-        """Return the encoder whose trains a neuron with these parameters receives."""
-        inputs = values.get("inputs")
+        """Return the encoder whose trains a neuron receives: all of it, or of a composite one its `inputs`.
+
+        Parameters
+        ----------
+        values : mapping
+            The neuron's parameters.
+
+        Raises
+        ------
+        ProblemError : `inputs` that are not parts of a composite encoder
+        """
+        inputs = {**self.learner, **values}.get("inputs")
         if inputs is None:
             return self.encoder
         if not isinstance(self.encoder, Composite):
@@ -171,30 +175,12 @@ class Recipe:
         """
         return tuple(several("inputs", self._of(label).get("inputs", ())))
 
-    def _narrowed(self, labels: Sequence[str], *, search: bool = False, choices: bool = True) -> Recipe:
-        """Return the recipe without the parts of a composite encoder that no neuron of these labels receives.
-
-        Without `search` or `choices` that is a working copy: points to try may name parts that are left out.
-        """
-        if not isinstance(self.encoder, Composite):
-            return self
-        tried = [
-            self.points_of(label)[: None if search else 1] + self._choices_of(label)[: None if choices else 1]
-            for label in labels
-        ]
-        points = [{**self.learner, **point} for each in tried for point in each]
-        received = {name for point in points for name in point.get("inputs", self.encoder.parts)}
-        parts = {name: part for name, part in self.encoder.parts.items() if name in received}
-        narrowed = copy(self)
-        object.__setattr__(narrowed, "encoder", Composite(parts) if parts else self.encoder)
-        return narrowed
-
     def _of(self, label: str) -> dict[str, Any]:
         """Return the parameters of a label's neuron, those for all among them."""
         return {**self.learner, **self.points_of(label)[0]}
 
     def points_of(self, label: str) -> list[dict[str, Any]]:
-        """Return the parameters of a label's neuron, and behind them the others that the recipe lists for a search.
+        """Return the parameters of a label's neuron, and behind them the others that every training tries.
 
         Parameters
         ----------
@@ -207,77 +193,66 @@ class Recipe:
         Examples
         --------
         >>> from taxel.encode import LevelCrossing
-        >>> recipe = Recipe(LevelCrossing([1.0]), {}, {"contact": {"ub": 2.0, "search": [{"ub": 3.0}]}})
+        >>> recipe = Recipe(LevelCrossing([1.0]), {}, {"contact": {"ub": 2.0, "choose": [{"ub": 3.0, "fewer": 0}]}})
         >>> recipe.points_of("contact")
         [{'ub': 2.0}, {'ub': 3.0}]
         """
-        return self._points(label, "search")
-
-    def _choices_of(self, label: str) -> list[dict[str, Any]]:
-        """Return the parameters of a label's neuron, and behind them those that every training tries."""
-        points = self._points(label, "choose")
-        return [{key: value for key, value in point.items() if key != "fewer"} for point in points]
+        values = self.neurons.get(text("label", label), {})
+        first = {name: value for name, value in values.items() if name != "choose"}
+        points = [{**first, **point} for point in self._listed(label)]
+        return [first, *({key: value for key, value in point.items() if key != "fewer"} for point in points)]
 
     def _fewer_of(self, label: str) -> list[int | None]:
-        """Return of each point that every training tries how many fewer mistakes make it count; None: as usual."""
-        location = f"neurons.{label}.choose: fewer"
-        stated = [point.get("fewer") for point in self._points(label, "choose")[1:]]
-        return [None if fewer is None else integer(location, fewer, 0) for fewer in stated]
+        """Return of each point behind the first how many fewer mistakes make it count; None: as usual.
 
-    def _points(self, label: str, key: str) -> list[dict[str, Any]]:
-        """Return the parameters of a label's neuron, and behind them the others that it lists under a key."""
-        values = self.neurons.get(text("label", label), {})
-        plain = {name: value for name, value in values.items() if name not in LISTS}
-        listed = several(f"neurons.{label}.{key}", values.get(key, ()))
-        return [plain, *({**plain, **mapping(f"neurons.{label}.{key}", point)} for point in listed)]
+        Parameters
+        ----------
+        label : str
 
-    def _at(self, points: Mapping[str, Mapping[str, Any]]) -> Recipe:
-        """Return the recipe with these parameters of its neurons, and with the points that it lists.
-
-        Those are changes of the neuron as it was, whose other parameters they keep.
+        Raises
+        ------
+        ProblemError : a number that is not whole
         """
+        stated = [point.get("fewer") for point in self._listed(label)]
+        return [None if fewer is None else integer(f"neurons.{label}.choose: fewer", fewer, 0) for fewer in stated]
 
-        def listed(label: str, point: Mapping[str, Any]) -> dict[str, Any]:
-            before, first = self.neurons.get(label, {}), self.points_of(label)[0]
-            more = {name: value for name, value in first.items() if point.get(name) != value}
-            return {key: [{**more, **was} for was in before[key]] for key in LISTS if key in before}
-
-        return replace(self, neurons={label: {**point, **listed(label, point)} for label, point in points.items()})
-
-    def _without_choices(self, part: str) -> Recipe:
-        """Return the recipe without the points to choose from whose neuron receives an encoder of this name."""
-
-        def left(label: str, neuron: Mapping[str, Any]) -> dict[str, Any]:
-            points = [self._received({**self.learner, **point}) for point in self._choices_of(label)[1:]]
-            kept = [choice for choice, got in zip(neuron.get("choose", ()), points, strict=True) if got.name != part]
-            return (
-                {**neuron, "choose": kept} if kept else {key: value for key, value in neuron.items() if key != "choose"}
-            )
-
-        return replace(self, neurons={label: left(label, neuron) for label, neuron in self.neurons.items()})
+    def _listed(self, label: str) -> list[Mapping[str, Any]]:
+        """Return the points that a neuron lists, as they are written."""
+        name = f"neurons.{label}.choose"
+        return [mapping(name, point) for point in several(name, self.neurons.get(label, {}).get("choose", ()))]
 
     def _without_parts(self, names: Collection[str]) -> Recipe:
         """Return the recipe without some parts of a composite encoder, and without the points that receive any of them.
 
         Of a neuron whose first point is among these the next one is the first; one without any other keeps it.
+
+        Parameters
+        ----------
+        names : collection of str
+
+        Raises
+        ------
+        ProblemError : parts without which a neuron has nothing left that it can receive
         """
         if not isinstance(self.encoder, Composite) or not names:
             return self
         parts = self.encoder.parts
 
         def left(label: str) -> dict[str, Any]:
-            points = self._points(label, "choose")
-            kept = [point for point in points if not set(names) & set(point.get("inputs", parts))]
+            points = self.points_of(label)
+            stated = [{}, *self._listed(label)]
+            kept = [
+                point | ({"fewer": listed["fewer"]} if "fewer" in listed else {})
+                for point, listed in zip(points, stated, strict=True)
+                if not set(names) & set(point.get("inputs", self.learner.get("inputs", parts)))
+            ]
             if len(kept) == len(points) or not kept:
                 return dict(self.neurons[label])
-            first, *others = ({key: value for key, value in point.items() if key != "fewer"} for point in kept)
+            first, *others = kept
+            first.pop("fewer", None)
             return {**first, **({"choose": others} if others else {})}
 
         return replace(self, neurons={label: left(label) for label in self.neurons})
-
-    def _labels(self, examples: Sequence[Example]) -> tuple[str, ...]:
-        """Return the labels that are learnt: the recipe's, or where it has none those of the examples."""
-        return tuple(self.neurons) or tuple(sorted({label for example in examples for label in example.labels}))
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Recipe:

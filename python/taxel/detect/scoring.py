@@ -139,7 +139,7 @@ class Score:
     def rank(self) -> tuple[int, float]:
         """Missed and false together, then the root mean square of `errors_ms` (ms): the less, the better.
 
-        `taxel.detect.choose` compares it. The error is infinite where nothing was found.
+        The error is infinite where nothing was found.
         """
         return self.missed + self.false, float(np.sqrt(np.mean(self.errors_ms**2))) if self.found else np.inf
 

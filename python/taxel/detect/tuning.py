@@ -16,14 +16,17 @@ from taxel._core import ProblemError
 from taxel.detect.examples import Example, check_examples
 from taxel.detect.loads import EdgeRule, FoundTimes, Loads, Stretch, clock_of, lacks
 from taxel.detect.plain_rule import PlainRule
+from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: Thresholds of the area, taxels.
 AREAS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 #: Thresholds of the total: steps of a ladder with so many a decade, between these quantiles of its values above 0.
 TOTALS_A_DECADE, QUANTILES = 8, (0.0, 0.95)
-#: Thresholds of the local load, units of noise.
-LOCAL_LOADS = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
+#: Thresholds of local loads, units of noise.
+LOCAL_LOADS = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
+#: Local loads above and below their running mean.
+CHANGES = ("local_rise", "local_fall")
 #: Thresholds of the peak, units of noise.
 PEAKS = (4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 24.0, 32.0, 48.0)
 #: Parts of the threshold below which a load ends.
@@ -49,7 +52,7 @@ DATES = 6
 AGES_MS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 16.0, 20.0, 30.0, 50.0)
 #: Rules are equally often right whose missed and false differ by at most that share of the labels: more is noise.
 EQUAL_SHARE = 0.002
-#: Of these counts how many detections are so near to their label, us.
+#: ... and so many of them within `NEAR_US`, beside one: of few labels one is noise.
 NEAR_US = 10_000
 
 
@@ -85,13 +88,15 @@ def tune(
     10 ms of their label, and of these the one whose `known` is nearest to it at the median, before as after it: what is
     known earlier responds to something else.
 
-    Tried are thresholds of the area (`AREAS`), of the total (`TOTALS_A_DECADE`), of the local load (`LOCAL_LOADS`) and
-    of the peak (`PEAKS`), with all numbers of frames (`FRAMES`) and releases (`RELEASES`), at the onset and at the end
-    of a load; of channels those of peak and total alone. Of frames so are thresholds of total and peak with ends at
-    parts of what they were at most (`OF_LARGEST`), and counts of levels that are on: levels by the unit (`LEVELS`), by
-    what loaded taxels read (`LEVEL_QUANTILES`) and in parts of the running range (`RANGE_LEVELS`), of which a load
-    begins where the count rises to one number after it was at most another, and ends likewise, dated at a number
-    between them.
+    Of thresholds alike in all else that are equally right it is the middle one.
+
+    Tried are thresholds of the area (`AREAS`), of the total (`TOTALS_A_DECADE`), of the local load, its rise and its
+    fall (`LOCAL_LOADS`) and of the peak (`PEAKS`), with all numbers of frames (`FRAMES`) and releases (`RELEASES`), at
+    the onset and at the end of a load; of channels those of peak and total alone. Of frames so are thresholds of total
+    and peak with ends at parts of what they were at most (`OF_LARGEST`), and counts of levels that are on: levels by
+    the unit (`LEVELS`), by what loaded taxels read (`LEVEL_QUANTILES`) and in parts of the running range
+    (`RANGE_LEVELS`), of which a load begins where the count rises to one number after it was at most another, and ends
+    likewise, dated at a number between them.
 
     Two labels are kinds where exactly two are nearer to onsets than to ends, or where there are only two: then
     thresholds of the area at each of `AGES_MS` are tried too, on a logarithmic scale, and thresholds of the duration as
@@ -124,8 +129,8 @@ def tune(
 
     Notes
     -----
-    If rules are equal, the first counts: area before total before local load before peak before counts, low thresholds
-    before high, few frames before many. A rule that misses and invents as many as there are labels is no better than
+    If rules are equal, the first counts: area before total before local loads before peak before counts, few frames
+    before many. A rule that misses and invents as many as there are labels is no better than
     none.
 
     Examples
@@ -179,7 +184,7 @@ class Tuning:
 
     def __init__(self, loads: Loads, names: Sequence[str], window_ms: float) -> None:
         self.loads, self._names, self._width_us = loads, list(names), round(float(to_us(window_ms)))
-        self._truth = {name: loads.truth(name, loads.labelled([name], loads.whole_examples)) for name in names}
+        self._truth = {name: loads.truth(name, loads.whole_examples) for name in names}
         self._outcomes: dict[EdgeRule, dict[tuple[str, int], _Outcomes]] = {}
 
     def best_rules(self, parts: Sequence[Stretch], only: str | None = None) -> dict[str, PlainRule | None]:
@@ -190,11 +195,11 @@ class Tuning:
         truth = {name: self.loads.truth(name, parts) for name in self._names}
         points = list(_points(self.loads, parts, only))
         best = {name: self._at_edges(name, points, parts) for name in self._names}
-        onsets = [name for name, (onset, end) in best.items() if onset.fit.error_ms < end.fit.error_ms]
+        onsets = [name for name, pair in best.items() if _is_onset(*pair)]
         single = {name: _better(pair, len(truth[name])) for name, pair in best.items()}
         kinds = onsets if len(onsets) == 2 else self._names if len(self._names) == 2 else []
         if kinds and only is None and self.loads.have_rest:
-            windows = self.loads.windows(self.loads.labelled(kinds, parts))
+            windows = self.loads.windows(parts)
             touches: dict[float | str, FoundTimes] = {
                 age: self.loads.at_age(age).between(windows) for age in self.loads.ages_ms(AGES_MS)
             }
@@ -207,20 +212,45 @@ class Tuning:
 
     def _at_edges(self, name: str, points: Sequence[EdgeRule], parts: Sequence[Stretch]) -> tuple[_Best, _Best]:
         """Return the best rule for a label at onsets, and the best at ends."""
-        windows = self.loads.windows(self.loads.labelled([name], parts))
+        windows = self.loads.windows(parts)
         onset, end = (self._best_at(name, edge, points, windows) for edge in (0, 1))
         return onset, end
 
     def _best_at(self, name: str, edge: int, points: Sequence[EdgeRule], windows: Sequence[tuple[int, int]]) -> _Best:
         """Return the best rule for a label at one edge of loads, in windows on the one clock."""
-        tried = [(point, found) for point in points if (found := self._found(point).get((name, edge))) is not None]
+        # A change of the load begins where the load begins or ends; it ends as it is forgotten.
+        possible = [point for point in points if edge == 0 or point.quantity not in CHANGES]
+        tried = [(point, found) for point in possible if (found := self._found(point).get((name, edge))) is not None]
         rule, fit = EdgeRule("peak", 4.0), _RuleFit(2**62, 0, np.inf, np.inf)
         if tried:
-            k, fit = _best_of([found for _, found in tried], windows, len(self._truth[name]))
+            k, fit = _best_of(
+                [found for _, found in tried], [point for point, _ in tried], windows, len(self._truth[name])
+            )
             rule = tried[k][0]
         labels_of = [name, None] if edge == 0 else [None, name]
         how: dict[str, Any] = {"labels": labels_of, "noise_floor": self.loads.noise_floor, "unit": self.loads.unit}
         return _Best(fit, PlainRule(**rule._asdict(), **how))
+
+    def detected(self, rules: Mapping[str, PlainRule | None], part: Stretch) -> Detections:
+        """Return what the rule of each label detects of it in a part of an example, as `taxel.detect.run` finds it."""
+        detections = Detections([], [], [])
+        for label, rule in rules.items():
+            if rule is None:
+                continue
+            label_index = rule._parts["labels"].index(label)
+            if isinstance(rule.age_ms, str):
+                edges = self.loads.at_end()
+            elif rule.age_ms is None:
+                numbers = rule.quantity, rule.threshold, rule.release, rule.frames, rule.levels
+                edges = self.loads.edges(EdgeRule(*numbers, rule.dated_at, rule.of_largest))[label_index]
+            else:
+                edges = self.loads.at_age(rule.age_ms)
+            found = self.loads.off(edges.between(self.loads.windows([part])), part[0])
+            if rule.age_ms is not None:
+                is_label = (found.value >= rule.threshold) == bool(label_index)
+                found = found._replace(t=found.t[is_label], known=found.known[is_label])
+            detections += Detections([label] * len(found.t), found.t, found.known)
+        return detections
 
     def _found(self, point: EdgeRule) -> dict[tuple[str, int], _Outcomes]:
         """Return what a rule makes of each label at either edge; none where that is no better than nothing."""
@@ -228,7 +258,7 @@ class Tuning:
             self._outcomes[point] = {}
             for edge, edges in enumerate(self.loads.edges(point)):
                 for name, true in self._truth.items():
-                    windows = self.loads.windows(self.loads.labelled([name], self.loads.whole_examples))
+                    windows = self.loads.windows(self.loads.whole_examples)
                     outcomes = _outcomes(edges.between(windows), true, self._width_us)
                     if outcomes is not None:
                         self._outcomes[point][name, edge] = outcomes
@@ -240,14 +270,15 @@ def _points(loads: Loads, parts: Sequence[Stretch], only: str | None) -> Iterato
     if loads.have_rest:
         # Channels have no local load, and their area shows edges no better than the peak.
         quantities: tuple[str, ...] = (
-            ("peak", "total") if loads.are_channels else ("area", "total", "local_load", "peak")
+            ("peak", "total") if loads.are_channels else ("area", "total", "local_load", *CHANGES, "peak")
         )
         if only is not None:
             quantities = (only,)
         else:
             quantities = tuple(quantity for quantity in quantities if quantity not in loads.labels_of)
         totals = loads.values("total", parts) if "total" in quantities else np.empty(0)
-        thresholds = {"area": AREAS, "total": _ladder(totals), "local_load": LOCAL_LOADS, "peak": PEAKS}
+        thresholds = {"area": AREAS, "total": _ladder(totals), "peak": PEAKS}
+        thresholds |= dict.fromkeys(("local_load", *CHANGES), LOCAL_LOADS)
         for quantity in quantities:
             for threshold, frames, release in product(thresholds[quantity], FRAMES, RELEASES):
                 yield EdgeRule(quantity, threshold, release, frames)
@@ -311,8 +342,14 @@ def _outcomes(found: FoundTimes, true: NDArray[np.int64], width_us: int) -> _Out
     )
 
 
-def _best_of(several: Sequence[_Outcomes], windows: Sequence[tuple[int, int]], labels: int) -> tuple[int, _RuleFit]:
-    """Return the place of the best rule in windows on the one clock, which ascend and have so many labels."""
+def _best_of(
+    several: Sequence[_Outcomes], points: Sequence[EdgeRule], windows: Sequence[tuple[int, int]], labels: int
+) -> tuple[int, _RuleFit]:
+    """Return the place of the best rule in windows on the one clock, which ascend and have so many labels.
+
+    Of thresholds alike in all else that are equally right it is the middle one: farthest from noise, and from what
+    weaker loads reach.
+    """
     rule = np.repeat(np.arange(len(several)), [len(outcomes.t) for outcomes in several])
     t, errors, delays = (np.concatenate(column) for column in zip(*several, strict=True))
     inside = np.searchsorted(np.array(windows, np.int64).reshape(-1), t, side="right") % 2 == 1
@@ -321,11 +358,19 @@ def _best_of(several: Sequence[_Outcomes], windows: Sequence[tuple[int, int]], l
     wrong, near = (np.bincount(rule[of], minlength=len(several)) for of in (~found, errors <= to_ms(NEAR_US)))
     equal = np.flatnonzero(wrong <= wrong.min() + EQUAL_SHARE * labels)
     fits = {}
-    for k in equal[near[equal] == near[equal].max()].tolist():
+    for k in equal[near[equal] >= near[equal].max() - 1 - EQUAL_SHARE * labels].tolist():
         mine = found & (rule == k)
         fits[k] = _RuleFit(int(wrong[k]), int(near[k]), _median(delays[mine]), _median(errors[mine]))
-    best = min(fits, key=lambda k: (fits[k].delay_ms, k))
+    best = min(fits, key=lambda k: (-fits[k].near, fits[k].delay_ms, k))
+    if not points[best].levels:
+        alike = [k for k in fits if points[k] == points[best]._replace(threshold=points[k].threshold)]
+        best = alike[(len(alike) - 1) // 2]
     return best, fits[best]
+
+
+def _is_onset(onset: _Best, end: _Best) -> bool:
+    """Whether a label is that of the begin of a load; a load that falls begins where one ends."""
+    return onset.fit.error_ms < end.fit.error_ms and onset.rule.quantity != "local_fall"
 
 
 def _better(pair: tuple[_Best, _Best], labels: int) -> _Best:

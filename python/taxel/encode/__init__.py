@@ -14,9 +14,7 @@ from taxel.encode.moments import Moments as Moments
 from taxel.encode.peak import Peak as Peak
 from taxel.encode.sa1 import SA1 as SA1
 from taxel.encode.sa2 import SA2 as SA2
-from taxel.encode.separate_loads import SeparateLoads as SeparateLoads
 from taxel.encode.threshold_izhikevich import ThresholdIzhikevich as ThresholdIzhikevich
-from taxel.encode.touch_ends import TouchEnds as TouchEnds
 
 # The imports above are the registry of encoders.
 __all__ = [name for name, kind in sorted(globals().items()) if isinstance(kind, type)]

@@ -39,8 +39,6 @@ class Encoder(Value):
     _by_name: ClassVar[dict[str, type[Encoder]]] = {}
     #: Whether channels have no such trains, as it counts taxels beside each other or needs their places.
     _needs_neighbours: bool = False
-    #: Whether its trains are levels of one quantity, of which a neuron learns the one that follows its labels best.
-    _learns_one: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         if "name" in vars(cls):
@@ -103,13 +101,6 @@ class Encoder(Value):
     def _each(self) -> list[Encoder]:
         """Return the encoders that it is made of: itself, or the parts of a composite in the order of their trains."""
         return [self]
-
-    def _quantities(self) -> dict[int, tuple[int, ...]]:
-        """Return the quantities whose onsets labels may follow, by train, each with the trains about it.
-
-        Such an encoder is graded with logarithms of 1 + quantity, and its last train has a spike at every sample.
-        """
-        return {}
 
     def trains(self, array: Array) -> int:
         """Return the number of trains that the encoder returns for an array; a signed train counts once.

@@ -19,10 +19,11 @@ class ContactArea(Tared):
 
     A taxel is loaded while its held value exceeds its rest by the noise floor and half a tick (by the floor and half of
     it if the floor is below 1, as for a unit coarser than the values; a floor of 0 is for whole numbers only). It
-    counts if one of its 8 neighbours is loaded too; a single taxel counts as in `TouchEnds`. A taxel without a value,
-    in the tare or since, is unloaded. The number is computed once for each stamp, after the last event with it, and
-    spikes have the time of the stamp. Spikes do not depend on the position of a touch, so weights that are learnt at
-    one position apply to others.
+    counts if one of its 8 neighbours is loaded too; a single taxel counts from the noise floor on, or from six times
+    its noise in the tare if that is more, until it is below half of it. A taxel without a value, in the tare or since,
+    is unloaded. The number is computed once for each stamp, after the last event with it, and spikes have the time of
+    the stamp. Spikes do not depend on the position of a touch, so weights that are learnt at one position apply to
+    others.
 
     Trains are unsigned: rises to each level, then falls below each; ten by default.
 

@@ -122,16 +122,6 @@ class LocalLoad(Tared):
         """
         return tuple(_core.local_load_quantities(self._json()))
 
-    def _quantities(self) -> dict[int, tuple[int, ...]]:
-        if len(self.levels):
-            return {}
-        names = self.quantities
-        return {
-            k: (*(n for n, name in enumerate(names) if name == top or name.startswith(f"{top}, mean")), len(names) - 1)
-            for k, top in enumerate(names)
-            if top.startswith("largest") and ", mean" not in top
-        }
-
     def values(self, x: Events | Frames | Recorded) -> NDArray[np.float64]:
         """Return the quantities themselves, of which `encode` returns log(1 + quantity) as graded spikes.
 

@@ -16,8 +16,8 @@ _DEFAULT = defaults("moments")
 class Moments(Tared):
     """Fire when the area, total, peak or displacement of the centre of a touch crosses levels in geometric steps.
 
-    The moments of the loaded taxels (as in `ContactArea`; of channels as in `TouchEnds`) are their number (area), the
-    sum and the largest of their values above rest (total, peak), and the displacement to the right and downwards of
+    The moments of the loaded taxels (as in `ContactArea`; a channel as a single taxel there) are their number (area),
+    the sum and the largest of their values above rest (total, peak), and the displacement to the right and downwards of
     their centre, weighted by these values, since the present touch began. A touch begins when area rises above 0 and
     ends when it is 0; between touches all moments are 0. Each level of the displacement applies on both sides of 0. The
     moments do not depend on the position of the touch on the array, so weights that are learnt at one position apply to

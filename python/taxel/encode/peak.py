@@ -65,7 +65,6 @@ class Peak(Tared):
     """
 
     name = "peak"
-    _learns_one = True
 
     least_noise: float = _DEFAULT.least_noise
     levels: Sequence[float] = _DEFAULT.levels

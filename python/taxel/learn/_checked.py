@@ -48,7 +48,7 @@ def checked_examples(
         if len(pattern) != trains:
             raise ProblemError(f"pattern {p}: {counted(len(pattern), 'train')}; must be {trains}, as in the fit")
         if pattern.kind == "signed":
-            raise ProblemError(f"pattern {p}: spikes are signed; split them into ON and OFF trains first")
+            raise ProblemError(f"pattern {p}: spikes are signed; split them into ON and OFF trains (split_by_sign)")
         for k in np.flatnonzero(~((pattern.start <= times[p]) & (times[p] <= pattern.stop)))[:1]:
             window = f"{pattern.start:g} to {pattern.stop:g} ms"
             raise ProblemError(

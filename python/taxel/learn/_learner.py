@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import ClassVar, Literal
 
 from numpy import float64
 from numpy.typing import ArrayLike, NDArray
@@ -61,6 +61,9 @@ class Learner(Parameters):
 class SpikeLearner(Learner):
     """Learn spike times."""
 
+    #: Largest distance of a spike from its target in a score, ms.
+    _WINDOW_MS: ClassVar[float] = _DEFAULT.window_ms
+
     def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[float64]]:
         """Return the output spikes of the trained neuron, one array a pattern, ms.
 
@@ -90,7 +93,7 @@ class SpikeLearner(Learner):
         return [fit["neuron_"].run(weights, pattern) for pattern in patterns]
 
     def score(
-        self, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike], window_ms: float = _DEFAULT.window_ms
+        self, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike], window_ms: float | None = None
     ) -> float:
         """Return how well the output spikes match the targets.
 
@@ -99,8 +102,8 @@ class SpikeLearner(Learner):
         patterns : sequence of SpikeTrains
         targets : sequence of float sequences, ms
             Target spike times, one list per pattern.
-        window_ms : float, ms, 0 or more
-            Largest distance of a spike from its target.
+        window_ms : float, ms, 0 or more, optional
+            Largest distance of a spike from its target. Default: 50, of exact learners 1.
 
         Returns
         -------
@@ -113,7 +116,7 @@ class SpikeLearner(Learner):
         NotFittedError : before `fit`
         """
         _, target_times = examples(patterns, targets)
-        return f1(self.predict(patterns), target_times, window_ms=window_ms)
+        return f1(self.predict(patterns), target_times, window_ms=self._WINDOW_MS if window_ms is None else window_ms)
 
 
 def patterns_of(patterns: Sequence[SpikeTrains]) -> list[SpikeTrains]:

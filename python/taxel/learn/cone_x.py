@@ -289,6 +289,9 @@ class ConeX(SpikeLearner):
     array([20.])
     """
 
+    #: An exact target is met or not; 1 ms leaves room for targets and spikes that were rounded.
+    _WINDOW_MS = 1.0
+
     _kind = "cone_x"
     _nested: ClassVar = {"neuron": Neuron}
     neuron: Neuron | None = _DEFAULT.neuron

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -42,7 +42,7 @@ from taxel.tasks.labels import (
     table_names,
     titles_of,
 )
-from taxel.tasks.rest import TakenRest, UnknownRestError, rest, zero_by_unit
+from taxel.tasks.rest import TakenRest, UnknownRestError, rest
 
 #: So many lines, beside that of each sensor, say what was measured.
 _LINES = 3
@@ -107,9 +107,9 @@ class Detecting:
         Over all recordings, if the truth is known.
     not_scored : tuple of str
         The labels of the truth that the readout does not have.
-    unlabelled : mapping of str to tuple of str
-        The sources that no row of the truth names, by label, where rows name sources: they are not scored for it. No
-        sources: the truth has no label of that name, so nothing is scored for it.
+    unlabelled : tuple of str
+        The labels of the readout that the truth does not name, and the sources that no row of it names, where rows name
+        sources: they are not scored.
     window_ms, shift_ms : float, ms
     use : str
         As asked (`DetectOptions`).
@@ -123,7 +123,7 @@ class Detecting:
     each: tuple[Detected, ...]
     score: Score | None
     not_scored: tuple[str, ...]
-    unlabelled: Mapping[str, tuple[str, ...]]
+    unlabelled: tuple[str, ...]
     window_ms: float
     shift_ms: float = 0.0
     use: str = "better"
@@ -146,9 +146,8 @@ class Detecting:
         }
         if self.score is None:
             return result
-        unlabelled = {label: list(sources) for label, sources in self.unlabelled.items()}
         asked = {"window_ms": self.window_ms, "shift_ms": self.shift_ms}
-        return result | asked | {"score": self.score.to_dict(), "unlabelled": unlabelled}
+        return result | asked | {"score": self.score.to_dict(), "unlabelled": list(self.unlabelled)}
 
 
 def detect(
@@ -214,21 +213,21 @@ def detect(
         if truth is not None and not any(events):
             names = table_names(truth) if are_tables(truth) else truth
             raise refused("truth", f" is {names}: names no event in {titles_of(opened)}")
-        unlabelled = {} if truth is None else sources_without(truth, opened, events)
+        sources = () if truth is None else sources_without(truth, opened, events)
         named = {label for of_recording in events for label in of_recording}
-        if named.intersection(readout.labels):
-            unlabelled |= {label: () for label in readout.labels if label not in named}
+        known = [label for label in readout.labels if label in named] or list(readout.labels)
         each_labelled = [
-            None if truth is None else moved(events[k], recording, options.shift_ms)
+            None if truth is None or recording.label in sources else moved(events[k], recording, options.shift_ms)
             for k, recording in enumerate(opened)
         ]
         left_out = _of_other_arrays(readout, opened)
-        each_one = []
-        for recording, labelled in zip(opened, each_labelled, strict=True):
-            if not left_out or readout._accepts(recording.array):
-                without = {label for label, sources in unlabelled.items() if not sources or recording.label in sources}
-                each_one.append((recording, labelled, without))
-        found, unknown_rests = _in_each(readout, options, each_one, Workers() if workers is None else workers, update)
+        each_one = [
+            (recording, labelled)
+            for recording, labelled in zip(opened, each_labelled, strict=True)
+            if not left_out or readout._accepts(recording.array)
+        ]
+        workers = Workers() if workers is None else workers
+        found, unknown_rests = _in_each(readout, known, options, each_one, workers, update)
         if not found and unknown_rests:
             raise next(iter(unknown_rests.values()))
         for unknown_rest in unknown_rests.values():
@@ -256,7 +255,8 @@ def detect(
         else ()
     )
     how = options.window_ms, options.shift_ms, options.use
-    return Detecting(each, together, tuple(unknown), unlabelled, *how, bad, tuple(warnings), names)
+    without = () if truth is None else (*(label for label in readout.labels if label not in known), *sources)
+    return Detecting(each, together, tuple(unknown), without, *how, bad, tuple(warnings), names)
 
 
 def _used(readout: Readout | PlainRule, use: str) -> Readout | PlainRule:
@@ -270,8 +270,9 @@ def _used(readout: Readout | PlainRule, use: str) -> Readout | PlainRule:
 
 def _score_of(outcomes: Sequence[Outcome], window_ms: float) -> Score:
     """Return the score of the detections in several examples as one."""
-    found = [outcome.example._known(outcome.found) for outcome in outcomes]
-    return score_together(found, [outcome.example.labels for outcome in outcomes], window_ms)
+    return score_together(
+        [outcome.compared for outcome in outcomes], [outcome.example.labels for outcome in outcomes], window_ms
+    )
 
 
 def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) -> Iterator[str]:
@@ -322,23 +323,28 @@ def _of_other_arrays(readout: Readout | PlainRule, recordings: Sequence[Recordin
     return others
 
 
-#: A recording, its labels if the truth is known, and the labels of which nothing is known in it.
-_One: TypeAlias = tuple[Recording, Mapping[str, Any] | None, Collection[str]]
+#: A recording, and its labels if the truth is known.
+_One: TypeAlias = tuple[Recording, Mapping[str, Any] | None]
 
 
 def _in_each(
-    readout: Readout | PlainRule, options: DetectOptions, each: Sequence[_One], workers: Workers, update: Progress
+    readout: Readout | PlainRule,
+    known: Sequence[str],
+    options: DetectOptions,
+    each: Sequence[_One],
+    workers: Workers,
+    update: Progress,
 ) -> tuple[list[Detected], dict[str, UnknownRestError]]:
     """Return what is detected in recordings, in their order, and those whose rest is not known, by title."""
     results: dict[int, tuple[Detected | UnknownRestError, tuple[str, ...]]] = {}
-    for recording, *_ in each[:1]:
+    for recording, _ in each[:1]:
         update(f"detecting in {recording.title}", 0, 0)
-    for k, result in instance("workers", workers, Workers).run(partial(_tried, readout, options), each):
+    for k, result in instance("workers", workers, Workers).run(partial(_tried, readout, known, options), each):
         results[k] = result
         update("detecting", len(results), len(each))
     found: list[Detected] = []
     unknown: dict[str, UnknownRestError] = {}
-    for k, (recording, *_) in enumerate(each):
+    for k, (recording, _) in enumerate(each):
         detected, warned = results[k]
         for line in warned:
             warn(line, stacklevel=3)
@@ -351,14 +357,15 @@ def _in_each(
 
 def _tried(
     readout: Readout | PlainRule,
+    known: Sequence[str],
     options: DetectOptions,
     one: _One,
 ) -> tuple[Detected | UnknownRestError, tuple[str, ...]]:
     """Return what is detected in a recording, or that its rest is not known, and the warnings."""
-    recording, labels, without = one
+    recording, labels = one
     with collected() as warnings:
         try:
-            found: Detected | UnknownRestError = _detected(readout, recording, labels, without, options)
+            found: Detected | UnknownRestError = _detected(readout, recording, labels, known, options)
         except UnknownRestError as error:
             found = error
     return found, tuple(warnings)
@@ -368,7 +375,7 @@ def _detected(
     readout: Readout | PlainRule,
     recording: Recording,
     labels: Mapping[str, Any] | None,
-    without: Collection[str],
+    known: Sequence[str],
     options: DetectOptions,
 ) -> Detected:
     if recording.verdict.status in ("damaged", "unfinished", "lost", "nothing arrived"):
@@ -377,17 +384,15 @@ def _detected(
     with _naming(recording.title):
         _check_unit(readout, recording)
         taken = _rest(readout, recording, options.tare)
-        if options.tare is None:
-            zero_by_unit(recording)  # warns of taxels that do not rest there
         tare, begin_us = (None, None) if taken is None else (taken.tare, taken.detect_from_us)
         found, outside = run_counting(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=begin_us)
     # Labels that the readout does not have do not count as missed.
-    named = () if labels is None else tuple(label for label in readout.labels if label not in without)
-    true = {} if labels is None else {label: labels.get(label, _NONE) for label in named}
+    true = {} if labels is None else {label: labels.get(label, _NONE) for label in known}
     title = recording.title
-    example = Example(recording, true, tare, title.removesuffix(recording.label), title, tuple(without))
-    scored = score(example._known(found), true, options.window_ms) if true else None
-    outcome = Outcome(title, example, found, scored, outside)
+    example = Example(recording, true, tare, title.removesuffix(recording.label), title)
+    outcome = Outcome(title, example, found, None, outside)
+    scored = score(outcome.compared, true, options.window_ms) if true else None
+    outcome = outcome._replace(score=scored)
     remarks = [] if scored is not None and scored.events and not many_wrong(scored) else list(_remarks(recording))
     if scored is not None and not scored.events:
         remarks.insert(

@@ -111,11 +111,9 @@ def moved(
 
 
 def sources_without(
-    source: GivenLabels, recordings: Sequence[Recording], events: Sequence[Mapping[str, Any] | None]
-) -> dict[str, tuple[str, ...]]:
-    """Return the sources that no row of labels names, by label, where rows of that label name sources at all.
-
-    Nothing is known of them. In a recording that rows of this source leave out, or all rows, nothing happened.
+    source: GivenLabels, recordings: Sequence[Recording], events: Sequence[Mapping[str, Any]]
+) -> tuple[str, ...]:
+    """Return the sources that no row of labels names, where rows name sources at all: nothing is known of them.
 
     Parameters
     ----------
@@ -125,20 +123,15 @@ def sources_without(
         Labels of each recording, as `references` returns them.
     """
     if not are_tables(source):
-        return {}
+        return ()
     rows = (
         (note for each in recordings for note in each.notes) if source == "notes" else _opened(source, recordings).rows
     )
-    titles = {each.label: {each.title, each.name} for each in recordings if each.label}
-    of_sources = {row.text for row in rows if row.source or any(row.recording in names for names in titles.values())}
-    without = {}
-    for label in sorted(of_sources & {label for of_recording in events if of_recording for label in of_recording}):
-        pairs = zip(recordings, events, strict=True)
-        named = {each.label for each, of_recording in pairs if of_recording and label in of_recording}
-        without[label] = tuple(
-            dict.fromkeys(each.label for each in recordings if each.label and each.label not in named)
-        )
-    return {label: sources for label, sources in without.items() if sources}
+    titles = {name for each in recordings if each.label for name in (each.title, each.name)}
+    if not any(row.source or row.recording in titles for row in rows):
+        return ()
+    named = {each.label for each, of_recording in zip(recordings, events, strict=True) if of_recording}
+    return tuple(dict.fromkeys(each.label for each in recordings if each.label and each.label not in named))
 
 
 def are_tables(source: GivenLabels) -> TypeGuard[Tables]:
@@ -153,20 +146,8 @@ def table_names(source: Tables) -> str:
 
 
 def _opened(source: Tables, recordings: Sequence[Recording]) -> Labels:
-    """Open tables of labels; on grids of no side, such as plates, which have both feet, sides do not name sources."""
-    table = Labels(source) if isinstance(source, str | os.PathLike) else _joined(source, recordings)
-    sides = {row.source for row in table.rows} - {""}
-    files = {(recording.path, trial_name(recording)) for recording in recordings}
-    of_both = all(
-        recording.array._has_neighbours and not {recording.side, recording.label} & _SIDES for recording in recordings
-    )
-    if not sides or not sides <= _SIDES or not of_both or len(files) < len(recordings):
-        return table
-    warn(
-        f"{table.path}: labels of {' and '.join(sorted(sides))} count alike, because no recording states its side "
-        "(side in a layout file)"
-    )
-    return table._without_sources()
+    """Open tables of labels as one."""
+    return Labels(source) if isinstance(source, str | os.PathLike) else _joined(source, recordings)
 
 
 def _joined(paths: Sequence[str | os.PathLike[str]], recordings: Sequence[Recording]) -> Labels:
@@ -222,6 +203,8 @@ def _tables(source: GivenLabels, recording: Path, recordings: Sequence[Recording
 
 def _mapped(source: GivenLabels, recordings: Sequence[Recording], argument: str) -> list[dict[str, NDArray[np.int64]]]:
     """Return the events that are given as times by label, a mapping for each recording."""
+    if isinstance(source, Mapping):
+        raise refused(argument, " is one mapping: must be a list with one mapping of times by label for each recording")
     each = several(argument, source)
     if len(each) != len(recordings):
         have = counted(len(recordings), "recording")

@@ -14,20 +14,19 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import checked_path, instance
 from taxel._base.errors import helped, refused
-from taxel._base.messages import collected, counted, warn
+from taxel._base.messages import warn
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
 from taxel.detect import Example
 from taxel.detect.floors import TOUCH, held_by_tare
 from taxel.events import Events
-from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.options import GivenTare, check_tare, seconds_of
 from taxel.recorded import recorded
 from taxel.recording import Recording, open_one
-from taxel.recording.analysis.preload import free_of_preload, standing, without_preload
+from taxel.recording.analysis.preload import free_of_preload, standing
 from taxel.recording.analysis.pressure import quiet_rest
-from taxel.recording.analysis.rest import ZEROS_BEFORE, by_unit, of_quiet, quantile
+from taxel.recording.analysis.rest import by_unit, of_quiet, quantile
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 
@@ -41,11 +40,6 @@ _LEAST_FRAMES = 20
 #: than this share of all are many. It has no load that stays for a while if it reads as much in all but this share of
 #: the frames, of so many, and not less than that share of the stretch's reading.
 _TIMES, _MANY, _LOWEST, _FRAMES, _MOSTLY_LOAD = 3.0, 0.25, 0.05, 2000, 0.5
-#: A recording begins loaded if the sum of its first so many frames is so many times its least sums, and not less than
-#: its largest ones by more.
-_FIRST_FRAMES, _LOADED_TIMES = 5, 10.0
-#: At most so many half seconds are looked at. Only noise moves in one if no three taxels spread so many times as much.
-_STRETCHES, _THIRD, _BY_NOISE = 64, 3, 2.0
 #: Share of the taxels with events that may lack a rest without a warning: a few have their first event late.
 _MOST_UNKNOWN = 0.1
 
@@ -59,13 +53,13 @@ class UnknownRestError(ProblemError):
 
 @dataclass(frozen=True, eq=False)
 class TakenRest:
-    """Hold the rest that a detection takes for a recording.
+    """Hold the rest that a training and a detection take for a recording.
 
     Parameters
     ----------
-    source : {"given", "beginning", "unit", "quiet"}
+    source : {"given", "beginning", "unit", "quiet", "labels"}
         A given tare; seconds at the recording's beginning, as asked; 0, as the values are force or pressure; the
-        recording's first quiet stretch.
+        recording's first quiet stretch; in a training the time before its first label.
     tare : Tare
     begin_us : int, us
         The time that text counts from: the recording's first if its times count from 1970, else 0.
@@ -87,20 +81,25 @@ class TakenRest:
             "beginning": f"its beginning, {first:.3f} to {end:.3f} s",
             "unit": "0, as the values are force or pressure",
             "quiet": f"its first quiet stretch, {first:.3f} to {end:.3f} s",
+            "labels": f"the time before its first label, {first:.3f} to {end:.3f} s",
         }[self.source]
 
     def to_dict(self) -> dict[str, Any]:
         """Return where the rest is from, and from when to when it was measured, as plain values."""
-        measured = self.source in ("beginning", "quiet")
+        measured = self.source in ("beginning", "quiet", "labels")
         return {"source": self.source, "us": [self.tare.start_us, self.tare.stop_us] if measured else None}
 
 
-def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
-    """Return the rest of a recording's taxels as each detection takes it: the page's, the shell's and Python's.
+def rest(
+    recording: Recording,
+    tare: GivenTare | None = None,
+    labels: Mapping[str, NDArray[np.int64]] | None = None,
+) -> TakenRest:
+    """Return the rest of a recording's taxels as trainings and detections take it, on the page, in shell and Python.
 
     It is the given one; else 0 of frames in a unit of force or pressure; else that of the first quiet stretch of half
-    a second in which nothing is on the array, for a board's events on their held values. Labels and notes never
-    count.
+    a second in which nothing is on the array, for a board's events on their held values; else, where labels are given,
+    as a training does, that of the time before the first of them.
 
     Parameters
     ----------
@@ -108,6 +107,8 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
         Of one sensor.
     tare : Tare, path or float (s), optional
         A tare, its file, a recording at rest, or the seconds at rest at the recording's beginning.
+    labels : mapping of str to int64, shape (events,), us, optional
+        The labels of a training.
 
     Raises
     ------
@@ -134,20 +135,34 @@ def rest(recording: Recording, tare: GivenTare | None = None) -> TakenRest:
     if tare is not None:
         seconds = seconds_of(tare)
         return TakenRest("given" if seconds is None else "beginning", given_tare(tare, recording), begin_us)
-    if isinstance(source, Frames) and (zero := by_unit(source)) is not None:
+    if (zero := zero_by_unit(recording)) is not None:
         return TakenRest("unit", zero, begin_us)
     span, warning = _quiet_us(recording, source)
     if warning:
         warn(warning, stacklevel=2)
-    if span is None:
-        loaded = _begun_loaded(source)
-        because = ("" if loaded else _noisy(source)) or f" with nothing on it{_slow(source) or loaded}"
-        error = UnknownRestError(
-            f"{recording.path}: the values of its taxels at rest are not known, because no half second is "
-            f"quiet{because}"
-        )
+    if span is not None:
+        return TakenRest("quiet", _measured(recording, recorded(recording), span[1], span[0]), begin_us)
+    before = None if labels is None else _before(recorded(recording), labels)
+    if before is None:
+        why = "no half second is quiet" + " and no label is late enough" * (labels is not None)
+        error = UnknownRestError(f"{recording.path}: the values of its taxels at rest are not known, because {why}")
         raise helped(error, "tare", "give")
-    return TakenRest("quiet", _measured(recording, recorded(recording), span[1], span[0]), begin_us)
+    return TakenRest("labels", _measured(recording, recorded(recording), before), begin_us)
+
+
+def _before(source: Events | Frames, labels: Mapping[str, NDArray[np.int64]]) -> int | None:
+    """Return until when nothing is labelled, or until the board's start marker, us; None if that is too short a time.
+
+    A label that a person set may be late, so it ends a little earlier.
+    """
+    ends = [int(times.min()) - _BEFORE_US for times in labels.values() if len(times)]
+    first = int(source.t[0]) if len(source) else 0
+    if isinstance(source, Events):
+        ends += [t for t, start in source.markers if start and t > first]
+    if not ends or min(ends) - first < _LEAST_REST_US:
+        return None
+    few = isinstance(source, Frames) and np.count_nonzero(source.t < min(ends)) < _LEAST_FRAMES
+    return None if few else min(ends)
 
 
 def _quiet_us(recording: Recording, source: Events | Frames) -> tuple[tuple[int, int] | None, str]:
@@ -281,136 +296,6 @@ def _warn_of_touch(subject: str, remedy: str, source: Events | Frames, measured:
     taxels = held_by_tare([Example(source, {}, measured)])
     if taxels >= TOUCH:
         warn(f"{subject} is not quiet but contains a touch of {taxels} taxels; {remedy}", stacklevel=3)
-
-
-def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
-    """Return the tare of the time before a recording's first label, or before the board's start marker.
-
-    The tare of frames in a unit of force or pressure is 0, as everywhere (`taxel.recording.analysis.rest`).
-    A label that a person set may be late, so the rest ends a little earlier. Where fewer than 20 frames come before
-    it, the tare is that of a quiet stretch, if there is one. Where something lay on the array before it and was taken
-    away, the tare is of the longest time without it, before the label if there is one; a warning says so. So it does
-    where a tare would hold a touch, and is that of the first quiet stretch, as of a detection, instead.
-    """
-    if (zero := zero_by_unit(recording)) is not None:
-        return zero
-    source = recorded(recording)
-    return _without_touch(_unloaded(labels, recording, source), recording, source)
-
-
-def _without_touch(tare: Tare, recording: Recording, source: Events | Frames) -> Tare:
-    """Return a tare of a recording; if it holds a touch, and the first quiet stretch none, that of this stretch."""
-    taxels = held_by_tare([Example(source, {}, tare)])
-    span = _quiet_us(recording, source)[0] if taxels >= TOUCH else None
-    if span is None:
-        return tare
-    quiet = _measured(recording, source, span[1], span[0])
-    if held_by_tare([Example(source, {}, quiet)]) >= TOUCH:
-        return tare
-    begin_us = beginning_us(source.t[:1])
-    first, end, *stretch = ((t - begin_us) / 1e6 for t in (tare.start_us, tare.stop_us, *span))
-    warn(
-        f"{recording.path}: {first:.3f} to {end:.3f} s, before the first label, contains a touch of {taxels} taxels, "
-        "so the tare is that of the first quiet stretch, {:.3f} to {:.3f} s".format(*stretch),
-        stacklevel=2,
-    )
-    return quiet
-
-
-def _unloaded(labels: Mapping[str, NDArray[np.int64]], recording: Recording, source: Events | Frames) -> Tare:
-    """Return the tare of the time before the first label without what lay on the array."""
-    first = min((int(times[0]) for times in labels.values() if len(times)), default=0) - _BEFORE_US
-    tare, warning = without_preload(recording, first)
-    if warning:
-        warn(warning, stacklevel=2)
-    if tare is not None:
-        return tare
-    if isinstance(source, Frames) and np.count_nonzero(source.t < first) < _LEAST_FRAMES <= len(source):
-        quiet = of_quiet(source).quiet_us
-        if quiet is not None:
-            return Tare.take(source, start_us=quiet[0], stop_us=quiet[1], note=str(recording.path))
-    return _before(labels, recording)
-
-
-def _before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
-    source = recorded(recording)
-    ends = [int(times[0]) - _BEFORE_US for times in labels.values() if len(times)]
-    first = int(source.t[0]) if len(source) else 0
-    if isinstance(source, Events):
-        ends += [t for t, start in source.markers if start and t > first]
-    if not ends or min(ends) - first < _LEAST_REST_US:
-        content = f"only {to_ms(max(0, min(ends) - first)):g} ms before its first label" if ends else "no label"
-        error = UnknownRestError(
-            f"{recording.path}: holds {content}, so the taxels' rest is not known{_begun_loaded(source)}"
-        )
-        raise helped(error, "tare", "give")
-    return _measured(recording, source, min(ends))
-
-
-def _noisy(source: Events | Frames) -> str:
-    """Return that only noise is why no half second is quiet, and how strong it is; else ""."""
-    if not isinstance(source, Frames) or len(source) < 2:
-        return ""
-    lasts, values = int(np.ceil(_QUIET_US / np.median(np.diff(source.t)))), source.values.reshape(len(source), -1)
-    begins = np.arange(0, len(source) - lasts, lasts)[:: 1 + len(source) // (lasts * _STRETCHES)]
-    if lasts < _LEAST_FRAMES or not len(begins):
-        return ""
-    spread, noise = np.array([_spread(values[begin : begin + lasts]) for begin in begins.tolist()]).transpose(1, 0, 2)
-    moves = np.nan_to_num(spread / np.maximum(noise, np.finfo(np.float32).tiny))
-    still = np.sort(moves, axis=1)[:, -min(_THIRD, moves.shape[1])] < _BY_NOISE
-    strong = float(np.median(noise[still])) if still.any() else 0.0
-    if not strong:
-        return ""
-    share = strong / np.nanmax(np.ptp(values, axis=0))
-    return (
-        f": {np.count_nonzero(still)} of {counted(len(still), 'half second')} contain only noise, but the noise has a "
-        f"standard deviation of {strong:.3g} {source.unit}, {share:.1%} of the range"
-    )
-
-
-def _spread(values: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return each taxel's standard deviation, and that of its noise: two frames differ by twice its variance."""
-    apart = np.diff(values, axis=0).astype(np.float64)
-    return values.std(axis=0, dtype=np.float64), np.sqrt((apart**2).mean(axis=0) / 2)
-
-
-def _slow(source: Events | Frames) -> str:
-    """Return that frames come so slowly that half a second holds none or one; else ""."""
-    apart_us = float(np.median(np.diff(source.t))) if isinstance(source, Frames) and len(source) > 1 else 0.0
-    return f": its frames are {apart_us / 1e6:.3g} s apart" if apart_us > _QUIET_US / 2 else ""
-
-
-def _begun_loaded(source: Events | Frames) -> str:
-    """Return what helps if a recording of taxels that read 0 at some time seems to begin loaded; else "".
-
-    It does if the sum of all taxels in its first frames is far above its least ones, and not far below its largest
-    ones. Counts of events do not: noise alone counts, and is 0 at times.
-    """
-    if not isinstance(source, Frames) or are_counts(source.unit) or source.values.min(axis=0, initial=np.inf).any():
-        return ""
-    sums = np.asarray(np.nansum(source.values, axis=(1, 2), dtype=np.float64))
-    begin, (least, most) = np.median(sums[:_FIRST_FRAMES]), np.quantile(sums, (_LOWEST, 1 - _LOWEST))
-    is_loaded = begin > 0 and begin >= _LOADED_TIMES * least and begin >= most / _LOADED_TIMES
-    return f"; where trials begin with load on the sensor, {ZEROS_BEFORE} helps" if is_loaded else ""
-
-
-def tare_if_any(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare | None:
-    """Return a recording's tare: 0 of force or pressure, else as `tare_before`, or None without such a time."""
-    if (zero := zero_by_unit(recording)) is not None:
-        return zero
-    source = recorded(recording)
-    try:
-        return _without_touch(_before(labels, recording), recording, source)
-    except ProblemError:
-        return None
-
-
-def has_rest(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> bool:
-    """Return whether a training has a tare of a recording that holds no touch."""
-    with collected():  # what it warns of, the training does
-        tare = tare_if_any(labels, recording)
-    source = recorded(recording)
-    return tare is not None and held_by_tare([Example(source, {}, tare)]) < min(TOUCH, source.array.taxels)
 
 
 def _measured(recording: Recording, source: Events | Frames, stop_us: int, start_us: int | None = None) -> Tare:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance
 from taxel._base.errors import helped, refused
-from taxel._base.messages import collected, warn
+from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Forecast, Progress, reporting
 from taxel._core import ProblemError
-from taxel.detect import Example, Judged, Outcome, Readout, Recipe, judge, recipes, score
+from taxel.detect import Example, Outcome, Readout, Recipe, recipes, score
 from taxel.detect.clock import off_loads
 from taxel.detect.drift import training_data
 from taxel.detect.examples import check_examples, sizes_of
-from taxel.detect.fitting import Trained, fit_aligned
-from taxel.detect.floors import measured_floor
-from taxel.detect.folds import count_of_folds, judge_by_training
-from taxel.detect.loads import clock_of
+from taxel.detect.fit import Fitter
+from taxel.detect.floors import TOUCH, held_by_tare, measured_floor
+from taxel.detect.folds import count_of_folds
+from taxel.detect.judge import judge_by, judge_training
 from taxel.detect.readout import run_counting
 from taxel.detect.scoring import many_wrong
 from taxel.events import Events
@@ -29,10 +29,7 @@ from taxel.frames import Frames
 from taxel.options import GivenTare, TrainOptions
 from taxel.recorded import recorded
 from taxel.recording import Recording
-from taxel.recording.analysis.rest import BY_UNIT
 from taxel.recording.opening import sensors_of
-from taxel.spikes import SpikeTrains
-from taxel.tare import Tare
 from taxel.tasks.info import sensor_line
 from taxel.tasks.labels import (
     GivenLabels,
@@ -44,7 +41,7 @@ from taxel.tasks.labels import (
     table_names,
     titles_of,
 )
-from taxel.tasks.rest import given_tare, has_rest, tare_before, tare_if_any
+from taxel.tasks.rest import TakenRest, UnknownRestError, rest
 from taxel.tasks.train_result import Training
 
 #: Work that takes longer says so before it begins, s.
@@ -131,22 +128,20 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
             right = "if it holds labels, not readings, leave it out (leave_out in a layout file)"
             warn(f"{each.name}: {like[0]} alone changes with the labels and hardly else; {right}")
     unlabelled = sources_without(labels, opened, labelled)
+    some = [k for k, each in enumerate(opened) if each.label not in unlabelled]
+    opened, labelled = [opened[k] for k in some], [labelled[k] for k in some]
     labelled = [moved(events, each, options.shift_ms) for events, each in zip(labelled, opened, strict=True)]
     names = sorted({label for events in labelled for label in events})
-    without = [{label for label in names if each.label in unlabelled.get(label, ())} for each in opened]
-    # A source without any label takes no part.
-    some = [k for k, none in enumerate(without) if len(none) < len(names)]
-    opened, labelled, without = [opened[k] for k in some], [labelled[k] for k in some], [without[k] for k in some]
+    rests = _rests(opened, labelled, options.tare)
     if options.recipe is None and "encoder.name" not in options.changes:
-        source, rests = recorded(opened[0]), True
-        if isinstance(source, Frames) and not source.array._has_neighbours and options.tare is None:
-            rests = all(map(has_rest, labelled, opened))
-        recipe, why = recipes.chosen(source, names, rests=rests)
-        update(f"recipe {recipe}, chosen for {why}{', whose rest is not known' * (not rests)}", 0, 0)
+        source = recorded(opened[0])
+        known = all(map(_is_rest, rests, opened))
+        recipe, why = recipes.chosen(source, names, rests=known)
+        update(f"recipe {recipe}, chosen for {why}{', whose rest is not known' * (not known)}", 0, 0)
         options = replace(options, recipe=recipe)
     plan = options._plan(names)
     assert plan is not None
-    examples = _examples(opened, labelled, without, options.tare, plan)
+    examples = _examples(opened, labelled, rests, plan)
     if labels == "notes":
         examples = [
             example._replace(labels_of=each._main.facts.labels_of)
@@ -159,7 +154,8 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
         )
     plan = options._plan(names, measured_floor(examples))
     assert plan is not None
-    return replace(_Work(opened, examples, options, update).training(plan), unlabelled=unlabelled)
+    taken = [one for one in rests if isinstance(one, TakenRest)]
+    return replace(_Work(opened, examples, taken, options, update).training(plan), unlabelled=unlabelled)
 
 
 def _like_labels(table: Events | Frames, events: Mapping[str, NDArray[np.int64]]) -> list[str]:
@@ -179,51 +175,60 @@ def _named(labels: GivenLabels) -> str:
     return table_names(labels) if are_tables(labels) else "given as times"
 
 
+def _rests(
+    opened: Sequence[Recording], labelled: Sequence[Mapping[str, NDArray[np.int64]]], tare: GivenTare | None
+) -> list[TakenRest | UnknownRestError]:
+    """Return the rest of each recording, or why it is not known."""
+    found: list[TakenRest | UnknownRestError] = []
+    for recording, events in zip(opened, labelled, strict=True):
+        try:
+            found.append(rest(recording, tare, events))
+        except UnknownRestError as error:
+            found.append(error)
+    return found
+
+
+def _is_rest(taken: TakenRest | UnknownRestError, recording: Recording) -> bool:
+    """Whether a rest is known, and holds no touch."""
+    if isinstance(taken, UnknownRestError):
+        return False
+    source = recorded(recording)
+    return held_by_tare([Example(source, {}, taken.tare)]) < min(TOUCH, source.array.taxels)
+
+
 def _examples(
     opened: Sequence[Recording],
     labelled: Sequence[Mapping[str, NDArray[np.int64]]],
-    without: Sequence[Collection[str]],
-    tare: GivenTare | None,
+    rests: Sequence[TakenRest | UnknownRestError],
     plan: Recipe,
 ) -> list[Example]:
-    """Return recordings as examples; if no tare is given, it is taken from each recording.
+    """Return recordings as examples.
 
-    Where the encoder needs none, only plain rules use it, and a recording from which it cannot be taken has none.
+    Where the encoder needs no tare, only plain rules use it, and a recording whose rest is not known has none.
     """
-    rests = [part.tare for part in plan.encoder._each() if hasattr(part, "tare")]
-
-    def rest(events: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare | None:
-        if tare is not None:
-            return given_tare(tare, recording)
-        if any(stated is not None for stated in rests):
-            return None
-        return tare_before(events, recording) if rests else tare_if_any(events, recording)
-
-    return [
-        Example(
-            recording,
-            events,
-            rest(events, recording),
-            recording.title.removesuffix(recording.label),
-            recording.title,
-            tuple(unlabelled),
-        )
-        for recording, events, unlabelled in zip(opened, labelled, without, strict=True)
-    ]
+    needed = any(part.tare is None for part in plan.encoder._each() if hasattr(part, "tare"))
+    examples = []
+    for recording, events, taken in zip(opened, labelled, rests, strict=True):
+        if needed and isinstance(taken, UnknownRestError):
+            raise taken
+        tare = None if isinstance(taken, UnknownRestError) else taken.tare
+        group = recording.title.removesuffix(recording.label)
+        examples.append(Example(recording, events, tare, group, recording.title))
+    return examples
 
 
-def _taken(examples: Sequence[Example]) -> tuple[tuple[int, int, int], ...]:
-    """Return from when to when each recording's tare was taken, and how long it lasts, us.
-
-    Of those whose rest is 0 by their unit nothing.
-    """
-    spans = []
-    for example in examples:
-        source = recorded(example.source)
-        if example.tare is not None and example.tare.note != BY_UNIT and not isinstance(source, SpikeTrains):
-            first = int(source.t[0])
-            spans.append((example.tare.start_us - first, example.tare.stop_us - first, int(source.t[-1]) - first))
-    return tuple(spans)
+def _within_touches(fitter: Fitter) -> Iterator[str]:
+    """Yield the labels of ends of touches that lie within touches, where nothing is learnt."""
+    named = [label for label in fitter.labels if recipes.neuron_of("touch", label) == "lift"]
+    if fitter.lacks or not named:
+        return
+    times = {label: np.concatenate(fitter.labels_in(label, fitter.whole)) for label in named}
+    for label, count in fitter.inside_loads(named).items():
+        if 2 * count > len(times[label]):
+            yield (
+                f"{label}: {count} of {counted(len(times[label]), 'label')} lie within touches, but {label} is read as "
+                "the end of a touch, and nothing within a touch is learnt"
+            )
 
 
 @dataclass(frozen=True)
@@ -232,6 +237,7 @@ class _Work:
 
     opened: Sequence[Recording]
     examples: Sequence[Example]
+    rests: Sequence[TakenRest]
     options: TrainOptions
     update: Progress
 
@@ -255,42 +261,37 @@ class _Work:
 
     def _training(self, plan: Recipe) -> Training:
         folds, window_ms = self.options.folds, self.options.window_ms
-        count, why = count_of_folds(self.examples) if folds is None else (folds, "" if folds else "folds is 0")
-        begun = perf_counter()
-        trained = fit_aligned(self.examples, plan, self.update)
-        self._say_how_long(perf_counter() - begun, count)
         registers = self.opened[0].registers
         frame_us = None if registers is None else registers.frame_us
-
+        fitter = Fitter(self.examples, plan, window_ms=window_ms, frame_us=frame_us, progress=self.update)
+        count, why = count_of_folds(fitter.examples) if folds is None else (folds, "" if folds else "folds is 0")
+        for line in _within_touches(fitter):
+            warn(line)
+            self.update(line, 0, 0)
+        begun = perf_counter()
+        trained = fitter.fit()
+        self._say_how_long(perf_counter() - begun, count)
         scored = None
         if count:
             try:
-                scored = judge(self.examples, plan, count, window_ms=window_ms, frame_us=frame_us, progress=self.update)
+                scored = judge_by(fitter, count)
             except ProblemError as error:
                 # These folds are the default, not a request, and all of the data may still be learnt from.
                 if folds is not None:
                     raise
                 count, why = 0, f"a part of the training data cannot be learnt from: {error}"
-        sound = check_examples(self.examples)
         if scored is None:
-            scored = self._own(trained, sound)
-        rules = {} if scored.plain is None else scored.plain.rules
+            by_halves = trained.readout._with_rules(trained.readout.rules, fitter.by_rule(fitter.whole))
+            scored = judge_training(fitter, trained._replace(readout=by_halves))
+        rules = {label: rule for label, rule in scored.plain.rules.items() if rule is not None}
         readout = trained.readout._with_rules(rules, scored.by_rule)
-        trained = trained._replace(readout=readout._with(training=training_data(sound, scored.together)))
-        taken = _taken(self.examples) if self.options.tare is None else ()
-        return Training(self.options, self.opened, trained, scored, why, self._outcomes(trained.readout), taken)
-
-    def _own(self, trained: Trained, sound: Sequence[Example]) -> Judged:
-        """Return the scores on the training data."""
-        outcomes = zip(sound, self._outcomes(trained.readout), strict=True)
-        by_neurons = [example._known(outcome.found) for example, outcome in outcomes]
-        clocks = [clock_of(example) for example in self.examples]
-        labels = trained.readout.labels
-        return judge_by_training(sound, labels, clocks, by_neurons, self.options.window_ms, self.update)
+        trained = trained._replace(readout=readout._with(training=training_data(fitter.examples, scored.together)))
+        return Training(self.options, self.opened, trained, scored, why, self._outcomes(trained.readout), self.rests)
 
     def _say_how_long(self, once_s: float, folds: int) -> None:
         """Say how long all takes by what one training on all data took, if that is more than a minute."""
-        trainings = folds - 1
+        # Each fold trains on its part, and on each half of it.
+        trainings = 2 * (folds - 1)
         if once_s * trainings < _LONG_S:
             return
         ground = (
@@ -304,13 +305,9 @@ class _Work:
         outcomes = []
         for recording, example in zip(self.opened, self.examples, strict=True):
             self.update(f"scoring on {recording.title}", 0, 0)
-            truth = {
-                label: np.asarray(example.labels.get(label, []), np.int64)
-                for label in readout.labels
-                if label not in example.unlabelled
-            }
+            truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
             detections, outside = run_counting(readout, recording, tare=example.tare)
-            scored = score(example._known(detections), truth, self.options.window_ms)
-            of_recording = Example(recording, truth, example.tare, unlabelled=example.unlabelled)
+            scored = score(detections, truth, self.options.window_ms)
+            of_recording = Example(recording, truth, example.tare)
             outcomes.append(Outcome(recording.title, of_recording, detections, scored, outside))
         return outcomes

@@ -2,39 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from shlex import quote
 from typing import Any
 
-import numpy as np
-
 from taxel._base.arguments import text
-from taxel._base.messages import collected, counted, three_digits
-from taxel._base.times import beginning_us
-from taxel._core import ProblemError
+from taxel._base.messages import three_digits
 from taxel.detect import Judged, Outcome, Readout, Score, Trained, recipes
 from taxel.detect.examples import unreliable
 from taxel.detect.levels import LEAST_LEVELS
 from taxel.detect.scoring import score_rows
-from taxel.encode import TouchEnds
 from taxel.options import TrainOptions
-from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.spikes import to_ms, to_us
 from taxel.tare import Tare
-from taxel.tasks.rest import rest
+from taxel.tasks.rest import TakenRest
 
-#: Largest number of unpaired labels that a warning names.
-_NAMED = 5
 #: Detections are known late that are known so long after their label, ms.
 _LATE_MS = 500.0
-#: The width of a line.
-_WIDTH = 160
+#: The width of a line, and how many are before the table.
+_WIDTH, _MOST_LINES = 160, 15
 #: What the written readout detects a label by.
 _RUNS = "; runs"
-#: Readouts know at other times whose delays differ by more, ms.
-_APART_MS = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,14 +45,13 @@ class Training:
         Why the scores are those on the training data; empty where they are held out.
     outcomes : sequence of taxel.detect.Outcome
         What the readout detects in its own training data.
-    tares_us : sequence of (int, int, int), us
-        From when to when the tare of each recording was taken from it, and how long it lasts; none of given tares.
+    rests : sequence of TakenRest
+        The rest of each recording whose rest is known.
     warned : tuple of str
         The warnings of the training, and, where more than 5 % of the labels of a name are missed or false, by how much
         labels are off what was felt, and what is the matter with the sensor.
-    unlabelled : mapping of str to tuple of str
-        The sources that no row of the labels names, by label, where rows name sources: they are neither trained nor
-        scored for it.
+    unlabelled : tuple of str
+        The sources that no row of the labels names, where rows name sources: they are left out.
     """
 
     options: TrainOptions
@@ -71,9 +60,9 @@ class Training:
     scored: Judged
     why: str
     outcomes: Sequence[Outcome]
-    tares_us: Sequence[tuple[int, int, int]]
+    rests: Sequence[TakenRest]
     warned: tuple[str, ...] = ()
-    unlabelled: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    unlabelled: tuple[str, ...] = ()
 
     @property
     def readout(self) -> Readout:
@@ -121,7 +110,7 @@ class Training:
                 for recording, score in zip(self.recordings, self.scored.scores, strict=True)
             ],
             "score": self.scored.together.to_dict(),
-            "neurons": (self.scored.neurons or self.scored.together).to_dict(),
+            "neurons": self.scored.neurons.to_dict(),
             "by_rule": list(self.readout.by_rule),
             "mistakes": [
                 {
@@ -133,12 +122,13 @@ class Training:
                 }
                 for k, label, t, is_missed in self.scored.mistakes
             ],
-            "plain_rule": None if self.scored.plain is None else self.scored.plain.to_dict(),
+            "plain_rule": self.scored.plain.to_dict(),
+            "rests": [taken.to_dict() for taken in self.rests],
             "shift_ms": self.options.shift_ms,
             "fitted_levels": list(self.fitted_levels),
             "chosen": dict(self.made.chosen),
             "warnings": list(self.warnings),
-            "unlabelled": {label: list(sources) for label, sources in self.unlabelled.items()},
+            "unlabelled": list(self.unlabelled),
         }
         if self.made.alignments:
             result["alignment"] = {label: aligned.to_dict() for label, aligned in self.made.alignments.items()}
@@ -148,28 +138,44 @@ class Training:
         return result
 
     def lines(self) -> list[str]:
-        """Return the result as lines for people; the first says whether the scores are held out."""
-        window, recipe = f"(window {self.options.window_ms:g} ms)", self.options.recipe
-        lines = [f"not held out, but scored on its own training data {window}: {self.why}"]
+        """Return the result as lines for people; the first says whether the scores are held out.
+
+        Before the table are at most 15 lines of 160 characters.
+        """
+        window = f"(window {self.options.window_ms:g} ms)"
+        first = f"not held out, but scored on its own training data {window}: {self.why}"
         if self.held_out:
-            lines = [f"held out: {self.scored.how} {window}"]
-        for label, sources in self.unlabelled.items():
-            lines.append(f"{label}: neither trained nor scored on {', '.join(sources)}, which no row of labels names")
-        for label in self.readout.labels:
-            lines += self._scores(label)
-        lines += self._aligned()
-        if self.options.shift_ms:
-            lines.append(f"labels moved by {self.options.shift_ms:+g} ms before training (--shift-ms)")
-        lines += self._kinds()
-        if recipe is not None:
-            about = self.made.recipe.about
-            lines.append(_cut(f"recipe {recipe}" + (f": {about}" if about else "")))
-        lines += [*self._levels(), *self._tares(), _cut(repr(self.readout))]
+            first = f"held out: {self.scored.how} {window}"
+        scores = [line for label in self.readout.labels for line in self._scores(label)]
+        about = list(self._about())
+        room = _MOST_LINES - 1 - len(about)
+        if len(scores) > room:
+            scores = [
+                *scores[: room - 1],
+                f"and {len(scores) - room + 1} more lines about labels: --json has all of them",
+            ]
+        lines = [_cut(line) for line in (first, *scores, *about)]
         lines += ["", *repr(self.scored.together).split("\n")]
         if len(self.scored.scores) > 1:
             titles = [recording.title for recording in self.recordings]
             lines += ["", *score_rows(zip(titles, self.scored.scores, strict=True))]
         return lines
+
+    def _about(self) -> Iterator[str]:
+        """Yield what was done with labels and recordings, and by which recipe."""
+        recipe = self.options.recipe
+        if self.unlabelled:
+            yield f"left out, because no row of labels names this source: {', '.join(self.unlabelled)}"
+        yield from self._aligned()
+        if self.options.shift_ms:
+            yield f"labels moved by {self.options.shift_ms:+g} ms before training (--shift-ms)"
+        yield from self._kinds()
+        if recipe is not None:
+            about = self.made.recipe.about
+            yield f"recipe {recipe}" + (f": {about}" if about else "")
+        yield from self._levels()
+        yield from self._rests()
+        yield repr(self.readout)
 
     def command(self, readout: str) -> str:
         """Return the command that detects by the readout in a file, with the tare, if any, of the training.
@@ -189,17 +195,11 @@ class Training:
         if any(self.unreliable()):
             return ""
         tare = "FILE" if isinstance(self.options.tare, Tare) else self.options.tare
-        if tare is None:
-            tare = "" if _are_quiet(self.recordings) else self._beginning()
+        before = [taken.tare.stop_us - taken.tare.start_us for taken in self.rests if taken.source == "labels"]
+        if before:
+            tare = f"{min(before) / 1e6:g}"
         option = f" --tare {quote(str(tare))}" if tare and self.readout._needs_tare else ""
         return f"taxel detect RECORDING --readout {quote(readout)}{option}"
-
-    def _beginning(self) -> str:
-        """Return the seconds at rest at the beginning of each recording, for ``--tare``; "" where none is needed."""
-        if not self.tares_us or any(begin > 0 for begin, *_ in self.tares_us):
-            return "SECONDS" if self.tares_us else ""
-        # More than half of a recording is refused.
-        return f"{min(min(end, lasts // 2) for _, end, lasts in self.tares_us) / 1e6:g}"
 
     @property
     def fitted_levels(self) -> tuple[float, ...]:
@@ -217,13 +217,7 @@ class Training:
             )
 
     def _levels(self) -> Iterator[str]:
-        """Yield the levels and the noise floor that the training data gave, if they did."""
-        if self.made.raised_floor is not None:
-            yield (
-                f"noise floor: {self.made.raised_floor:g} {self.readout.unit}, more than the noise requires, because "
-                "touches then begin and end nearer to the labels; some sensors also read what only comes near them; "
-                "--set encoders.NAME.noise_floor=... sets another"
-            )
+        """Yield the levels that the training data gave, if they did."""
         if self.fitted_levels:
             levels = ", ".join(f"{level:g}" for level in self.fitted_levels)
             yield (
@@ -232,47 +226,31 @@ class Training:
                 "others"
             )
 
-    def _tares(self) -> Iterator[str]:
-        """Yield the line of which tares were taken from the recordings."""
-        if not self.tares_us:
-            return
-        lengths = [to_ms(end - begin) for begin, end, _ in self.tares_us]
-        text = f"measured separately in each of {len(lengths)} recordings, for {min(lengths):g} to {max(lengths):g} ms"
-        if len(lengths) == 1:
-            text = "measured in the recording from {:g} to {:g} ms".format(*map(to_ms, self.tares_us[0][:2]))
-        yield f"tare: {text}; --tare sets another tare"
+    def _rests(self) -> Iterator[str]:
+        """Yield the line of which rests were taken from the recordings."""
+        taken = [one for one in self.rests if one.source in ("beginning", "quiet", "labels")]
+        if len(taken) == 1:
+            yield f"rest: {taken[0]}; --tare sets another"
+        elif taken:
+            lasts_ms = [to_ms(one.tare.stop_us - one.tare.start_us) for one in taken]
+            lasts = f"{min(lasts_ms):g} to {max(lasts_ms):g} ms"
+            yield f"rest: measured separately in each of {len(taken)} recordings, for {lasts}; --tare sets another"
 
     def _scores(self, label: str) -> Iterator[str]:
         """Yield how the neuron and the plain rule of a label scored on the same labels, and which of them runs."""
-        parts = self.readout.encoder_of(label)._each()
-        when = "when the touch ends" if any(isinstance(part, TouchEnds) for part in parts) else ""
         by_rule, plain = label in self.readout.by_rule, self.scored.plain
-        rule = None if plain is None else plain.rules[label]
-        neuron = (self.scored.neurons or self.scored.together)[label]
-        yield _line(label, "neuron", neuron, when) + self._written(label) + _RUNS * (rule is not None and not by_rule)
-        if plain is None or plain.together is None:
-            yield f"no plain rule for {label}" + (f": {plain.lacks}" if plain is not None else "")
+        rule = plain.rules[label]
+        yield _line(label, "neuron", self.scored.neurons[label]) + _RUNS * (rule is not None and not by_rule)
+        if plain.together is None:
+            yield f"no plain rule for {label}: {plain.lacks}"
         elif rule is None:
             yield f"no plain rule for {label}: none is better than to detect nothing"
         else:
-            yield _line(label, "plain rule", plain.together[label]) + _RUNS * by_rule
-            yield _cut(f"  tuned on all: {rule._compared()}")
-        if plain is not None and plain.own is not None and (own := plain.own[0][label]) is not None:
+            when = "when the touch ends" if rule.age_ms == "end" else ""
+            yield _line(label, "plain rule", plain.together[label], when) + _RUNS * by_rule
+            yield f"  tuned on all: {rule._compared()}"
+        if plain.own is not None and (own := plain.own[0][label]) is not None:
             yield _line(label, "the labels' own rule", plain.own[1][label]) + f": {own._compared()}"
-
-    def _written(self, label: str) -> str:
-        """Return when the readout that is written knows, where folds chose other ages of a touch; else ""."""
-        folds = [trained.readout.neurons for trained in self.scored.trained]
-        delay_ms = self.readout.neurons[label].delay_ms
-        if all(abs(delay_ms - neurons[label].delay_ms) <= _APART_MS for neurons in folds if label in neurons):
-            return ""
-        scores = [outcome.score.by_label[label] for outcome in self.outcomes if outcome.score is not None]
-        known_ms = np.concatenate([score.delays_ms for score in scores])
-        return (
-            f"; for the readout that is written, {three_digits(float(np.median(known_ms)), '+')} ms"
-            if len(known_ms)
-            else ""
-        )
 
     def unreliable(self) -> Iterator[str]:
         """Yield the labels of which the readout misses most, or detects no more than one of nothing."""
@@ -282,37 +260,18 @@ class Training:
                 yield text
 
     def _aligned(self) -> Iterator[str]:
-        """Yield by how much labels were moved to what the sensor felt, and which found no pair."""
+        """Yield by how much labels were moved to what the sensor felt, and how many found no pair."""
+        moved = []
         for label, alignment in self.made.alignments.items():
             if alignment.train is None:
-                yield f"{label}: no input follows the labels, so they were learnt as given"
+                moved.append(f"{label}: no input follows, learnt as given")
                 continue
-            yield (
-                f"{label}: labels moved to what the sensor felt: median {three_digits(alignment.median_ms, '+')} ms, "
-                f"largest {three_digits(alignment.largest_ms, '+')} ms"
-            )
-            unpaired = ((self.recordings[k], t) for k, t in alignment.to_dict()["unpaired"])
-            events = [
-                f"{recording.title} at {(t - beginning_us(recorded(recording, hold=False).t)) / 1e6:.3f} s"
-                for recording, t in unpaired
-            ]
-            if events:
-                more = f" and {len(events) - _NAMED} more" if len(events) > _NAMED else ""
-                labels = counted(len(events), "label")
-                named = ", ".join(events[:_NAMED]) + more
-                yield (
-                    f"{label}: no input that {label} is learnt from is within 50 ms of {labels}, which "
-                    f"{'was' if len(events) == 1 else 'were'} not learnt: {named}"
-                )
-
-
-def _are_quiet(recordings: Sequence[Recording]) -> bool:
-    """Return whether a detection finds the rest of each recording by itself."""
-    try:
-        with collected():
-            return all(rest(recording) for recording in recordings)
-    except ProblemError:
-        return False
+            median, largest = (three_digits(ms, "+") for ms in (alignment.median_ms, alignment.largest_ms))
+            without = int(alignment.unpaired.sum())
+            lacking = f", {without} of {len(alignment.given)} felt by none of its inputs and not learnt" * (without > 0)
+            moved.append(f"{label} by {median} ms (median; largest {largest}){lacking}")
+        if moved:
+            yield f"labels moved to what the sensor felt: {'; '.join(moved)}"
 
 
 def _cut(line: str) -> str:

@@ -19,7 +19,6 @@ WHERE = "thesis 6.5, figures 6.12 to 6.14, Table 6.2"
 PROTOCOL = (
     "The protocols of 6.5.2 and 6.5.3 on recordings of other people, as far as each recording's truth allows. "
     "Errors are neuron minus reference (negative: early), window ±50 ms, one to one; every further spike counts as "
-    "false, inside the window too. Where parameters are chosen, they are chosen inside each training fold "
-    "(taxel.detect.choose)."
+    "false, inside the window too. Where parameters are chosen, they are chosen inside each training fold."
 )
 DATA = tuple(source.folder for source in SOURCES.values())

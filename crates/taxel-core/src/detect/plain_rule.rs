@@ -223,7 +223,7 @@ impl PlainRule {
 
     /// The noise floor above the tare, in the sensor's unit; 0 of quantities that follow or need no rest.
     pub(super) fn floor_above_tare(&self) -> f64 {
-        if matches!(self.quantity, Quantity::LocalLoad | Quantity::RangeCount) { 0.0 } else { self.noise_floor }
+        if self.quantity.is_local() || self.quantity == Quantity::RangeCount { 0.0 } else { self.noise_floor }
     }
 
     /// The time after the last input within which its last detection is complete, us.

@@ -233,7 +233,6 @@ impl Readout {
             };
             let (encoder, inputs) = (self.encoder_of(cell)?, ReceivedTrains::new(received, self.delays_ms.len()));
             let named = NamedNeuron::new(label, cell, self.run_threshold, encoder.latency_ms(), inputs);
-            let named = named.with_duration(encoder.duration_train(array).map(|train| train as u32));
             Ok(named.with_ranges(Ranges::new(self.seen.get(label).cloned(), encoder.kind())))
         });
         let mut ways = vec![];

@@ -131,14 +131,14 @@ impl LocalLoad {
         Ok(quantities(&spikes_of_frames(&mut stream, frames, stop)?.0))
     }
 
-    /// The largest local sum alone, of an array's frames: the quantity of plain rules.
+    /// The largest local sums alone, of an array's frames: quantities of plain rules.
     ///
     /// # Errors
     ///
     /// As [`Encoder::stream`](super::Encoder::stream).
-    pub fn largest(&self, array: &Array) -> Result<LargestSum> {
+    pub fn largest(&self, array: &Array) -> Result<LargestSums> {
         self.check()?;
-        self.sums(array, &[]).map(LargestSum)
+        self.sums(array, &self.running_us()).map(LargestSums)
     }
 
     fn running_us(&self) -> Vec<f64> {
@@ -207,15 +207,30 @@ impl Encoding for LocalLoad {
     }
 }
 
-/// The largest local sum of each frame: [`LocalLoad`]'s quantity "largest".
-#[derive(Clone)]
-pub struct LargestSum(LocalSums);
+/// The largest local sums of each frame: above the rest, and above and below the last running mean, if there is any.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LargestOfFrame {
+    /// [`LocalLoad`]'s quantity "largest".
+    pub above_rest: f64,
+    /// The same above and below the running mean: "largest" and "largest below".
+    pub of_mean: [f64; 2],
+}
 
-impl LargestSum {
-    /// Reads the next frame, row by row, at `t` us, which must not be earlier than the last; returns its largest sum.
-    pub fn take(&mut self, t: i64, frame: &[f32]) -> f64 {
-        let mut largest = 0.0;
-        self.0.take(t, Values::Frame(frame), |sums| largest = sums.largest[0]);
+/// Computes the largest local sums of each frame.
+#[derive(Clone)]
+pub struct LargestSums(LocalSums);
+
+impl LargestSums {
+    /// Reads the next frame, row by row, at `t` us, which must not be earlier than the last; returns its largest sums.
+    pub fn take(&mut self, t: i64, frame: &[f32]) -> LargestOfFrame {
+        let (mut largest, mut of_rest) = (LargestOfFrame::default(), true);
+        self.0.take(t, Values::Frame(frame), |sums| {
+            if std::mem::take(&mut of_rest) {
+                largest.above_rest = sums.largest[0];
+            } else {
+                largest.of_mean = sums.largest;
+            }
+        });
         largest
     }
 

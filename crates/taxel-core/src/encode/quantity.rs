@@ -6,13 +6,16 @@ use super::blocks::Block;
 use super::by_stamp::{ByStamp, Measure};
 use super::level_count::LevelCount;
 use super::loaded::{Loaded, require_tare};
-use super::local_load::{LargestSum, LocalLoad};
+use super::local_load::{LargestOfFrame, LargestSums, LocalLoad};
 use super::peak::PeakLoad;
 use super::stream::Stream;
 use super::tare::Tare;
 use crate::rest::step_of;
 use crate::spikes::ms;
 use crate::{Array, Result, Spike, problem};
+
+/// The time constant of the running mean above or below which a load changes, ms.
+const CHANGE_MS: f64 = 50.0;
 
 /// A measure of the load on a sensor, which does not depend on position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,6 +28,11 @@ pub enum Quantity {
     /// The largest sum over 3 x 3 taxels above a tracked rest, in units of its noise, as of
     /// [`LocalLoad`](super::LocalLoad).
     LocalLoad,
+    /// The largest sum over 3 x 3 taxels above their running mean of 50 ms, in units of its noise: loads that begin beside
+    /// one that stays, and of a rest that is no longer so.
+    LocalRise,
+    /// The same below the running mean.
+    LocalFall,
     /// The largest value of a taxel above a tracked rest, in units of its noise, with what several loaded taxels add, as
     /// of [`Peak`](super::Peak).
     Peak,
@@ -39,6 +47,12 @@ pub enum Quantity {
 }
 
 impl Quantity {
+    /// Whether it is a sum over taxels beside each other, which channels have none of.
+    #[must_use]
+    pub fn is_local(self) -> bool {
+        matches!(self, Self::LocalLoad | Self::LocalRise | Self::LocalFall)
+    }
+
     /// Whether it counts levels, which must then be given.
     #[must_use]
     pub fn has_levels(self) -> bool {
@@ -50,8 +64,8 @@ impl Quantity {
     ///
     /// # Errors
     ///
-    /// `Problem` for the local load of channels, of which no taxel is known to have neighbours; without a tare, except for a
-    /// count by running range alone, or with one of another array; for the local load and the peak, with one without the
+    /// `Problem` for local loads of channels, of which no taxel is known to have neighbours; without a tare, except for a
+    /// count by running range alone, or with one of another array; for local loads and the peak, with one without the
     /// taxels' noise; for levels that are not above 0 or do not ascend; for the duration.
     pub fn stream(
         several: &[Self],
@@ -67,7 +81,9 @@ impl Quantity {
                         problem!("quantity"; " duration: does not change during a touch; choose another quantity"),
                     );
                 }
-                Self::LocalLoad => array.check_neighbours("a plain rule by local load")?,
+                Self::LocalLoad | Self::LocalRise | Self::LocalFall => {
+                    array.check_neighbours("a plain rule by local load")?;
+                }
                 Self::Area | Self::Total | Self::Peak | Self::Count | Self::RangeCount => {}
             }
         }
@@ -81,7 +97,10 @@ impl Quantity {
         local.least_noise *= step_of(noise_floor);
         // The least noise of a taxel belongs to the floor: .3 is of a board's 3 ticks, and of values in whole steps.
         let least = if noise_floor > 0.0 { noise_floor / 10.0 } else { local.least_noise };
-        let local = several.contains(&Self::LocalLoad).then(|| local.largest(array)).transpose()?;
+        if several.iter().any(|quantity| matches!(quantity, Self::LocalRise | Self::LocalFall)) {
+            local.local_ms = vec![CHANGE_MS];
+        }
+        let local = several.iter().any(|quantity| quantity.is_local()).then(|| local.largest(array)).transpose()?;
         let peak = several.contains(&Self::Peak).then(|| PeakLoad::new(array, tare, least)).transpose()?;
         let count = several.contains(&Self::Count).then(|| {
             let rest = require_tare("plain rule", tare)?.rest_of(array)?;
@@ -105,8 +124,8 @@ impl Quantity {
 struct QuantityMeasure {
     quantities: Vec<Quantity>,
     values: Vec<f32>,
-    /// Computes the local load, if it is among the quantities.
-    local: Option<LargestSum>,
+    /// Computes local loads, if one is among the quantities.
+    local: Option<LargestSums>,
     /// Computes the peak, if it is among the quantities.
     peak: Option<PeakLoad>,
     /// Counts levels above rest, if that is among the quantities.
@@ -137,7 +156,7 @@ impl Measure for QuantityMeasure {
     }
 
     fn emit(&mut self, t: i64, loaded: &Loaded, held: &[Block], out: &mut Vec<Spike>) {
-        let local = self.local.as_mut().map_or(0.0, |sums| sums.take(t, held.as_flattened()));
+        let local = self.local.as_mut().map_or(LargestOfFrame::default(), |sums| sums.take(t, held.as_flattened()));
         let peak = self.peak.as_mut().map_or(0.0, |peak| peak.take(t, held.as_flattened()));
         let count = self.count.as_mut().map_or(0, |count| count.take(t, held));
         let range_count = self.range_count.as_mut().map_or(0, |count| count.take(t, held));
@@ -146,7 +165,9 @@ impl Measure for QuantityMeasure {
             let value = match quantity {
                 Quantity::Area => loaded.area() as f32,
                 Quantity::Total => loaded.sums(held).total as f32,
-                Quantity::LocalLoad => local as f32,
+                Quantity::LocalLoad => local.above_rest as f32,
+                Quantity::LocalRise => local.of_mean[0] as f32,
+                Quantity::LocalFall => local.of_mean[1] as f32,
                 Quantity::Peak => peak as f32,
                 Quantity::Count => count as f32,
                 Quantity::RangeCount => range_count as f32,

@@ -11,27 +11,9 @@ from taxel.recorded import recorded
 from taxel.recording.analysis.pressure import readings
 from taxel.recording.analysis.rest import FORCE_UNITS, LOADED_TICKS, Rest, of_quiet, quantile, ticks_by_unit
 from taxel.recording.recording import Recording
-from taxel.tare import Tare
 
-#: A tare lasts so long at least, us, and so many frames.
-_LEAST_US, _LEAST_FRAMES = 10_000, 20
 #: What lies on an array all the time is in all but this share of the frames, of so many.
 _LOWEST, _FRAMES = 0.05, 2000
-
-
-def without_preload(recording: Recording, first_us: int) -> tuple[Tare | None, str]:
-    """Return the tare of a time without what lay on the array before a time, us, and the line that says so.
-
-    The time is the longest one before that time, else that of a later quiet stretch. None and "" where nothing lay;
-    None and a line where there is no such time.
-    """
-    source = recorded(recording)
-    read = (source, of_quiet(source)) if isinstance(source, Frames) else readings(recording)
-    if read is None or not read[1].preload_at or read[1].quiet_us is None or read[1].quiet_us[0] >= first_us:
-        return None, ""
-    span = _without(read[0], read[1], first_us)
-    tare = None if span is None else Tare.take(source, start_us=span[0], stop_us=span[1], note=str(recording.path))
-    return tare, _line(recording, read[1], found=span is not None)
 
 
 def free_of_preload(recording: Recording, rest: Rest) -> tuple[tuple[int, int] | None, str]:
@@ -81,17 +63,3 @@ def _later(frames: Frames, free: NDArray[np.int64]) -> tuple[int, int] | None:
     """Return the first quiet stretch after the first of these frames, us, unless the array is loaded in it."""
     later = of_quiet(frames.between(frames.t[free[0]], np.inf))
     return None if later.preload_at else later.quiet_us
-
-
-def _without(frames: Frames, rest: Rest, first_us: int) -> tuple[int, int] | None:
-    """Return the longest time before the first label without what lay on the array, else a later quiet one, us."""
-    free = _free(frames, rest)
-    if not len(free):
-        return None
-    runs = np.split(free, np.flatnonzero(np.diff(free) > 1) + 1)
-    spans = [(int(frames.t[run[0]]), min(int(frames.t[run[-1]]), first_us)) for run in runs]
-    begin, end = max(spans, key=lambda span: span[1] - span[0])
-    count = np.count_nonzero((frames.t >= begin) & (frames.t < end))
-    if end - begin >= _LEAST_US and count >= _LEAST_FRAMES:
-        return begin, end
-    return _later(frames, free)

@@ -24,8 +24,6 @@ from taxel.tare import Tare
 
 #: Units of force and pressure: an unloaded taxel reads 0 in them.
 FORCE_UNITS = _core.FORCE_UNITS
-#: What helps where recordings begin loaded: so long a rest is a quiet stretch.
-ZEROS_BEFORE = "zeros_before_s = 0.6 in a layout file (layout.toml beside them)"
 #: The note of a tare that was not measured.
 BY_UNIT = "0, by the unit"
 #: Reading: a noise floor is so many standard deviations of the noise, so that two neighbours rarely exceed it together,

@@ -2,7 +2,6 @@
 
 use super::ranges::Ranges;
 use crate::detect::TrainedNeuron;
-use crate::encode::duration_us;
 use crate::neuron::{Neuron, NeuronStream, OutputSpike, Time};
 use crate::spikes::us;
 use crate::{Result, Spike};
@@ -55,10 +54,6 @@ pub(in crate::detect) struct NamedNeuron {
     repaired: Option<f64>,
     /// The time of the latest input outside its range in training, ms.
     outside: Option<f64>,
-    /// The input with the duration of a touch, if the neuron decides as it ends.
-    duration: Option<u32>,
-    /// When touches ended, ms, and how long they lasted, us; those that a crossing may still rest on.
-    ended: Vec<(f64, f64)>,
 }
 
 /// A crossing of a neuron, and what it rests on.
@@ -87,32 +82,12 @@ impl NamedNeuron {
             ranges: Ranges::default(),
             repaired: None,
             outside: None,
-            duration: None,
-            ended: vec![],
         }
     }
 
-    /// The neuron as one that decides when a touch ends, whose duration is on an input.
-    pub fn with_duration(self, duration: Option<u32>) -> Self {
-        Self { duration, ..self }
-    }
-
-    /// The time of the event of a crossing, us: without the delay, and of a neuron that decides as a touch ends the
-    /// begin of this touch.
+    /// The time of the event of a crossing, us: without the delay.
     pub fn event_us(&self, crossing: &OutputSpike) -> i64 {
-        let end = crossing.t - self.offset_ms;
-        let nearest = self.ended.iter().min_by(|(a, _), (b, _)| (a - end).abs().total_cmp(&(b - end).abs()));
-        match nearest {
-            // A touch begins a whole number of us before it ends.
-            Some(&(t, lasted)) => (us(t) - lasted).round() as i64,
-            None => us(end).round() as i64,
-        }
-    }
-
-    /// Forgets touches on which no crossing from `until_ms` on can rest.
-    pub fn forget_before(&mut self, until_ms: f64) {
-        let memory = self.neuron.memory_ms() + self.offset_ms;
-        self.ended.retain(|(t, _)| *t >= until_ms - memory);
+        us(crossing.t - self.offset_ms).round() as i64
     }
 
     /// The neuron with the ranges that its inputs had in training.
@@ -140,9 +115,6 @@ impl NamedNeuron {
             }
         };
         stream.push(spike, &mut self.crossings)?;
-        if Some(input) == self.duration {
-            self.ended.push((spike.t, duration_us(spike.value)));
-        }
         let outside = self.ranges.is_outside(spike, self.neuron.memory_ms());
         if repaired || outside {
             // Crossings up to here cannot rest on this spike.

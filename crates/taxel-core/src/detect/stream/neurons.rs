@@ -75,7 +75,6 @@ impl DelayedNeurons {
             slope: crossing.spike.slope,
             repaired: crossing.repaired,
         }));
-        self.neurons.iter_mut().for_each(|neuron| neuron.forget_before(until_ms));
         Ok(())
     }
 }

@@ -1,0 +1,751 @@
+"""From labelled recordings to a readout: what `taxel train` fits to all of them, and to each part that it judges by."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel._base.arguments import finite, instance, several, shown
+from taxel._base.errors import helped
+from taxel._base.messages import are, collected, counted, warn
+from taxel._base.progress import Progress, reporting
+from taxel._base.times import beginning_us
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.detect.ages import ACTS_AFTER_MS, Ages, ages_of, in_frames, later_us, silent_windows
+from taxel.detect.alignment import WINDOW_MS, Alignment, align
+from taxel.detect.examples import Example, array_of, check_examples, name_of, sizes_of, unit_of
+from taxel.detect.floors import floor_alone, floor_of
+from taxel.detect.folds import Fold, Part, inside, split, whole
+from taxel.detect.levels import fit_levels
+from taxel.detect.loads import Loads, clock_of, lacks, lacks_neighbours
+from taxel.detect.plain_rule import PlainRule
+from taxel.detect.readout import SILENCE_MS, Readout, run
+from taxel.detect.recipe import Recipe, learner_from
+from taxel.detect.scoring import Score, score_together
+from taxel.detect.seen import seen
+from taxel.detect.trained import TrainedNeuron
+from taxel.detect.tuning import Tuning
+from taxel.detections import Detections
+from taxel.encode import Composite, Encoder, LocalLoad, Moments
+from taxel.learn import ConeR
+from taxel.spikes import SpikeTrains, to_ms, to_us
+
+#: How many fewer events a point must leave missed or false to count before the first of those to choose from.
+_FEWER = 3
+#: ... and that share of the labels: of many labels some were never felt.
+_FEWER_SHARE = 0.05
+#: A rule that finds this share of the labels of its training says when they were felt.
+_ALIGNS = 0.95
+#: Two folds need this many labels.
+TWO_FOLDS = 4
+#: A first input that is later than that after its label, ms, is of something else.
+_MOST_WAIT_MS = 100.0
+#: Where a neuron waits for its first inputs, those of this share of the labels have come.
+_MOST_LABELS = 0.9
+#: Why events cannot be learnt that have too few inputs.
+UNLEARNT = "cannot be learnt, because too few input spikes come before them"
+
+#: The rule of each label; None where none is better than to detect nothing.
+Rules = Mapping[str, PlainRule | None]
+
+
+class Trained(NamedTuple):
+    """Hold what one training made.
+
+    Attributes
+    ----------
+    recipe : Recipe
+        With the points that were chosen.
+    learners : mapping of str to ConeR or TrainedNeuron
+        The fitted learners, by label; a neuron that never fires where nothing was felt and a rule detects the label.
+    readout : Readout
+        Their neurons and the plain rules, and which of both runs.
+    alignments : mapping of str to Alignment
+        By how much its labels were moved to what the sensor felt, by label; empty where the recipe does not align them.
+    fitted_levels : bool
+        Whether the encoder's levels are of the training data (`Recipe`).
+    chosen : mapping of str to str
+        For each label, the chosen point of `choose`, the first one, and the mistakes of both in the training data.
+    """
+
+    recipe: Recipe
+    learners: Mapping[str, ConeR | TrainedNeuron]
+    readout: Readout
+    alignments: Mapping[str, Alignment]
+    fitted_levels: bool = False
+    chosen: Mapping[str, str] = {}
+
+
+def fit(
+    examples: Sequence[Example],
+    recipe: Recipe,
+    *,
+    by_rule: Sequence[str] | None = None,
+    window_ms: float = 50.0,
+    progress: Progress | None = None,
+) -> Readout:
+    """Train a readout on labelled recordings: of each label a neuron and a plain rule, of which the better one runs.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+        All of the same array. A label that an example lacks is not in it: that teaches silence.
+    recipe : Recipe
+    by_rule : sequence of str, optional
+        The labels that their rule is to detect, as `taxel.detect.judge` finds them. Default: found by halves (Notes).
+    window_ms : float, ms, 0 or more
+        Largest distance of a detection from its label, for rules and for the choice.
+    progress : function of (step, done, all), optional
+        Called before each step; of folds with how many are done, else with 0 of 0.
+
+    Returns
+    -------
+    Readout
+
+    Raises
+    ------
+    ProblemError : no event at all of a label, an event outside its example, or examples that are invalid
+
+    Warns
+    -----
+    UserWarning : what `taxel.learn.ConeR` warns of, behind the label; events that cannot be learnt by their times
+
+    Notes
+    -----
+    Target = event + the encoder's latency + the trained delay (thesis 6.5; the delay is ours). The event is the label,
+    or where the recipe aligns labels what the sensor felt of it. Which of neuron and rule is better is found by
+    training on each half of the data and detecting in the other: the one with fewer missed and false, and of as many
+    the one that knows earlier.
+
+    Examples
+    --------
+    >>> from taxel import Frames
+    >>> from taxel.encode import LevelCrossing
+    >>> frames = Frames([[[v]] for v in (0.0, 0.0, 9.0, 9.0, 0.0, 0.0)], range(0, 60_000, 10_000), unit="N")
+    >>> recipe = Recipe(LevelCrossing([5.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
+    >>> fit([Example(frames, {"contact": [20_000]})], recipe)
+    Readout(contact; LevelCrossing(levels=[5.0]) on 1 x 1 taxels; grid, keep)
+    """
+    stated = None if by_rule is None else several("by_rule", by_rule)
+    fitter = Fitter(examples, recipe, window_ms=window_ms, progress=progress)
+    trained = fitter.fit().readout
+    return trained._with_rules(trained.rules, fitter.by_rule(fitter.whole) if stated is None else stated)
+
+
+class Found(NamedTuple):
+    """What a training detects in a part of an example."""
+
+    by_neurons: Detections
+    by_rules: Detections
+    by_own: Detections
+    """By the labels' own rules, of the quantity whose thresholds labels are."""
+
+
+class Fitter:
+    """Fit readouts to parts of labelled examples; what all of them need is computed once.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+    recipe : Recipe
+    window_ms : float, ms
+        Of scores.
+    frame_us : float, us, optional
+        As in `taxel.detect.run`.
+    progress : function of (step, done, all), optional
+
+    Raises
+    ------
+    ProblemError : examples that are invalid, labels that the recipe does not know
+    """
+
+    def __init__(
+        self,
+        examples: Sequence[Example],
+        recipe: Recipe,
+        *,
+        window_ms: float = 50.0,
+        frame_us: float | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        if frame_us is not None:
+            finite("frame_us", frame_us, "us", least=1.0, most=3.6e9)
+        clocks = [clock_of(example, frame_us) for example in examples] if isinstance(examples, Sequence) else []
+        self.examples, self.clocks = check_examples(examples), clocks
+        self.window_ms = finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6)
+        self.report = reporting(progress)
+        #: All of the examples.
+        self.whole = whole(self.examples)
+        self._in_frames = in_frames(instance("recipe", recipe, Recipe), self.examples, clocks)
+        self._recipe = _possible(self._in_frames, self.examples)
+        self.array, self._unit = array_of(self.examples), unit_of(self.examples)
+        self._pads = len(sizes_of(examples)) > 0
+        self.labels = _labels_to_learn(self.examples, recipe)
+        #: What keeps rules from being tried; empty where they are.
+        self.lacks = lacks(self.examples)
+        self._tuning: Tuning | None = None
+        if not self.lacks:
+            loads = Loads(self.examples, clocks, floor_of(self.examples), self.report)
+            self._tuning = Tuning(loads, self.labels, self.window_ms)
+        # The quantity whose thresholds the labels are.
+        self._own = min((example.labels_of for example in self.examples if example.labels_of), default=None)
+        self._trains: dict[str, list[SpikeTrains]] = {}
+
+    def fit(self, parts: Sequence[Part] | None = None) -> Trained:
+        """Return neurons and rules of parts of the examples, by default of all; the neurons run."""
+        parts = self.whole if parts is None else parts
+        plan = fit_levels(self._recipe, self.examples, parts)
+        rules = self.rules(parts)
+        learners: dict[str, ConeR | TrainedNeuron] = {}
+        delays, alignments, ranges, chosen = {}, {}, {}, {}
+        points: dict[str, Mapping[str, Any]] = {}
+        for label in self.labels:
+            try:
+                best, first_wrong = self._best(plan, label, parts, rules[label])
+            except ProblemError as error:
+                if error.hint != "unfelt" or rules[label] is None:
+                    raise
+                warn(f"{label}: its neuron feels nothing and never fires; its plain rule detects it", stacklevel=4)
+                silent, points[label] = self._silent(plan, label), plan.points_of(label)[0]
+                learners[label], delays[label] = silent, silent.delay_ms
+                ranges[label] = {"most": np.zeros(len(silent.weights)).tolist()}
+                continue
+            learners[label], points[label], delays[label] = best.learner, best.point, best.delay_ms
+            ranges[label] = best.seen()
+            if differs := _differing(best.point, plan.points_of(label)[0]):
+                by, by_first = differs
+                chosen[label] = (
+                    f"learnt with {by}: {best.wrong} missed and false in the training data; with {by_first}: "
+                    f"{first_wrong}"
+                )
+            if best.alignment is not None:
+                alignments[label] = best.alignment
+        plan = replace(plan, neurons=points)
+        readout = _readout_of(learners, delays, plan, self.array)
+        known = {label: rule for label, rule in rules.items() if rule is not None}
+        readout = readout._with(seen=ranges, unit=self._unit, pads=self._pads)._with_rules(known)
+        fitted_levels = plan.encoder != self._recipe.encoder
+        return Trained(plan, learners, readout, alignments, fitted_levels, chosen)
+
+    def _silent(self, plan: Recipe, label: str) -> TrainedNeuron:
+        """Return a neuron that never fires."""
+        learner, delay_ms = plan.learner_of(label)
+        _, trains = self._received(plan, plan.points_of(label)[0])
+        return TrainedNeuron(learner._on_grid(), np.zeros(len(trains[0])), delay_ms)
+
+    def decided(self, parts: Sequence[Part]) -> Trained:
+        """Return neurons and rules of parts of the examples; what is better by halves of these parts runs."""
+        trained = self.fit(parts)
+        return trained._replace(readout=trained.readout._with_rules(trained.readout.rules, self.by_rule(parts)))
+
+    def by_rule(self, parts: Sequence[Part]) -> tuple[str, ...]:
+        """Return the labels that rules detect better than neurons, each judged on the half that it did not learn from.
+
+        On the same parts where they cannot be halved.
+        """
+        if self._tuning is None:
+            return ()
+        try:
+            halves = [fold for fold in split(self.examples, parts, 2) if self._has_all(fold.train)]
+        except ProblemError:
+            halves = []
+        pairs = []
+        for fold in halves or [Fold(parts, parts)]:
+            with collected(), contextlib.suppress(ProblemError):
+                trained = self.fit(fold.train)
+                found = [self.detected(trained, part) for part in fold.test]
+                pairs.append(
+                    (
+                        self.score([f.by_neurons for f in found], fold.test),
+                        self.score([f.by_rules for f in found], fold.test),
+                    )
+                )
+        return better_by_rule(self.labels, pairs)
+
+    def _has_all(self, parts: Sequence[Part]) -> bool:
+        """Whether parts have an event of each label."""
+        return all(len(np.concatenate(self.labels_in(label, parts))) for label in self.labels)
+
+    def rules(self, parts: Sequence[Part], *, own: bool = False) -> Rules:
+        """Return the plain rule of each label, tuned on parts of the examples; or the labels' own rules."""
+        if self._tuning is None or (own and self._own is None):
+            return dict.fromkeys(self.labels)
+        return self._tuning.best_rules(parts, self._own if own else None)
+
+    def detected(self, trained: Trained, part: Part, own: Rules | None = None) -> Found:
+        """Return what the neurons and the rules of a training detect in a part, and what the labels' own rules do."""
+        example, (frame_us, version) = self.examples[part.example], self.clocks[part.example]
+        neurons = trained.readout.using("neuron")
+        found = run(neurons, example.source, tare=example.tare, frame_us=frame_us, wire_version=version)  # type: ignore[arg-type]
+        by_neurons = found[(found.t >= part.start) & (found.t < part.stop)]
+        return Found(by_neurons, self._by_rules(trained.readout.rules, part), self._by_rules(own or {}, part))
+
+    def _by_rules(self, rules: Rules, part: Part) -> Detections:
+        """Return what the rule of each label detects of it in a part of an example."""
+        if self._tuning is None:
+            return Detections([], [], [])
+        return self._tuning.detected(rules, part)
+
+    def inside_loads(self, labels: Sequence[str]) -> dict[str, int]:
+        """Return how many events of each label lie within a load, farther from its begin and end than the window."""
+        assert self._tuning is not None
+        return {label: self._tuning.loads.inside(label, round(float(to_us(self.window_ms)))) for label in labels}
+
+    def labels_in(self, label: str, parts: Sequence[Part]) -> list[NDArray[np.int64]]:
+        """Return the events of a label in parts of the examples, us, ascending."""
+        nothing = np.empty(0, np.int64)
+        return [np.sort(inside(self.examples[part.example].labels.get(label, nothing), part)) for part in parts]
+
+    def score(self, found: Sequence[Detections], parts: Sequence[Part]) -> Score:
+        """Return the score of detections in parts of the examples, as one."""
+        each = {label: self.labels_in(label, parts) for label in self.labels}
+        truths = [{label: times[n] for label, times in each.items()} for n in range(len(parts))]
+        return score_together(found, truths, self.window_ms)
+
+    def _received(self, plan: Recipe, point: Mapping[str, Any]) -> tuple[Encoder, list[SpikeTrains]]:
+        """Return the encoder whose trains a neuron receives, and these trains of all examples."""
+        received = plan._received(point)
+        key = received.to_json()
+        if key not in self._trains:
+            self._trains[key] = [
+                self._encoded(k, example, plan.encoder, received, point) for k, example in enumerate(self.examples)
+            ]
+        return received, self._trains[key]
+
+    def _encoded(
+        self, k: int, example: Example, encoder: Encoder, received: Encoder, point: Mapping[str, Any]
+    ) -> SpikeTrains:
+        trains = example.source
+        if isinstance(trains, SpikeTrains):
+            trains = trains.split_by_sign() if trains.signed else trains
+            if received == encoder or not isinstance(encoder, Composite):
+                return trains
+            places = encoder.places(point["inputs"], self.array or Array(1, 1))
+            if len(places) != len(trains):
+                trains_text = f"{counted(len(trains), 'train')}, but the encoders make {len(places)}"
+                raise ProblemError(f"{name_of(k, example)}: {trains_text}: must be equally many")
+            return trains.select(places)
+        self.report(f"encoding {k + 1} of {len(self.examples)}", 0, 0)
+        with_rest = received if example.tare is None else received.with_tare(example.tare)
+        trains = with_rest.encode(trains)
+        return trains.split_by_sign() if trains.signed else trains
+
+    def _best(
+        self, plan: Recipe, label: str, parts: Sequence[Part], rule: PlainRule | None
+    ) -> tuple[_FittedPoint, int]:
+        """Return the first of the points to choose from, or a later one that leaves fewer events missed or false.
+
+        And how many the first one leaves.
+
+        They are tried in turn. A later one counts if it leaves as many fewer as its `fewer` says, else `_FEWER`, and
+        `_FEWER_SHARE` of the labels, as some more or less are chance; with 0 it counts if it leaves no more. Where most
+        events are missed whose targets come before the inputs that tell them, as with the true onsets of slow steps,
+        the neuron is trained to fire after the first input. A later point that cannot be learnt is left out. If the
+        first felt nothing, which counts as all labels missed, a later one must leave as many fewer, or none. Warnings
+        are those of the point that counts.
+        """
+        points = plan.points_of(label)
+        count = sum(map(len, self.labels_in(label, parts)))
+        best, refused = None, None
+        try:
+            best = self._fitted(plan, label, points[0], parts, rule)
+        except ProblemError as error:
+            if error.hint != "unfelt":
+                raise
+            refused = error
+        usual, first_wrong = max(_FEWER, _FEWER_SHARE * count), count if best is None else best.wrong
+        for point, stated in zip(points[1:], plan._fewer_of(label), strict=True):
+            fewer = usual if stated is None else stated
+            wrong, fewer = (count, min(max(1, fewer), count)) if best is None else (best.wrong, fewer)
+            if wrong < fewer:
+                continue
+            with contextlib.suppress(ProblemError):
+                second = self._fitted(plan, label, point, parts, rule)
+                if second.wrong <= wrong - fewer:
+                    best = second
+        if best is None:
+            assert refused is not None
+            raise refused
+        for caught in best.caught:
+            warn(caught, stacklevel=5)
+        return best, first_wrong
+
+    def _fitted(
+        self, plan: Recipe, label: str, point: Mapping[str, Any], parts: Sequence[Part], rule: PlainRule | None
+    ) -> _FittedPoint:
+        """Return one point of a label's neuron, fitted; one that waits for its inputs where that leaves fewer wrong."""
+        received, trains = self._received(plan, point)
+        cut = [_cut(trains[part.example], part) for part in parts]
+        felt = self._felt(label, parts, rule) if plan.align else None
+        inputs = _Inputs(label, received, cut, self.labels_in(label, parts), felt, parts, self)
+        fitted = inputs.fitted(plan, point)
+        if fitted.precedes_input and 2 * fitted.missed > inputs.count:
+            later = inputs.fitted(plan, point, behind_input=True)
+            if later.rank < fitted.rank:
+                return later._replace(caught=[_waits(label, inputs.count, fitted, later), *later.caught])
+        return fitted
+
+    def _felt(self, label: str, parts: Sequence[Part], rule: PlainRule | None) -> list[NDArray[np.float64]] | None:
+        """Return when a rule felt each event of a label in parts, us, NaN of those that it misses; None if many are."""
+        labels = self.labels_in(label, parts)
+        if rule is None:
+            return None
+        found = [self._by_rules({label: rule}, part)[label].t for part in parts]
+        times = [np.full(len(each), np.nan) for each in labels]
+        for k, (t, given) in enumerate(zip(found, labels, strict=True)):
+            scored = score_together([Detections([label] * len(t), t, t)], [{label: given}], WINDOW_MS)
+            times[k][scored.pairs[:, 1]] = t[scored.pairs[:, 0]]
+        count = sum(map(len, labels))
+        return times if np.isfinite(np.concatenate(times)).sum() >= _ALIGNS * count else None
+
+
+class _FittedPoint(NamedTuple):
+    """One point of a label's neuron, fitted."""
+
+    learner: ConeR
+    point: Mapping[str, Any]
+    #: How much later than the event it fires, ms, the encoder's latency apart.
+    delay_ms: float
+    alignment: Alignment | None
+    #: Events missed in the training data, and missed and false, then the error (ms).
+    missed: int
+    rank: tuple[int, float]
+    #: Whether most labels, which are not aligned, are so early that no neuron can fire by their targets.
+    precedes_input: bool
+    caught: list[str]
+    trains: Sequence[SpikeTrains]
+    is_graded: bool
+
+    @property
+    def wrong(self) -> int:
+        return self.rank[0]
+
+    def seen(self) -> dict[str, Any]:
+        """Return the range of the neuron's inputs."""
+        memory_ms = _core.neuron_memory_ms(self.learner.neuron_._json())
+        return seen(self.trains, memory_ms, graded=self.is_graded)
+
+
+@dataclass(frozen=True)
+class _Inputs:
+    """The trains that a label's neuron receives in parts of the examples, and its labels there."""
+
+    label: str
+    received: Encoder
+    trains: Sequence[SpikeTrains]
+    #: As given, and when a rule felt them, if it did; us.
+    given: Sequence[NDArray[np.int64]]
+    by_rule: Sequence[NDArray[np.float64]] | None
+    parts: Sequence[Part]
+    fitter: Fitter
+
+    @property
+    def count(self) -> int:
+        """The number of events."""
+        return sum(map(len, self.given))
+
+    @property
+    def names(self) -> list[str]:
+        """What errors call each part's example."""
+        return [name_of(part.example, self.fitter.examples[part.example]) for part in self.parts]
+
+    def fitted(self, plan: Recipe, point: Mapping[str, Any], *, behind_input: bool = False) -> _FittedPoint:
+        """Return a point fitted to them.
+
+        Raises
+        ------
+        ProblemError : no event, one outside its example, events within the refractory time, nothing felt
+        """
+        learner, delay_ms = learner_from(self.label, {**plan.learner, **point})
+        if not self.count:
+            raise ProblemError(f"{self.label}: no example has such an event, so it cannot be learnt")
+        self._check_inside()
+        neuron, ages = learner._on_grid(), ages_of(self.received, self.fitter.array)
+        alignment = None
+        if plan.align:
+            # Ages count from the begin of a touch, which the rule of a kind need not tell.
+            by_rule = self.by_rule if ages is None else None
+            alignment = align(self.trains, self.label, self.given, by_rule, self.received.latency_ms, ages)
+        felt = self.given if alignment is None else [alignment.felt(k) for k in range(len(self.given))]
+        for name, times in zip(self.names, felt, strict=True):
+            _check_apart(self.label, name, times, neuron.refractory)
+        # Where an age of the touch begins then, it is later: a spike at that age acts after its time, or at once where
+        # the potential jumps.
+        more_ms = ACTS_AFTER_MS if neuron.kernel == "exponential" else neuron.step_ms
+        shift_ms = self.received.latency_ms + delay_ms + (0.0 if ages is None else more_ms)
+        later = self._later(felt, ages, alignment, delay_ms, behind_input)
+        targets = [to_ms(t + more) + shift_ms for t, more in zip(felt, later, strict=True)]
+        shift_ms += to_ms(float(np.median(np.concatenate(later))))
+        graded = self.received.kind == "graded"
+        lasting = _until(self.trains, targets)
+        trains = lasting if graded or alignment is None else _until(distinct(self.trains), targets)
+        self._check_felt(trains, targets)
+        silent = None
+        if ages is not None and neuron.kernel == "exponential":
+            silent = [silent_windows(train, ages, t, neuron) for train, t in zip(lasting, targets, strict=True)]
+        what, report = f"learning {self.label} from {counted(self.count, 'event')}", self.fitter.report
+        report(what, 0, 0)
+        with collected() as caught:
+            try:
+                cone = learner.prepare(trains, targets, silence=silent).fit(
+                    learner,
+                    progress=lambda n, _rows, _objective, gap: report(
+                        f"{what}, round {n}: weights at most {gap:.2%} from the best", 0, 0
+                    ),
+                )
+            except ProblemError as error:
+                raise ProblemError(f"{self.label}: {error}") from None
+        scored = self._score(cone, plan.run_threshold, shift_ms)
+        begins = [_begin_ms(train) for train in self.trains]
+        remarks = _remarks(cone, targets, self.names, shift_ms, begins, scored.found, caught)
+        if alignment is not None:
+            places = np.array([part.example for part in self.parts])
+            alignment = replace(alignment, example=places[alignment.example])
+        return _FittedPoint(
+            cone,
+            point,
+            shift_ms - self.received.latency_ms,
+            alignment,
+            scored.missed,
+            scored.rank,
+            alignment is None and 2 * len(cone.unreachable_) > self.count,
+            [f"{self.label}: {remark}" for remark in remarks],
+            self.trains,
+            graded,
+        )
+
+    def _later(
+        self,
+        felt: Sequence[NDArray[np.int64]],
+        ages: Ages | None,
+        alignment: Alignment | None,
+        delay_ms: float,
+        behind_input: bool,
+    ) -> list[NDArray[np.int64]]:
+        """Return how much later than the trained delay after what was felt each target is, us."""
+        if ages is not None and alignment is not None and alignment.train == ages.trains[0]:
+            return [later_us(train, ages, to_ms(t), delay_ms) for train, t in zip(self.trains, felt, strict=True)]
+        wait_ms = _first_input_ms(self.trains, felt, self.received.latency_ms) if behind_input else 0.0
+        return [np.full(len(times), round(to_us(wait_ms)), np.int64) for times in felt]
+
+    def _score(self, cone: ConeR, run_threshold: float, shift_ms: float) -> Score:
+        """Return the score of a fitted learner in the training data, against the labels as given."""
+        neuron = cone._on_grid()
+        neuron.set_params(theta_0=run_threshold * neuron.theta_0)
+        found = []
+        for train in self.trains:
+            t = np.rint(to_us(neuron.run(cone.weights_, train) - shift_ms)).astype(np.int64)
+            found.append(Detections([self.label] * len(t), t, t))
+        return score_together(found, [{self.label: times} for times in self.given], WINDOW_MS)
+
+    def _check_inside(self) -> None:
+        """Refuse labels outside their example."""
+        for name, trains, times in zip(self.names, self.trains, map(to_ms, self.given), strict=True):
+            outside = times[(times < trains.start) | (times > trains.stop + SILENCE_MS)]
+            if len(outside):
+                at, start, stop = (ms - _begin_ms(trains) for ms in (outside[0], trains.start, trains.stop))
+                raise ProblemError(
+                    f"{name}: {self.label} at {at:.3f} ms is outside the trains, {start:.3f} to {stop:.3f} ms"
+                )
+
+    def _check_felt(self, trains: Sequence[SpikeTrains], targets: Sequence[NDArray[np.float64]]) -> None:
+        """Refuse an example with targets and without any spike up to them."""
+        for name, train, times in zip(self.names, trains, targets, strict=True):
+            if len(times) and not len(train.times):
+                where = name if len(trains) > 1 else "the recording"
+                events = counted(len(times), "event")
+                error = ProblemError(f"{self.label}: the sensor felt nothing in {where} up to the last of its {events}")
+                raise helped(error, "tare", "unfelt")
+
+
+def better_by_rule(labels: Sequence[str], pairs: Sequence[tuple[Score, Score]]) -> tuple[str, ...]:
+    """Return the labels that rules detect better than neurons, by scores of both on the same events, neurons first.
+
+    They have fewer missed and false, or as few and are known earlier at the median.
+    """
+
+    def worth(label: str, of: int) -> tuple[int, float]:
+        each = [pair[of].by_label[label] for pair in pairs if label in pair[of].by_label]
+        delays = np.concatenate([np.empty(0), *(one.delays_ms for one in each)])
+        return sum(one.rank[0] for one in each), float(np.median(delays)) if len(delays) else np.inf
+
+    return tuple(label for label in labels if worth(label, 1) < worth(label, 0))
+
+
+def distinct(patterns: Sequence[SpikeTrains]) -> list[SpikeTrains]:
+    """Return patterns in which, of trains with the same spikes in all of them, only the first has any.
+
+    Weights that equal trains share require all of these to spike at once, as levels do that every touch of the training
+    reached in one frame. The first of several levels is the lowest, which weaker touches reach as well.
+    """
+    spikes = [tuple(pattern[train].tobytes() for pattern in patterns) for train in range(len(patterns[0]))]
+    first = {key: train for train, key in reversed(list(enumerate(spikes)))}
+    kept = np.zeros(len(spikes), np.bool_)
+    kept[list(first.values())] = True
+
+    def alone(trains: SpikeTrains) -> SpikeTrains:
+        spikes = np.repeat(kept, trains.counts)
+        offsets = np.concatenate([[0], np.cumsum(np.where(kept, trains.counts, 0))])
+        return SpikeTrains(trains.times[spikes], offsets, trains.start, trains.stop, None, kind=trains.kind)
+
+    return [alone(pattern) for pattern in patterns]
+
+
+def _possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
+    """Return the recipe without the points to choose from that (checked) examples do not allow.
+
+    The local load requires a tare; channels have no neighbours, so that only encoders that need none remain, and their
+    noise alone must not load them.
+    """
+    if lacks_neighbours(examples) and isinstance(recipe.encoder, Composite):
+        near = {name for name, part in recipe.encoder.parts.items() if part._needs_neighbours}
+        recipe = recipe._without_parts(near)
+        assert isinstance(recipe.encoder, Composite)
+        parts = {
+            name: copy(part).set_params(noise_floor=floor_alone(examples, part.noise_floor, kinds=len(recipe.neurons)))
+            if isinstance(part, Moments)
+            else part
+            for name, part in recipe.encoder.parts.items()
+        }
+        recipe = replace(recipe, encoder=Composite(parts))
+    if isinstance(recipe.encoder, Composite) and any(example.tare is None for example in examples):
+        by_tare = {name for name, part in recipe.encoder.parts.items() if isinstance(part, LocalLoad)}
+        recipe = recipe._without_parts(by_tare)
+    return recipe
+
+
+def _readout_of(
+    learners: Mapping[str, ConeR | TrainedNeuron], delays_ms: Mapping[str, float], recipe: Recipe, array: Array | None
+) -> Readout:
+    """Return the readout of fitted learners with their delays, behind the encoder of the recipe that made them.
+
+    Of a composite encoder the readout has the parts that its neurons receive; where that is one, it is the encoder.
+    """
+    encoder, inputs = recipe.encoder, {label: recipe.inputs_of(label) for label in learners}
+    if isinstance(encoder, Composite):
+        used = {name for label in learners for name in recipe.inputs_of(label) or encoder.parts}
+        encoder = encoder.only(sorted(used))
+        inputs = inputs if isinstance(encoder, Composite) else {}
+    threshold = float(recipe.run_threshold)
+    return Readout(encoder, learners, array=array, delay_ms=delays_ms, run_threshold=threshold, inputs=inputs)
+
+
+def _differing(point: Mapping[str, Any], first: Mapping[str, Any]) -> tuple[str, str] | None:
+    """Return by what a point and the first one differ, as text; None where they do not."""
+    keys = [key for key in dict(point) | dict(first) if point.get(key) != first.get(key)]
+    if "inputs" in keys:  # the rest suits these
+        keys = ["inputs"]
+
+    def text(values: Mapping[str, Any]) -> str:
+        of_key = {key: values.get(key, "as of all") for key in keys}
+        return ", ".join(f"input {' and '.join(v)}" if key == "inputs" else f"{key} {v}" for key, v in of_key.items())
+
+    return (text(point), text(first)) if keys else None
+
+
+def _waits(label: str, count: int, early: _FittedPoint, later: _FittedPoint) -> str:
+    """Return the warning that a neuron waits for its inputs, as those of a learner come behind its targets."""
+    out_of_reach, more_ms = len(early.learner.unreachable_), later.delay_ms - early.delay_ms
+    return (
+        f"{label}: {out_of_reach} of {counted(count, 'label')} {'comes' if out_of_reach == 1 else 'come'} before the "
+        f"first input: the neuron waits for this input, and {label} is known {more_ms:.3g} ms later"
+    )
+
+
+def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, ...]:
+    """Return the labels that are learnt: the recipe's, or where it has none those of the examples."""
+    given = sorted({label for example in examples for label in example.labels})
+    labels = tuple(recipe.neurons) or tuple(given)
+    if not labels:
+        raise ProblemError("no label in any example: there is nothing to learn")
+    for label in set(given) - set(labels):
+        raise ProblemError(
+            f"label {shown(label)} has no neuron: the recipe has {', '.join(map(repr, labels))}; "
+            f"give it a section, {_setting(label)}, or leave it out of the labels"
+        )
+    return labels
+
+
+def _setting(label: str) -> str:
+    """Return how a parameter of a label's neuron is written in a recipe, and as an option."""
+    quote = "" if re.fullmatch(r"[\w-]+", label, re.ASCII) else '"'
+    return f"[neurons.{quote}{label}{quote}] in a recipe or --set {quote}neurons.{label}.tau=0.5{quote}"
+
+
+def _cut(trains: SpikeTrains, part: Part) -> SpikeTrains:
+    """Return the spike trains of an example in a part of it."""
+    start, stop = max(to_ms(part.start), trains.start), min(to_ms(part.stop), trains.stop)
+    return trains.between(start, max(start, stop))
+
+
+def _until(trains: Sequence[SpikeTrains], targets: Sequence[NDArray[np.float64]]) -> list[SpikeTrains]:
+    """Return trains with an end after the last target, which may come after the last spike."""
+    pairs = zip(trains, targets, strict=True)
+    return [each.lasting(max(each.stop, *times, each.start)) for each, times in pairs]
+
+
+def _check_apart(label: str, name: str, times: NDArray[np.int64], refractory_ms: float) -> None:
+    """Refuse labels, as they were felt, closer to each other than the neuron can fire."""
+    times = np.sort(times)
+    for k in np.flatnonzero(np.diff(times) <= to_us(refractory_ms))[:1]:
+        before, t = times[k : k + 2].tolist()
+        raise ProblemError(
+            f"{label}: {name} has a label at {t} us, {t - before} us after the previous label; labels must "
+            f"be more than {refractory_ms:g} ms apart, because the neuron fires once in that time: are the times "
+            "in us, and is each label listed once?"
+        )
+
+
+def _first_input_ms(sources: Sequence[SpikeTrains], felt: Sequence[NDArray[np.int64]], latency_ms: float) -> float:
+    """Return how long after its label the first input spike comes, ms, of nine in ten labels that have one."""
+    waits = []
+    for source, times in zip(sources, felt, strict=True):
+        spikes, labels = np.append(np.sort(source.times), np.inf), to_ms(times) + latency_ms
+        waits.append(spikes[np.searchsorted(spikes, labels - WINDOW_MS)] - labels)
+    wait = np.concatenate(waits)
+    wait = wait[wait <= _MOST_WAIT_MS]
+    return max(0.0, float(np.quantile(wait, _MOST_LABELS))) if len(wait) else 0.0
+
+
+def _begin_ms(trains: SpikeTrains) -> float:
+    """Return the time that text counts from, ms: the trains' first if they count from 1970, else 0."""
+    return to_ms(beginning_us(np.array([round(float(to_us(trains.start)))])))
+
+
+def _remarks(
+    cone: ConeR,
+    targets: Sequence[NDArray[np.float64]],
+    names: Sequence[str],
+    shift_ms: float,
+    begins_ms: Sequence[float],
+    found: int,
+    caught: Sequence[str],
+) -> Iterator[str]:
+    """Yield the warnings of a fit, which name events and examples; `found`: how many of the events it finds."""
+    missed, count = cone.unreachable_, sum(map(len, targets))
+    if missed:
+        at = [(targets[p][k] - shift_ms - begins_ms[p], f" of {names[p]}" * (len(targets) > 1)) for p, k in missed]
+        times_and_names = [f"{ms:.10g} ms{name}" for ms, name in at]
+        listed = ", ".join(times_and_names[:3]) + f" and {len(times_and_names) - 3} more" * (len(times_and_names) > 3)
+        why = f"{UNLEARNT} ({listed})"
+        if found > count - len(missed):
+            yield (
+                f"the inputs of {len(missed)} of {counted(count, 'label')} come too late to fire at the label "
+                f"({listed}); the neuron fires later, and finds {found} of {count}"
+            )
+        elif count < TWO_FOLDS:
+            there = f"there {are(count)} {counted(count, 'event')} to learn from"
+            yield f"{there}; {len(missed)} {why}"
+        else:
+            yield f"{len(missed)} of {count} events {why}" + "; the others were" * (len(missed) < count)
+    # The learner names unreachable targets, if any, first.
+    yield from caught[bool(missed) :]
