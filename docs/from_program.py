@@ -1,6 +1,7 @@
-"""Parts of the documentation that are made from the program: figures, options of commands, keys, public names.
+"""Parts of the documentation that are made from the program: figures, options of commands, keys, requests, names.
 
-A page asks for them by directives: ``.. studies::``, ``.. commands::``, ``.. keys::`` and ``.. names:: MODULE``.
+A page asks for them by directives: ``.. studies::``, ``.. commands::``, ``.. keys::``, ``.. requests::`` and
+``.. names:: MODULE``.
 """
 
 from __future__ import annotations
@@ -21,11 +22,13 @@ from sphinx.pycode import ModuleAnalyzer
 from taxel.cli._commands import OWN, plugins
 from taxel.cli._commands import command as imported
 from taxel.cli.app import about, own_commands, rows
+from taxel.panel.declared import described
+from taxel.panel.session import REQUESTS
 from taxel_studies import STUDIES
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURES = ROOT / "benchmarks" / "results" / "figures"
-KEYS = ROOT / "crates" / "taxel-panel" / "web" / "keys.js"
+KEYS = ROOT / "python" / "taxel" / "panel" / "web" / "keys.js"
 KEY = r'shown: "([^"]+)", text: "([^"]+)"'
 #: Characters; the values of longer constants are not shown.
 LONGEST_VALUE = 80
@@ -147,6 +150,22 @@ def keys() -> list[tuple[str, str]]:
     return re.findall(KEY, KEYS.read_text())
 
 
+class Requests(FromProgram):
+    """Every request of the page to its server: the keys with their types, and what it asks for."""
+
+    def lines(self) -> list[str]:
+        """Return a table, a row a request."""
+        rows = []
+        for name, request in REQUESTS.items():
+            keys = [
+                f"``{key}`` {described(kind)}{', may be left out' if key in request.optional else ''}"
+                for key, kind in request.kinds.items()
+            ]
+            about = " ".join((request.method.__doc__ or "").split())
+            rows.append([f"``{name}``", ". ".join(keys), re.sub("(?<!`)`(?!`)", "``", about)])
+        return table(["request", "keys", ""], rows, "12 38 50")
+
+
 def command(name: str, app: Any) -> list[str]:
     """Return a command's section, and those of its own commands; studies alike are shown once."""
     lines = [*heading(name), *paragraphs(about(app)), ""]
@@ -201,5 +220,6 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.add_directive("studies", Studies)
     app.add_directive("commands", Commands)
     app.add_directive("keys", Keys)
+    app.add_directive("requests", Requests)
     app.add_directive("names", Names)
     return {"parallel_read_safe": True}

@@ -419,16 +419,9 @@ USES: dict[str, Callable[[Any], Any]] = {
 LEFT_OUT = {
     *("BoardChange", "Clock", "Datagrams", "Detection", "Health", "Recording", "Zeroing", "Certificate", "Checked"),
     *("Margin", "Multipliers", "Row", "Summary", "Matching", "TakenRest", "Status", "Received"),
-    *("BoardCheck", "Difference", "Finding", "PatternCheck", "RestCheck", "Greeting", "Port", "Training.command"),
+    *("BoardCheck", "Finding", "Greeting", "Port", "Training.command"),
     "check_board",
     "Workers.run",
     *("Device.apply", "Device.record", "Live.source_address", "Live.zero", "Live.record", "Live.sample", "Live.note"),
-    *(
-        "Live.expect_version",
-        "Recording.at_rate",
-        "Panel.listen",
-        "Panel.read_source",
-        "Panel.delta_intensity",
-        "Panel.read_out",
-    ),
+    *("Live.expect_version", "Recording.at_rate"),
 }

@@ -94,7 +94,7 @@ def test_the_source_package_holds_what_a_build_needs_and_no_more() -> None:
                 "crates/taxel-core/src",
                 "crates/taxel-live/src",
                 "crates/taxel-panel/src",
-                "crates/taxel-panel/web",
+                "python/taxel/panel/web",
                 "python/taxel/",
             )
         )

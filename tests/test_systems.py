@@ -26,7 +26,7 @@ from taxel._base.files import create, write_whole
 from taxel._base.stopping import asked_to_end
 from taxel._base.windows_names import name_fault
 from taxel.live import Live
-from taxel.live._label_file import LabelFile
+from taxel.panel.label_file import LabelFile
 
 on_windows = pytest.mark.skipif(sys.platform != "win32", reason="a matter of Windows alone")
 

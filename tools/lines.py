@@ -25,7 +25,7 @@ PRODUCT = {
     "taxel-core": (21_000, "crates/taxel-core/src"),
     "taxel-live": (7_500, "crates/taxel-live/src"),
     "taxel-panel": (2_000, "crates/taxel-panel/src"),
-    "page": (3_600, "crates/taxel-panel/web"),
+    "page": (3_600, "python/taxel/panel/web"),
     "border": (3_400, "crates/taxel-python/src crates/taxel-border/src"),
     "nouns": (1_600, "__init__ array event_table events frames spikes tare calibration clock plot"),
     "labels, wire, neuron": (1_100, "labels detections recorded reading verdict wire neuron"),

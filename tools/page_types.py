@@ -44,7 +44,7 @@ def main() -> int:
             return 0
         installed.touch()
     return subprocess.run(
-        [node, str(TSC), "-p", str(ROOT / "crates/taxel-panel/tsconfig.json")], check=False
+        [node, str(TSC), "-p", str(ROOT / "python/taxel/panel/web/tsconfig.json")], check=False
     ).returncode
 
 

@@ -463,7 +463,7 @@ MADE = {
     "crates/taxel-core/src/wire/registers/presets.rs": rust_presets,
     "crates/taxel-core/src/wire/registers/rules.rs": rust_checks,
     "crates/taxel-core/src/wire/registers/power_law.rs": rust_power_law,
-    "crates/taxel-panel/web/registers.js": javascript,
+    "python/taxel/panel/web/registers.js": javascript,
     "crates/taxel-live/src/recording/schemas/Registers.json": schema,
     "docs/registers.md": docs,
 }

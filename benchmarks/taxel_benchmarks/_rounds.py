@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from importlib import metadata
@@ -85,9 +86,11 @@ def compared(
 
 def thread_seconds() -> dict[str, float]:
     """Return the CPU time of each named thread of this process so far, s."""
+    # The system does not know the names that Python gives its threads.
+    names = {thread.native_id: thread.name for thread in threading.enumerate()}
     seconds: dict[str, float] = {}
     for task in Path("/proc/self/task").iterdir():
-        name = (task / "comm").read_text().strip()
+        name = names.get(int(task.name)) or (task / "comm").read_text().strip()
         seconds[name] = seconds.get(name, 0.0) + int((task / "schedstat").read_text().split()[0]) / 1e9
     return seconds
 

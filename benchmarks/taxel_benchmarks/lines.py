@@ -26,7 +26,8 @@ import numpy as np
 import taxel
 from taxel import Array, Neuron, ProblemError, Readout
 from taxel.encode import LevelCrossing
-from taxel.live import Live, Panel
+from taxel.live import Live
+from taxel.panel import Panel
 from taxel_benchmarks._goals import Goal
 from taxel_benchmarks._peer import missing
 from taxel_benchmarks._rounds import stamp

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         learn,
         live,
         metrics,
+        panel,
         plot,
         simulate,
         tasks,
@@ -84,6 +85,7 @@ __all__ = [
     "metrics",
     "open",
     "open_all",
+    "panel",
     "plot",
     "simulate",
     "tasks",
@@ -94,7 +96,7 @@ __all__ = [
 
 #: The module of each name that is imported at its first access, so that ``import taxel`` is quick.
 _ROOMS = (
-    "board_check", "detect", "device", "encode", "formats", "information", "learn", "live", "metrics", "plot",
+    "board_check", "detect", "device", "encode", "formats", "information", "learn", "live", "metrics", "panel", "plot",
     "reading", "recording", "report", "simulate", "tasks", "wire",
 )  # fmt: skip
 _RECORDING = (

@@ -145,13 +145,13 @@ def test_a_request_that_takes_long_does_not_abort_a_server_that_ends(tmp_path: P
     (tmp_path / "a.csv").write_text("t_us,a,b\n" + "".join(f"{1000 * k},1,2\n" for k in range(100)))
     script.write_text(
         "import sys, time\n"
-        "from taxel.live._requests.files import FileRequests\n"
+        "from taxel.panel.shown_files import ShownFiles\n"
         "def reads(self, *_, **__):\n"
         "    open('reads', 'w')\n"
         "    until = time.monotonic() + 8\n"
         "    while time.monotonic() < until:\n"
         "        time.sleep(0.0001)\n"
-        "FileRequests.read = reads\n"
+        "ShownFiles.read = reads\n"
         "sys.argv = ['taxel', 'view', 'a.csv', '--no-open', '--json']\n"
         "from taxel.cli import program\n"
         "program()\n"

@@ -18,7 +18,7 @@ from taxel import Array, Events, Frames, Readout, Tare
 from taxel.detect import Example, PlainRule, Recipe, fit, judge, load, run, tune
 from taxel.encode import LevelCrossing
 from taxel.live import Live
-from taxel.live._shown_files import Opening, ShownFiles
+from taxel.panel.shown_files import Opening, ShownFiles
 
 #: As recordings name units; ticks are those of a board's events.
 UNITS = st.sampled_from(["ticks", "counts", "as sent", "N", "mN", "kPa", "Pa", "N/cm2"])
@@ -97,7 +97,7 @@ def test_recordings_in_different_units_are_not_trained_on_together(does) -> None
 
 
 def test_the_commands_and_the_page_name_both_units(tmp_path: Path, capsys) -> None:
-    from taxel.live._requests.training import TrainingRequests
+    from taxel.panel.training import Training
 
     for unit in ("kPa", "counts"):
         taxel.convert(pressed(unit), tmp_path / f"{unit}.npz")
@@ -110,7 +110,7 @@ def test_the_commands_and_the_page_name_both_units(tmp_path: Path, capsys) -> No
     code, out, error = call(capsys, "detect", tmp_path / "counts.npz", "--readout", readout, "--tare", "0.3")
     said = "values are in counts, but the readout was trained on kPa: give values in kPa, as a calibration gives"
     assert (code, out, error.count("\n"), said in error) == (2, "", 1, True), error
-    handler = TrainingRequests(Opening(), ShownFiles())
+    handler = Training(Opening(), ShownFiles())
     with refused():
         handler.detect(tmp_path / "counts.npz", None, readout)
     labels, _, found = handler.detect(tmp_path / "kPa.npz", None, readout)

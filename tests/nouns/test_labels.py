@@ -15,8 +15,7 @@ import taxel
 from taxel import _core
 from taxel._base.errors import Place
 from taxel.labels import TURN_US
-from taxel.live._requests.labels import LabelRequests
-from taxel.live._shown_files import Opening
+from taxel.panel.label_file import LabelFile
 from taxel.recording.beside import is_label_table
 
 ARRAY = {"rows": 64, "columns": 64, "pitch_mm": 2.67, "name": "thesis 64x64"}
@@ -193,25 +192,25 @@ def test_columns_that_taxel_does_not_know_stay_with_their_labels_on_the_page(row
         with place.open("w", newline="") as file:
             table = csv.writer(file)
             table.writerows([("label", "t_us", "source", "recording", "comment", "sure"), *rows])
-        handler = LabelRequests(Opening())
-        assert len(handler.read(place, "walk.mcap", 1, 0).rows) == len(rows)
+        handler = LabelFile(place, frozenset({"", "walk.mcap", "walk"}))
+        assert len(handler.read()) == len(rows)
         at = random.randrange(len(rows))
         left = [row if row[3] != "walk" else (*row[:3], "", *row[4:]) for row in rows]
         label, t, source, trial, *said = left[at]
         changed = {"rename": ("ball", t), "move": (label, 77)}.get(change, (label, t))
-        old = {"text": label, "t": t, "source": source, "recording": trial}
-        edit = (old, old | dict(zip(("text", "t"), changed, strict=True)))
+        old = taxel.Note(label, t, 0, trial, source)
+        edit = (old, taxel.Note(*changed, 0, trial, source))
         if change == "mark":
-            edit = (None, {"text": "ball", "t": 5})
+            edit = (None, taxel.Note("ball", 5))
             left.append(("ball", 5, "", "", "", ""))
         elif change == "delete":
             edit = (old, None)
             del left[at]
         else:
             left[at] = (*changed, source, trial, *said)
-        outcomes, written = handler.change(place, "walk.mcap", 1, 0, [] if change == "none" else [[edit]])
+        outcomes, written = handler.change([] if change == "none" else [[edit]])
         assert not any(isinstance(outcome, str) for outcome in outcomes)
-        assert sorted((row.text, row.t, row.source, row.recording) for row in written.rows) == sorted(
+        assert sorted((row.text, row.t, row.source, row.recording) for row in written) == sorted(
             row[:4] for row in left
         )
         again = taxel.Labels(place).rows

@@ -3,7 +3,8 @@
 import pytest
 from tests.panel.browser import started_chromium
 
-from taxel.live import Live, Panel
+from taxel.live import Live
+from taxel.panel import Panel
 
 __all__ = ["started_chromium"]
 

@@ -16,7 +16,7 @@ from loopback import free_port
 from tests.panel.browser import PATIENCE, running
 
 import taxel
-from taxel.live import Panel
+from taxel.panel import Panel
 
 #: Pixels of a map, as a text that changes when the picture does.
 PIXELS = "name => document.getElementById(name).toDataURL()"

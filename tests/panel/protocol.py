@@ -1,4 +1,4 @@
-"""A client of the panel's server, by crates/taxel-panel/protocol.md alone, and what the tests of the server share."""
+"""A client of the panel's server, by docs/panel-protocol.md alone, and what the tests of the server share."""
 
 from __future__ import annotations
 
@@ -79,6 +79,24 @@ class Client:
             answer = self.next()
             if not isinstance(answer, bytes) and answer["type"] in ("done", "refused") and answer["id"] == self.ids:
                 return answer
+
+    def labels(self):
+        """The rows of the last message of labels."""
+        return next(message["labels"] for message in reversed(self.said) if message["type"] == "labels")
+
+    def mark(self, label, t_us, **more):
+        return self.ask("change", changes=[{"new": row(label, t_us, **more)}])
+
+    def alter(self, old, **by):
+        return self.ask("change", changes=[{"old": old, "new": {**old, **by}}])
+
+    def remove(self, old):
+        return self.ask("change", changes=[{"old": old}])
+
+
+def row(label, t_us, source="", trial="", replaces_us=None):
+    """A label as the page has it."""
+    return {"label": label, "t_us": t_us, "source": source, "trial": trial, "replaces_us": replaces_us}
 
 
 def head(frame):

@@ -57,7 +57,7 @@ def test_whoever_is_killed_what_was_recorded_is_there(dies: str, turn: int, tmp_
         page.send(type="credit", n=2)
         while not page.until("counters")["events"]:
             pass
-        assert page.ask("record", name="walk", index=turn)["type"] == "done"
+        assert page.ask("record", name=f"walk{turn}")["type"] == "done"
         page.since_asked("recorder", state="recording")
         last = while_it_runs(page, random.uniform(1.0, 3.0))
         file = tmp_path / f"walk{turn}.mcap"

@@ -13,8 +13,7 @@ from panel.protocol import Client, head, parts_of, section
 
 import taxel
 from taxel import Array, Frames, Places
-from taxel.live import Panel
-from taxel.live import _shown_files as shown_files
+from taxel.panel import Panel, shown_files
 from taxel.reading import Facts, InMemory
 from taxel.recording.analysis.pressure import above_rest, force_n
 from taxel.recording.analysis.rest import ticks_by_unit
@@ -96,8 +95,8 @@ def test_both_feet_stand_side_by_side(tmp_path):
         assert np.isnan(values[0, columns])
         assert np.allclose(values[0, columns + 1 :], right.values[30, 0], atol=about["frames"]["step"])
         # A label with a source is of that foot, one without of both.
-        assert page.ask("mark", label="heel", t_us=50_000, source="left")["type"] == "done"
-        assert page.ask("mark", label="turn", t_us=90_000)["type"] == "done"
+        assert page.mark("heel", 50_000, source="left")["type"] == "done"
+        assert page.mark("turn", 90_000)["type"] == "done"
         assert page.ask("cut", start_us=0, stop_us=100_000, name="cut.mcap")["type"] == "done"
     assert (tmp_path / "walk.notes.csv").read_text() == "label,t_us,source\nheel,50000,left\nturn,90000,\n"
     again = taxel.open(file).sources.values()
@@ -109,6 +108,7 @@ def test_both_feet_stand_side_by_side(tmp_path):
 def spikes_up_to(page, t_us):
     """The spikes of a view that moves to a time: times (ms), trains, values."""
     assert page.ask("seek", t_us=t_us)["type"] == "done"
+    page.send(type="credit", n=1)
     told = page.until("spikes")
     assert told["left_out"] == 0
     return list(zip(told["t_ms"], told["train"], told["value"], strict=True))
@@ -188,6 +188,7 @@ def test_an_encoder_that_does_not_fit_frames_is_refused_with_the_reason(tmp_path
         # A value is missing from the 41st frame on.
         assert page.ask("encode", encoder={"name": "change_events"})["type"] == "done"
         assert page.ask("seek", t_us=450_000)["type"] == "done"
+        page.send(type="credit", n=1)
         assert "values must be finite" in page.until("warning")["text"]
         opened(page, "grasp.npz")
         said = page.ask("encode", encoder={"name": "change_events"})
@@ -204,7 +205,7 @@ def test_frames_without_times_are_numbered(tmp_path):
         assert (about["start_us"], about["stop_us"]) == (0, 3 * us)
         values, _ = values_at(page, about, 2 * us)
         assert np.array_equal(values[0], [6, 7, 8])
-        assert page.ask("mark", label="slip", t_us=2 * us + 5)["type"] == "done"
+        assert page.mark("slip", 2 * us + 5)["type"] == "done"
         assert page.since_asked("labels")["labels"][0]["t_us"] == 2 * us
         assert page.ask("cut", start_us=us, stop_us=3 * us, name="part.npz")["type"] == "done"
     assert (tmp_path / "grasp.notes.csv").read_text() == "label,t_us\nslip,2\n"
@@ -224,7 +225,7 @@ def test_a_file_of_several_trials_shows_each(tmp_path):
         values, _ = values_at(page, about, 0)
         assert np.array_equal(values, np.full((5, 12), 55))
         assert page.ask("open", name=file.name, trial="ball/9")["type"] == "refused"
-        assert page.ask("mark", label="slip", t_us=0)["type"] == "done"
+        assert page.mark("slip", 0)["type"] == "done"
     assert (tmp_path / "ball.csv.notes.csv").read_text() == "label,t_us,recording\nslip,0,ball/2\n"
     assert [[note.text for note in one.notes] for one in taxel.open_all(file)] == [[], ["slip"]]
 
@@ -236,7 +237,7 @@ def test_events_of_a_table_are_shown_as_those_of_a_board(tmp_path):
         about = opened(page, "events.npz")
         assert about["frames"] is None
         assert about["events"] == 2
-        temporary = panel._requests._files._folder.name
+        temporary = panel._hub.folder.files._folder.name
     assert not Path(temporary).exists()
 
 

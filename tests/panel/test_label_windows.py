@@ -16,12 +16,12 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from panel.protocol import Client
+from panel.protocol import Client, row
 from tests.panel.browser import running
 from websockets.exceptions import WebSocketException
 
 import taxel
-from taxel.live import Panel
+from taxel.panel import Panel
 from taxel.tasks.labels import references
 
 
@@ -47,12 +47,8 @@ def server(recording: Path):
         yield process.process, SimpleNamespace(address=(url.hostname, url.port), token=said["token"])
 
 
-def labels_of(page: Client) -> list[dict]:
-    return next(message["labels"] for message in reversed(page.said) if message["type"] == "labels")
-
-
 def told(page: Client) -> list[tuple[str, int]]:
-    return [(row["label"], row["t_us"]) for row in labels_of(page)]
+    return [(row["label"], row["t_us"]) for row in page.labels()]
 
 
 def opened(page: Client, name: str = "walk.mcap") -> list[tuple[str, int]]:
@@ -91,16 +87,16 @@ class Window(threading.Thread):
             raise
 
     def change(self, page):
-        rows = [row for row in labels_of(page) if row["label"].startswith(f"w{self.number} ")]
+        rows = [row for row in page.labels() if row["label"].startswith(f"w{self.number} ")]
         fresh = {"label": f"w{self.number} {self.choose.choice('abc')}", "t_us": next(self.times)}
         kind = self.choose.choice(["mark", "mark", "rename", "move", "delete"]) if rows else "mark"
-        row = self.choose.choice(rows) if rows else {}
+        old = self.choose.choice(rows) if rows else {}
         keys = {"mark": ("label", "t_us"), "rename": ("label",), "move": ("t_us",)}.get(kind, ())
         changed = {key: fresh[key] for key in keys}
-        one = {} if kind == "mark" else {"label_id": row["label_id"]}
-        if page.ask(kind, **one, **changed)["type"] == "done":
-            new = {**row, **changed}
-            gone = Counter([(row["label"], row["t_us"])] if kind != "mark" else [])
+        new = {**row("", 0), **old, **changed} if kind != "mark" else {**row("", 0), **changed}
+        edit = {"mark": {"new": new}, "delete": {"old": old}}.get(kind, {"old": old, "new": new})
+        if page.ask("change", changes=[edit])["type"] == "done":
+            gone = Counter([(old["label"], old["t_us"])] if kind != "mark" else [])
             there = Counter([(new["label"], new["t_us"])] if kind != "delete" else [])
             self.held = self.held - gone + there
             while there - Counter(told(page)) or (gone - there) & Counter(told(page)):
@@ -130,18 +126,18 @@ def test_a_page_shows_what_another_window_and_a_hand_write_and_refuses_to_change
         opened(here)
         opened(there)
 
-        assert here.ask("mark", label="heel", t_us=5)["type"] == "done"
+        assert here.mark("heel", 5)["type"] == "done"
         shown_by(there, [("heel", 5)])
         older = table.read_text()
-        assert there.ask("mark", label="toe", t_us=7)["type"] == "done"
+        assert there.mark("toe", 7)["type"] == "done"
         shown_by(here, [("heel", 5), ("toe", 7)])
         # A program that saves an older table wins.
         editor = table.with_name("editor")
         editor.write_text(older + "hand,9\n")
-        gone = labels_of(here)[1]["label_id"]
+        gone = here.labels()[1]
         os.replace(editor, table)
-        for change in ({"kind": "move", "t_us": 6}, {"kind": "rename", "label": "ball"}, {"kind": "delete"}):
-            assert here.ask(label_id=gone, **change)["type"] == "refused"
+        for change in ({"new": {**gone, "t_us": 6}}, {"new": {**gone, "label": "ball"}}, {}):
+            assert here.ask("change", changes=[{"old": gone, **change}])["type"] == "refused"
         for page in (here, there):
             shown_by(page, [("heel", 5), ("hand", 9)])
         assert here.ask("undo")["type"] == "done"
@@ -149,7 +145,7 @@ def test_a_page_shows_what_another_window_and_a_hand_write_and_refuses_to_change
         assert held(table) == {("hand", 9): 1}
         table.write_text("label,t_us\nheel,soon\n")
         assert here.until("warning")
-        assert here.ask("mark", label="toe", t_us=7)["type"] == "refused"
+        assert here.mark("toe", 7)["type"] == "refused"
         assert table.read_text() == "label,t_us\nheel,soon\n"
         table.unlink()
         shown_by(here, [])
@@ -165,13 +161,13 @@ def test_a_page_shows_what_another_window_and_a_hand_write_and_refuses_to_change
 def test_a_killed_server_has_lost_nothing_that_it_acknowledged(walk, table):
     done = Counter()
     with server(walk) as (process, where):
-        killer = threading.Timer(random.uniform(0.2, 1.0), process.send_signal, (signal.SIGKILL,))
+        killer = threading.Timer(random.uniform(1.0, 2.0), process.send_signal, (signal.SIGKILL,))
         try:
             with Client(where) as page:
                 opened(page)
                 killer.start()
                 for t in range(10**6):
-                    page.ask("mark", label="heel", t_us=t)
+                    page.mark("heel", t)
                     done["heel", t] += 1
         except (OSError, WebSocketException):
             killer.join()
@@ -181,33 +177,34 @@ def test_a_killed_server_has_lost_nothing_that_it_acknowledged(walk, table):
         assert Counter(opened(page)) == held(table)
 
 
-def test_several_marks_are_one_request_that_is_done_or_not(walk, table):
+def test_several_changes_are_one_request_that_is_done_or_not(walk, table):
     with Panel(walk) as panel, Client(panel) as page:
         opened(page)
-        times = [10, 20, 30]
-        group = {"label": "heel", "source": "left", "t_us": times, "replaces_us": times}
+        group = [{"new": row("heel", t, source="left", replaces_us=t)} for t in (10, 20, 30)]
         for wrong, field in (
-            ([], "labels"),
-            ([group, 3], "labels"),
-            ([{**group, "t_us": 5}], "t_us"),
-            ([group, {**group, "t_us": [10**12, 1, 2]}], "t_us"),
-            ([group, {**group, "replaces_us": [1]}], "replaces_us"),
-            ([group, {**group, "label": ""}], "label"),
-            ([{"label": "heel", "t_us": list(range(5001))}], "labels"),
+            ([], "changes"),
+            ([*group, 3], "changes"),
+            ([{"new": {**row("heel", 5), "t_us": "soon"}}], "t_us"),
+            ([*group, {"new": row("heel", 10**12)}], "t_us"),
+            ([*group, {"new": row("", 5)}], "label"),
+            ([*group, {"new": {"label": "toe"}}], "t_us"),
+            ([{"old": row("toe", 7), "now": row("toe", 8)}], "now"),
+            ([{"new": row("heel", t)} for t in range(5001)], "changes"),
         ):
-            assert page.ask("marks", labels=wrong)["field"] == field, wrong
+            assert page.ask("change", changes=wrong)["field"] == field, wrong
+        assert page.ask("change", changes=[*group, {"old": row("toe", 7)}])["type"] == "refused"
         assert not table.exists()
-        assert page.ask("marks", labels=[group, {"label": "toe", "t_us": [15]}])["type"] == "done"
+        assert page.ask("change", changes=[*group, {"new": row("toe", 15)}])["type"] == "done"
         assert table.read_text() == (
             "label,t_us,source,replaces_us\nheel,10,left,10\ntoe,15,,\nheel,20,left,20\nheel,30,left,30\n"
         )
-        # Long names make a request of more than 1 MB; a client that asks again and again is answered each time.
-        each = [{"label": f"{t:0200}", "t_us": [t]} for t in range(5000)]
-        assert page.ask("marks", labels=each)["type"] == "done"
-        for k in range(300):
-            page.send(type="mark", id=1000 + k, label="ball", t_us=k)
-        assert {page.until("done")["id"] for _ in range(300)} == set(range(1000, 1300))
-        assert held(table).total() == 5304
+        assert page.ask("change", changes=[{"new": row(f"{t}", t)} for t in range(5000)])["type"] == "done"
+        for k in range(20):
+            page.send(type="change", id=1000 + k, changes=[{"new": row("ball", k)}])
+        assert {page.until("done")["id"] for _ in range(20)} == set(range(1000, 1020))
+        assert held(table).total() == 5024
+        assert page.ask("undo")["type"] == "done"
+        assert held(table).total() == 5023
 
 
 def test_a_mark_in_a_table_that_counts_from_the_beginning_leaves_all_labels_to_train_on(tmp_path):
@@ -219,7 +216,7 @@ def test_a_mark_in_a_table_that_counts_from_the_beginning_leaves_all_labels_to_t
     table.write_text("label,t_us\n" + "".join(f"heel,{10_000 * k}\n" for k in range(20, 72)))
     with Panel(tmp_path / "walk.npz") as panel, Client(panel) as page:
         assert opened(page, "walk.npz") == [("heel", begin + 10_000 * k) for k in range(20, 72)]
-        assert page.ask("mark", label="heel", t_us=begin + 900_000)["type"] == "done"
+        assert page.mark("heel", begin + 900_000)["type"] == "done"
     assert held(table)["heel", 900_000] == 1
     for source in ("notes", table):
         (found,) = references(source, [taxel.open(tmp_path / "walk.npz")])
@@ -237,7 +234,7 @@ def test_a_link_leads_nowhere_else_for_the_page_than_for_training(walk, tmp_path
     (folder / "walk.notes.csv").symlink_to(store / "labels.csv")
     with Panel(folder / "walk.mcap") as panel, Client(panel) as page:
         assert opened(page) == [("heel", 5)]
-        assert page.ask("mark", label="toe", t_us=7)["type"] == "done"
+        assert page.mark("toe", 7)["type"] == "done"
     assert (folder / "walk.notes.csv").is_symlink()
     (found,) = references("notes", [taxel.open(folder / "walk.mcap")])
     assert {label: t.tolist() for label, t in found.items()} == {"heel": [5], "toe": [7]}

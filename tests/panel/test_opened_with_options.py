@@ -19,7 +19,7 @@ from shell import call
 
 import taxel
 from taxel import Array, Calibration, Frames
-from taxel.live import Panel
+from taxel.panel import Panel
 from taxel.recording.opening import recordings_in
 from taxel.recording.text_options import TextOptions
 
@@ -55,7 +55,7 @@ def test_a_bag_is_walked_to_the_page_by_the_options_of_its_topic(name, tmp_path)
         assert (about["start_us"], about["stop_us"]) == (t, t + 390_000)
         shown, _ = values_at(page, about, t + 300_000)
         assert np.array_equal(shown, values[30])
-        assert page.ask("mark", label="touch", t_us=t + 200_000)["type"] == "done"
+        assert page.mark("touch", t + 200_000)["type"] == "done"
     assert [note.t for note in taxel.open(bag, topic="/palm").notes] == [t + 200_000]
 
 
@@ -109,7 +109,7 @@ def test_labels_of_a_folder_are_of_the_bag_that_they_name(capsys, tmp_path):
         for name, every in times.items():
             assert [note["t_us"] for note in opened(page, name)["notes"]] == every
         # One that is moved stands for that of the table.
-        assert page.ask("mark", label="contact", t_us=times["b.bag"][0] + 10_000, replaces_us=times["b.bag"][0])
+        assert page.mark("contact", times["b.bag"][0] + 10_000, replaces_us=times["b.bag"][0])
         answer = page.ask("train")
         assert answer["type"] == "done", answer
         assert "contact, neuron: 5 of 5 found" in page.since_asked("trained")["text"]
@@ -208,7 +208,7 @@ def test_labels_of_a_trial_are_its_own_and_training_takes_the_labelled_trials(ca
         for trial in ("ball/1", "ball/3"):
             opened(page, file.name, trial=trial)
             for begin in range(70, 170, 20):
-                assert page.ask("mark", label="touch", t_us=begin * 10_000)["type"] == "done"
+                assert page.mark("touch", begin * 10_000)["type"] == "done"
         opened(page, file.name, trial="ball/3")
         labels = page.since_asked("labels")["labels"]
         assert [label["trial"] for label in labels].count("ball/1") == 5

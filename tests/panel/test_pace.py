@@ -13,7 +13,7 @@ from tests.panel.protocol import Client, say, word
 from tests.recording.test_clock_doubt import CAUSE, recorded
 
 import taxel
-from taxel.live import Panel
+from taxel.panel import Panel
 
 pytestmark = pytest.mark.timeout(600)
 

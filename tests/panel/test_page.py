@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import http.client
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
+import pytest
 from panel.protocol import SOON
 
-from taxel.live import Panel
+from taxel.panel import Panel
+from taxel.panel.session import REQUESTS
 
 ROOT = Path(__file__).resolve().parents[2]
-WEB = ROOT / "crates/taxel-panel/web"
+WEB = ROOT / "python/taxel/panel/web"
 PAGE = (ROOT / "docs/panel.md").read_text()
 SERVED = sorted(
     str(file.relative_to(WEB))
     for file in WEB.rglob("*")
-    if file.is_file() and not file.name.endswith((".d.ts", "README.md"))
+    if file.is_file() and not file.name.endswith((".d.ts", "README.md", "tsconfig.json"))
 )
 
 
@@ -65,3 +70,25 @@ def test_the_documentation_lists_every_key() -> None:
     [pattern] = re.findall(r"^KEY = r'(.*)'$", (ROOT / "docs/from_program.py").read_text(), re.MULTILINE)
     assert len(re.findall(pattern, source)) == source.count('action: "')
     assert ".. keys::" in PAGE.split("## Keys")[1]
+
+
+def test_what_the_page_computes_without_a_browser() -> None:
+    node = shutil.which("node") or shutil.which("node", path=str(Path(sys.executable).parent))
+    if node is None:
+        pytest.skip("no node")
+    command = [node, "--test", Path(__file__).with_name("page.test.mjs")]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+
+
+def test_the_page_knows_each_request_by_the_keys_that_its_method_declares() -> None:
+    """The types of the page are written by hand."""
+    text = (WEB / "messages.d.ts").read_text()
+    known = {}
+    for body in re.findall(r"export interface \w+Request \{(.*?)^\}", text, re.MULTILINE | re.DOTALL):
+        (kind,) = re.findall(r'^  type: "(\w+)";', body, re.MULTILINE)
+        keys = re.findall(r"^  (\w+)(\??):", body, re.MULTILINE)
+        known[kind] = {key: bool(may_lack) for key, may_lack in keys if key not in ("type", "id")}
+    assert known == {
+        name: {key: key in request.optional for key in request.kinds} for name, request in REQUESTS.items()
+    }

@@ -33,47 +33,11 @@ from tests.panel.pages import (
 from tests.panel.protocol import word
 
 import taxel
-import taxel.device
 from taxel.detect import Example, fit
 
 __all__ = ["live", "page", "recording", "replay"]
 
 pytestmark = pytest.mark.timeout(600)
-
-
-def test_a_board_is_chosen_connected_and_remembered(chromium: Any, tmp_path: Path) -> None:
-    port = str(free_port())
-    with (
-        running("emulate", "--port", port, "--control", "0", folder=tmp_path) as board,
-        running("live", "--panel", "--port", port, "--host", "127.0.0.1", folder=tmp_path) as server,
-        opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
-    ):
-        control = board.wait_for(r"commands are accepted at (\S+)")
-        shows(page, "where-info", "no control line")
-        assert not page.get_by_label("Noise floor", exact=True).is_enabled()
-        # The machine's ports and addresses stand in the lists.
-        until(lambda: page.locator("#udp-choice option[value^='127.0.0.1:']").count() == 1, "loopback is offered")
-        listed = page.locator("#control-choice optgroup[label='Serial ports'] option").evaluate_all(
-            "all => all.map(e => e.value)"
-        )
-        assert listed == [port.place for port in taxel.device.ports()]
-        page.locator("#control").fill("127.0.0.1:1")
-        page.locator("#control-form").get_by_role("button", name="Connect", exact=True).click()
-        shows(page, "control-why", "refused")
-        page.locator("#control").fill(control)
-        page.locator("#control-form").get_by_role("button", name="Connect", exact=True).click()
-        shows(page, "where-info", re.escape(control))
-        until(lambda: page.get_by_label("Noise floor", exact=True).is_enabled(), "registers can be written")
-        shows(page, "board-lines", "REG")
-        page.locator("#control-drop").click()
-        shows(page, "where-info", "no control line")
-        page.locator("#control-choice").select_option(control)
-        assert page.locator("#control").input_value() == control
-        page.locator("#delta-intensity").check()
-        until(
-            lambda: page.locator("#delta-intensity").is_checked() and page.locator("#notice").is_hidden(),
-            "it is taken",
-        )
 
 
 def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, tmp_path: Path) -> None:
@@ -104,7 +68,7 @@ def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, 
         shows(page, "detection-count", f"^{len(printed())}$")
         # The page lists the detections of the terminal, the latest first, with the time and the latency of each.
         rows = page.locator("#detection-list li").all_inner_texts()
-        assert all(re.search(r"\d+\.\d{3} s\s+-?\d[\d.]* (µs|ms|s)$", row) for row in rows), rows
+        assert all(re.search(r"\d+\.\d{3} s\s+(at once|-?\d[\d.]* (µs|ms|s))$", row) for row in rows), rows
         names = [re.match(r"\w+", row.strip()).group() for row in rows]  # type: ignore[union-attr]
         at = np.array([float(re.findall(r"([\d.]+) s", row)[0]) for row in rows])
         assert names[::-1] == [name for _, name in printed()]
@@ -165,7 +129,7 @@ def story(page: Any, folder: Path, name: str, floor_ticks: int) -> None:
     shows(page, "registers-why", "^$")
     until(lambda: floor.input_value() == str(floor_ticks), "the board holds the floor")
     until(lambda: page.evaluate(PIXELS, "pressure-map") != before, "the map moves")
-    record_form(page, name=name, index="7", label="heel", length="", countdown="0")
+    record_form(page, name=name, index="7", label="heel", length="")
     press(page, "r")
     shows(page, "state-word", rf"Recording {name}7\.mcap")
     page.locator("#label-name").evaluate(
@@ -201,16 +165,14 @@ def test_a_register_a_recording_and_a_label_reach_board_and_file(page: Any, live
     story(page, live.folder, "walk", 5)
 
 
-def test_recordings_count_down_go_on_by_themselves_and_overwrite_nothing(page: Any, live: SimpleNamespace) -> None:
-    record_form(page, name="auto", index="1", countdown="1", length="1", advance=True)
+def test_recordings_are_numbered_end_by_themselves_and_overwrite_nothing(page: Any, live: SimpleNamespace) -> None:
+    record_form(page, name="auto", index="1", length="1")
     press(page, "r")
-    shows(page, "record-word", "^Cancel$")
     shows(page, "record-word", "^Stop$")
-    until((live.folder / "auto2.mcap").exists, "the second begins by itself")
-    press(page, "r")
-    shows(page, "record-word", "^Record$")
+    shows(page, "record-last-file", r"^auto1\.mcap$")
+    shows(page, "record-file", r"^auto2\.mcap$")
     before = (live.folder / "auto1.mcap").read_bytes()
-    record_form(page, name="auto", index="1", countdown="0", length="1", advance=False)
+    record_form(page, name="auto", index="1", length="1")
     press(page, "r")
     shows(page, "record-reason", r"auto1\.mcap.*exists")
     for name in ("../away", ".hidden", ""):
@@ -220,7 +182,7 @@ def test_recordings_count_down_go_on_by_themselves_and_overwrite_nothing(page: A
     assert (live.folder / "auto1.mcap").read_bytes() == before
     record_form(page, name="auto", index="one")
     press(page, "r")
-    shows(page, "record-reason", "index: one is not a number")
+    shows(page, "record-reason", "number: one is not a number")
 
 
 def test_looking_back_while_live_holds_the_view_and_not_the_board(page: Any) -> None:

@@ -176,17 +176,14 @@ def test_a_click_anywhere_in_the_row_makes_a_label_and_a_handle_moves_it(replay:
     shows(replay, "label-count", "^6 label")
 
 
-def test_a_stretch_is_cut_out_and_the_picture_saved(replay: Any, recording: Path, tmp_path: Path) -> None:
+def test_a_stretch_is_cut_out(replay: Any, recording: Path) -> None:
     press(replay, "Home", "4", "[")
     press(replay, "Shift+ArrowRight")
     until(lambda: clock(replay) > 1.1, "a second on")
     press(replay, "]")
+    assert replay.locator("#cut-name").input_value() == "walk-cut.mcap"
     replay.locator("#cut-name").fill("piece.mcap")
     replay.locator("#cut-write").click()
     shows(replay, "notice-text", r"wrote piece\.mcap")
     whole, piece = taxel.open(recording).events, taxel.open(recording.parent / "piece.mcap").events
     assert 0 < len(piece.t) < len(whole.t)
-    with replay.expect_download() as download:
-        press(replay, "s")
-    download.value.save_as(tmp_path / "picture.png")
-    assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")

@@ -14,7 +14,7 @@ from tests.panel.pages import clock, recording, shown, shows, still, until
 
 import taxel
 from taxel import Array, Frames
-from taxel.live import Panel
+from taxel.panel import Panel
 from taxel.recording.analysis.rest import of_frames
 
 __all__ = ["recording"]

@@ -1,4 +1,4 @@
-"""A source of numbers is chosen on the page: a mat on a serial line, in a real browser."""
+"""A sensor is plugged in on the page: a mat on a serial line, in a real browser."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 from loopback import free_port
 from tests.panel.browser import running
-from tests.panel.pages import opened, shows, until
+from tests.panel.pages import opened, press, shows, until
 
 import taxel
-from taxel.formats.layout import Layout
+import taxel.live
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -55,44 +55,39 @@ def mat(rows: int, columns: int) -> Iterator[tuple[str, threading.Event]]:
         os.close(theirs)
 
 
-def test_a_mat_on_a_serial_line_is_chosen_seen_and_recorded(chromium: Any, tmp_path: Path) -> None:
+def connect(page: Any, port: object, rows: str, columns: str) -> None:
+    """Plug in a sensor in the dialog, once its lines look as they should; a pseudo-terminal is in no list of ports."""
+    press(page, "1")
+    page.locator("#sensor-open").click()
+    until(lambda: page.locator("#sensor-port option").count() > 0, "the ports are listed")
+    page.locator("#sensor-port").evaluate("(list, port) => list.append(new Option(port, port))", str(port))
+    page.locator("#sensor-port").select_option(str(port))
+    until(lambda: page.locator("#sensor-rows").input_value() == rows, "the rows are guessed")
+    assert page.locator("#sensor-columns").input_value() == columns
+    page.locator("#sensor").get_by_role("button", name="Connect", exact=True).click()
+    until(lambda: page.locator("#sensor").is_hidden(), "it is connected")
+
+
+def test_a_mat_on_a_serial_line_is_plugged_in_seen_and_unplugged(chromium: Any, tmp_path: Path) -> None:
     port = str(free_port())
     with (
         mat(16, 12) as (line, silent),
         running("live", "--panel", "--port", port, "--host", "127.0.0.1", folder=tmp_path) as server,
         opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
     ):
-        source = page.locator("#numbers")
-        source.fill("serial:ttyX")
-        page.locator("#numbers-look").click()
-        shows(page, "numbers-why", "must be a serial port")
-        source.fill(f"serial:{line}")
-        page.locator("#numbers-look").click()
-        shows(page, "numbers-about", "16 lines of 12 numbers, then an empty line: 16 x 12")
-        assert source.input_value() == f"serial:{line},array=16x12,frame_end=blank"
-        page.locator("#numbers-form").get_by_role("button", name="Connect", exact=True).click()
+        connect(page, line, "16", "12")
         shows(page, "pressure-top", "counts")
-        shows(page, "where-info", f"serial:{line}")
         shows(page, "registers-why", "A sensor that prints numbers has no registers")
-        shows(page, "numbers-command", r"taxel live --panel --source serial:.*,array=16x12,frame_end=blank$")
-        # A source that was begun elsewhere is in the field as a whole.
-        page.evaluate("localStorage.clear()")
-        page.reload()
-        until(lambda: source.input_value() == f"serial:{line},array=16x12,frame_end=blank", "all of it is in the field")
-        name = page.locator("#layout-name")
-        name.fill("my mat")
-        page.locator("#layout-save").click()
-        shows(page, "layout-saved", r"^Saved in my mat\.layout\.toml, which the command reads\.$")
-        shows(page, "numbers-shell", r"^taxel live --panel --source 'my mat\.layout\.toml'$")
-        layout = Layout.read(tmp_path / "my mat.layout.toml")
-        assert layout.source_text() == source.input_value()
-        page.locator("#layout-save").click()
-        shows(page, "numbers-why", r"my mat\.layout\.toml: exists already$")
-        page.locator("#numbers-falls").check()
-        assert source.input_value().endswith(",falls=true")
         silent.set()
         time.sleep(0.1)
         until(lambda: "The line is silent" in page.content(), "the page says that the line is silent")
+        page.locator("#sensor-open").click()
+        page.locator("#sensor-off").click()
+        until(lambda: "The line is silent" not in page.content(), "nothing is received any more")
+        # The port is free for other programs, and the command goes on.
+        silent.clear()
+        with taxel.live.Live(sources=f"serial:{line},array=16x12,frame_end=blank"):
+            assert server.process.poll() is None
 
 
 def test_a_plug_that_is_pulled_while_recording_is_said_and_is_in_the_verdict(chromium: Any, tmp_path: Path) -> None:
@@ -101,11 +96,9 @@ def test_a_plug_that_is_pulled_while_recording_is_said_and_is_in_the_verdict(chr
         running("live", "--panel", "--port", "0", "--host", "127.0.0.1", folder=tmp_path) as server,
         opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
     ):
-        connect = page.locator("#numbers-form").get_by_role("button", name="Connect", exact=True)
         with mat(4, 4) as (line, _):
             plug.symlink_to(line)
-            page.locator("#numbers").fill(f"serial:{plug},array=4x4,frame_end=blank")
-            connect.click()
+            connect(page, plug, "4", "4")
             shows(page, "pressure-top", "counts")
             shows(page, "state-word", "^Live$")
             page.locator("#record").click()
@@ -126,9 +119,6 @@ def test_a_plug_that_is_pulled_while_recording_is_said_and_is_in_the_verdict(chr
             page.wait_for_timeout(500)
             page.locator("#record").click()
             shows(page, "record-last-verdict", r"no frame arrived for a second or more: 1 time, \d+\.\d s in all")
-            shows(page, "state-word", "^Live$")
-            connect.click()
-            until(lambda: page.locator("#numbers-why").is_hidden(), "it is connected again")
             shows(page, "state-word", "^Live$")
     verdict = taxel.open(tmp_path / "trial1.mcap").verdict
     assert verdict.noted["silences"] == 1

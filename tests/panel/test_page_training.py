@@ -30,7 +30,7 @@ from tests.tasks.recordings import rested
 
 import taxel
 import taxel.device
-from taxel.live import Panel
+from taxel.panel import Panel
 
 __all__ = ["live", "page", "recording"]
 
@@ -71,11 +71,12 @@ def palm(folder: Path) -> dict[str, list[int]]:
         values[begin : begin + 45, 4 + k : 9 + k, 8 + 2 * k : 13 + 2 * k] -= 350
     messages = [("/hand/palm", PALM, 10.0 * k, 10.0 * k, bags.palm(np.round(one))) for k, one in enumerate(values)]
     bags.write(folder / "played.bag", messages)
-    (folder / "palm.toml").write_text("falls = true\n")
+    stated = 'falls = true\nrows = 24\ncolumns = 32\n[ros]\ntopic = "/hand/palm"\nfield = "taxels"\n'
+    (folder / "palm.toml").write_text(stated)
     return {"contact": [10_000 * k for k in begins], "lift": [10_000 * (k + 45) for k in begins]}
 
 
-OPTIONS = ("--topic", "/hand/palm", "--field", "taxels", "--array", "24x32", "--layout", "palm.toml")
+OPTIONS = ("--layout", "palm.toml")
 
 
 @pytest.mark.parametrize(

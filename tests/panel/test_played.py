@@ -9,7 +9,8 @@ from panel.protocol import SOON, Client, head, section
 from tests.live.boards import LOOPBACK, SMALL, above_rest, force, play, presses, spikes_of, touch, wait_for
 
 import taxel
-from taxel.live import Live, Panel
+from taxel.live import Live
+from taxel.panel import Panel
 
 ConnectionClosedOK = pytest.importorskip("websockets.exceptions").ConnectionClosedOK
 

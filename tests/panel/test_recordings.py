@@ -13,6 +13,7 @@ from panel.protocol import (
     heard,
     marker,
     parts_of,
+    row,
     say,
     section,
     spikes_of,
@@ -21,7 +22,8 @@ from panel.protocol import (
 
 import taxel
 import taxel.device
-from taxel.live import Live, Panel, send
+from taxel.live import Live, send
+from taxel.panel import Panel
 
 
 def test_a_recording_is_made_labelled_shown_and_cut(live, panel, tmp_path):  # noqa: PLR0915  one story
@@ -41,15 +43,14 @@ def test_a_recording_is_made_labelled_shown_and_cut(live, panel, tmp_path):  # n
         heard(live, 1)
         board.start()
         try:
-            assert page.ask("record", name="step", index=1, length_s=0.5, label="heel")["type"] == "done"
+            assert page.ask("record", name="step1", length_s=0.5, label="heel")["type"] == "done"
             assert page.ask("record", name="other")["type"] == "refused"
             last = page.since_asked("recorder", state="idle")
         finally:
             playing.set()
             board.join()
         assert last["last"]["file"] == "step1.mcap"
-        assert last["index"] == 2
-        again = page.ask("record", name="step", index=1)
+        again = page.ask("record", name="step1")
         assert again["type"] == "refused"
         assert "exists" in again["reason"]
         recording = taxel.open(tmp_path / "step1.mcap")
@@ -72,18 +73,18 @@ def test_a_recording_is_made_labelled_shown_and_cut(live, panel, tmp_path):  # n
             if here.any():
                 assert frame[7, x] == recording.events.intensity[here][-1]
         assert frame[9, 9] == 77, "what was held when it began"
-        assert page.ask("mark", label="contact", t_us=middle)["type"] == "done"
-        labels = next(m for m in reversed(page.said) if m["type"] == "labels")["labels"]
+        assert page.mark("contact", middle)["type"] == "done"
+        (marked,) = page.labels()
         before = (tmp_path / "step1.mcap").read_bytes()
-        assert page.ask("rename", label_id=labels[0]["label_id"], label="lift")["type"] == "done"
-        assert page.ask("move", label_id=labels[0]["label_id"], t_us=middle + 5)["type"] == "done"
+        assert page.alter(marked, label="lift")["type"] == "done"
+        assert page.alter(page.labels()[0], t_us=middle + 5)["type"] == "done"
         assert (tmp_path / "step1.notes.csv").read_text() == f"label,t_us\nlift,{middle + 5}\n"
         assert (tmp_path / "step1.mcap").read_bytes() == before
         notes = taxel.open(tmp_path / "step1.mcap").notes
         assert [(n.text, n.t) for n in notes][1:] == [("lift", middle + 5)]
         assert page.ask("cut", start_us=opened["start_us"], stop_us=middle, name="half.mcap")["type"] == "done"
         assert len(taxel.open(tmp_path / "half.mcap").events) == int((recording.events.t < middle).sum())
-        assert page.ask("delete", label_id=labels[0]["label_id"])["type"] == "done"
+        assert page.remove(page.labels()[0])["type"] == "done"
         assert page.ask("step", frames=-1)["type"] == "done"
         earlier = recording.events.t[recording.events.t < middle].max()
         assert next(m for m in reversed(page.said) if m["type"] == "transport")["t_us"] == earlier
@@ -276,17 +277,19 @@ def test_labels_that_change_at_once_are_in_the_file_as_the_page_shows_them(tmp_p
         for round_ in range(20):
             first, page.ids = page.ids, page.ids + 10
             for k in range(1, 5):
-                page.send(type="mark", id=first + k, label=f"{round_}-{k}", t_us=1000 + 10 * round_ + k)
+                page.send(type="change", id=first + k, changes=[{"new": row(f"{round_}-{k}", 1000 + 10 * round_ + k)}])
             answered = {page.until("done")["id"] for _ in range(4)}
             assert answered == set(range(first + 1, first + 5))
             marked = file.read_text().splitlines()[1:]
             assert len(marked) == 4 * (round_ + 1)
-            label = labels_of(page)[-1]["label_id"]
+            label = labels_of(page)[-1]
             for k in range(5, 11):
-                page.send(type="move", id=first + k, label_id=label, t_us=1500 + 20 * round_ + k)
+                moved = {**label, "t_us": 1500 + 20 * round_ + k}
+                page.send(type="change", id=first + k, changes=[{"old": label, "new": moved}])
+                label = moved
             for _ in range(6):
                 page.until("done")
-            shown = [f"{row['label']},{row['t_us']}" for row in labels_of(page)]
+            shown = [f"{one['label']},{one['t_us']}" for one in labels_of(page)]
             assert file.read_text().splitlines()[1:] == shown
 
 
@@ -306,13 +309,13 @@ def test_a_label_outside_the_recording_is_refused(tmp_path):
             ("table.csv", 0, 590_000, 10_000, "2 frames"),
         ):
             assert page.ask("open", name=name)["type"] == "done"
-            assert page.ask("mark", label="a", t_us=last + late)["type"] == "done"
-            assert page.ask("mark", label="a", t_us=first - late)["type"] == "done"
+            assert page.mark("a", last + late)["type"] == "done"
+            assert page.mark("a", first - late)["type"] == "done"
             more = 10_000 if name == "table.csv" else 1
             for t_us, side in ((last + late + more, "after the end"), (first - late - more, "before the beginning")):
-                refused = page.ask("mark", label="a", t_us=t_us)
-                said = f"a label is {far} {side} of {name}: must be within the recording"
+                refused = page.mark("a", t_us)
+                said = f"t_us: a label is {far} {side} of {name}: must be within the recording"
                 assert (refused["field"], refused["reason"]) == ("t_us", said)
-            mine = labels_of(page)[0]["label_id"]
-            assert page.ask("move", label_id=mine, t_us=10**12)["type"] == "refused"
-            assert page.ask("rename", label_id=mine, label="b")["type"] == "done"
+            mine = labels_of(page)[0]
+            assert page.alter(mine, t_us=10**12)["type"] == "refused"
+            assert page.alter(mine, label="b")["type"] == "done"

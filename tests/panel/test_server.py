@@ -1,4 +1,4 @@
-"""The panel's server, by a client that is written from crates/taxel-panel/protocol.md alone."""
+"""The panel's server, by a client that is written from docs/panel-protocol.md alone."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from panel.protocol import (
     word,
 )
 
-from taxel import _core
 from taxel.live import send
 
 
@@ -71,36 +70,6 @@ def test_a_source_that_stalled_is_shown_at_its_own_time_again(live, panel):
         for _ in range(8):
             t_us = head(page.until("frame"))[0]["t_us"]
         assert 400_000 < t_us < 600_000 + 1e6 * (time.monotonic() - since)
-
-
-def test_differences_add_up_once_the_page_says_that_they_are_some(panel):
-    with Client(panel) as page:
-        assert page.until("hello")["delta_intensity"] is False
-        page.send(type="credit", n=2)
-        say(panel.live, word(1000, 3, 5, 90))
-        while head(page.until("frame"))[0]["events"] < 1:
-            pass
-        where = panel.live.address
-        assert page.ask("delta_intensity", on="yes")["field"] == "on"
-        said = page.ask("delta_intensity", on=True)
-        assert said["type"] == "done", said
-        told = next((m for m in page.said[1:] if m["type"] == "hello"), None) or page.until("hello")
-        assert told["firewall"] == _core.FIREWALL
-        assert (told["delta_intensity"], told["udp"]) == (True, "{}:{}".format(*where))
-        say(
-            panel.live,
-            *(word(t, 3, 5, n, more) for t, more, n in ((1000, True, 40), (2000, True, 8), (3000, False, 18))),
-        )
-        say(panel.live, word(4000, 4, 5, 7))
-        while head(page.until("frame"))[0]["events"] < 4:
-            pass
-        assert list(section(page.frames[-1], 0, "<u2").reshape(64, 64)[5, 3:5]) == [30, 7]
-        assert page.ask("record", name="delta")["type"] == "done"
-        assert "recording runs" in page.ask("delta_intensity", on=False)["reason"]
-        say(panel.live, word(5000, 3, 5, 1))
-        heard(panel.live, 5)
-        assert page.ask("stop")["type"] == "done"
-        page.since_asked("recorder", state="idle")
 
 
 def test_narrow_and_wide_columns_follow_the_board_too(live, panel):

@@ -14,7 +14,8 @@ from tests.tasks.recordings import rested
 
 import taxel
 from taxel.detect import Example, fit
-from taxel.live import Live, Panel
+from taxel.live import Live
+from taxel.panel import Panel
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from refusal import refused
 import taxel
 from taxel import Frames
 from taxel._core import FormatError, ProblemError
-from taxel.live import Panel
+from taxel.panel import Panel
 from taxel.recording.text_options import TextOptions
 
 from .making import HEADER, record, some_events

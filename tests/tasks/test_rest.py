@@ -15,8 +15,8 @@ import taxel
 from taxel import Array, Frames, ProblemError, Tare
 from taxel._base.messages import collected
 from taxel.detect import PlainRule
-from taxel.live._requests.training import TrainingRequests
-from taxel.live._shown_files import Opening, ShownFiles
+from taxel.panel.shown_files import Opening, ShownFiles
+from taxel.panel.training import Training
 from taxel.tasks import detect, rest
 
 from .recordings import board, mat, trials
@@ -135,8 +135,8 @@ def test_the_page_takes_the_same_rest_also_where_a_touch_begins_the_recording(tm
     rule.save(tmp_path / "rule.json")
     found = detect(rule, taxel.open(tmp_path / "a.npz")).outcomes[0].found
     assert found.t.tolist()[-4:] == [1_200_000, 1_320_000, 2_200_000, 2_320_000]
-    page = TrainingRequests(Opening(), ShownFiles()).detect(tmp_path / "a.npz", None, tmp_path / "rule.json")
-    assert [t for _, t, *_ in page[2]] == found.t.tolist()
+    page = Training(Opening(), ShownFiles()).detect(tmp_path / "a.npz", None, tmp_path / "rule.json")
+    assert [one["t_us"] for one in page[2]] == found.t.tolist()
 
 
 def test_where_nothing_is_quiet_it_is_refused_with_what_to_give(tmp_path: Path) -> None:

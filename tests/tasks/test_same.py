@@ -13,8 +13,8 @@ import pytest
 from tests.shell import run
 
 import taxel
-from taxel.live._requests.training import TrainingRequests
-from taxel.live._shown_files import Opening, ShownFiles
+from taxel.panel.shown_files import Opening, ShownFiles
+from taxel.panel.training import Training
 from taxel.tasks import detect
 
 from .recordings import board, mat, trials
@@ -31,9 +31,9 @@ def task(name: str, **request: Any) -> dict[str, Any]:
     return last["result"]
 
 
-def requests() -> TrainingRequests:
+def requests() -> Training:
     """Return what handles the page's requests about readouts."""
-    return TrainingRequests(Opening(), ShownFiles())
+    return Training(Opening(), ShownFiles())
 
 
 def moments(detections: list[dict[str, Any]]) -> list[tuple[str, int, int]]:
@@ -56,8 +56,8 @@ def test_readouts_and_detections_are_the_same_from_python_the_shell_a_process_an
     if place.is_file():
         made = requests().train(place, tmp_path / "page.json")
         texts.add((tmp_path / "page.json").read_text())
-        assert made.text.splitlines() == [*training.lines(), *(f"warning: {text}" for text in training.warnings)]
-        assert made.next == f"taxel detect RECORDING --readout {tmp_path / 'page.json'}"
+        assert made["text"].splitlines() == [*training.lines(), *(f"warning: {text}" for text in training.warnings)]
+        assert made["next"] == f"taxel detect RECORDING --readout {tmp_path / 'page.json'}"
     assert len(texts) == 1
     assert json.loads(shell.stdout) == {"readout": str(tmp_path / "shell.json"), **training.to_dict()}
     assert process == json.loads(json.dumps(training.to_dict()))
@@ -73,4 +73,4 @@ def test_readouts_and_detections_are_the_same_from_python_the_shell_a_process_an
     [one] = found["recordings"]
     assert {key: shown[key] for key in one} == one
     labels, _, detections = requests().detect(place, None, readout)
-    assert (labels, [tuple(moment) for *moment, _ in detections]) == (["contact", "lift"], moments(one["detections"]))
+    assert (labels, moments(detections)) == (["contact", "lift"], moments(one["detections"]))

@@ -15,7 +15,7 @@ import taxel
 from taxel.wire import PRESETS, Registers
 
 ROOT = Path(__file__).parents[2]
-PANEL = "crates/taxel-panel/web/registers.js"
+PANEL = "python/taxel/panel/web/registers.js"
 MADE = (
     "crates/taxel-core/src/wire/registers/table.rs",
     "crates/taxel-core/src/wire/registers/presets.rs",

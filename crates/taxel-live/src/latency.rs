@@ -16,7 +16,6 @@ pub struct Latencies {
 
 /// Quantiles of measured latencies, us; none if nothing was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Quantiles {
     /// Number of measured durations.
     pub count: u64,

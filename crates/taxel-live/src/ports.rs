@@ -7,7 +7,6 @@ use crate::{Error, Result};
 
 /// A serial port.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Port {
     /// Name of the port, as "COM3" or "/dev/ttyACM0".
     pub place: String,

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Serialize, Serializer};
 use serde_json::{Map, Value, json};
 use taxel_core::encode::{Composite, Encoder, Tare};
 use taxel_core::problem;
@@ -28,16 +27,14 @@ impl From<Encoder> for ReadoutEncoders {
 }
 
 impl ReadoutEncoders {
+    /// Their names.
+    pub(super) fn names(&self) -> Vec<&str> {
+        self.0.keys().map(String::as_str).collect()
+    }
+
     /// These encoders with a tare.
     pub(super) fn with_tare(&self, tare: &Tare) -> Self {
         Self(self.0.iter().map(|(name, encoder)| (name.clone(), encoder.with_tare(tare))).collect())
-    }
-}
-
-/// In messages: the names.
-impl Serialize for ReadoutEncoders {
-    fn serialize<S: Serializer>(&self, to: S) -> std::result::Result<S::Ok, S::Error> {
-        to.collect_seq(self.0.keys())
     }
 }
 
@@ -51,6 +48,12 @@ fn side_by_side(parts: BTreeMap<String, Encoder>) -> Encoder {
 
 fn name_of(encoder: &Encoder) -> String {
     json!(encoder)["name"].as_str().unwrap_or_default().to_owned()
+}
+
+/// The names of an encoder and of its parts.
+#[must_use]
+pub fn encoder_names(encoder: Encoder) -> Vec<String> {
+    ReadoutEncoders::from(encoder).0.into_keys().collect()
 }
 
 /// The encoder of a view.

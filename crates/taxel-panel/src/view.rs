@@ -1,5 +1,576 @@
-//! What a view shows of a source at a time: the player, the spikes of an encoder, and the frames sent to a client.
+//! A client's view: which source it shows, at which time, and how; and the frames that are sent of it.
 
+mod delivered;
 pub(super) mod encoded_spikes;
+mod following;
 pub(super) mod frame;
+mod playback;
 pub(super) mod player;
+
+use std::sync::Arc;
+
+use serde_json::{Map, Value, json};
+use taxel_core::encode::Encoder;
+use taxel_core::problem;
+use taxel_live::Result;
+use taxel_live::locked::lock;
+
+use crate::keyframe_index::KeyframeIndex;
+use crate::live_source::LiveSource;
+use crate::readout_encoders::{ReadoutEncoders, ViewEncoder};
+use crate::shown::Shown;
+use crate::time_columns::{COLUMN_US, COLUMNS_US, is_column};
+use delivered::Delivered;
+use encoded_spikes::EncodedSpikes;
+use following::Following;
+use frame::{About, FOLLOWS, LIVE, MOVES, RECORDS, RESTART};
+use playback::Playback;
+use player::{Player, ViewOptions};
+
+/// Where in its source a view is.
+enum Position {
+    /// At the newest state of the live source.
+    Following,
+    /// At a time of a recording or of the live source; empty where nothing can be shown.
+    At(Option<Box<SourcePosition>>),
+}
+
+/// A time of a source, and the columns of time beside it.
+struct SourcePosition {
+    player: Player,
+    /// The columns of the window that the client chose; `None`: those up to the time.
+    window: Option<Player>,
+}
+
+/// The source, the time and the options of what a client sees.
+pub struct View {
+    live: Option<Arc<LiveSource>>,
+    /// The recording that is shown, in place of the live source.
+    recording: Option<Shown>,
+    position: Position,
+    playback: Playback,
+    options: ViewOptions,
+    /// The encoder that the client has requested.
+    requested_encoder: Option<Map<String, Value>>,
+    /// The encoders of the readout that reads the recording.
+    recording_encoders: ReadoutEncoders,
+    /// Where the window of columns ends, us; `None`: at the time of the view.
+    window_us: Option<i64>,
+    following: Following,
+    delivered: Delivered,
+    /// A new frame can be shown.
+    dirty: bool,
+    /// What the live source had received when the last frame was made.
+    received: u64,
+    /// Number of the next frame.
+    number: u32,
+    /// Messages to the client that go with its next frame.
+    texts: Vec<String>,
+}
+
+impl View {
+    /// A view that follows a live source, where there is one.
+    #[must_use]
+    pub fn new(live: Option<Arc<LiveSource>>) -> Self {
+        Self {
+            live,
+            recording: None,
+            position: Position::Following,
+            playback: Playback::paused(),
+            options: ViewOptions::plain(COLUMN_US),
+            requested_encoder: None,
+            recording_encoders: ReadoutEncoders::default(),
+            window_us: None,
+            following: Following::default(),
+            delivered: Delivered::nothing(),
+            dirty: true,
+            received: 0,
+            number: 0,
+            texts: vec![],
+        }
+    }
+
+    /// Replaces the live source, which is then followed unless a recording is shown.
+    pub fn set_live(&mut self, live: Option<Arc<LiveSource>>) {
+        self.live = live;
+        if self.recording.is_none() {
+            self.follow_newest();
+        }
+    }
+
+    /// What it does (`following`, `playing` or `paused`), the speed, and the board time, us.
+    #[must_use]
+    pub fn transport(&self) -> (&'static str, f64, Option<i64>) {
+        let state = match (&self.position, self.playback.is_playing()) {
+            (Position::Following, _) => "following",
+            (Position::At(_), true) => "playing",
+            (Position::At(_), false) => "paused",
+        };
+        (state, self.playback.speed(), self.t())
+    }
+
+    /// Whether [`View::advance`] has work to do before the next frame.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        let follows = matches!(self.position, Position::Following) && self.live.is_some();
+        let narrow = self.options.column_us < COLUMN_US;
+        self.playback.is_playing() || follows && (narrow || self.options.encoder.is_some())
+    }
+
+    /// Board time of the view, us.
+    fn t(&self) -> Option<i64> {
+        match &self.position {
+            Position::At(Some(position)) => Some(position.player.t()),
+            Position::At(None) => None,
+            Position::Following => self.live.as_ref().and_then(|live| lock(&live.state).latest()),
+        }
+    }
+
+    fn index(&self) -> Result<Arc<dyn KeyframeIndex>> {
+        match (&self.recording, &self.live) {
+            (Some(shown), _) => Ok(shown.index()),
+            (None, Some(live)) => Ok(Arc::new(live.index.clone())),
+            (None, None) => Err(problem!("nothing is shown: open a recording first").into()),
+        }
+    }
+
+    fn warn(&mut self, error: &taxel_live::Error) {
+        self.texts.push(json!({ "type": "warning", "text": error.to_string() }).to_string());
+    }
+
+    // ------------------------------------------------------------------------------------------ frames
+
+    /// Moves a playing view on, decodes narrow columns and encodes; returns whether it has arrived at the end of its recording.
+    pub fn advance(&mut self) -> bool {
+        let live = self.live.clone().filter(|_| matches!(self.position, Position::Following));
+        if let Err(error) = self.following.update_narrow(live.as_ref(), self.options.column_us) {
+            self.warn(&error);
+        }
+        if let Some(live) = live {
+            self.following.encode(&live);
+        }
+        let Some(t) = self.playback.now() else { return false };
+        let moved = self.position().and_then(|position| {
+            // A window that the view leaves moves with it.
+            if let Some(window) = position.window.as_mut().filter(|window| window.t() < t) {
+                window.advance(t)?;
+            }
+            position.player.advance(t)
+        });
+        let more = match moved {
+            Ok(more) => more || self.recording.is_none(),
+            Err(error) => {
+                self.warn(&error);
+                false
+            }
+        };
+        self.dirty = true;
+        self.window_us = self.window_us.map(|end| end.max(t));
+        if !more {
+            self.playback.pause();
+        }
+        !more
+    }
+
+    /// The next frame, and messages that go with it; `None` where there is nothing new to show. `records`: something is recorded.
+    pub fn frame(&mut self, records: bool) -> Option<(Vec<u8>, Vec<String>)> {
+        if let (Position::Following, Some(live)) = (&self.position, &self.live) {
+            let received = live.received();
+            self.dirty |= std::mem::replace(&mut self.received, received) != received;
+            self.delivered.note_source_restarts(lock(&live.state).restarts());
+        }
+        if !std::mem::take(&mut self.dirty) {
+            return None;
+        }
+        let restart = if self.delivered.is_restart() { RESTART } else { 0 };
+        let live = if self.recording.is_none() { LIVE } else { 0 };
+        let moves = match self.position {
+            Position::Following => MOVES | FOLLOWS,
+            Position::At(_) if self.playback.is_playing() => MOVES,
+            Position::At(_) => 0,
+        };
+        let about = About {
+            flags: restart | live | moves | if records { RECORDS } else { 0 },
+            number: self.number,
+            from: self.delivered.from(),
+            with_rest: false,
+            watched: self.options.watched,
+            column_us: self.options.column_us,
+        };
+        self.write_spikes();
+        let needs_rest = |rests: u64| self.delivered.needs_rest(rests, moves != 0);
+        let (bytes, last, rests) = match &mut self.position {
+            Position::Following => self.following.frame(self.live.as_ref()?, about, needs_rest),
+            Position::At(position) => {
+                let SourcePosition { player, window } = &mut **position.as_mut()?;
+                let rests = Some(player.state().rests()).filter(|rests| needs_rest(*rests));
+                let about = About { with_rest: rests.is_some(), ..about };
+                let (bytes, last) = frame::of_player(player, window.as_mut(), about);
+                (bytes, last, rests)
+            }
+        };
+        self.delivered.frame(last, self.options.column_us, rests);
+        self.number = self.number.wrapping_add(1);
+        Some((bytes, std::mem::take(&mut self.texts)))
+    }
+
+    /// Writes the `spikes` message, where the encoder has made any since the last frame.
+    fn write_spikes(&mut self) {
+        if self.options.encoder.is_none() {
+            return;
+        }
+        let spikes = match &mut self.position {
+            Position::Following => self.live.as_ref().and_then(|live| self.following.encode(live)),
+            Position::At(position) => position
+                .as_mut()
+                .and_then(|position| position.window.as_mut().unwrap_or(&mut position.player).spikes_mut()),
+        };
+        let Some(spikes) = spikes else { return };
+        let (message, failed) = (spikes.message(), spikes.failed().cloned());
+        self.texts.extend(message.map(|message| message.to_string()));
+        if let Some(error) = failed {
+            (self.options.encoder, self.requested_encoder) = (None, None);
+            self.following.stop_encoding();
+            self.warn(&error.into());
+        }
+    }
+
+    // ------------------------------------------------------------------------------------------ moving
+
+    fn position(&mut self) -> Result<&mut SourcePosition> {
+        match &mut self.position {
+            Position::Following => Err(problem!("the view follows the newest data").into()),
+            Position::At(None) => Err(problem!("this view has ended: open the recording again").into()),
+            Position::At(Some(position)) => Ok(position),
+        }
+    }
+
+    /// Moves the view to a time.
+    fn go(&mut self, t: i64) -> Result<()> {
+        let index = self.index()?;
+        if let Err(error) = self.choose_encoder(&index) {
+            self.warn(&error);
+        }
+        // For the past of a live source at wide columns, the shared state has them all.
+        let live = self.live.as_ref().filter(|_| self.recording.is_none() && self.options.column_us > COLUMN_US);
+        let all_columns = live.map(|live| {
+            let mut state = lock(&live.state);
+            state.update_curve();
+            Arc::new(state.time_columns().clone())
+        });
+        let options = ViewOptions { all_columns, ..self.options.clone() };
+        // A window whose columns the client has already stays as it is.
+        let same = match &mut self.position {
+            Position::At(Some(position)) if !self.delivered.is_restart() => position.window.take(),
+            _ => None,
+        };
+        let end = self.window_us;
+        if end.is_none() || same.is_none() {
+            self.restart();
+        }
+        let position = match end {
+            None => Player::open(index, t, options).map(|player| SourcePosition { player, window: None }),
+            Some(end) => Player::open(Arc::clone(&index), t, ViewOptions::plain(COLUMN_US)).and_then(|player| {
+                let window = same.map_or_else(|| Player::open(index, end, options), Ok)?;
+                Ok(SourcePosition { player, window: Some(window) })
+            }),
+        };
+        if position.is_err() {
+            self.restart();
+        }
+        self.position = Position::At(Some(Box::new(position?)));
+        self.delivered.invalidate_rest();
+        self.dirty = true;
+        self.following.stop_encoding();
+        Ok(())
+    }
+
+    /// The next frame shows everything anew.
+    fn restart(&mut self) {
+        self.dirty = true;
+        self.delivered.invalidate();
+        self.following.restart();
+    }
+
+    /// Shows the newest state of the live source from now on.
+    fn follow_newest(&mut self) {
+        (self.position, self.recording, self.window_us) = (Position::Following, None, None);
+        self.recording_encoders = ReadoutEncoders::default();
+        self.playback.pause();
+        self.restart();
+        self.start_encoding();
+    }
+
+    /// While following: begins the encoder anew.
+    fn start_encoding(&mut self) {
+        self.following.stop_encoding();
+        let (Position::Following, Ok(index), Some(live)) = (&self.position, self.index(), self.live.clone()) else {
+            return;
+        };
+        let started = self.choose_encoder(&index).and_then(|()| match &self.options.encoder {
+            Some(encoder) => self.following.start_encoding(&live, encoder, self.options.column_us),
+            None => Ok(()),
+        });
+        if let Err(error) = started {
+            (self.options.encoder, self.requested_encoder) = (None, None);
+            self.warn(&error);
+        }
+    }
+
+    /// Chooses the encoder that the client has requested, of the readout that reads what is shown; none where it does not
+    /// encode what an index holds.
+    fn choose_encoder(&mut self, index: &Arc<dyn KeyframeIndex>) -> Result<()> {
+        self.options.encoder = None;
+        let Some(request) = self.requested_encoder.take() else { return Ok(()) };
+        let live = self.live.as_ref().filter(|_| self.recording.is_none());
+        let encoder = match live {
+            Some(live) => ViewEncoder::requested(&request, &live.encoders())?,
+            None => ViewEncoder::requested(&request, &self.recording_encoders)?,
+        };
+        let stream = match index.frames() {
+            Some(frames) => EncodedSpikes::of_frames(&encoder, &frames, COLUMN_US, None)?.check(),
+            None => encoder.encoder.stream(index.array()).map(drop).map_err(Into::into),
+        };
+        if stream.is_err() && encoder.of_readout && live.is_some_and(|live| live.measures_tare()) {
+            let name = encoder.name;
+            return Err(problem!(
+                "encoder {name}: the readout is still measuring its tare; choose the encoder again after it"
+            )
+            .into());
+        }
+        stream?;
+        (self.options.encoder, self.requested_encoder) = (Some(encoder), Some(request));
+        Ok(())
+    }
+
+    /// This is the encoder of the readout that reads the recording from now on; none of a plain rule.
+    pub fn set_readout(&mut self, encoder: Option<Encoder>) {
+        self.recording_encoders = encoder.map_or_else(ReadoutEncoders::default, ReadoutEncoders::from);
+        if self.requested_encoder.is_some()
+            && let Err(error) = self.reopen()
+        {
+            self.warn(&error);
+        }
+    }
+
+    /// Shows the same time with other options.
+    fn reopen(&mut self) -> Result<()> {
+        self.restart();
+        match self.t() {
+            Some(t) if matches!(self.position, Position::At(_)) => {
+                self.go(t)?;
+                self.playback.continue_from(t);
+            }
+            _ => self.start_encoding(),
+        }
+        Ok(())
+    }
+
+    // ------------------------------------------------------------------------------------------ requests
+
+    /// Sends the history of a taxel (column, row) from now on, or none.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` for a taxel outside the array; as [`Player::open`].
+    pub fn watch(&mut self, taxel: Option<(u16, u16)>) -> Result<()> {
+        let index = self.index()?;
+        let array = index.array();
+        let (rows, columns) = (array.rows, array.columns);
+        if taxel.is_some_and(|(x, y)| x >= columns || y >= rows) {
+            return Err(problem!("taxel"; ": must be [x, y] on {rows} rows x {columns} columns, or null").into());
+        }
+        self.options.watched = taxel.and_then(|(x, y)| u32::try_from(array.index(x, y)).ok());
+        if !matches!(self.position, Position::Following) {
+            return self.reopen();
+        }
+        self.dirty = true;
+        self.delivered.invalidate();
+        self.following.restart_history();
+        Ok(())
+    }
+
+    /// Makes spikes by this encoder from now on, or none.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where there is no such encoder, or it does not encode what is shown.
+    pub fn encode(&mut self, encoder: Option<Map<String, Value>>) -> Result<()> {
+        self.requested_encoder = None;
+        if encoder.is_some() {
+            let index = self.index()?;
+            self.requested_encoder = encoder;
+            self.choose_encoder(&index)?;
+        }
+        self.reopen()
+    }
+
+    /// Shows columns of this width, us, which end at a time or, without one, at that of the view.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` for a width that does not exist; as [`Player::open`].
+    pub fn zoom(&mut self, column_us: i64, end_us: Option<i64>) -> Result<()> {
+        if !is_column(column_us) {
+            let (least, most) = COLUMNS_US;
+            return Err(problem!("column_us"; ": must be {least} times a power of two, up to {most}").into());
+        }
+        self.options.column_us = column_us;
+        self.window_us = end_us.filter(|_| !matches!(self.position, Position::Following));
+        self.reopen()
+    }
+
+    /// Moves the view to a time, us, and stops playing.
+    ///
+    /// # Errors
+    ///
+    /// As [`Player::open`].
+    pub fn seek(&mut self, t: i64) -> Result<()> {
+        self.playback.pause();
+        self.go(t)
+    }
+
+    /// Plays from here, from the end of a recording from its beginning; at the last speed unless one is given.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where nothing is shown, or the view follows the newest data.
+    pub fn play(&mut self, speed: Option<f64>) -> Result<()> {
+        let speed = speed.unwrap_or_else(|| self.playback.speed());
+        let t = self.t().ok_or_else(|| problem!("nothing is shown yet"))?;
+        if matches!(self.position, Position::Following) {
+            // Playing the live source from now on would be a delay of zero, which is following.
+            return Err(problem!("the view already follows the newest data: go to an earlier time first").into());
+        }
+        let (first, last) = self.index()?.range().unwrap_or((t, t));
+        let at_end = t >= last && self.recording.is_some();
+        if at_end {
+            self.go(first)?;
+        }
+        self.playback.start(speed, if at_end { first } else { t });
+        Ok(())
+    }
+
+    /// Stops playing, or following.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` before the first event.
+    pub fn pause(&mut self) -> Result<()> {
+        self.playback.pause();
+        if matches!(self.position, Position::Following) {
+            let t = self.t().ok_or_else(|| problem!("no events have arrived yet"))?;
+            self.go(t)?;
+        }
+        self.dirty = true;
+        Ok(())
+    }
+
+    /// Moves by so many time stamps that have events, back where negative.
+    ///
+    /// # Errors
+    ///
+    /// As [`View::pause`] and [`Player::open`].
+    pub fn step(&mut self, steps: i64) -> Result<()> {
+        self.pause()?;
+        for _ in 0..steps.unsigned_abs() {
+            let player = &mut self.position()?.player;
+            if steps > 0 {
+                let Some(t) = player.next_stamp()? else { break };
+                player.advance(t)?;
+            } else {
+                let Some(t) = player.last_stamp()? else { break };
+                self.go(t)?;
+            }
+        }
+        self.dirty = true;
+        Ok(())
+    }
+
+    /// Follows the live source.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where there is none.
+    pub fn follow(&mut self) -> Result<()> {
+        if self.live.is_none() {
+            return Err(problem!("this panel shows recordings only: start it by taxel live --panel").into());
+        }
+        self.follow_newest();
+        Ok(())
+    }
+
+    /// Shows a recording at a time, us, or at its beginning, paused.
+    ///
+    /// # Errors
+    ///
+    /// As [`Player::open`].
+    pub fn show(&mut self, recording: Shown, t: Option<i64>) -> Result<()> {
+        let index = recording.index();
+        self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < index.array().len());
+        (self.recording, self.window_us) = (Some(recording), None);
+        self.recording_encoders = ReadoutEncoders::default();
+        self.playback.pause();
+        match index.range() {
+            Some((first, _)) => self.go(t.unwrap_or(first))?,
+            None => self.position = Position::At(None),
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+    use taxel_core::encode::{ChangeEvents, Composite, Fa1};
+
+    use super::*;
+    use crate::keyframe_index::recording::{RecordingIndex, tests::recorded};
+
+    /// The `spikes` message of the next frame, and whether it is of the readout's encoder.
+    fn spikes(view: &mut View) -> (Value, bool) {
+        let (_, texts) = view.frame(false).unwrap();
+        let mut message: Value = serde_json::from_str(&texts[0]).unwrap();
+        let of_readout = message["of_readout"].take();
+        (message, of_readout.as_bool().unwrap())
+    }
+
+    fn encode(view: &mut View, encoder: Value) -> (Value, bool) {
+        view.encode(encoder.as_object().cloned()).unwrap();
+        spikes(view)
+    }
+
+    #[test]
+    fn an_encoder_by_its_name_alone_is_the_readout_s() {
+        let path = recorded("readout-encoder", "mcap", 3);
+        let index = RecordingIndex::open(&path).unwrap();
+        let last = index.range().unwrap().1;
+        let mut view = View::new(None);
+        view.show(Shown::Events(index), Some(last)).unwrap();
+        let coarse = Encoder::ChangeEvents(ChangeEvents { noise_floor: 20.0, ..ChangeEvents::default() });
+        let by_name = || json!({ "name": "change_events" });
+        let (defaults, of_readout) = encode(&mut view, by_name());
+        assert!(!of_readout);
+        let (stated, _) = encode(&mut view, json!(coarse));
+        assert_ne!(stated, defaults);
+        assert_eq!(encode(&mut view, by_name()), (defaults, false));
+        // A readout that reads from now on gives its parameters without another request.
+        view.set_readout(Some(coarse.clone()));
+        assert_eq!(spikes(&mut view), (stated.clone(), true));
+        // Stated parameters are those of the request.
+        assert!(!encode(&mut view, json!(Encoder::ChangeEvents(ChangeEvents::default()))).1);
+        // A part of a composite, and the whole.
+        let parts = [("on", coarse), ("afferent", Encoder::Fa1(Fa1::default()))];
+        let parts = parts.map(|(name, part)| (name.to_owned(), part)).into();
+        let composite = Encoder::Composite(Composite { parts });
+        assert_eq!(ReadoutEncoders::from(composite.clone()).names(), ["change_events", "composite", "fa1"]);
+        view.set_readout(Some(composite.clone()));
+        assert_eq!(encode(&mut view, by_name()), (stated, true));
+        let (whole, _) = encode(&mut view, json!(composite));
+        assert_eq!(encode(&mut view, json!({ "name": "composite" })), (whole, true));
+        view.set_readout(None);
+        let (_, texts) = view.frame(false).unwrap();
+        assert!(texts[0].contains("needs a readout with several encoders"));
+        std::fs::remove_file(&path).unwrap();
+    }
+}

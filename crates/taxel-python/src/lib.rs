@@ -73,7 +73,7 @@ mod _core {
     #[pymodule_export]
     use crate::nouns::{check_events, check_spikes, split_by_sign};
     #[pymodule_export]
-    use crate::panel::Panel;
+    use crate::panel::{PanelLive, PanelRecording, PanelView, lines_preview, panel_encoders, panel_limits};
     #[pymodule_export]
     use crate::previews::RecordingPreviews;
     #[pymodule_export]
@@ -87,7 +87,7 @@ mod _core {
     };
     #[cfg(feature = "test-hooks")]
     #[pymodule_export]
-    use crate::test_hooks::{message_schemas, test_hook};
+    use crate::test_hooks::test_hook;
     #[pymodule_export]
     use crate::wire::{
         WireBoard, WireDecoder, command_bytes, command_read, registers_at_reset, registers_commands, registers_fields,

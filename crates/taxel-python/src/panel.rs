@@ -1,86 +1,414 @@
-//! The panel's server.
-
-mod requests;
+//! The panel's view of a live source or a recording.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::Duration;
 
+use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_live::address::of_host;
-use taxel_panel::{Panel as Server, PanelOptions};
+use pyo3::types::PyBytes;
+use serde_json::{Map, Value};
+use taxel_core::detect::Detection;
+use taxel_core::encode::Encoder;
+use taxel_core::held::UNKNOWN;
+use taxel_core::rest::Value as _;
+use taxel_core::wire::Registers;
+use taxel_live::pipeline::{SourcePreview, SourceText};
+use taxel_live::recording::{self, Remarks};
+use taxel_panel::{
+    Activity, FrameArea, FrameFile, FrameIndex, FrameRest, FrameSource, LiveSource, RecordingIndex, RestSource, Shown,
+    View,
+};
 
+use crate::held::{TouchesOut, from_touches};
 use crate::live::Live;
-use crate::threaded::Threaded;
-use requests::handlers;
+use taxel_border::convert::{ArrayParts, array, from_array, slice, to_array};
 use taxel_border::enter::enter;
+use taxel_border::errors::{ProblemError, core};
+use taxel_border::parameters::{Plain, parsed};
 
-/// The panel's server.
+/// Counts by which unhealthy taxels are found: the sensor, the events of each taxel, those in the direction of the one before,
+/// touches, and with intensities the number of different values and the least and the greatest held, -1 where unknown.
+type ActivityOut<'py> = (
+    ArrayParts,
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<u32>>,
+    TouchesOut<'py>,
+    Option<(Bound<'py, PyArray1<u8>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<i32>>)>,
+);
+
+fn activity_out<'py>(py: Python<'py>, sensor: &taxel_core::Array, activity: Activity) -> ActivityOut<'py> {
+    let known = activity.range.iter().any(|&(least, _)| least != UNKNOWN);
+    // Python has -1 for what is unknown.
+    let range = |&(least, greatest): &(u16, u16)| match least {
+        UNKNOWN => (-1_i32, -1_i32),
+        _ => (least.into(), greatest.into()),
+    };
+    let (least, greatest): (Vec<_>, Vec<_>) = activity.range.iter().map(range).unzip();
+    let values = known.then(|| (array(py, activity.values), array(py, least), array(py, greatest)));
+    let touches = from_touches(py, &activity.touches);
+    (from_array(sensor), array(py, activity.events), array(py, activity.moved), touches, values)
+}
+
+/// What every panel says at first.
+#[pyfunction]
+pub fn panel_limits() -> Plain<Value> {
+    Plain(taxel_panel::limits())
+}
+
+/// The names of an encoder (JSON) and of its parts.
+#[pyfunction]
+pub fn panel_encoders(encoder: &str) -> PyResult<Vec<String>> {
+    Ok(taxel_panel::encoder_names(Encoder::from_json(encoder).map_err(core)?))
+}
+
+/// The last lines that arrive from a source of lines within two seconds, what they seem to be, and the source with that added.
+#[pyfunction]
+pub fn lines_preview(py: Python<'_>, source: &str) -> PyResult<(Vec<String>, String, String)> {
+    let SourcePreview { lines, source, about } = enter(py, |_| {
+        source.parse::<SourceText>().and_then(|source| SourcePreview::read(&source, Duration::from_secs(2)))
+    })?;
+    Ok((lines, about, source))
+}
+
+/// A live source as the panel shows it, received in a thread of its own. Messages are JSON.
 #[pyclass(frozen)]
-pub struct Panel(Threaded<Server>);
+pub struct PanelLive(Arc<LiveSource>);
 
 #[pymethods]
-impl Panel {
-    /// Opens the port and begins to serve.
+impl PanelLive {
+    /// Begins to receive from a board that holds these registers (JSON), or those that the pipeline knows.
     #[new]
-    fn start(
-        py: Python<'_>,
-        host: &str,
-        port: u16,
-        folder: PathBuf,
-        opened: Option<String>,
-        open_by_handler: bool,
-        control: Option<String>,
-        registers_stated: bool,
-        live: Option<&Live>,
-        requests: &Bound<'_, PyAny>,
-    ) -> PyResult<Self> {
-        let handle = live.map(|live| live.handle(py)).transpose()?;
-        let handlers = handlers(requests)?;
-        let server = enter(py, |_| {
-            let address = of_host(host, port)?;
-            let options = PanelOptions { address, folder, open: opened, open_by_handler, control, registers_stated };
-            Server::start(options, handle, handlers)
-        })?;
-        Ok(Self(Threaded::new("panel: has been stopped; begin a new Panel", server)))
-    }
-
-    /// Host and port on which it listens.
-    fn address(&self, py: Python<'_>) -> PyResult<(String, u16)> {
-        let address = self.0.with(py, |server| Ok(server.address()))?;
-        Ok((address.ip().to_string(), address.port()))
-    }
-
-    /// The address for a browser, with the token.
-    fn url(&self, py: Python<'_>) -> PyResult<String> {
-        self.0.with(py, |server| Ok(server.url()))
-    }
-
-    /// The token.
-    fn token(&self, py: Python<'_>) -> PyResult<String> {
-        self.0.with(py, |server| Ok(server.token().to_owned()))
-    }
-
-    /// Number of connected clients.
-    fn viewers(&self, py: Python<'_>) -> PyResult<usize> {
-        self.0.with(py, |server| Ok(server.viewers()))
-    }
-
-    /// Shows another live source from now on.
-    fn attach(&self, py: Python<'_>, live: &Live) -> PyResult<()> {
+    fn begin(py: Python<'_>, live: &Live, registers: Option<&str>) -> PyResult<Self> {
+        let registers: Option<Registers> = registers.map(|text| parsed("registers", text)).transpose()?;
         let handle = live.handle(py)?;
-        self.0.with(py, |server| server.attach(handle))
+        enter(py, |_| LiveSource::begin(handle, registers)).map(Self)
     }
 
-    /// Notes that the handler has connected the board's serial line, or disconnected it.
-    fn connected(&self, py: Python<'_>, control: Option<String>) -> PyResult<()> {
-        self.0.with(py, |server| {
-            server.connected(control);
+    /// What is said of it at first, and when `news` says so again.
+    fn about(&self, py: Python<'_>) -> Plain<Value> {
+        Plain(py.detach(|| self.0.about()))
+    }
+
+    /// What has happened since the last call: detections as messages, and whether the board was reset, taxels were zeroed, and
+    /// `about` says something else; None: nothing.
+    fn news(&self) -> Option<(Vec<String>, bool, bool, bool)> {
+        self.0.news().map(|news| (news.detections, news.reset, news.zeroed, news.about))
+    }
+
+    /// The messages of the latest detections, oldest first.
+    fn latest_detections(&self, py: Python<'_>) -> Vec<String> {
+        py.detach(|| self.0.latest_detections())
+    }
+
+    /// The message of its counters; `frame_us` is the length of the board's frames, where it is known.
+    fn counters(&self, py: Python<'_>, frame_us: Option<f64>) -> String {
+        py.detach(|| self.0.counters(frame_us).to_string())
+    }
+
+    /// The message of the past that can be viewed.
+    fn overview(&self, py: Python<'_>) -> String {
+        py.detach(|| self.0.overview().to_string())
+    }
+
+    /// Whether a client is connected: then the pipeline copies more often.
+    fn watch(&self, watched: bool) {
+        self.0.set_watched(watched);
+    }
+
+    /// The registers as far as the pipeline knows them.
+    fn registers(&self) -> Plain<Registers> {
+        Plain(self.0.registers())
+    }
+
+    /// The board holds these registers (JSON).
+    fn announce(&self, py: Python<'_>, registers: &str) -> PyResult<()> {
+        let registers: Registers = parsed("registers", registers)?;
+        py.detach(|| self.0.announce(registers));
+        Ok(())
+    }
+
+    /// Makes the held values the rest of all taxels (`now`), or tracks it from them on.
+    fn rest(&self, py: Python<'_>, now: bool) -> PyResult<()> {
+        enter(py, |_| self.0.rest(now))
+    }
+
+    /// Begins to record into a new .mcap.
+    fn record(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        enter(py, |_| self.0.record(path))
+    }
+
+    /// Names the whole recording that runs.
+    fn entitle(&self, py: Python<'_>, text: &str) -> PyResult<()> {
+        enter(py, |_| self.0.entitle(text))
+    }
+
+    /// Whether any recording runs.
+    fn is_recording(&self, py: Python<'_>) -> bool {
+        py.detach(|| self.0.is_recording())
+    }
+
+    /// Counts by which unhealthy taxels are found.
+    fn activity<'py>(&self, py: Python<'py>) -> ActivityOut<'py> {
+        let activity = py.detach(|| self.0.activity());
+        activity_out(py, self.0.array(), activity)
+    }
+}
+
+/// An indexed recording.
+#[pyclass(frozen)]
+pub struct PanelRecording(Shown);
+
+#[pymethods]
+impl PanelRecording {
+    /// Reads a file of a board's events (.mcap, .lsa); None of any other file, a .mcap of other programs among them.
+    #[staticmethod]
+    fn of_events(py: Python<'_>, path: PathBuf) -> PyResult<Option<Self>> {
+        let index = enter(py, |_| RecordingIndex::of_a_board(&path))?;
+        Ok(index.map(|index| Self(Shown::Events(index))))
+    }
+
+    /// Takes frames, `ReadFrames` of Python.
+    #[staticmethod]
+    fn of_frames(py: Python<'_>, frames: ReadFrames<'_>) -> PyResult<Self> {
+        to_index(py, frames).map(|index| Self(Shown::Frames(Arc::new(index))))
+    }
+
+    /// What the `opened` message says of its contents, a JSON object.
+    fn opened(&self, py: Python<'_>) -> String {
+        py.detach(|| self.0.opened().to_string())
+    }
+
+    /// Its `overview` message.
+    fn overview(&self, py: Python<'_>, name: &str) -> String {
+        py.detach(|| self.0.overview(name).to_string())
+    }
+
+    /// First and last time, us; how long before and after them a label may lie, us; how long one us of the file is in the view.
+    fn times(&self) -> (Option<(i64, i64)>, i64, i64) {
+        let (range, late_us) = self.0.range();
+        (range, late_us, self.0.us())
+    }
+
+    /// The sensor.
+    fn array(&self) -> ArrayParts {
+        from_array(self.0.array())
+    }
+
+    /// Counts by which unhealthy taxels are found; None of frames.
+    fn activity<'py>(&self, py: Python<'py>) -> Option<ActivityOut<'py>> {
+        match &self.0 {
+            Shown::Events(index) => Some(activity_out(py, self.0.array(), index.activity.clone())),
+            Shown::Frames(_) => None,
+        }
+    }
+}
+
+/// What a client sees of a live source or a recording. Its methods may be called in any thread; those that decode take long.
+#[pyclass(frozen)]
+pub struct PanelView {
+    view: Mutex<View>,
+    moves: AtomicBool,
+}
+
+impl PanelView {
+    fn lock(&self) -> MutexGuard<'_, View> {
+        self.view.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Works with the view, without the GIL.
+    fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut View) -> taxel_live::Result<T> + Send,
+    ) -> PyResult<T> {
+        enter(py, |_| {
+            let mut view = self.lock();
+            let done = work(&mut view);
+            self.moves.store(view.moves(), Ordering::Relaxed);
+            done
+        })
+    }
+}
+
+#[pymethods]
+impl PanelView {
+    /// A view that follows a live source, where there is one.
+    #[new]
+    fn new(live: Option<&PanelLive>) -> Self {
+        let view = View::new(live.map(|live| Arc::clone(&live.0)));
+        Self { moves: AtomicBool::new(view.moves()), view: Mutex::new(view) }
+    }
+
+    /// Another live source is there, or none; it is followed unless a recording is shown.
+    fn set_live(&self, py: Python<'_>, live: Option<&PanelLive>) -> PyResult<()> {
+        let live = live.map(|live| Arc::clone(&live.0));
+        self.with(py, |view| {
+            view.set_live(live);
             Ok(())
         })
     }
 
-    /// Ends the server; does nothing once it has ended.
-    fn stop(&self, py: Python<'_>) {
-        // A request may be about to call Python: without the GIL released here the server would never end.
-        py.detach(|| drop(self.0.take()));
+    /// Whether `advance` is to be called before the next frame.
+    fn moves(&self) -> bool {
+        self.moves.load(Ordering::Relaxed)
     }
+
+    /// Plays on, decodes narrow columns, encodes; returns whether the end of a recording was reached.
+    fn advance(&self, py: Python<'_>) -> PyResult<bool> {
+        self.with(py, |view| Ok(view.advance()))
+    }
+
+    /// The next frame, and messages that go with it; None where nothing is new, or another thread works on the view.
+    fn frame<'py>(&self, py: Python<'py>, records: bool) -> PyResult<Option<(Bound<'py, PyBytes>, Vec<String>)>> {
+        let frame = enter(py, |_| {
+            let mut view = match self.view.try_lock() {
+                Ok(view) => view,
+                Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+                Err(TryLockError::WouldBlock) => return Ok::<_, taxel_core::Error>(None),
+            };
+            let frame = view.frame(records);
+            self.moves.store(view.moves(), Ordering::Relaxed);
+            Ok(frame)
+        })?;
+        Ok(frame.map(|(bytes, texts)| (PyBytes::new(py, &bytes), texts)))
+    }
+
+    /// State (following, playing, paused), speed, and time, us.
+    fn transport(&self, py: Python<'_>) -> PyResult<(&'static str, f64, Option<i64>)> {
+        self.with(py, |view| Ok(view.transport()))
+    }
+
+    /// Sends the history of a taxel (column, row) from now on, or none.
+    fn watch(&self, py: Python<'_>, taxel: Option<(u16, u16)>) -> PyResult<()> {
+        self.with(py, |view| view.watch(taxel))
+    }
+
+    /// Makes spikes by an encoder (JSON) from now on, or none.
+    fn encode(&self, py: Python<'_>, encoder: Option<&str>) -> PyResult<()> {
+        let encoder: Option<Map<String, Value>> = encoder.map(|text| parsed("encoder", text)).transpose()?;
+        self.with(py, |view| view.encode(encoder))
+    }
+
+    /// The encoder (JSON) of the readout that reads the recording from now on; none of a plain rule.
+    fn set_readout(&self, py: Python<'_>, encoder: Option<&str>) -> PyResult<()> {
+        let encoder = encoder.map(Encoder::from_json).transpose().map_err(core)?;
+        self.with(py, |view| {
+            view.set_readout(encoder);
+            Ok(())
+        })
+    }
+
+    /// Columns of this width, us, that end at a time or at that of the view.
+    fn zoom(&self, py: Python<'_>, column_us: i64, end_us: Option<i64>) -> PyResult<()> {
+        self.with(py, |view| view.zoom(column_us, end_us))
+    }
+
+    /// Shows a time, us.
+    fn seek(&self, py: Python<'_>, t_us: i64) -> PyResult<()> {
+        self.with(py, |view| view.seek(t_us))
+    }
+
+    /// Plays at a speed, or at the last one.
+    fn play(&self, py: Python<'_>, speed: Option<f64>) -> PyResult<()> {
+        self.with(py, |view| view.play(speed))
+    }
+
+    /// Stays where it is.
+    fn pause(&self, py: Python<'_>) -> PyResult<()> {
+        self.with(py, View::pause)
+    }
+
+    /// Moves by so many time stamps with events.
+    fn step(&self, py: Python<'_>, frames: i64) -> PyResult<()> {
+        self.with(py, |view| view.step(frames))
+    }
+
+    /// Follows the live source.
+    fn follow(&self, py: Python<'_>) -> PyResult<()> {
+        self.with(py, View::follow)
+    }
+
+    /// Shows a recording at a time, us, or at its beginning.
+    fn show(&self, py: Python<'_>, recording: &PanelRecording, t_us: Option<i64>) -> PyResult<()> {
+        let recording = recording.0.clone();
+        self.with(py, |view| view.show(recording, t_us))
+    }
+}
+
+/// `ReadRest` of Python: its values are NaN where the rest is unknown.
+#[derive(FromPyObject)]
+struct ReadRest<'py> {
+    source: String,
+    values: PyReadonlyArray1<'py, f64>,
+    ticks_by_unit: f64,
+    loaded_from: f64,
+    falls: bool,
+    flickering: Vec<usize>,
+    preload_at: String,
+}
+
+/// `ReadSource` of Python.
+#[derive(FromPyObject)]
+struct ReadSource<'py> {
+    name: String,
+    left: u16,
+    rows: u16,
+    columns: u16,
+    t: PyReadonlyArray1<'py, i64>,
+    values: PyReadonlyArray1<'py, f32>,
+    rest: ReadRest<'py>,
+}
+
+/// `ReadFrames` of Python.
+#[derive(FromPyObject)]
+struct ReadFrames<'py> {
+    array: ArrayParts,
+    sources: Vec<ReadSource<'py>>,
+    unit: String,
+    number_us: Option<i64>,
+    notes: Vec<(Option<i64>, String, String)>,
+    detections: Vec<(String, i64, i64, String)>,
+    verdict: String,
+    trial: Option<String>,
+    trials: Vec<String>,
+    left_s: Option<f64>,
+}
+
+fn to_index(py: Python<'_>, frames: ReadFrames<'_>) -> PyResult<FrameIndex> {
+    let ReadFrames { array, sources, unit, number_us, notes, detections, verdict, trial, trials, left_s } = frames;
+    let array = to_array(array)?;
+    let (notes, note_sources) =
+        notes.into_iter().map(|(t_us, text, source)| (recording::Note { at_ns: 0, t_us, text }, source)).unzip();
+    let (detections, detection_sources) = detections
+        .into_iter()
+        .map(|(label, t, known, source)| ((0, Detection { label, t, known, slope: f64::NAN, repaired: false }), source))
+        .unzip();
+    let remarks = Remarks { notes, detections, ..Remarks::default() };
+    let file = FrameFile { unit, number_us, remarks, note_sources, detection_sources, verdict, trial, trials, left_s };
+    let mut placed = vec![];
+    for ReadSource { name, left, rows, columns, t, values, rest } in &sources {
+        let (t, values, rests) = (slice("t", t)?, slice("values", values)?, slice("rest", &rest.values)?);
+        let inside = *left <= array.columns && *columns <= array.columns - left && *rows <= array.rows;
+        let cells = usize::from(*rows) * usize::from(*columns);
+        let each = rests.len() == cells && rest.flickering.iter().all(|&cell| cell < cells);
+        if !inside || values.len() != t.len() * cells || !each {
+            return Err(ProblemError::new_err(format!("source {name}: does not fit the array")));
+        }
+        let known = |&rest: &f64| if rest.is_nan() { f64::NO_REST } else { rest };
+        let rest = FrameRest {
+            source: RestSource::named(&rest.source)
+                .ok_or_else(|| ProblemError::new_err(format!("source {name}: rest {:?} is not known", rest.source)))?,
+            values: rests.iter().map(known).collect(),
+            ticks_by_unit: rest.ticks_by_unit,
+            loaded_from: rest.loaded_from,
+            falls: rest.falls,
+            flickering: rest.flickering.clone(),
+            preload_at: rest.preload_at.clone(),
+        };
+        let area = FrameArea { name: name.clone(), left: *left, rows: *rows, columns: *columns };
+        placed.push(FrameSource { area, t: t.to_vec(), values, rest });
+    }
+    enter(py, |_| Ok::<_, taxel_core::Error>(FrameIndex::new(array, file, placed)))
 }

@@ -1,4 +1,4 @@
-//! What only tests and tools call: the schemas of the panel's messages, and work that panics, waits for Ctrl-C or returns an error of each kind, to see what [`enter`] makes of it.
+//! What only tests call: work that panics, waits for Ctrl-C or returns an error of each kind, to see what [`enter`] makes of it.
 //! Built with the feature `test-hooks` alone.
 
 use std::time::Duration;
@@ -32,10 +32,4 @@ pub fn test_hook(py: Python<'_>, hook: &str) -> PyResult<()> {
         other => return Err(ProblemError::new_err(format!("what is {other:?}: there is no such test hook"))),
     };
     enter(py, |_| Err::<(), _>(error))
-}
-
-/// The JSON schemas of the panel's requests and messages.
-#[pyfunction]
-pub fn message_schemas() -> String {
-    taxel_panel::message_schemas()
 }

@@ -165,7 +165,8 @@ def placed(
     error: _Error, file: str | PathLike[str] | None = None, *, line: int | None = None, byte: int | None = None
 ) -> _Error:
     """Return the same error with its place; what it knows of its place already stays."""
-    known = error.place or Place()
+    there = error.place
+    known = Place() if there is None else Place(there.file, there.line, there.byte)
     if known.line is None and known.byte is None:
         known = replace(known, line=line, byte=byte)
     if known.file is None and file is not None:

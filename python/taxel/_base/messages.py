@@ -16,7 +16,7 @@ from contextvars import ContextVar
 from itertools import chain
 
 #: C0, DEL and C1, the marks and overrides of direction, the separators of lines and paragraphs, and halves of surrogate
-#: pairs, which represent bytes of file names that are not UTF-8. `crates/taxel-panel/web/dom.js` has the same.
+#: pairs, which represent bytes of file names that are not UTF-8. `python/taxel/panel/web/dom.js` has the same.
 _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 

@@ -106,11 +106,10 @@ def asked_to_end() -> Iterator[threading.Event]:
 def leave(code: int | str | None) -> NoReturn:
     """End the process with an exit code.
 
-    Where a thread that Python did not begin runs Python code yet, the interpreter must not end as usual: it would end
-    the thread inside compiled code that called Python, which aborts the process. A request of the panel's page may be
-    such a thread.
+    Where a thread runs Python code yet for which no end of the interpreter waits, it must not end as usual: it would
+    end the thread inside compiled code, which aborts the process. A request of the panel's page may be such a thread.
     """
-    known = {thread.ident for thread in threading.enumerate() if not isinstance(thread, threading._DummyThread)}
+    known = {thread.ident for thread in threading.enumerate() if not thread.daemon}
     if not isinstance(code, int) or set(sys._current_frames()) <= known:
         sys.exit(code)
     atexit._run_exitfuncs()

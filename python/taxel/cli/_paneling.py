@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from taxel.cli.app import Limits
 from taxel.cli.console import Console
-from taxel.live import Panel
+from taxel.panel import Panel
 
 PanelHostOption = Annotated[
     str,

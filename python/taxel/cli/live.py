@@ -41,7 +41,8 @@ from taxel.cli.board import (
 from taxel.cli.console import Console
 from taxel.detect import PlainRule, Readout
 from taxel.device import Cable
-from taxel.live import Live, Panel, Summary, delays
+from taxel.live import Live, Summary, delays
+from taxel.panel import Panel
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 from taxel.wire import Registers

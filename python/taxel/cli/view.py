@@ -19,7 +19,7 @@ from taxel.cli._topics import list_topics
 from taxel.cli.app import App, Flat, JsonOption, SecondsOption
 from taxel.cli.console import Console
 from taxel.formats.ros import is_bag, topics
-from taxel.live import Panel
+from taxel.panel import Panel
 from taxel.recording import Recording
 from taxel.recording.opening import is_folder, recordings_in
 

@@ -1,7 +1,6 @@
-"""From a board's datagrams to detections, as they arrive, and the panel that shows them in a browser."""
+"""From a board's datagrams to detections, as they arrive."""
 
 from taxel.live.live import Live
-from taxel.live.panel import Panel
 from taxel.live.sending import PORT, send
 from taxel.live.source import Source
 from taxel.live.summary import Summary
@@ -10,7 +9,6 @@ from taxel.live.summary import delays as delays
 __all__ = [
     "PORT",
     "Live",
-    "Panel",
     "Source",
     "Summary",
     "send",

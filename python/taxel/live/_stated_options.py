@@ -1,7 +1,4 @@
-"""The options of a `Live` that Rust reads too.
-
-Made from the structs of crates/taxel-live by tools/messages.py (`make messages`): edit those.
-"""
+"""The options of a `Live` that Rust reads too."""
 
 from __future__ import annotations
 

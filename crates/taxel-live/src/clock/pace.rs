@@ -53,7 +53,6 @@ pub fn doubt(drift_ppm: f64, delay_us: f64, median_us: f64) -> Option<String> {
 
 /// The drift and the delays that arrivals show.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Pace {
     /// Drift of the host's clock relative to the board's, parts per million.
     pub drift_ppm: f64,

@@ -128,7 +128,6 @@ const LOST_NS: i64 = 500_000_000;
 /// Whether datagrams arrive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema), schemars(inline))]
 pub enum ArrivalState {
     /// None has arrived so far.
     Nothing,
@@ -142,7 +141,6 @@ pub enum ArrivalState {
 
 /// Whether datagrams arrive, since when none do, and how long they may be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Arrival {
     /// Whether they arrive.
     pub state: ArrivalState,

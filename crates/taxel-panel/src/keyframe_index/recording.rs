@@ -136,6 +136,20 @@ impl RecordingIndex {
         Ok(Arc::new(index))
     }
 
+    /// The index of a file of a board's events; `None` for any other file, an MCAP file of other programs among them.
+    ///
+    /// # Errors
+    ///
+    /// As [`RecordingIndex::open`].
+    pub fn of_a_board(path: &Path) -> Result<Option<Arc<Self>>> {
+        let events = match path.extension().and_then(|ending| ending.to_str()) {
+            Some("mcap") => Reader::open(path).is_ok_and(|recording| recording.header().frames.is_none()),
+            Some("lsa") => true,
+            _ => false,
+        };
+        if events { Self::open(path).map(Some) } else { Ok(None) }
+    }
+
     /// The header of the file.
     #[must_use]
     pub fn header(&self) -> &Header {

@@ -5,11 +5,11 @@ use std::ops::Range;
 use std::slice;
 use std::sync::Arc;
 
+use serde_json::{Value, json};
 use taxel_core::encode::Stream;
 use taxel_core::{Array, Error, Events, Hint, Intensities, Spike, SpikeKind, problem};
 
 use crate::keyframe_index::FrameSources;
-use crate::protocol::messages::Message;
 use crate::readout_encoders::ViewEncoder;
 use crate::time_columns::{SPAN, column_of};
 use taxel_core::held::{UNKNOWN, as_events};
@@ -255,22 +255,24 @@ impl EncodedSpikes {
     }
 
     /// The `spikes` message of the pending spikes, if there are any.
-    pub(crate) fn message(&mut self) -> Option<Message> {
+    pub(crate) fn message(&mut self) -> Option<Value> {
         if self.pending.is_empty() {
             return None;
         }
         let stream = &self.encoders.first()?.stream;
-        let message = Message::Spikes {
-            encoder: self.name.clone(),
-            of_readout: self.of_readout,
-            trains: self.encoders.iter().map(|encoder| encoder.stream.trains()).sum(),
-            signed: stream.kind() == SpikeKind::Signed,
-            latency_ms: stream.latency_ms(),
-            t_ms: self.pending.iter().map(|spike| spike.t).collect(),
-            train: self.pending.iter().map(|spike| spike.train).collect(),
-            value: self.pending.iter().map(|spike| spike.value).collect(),
-            left_out: self.left_out,
-        };
+        let trains: usize = self.encoders.iter().map(|encoder| encoder.stream.trains()).sum();
+        let message = json!({
+            "type": "spikes",
+            "encoder": self.name,
+            "of_readout": self.of_readout,
+            "trains": trains,
+            "signed": stream.kind() == SpikeKind::Signed,
+            "latency_ms": stream.latency_ms(),
+            "t_ms": self.pending.iter().map(|spike| spike.t).collect::<Vec<_>>(),
+            "train": self.pending.iter().map(|spike| spike.train).collect::<Vec<_>>(),
+            "value": self.pending.iter().map(|spike| spike.value).collect::<Vec<_>>(),
+            "left_out": self.left_out,
+        });
         self.pending.clear();
         self.left_out = 0;
         Some(message)

@@ -1,0 +1,137 @@
+"""The board behind the live source: its serial line, and its registers as far as they are known."""
+
+from __future__ import annotations
+
+import json
+import threading
+from typing import Any
+
+from taxel import _core
+from taxel._base.errors import refused
+from taxel._core import DeviceError, ProblemError
+from taxel.array import Array
+from taxel.device import Cable
+from taxel.wire import Command, Registers
+
+#: The registers that can be read; REG6 asks for them.
+_READABLE = (0, 1, 2, 3, 4, 5, 7)
+
+#: Value of REG7 while a recording runs (Table 5.5).
+_RECORD = 1 << 16
+
+#: Registers that are not set by hand.
+_APART = {"record": " is written when a recording starts or stops", "channels": " is a property of the board"}
+
+
+class Board:
+    """Read and write a board's registers over its serial line; methods that do so take long, and one does at a time.
+
+    Parameters
+    ----------
+    cable : Cable or None
+    """
+
+    def __init__(self, cable: Cable | None) -> None:
+        self._cable, self._resets = cable, 0
+        self._lock = threading.Lock()
+        #: In the registers' own units.
+        self.registers: dict[str, Any] = Registers()._held
+        #: Whether they were read from the board.
+        self.known = False
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether there is a serial line."""
+        return self._cable is not None
+
+    @property
+    def place(self) -> str | None:
+        """The place of the serial line."""
+        return None if self._cable is None else self._cable.place
+
+    def connect(self, cable: Cable) -> None:
+        """Use a serial line from now on."""
+        self._cable, self._resets, self.known = cable, 0, False
+
+    def close(self) -> None:
+        """Close the serial line."""
+        with self._lock:
+            if self._cable is not None:
+                self._cable.close()
+                self._cable = None
+
+    def was_reset(self) -> bool:
+        """Return whether the board has reported a reset since the last call."""
+        with self._lock:
+            if self._cable is None:
+                return False
+            self._cable.take_lines()
+            before, self._resets = self._resets, self._cable.resets
+            return before != self._resets
+
+    def read(self) -> None:
+        """Read all registers."""
+        with self._lock:
+            cable = self._connected()
+            try:
+                # It is no register: it is in the board's greeting. A board without one has as many as it had.
+                channels = cable.greeting().channels
+            except DeviceError:
+                channels = self.registers["channels"]
+            words = [cable.read(n) if n in _READABLE else 0 for n in range(8)]
+            self.registers, self.known = _core.registers_of_words(words, channels), True
+
+    def set(self, values: dict[str, Any], array: Array) -> None:
+        """Write registers by name; all, or none where a rule is broken."""
+        fields = []
+        for name, value in values.items():
+            if type(value) not in (bool, int) or not 0 <= value < 2**32:
+                raise refused(name, ": must be a whole number, 0 or more, in the unit of the register")
+            if name in _APART:
+                raise refused(name, _APART[name])
+            fields.append((name, int(value)))
+        self._know()
+        try:
+            self._write(_core.registers_with(json.dumps(self.registers), fields, array._parts()), array)
+        except (DeviceError, ProblemError) as error:
+            if error.argument is None:
+                # A rule of several registers: the field is the one that its text names first.
+                text = str(error)
+                error.argument = min((n for n in values if n in text), key=text.index, default=None)
+                error.args = (text.removeprefix(error.argument or ""),)
+            raise
+
+    def apply(self, preset: str, array: Array) -> None:
+        """Write the registers of a preset."""
+        self._know()
+        self._write(_core.registers_with_preset(json.dumps(self.registers), preset, array._parts()), array)
+
+    def record(self, on: bool) -> None:
+        """Write the register that marks a recording."""
+        with self._lock:
+            self._connected().command(Command(7, _RECORD if on else 0))
+        self.registers = self.registers | {"record": on}
+
+    def _connected(self) -> Cable:
+        if self._cable is None:
+            raise ProblemError("the board's serial line is not connected: give --control to taxel live")
+        return self._cable
+
+    def _know(self) -> None:
+        self._connected()
+        if not self.known:
+            self.read()
+
+    def _write(self, target: dict[str, Any], array: Array) -> None:
+        held = self.registers
+        commands = _core.registers_commands(json.dumps(held), json.dumps(target), array._parts())
+        try:
+            with self._lock:
+                for register, value in commands:
+                    self._connected().command(Command(register, value))
+        except (DeviceError, OSError):
+            # What the board holds now is not certain; the error is that of the write.
+            self.known = False
+            self.read()
+            raise
+        self.registers = target | {"record": held["record"]}

@@ -1,0 +1,174 @@
+"""The folder of recordings: which there are, and those that were opened, indexed."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from taxel import _core
+from taxel._base.errors import refused
+from taxel._core import ProblemError
+from taxel.panel.shown_files import Opening, ShownFiles
+from taxel.panel.threads import in_thread
+
+#: Recordings and readouts in a list.
+_MOST_LISTED = 1000
+
+#: A name that leads nowhere out of the folder.
+_NAME = re.compile(r"(?!\.)[\w ._-]{1,110}")
+
+#: How a file of a readout or a plain rule begins.
+_READOUT = re.compile(rb'"format": "taxel (?:readout|plain rule)"')
+
+
+@dataclass(eq=False)
+class Shown:
+    """Hold a recording as it is shown.
+
+    Parameters
+    ----------
+    name, path : str, Path
+    asked : str or None
+        The trial that was asked for.
+    trial : str
+        The trial that it is, where the file has several; else "".
+    recording : PanelRecording
+    size : int, bytes
+    left_s : float or None
+        How long the rest of the file takes to read, where this is its beginning, s.
+    index_ms : float, ms
+        How long reading it took.
+    """
+
+    name: str
+    path: Path
+    asked: str | None
+    trial: str
+    recording: _core.PanelRecording
+    size: int
+    left_s: float | None
+    index_ms: float
+    reading: asyncio.Task[None] | None = field(default=None)
+
+    @property
+    def us(self) -> int:
+        """How long one us of the file is in the view: above 1 where frames are numbered."""
+        return self.recording.times()[2]
+
+    @property
+    def begin_us(self) -> int:
+        """The first time in the view, us."""
+        range_us = self.recording.times()[0]
+        return 0 if range_us is None else range_us[0]
+
+    def check_label(self, t_us: int) -> None:
+        """Refuse a time of a label outside the recording."""
+        range_us, late_us, us = self.recording.times()
+        if range_us is None:
+            return
+        for beyond, end in ((range_us[0] - t_us, "before the beginning"), (t_us - range_us[1], "after the end")):
+            if beyond > late_us:
+                far = f"{beyond / 1e6:.3f} s" if us == 1 else f"{beyond // us} frames"
+                raise refused("t_us", f": a label is {far} {end} of {self.name}: must be within the recording")
+
+
+class Folder:
+    """List and index the recordings of a folder.
+
+    Parameters
+    ----------
+    path : Path
+    opening : Opening
+        How recordings are opened.
+    asked : str or None
+        The recording that is opened so also if it is a board's.
+    """
+
+    def __init__(self, path: Path, opening: Opening, asked: str | None) -> None:
+        self.path, self._asked = path, asked
+        self.files = ShownFiles(opening)
+        self._opening = opening
+        self._locks: dict[Path, asyncio.Lock] = {}
+        #: The recordings that were opened last, by path and the trial that was asked for.
+        self._open: dict[tuple[Path, str | None], Shown] = {}
+
+    def file(self, name: str) -> Path:
+        """Return the path of a file of the folder, which need not exist; a ProblemError refuses other names."""
+        if not _NAME.fullmatch(name):
+            raise refused(
+                "name",
+                f" {name[:40]!r}: must be 1 to 100 letters, digits, spaces, '.', '_' or '-', not beginning with '.'",
+            )
+        return self.path / name
+
+    def listed(self) -> tuple[list[tuple[str, int, int]], list[str]]:
+        """Return name, size (bytes) and time of the last change (ns since 1970) of each recording, and the readouts."""
+        files, readouts = [], []
+        for file in self.path.iterdir():
+            if not _NAME.fullmatch(file.name):
+                continue
+            try:
+                if self._opening.is_recording(file):
+                    files.append((file.name, _size(file), file.stat().st_mtime_ns))
+                elif file.suffix == ".json" and _begins_as_readout(file):
+                    readouts.append(file.name)
+            except OSError:
+                # It is gone, or may not be read.
+                continue
+        files.sort(key=lambda file: -file[2])
+        return files[:_MOST_LISTED], sorted(readouts)[:_MOST_LISTED]
+
+    def forget(self, path: Path) -> None:
+        """Read a file anew when it is opened next."""
+        self.files.forget()
+        self._open = {key: shown for key, shown in self._open.items() if shown.path != path}
+
+    async def open(self, name: str, trial: str | None, *, entire: bool = False) -> Shown:
+        """Return a recording, indexed once however many clients show it.
+
+        Raises
+        ------
+        ProblemError, FormatError : no recording, or no such trial
+        OSError : it cannot be read
+        """
+        path = self.file(name)
+        async with self._locks.setdefault(path, asyncio.Lock()):
+            known = self._open.get((path, trial))
+            if known is not None and not (entire and known.left_s is not None) and known.size == _size(path):
+                return known
+            shown = await in_thread(self._index, name, path, trial, entire)
+            self._open = dict([*self._open.items()][-3:]) | {(path, trial): shown}
+            return shown
+
+    def _index(self, name: str, path: Path, trial: str | None, entire: bool) -> Shown:
+        begun, size = time.monotonic(), _size(path)
+        recording, shown_trial, left_s = self._read(path, trial, entire)
+        return Shown(name, path, trial, shown_trial, recording, size, left_s, 1e3 * (time.monotonic() - begun))
+
+    def _read(self, path: Path, trial: str | None, entire: bool) -> tuple[_core.PanelRecording, str, float | None]:
+        if path.name != self._asked:
+            of_board = _core.PanelRecording.of_events(path)
+            if of_board is not None:
+                return of_board, "", None
+        events, frames = self.files.read(path, trial, entire=entire)
+        if frames is not None:
+            return _core.PanelRecording.of_frames(frames), frames.trial or "", frames.left_s
+        converted = None if events is None else _core.PanelRecording.of_events(events)
+        if converted is None:
+            raise ProblemError(f"{path}: contains neither events nor frames")
+        return converted, "", None
+
+
+def _size(path: Path) -> int:
+    """Return the size of a recording, bytes: of a bag that is a folder that of its files."""
+    if not path.is_dir():
+        return path.stat().st_size
+    return sum(file.stat().st_size for file in path.iterdir() if file.is_file())
+
+
+def _begins_as_readout(file: Path) -> bool:
+    with open(file, "rb") as opened:
+        return _READOUT.search(opened.read(256)) is not None

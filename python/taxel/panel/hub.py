@@ -1,0 +1,450 @@
+"""What all clients of a panel share: the live source, the board's registers, the folder, labels, the recorder."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import threading
+import time
+from collections.abc import Callable, Coroutine, Iterator
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from taxel import _core
+from taxel._core import ProblemError
+from taxel.detect import load
+from taxel.device import Cable
+from taxel.frames import Frames
+from taxel.live import Live
+from taxel.panel.board import Board
+from taxel.panel.folder import Folder, Shown
+from taxel.panel.labels import LabelTables
+from taxel.panel.messages import MOST_BYTES, text_of
+from taxel.panel.recorder import Recorder
+from taxel.panel.shown_files import Opening
+from taxel.panel.threads import in_thread
+from taxel.panel.training import Training
+from taxel.tare import Tare
+
+_T = TypeVar("_T")
+
+#: How often counters are sent, and tables of labels are looked at, s.
+_COUNT_S, _FOLLOW_S = 0.25, 0.3
+
+
+class Client(Protocol):
+    """Serve a client: a session."""
+
+    view: _core.PanelView
+    shown: Shown | None
+    credits: int
+    answers: bool
+
+    async def say(self, message: dict[str, Any] | str) -> None:
+        """Send a message."""
+
+    async def show_whole(self, whole: Shown) -> None:
+        """Show the whole of a recording whose beginning is shown."""
+
+    async def send_frame(self) -> None:
+        """Send a frame, if there is a new one."""
+
+    def waiting(self) -> int:
+        """Return how many bytes wait for the client."""
+
+    def unread_s(self, waiting: int, now: float) -> float:
+        """Return for how long the client has read nothing of what waits for it, s."""
+
+    def abort(self) -> None:
+        """Disconnect the client at once."""
+
+
+class Hub:
+    """Hold what all clients share. All methods but `live` and `close` are called in the server's thread.
+
+    Parameters
+    ----------
+    live : Live or None
+    registers_stated : bool
+        Whether somebody stated the board's registers.
+    folder : Path
+        That of the recordings.
+    opened : str or None
+        The recording to show first.
+    opening : Opening
+        How recordings are opened.
+    cable : Cable or None
+        The board's serial line, which `close` closes.
+    asked : bool
+        Whether `opened` is opened by `opening` also if it is a board's.
+    """
+
+    def __init__(
+        self,
+        live: Live | None,
+        registers_stated: bool,
+        folder: Path,
+        opened: str | None,
+        opening: Opening,
+        cable: Cable | None,
+        *,
+        asked: bool,
+    ) -> None:
+        self.sessions: list[Client] = []
+        #: Requests that are carried out beside others.
+        self.tasks: set[asyncio.Task[None]] = set()
+        self.opened, self.registers_stated = opened, registers_stated
+        self.folder = Folder(folder, opening, opened if asked else None)
+        self.labels = LabelTables(self.folder, opening)
+        self.recorder = Recorder(self)
+        self.training = Training(opening, self.folder.files)
+        self.board = Board(cable)
+        self.source: _core.PanelLive | None = None
+        # Locked while one `Live` replaces another.
+        self._restarting = threading.Lock()
+        self._live = self._first = live
+        if live is not None:
+            self._show_live(live)
+
+    @property
+    def live(self) -> Live | None:
+        """The live source; waits while another one begins."""
+        with self._restarting:
+            return self._live
+
+    def close(self) -> None:
+        """Close the serial line, remove temporary files, and end a `Live` that was begun here."""
+        self.board.close()
+        self.folder.files.close()
+        if self._live is not None and self._live is not self._first:
+            self._live.stop()
+
+    async def end(self) -> None:
+        """End a training, which no request may wait for."""
+        self.training.close()
+
+    def works(self) -> Iterator[Coroutine[Any, Any, None]]:
+        """Yield what is done beside the clients until the server ends."""
+        yield self._count()
+        yield self._follow_labels()
+        yield self._read_first()
+
+    # ---------------------------------------------------------------------------------------------- clients
+
+    def join(self, session: Client) -> None:
+        """Count another client."""
+        self.sessions.append(session)
+        if self.source is not None:
+            self.source.watch(True)
+
+    def leave(self, session: Client) -> None:
+        """Count one client less."""
+        self.sessions.remove(session)
+        if self.source is not None and not self.sessions:
+            self.source.watch(False)
+
+    async def say(self, message: dict[str, Any] | str) -> None:
+        """Send a message to all clients."""
+        text = message if isinstance(message, str) else await text_of(message)
+        for session in list(self.sessions):
+            await session.say(text)
+
+    async def warn(self, reason: object) -> None:
+        """Tell all clients what went wrong."""
+        await self.say({"type": "warning", "text": str(reason)})
+
+    async def tell(self) -> None:
+        """Send what has happened at the live source."""
+        news = None if self.source is None else self.source.news()
+        if news is None:
+            return
+        detections, was_reset, zeroed, about = news
+        for text in detections:
+            await self.say(text)
+        if was_reset:
+            await self.forget_registers()
+        if zeroed:
+            await self.say(self.zeroed())
+        if about:
+            await self.say(self.hello())
+
+    # ---------------------------------------------------------------------------------------------- the live source
+
+    def needed_live(self) -> Live:
+        """Return the live source; a ProblemError says that there is none."""
+        if self._live is None:
+            raise ProblemError("no board is connected")
+        return self._live
+
+    def needed_source(self) -> _core.PanelLive:
+        """Return the live source as the views see it; a ProblemError says that there is none."""
+        if self.source is None:
+            raise ProblemError("no board is connected")
+        return self.source
+
+    def _show_live(self, live: Live) -> None:
+        """Show another live source from now on."""
+        # It may be the board whose registers were read: then the other source begins with them.
+        source = _core.PanelLive(live._core, json.dumps(self.board.registers) if self.board.known else None)
+        if not self.board.known:
+            self.board.registers = source.registers()
+        source.watch(bool(self.sessions))
+        self._live, self.source = live, source
+
+    async def restart(self, change: Callable[[Live], Live]) -> None:
+        """Show the `Live` that a function makes of the one before.
+
+        Raises
+        ------
+        ProblemError : a recording runs, or the panel shows recordings only; what the function raises
+        """
+        if self.recorder.is_busy:
+            raise ProblemError("a recording runs: stop it first")
+        if self._live is None:
+            raise ProblemError("this panel shows recordings only: start it by taxel live --panel")
+        if self._live._options.record is not None:
+            raise ProblemError("a recording from this address is running; end it first")
+
+        def replaced() -> None:
+            with self._restarting:
+                assert self._live is not None
+                self._show_live(change(self._live))
+
+        await in_thread(replaced)
+        for session in self.sessions:
+            session.view.set_live(self.source)
+        await self.say(self.hello())
+        await self.say(self.registers())
+        await self.say(self.zeroed())
+
+    async def read_source(self, source: str) -> None:
+        """Receive another source, as `sources` of `taxel.live.Live` names it, with all other options unchanged."""
+
+        def change(before: Live) -> Live:
+            # A serial line has one reader at a time.
+            before.stop()
+            try:
+                return before._again(port=None, host=None, sources=source)
+            except Exception:
+                self._show_live(before._again())
+                raise
+
+        await self.restart(change)
+
+    async def read_out(self, readout: Path) -> None:
+        """Read the live source out with another readout: time, values and the past begin again.
+
+        A readout that needs a tare uses that of the board, if there is one; else the present values of the taxels are
+        their rest, so the sensor must be unloaded.
+        """
+
+        def change(before: Live) -> Live:
+            loaded = load(readout)
+            tare = before.tare or (before._options.tare if before._options.readout is not None else None)
+            if tare is None:
+                tare = _rest_of_held(before)
+            before.stop()
+            try:
+                return before._again(readout=loaded, tare=tare)
+            except Exception:
+                # The sensor stays in sight, whatever the readout lacks.
+                self._show_live(before._again())
+                raise
+
+        await self.restart(change)
+
+    # ---------------------------------------------------------------------------------------------- the board
+
+    async def connect(self, cable: Cable) -> None:
+        """Use the board's serial line from now on."""
+        self.board.connect(cable)
+        await self.say(self.hello())
+        await self.prepare()
+
+    async def prepare(self) -> None:
+        """Read the registers that are not known; where the board does not answer now, they stay unknown."""
+        if self.board.is_connected and not self.board.known:
+            try:
+                await self.on_board(self.board.read)
+            except (OSError, _core.Error):
+                return
+
+    async def on_board(self, work: Callable[[], _T]) -> _T:
+        """Work on the board in a thread of its own, and tell all clients what it holds then."""
+        before = dict(self.board.registers), self.board.known
+        try:
+            return await in_thread(work)
+        finally:
+            if before != (self.board.registers, self.board.known):
+                if self.source is not None:
+                    self.source.announce(json.dumps(self.board.registers))
+                await self.say(self.registers())
+                if before[0]["channels"] != self.board.registers["channels"]:
+                    # Other presets fit it.
+                    await self.say(self.presets())
+
+    async def forget_registers(self) -> None:
+        """After a reset the board holds other registers than were read."""
+        if self.board.known:
+            self.board.known = False
+            await self.say(self.registers())
+        await self.prepare()
+
+    # ---------------------------------------------------------------------------------------------- works
+
+    async def _count(self) -> None:
+        """Send the counters, and read the board's line, whose greetings report resets."""
+        while True:
+            await asyncio.sleep(_COUNT_S)
+            if self.source is None or not self.sessions:
+                continue
+            certain = self.registers_stated or self.board.known
+            frame_us = _core.registers_words(json.dumps(self.board.registers))[1] if certain else None
+            counters = self.source.counters(frame_us)
+            await self.say(f'{counters[:-1]},"viewers":{len(self.sessions)}}}')
+            if self.board.is_connected and await in_thread(self.board.was_reset):
+                await self.forget_registers()
+
+    async def _follow_labels(self) -> None:
+        """Read tables of labels again that other programs have changed."""
+        while True:
+            await asyncio.sleep(_FOLLOW_S)
+            try:
+                for name in await self.labels.changed():
+                    await self.say_labels(name)
+            except (OSError, _core.Error) as error:
+                await self.warn(error)
+
+    async def say_labels(self, name: str) -> None:
+        """Send the labels of a recording to the clients that show it."""
+        text = await text_of(self.labels.message(name))
+        for session in list(self.sessions):
+            if (self.recorder.file if session.shown is None else session.shown.name) == name:
+                await session.say(text)
+
+    async def _read_first(self) -> None:
+        """Read the recording to show first while the browser starts; who opens it gets the error."""
+        if self.opened is not None:
+            try:
+                await self.open(self.opened, None)
+            except (OSError, _core.Error):
+                return
+
+    async def open(self, name: str, trial: str | None) -> Shown:
+        """Return a recording of the folder, indexed; of a large text table its beginning, and the rest is read."""
+        shown = await self.folder.open(name, trial)
+        if shown.left_s is not None and shown.reading is None:
+            shown.reading = asyncio.create_task(self._read_rest(shown))
+        return shown
+
+    async def _read_rest(self, shown: Shown) -> None:
+        """Read the whole of a file whose beginning is shown, with progress for the clients."""
+        assert shown.left_s is not None
+        begun = time.monotonic()
+        whole = asyncio.create_task(self.folder.open(shown.name, shown.asked, entire=True))
+        while not (await asyncio.wait({whole}, timeout=1.0))[0]:
+            share = min(0.99, (time.monotonic() - begun) / max(1.0, shown.left_s))
+            await self.say({"type": "loading", "name": shown.name, "share": share})
+        try:
+            complete = whole.result()
+        except (OSError, _core.Error) as error:
+            self.folder.forget(shown.path)
+            await self.warn(f"{error}; only the beginning of the recording is shown")
+            return
+        await self.say({"type": "loading", "name": shown.name, "share": 1.0})
+        for session in list(self.sessions):
+            if session.shown is shown:
+                await session.show_whole(complete)
+
+    # ---------------------------------------------------------------------------------------------- messages
+
+    def hello(self) -> dict[str, Any]:
+        """Return what the panel shows, sent again when any of it changes."""
+        nothing = dict.fromkeys(("array", "udp", "lines", "source", "frames", "readout"))
+        live = {**nothing, "sources": [], "readout_encoders": []} if self.source is None else self.source.about()
+        return {
+            "type": "hello",
+            "protocol": 1,
+            "live": self.source is not None,
+            "control": self.board.place,
+            "most_message_bytes": MOST_BYTES,
+            "folder": str(self.folder.path),
+            "open": self.opened,
+            **live,
+            **_core.panel_limits(),
+        }
+
+    def registers(self) -> dict[str, Any]:
+        """Return the registers that the board holds, or is assumed to hold; sent after every change."""
+        held, array = self.board.registers, None if self._live is None else self._live.array
+        values = json.dumps(held)
+        return {
+            "type": "registers",
+            "known": self.board.known,
+            "stated": self.registers_stated,
+            "values": held,
+            "preset": next((name for name in fitting_presets(held, array) if is_preset(held, name, array)), None),
+            "frame_us": _core.registers_words(values)[1],
+            "warnings": _core.registers_warnings(values),
+        }
+
+    def presets(self) -> dict[str, Any]:
+        """Return the names of the presets that the board can hold."""
+        array = None if self._live is None else self._live.array
+        return {"type": "presets", "built_in": list(fitting_presets(self.board.registers, array))}
+
+    def zeroed(self) -> dict[str, Any]:
+        """Return the taxels of the live source that were zeroed, each as it was last; sent when that has changed."""
+        zeroings = () if self._live is None else self._live.zeroed
+        return {
+            "type": "zeroed",
+            "taxels": [{"taxel": (z.x, z.y), "t_us": z.t, "rest": z.rest, "before": z.before} for z in zeroings],
+        }
+
+    async def recordings(self) -> dict[str, Any]:
+        """Return the recordings of the folder, newest first, and its readouts; sent when any was changed."""
+        files, readouts = await in_thread(self.folder.listed)
+        counts = {name: self.labels.count(name) for name, _, _ in files}
+        return {
+            "type": "recordings",
+            "folder": str(self.folder.path),
+            "files": [
+                {"name": name, "bytes": size, "modified_ns": at_ns, "labels": counts[name]}
+                for name, size, at_ns in files
+            ],
+            "readouts": readouts,
+        }
+
+
+def fitting_presets(held: dict[str, Any], array: Any) -> Iterator[str]:
+    """Yield the names of the presets that a board of an array can hold, all of them without a board."""
+    for name in _core.registers_presets():
+        if array is not None:
+            try:
+                wanted = _core.registers_with_preset(json.dumps(held), name, array._parts())
+                _core.registers_with(json.dumps(wanted), [], array._parts())
+            except _core.Error:
+                continue
+        yield name
+
+
+def is_preset(held: dict[str, Any], name: str, array: Any) -> bool:
+    """Return whether registers equal a preset, whatever the version of the wire."""
+    held = held | {"record": False}
+    if array is None:
+        return held == _core.registers_preset(name)
+    return held == _core.registers_with_preset(json.dumps(held), name, array._parts())
+
+
+def _rest_of_held(live: Live) -> Tare:
+    """Return the values that the taxels hold now as their rest."""
+    values = live.frame.astype(float)
+    if not np.nan_to_num(values).any():
+        raise ProblemError(
+            "read_out: no values of taxels have arrived yet, so their rest is unknown; wait for the board"
+        )
+    return Tare.take(
+        Frames([values, values], [0, 1], unit=live.unit, array=live.array), note="the values when the readout began"
+    )

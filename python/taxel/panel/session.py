@@ -1,0 +1,614 @@
+"""The session of a client: its requests, each a method, and what it is sent."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import math
+import time
+from collections import deque
+from collections.abc import Coroutine, Iterator
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NotRequired, TypedDict
+
+from websockets.exceptions import ConnectionClosed
+
+from taxel import _core
+from taxel._base.errors import refused
+from taxel._core import ProblemError
+from taxel.device import ports
+from taxel.labels import Note
+from taxel.panel.declared import Number, Request, Several, Text, Time, Whole, long_request, request, requests_of
+from taxel.panel.folder import Shown
+from taxel.panel.label_file import Edit
+from taxel.panel.messages import dumps, text_of
+from taxel.panel.shown_files import judged
+from taxel.panel.threads import in_thread
+
+if TYPE_CHECKING:
+    from websockets.asyncio.server import ServerConnection
+
+    from taxel.panel.hub import Hub
+
+#: Frames on their way, labels of a request, long requests at a time, changes of labels that can be undone.
+_MOST_CREDITS, _MOST_LABELS, _MOST_LONG, _MOST_CHANGES = 8, 5000, 8, 1000
+
+#: A client with more refused requests than the first within the second is disconnected, s.
+_MOST_REFUSED, _REFUSED_WITHIN_S = 100, 10.0
+
+#: A client that does not read as many bytes that wait for it is disconnected.
+_MOST_WAITING = 1 << 21
+
+
+class Row(TypedDict):
+    """Hold a label as the page has it."""
+
+    label: Annotated[str, Text(200, least=0)]
+    t_us: Time
+    source: Annotated[str, Text(64, least=0)]
+    trial: Annotated[str, Text(255, least=0)]
+    replaces_us: NotRequired[Time | None]
+
+
+class Change(TypedDict):
+    """Hold a change of labels: `new` in the place of `old`; without `old` a new label, without `new` a deletion."""
+
+    old: NotRequired[Row | None]
+    new: NotRequired[Row | None]
+
+
+class Session:
+    """Serve a client.
+
+    Parameters
+    ----------
+    hub : Hub
+        What all clients share.
+    connection : ServerConnection
+        The client's web socket.
+    """
+
+    def __init__(self, hub: Hub, connection: ServerConnection) -> None:
+        self._hub, self._connection = hub, connection
+        self.view = _core.PanelView(hub.source)
+        #: The recording that is shown; None: the live source.
+        self.shown: Shown | None = None
+        #: Frames that may be sent; none while a request is answered, so that a frame shows what was answered before it.
+        self.credits, self.answers = 0, False
+        self._advancing: asyncio.Task[None] | None = None
+        self._long: set[asyncio.Task[None]] = set()
+        self._refusals: deque[float] = deque()
+        #: What takes the newest changes of labels back, by the recording's name.
+        self._changes: deque[tuple[str, tuple[Edit, ...]]] = deque(maxlen=_MOST_CHANGES)
+        self._unread = (0, 0.0)
+
+    # ---------------------------------------------------------------------------------------------- sending
+
+    async def greet(self) -> None:
+        """Say what the panel shows."""
+        hub = self._hub
+        await hub.prepare()
+        for message in (
+            hub.hello(),
+            hub.registers(),
+            hub.presets(),
+            hub.recorder.message(),
+            await hub.recordings(),
+            hub.zeroed(),
+        ):
+            await self.say(message)
+        for text in [] if hub.source is None else hub.source.latest_detections():
+            await self.say(text)
+
+    async def say(self, message: dict[str, Any] | str) -> None:
+        """Send a message; a client that does not read is disconnected, and one that has left is no error."""
+        if self.waiting() > _MOST_WAITING:
+            return self.abort()
+        text = message if isinstance(message, str) else await text_of(message)
+        with contextlib.suppress(ConnectionClosed):
+            await self._connection.send(text)
+        return None
+
+    def waiting(self) -> int:
+        """Return how many bytes wait for the client."""
+        return self._connection.transport.get_write_buffer_size()
+
+    def unread_s(self, waiting: int, now: float) -> float:
+        """Return for how long the client has read nothing of what waits for it, s."""
+        before, since = self._unread
+        if before == 0 or waiting < before:
+            since = now
+        self._unread = (waiting, since)
+        return now - since
+
+    def abort(self) -> None:
+        """Disconnect the client at once."""
+        self._connection.transport.abort()
+
+    async def send_frame(self) -> None:
+        """Send a frame, if there is a new one; what takes long before it is done in another thread."""
+        self._unread = (0, 0.0)
+        made = self.view.frame(self._hub.recorder.is_busy or bool(self._hub.board.registers["record"]))
+        if made is not None:
+            frame, texts = made
+            self.credits -= 1
+            await self._connection.send(frame)
+            for text in texts:
+                await self.say(text)
+        if self.view.moves() and self._advancing is None:
+            self._advancing = asyncio.create_task(self._advance())
+
+    async def _advance(self) -> None:
+        try:
+            if await in_thread(self.view.advance):
+                await self._say_transport()
+        finally:
+            self._advancing = None
+
+    async def _say_transport(self) -> None:
+        state, speed, t_us = self.view.transport()
+        source = None if self.shown is None else self.shown.name
+        await self.say({"type": "transport", "source": source, "state": state, "speed": speed, "t_us": t_us})
+
+    # ---------------------------------------------------------------------------------------------- answering
+
+    async def answer(self, text: str) -> bool:
+        """Carry out a request; return whether the client may go on."""
+        number, kind = None, ""
+        self.answers = True
+        try:
+            number, kind, asked, keys = _parsed(text)
+            arguments = asked.read(keys)
+            if not asked.is_long:
+                await asked.method(self, **arguments)
+            elif len(self._long) >= _MOST_LONG:
+                raise ProblemError("too many requests at a time: wait for their answers")
+            else:
+                task = asyncio.create_task(self._carry_out(asked.method(self, **arguments), number, kind))
+                # It goes on when the client has left.
+                for tasks in (self._long, self._hub.tasks):
+                    tasks.add(task)
+                    task.add_done_callback(tasks.discard)
+                return True
+        except Exception as error:
+            await self._refuse(error, number, kind)
+        else:
+            if number is not None:
+                await self.say({"type": "done", "id": number})
+        finally:
+            self.answers = False
+        return self._may_go_on()
+
+    async def _carry_out(self, work: Coroutine[Any, Any, None], number: int | str | None, kind: str) -> None:
+        try:
+            await work
+        except Exception as error:
+            await self._refuse(error, number, kind)
+        else:
+            if number is not None:
+                await self.say({"type": "done", "id": number})
+
+    async def _refuse(self, error: Exception, number: int | str | None, kind: str) -> None:
+        self._refusals.append(time.monotonic())
+        await self.say(
+            {"type": "refused", "id": number, "what": kind, "reason": reason(error), "field": field_of(error)}
+        )
+
+    def _may_go_on(self) -> bool:
+        while self._refusals and self._refusals[0] < time.monotonic() - _REFUSED_WITHIN_S:
+            self._refusals.popleft()
+        return len(self._refusals) <= _MOST_REFUSED
+
+    # ------------------------------------------------------------------------------------------ requests: the view
+
+    @request
+    async def credit(self, n: Annotated[int, Whole(1, _MOST_CREDITS)]) -> None:
+        """Give credits for `n` more frames."""
+        self.credits = min(_MOST_CREDITS, self.credits + n)
+
+    @request
+    async def watch(
+        self, taxel: tuple[Annotated[int, Whole(0, 65_535)], Annotated[int, Whole(0, 65_535)]] | None
+    ) -> None:
+        """Send the history of this taxel; null for none."""
+        await in_thread(self.view.watch, taxel)
+
+    @request
+    async def encode(self, encoder: dict[str, Any] | None) -> None:
+        """Send spikes of this encoder (JSON as `Encoder.to_json` writes it) of what this view shows; null for none.
+
+        A name without parameters is that of the encoder of the readout that reads what is shown, with its parameters
+        and its tare, where the readout has one of this name; else the parameters are the defaults.
+        """
+        with _field("encoder", whole=True):
+            await in_thread(self.view.encode, None if encoder is None else json.dumps(encoder))
+
+    @request
+    async def zoom(self, column_us: Annotated[int, Whole(1, 2**40)], end_us: Time | None = None) -> None:
+        """Send columns of time of this width, for this view: 125 us times a power of two.
+
+        With `end_us`, in a view that does not follow the newest, the columns end there, wherever the view's time is,
+        and stay until the next `zoom`; a view that plays beyond takes them along. Without it they end at the view's
+        time.
+        """
+        await in_thread(self.view.zoom, column_us, end_us)
+
+    @request
+    async def seek(self, t_us: Time) -> None:
+        """Show this time: of the recording, or while live within the reach; stops playing."""
+        await in_thread(self.view.seek, t_us)
+        await self._say_transport()
+
+    @request
+    async def play(self, speed: Annotated[float, Number(0.001, 100)] | None = None) -> None:
+        """Play from here at this speed (board time over real time; the last one where left out)."""
+        await in_thread(self.view.play, speed)
+        await self._say_transport()
+
+    @request
+    async def pause(self) -> None:
+        """Pause the view. Acquisition continues."""
+        await in_thread(self.view.pause)
+        await self._say_transport()
+
+    @request
+    async def step(self, frames: Annotated[int, Whole(-1000, 1000)]) -> None:
+        """Go forward or back (negative) by this number of time stamps with events; stops playing."""
+        await in_thread(self.view.step, frames)
+        await self._say_transport()
+
+    @request
+    async def live(self) -> None:
+        """Follow the live source; leaves a recording."""
+        await in_thread(self.view.follow)
+        self.shown = None
+        await self._say_transport()
+
+    @request
+    async def open(self, name: Annotated[str, Text(110)], trial: Annotated[str, Text(255)] | None = None) -> None:
+        """Show a recording of the folder at its beginning, paused: any file that `taxel.open` reads.
+
+        Of a file with several trials the one that `trial` names, or the first. `opened`, `labels` and `transport`
+        follow. Of a large text table the beginning is shown first, `loading` follows each second, and then `opened`
+        again, at the same time of the view.
+        """
+        with _field("name"):
+            shown = await self._hub.open(name, trial)
+            await self._show(shown, None)
+
+    async def _show(self, shown: Shown, t_us: int | None) -> None:
+        trouble = None
+        try:
+            if await self._hub.labels.read(shown):
+                await self._hub.say_labels(shown.name)
+        except (OSError, _core.Error) as error:
+            trouble = reason(error)
+        await in_thread(self.view.show, shown.recording, t_us)
+        self.shown = shown
+        opened = {
+            "type": "opened",
+            "name": shown.name,
+            "bytes": shown.size,
+            "train": self._hub.training.command(shown.path, self._hub.folder.file(readout_of(shown.name))),
+            "index_ms": shown.index_ms,
+        }
+        contents = await in_thread(shown.recording.opened)
+        await self.say(f"{dumps(opened)[:-1]},{contents[1:]}")
+        await self.say(self._hub.labels.message(shown.name))
+        await self._say_transport()
+        if trouble is not None:
+            await self.say({"type": "warning", "text": trouble})
+
+    async def show_whole(self, whole: Shown) -> None:
+        """Show the whole of a recording whose beginning is shown, at the same time."""
+        state, speed, t_us = self.view.transport()
+        try:
+            await self._show(whole, t_us)
+            if state == "playing":
+                await in_thread(self.view.play, speed)
+        except (OSError, _core.Error) as error:
+            await self.say({"type": "warning", "text": reason(error)})
+
+    @request
+    async def overview(self) -> None:
+        """Send `overview` of what this view shows: events and the greatest force over time, for the strip."""
+        if self.shown is not None:
+            await self.say(await in_thread(self.shown.recording.overview, self.shown.name))
+        elif self._hub.source is not None:
+            await self.say(await in_thread(self._hub.source.overview))
+        else:
+            raise ProblemError("nothing is shown: open a recording first")
+
+    @long_request
+    async def health(self) -> None:
+        """Send `health` of what this view shows, by the rules of `taxel info`."""
+        if self.shown is None:
+            found = await in_thread(judged, await in_thread(self._hub.needed_source().activity))
+        elif (activity := await in_thread(self.shown.recording.activity)) is not None:
+            found = await in_thread(judged, activity)
+        else:
+            found = await in_thread(self._hub.folder.files.judge, self.shown.path, self.shown.asked)
+        await self.say({"type": "health", "source": None if self.shown is None else self.shown.name, **found})
+
+    # ------------------------------------------------------------------------------------------ requests: the board
+
+    @request
+    async def rest(self, how: Literal["now", "lowest"]) -> None:
+        """Take the held values as the rest from now on (`now`), or find it again (`lowest`), for all clients."""
+        self._hub.needed_source().rest(how == "now")
+
+    @request
+    async def zero(
+        self,
+        taxels: Annotated[
+            list[tuple[Annotated[int, Whole(0, 65_535)], Annotated[int, Whole(0, 65_535)]]], Several(1 << 16)
+        ],
+    ) -> None:
+        """Take the present values of these taxels as their rest from now on, also for the readout; all or none.
+
+        The recording notes the time and the rests before and after. `zeroed` follows.
+        """
+        columns, rows = zip(*taxels, strict=True)
+        await in_thread(self._hub.needed_live().zero, columns, rows)
+
+    @request
+    async def set_(self, values: dict[str, Any]) -> None:
+        """Write registers, by taxel's names or the manual's, in the registers' own units; all or none."""
+        array = self._hub.needed_live().array
+        await self._hub.on_board(lambda: self._hub.board.set(values, array))
+
+    @request
+    async def read(self) -> None:
+        """Read all registers back from the board."""
+        await self._hub.on_board(self._hub.board.read)
+
+    @request
+    async def preset_apply(self, name: Annotated[str, Text(60)]) -> None:
+        """Write the registers of one of the manual's presets, which does not change the version of the wire."""
+        array = self._hub.needed_live().array
+        await self._hub.on_board(lambda: self._hub.board.apply(name, array))
+
+    @request
+    async def ports(self) -> None:
+        """Send `ports`: the serial ports that the system knows, USB devices first."""
+        found = await in_thread(ports)
+        texts = [", ".join(filter(None, (port.product, port.maker, port.serial))) for port in found]
+        listed = [{"place": port.place, "about": about} for port, about in zip(found, texts, strict=True)]
+        await self.say({"type": "ports", "ports": listed})
+
+    @long_request
+    async def guess(self, port: Annotated[str, Text(255)], baud: Annotated[int, Whole(*_core.BAUDS)]) -> None:
+        """Send `guess`: how the lines of a sensor on a serial port look, within two seconds.
+
+        `source` is what `connect` takes, with rows, columns and what else the lines show.
+        """
+        lines, about, source = await in_thread(_core.lines_preview, f"serial:{port},baud={baud}")
+        await self.say({"type": "guess", "lines": lines, "about": about, "source": source})
+
+    @request
+    async def connect(self, source: Annotated[str, Text(1024)]) -> None:
+        """Receive the lines of numbers of a sensor instead, for all clients; refused while recording."""
+        if not source.startswith("serial:"):
+            raise refused("source", ": must begin with serial:; taxel live --source takes the others")
+        with _field("source"):
+            await self._hub.read_source(source)
+
+    @request
+    async def disconnect(self) -> None:
+        """Receive nothing any more, for all clients: the port is free for other programs."""
+        live = self._hub.needed_live()
+        rows, columns = live.array.shape
+        await self._hub.read_source(f"{live.name}=given,array={rows}x{columns},rate=1")
+
+    @request
+    async def invert(self) -> None:
+        """Take smaller values as more pressure: of the recording shown, by the layout file beside it, or live.
+
+        The recording is read again by the next `open`; a live source begins again.
+        """
+        if self.shown is not None:
+            await in_thread(self._hub.folder.files.invert, self.shown.path)
+            self._hub.folder.forget(self.shown.path)
+        else:
+            source = self._hub.needed_source().about()["source"]
+            if source is None:
+                raise ProblemError("the live source is a board: its values are known to rise with pressure")
+            await self._hub.read_source(f"{source},falls=true")
+
+    # ------------------------------------------------------------------------------------------ requests: recordings
+
+    @request
+    async def recordings(self) -> None:
+        """Send `recordings`: those of the folder, and its readouts."""
+        await self.say(await self._hub.recordings())
+
+    @request
+    async def record(
+        self,
+        name: Annotated[str, Text(100)],
+        label: Annotated[str, Text(200)] | None = None,
+        length_s: Annotated[float, Number(0.01, 86_400)] | None = None,
+    ) -> None:
+        """Record to NAME.mcap, for `length_s`, or else until `stop`.
+
+        `label` is written into the recording as a note without a time: it is about the whole, and is not an event.
+        """
+        await self._hub.recorder.begin(name, label, length_s)
+
+    @request
+    async def stop(self) -> None:
+        """End the recording."""
+        self._hub.recorder.end()
+
+    @request
+    async def note(self, text: Annotated[str, Text(200)]) -> None:
+        """Write a note into the recording that runs, with the time of now."""
+        await in_thread(self._hub.needed_live().note, text)
+
+    @long_request
+    async def cut(self, start_us: Time, stop_us: Time, name: Annotated[str, Text(100)]) -> None:
+        """Write a stretch of the recording shown to a new file of the folder: what `taxel cut` does."""
+        shown, out = self._needed("cut"), self._hub.folder.file(name)
+        if start_us >= stop_us:
+            raise refused("stop_us", ": must be after start_us")
+        if out.exists():
+            raise refused("name", f": {name} exists already; choose another name")
+        # The first frame from the start on, and the first after the end.
+        begin, end = (math.ceil(t_us / shown.us) for t_us in (start_us, stop_us))
+        lost = await in_thread(self._hub.folder.files.cut, shown.path, shown.asked, out, begin, end)
+        await self._hub.say(await self._hub.recordings())
+        await self.say({"type": "cut", "name": name, "lost": lost})
+
+    # ------------------------------------------------------------------------------------------ requests: labels
+
+    @request
+    async def change(self, changes: Annotated[list[Change], Several(_MOST_LABELS)]) -> None:
+        """Change labels of the recording shown, or of the one that runs; all or none.
+
+        `old` is a label as `labels` has it. A label with `replaces_us` replaces the recording's own note of that time,
+        which counts no more; if it is deleted, the note does not count again until a label replaces it. Refused for a
+        time outside the recording, and where another window or program has changed the label since.
+        """
+        trial = "" if self.shown is None else self.shown.trial
+        if any(new is not None and not new["label"].strip() for new in (change.get("new") for change in changes)):
+            raise refused("label", ": must be a text of 1 to 200 characters")
+        edits = [(_note(change.get("old"), None), _note(change.get("new"), trial)) for change in changes]
+        await self._change(edits)
+
+    async def _change(self, edits: list[Edit]) -> None:
+        name = self._labelled()
+        inverse = await self._hub.labels.change(name, self.shown, edits)
+        if inverse:
+            self._changes.append((name, inverse))
+        await self._hub.say_labels(name)
+
+    @request
+    async def undo(self) -> None:
+        """Take back the last change of labels that this client made in the recording that it shows or that runs."""
+        name = self._labelled()
+        made = next((change for change in reversed(self._changes) if change[0] == name), None)
+        if made is None:
+            raise ProblemError("nothing to undo: no label of this recording was changed in this window")
+        self._changes.remove(made)
+        await self._hub.labels.take_back(name, made[1])
+        await self._hub.say_labels(name)
+
+    def _labelled(self) -> str:
+        """Return the recording whose labels are changed."""
+        name = self._hub.recorder.file if self.shown is None else self.shown.name
+        if name is None:
+            raise ProblemError("a label needs a recording: open a recording, or start one")
+        return name
+
+    # ------------------------------------------------------------------------------------------ requests: readouts
+
+    @long_request
+    async def train(self) -> None:
+        """Train a readout on the labels of the recording shown, as `taxel train --labels notes` does.
+
+        The readout replaces NAME.readout.json beside the recording. `trained` comes before the answer, when the
+        training has ended. One training runs at a time.
+        """
+        shown = self._needed("train")
+        readout, us = readout_of(shown.name), shown.us
+        trained = await in_thread(self._hub.training.train, shown.path, self._hub.folder.file(readout))
+        mistakes = [mistake | {"t_us": mistake["t_us"] * us} for mistake in trained.pop("mistakes")]
+        await self._hub.say(await self._hub.recordings())
+        await self.say({"type": "trained", "name": shown.name, "readout": readout, "mistakes": mistakes, **trained})
+
+    @request
+    async def training(self) -> None:
+        """Send `training`: the latest progress of the training that runs, in words; empty where none runs."""
+        await self.say({"type": "training", "text": self._hub.training.progress()})
+
+    @request
+    async def train_stop(self) -> None:
+        """End the training that runs: it is refused, and writes nothing."""
+        await in_thread(self._hub.training.end)
+
+    @long_request
+    async def read_out(self, readout: Annotated[str, Text(110)]) -> None:
+        """Read what this view shows with a readout or a plain rule of the folder.
+
+        A recording: `detections` follows. The live source: from now on, for all clients; it begins again. A readout
+        that needs a tare uses that of the command, else what the taxels hold now.
+        """
+        with _field("readout"):
+            path = self._hub.folder.file(readout)
+        shown = self.shown
+        if shown is None:
+            return await self._hub.read_out(path)
+        labels, encoder, found = await in_thread(self._hub.training.detect, shown.path, shown.asked, path)
+        if self.shown is shown:
+            await in_thread(self.view.set_readout, encoder)
+        message = {"type": "detections", "source": shown.name, "readout": readout, "labels": labels}
+        names = [] if encoder is None else _core.panel_encoders(encoder)
+        await self.say(message | {"encoders": names, "detections": found})
+        return None
+
+    def _needed(self, action: str) -> Shown:
+        if self.shown is None:
+            raise ProblemError(f"{action}: open a recording first")
+        return self.shown
+
+
+#: The requests by name.
+REQUESTS = requests_of(Session)
+
+
+def readout_of(recording: str) -> str:
+    """Return the name of the readout that is trained on a recording."""
+    return f"{recording.rpartition('.')[0] or recording}.readout.json"
+
+
+def _parsed(text: str) -> tuple[int | str | None, str, Request, dict[str, Any]]:
+    """Return number, name and keys of a request, and how it is carried out."""
+    try:
+        keys = json.loads(text)
+    except (ValueError, RecursionError):
+        keys = None
+    if not isinstance(keys, dict):
+        raise ProblemError("not a JSON object")
+    number, kind = keys.pop("id", None), keys.pop("type", None)
+    if number is not None and type(number) is not int and not (isinstance(number, str) and len(number) <= 64):
+        raise refused("id", ": must be a whole number, or a text of 64 characters at most")
+    asked = REQUESTS.get(kind) if isinstance(kind, str) else None
+    if asked is None:
+        raise refused("type", f": must be one of {', '.join(REQUESTS)}")
+    return number, kind, asked, keys
+
+
+def _note(row: Row | None, trial: str | None) -> Note | None:
+    """Return a label of the page as a table holds it; a new one without a trial is of the one that is shown."""
+    if row is None:
+        return None
+    of_trial = row["trial"] or trial or ""
+    return Note(row["label"].strip(), row["t_us"], 0, of_trial, row["source"], row.get("replaces_us"))
+
+
+def reason(error: Exception) -> str:
+    """Return why a request is refused, for a person."""
+    if isinstance(error, _core.Error):
+        return str(error)
+    if isinstance(error, OSError):
+        words = {FileExistsError: "exists already", FileNotFoundError: "no such file or device"}
+        where = "" if error.filename is None else f"{error.filename}: "
+        what = "permission denied" if isinstance(error, PermissionError) else words.get(type(error))
+        return f"{where}{what or error.strerror or error}"
+    return f"failed within taxel; please report it: {type(error).__name__}: {error}"
+
+
+def field_of(error: Exception) -> str | None:
+    """Return the key or register at fault."""
+    return getattr(error, "field", None) or getattr(error, "argument", None)
+
+
+@contextlib.contextmanager
+def _field(name: str, *, whole: bool = False) -> Iterator[None]:
+    """Note the key at fault where an error names none of the request; or, of a `whole` object, in any case."""
+    try:
+        yield
+    except (OSError, _core.Error) as error:
+        if whole or getattr(error, "argument", None) is None:
+            error.field = name  # type: ignore[union-attr]
+        raise

@@ -1,0 +1,186 @@
+"""Readouts on the page: one is trained on a recording, and run on others."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import threading
+from collections.abc import Iterator
+from operator import itemgetter
+from pathlib import Path
+from subprocess import PIPE
+from typing import Any
+
+from taxel._base.child_process import ChildProcess
+from taxel._base.progress import Steps
+from taxel._core import ProblemError
+from taxel.detect import Readout, load
+from taxel.panel.shown_files import Opening, ShownFiles
+
+#: Code with which a task ends that was stopped.
+_INTERRUPTED = 130
+
+#: The reason that a client sees of a training that was stopped.
+_STOPPED = "the training was stopped: nothing was written"
+
+
+def _scores(result: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield the scores of each label, of the neuron and of the plain rule, of a training."""
+    plain = result["plain_rule"]
+    for label in result["labels"]:
+        rows = [(False, result["neurons"])]
+        if plain is not None and plain["score"] is not None and plain["rules"].get(label) is not None:
+            rows.append((True, plain["score"]))
+        for is_plain_rule, score in rows:
+            counts = score["by_label"][label]
+            yield {
+                "label": label,
+                "is_plain_rule": is_plain_rule,
+                "found": counts["found"],
+                "missed": counts["missed"],
+                "false": counts["false"],
+                "delay_ms": counts["known_delay_ms"]["median"],
+            }
+
+
+def typed(path: Path) -> str:
+    """Return a path as it is typed in the folder where taxel was started."""
+    here = Path.cwd()
+    name = str(path.relative_to(here) if path.is_relative_to(here) else path)
+    # A name that begins with a dash is no option.
+    return f"./{name}" if name.startswith("-") else name
+
+
+class Training:
+    """Train readouts in a separate process, one at a time, and run them on recordings.
+
+    Parameters
+    ----------
+    opening : Opening
+        How recordings are opened.
+    files : ShownFiles
+        Reads them.
+    """
+
+    def __init__(self, opening: Opening, files: ShownFiles) -> None:
+        self._opening, self._files = opening, files
+        self._training: ChildProcess | None = None
+        self._steps = Steps()
+        self._closed, self._lock = False, threading.Lock()
+
+    def close(self) -> None:
+        """End a training that runs, and begin no other: the server waits for no request that takes long."""
+        with self._lock:
+            self._closed = True
+        self.end()
+
+    def train(self, recording: Path, out: Path) -> dict[str, Any]:
+        """Train on the labels of a recording, and return what the page shows of it, with times as in the file."""
+        request = {
+            "recordings": [str(recording)],
+            "open": self._opening.options_of(recording).given(),
+        }
+        with self._lock:
+            if self._closed:
+                raise ProblemError(_STOPPED)
+            if self._training is not None:
+                raise ProblemError("a training runs already: stop it first, or wait for its end")
+            self._steps = Steps()
+            # A separate process, so that it does not delay receiving.
+            line = json.dumps(request | {"out": typed(out), "overwrite": True})
+            self._training = ChildProcess("taxel.tasks", ["train"], line=line, stdout=PIPE)
+        try:
+            with self._training:
+                answer = self._answer(self._training)
+            code = self._training.returncode
+        finally:
+            self._training = None
+        if answer["type"] == "error":
+            raise ProblemError(answer["text"])
+        if answer["type"] != "result":
+            stopped = code < 0 or code == _INTERRUPTED
+            raise ProblemError(_STOPPED if stopped else f"the training ended with code {code}")
+        lines = [*answer["lines"], *(f"warning: {text}" for text in answer["result"]["warnings"])]
+        result = answer["result"]
+        mistakes = [
+            {
+                "label": mistake["label"],
+                "t_us": mistake["t_us"],
+                "is_missed": mistake["missed"],
+                "source": mistake["source"],
+                "trial": mistake["recording"],
+            }
+            for mistake in result["mistakes"]
+        ]
+        return {
+            "text": "\n".join(lines),
+            "judged_on": answer["lines"][0],
+            "scores": list(_scores(result)),
+            "mistakes": mistakes,
+            "next": answer["command"],
+        }
+
+    def _answer(self, training: ChildProcess) -> dict[str, Any]:
+        """Wait until a training has ended, and return the last line that it wrote."""
+        assert training.stdout is not None
+        line: dict[str, Any] = {"type": "progress"}
+        for written in training.stdout:
+            if not written.endswith("\n"):  # it was stopped while it wrote
+                break
+            line = json.loads(written)
+            if line["type"] == "progress":
+                self._steps.update(line["step"], line["done"], line["of"])
+        training.wait()
+        return line
+
+    def progress(self) -> str:
+        """Return how far the training that runs is; empty if none runs."""
+        return str(self._steps) if self._training is not None else ""
+
+    def command(self, recording: Path, out: Path) -> str:
+        """Return the command that trains the same in a shell, in the folder where taxel was started.
+
+        It is empty where the recording was opened by options that only a layout file can give to a training.
+        """
+        options = self._opening.options_of(recording)
+        words = options.words()
+        if not options.given().keys() <= {"layout", "label_column"}:
+            return ""
+        return shlex.join(["taxel", "train", typed(recording), "--labels", "notes", "-o", typed(out), *words])
+
+    def end(self) -> None:
+        """End the training that runs, if one does."""
+        training = self._training
+        if training is not None:
+            training.end()
+
+    def detect(
+        self, recording: Path, trial: str | None, readout: Path
+    ) -> tuple[list[str], str | None, list[dict[str, Any]]]:
+        """Detect by a readout in a recording or its trial.
+
+        Returns
+        -------
+        tuple of list of str, str or None, and list of dict
+            The readout's labels; its encoder, as JSON, with the tare that it read with (none for several sensors, each
+            of which has its own); the detections in the order in which they are known.
+        """
+        from taxel.tasks import detect  # noqa: PLC0415  the command line starts quickly
+
+        loaded = load(readout)
+        opened, _ = self._files.opened(recording, trial)
+        detected = detect(loaded, opened).each
+        encoder = loaded.encoder if isinstance(loaded, Readout) else None
+        if encoder is not None and len(detected) == 1 and detected[0].rest is not None:
+            encoder = encoder.with_tare(detected[0].rest.tare)
+        names = [each.recording.label or "" if len(detected) > 1 else "" for each in detected]
+        found = [
+            {"label": found.label, "t_us": found.t, "known_us": found.known, "source": name}
+            for each, name in zip(detected, names, strict=True)
+            for found in each.outcome.found
+        ]
+        return (
+            list(loaded.labels),
+            None if encoder is None else encoder.to_json(),
+            sorted(found, key=itemgetter("known_us")),
+        )

@@ -1,0 +1,315 @@
+// The lanes, one above the other: all share one time. A new lane is an entry of LANES and what draws it: the block on the page, its element, its
+// box in the tab of the view and what the cursor says come from the entry.
+
+import { Channels } from "./channels.js";
+import { make, part, themed, write } from "./dom.js";
+import { UNKNOWN_VALUE } from "./protocol.js";
+import { Raster } from "./raster.js";
+import uPlot from "./vendor/uPlot.js";
+import { rounded, integer } from "./words.js";
+
+/** @typedef {import("./timeline.js").Timeline} Timeline */
+/** @typedef {{ draw: (timeline: Timeline, shown: Shown) => string, colour?: () => void }} Painter `draw` returns what the heading says;
+ *   `colour` is called before it, and for each theme */
+/** @typedef {{ scales: uPlot.Scales, series: uPlot.Series[], axes: uPlot.Axis[], bands?: uPlot.Band[] }} Plan of the curves, without the axis of time */
+
+/**
+ * What the page shows.
+ * @typedef {object} Shown
+ * @property {import("./geometry.js").Geometry} sensor
+ * @property {import("./geometry.js").Taxel | null} taxel the watched one
+ * @property {string} named its name
+ * @property {{ unit: string, step: number, zero: number, frames: boolean }} values their unit, the size of a tick in it, ticks of the value 0, and whether they are of frames
+ * @property {{ unit: string, step: number }} sums unit of the sum of the values, and size of a tick in it
+ * @property {number | null} gap_us how long frames of a live source may be away until the curves have a gap; null: however long
+ * @property {string} raster "changes" or "spikes"
+ * @property {string} spikes encoder and latency
+ */
+
+/**
+ * A lane. It draws curves (`plan`, `at`, `says`), or paints a canvas (`painter`).
+ * @typedef {object} Lane
+ * @property {string} name of its elements: `NAME-block` with a heading, and `NAME-lane`
+ * @property {string} label what it is, for those who hear the page
+ * @property {number} least height that it needs with its heading, CSS pixels
+ * @property {string} [kind] class of its block and of its element in style.css
+ * @property {`show${string}`} setting that shows it
+ * @property {string} [box] text of the setting's box; without one it shares the box of another lane
+ * @property {(shown: Shown) => boolean} [fits] whether it has anything to show of this source; without it: of all
+ * @property {(shown: Shown, sources: string[]) => (Node | string)[]} heading
+ * @property {(shown: () => Shown, sources: string[]) => Plan} [plan]
+ * @property {(shown: Shown, timeline: Timeline, column: number) => (number | null)[]} [at] values of all curves in a column
+ * @property {(shown: Shown, timeline: Timeline, column: number) => string[]} [says] texts of the outputs in its heading, of a column
+ * @property {(element: HTMLElement) => Painter} [painter]
+ */
+
+/** Room for the numbers on either side, CSS pixels; the raster has the same. */
+const SIDE = 44;
+/** CSS pixels between two lines of the grid. */
+const GRID_PX = 96;
+/** Steps between the numbers of an axis of counts. */
+const WHOLE = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000];
+/** Up to this many channels have a curve each. */
+const MOST_CHANNELS = 64;
+/** Colours of the sums of several sources, by their names in style.css. */
+const COLOURS = ["more", "less", "label", "good"];
+
+/** @param {string} kind */
+const swatch = (kind) => make("span", { class: `swatch ${kind}` });
+/** @param {Record<string, string>} [attributes] */
+const output = (attributes) => make("output", { "aria-live": "off", ...attributes });
+
+/**
+ * @param {string} scale
+ * @param {number} side
+ * @param {string} stroke
+ * @returns {uPlot.Axis}
+ */
+const axis = (scale, side, stroke) => ({
+  scale, side, stroke,
+  size: SIDE, gap: 4, space: 24,
+  font: "11px system-ui, sans-serif",
+  grid: { show: side === 3, stroke: themed("grid"), width: 1 },
+  ticks: { show: false },
+  values: (_, marks) => marks.map((mark) => (mark >= 10_000 ? `${mark / 1000}k` : String(mark))),
+});
+/** @param {string} stroke @param {string} scale @param {number[]} [dash] @returns {uPlot.Series} */
+const line = (stroke, scale, dash) => ({ stroke, scale, width: 1.25, points: { show: false }, ...(dash ? { dash } : {}) });
+/** @param {() => number} least of its end @returns {uPlot.Scale.Range} */
+const fromZero = (least) => (_, __, greatest) => [0, Math.max(least(), (greatest ?? 0) * 1.1)];
+/** @param {string[]} sources @returns {string[]} the colour of each, or of one curve for all */
+const coloured = (sources) => (sources.length ? COLOURS.slice(0, sources.length) : COLOURS.slice(0, 1)).map(themed);
+
+/** @param {Shown} shown @param {Timeline} timeline @param {number} column @returns {string[]} the sum, of several sources of each */
+const sumsAt = ({ sums: { unit, step } }, timeline, column) =>
+  timeline.sums(column).map((sum) => (Number.isNaN(sum) ? "missing" : `${step === 1 ? integer(sum) : rounded(sum * step)} ${unit}`));
+
+/** @param {Shown} shown @param {Timeline} timeline @param {number} column @returns {string} the number of taxels that are pressed */
+const areaAt = ({ sensor }, timeline, column) => (Number.isNaN(timeline.area[column]) ? "" : sensor.area(timeline.area[column]));
+
+/** @param {Shown} shown @param {Timeline} timeline @param {number} column @returns {string} the centre of pressure, of several sources of each that is pressed */
+function centreAt({ sensor }, timeline, column) {
+  const [first, ...others] = timeline.centres(column);
+  if (sensor.kind === "channels" || Number.isNaN(timeline.sum[column])) return "";
+  if (timeline.area[column] <= 1) return "";
+  if (!others.length) return Number.isNaN(first[0]) ? "nothing pressed" : sensor.centre(...first);
+  const pressed = [first, ...others].flatMap((at, k) => (Number.isNaN(at[0]) ? [] : [`${sensor.sources[k].name} ${sensor.within(k, at)}`]));
+  return pressed.length ? pressed.join(", ") + sensor.unit : "nothing pressed";
+}
+
+/** The lanes, from top to bottom. @type {readonly Lane[]} */
+export const LANES = [
+  {
+    name: "raster", label: "Raster of events by row over time", kind: "raster", least: 96,
+    setting: "showRaster", box: "Raster, channels",
+    // The values of frames and of channels say more than their changes.
+    fits: ({ raster, values, sensor }) => raster === "spikes" || (!values.frames && sensor.kind !== "channels"),
+    heading: ({ raster }) =>
+      raster === "spikes" ? ["Raster spikes of ", output({ id: "spikes-info", class: "dim" })] : ["Raster ", make("span", {}, swatch("more"), " more ", swatch("less"), " less, by row")],
+    painter: (element) => new Raster(element),
+  },
+  {
+    name: "channels", label: "Curve of each channel over time, one above the other", kind: "raster", least: 96,
+    setting: "showRaster",
+    fits: ({ sensor }) => sensor.kind === "channels" && sensor.count <= MOST_CHANNELS,
+    heading: () => ["Channels ", swatch("more"), " ", output({ id: "channels-scale", class: "dim" })],
+    painter: (element) => new Channels(element),
+  },
+  {
+    name: "taxel", label: "History of the watched taxel", least: 72,
+    setting: "showTaxel", box: "Taxel",
+    fits: ({ taxel }) => taxel !== null,
+    heading: () => ["Taxel ", make("span", {}, "least to greatest, last"), " ", output()],
+    says: ({ values: { unit, step, zero } }, timeline, column) => {
+      const [least, greatest, last] = timeline.history.subarray(3 * column, 3 * column + 3);
+      if (last === UNKNOWN_VALUE) return [];
+      const value = (/** @type {number} */ ticks) => rounded((ticks - zero) * step);
+      return [`${value(last)} ${unit}${least === greatest ? "" : ` (${value(least)} to ${value(greatest)})`}`];
+    },
+    plan: (shown) => {
+      /** @type {uPlot.Series} the edge of a band */
+      const bound = { scale: "value", points: { show: false } };
+      const room = () => 2 * shown().values.step;
+      return {
+        scales: { value: { range: (_, least, greatest) => (least === null ? [0, 10] : [least - room(), greatest + room()]) } },
+        series: [bound, bound, line(themed("more"), "value")],
+        bands: [{ series: [2, 1], fill: themed("band") }],
+        axes: [axis("value", 3, themed("dim"))],
+      };
+    },
+    at: ({ values: { step, zero } }, { history }, column) =>
+      history[3 * column + 2] === UNKNOWN_VALUE ? [] : Array.from(history.subarray(3 * column, 3 * column + 3), (ticks) => (ticks - zero) * step),
+  },
+  {
+    name: "force", label: "Sum of the values, or force", least: 72,
+    setting: "showForce", box: "Sum or force",
+    heading: ({ sums }, sources) => [
+      make("b", { id: "force-title" }, sums.unit === "N" ? "Force" : "Sum"),
+      " ",
+      make("span", { id: "force-sums" }, ...(sources.length ? sources.flatMap((source, k) => [swatch(COLOURS[k]), ` ${source} `, output(), " "]) : [swatch("more"), " ", output({ id: "force-sum" })])),
+    ],
+    says: sumsAt,
+    plan: (shown, sources) => ({
+      scales: { force: { range: fromZero(() => 8 * shown().sums.step) } },
+      series: coloured(sources).map((colour) => line(colour, "force")),
+      axes: [axis("force", 3, sources.length ? themed("dim") : themed("more"))],
+    }),
+    at: ({ sums: { step } }, timeline, column) => timeline.sums(column).map((sum) => (sum >= 0 ? sum * step : null)),
+  },
+  {
+    name: "area", label: "Number of taxels pressed", kind: "low", least: 54,
+    setting: "showArea", box: "Area",
+    fits: ({ sensor }) => sensor.kind !== "channels",
+    heading: () => ["Area ", swatch("less"), " ", output({ id: "area-now" })],
+    says: (shown, timeline, column) => [areaAt(shown, timeline, column)],
+    plan: () => ({ scales: { area: { range: fromZero(() => 8) } }, series: [line(themed("less"), "area")], axes: [{ ...axis("area", 3, themed("less")), incrs: WHOLE }] }),
+    at: (_, timeline, column) => [timeline.area[column] >= 0 ? timeline.area[column] : null],
+  },
+  {
+    name: "centre", label: "Centre of pressure", kind: "low", least: 62,
+    setting: "showCentre", box: "Centre",
+    fits: ({ sensor }) => sensor.kind !== "channels",
+    heading: ({ sensor: { axes: [across, down] } }, sources) =>
+      // Of several sources each value has the name of its axis.
+      ["Centre ", make("span", { class: sources.length ? "apart" : "" }, swatch("more"), sources.length ? " " : ` ${across} `, swatch("less dashed"), sources.length ? "" : ` ${down}`), " ", output({ id: "centre-now" })],
+    says: (shown, timeline, column) => [centreAt(shown, timeline, column)],
+    plan: (shown, sources) => {
+      const [low, high] = shown().sensor.limits;
+      const down = themed("less");
+      return {
+        scales: { centre: { range: [low, high] } },
+        series: coloured(sources).flatMap((colour) => [line(colour, "centre"), line(sources.length ? colour : down, "centre", [5, 3])]),
+        axes: [{ ...axis("centre", 3, themed("dim")), splits: () => [low, (low + high) / 2, high], values: (_, marks) => marks.map(rounded) }],
+      };
+    },
+    // A single loaded taxel has no centre of its own.
+    at: ({ sensor }, timeline, column) =>
+      timeline.area[column] <= 1 ? [] : timeline.centres(column).flatMap(([x, y], k) => (Number.isNaN(x) ? [null, null] : [sensor.kind === "channels" ? x : sensor.across(k, x), y])),
+  },
+];
+
+/** The lanes on the page. */
+export class Lanes {
+  /**
+   * @param {import("./settings.js").Settings} settings
+   * @param {() => Shown} shown
+   */
+  constructor(settings, shown) {
+    this.settings = settings;
+    this.shown = shown;
+    /** Names of the sources that have curves of their own; empty: one for all. @type {string[]} */
+    this.sources = [];
+    /** What the headings and plots were made for. */
+    this.made = "";
+    /** The length of the window, s, and where the axis has numbers, s from its left edge. */
+    this.span_s = 1;
+    /** @type {number[]} */
+    this.splits = [];
+    const observer = new ResizeObserver(() => this.fit());
+    this.all = LANES.map((lane) => {
+      const [heading, element] = [make("h2"), make("div", { id: `${lane.name}-lane`, class: `lane ${lane.kind ?? ""}`, role: "img", "aria-label": lane.label })];
+      const block = make("section", { id: `${lane.name}-block`, class: lane.kind ?? "" }, heading, element);
+      part("axis", HTMLElement).before(block);
+      observer.observe(element);
+      return { lane, block, heading, element, painter: lane.painter?.(element), plot: /** @type {uPlot | null} */ (null) };
+    });
+  }
+
+  /** @returns {Lane[]} those that are shown */
+  get visible() {
+    const shown = this.shown();
+    return LANES.filter(({ setting, fits }) => this.settings.values[setting] && (!fits || fits(shown)));
+  }
+
+  /** Shows the lanes that the settings ask for and the source has. */
+  show() {
+    const { visible } = this;
+    for (const { lane, block } of this.all) block.hidden = !visible.includes(lane);
+    this.renew();
+  }
+
+  /** Makes headings and plots where they are not yet for this theme and source. */
+  renew() {
+    const { sources } = this;
+    const shown = this.shown();
+    const { sensor, sums, raster } = shown;
+    const key = JSON.stringify([this.settings.theme, sensor.kind, sensor.limits, sensor.axes, sums.unit, raster, sources]);
+    if (this.made === key) return;
+    this.made = key;
+    const grid = { stroke: themed("grid"), width: 1 };
+    /** @type {uPlot.Axis} */
+    const time = { show: true, size: 0, values: () => [], grid, ticks: { show: false }, splits: () => this.splits };
+    for (const item of this.all) {
+      const { lane, heading, element, painter } = item;
+      heading.replaceChildren(...lane.heading(shown, sources));
+      painter?.colour?.();
+      item.plot?.destroy();
+      if (!lane.plan) continue;
+      const { scales, series, axes, bands } = lane.plan(this.shown, sources);
+      item.plot = new uPlot(
+        {
+          bands, series: [{}, ...series], axes: [time, ...axes],
+          width: Math.max(100, element.clientWidth), height: Math.max(40, element.clientHeight),
+          // Half of the uppermost number's height; on the right, room for numbers where there are none.
+          padding: [7, axes.length > 1 ? 0 : SIDE, 4, 0],
+          legend: { show: false }, cursor: { show: false },
+          scales: { x: { time: false, range: () => [0, this.span_s] }, ...scales },
+        },
+        [[], ...series.map(() => [])],
+        element,
+      );
+    }
+  }
+
+  /** Fits the plots to their elements. */
+  fit() {
+    for (const { plot, element: { clientWidth: width, clientHeight: height } } of this.all) {
+      if (plot && width > 0 && height > 0 && (plot.width !== width || plot.height !== height)) plot.setSize({ width, height });
+    }
+  }
+
+  /** @param {Timeline} timeline */
+  draw(timeline) {
+    const { columns, window, column_us } = timeline;
+    const shown = this.shown();
+    this.sources = shown.sensor.sources.slice(0, timeline.source_count).map(({ name }) => name);
+    this.renew();
+    this.span_s = timeline.span_us / 1e6;
+    this.splits = timeline.ticks(part("lanes", HTMLElement).clientWidth / GRID_PX).map(({ share }) => share * this.span_s);
+    const gaps = shown.gap_us !== null && columns ? timeline.gaps(columns[0] - 1, columns[1], shown.gap_us) : new Set();
+    for (const { lane, block, heading, painter, plot } of this.all) {
+      if (block.hidden) continue;
+      const drawn = painter?.draw(timeline, shown) ?? "";
+      if (painter) for (const output of heading.querySelectorAll("output")) write(output, drawn);
+      if (!plot || !lane.at || !columns || !window) continue;
+      // A column more on the left, so that curves begin at the edge.
+      const numbers = Array.from({ length: columns[1] - columns[0] + 2 }, (_, i) => columns[0] - 1 + i);
+      /** @type {(number | null)[][]} */
+      const curves = plot.series.slice(1).map(() => []);
+      for (const number of numbers) {
+        const column = timeline.known(number);
+        const values = column < 0 || gaps.has(number) ? [] : lane.at(shown, timeline, column);
+        curves.forEach((curve, k) => curve.push(values[k] ?? null));
+      }
+      // A curve has the value at the end of its column.
+      plot.setData([numbers.map((number) => ((number + 1) * column_us - window[0]) / 1e6), ...curves]);
+    }
+  }
+
+  /** Writes the values at the cursor, or at the time shown. @param {Timeline | null} timeline */
+  write(timeline) {
+    const shown = this.shown();
+    const column = timeline?.pointed ?? -1;
+    for (const { lane, heading } of this.all) {
+      if (!lane.says) continue;
+      const texts = timeline && column >= 0 ? lane.says(shown, timeline, column) : [];
+      heading.querySelectorAll("output").forEach((output, k) => write(output, texts[k] ?? ""));
+    }
+    if (!timeline || column < 0) return;
+    const { sensor } = shown;
+    const sums = sumsAt(shown, timeline, column);
+    const sum = sums.length > 1 ? sums.map((text, k) => `${sensor.sources[k].name} ${text}`).join(", ") : sums[0];
+    const more = sensor.kind === "channels" ? "" : ` over ${areaAt(shown, timeline, column)}, centre (${sensor.axes.join(", ")}): ${centreAt(shown, timeline, column)}`;
+    write(part("shown-info", HTMLElement), Number.isNaN(timeline.sum[column]) ? "missing" : `${sum}${more}`);
+  }
+}

@@ -1,0 +1,604 @@
+// The live panel: one page for a board and for recordings. Creates its parts, passes messages to them, and draws.
+
+import { bindActions } from "./actions.js";
+import { Board } from "./board.js";
+import { writeCounters, writePace } from "./counters.js";
+import { Cursor } from "./cursor.js";
+import { Detections, recorded } from "./detections.js";
+import { make, part, write } from "./dom.js";
+import { showKeys } from "./keys.js";
+import { Labels } from "./labels.js";
+import { Lanes } from "./lanes.js";
+import { Layout } from "./layout.js";
+import { Maps } from "./maps.js";
+import { Mistakes } from "./mistakes.js";
+import { Notes } from "./notes.js";
+import { failed, notify, silence } from "./notice.js";
+import { Player } from "./player.js";
+import { readFrame } from "./protocol.js";
+import { Recorder } from "./recorder.js";
+import { Sensor } from "./sensor.js";
+import { Server } from "./server.js";
+import { Settings } from "./settings.js";
+import { showState } from "./state.js";
+import { Strip } from "./strip.js";
+import { showTab } from "./tabs.js";
+import { Timeline } from "./timeline.js";
+import { Training } from "./training.js";
+import { View } from "./view.js";
+import { TimeWindow } from "./window.js";
+import { beginning, begun, counted, numbering, short } from "./words.js";
+
+/** @typedef {import("./messages.js").Message} Message */
+/** @typedef {import("./messages.js").Hello} Hello */
+/** @typedef {import("./messages.js").Counters} Counters */
+/** @typedef {import("./messages.js").Opened} Opened */
+/** @typedef {import("./messages.js").ArrayInfo} ArrayInfo */
+
+/** How often text is written, and lanes are drawn, ms. */
+const TEXT_MS = 125;
+const LANES_MS = 33;
+/** How often lanes are drawn for users who prefer reduced motion, ms. */
+const REDUCED_MS = 1000;
+const OVERVIEW_MS = 2000;
+/** The curves of frames have a gap where none came for so long, us, and for so many frames. */
+const LEAST_GAP_US = 500_000;
+const GAP_FRAMES = 3;
+
+const settings = new Settings();
+const fragment = new URLSearchParams(location.hash.slice(1));
+const server = new Server(fragment.get("token") ?? "", receive, receiveFrame, showConnection);
+const player = new Player(server, failed);
+const detections = new Detections((t_us) => player.seek(t_us));
+const timeWindow = new TimeWindow(server, player, () => timeline, () => hello?.columns_us ?? null, () => {
+  lanesDue = marksDue = true;
+});
+const cursor = new Cursor(() => timeline, (t_us) => player.seek(t_us), timeWindow, mark);
+const maps = new Maps(settings, watch);
+const lanes = new Lanes(settings, shown);
+const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), (from, to) => timeWindow.closer(from, to), listRecordings);
+const notes = new Notes(player, labels);
+const mistakes = new Mistakes(player, () => {
+  marksDue = true;
+  layout.arrange();
+});
+const training = new Training(server, player, mistakes, () => showDetections(detections.shown, detections.labels));
+const layout = new Layout(arrangement, () => (lanesDue = true));
+const board = new Board(server, failed);
+const sensor = new Sensor(server);
+const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
+part("turn-values", HTMLButtonElement).onclick = () => {
+  const name = opened?.name;
+  server.request({ type: "invert" }).then(() => {
+    if (!name) return;
+    reread = name;
+    ask(name);
+  }, failed);
+};
+const recorder = new Recorder(server, failed, () => showTab("record"));
+const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, mistakes: mistakes.shown, notes: notes.withTime, cut: view.cut }));
+
+/** @type {Timeline | null} */
+let timeline = null;
+/** @type {Hello | null} */
+let hello = null;
+/** @type {Opened | null} */
+let opened = null;
+/** @type {Counters | null} */
+let counters = null;
+/** @type {import("./messages.js").Registers | null} */
+let registers = null;
+/** Taxels of the board that the user has zeroed. @type {import("./messages.js").Zeroing[]} */
+let zeroed = [];
+/** The recording that is being opened. @type {string | null} */
+let opening = null;
+/** The recording that is read anew, in another way. */
+let reread = "";
+/** Encoder and latency of the spikes in the raster. */
+let spikes = "";
+/** Why the last one was not opened. */
+let refused = "";
+/** Whether the server is connected, and why not. */
+let connection = { connected: false, why: "" };
+/** @type {import("./messages.js").Recordings | null} */
+let recordings = null;
+/** What is to be drawn again: the maps, the lanes, the marks over the lanes. */
+let mapsDue = false;
+let lanesDue = true;
+let marksDue = true;
+/** Only the line at the time shown is to be drawn again. */
+let timeDue = true;
+/** Frames drawn in the last second. */
+let drawn = 0;
+
+// ------------------------------------------------------------------------------------------------ connection
+
+/** @param {"open" | "lost"} state @param {string} why */
+function showConnection(state, why) {
+  connection = { connected: state === "open", why };
+  if (state === "open") {
+    // The server knows nothing of the view after a new connection.
+    if (maps.taxel) watch(maps.taxel);
+    view.encode();
+    timeWindow.forget();
+    timeWindow.ask();
+  }
+  writeState();
+}
+
+function writeState() {
+  showState(connection, player.transport, hello, opened, recorder.status, counters, opening, refused);
+  writePace(opened ? opened.pace : (counters?.pace ?? null));
+}
+
+/** Whether there are two maps to choose from: of frames there are no events, and of channels no map, only their values. */
+const hasMaps = () => !opened?.frames && maps.geometry.kind !== "channels";
+
+/** The maps that are shown. */
+const mapsShown = () => (hasMaps() ? settings.values.maps : "pressure");
+
+/** Shows values and times as the source has them: ticks and seconds, or a unit and the numbers of frames. */
+function showUnits() {
+  const frames = opened?.frames;
+  const live = opened ? null : hello?.frames;
+  const { unit, step, zero } = frames ?? live ?? { unit: "ticks", step: 1, zero: 0 };
+  maps.values = { unit, step, zero, frames: frames !== null && frames !== undefined };
+  maps.name();
+  numbering.number_us = frames?.number_us ?? null;
+  numbering.begin_us = beginning(opened?.start_us ?? live?.begin_us ?? null);
+  write(part("begun", HTMLElement), begun() && `0 s: ${begun()}`);
+  const trials = part("trials", HTMLSelectElement);
+  trials.hidden = !frames?.trials.length;
+  trials.replaceChildren(...(frames?.trials ?? []).map((name) => make("option", { value: name }, name)));
+  trials.value = frames?.trial ?? "";
+  showLanes();
+}
+
+/** @returns {number | null} how long frames of the live source may be away, us; null of a board, which sends nothing at rest */
+function gapOfFrames() {
+  const frame_us = counters?.arrival.heartbeat_us ?? null;
+  return opened || !hello?.lines || frame_us === null ? null : Math.max(LEAST_GAP_US, GAP_FRAMES * frame_us);
+}
+
+/** @returns {import("./lanes.js").Shown} */
+function shown() {
+  const { geometry: sensor, taxel, values } = maps;
+  const newtons = opened?.frames?.newtons ?? null;
+  // The sum of the values is a force where they are in N, or where it is known of a pressure.
+  const sums = newtons === null ? { unit: values.unit, step: values.step } : { unit: "N", step: newtons };
+  return { sensor, taxel, named: maps.named(), values, sums, gap_us: gapOfFrames(), raster: settings.values.raster, spikes };
+}
+
+/** What the page has to place: see `Layout`. */
+function arrangement() {
+  return { aspect: maps.aspect, maps: mapsShown() === "both" ? 2 : 1, lanes: lanes.visible };
+}
+
+/** Lists the recordings, with the labels as the page knows them. */
+function listRecordings() {
+  if (recordings) recorder.list(recordings, player.transport.source, (file) => labels.count(file));
+}
+
+/** @param {[number, number] | null} taxel */
+function watch(taxel) {
+  server.send({ type: "watch", taxel });
+  timeline?.unwatch();
+  showLanes();
+}
+
+/** @param {ArrayInfo} array */
+function resize(array) {
+  if (!timeline || timeline.rows !== array.rows || maps.columns !== array.columns) {
+    timeline = new Timeline(array.rows, hello?.column_us ?? 4000);
+    timeWindow.forget();
+  }
+  maps.size(array, opened?.frames?.sources ?? []);
+  showLanes();
+}
+
+/** @param {ArrayBuffer} buffer */
+function receiveFrame(buffer) {
+  const frame = readFrame(buffer);
+  if (!timeline || frame.rows !== timeline.rows || frame.columns !== maps.columns) {
+    resize({ rows: frame.rows, columns: frame.columns, pitch_mm: null, name: "", exists: null });
+  }
+  if (!timeline) return;
+  const followed = timeline.following;
+  timeline.put(frame);
+  timeWindow.follow(frame);
+  if (followed !== frame.following) timeWindow.ask();
+  maps.take(frame);
+  player.t_us = frame.t_us;
+  if (frame.following && player.transport.state !== "following" && player.transport.source === null) move({ ...player.transport, source: null, state: "following" });
+  mapsDue = timeDue = true;
+  // The columns of a window that does not follow the newest change only where the server sends all of them, or where the window moves.
+  if (frame.following || frame.restart) lanesDue = true;
+  if (frame.following) marksDue = true;
+}
+
+// ------------------------------------------------------------------------------------------------ messages
+
+/** @param {Message} message */
+function receive(message) {
+  switch (message.type) {
+    case "hello":
+      return greet(message);
+    case "registers":
+      registers = message;
+      showAssumed();
+      return showRegisters();
+    case "presets":
+      return board.takePresets(message);
+    case "counters":
+      counters = message;
+      if (player.transport.source === null) player.reach = message.reach_us;
+      return writeState();
+    case "detection":
+      // Of several sources the first is read out.
+      detections.add({ ...message, source: (hello?.sources.length ?? 0) > 1 ? hello?.sources[0] ?? "" : "" });
+      marksDue = true;
+      if (player.transport.source === null) showDetections(detections.live, hello?.readout ?? []);
+      return;
+    case "spikes":
+      spikes = spikesInfo(message);
+      lanesDue = true;
+      return;
+    case "recorder":
+      recorder.take(message);
+      if (player.transport.source === null) labels.choose(message.state === "recording" || message.state === "finishing" ? message.file : null);
+      return writeState();
+    case "recordings":
+      recordings = message;
+      training.list(message);
+      return listRecordings();
+    case "trained":
+      return training.take(message);
+    case "training":
+      return training.progress(message.text);
+    case "detections":
+      if (message.source === player.transport.source) {
+        view.offer(message.encoders);
+        training.reads = message.readout;
+        showDetections(recorded(message.detections), message.labels);
+      }
+      return;
+    case "opened":
+      return open(message);
+    case "overview":
+      if (message.source === player.transport.source) strip.overview = message;
+      return;
+    case "transport":
+      return move(message);
+    case "labels":
+      labels.take(message);
+      notes.show();
+      labels.offer(hello?.readout ?? []);
+      return;
+    case "health":
+      maps.health = message;
+      maps.mark();
+      return view.takeHealth(message);
+    case "zeroed":
+      zeroed = message.taxels;
+      return showZeroed();
+    case "ports":
+      return sensor.offer(message);
+    case "guess":
+      return sensor.take(message);
+    case "cut":
+      return notify(`wrote ${message.name}${message.lost.length ? `; left out: ${message.lost.join(", ")}` : ""}`);
+    case "loading":
+      return notify(message.share < 1 ? `${message.name}: ${Math.round(100 * message.share)} % read; the beginning is shown` : `${message.name} is read`);
+    case "warning":
+      return notify(message.text, true);
+    case "refused":
+      return notify(message.reason, true);
+  }
+}
+
+/** Marks the taxels that were zeroed: of the board, or of the recording that is shown. */
+function showZeroed() {
+  maps.zeroed = opened ? opened.zeroed : zeroed;
+  maps.mark();
+}
+
+/** @param {import("./messages.js").Spikes} spikes @returns {string} */
+function spikesInfo({ encoder, of_readout, latency_ms, left_out }) {
+  return `${encoder.replaceAll("_", " ")}, ${of_readout ? "parameters of the readout" : "default parameters"}, latency ${latency_ms.toFixed(1)} ms${left_out ? `, ${counted(left_out, "spike")} not shown` : ""}`;
+}
+
+/** @param {Hello} message */
+function greet(message) {
+  const first = hello === null;
+  hello = message;
+  player.live = message.live;
+  if (message.array && player.transport.source === null) resize(message.array);
+  board.greet(message);
+  view.greet(message);
+  if (!opened) {
+    view.offer(message.readout_encoders);
+    showUnits();
+  }
+  labels.offer(message.readout ?? []);
+  showAssumed();
+  showRegisters();
+  recorder.able = message.live;
+  recorder.write();
+  part("record", HTMLButtonElement).hidden = !message.live;
+  part("record-start", HTMLButtonElement).disabled = !message.live;
+  part("counters", HTMLElement).hidden = part("sensor-open", HTMLElement).hidden = !message.live;
+  if (first && !message.live) showTab("labels");
+  showDetections(detections.shown, opened ? detections.labels : (message.readout ?? []));
+  document.title = message.live ? "taxel · live" : "taxel · view";
+  if (maps.taxel) watch(maps.taxel);
+  server.send({ type: "recordings" });
+  if (message.live) server.send({ type: "overview" });
+  const name = fragment.get("open") ?? message.open;
+  if (name && (first || !message.live)) ask(name, fragment.get("trial") ?? undefined);
+  player.show();
+  writeState();
+}
+
+/**
+ * Another recording is shown, or the live source: a reload of the page shows it again, and messages about the last one go.
+ * @param {Opened | null} shown
+ */
+function turnTo(shown) {
+  const kept = { open: shown?.name, trial: shown?.frames?.trial };
+  for (const [key, value] of Object.entries(kept)) {
+    if (value) fragment.set(key, value);
+    else fragment.delete(key);
+  }
+  history.replaceState(null, "", `#${fragment}`);
+  silence();
+  maps.forget();
+}
+
+/** Asks for a recording, or for a trial of it; says so while it is read. @param {string} name @param {string} [trial] */
+async function ask(name, trial) {
+  opening = name;
+  refused = "";
+  writeState();
+  try {
+    await server.request({ type: "open", name, ...(trial === undefined ? {} : { trial }) });
+  } catch (error) {
+    const why = error instanceof Error ? error.message : String(error);
+    refused = why.includes(name) ? why : `${name}: ${why}`;
+    // What is open stays open, so that the same file can be chosen again once it is mended.
+    if (opening === name) part("files", HTMLSelectElement).value = opened?.name ?? "";
+    // Where nothing is shown it stands above the maps.
+    if (player.transport.source !== null || hello?.live) notify(refused, true);
+  }
+  if (opening === name) opening = null;
+  writeState();
+}
+
+/** A readout that runs live assumes a frame, where the registers were neither stated nor read. */
+function showAssumed() {
+  const assumes = hello?.readout && !hello.lines && registers && !registers.known && !registers.stated && !opened;
+  write(part("assumed", HTMLElement), assumes ? `The readout assumes frames of ${short(registers?.frame_us ?? 0)}: the registers are not known.` : "");
+}
+
+/** Shows the registers of the board, or of the recording that is shown. */
+function showRegisters() {
+  const values = opened ? opened.registers : (registers?.values ?? null);
+  maps.floor = Number(opened?.frames?.floor ?? values?.noise_floor ?? 0);
+  if (opened) {
+    if (!hello?.live) board.showRecorded(opened.registers, opened.frame_us);
+  } else if (registers && hello?.live) board.take(registers);
+}
+
+/** @param {Opened} message */
+function open(message) {
+  const again = reread !== message.name && opened?.name === message.name && opened.frames?.trial === message.frames?.trial;
+  opened = message;
+  reread = "";
+  player.transport = { ...player.transport, source: message.name, state: "paused" };
+  player.reach = message.start_us === null || message.stop_us === null ? null : [message.start_us, message.stop_us];
+  player.t_us = message.start_us;
+  strip.overview = null;
+  showUnits();
+  resize(message.array);
+  timeWindow.forget();
+  if (!again) turnTo(message);
+  if (timeline && !again) {
+    timeline.following = false;
+    timeWindow.showBeginning(message.touch_us);
+    // It opens on something: the first touch.
+    if (message.touch_us !== null) player.seek(message.touch_us);
+  }
+  training.choose(message.name, message.train, message.frames?.trial ?? null);
+  board.array = message.array;
+  const noisy = message.frames?.flickering ?? [];
+  maps.flickering = noisy.length;
+  maps.health = noisy.length ? { dead: [], stuck: [], noisy } : null;
+  showZeroed();
+  part("files", HTMLSelectElement).value = message.name;
+  labels.choose(message.name, message.frames?.trial);
+  view.choose(message.name);
+  view.offer([]);
+  showDetections(recorded(message.detections), [...new Set(message.detections.map(({ label }) => label))].sort());
+  notes.choose(message.notes);
+  server.send({ type: "overview" });
+  showRegisters();
+  player.show();
+  writeState();
+}
+
+/** @param {import("./messages.js").Transport} transport */
+function move(transport) {
+  const changed = transport.source !== player.transport.source;
+  player.take(transport);
+  if (transport.source === null && (opened || changed)) {
+    opened = null;
+    showUnits();
+    strip.overview = null;
+    timeline = null;
+    training.choose(null);
+    if (hello?.array) resize(hello.array);
+    turnTo(null);
+    maps.health = null;
+    showZeroed();
+    part("files", HTMLSelectElement).value = "";
+    notes.choose([]);
+    player.reach = counters?.reach_us ?? null;
+    labels.choose(recorder.status?.state === "recording" ? recorder.status.file : null);
+    view.choose(null);
+    view.offer(hello?.readout_encoders ?? []);
+    showDetections(detections.live, hello?.readout ?? []);
+    showRegisters();
+    server.send({ type: "overview" });
+  }
+  writeState();
+}
+
+/** @param {import("./detections.js").Detection[]} shown of the live source newest first @param {string[]} labels in the order of their readout */
+function showDetections(shown, labels) {
+  const chosen = training.readout.value;
+  const ofRecording = !chosen
+    ? "No detections in this recording: train on labels, or choose a readout."
+    : chosen === training.reads ? `${chosen} detected nothing in this recording.` : `No detections yet: ${chosen} is reading this recording.`;
+  const none = opened ? ofRecording : hello?.readout ? "None yet." : "No readout is running: start taxel live with a readout, or choose a readout here.";
+  detections.show(shown, none, labels);
+  marksDue = true;
+}
+
+// ------------------------------------------------------------------------------------------------ drawing
+
+/** Draws what lies over the lanes. */
+function mark() {
+  cursor.draw();
+  detections.mark(timeline);
+  mistakes.mark(timeline);
+}
+
+const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
+let lanesAt = 0;
+let textAt = 0;
+let overviewAt = 0;
+let drawnAt = 0;
+let framesDrawn = 0;
+
+/** @param {number} now_ms */
+function drawFrame(now_ms) {
+  requestAnimationFrame(drawFrame);
+  if (mapsDue) {
+    mapsDue = false;
+    framesDrawn++;
+    maps.draw(now_ms);
+  }
+  if (now_ms - drawnAt >= 1000) {
+    drawn = Math.round((framesDrawn * 1000) / (now_ms - drawnAt));
+    [drawnAt, framesDrawn] = [now_ms, 0];
+  }
+  const moving = player.transport.state !== "paused";
+  if (timeline && (lanesDue || timeDue) && now_ms - lanesAt >= (reducedMotion.matches && moving ? REDUCED_MS : LANES_MS)) {
+    lanesAt = now_ms;
+    if (lanesDue) {
+      lanes.draw(timeline);
+      labels.arrange();
+      mark();
+    } else cursor.draw();
+    lanesDue = timeDue = false;
+  }
+  if (now_ms - textAt >= TEXT_MS) {
+    textAt = now_ms;
+    writeText();
+  }
+  if (connection.connected && player.transport.source === null && hello?.live && now_ms - overviewAt >= OVERVIEW_MS) {
+    overviewAt = now_ms;
+    server.send({ type: "overview" });
+  }
+}
+
+function writeText() {
+  maps.write();
+  writeCounters(counters, drawn);
+  timeWindow.write();
+  if (training.since !== null) training.write();
+  lanes.write(timeline);
+  player.write();
+  strip.draw();
+  strip.write();
+  detections.list();
+  if (marksDue) {
+    marksDue = false;
+    mark();
+  }
+}
+
+/** Applies the colours of the theme. */
+function applyTheme() {
+  document.documentElement.dataset.theme = settings.theme;
+  maps.colour();
+  lanes.renew();
+  mapsDue = lanesDue = true;
+}
+
+function showLanes() {
+  const { values } = settings;
+  for (const name of ["pressure", "change"]) {
+    part(`${name}-figure`, HTMLElement).hidden = mapsShown() !== "both" && mapsShown() !== name;
+    part(`${name}-alone`, HTMLButtonElement).setAttribute("aria-pressed", String(values.maps === name));
+  }
+  part("pressure-alone", HTMLButtonElement).hidden = part("maps-field", HTMLElement).hidden = !hasMaps();
+  lanes.show();
+  layout.arrange();
+  lanesDue = true;
+}
+
+settings.watch((name) => {
+  if (name === "theme") applyTheme();
+  if (name === "map" || name === "gamma") maps.colour();
+  if (name === "flipX" || name === "flipY") maps.mark();
+  if (name.startsWith("show") || name === "raster" || name === "maps") showLanes();
+  mapsDue = true;
+});
+matchMedia("(prefers-color-scheme: light)").addEventListener("change", applyTheme);
+
+// ------------------------------------------------------------------------------------------------ start
+
+bindActions({ server, player, settings, recorder, labels, mistakes, view, maps, window: timeWindow }, () => timeline);
+part("files", HTMLSelectElement).onchange = ({ target }) => {
+  const { value } = /** @type {HTMLSelectElement} */ (target);
+  if (value) ask(value);
+  else player.follow();
+};
+part("trials", HTMLSelectElement).onchange = ({ target }) => {
+  const { value } = /** @type {HTMLSelectElement} */ (target);
+  if (opened) ask(opened.name, value);
+};
+
+// A narrow page has only what must stay in sight in its header and footer, so that these stay low.
+const narrow = matchMedia("(max-width: 860px)");
+const arrange = () => {
+  if (narrow.matches) {
+    part("opening", HTMLElement).append(part("files", HTMLElement), part("speed", HTMLElement));
+    part("strip-place", HTMLElement).append(part("strip", HTMLElement));
+    part("aside", HTMLElement).prepend(part("counters", HTMLElement));
+  } else {
+    part("clock-place", HTMLElement).before(part("strip", HTMLElement));
+    part("corner", HTMLElement).before(part("counters", HTMLElement));
+    part("record", HTMLElement).after(part("files", HTMLElement));
+    part("step-on", HTMLElement).after(part("speed", HTMLElement));
+  }
+};
+narrow.addEventListener("change", arrange);
+arrange();
+
+showKeys();
+showTab("board");
+labels.show();
+view.showCut();
+applyTheme();
+showLanes();
+requestAnimationFrame(drawFrame);
+addEventListener("beforeunload", (event) => {
+  if (server.saves) event.preventDefault();
+});
+if (fragment.get("token")) server.open();
+else {
+  connection.why = "the token is missing in the address: copy the whole line that taxel printed";
+  writeState();
+  failed(new Error(connection.why));
+}

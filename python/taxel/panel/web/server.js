@@ -1,0 +1,113 @@
+// The connection to the server: requests with their answers, credits for frames, and reconnecting after a break.
+
+import { VERSION } from "./protocol.js";
+import { size } from "./words.js";
+
+/** @typedef {import("./messages.js").Message} Message */
+/** @typedef {import("./messages.js").Refused} Refused */
+/** @typedef {import("./messages.js").Request} Request */
+
+/** Time until the next attempt to connect, ms. */
+const RECONNECT_MS = 2000;
+
+/** Requests that save labels. */
+const SAVES = new Set(["change", "undo"]);
+
+/** The reason why a request was refused. */
+export class RefusedError extends Error {
+  /** @param {Refused} message */
+  constructor(message) {
+    super(message.reason);
+    this.field = message.field;
+  }
+}
+
+/** One WebSocket, opened again after it has closed. */
+export class Server {
+  /**
+   * @param {string} token
+   * @param {(message: Message) => void} onMessage
+   * @param {(frame: ArrayBuffer) => void} onFrame
+   * @param {(state: "open" | "lost", why: string) => void} onState
+   */
+  constructor(token, onMessage, onFrame, onState) {
+    this.token = token;
+    this.onMessage = onMessage;
+    this.onFrame = onFrame;
+    this.onState = onState;
+    /** @type {WebSocket | null} */
+    this.socket = null;
+    this.next = 0;
+    /** @type {Map<number, { type: string, done: () => void, refused: (error: Error) => void }>} */
+    this.pending = new Map();
+    /** Maximum size of a message to the server, bytes. */
+    this.mostBytes = Infinity;
+  }
+
+  /** Connects, and again whenever the connection has closed. */
+  open() {
+    const socket = new WebSocket(`ws://${location.host}/socket`, [`taxel.panel.${VERSION}`, `token.${this.token}`]);
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
+    socket.onopen = () => {
+      this.onState("open", "");
+      this.send({ type: "credit", n: 2 });
+    };
+    socket.onmessage = ({ data }) => {
+      if (data instanceof ArrayBuffer) {
+        // A credit for each frame received, not drawn: two may arrive between two refreshes of the screen.
+        this.send({ type: "credit", n: 1 });
+        this.onFrame(data);
+      } else {
+        this.receive(JSON.parse(data));
+      }
+    };
+    socket.onclose = ({ code, reason }) => {
+      for (const { refused } of this.pending.values()) refused(new Error("the connection broke"));
+      this.pending.clear();
+      const why = code === 1001 ? "the server has ended" : reason || "no connection to the server";
+      this.onState("lost", why);
+      setTimeout(() => this.open(), RECONNECT_MS);
+    };
+  }
+
+  /** Whether labels are being saved. */
+  get saves() {
+    return [...this.pending.values()].some(({ type }) => SAVES.has(type));
+  }
+
+  /** @param {Message} message */
+  receive(message) {
+    if (message.type === "hello") this.mostBytes = message.most_message_bytes;
+    const request = (message.type === "done" || message.type === "refused") && typeof message.id === "number" ? this.pending.get(message.id) : undefined;
+    if (!request) return this.onMessage(message);
+    const { id } = /** @type {{ id: number }} */ (message);
+    this.pending.delete(id);
+    if (message.type === "refused") request.refused(new RefusedError(message));
+    else request.done();
+  }
+
+  /**
+   * Sends a message that needs no answer.
+   * @param {Request} message
+   */
+  send(message) {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+  }
+
+  /**
+   * Makes a request: fulfilled when it is done, rejected with the reason when it is refused.
+   * @param {Request} message
+   * @returns {Promise<void>}
+   */
+  request(message) {
+    if (this.socket?.readyState !== WebSocket.OPEN) return Promise.reject(new Error("no connection to the server"));
+    const id = this.next++;
+    const bytes = new Blob([JSON.stringify({ ...message, id })]).size;
+    if (bytes > this.mostBytes) return Promise.reject(new Error(`the request has ${size(bytes)}; must have at most ${size(this.mostBytes)}`));
+    return new Promise((done, refused) => {
+      this.pending.set(id, { type: message.type, done, refused });
+      this.send({ ...message, id });
+    });
+  }
+}

@@ -1,0 +1,178 @@
+// The tab of the view: colours, flips, what the lanes show, the health of taxels, and cuts.
+
+import { MAPS } from "./colours.js";
+import { make, part, write } from "./dom.js";
+import { LANES } from "./lanes.js";
+import { counted, seconds } from "./words.js";
+
+/** @typedef {import("./messages.js").Health} Health */
+/** @typedef {import("./messages.js").Hello} Hello */
+/** @typedef {import("./settings.js").Settings} Settings */
+/** @typedef {import("./settings.js").Values} Values */
+/** @typedef {import("./server.js").Server} Server */
+
+/** The tab of the view. */
+export class View {
+  /**
+   * @param {Server} server
+   * @param {Settings} settings
+   * @param {(error: unknown) => void} failed
+   * @param {(taxel: [number, number]) => void} pointed called for a taxel of the list
+   */
+  constructor(server, settings, failed, pointed) {
+    this.server = server;
+    this.settings = settings;
+    this.failed = failed;
+    this.pointed = pointed;
+    /** @type {[number | null, number | null]} */
+    this.cut = [null, null];
+    /** Sets an end of the cut where the view is. @type {((end: 0 | 1) => void) | null} */
+    this.cutHere = null;
+    /** What is shown: a recording or, null, the live board. @type {string | null} */
+    this.source = null;
+    part("colour-map", HTMLSelectElement).append(...MAPS.map((name) => make("option", { value: name }, name)));
+    for (const [id, name] of /** @type {const} */ ([["colour-map", "map"], ["theme", "theme"], ["raster-what", "raster"], ["map-choice", "maps"]])) {
+      const select = part(id, HTMLSelectElement);
+      select.value = settings.values[name];
+      select.onchange = () => settings.set(name, select.value);
+    }
+    for (const name of /** @type {const} */ (["gamma", "contrast"])) this.slider(name);
+    /** @param {HTMLInputElement} box @param {"flipX" | "flipY" | "letters" | `show${string}`} name of its setting */
+    const bind = (box, name) => {
+      box.checked = settings.values[name];
+      box.onchange = () => settings.set(name, box.checked);
+      return box;
+    };
+    for (const [id, name] of /** @type {const} */ ([["flip-x", "flipX"], ["flip-y", "flipY"], ["letters", "letters"]])) bind(part(id, HTMLInputElement), name);
+    for (const { box, setting } of LANES) if (box) part("lane-boxes", HTMLElement).append(make("label", { class: "check" }, bind(make("input", { type: "checkbox" }), setting), ` ${box}`));
+    settings.watch(() => {
+      part("theme", HTMLSelectElement).value = settings.values.theme;
+      part("raster-what", HTMLSelectElement).value = settings.values.raster;
+      part("map-choice", HTMLSelectElement).value = settings.values.maps;
+    });
+    /** @type {string[]} */
+    this.encoders = [];
+    this.encoder = part("encoder", HTMLSelectElement);
+    this.encoder.onchange = () => this.encode();
+    part("rest-now", HTMLButtonElement).onclick = () => this.rest("now");
+    part("rest-lowest", HTMLButtonElement).onclick = () => this.rest("lowest");
+    part("look", HTMLButtonElement).onclick = () => this.look();
+    part("cut-from", HTMLButtonElement).onclick = () => this.cutHere?.(0);
+    part("cut-to", HTMLButtonElement).onclick = () => this.cutHere?.(1);
+    part("cut-form", HTMLFormElement).onsubmit = (event) => {
+      event.preventDefault();
+      this.write();
+    };
+  }
+
+  /** @param {"gamma" | "contrast"} name */
+  slider(name) {
+    const slider = part(name, HTMLInputElement);
+    // Even steps in ratio: a quarter to four, one in the middle.
+    slider.value = String(Math.log2(this.settings.values[name]));
+    const show = () => {
+      const value = 2 ** Number(slider.value);
+      write(part(`${name}-value`, HTMLElement), value.toFixed(2));
+      slider.setAttribute("aria-valuetext", value.toFixed(2));
+      return value;
+    };
+    slider.oninput = () => this.settings.set(name, show());
+    slider.ondblclick = () => {
+      slider.value = "0";
+      this.settings.set(name, show());
+    };
+    show();
+  }
+
+  /** @param {Hello} hello */
+  greet(hello) {
+    this.encoders = hello.encoders;
+    part("live-view", HTMLElement).hidden = !hello.live;
+  }
+
+  /** Offers the encoders. @param {string[]} readout the names of those of the readout that reads what is shown */
+  offer(readout) {
+    const names = [...new Set([...this.encoders, ...readout])];
+    const { value } = this.encoder;
+    this.encoder.replaceChildren(make("option", { value: "" }, "none"), ...names.map((name) => make("option", { value: name }, `${readout.includes(name) ? "readout: " : ""}${name.replaceAll("_", " ")}`)));
+    this.encoder.value = names.includes(value) ? value : "";
+    if (!this.encoder.value) this.settings.set("raster", "changes");
+  }
+
+  /** Asks for the spikes of the encoder that is chosen, or for none. */
+  encode() {
+    const { value: name } = this.encoder;
+    if (!name && this.settings.values.raster === "changes") return;
+    this.server.request({ type: "encode", encoder: name ? { name } : null }).then(() => {
+      this.settings.set("raster", name ? "spikes" : "changes");
+    }, (error) => {
+      // The server encodes nothing any more.
+      this.encoder.value = "";
+      this.settings.set("raster", "changes");
+      this.failed(error);
+    });
+  }
+
+  /** @param {"now" | "lowest"} how */
+  rest(how) {
+    return this.server.request({ type: "rest", how }).catch(this.failed);
+  }
+
+  look() {
+    write(part("health-info", HTMLElement), "checking …");
+    return this.server.request({ type: "health" }).catch((error) => {
+      write(part("health-info", HTMLElement), "");
+      this.failed(error);
+    });
+  }
+
+  /** @param {Health} health */
+  takeHealth(health) {
+    const kinds = /** @type {const} */ (["dead", "stuck", "noisy"]);
+    const counts = kinds.map((kind) => `${health[kind].length} ${kind}`).join(", ");
+    write(part("health-info", HTMLElement), `${counts}, of ${counted(health.taxels, "taxel")}; ${health.untested} not touched enough to say whether they work`);
+    const items = kinds.flatMap((kind) =>
+      health[kind].slice(0, 200).map(([x, y]) => {
+        const button = make("button", { type: "button", class: "link" }, make("span", { class: `unwell ${kind}` }), ` ${kind}: row ${y}, column ${x}`);
+        button.onclick = () => this.pointed([x, y]);
+        return make("li", {}, button);
+      }),
+    );
+    part("health-list", HTMLElement).replaceChildren(...items);
+  }
+
+  /** @param {0 | 1} end @param {number | null} t_us */
+  setCut(end, t_us) {
+    if (t_us === null) return;
+    this.cut[end] = t_us;
+    const [from, to] = this.cut;
+    // The other end gives way where the two would change places.
+    if (from !== null && to !== null && from >= to) this.cut[end ? 0 : 1] = null;
+    this.showCut();
+  }
+
+  /** @param {string | null} source */
+  choose(source) {
+    if (source !== this.source) {
+      this.cut = [null, null];
+      part("cut-name", HTMLInputElement).value = source?.replace(/(\.[^.]+)$/, "-cut$1") ?? "";
+    }
+    this.source = source;
+    this.showCut();
+  }
+
+  showCut() {
+    const [from, to] = this.cut;
+    write(part("cut-from-time", HTMLElement), seconds(from));
+    write(part("cut-to-time", HTMLElement), seconds(to));
+    const ready = this.source !== null && from !== null && to !== null;
+    part("cut-write", HTMLButtonElement).disabled = !ready;
+    write(part("cut-why", HTMLElement), this.source === null ? "Open a recording first: a cut writes a part of a recording to a file." : "");
+  }
+
+  write() {
+    const [start_us, stop_us] = this.cut;
+    if (start_us === null || stop_us === null) return;
+    this.server.request({ type: "cut", start_us, stop_us, name: part("cut-name", HTMLInputElement).value.trim() }).catch(this.failed);
+  }
+}
