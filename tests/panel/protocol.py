@@ -112,10 +112,16 @@ def section(frame, k, dtype):
     return np.frombuffer(frame, dtype, count=size // np.dtype(dtype).itemsize, offset=start)
 
 
-def parts_of(column, column_us):
-    """The ends of the parts of a column of time, us: of 4 ms, or of a narrower column itself."""
-    part_us = min(column_us, 4000)
-    return range(column * column_us + part_us - 1, (column + 1) * column_us, part_us)
+#: The curves of a column of time, least and greatest, and those at the time of a frame.
+EXTENT = np.dtype([("sum", "<u4", 2), ("area", "<u4", 2), ("x", "<f4", 2), ("y", "<f4", 2)])
+CURVE = np.dtype([("sum", "<u4"), ("area", "<u4"), ("x", "<f4"), ("y", "<f4")])
+
+
+def held_in(t, column, column_us, shown_us):
+    """Which of the values from times on are held at any time within a column of time, up to the time shown."""
+    begin, end = column * column_us, min((column + 1) * column_us - 1, shown_us)
+    first, last = np.searchsorted(t, [begin, end], side="right") - 1
+    return range(max(0, first), last + 1)
 
 
 def word(t_us, x, y, ticks, more=True):

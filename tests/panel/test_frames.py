@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from formats.making import write_gaitpdb, write_icub, write_pedar
-from panel.protocol import Client, head, parts_of, section
+from panel.protocol import CURVE, EXTENT, Client, head, held_in, section
 
 import taxel
 from taxel import Array, Frames, Places
@@ -358,8 +358,7 @@ def test_noise_is_no_area_and_moves_no_centre_and_counts_in_the_sum_of_forces(tm
             for k, pressed in ((begin - 20, False), (begin + 10, True)):
                 _, frame = values_at(page, about, k * 10_000)
                 at = head(frame)[0]
-                total, area = section(frame, 3, "<u4").reshape(-1, 4)[-1, :2]
-                centre = section(frame, 3, "<f4").reshape(-1, 4)[-1, 2:]
+                total, area, *centre = section(frame, 9, CURVE)[0].item()
                 assert at["t_us"] == k * 10_000
                 of_all = unit != "counts"
                 # As taxel info has it: one in ten may have more noise than what counts as such, in counts more.
@@ -394,22 +393,22 @@ def test_each_foot_has_a_sum_and_a_centre(tmp_path, column_us):
         while head(frame)[0]["column_us"] != column_us:
             frame = page.until("frame")
         of = head(frame)[0]
-        sums = section(frame, 8, "<u4").reshape(-1, 2)
-        centres = section(frame, 9, "<f4").reshape(-1, 2, 2)
-        assert len(sums) == len(centres) == of["count"] > 70
-        for number, at, own in zip(range(of["first"], of["first"] + of["count"]), centres, sums, strict=True):
-            ends = [min(end, 5_000_000) for end in parts_of(number, column_us)]
+        curves = section(frame, 8, EXTENT).reshape(-1, 2)
+        assert len(curves) == of["count"] > 70
+        for number, own in enumerate(curves, of["first"]):
             for k, frames in enumerate(feet):
-                seen = frames.values.reshape(len(frames), -1)[np.searchsorted(frames.t, ends, side="right") - 1]
-                most = seen[np.argmax(seen.sum(axis=1))].astype(float)
-                assert own[k] * about["frames"]["step"] == pytest.approx(most.sum(), abs=9 * about["frames"]["step"])
-                if not most.sum():
-                    assert np.isnan(at[k]).all()
+                held = held_in(frames.t, number, column_us, 5_000_000)
+                seen = frames.values.reshape(len(frames), -1)[held].astype(float)
+                sums = seen.sum(axis=1)
+                step = about["frames"]["step"]
+                assert own["sum"][k] * step == pytest.approx([sums.min(), sums.max()], abs=9 * step)
+                if not sums.any():
+                    assert np.isnan(own["x"][k]).all()
                     continue
                 places = frames.array.places
-                assert at[k] == pytest.approx(
-                    [(most @ axis.reshape(-1)) / most.sum() for axis in (places.x, places.y)], abs=1
-                )
+                for found, axis in ((own["x"][k], places.x), (own["y"][k], places.y)):
+                    at = (seen @ axis.reshape(-1))[sums > 0] / sums[sums > 0]
+                    assert found == pytest.approx([at.min(), at.max()], abs=1)
 
 
 def test_the_centre_is_at_the_places_and_channels_have_none(tmp_path):
@@ -422,8 +421,8 @@ def test_the_centre_is_at_the_places_and_channels_have_none(tmp_path):
         for name, expected in (("placed", (-650.0, -20.0)), ("channels", (np.nan, np.nan))):
             about = opened(page, f"{name}.npz")
             _, frame = values_at(page, about, 150_000)
-            centre = section(frame, 3, "<f4").reshape(-1, 4)[-1, 2:]
-            assert centre == pytest.approx(expected, abs=0.02, nan_ok=True)
+            *_, x, y = section(frame, 9, CURVE)[0].item()
+            assert (x, y) == pytest.approx(expected, abs=0.02, nan_ok=True)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -453,7 +452,7 @@ def test_a_force_from_pressures_uses_each_taxel_s_area(tmp_path, seed):
                 # What is played from a keyframe is weighed as the whole is.
                 for k in (25, 40, 59):
                     _, frame = values_at(page, about, int(frames.t[k]))
-                    assert section(frame, 3, "<u4").reshape(-1, 4)[-1, 0] * step == pytest.approx(total[k], rel=2e-3)
+                    assert section(frame, 9, CURVE)[0]["sum"] * step == pytest.approx(total[k], rel=2e-3)
 
 
 @pytest.mark.parametrize("column", [False, True])
@@ -472,9 +471,9 @@ def test_channels_have_a_curve_each(tmp_path, column):
             while head(frame)[0]["column_us"] != column_us:
                 frame = page.until("frame")
             of = head(frame)[0]
-            curves = section(frame, 7, "<u2").reshape(-1, 7)
+            curves = section(frame, 7, "<u2").reshape(-1, 7, 2)
             assert len(curves) == of["count"] > 100
             for number, curve in enumerate(curves, of["first"]):
-                ends = [min(end, t_us) for end in parts_of(number, column_us)]
-                at = np.searchsorted(frames.t, ends, side="right") - 1
-                np.testing.assert_array_equal(curve * about["frames"]["step"], values[at, 0].max(axis=0))
+                held = values[held_in(frames.t, number, column_us, t_us), 0]
+                expected = np.stack([held.min(axis=0), held.max(axis=0)], axis=1)
+                np.testing.assert_array_equal(curve * about["frames"]["step"], expected)

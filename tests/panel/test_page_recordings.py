@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.panel.pages import (
     PIXELS,
@@ -16,6 +17,7 @@ from tests.panel.pages import (
     recording,
     replay,
     settled,
+    shown,
     shows,
     span,
     still,
@@ -44,6 +46,26 @@ def test_a_recording_opens_on_all_of_its_time_and_its_first_touch(replay: Any) -
     title = replay.locator("#force-block h2").bounding_box()
     assert title["y"] + title["height"] <= force["y"] + 1, "titles cover no curve"
     assert replay.locator("#tab-labels").get_attribute("aria-selected") == "true"
+
+
+def test_the_numbers_are_those_of_the_cursor_s_time(chromium: Any, tmp_path: Path) -> None:
+    draw = np.random.default_rng(4)
+    values = draw.integers(0, 90, (1200, 3, 4)) * (draw.random((1200, 1, 1)) < 0.1)
+    frames = taxel.Frames(values, np.arange(1200) * 50_000, unit="N", array=taxel.Array(3, 4))
+    taxel.convert(frames, tmp_path / "peaks.npz")
+    with shown(chromium, tmp_path / "peaks.npz") as page:
+        press(page, "a")
+        until(lambda: span(page)[1] - span(page)[0] > 59, "all of it")
+        lane, tried = page.locator("#force-lane").bounding_box(), 0
+        for t_s in draw.uniform(1, 58, 40):
+            page.mouse.move(pixel(page, t_s), lane["y"] + 9)
+            t_us = 1e6 * float(page.locator("#cursor-time").inner_text()[:-2])
+            # The time is written in ms.
+            if 2000 < t_us % 50_000 < 48_000:
+                tried += 1
+                expected = int(values[int(t_us // 50_000)].sum())
+                shows(page, "force-sum", f"^{expected} N$")
+        assert tried > 20
 
 
 def test_the_lanes_zoom_and_scroll_as_a_time_axis(replay: Any) -> None:

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 from loopback import until
-from panel.protocol import SOON, Client, head, section
+from panel.protocol import EXTENT, SOON, Client, head, section
 from tests.live.boards import LOOPBACK, SMALL, above_rest, force, play, presses, spikes_of, touch, wait_for
 
 import taxel
@@ -13,8 +13,6 @@ from taxel.live import Live
 from taxel.panel import Panel
 
 ConnectionClosedOK = pytest.importorskip("websockets.exceptions").ConnectionClosedOK
-
-CURVES = np.dtype([("force", "<u4"), ("area", "<u4"), ("x", "<f4"), ("y", "<f4")])
 
 
 def shown(frame, rest):
@@ -43,12 +41,16 @@ def test_a_recording_is_played_to_its_end(tmp_path):
     for frame in page.frames:
         found = section(frame, 5, "<u2").astype(int)
         rest = found if len(found) else rest
-        first = head(frame)[0]["first"] + 1
-        sums |= {(first + k) * 4000: int(one["force"]) for k, one in enumerate(section(frame, 3, CURVES))}
+        first = head(frame)[0]["first"]
+        sums |= {(first + k) * 4000: one["sum"].tolist() for k, one in enumerate(section(frame, 3, EXTENT))}
     assert np.array_equal(shown(page.frames[-1], rest), above_rest(recording.events))
-    times = np.array([t for t in sorted(sums) if t <= recording.events.t[-1]])
+    times = np.array([t for t in sorted(sums) if t + 4000 <= recording.events.t[-1]])
     assert np.all(np.diff(times) == 4000)
-    assert [sums[t] for t in times] == force(recording.events, times)
+    # A change is each 100 us at most; before the first one nothing is known.
+    inside = [
+        force(recording.events, np.arange(t + 1, t + 4001, 100)) for t in np.maximum(times, recording.events.t[0])
+    ]
+    assert [sums[t] for t in times] == [[min(each), max(each)] for each in inside]
     assert sorted(spikes) == expected
     assert sorted(found["t_us"] for found in opened["detections"]) == sorted(d.t for d in recording.detections)
     assert [note["text"] for note in opened["notes"]] == ["here"]

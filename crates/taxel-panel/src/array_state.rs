@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::load::Coordinates;
 use super::load::Load;
 use super::load::Weights;
-use super::time_columns::{COLUMN_US, MISSING, TimeColumns, column_of};
+use super::time_columns::{COLUMN_US, Curve, Curves, Extent, MISSING, TimeColumns, column_of};
 use taxel_core::Array;
 use taxel_core::held::{Held, UNKNOWN};
 use taxel_core::rest::{NOISE_FLOOR, Rest, TrackedRest, Value};
@@ -115,6 +115,8 @@ pub struct ArrayState {
     change: Vec<i8>,
     time_columns: TimeColumns,
     column_us: i64,
+    /// The curves of the current column of time so far.
+    during: Curves,
     /// The current column of time.
     column: Option<i64>,
     /// The current column of [`COLUMN_US`], by which changes decay.
@@ -129,6 +131,8 @@ pub struct ArrayState {
     /// Number of the source of each column of several sources, and the load of each; else empty.
     source_of: Arc<[usize]>,
     loads: Vec<Load>,
+    /// Up to this sum of ticks above rest there is noise alone, and no centre; of each of several sources.
+    noise: (u32, Vec<u32>),
 }
 
 impl ArrayState {
@@ -139,6 +143,7 @@ impl ArrayState {
         // An array has 65 535 rows and columns at most.
         #[allow(clippy::cast_possible_truncation)]
         let position = |taxel: usize| ((taxel % columns) as u16, (taxel / columns) as u16);
+        let time_columns = TimeColumns::new(array, time_column_bytes);
         let mut state = Self {
             positions: (0..from.held.len()).map(position).collect(),
             floor,
@@ -154,7 +159,8 @@ impl ArrayState {
             track_at: from.latest.map(next_track),
             rests: 1,
             change: vec![0; from.held.len()],
-            time_columns: TimeColumns::new(array, time_column_bytes),
+            during: time_columns.no_curves(),
+            time_columns,
             column_us,
             column: None,
             decay_column: 0,
@@ -165,6 +171,7 @@ impl ArrayState {
             load: Load::default(),
             source_of: Arc::default(),
             loads: vec![],
+            noise: (0, vec![]),
         };
         state.sum_above_rest();
         if let Some(t) = from.latest {
@@ -175,7 +182,8 @@ impl ArrayState {
 
     /// The state where frames are shown: the rest is that of the keyframe until [`ArrayState::set_rest`]; a change without
     /// a value is a value that is missing from then on, and frames are counted as events are. The sums have a floor of
-    /// steps above rest, and the columns of the array are of these sources.
+    /// steps above rest, the columns of the array are of these sources, and up to these sums, of all and of each, there is
+    /// noise alone.
     #[must_use]
     pub(crate) fn of_frames(
         mut self,
@@ -184,11 +192,13 @@ impl ArrayState {
         sum_floor: u16,
         weights: &Weights,
         source_of: Arc<[usize]>,
+        noise: (u32, Vec<u32>),
     ) -> Self {
-        (self.frames, self.sum_floor) = (Some(rest), sum_floor);
+        (self.frames, self.sum_floor, self.noise) = (Some(rest), sum_floor, noise);
         (self.weights, self.source_of) = (weights.clone(), source_of);
         self.loads = vec![Load::default(); self.source_of.last().map_or(0, |last| last + 1)];
         self.time_columns = self.time_columns.with_sources(self.loads.len());
+        self.during = self.time_columns.no_curves();
         (self.tracked, self.track_at) = (None, None);
         self.rest = Rest::measured(from.rest.clone());
         self.sum_above_rest();
@@ -327,6 +337,10 @@ impl ArrayState {
         if self.latest.is_some_and(|latest| t < latest) {
             return;
         }
+        if self.latest.is_some_and(|latest| t > latest) {
+            // What holds now has held since the latest time.
+            self.extend_curves();
+        }
         self.latest = Some(t);
         if self.within.contains(&t) {
             return;
@@ -336,9 +350,10 @@ impl ArrayState {
             None => self.decay_column = decay_column,
             Some(now) if now == column => {}
             Some(now) => {
-                self.store_curve(now);
-                if column > now + 1 {
-                    self.store_curve(now + 1);
+                self.store_curves(now);
+                self.during = self.time_columns.no_curves();
+                if t > column * self.column_us {
+                    self.extend_curves();
                 }
             }
         }
@@ -371,6 +386,10 @@ impl ArrayState {
         self.track_at = Some(next_track(t));
         let column = column_of(t, self.column_us);
         self.time_columns.truncate_after(column);
+        if self.column != Some(column) {
+            self.during = self.time_columns.no_curves();
+            self.time_columns.join_curves(column..column + 1, &mut self.during.sums, &mut self.during.channels);
+        }
         self.enter_column(column, column_of(t, COLUMN_US));
         self.restarts += 1;
     }
@@ -496,28 +515,57 @@ impl ArrayState {
         self.events
     }
 
-    /// Writes the current curve into the current column.
-    pub fn update_curve(&mut self) {
-        if let Some(now) = self.column {
-            self.store_curve(now);
+    /// The curve of all taxels (0), or of one of several sources, at this time.
+    #[must_use]
+    pub fn curve(&self, number: usize) -> Curve {
+        let curve = |load: &Load, noise: u32| load.curve(&self.centre, &self.weights, noise);
+        match number.checked_sub(1) {
+            None if self.frames.is_some() && self.held.values().iter().all(|&value| value == UNKNOWN) => MISSING,
+            None => curve(&self.load, self.noise.0),
+            Some(source) if self.knows(source) => {
+                curve(&self.loads[source], self.noise.1.get(source).copied().unwrap_or(0))
+            }
+            Some(_) => MISSING,
         }
     }
 
-    /// Writes the current curve, and the values that have a curve each, into a column.
-    fn store_curve(&mut self, column: i64) {
-        let missing = self.frames.is_some() && self.held.values().iter().all(|&value| value == UNKNOWN);
-        let curve = |load: &Load| load.curve(&self.centre, &self.weights);
-        let total = if missing { MISSING } else { curve(&self.load) };
-        self.time_columns.set_curve(column, total);
-        if self.time_columns.value_count() > 0 {
-            let channels = (0..self.time_columns.channel_count()).map(|channel| self.above(channel).into());
-            let sources = self.loads.iter().enumerate().flat_map(|(source, load)| match self.knows(source) {
-                true => curve(load).of_source(),
-                false => MISSING.of_source(),
-            });
-            let values: Vec<u32> = channels.chain(sources).collect();
-            self.time_columns.set_values(column, &values);
+    /// The curves of all taxels and of each of several sources, at this time.
+    pub fn curves(&self) -> impl Iterator<Item = Curve> {
+        (0..=self.loads.len()).map(|number| self.curve(number))
+    }
+
+    /// Writes the curves of the current column up to now.
+    pub fn update_curve(&mut self) {
+        if let Some(now) = self.column {
+            self.extend_curves();
+            self.store_curves(now);
         }
+    }
+
+    /// Extends the curves of the current column to what holds now.
+    fn extend_curves(&mut self) {
+        let mut during = std::mem::replace(&mut self.during, Curves { sums: vec![], channels: vec![] });
+        self.extend(&mut during);
+        self.during = during;
+    }
+
+    fn extend(&self, curves: &mut Curves) {
+        curves
+            .sums
+            .iter_mut()
+            .zip(self.curves())
+            .for_each(|(extent, curve): (&mut Extent, Curve)| extent.extend(&curve));
+        for (channel, all) in curves.channels.iter_mut().enumerate() {
+            let above = self.above(channel);
+            *all = (all.0.min(above), all.1.max(above));
+        }
+    }
+
+    /// Writes the curves of a column that ends, or of the current one, and what holds after it.
+    fn store_curves(&mut self, column: i64) {
+        let mut after = self.time_columns.no_curves();
+        self.extend(&mut after);
+        self.time_columns.set_curves(column, &self.during, &after);
     }
 
     /// Whether any taxel of a source has a value.
@@ -615,16 +663,18 @@ mod tests {
         }
         state.apply_one(&change(100, 0, 51));
         state.update_curve();
-        assert_eq!(state.time_columns().curve(0).sum, 0, "the noise floor is not a touch");
+        assert_eq!(state.time_columns().curve(0).sum, (0, 0), "the noise floor is not a touch");
         state.apply_one(&change(200, 0, 58));
         state.apply_one(&change(300, 3, 78));
         state.update_curve();
-        let curve = state.time_columns().curve(0);
+        let curve = state.curve(0);
         assert_eq!((curve.sum, curve.area, curve.x, curve.y), (40, 2, 0.75, 0.75));
+        // Of 10 at the left upper taxel, and then of 30 more at the right lower one.
+        let extent = state.time_columns().curve(0);
+        assert_eq!((extent.sum, extent.area, extent.x, extent.y), ((0, 40), (0, 2), (0.0, 0.75), (0.0, 0.75)));
         assert_eq!(state.change(), [7, 0, 0, 30], "the larger of two changes, 3 and 7");
         state.set_rest(state.held().to_vec());
-        state.update_curve();
-        assert_eq!(state.time_columns().curve(0).sum, 0);
+        assert_eq!(state.curve(0).sum, 0);
         state.advance(FORGET * COLUMN_US);
         assert_eq!(state.change(), [0; 4]);
     }
@@ -636,8 +686,7 @@ mod tests {
             (0..4).for_each(|taxel| state.apply_one(&change(t, taxel, ticks)));
         }
         state.zero(1, 60);
-        state.update_curve();
-        assert_eq!((state.time_columns().curve(0).sum, state.time_columns().curve(0).area), (60, 3));
+        assert_eq!((state.curve(0).sum, state.curve(0).area), (60, 3));
         state.apply_one(&change(200, 1, 30));
         state.apply_one(&change(200, 0, 40));
         // Ten hours after, the others rest where they stay, and it still where it was zeroed.

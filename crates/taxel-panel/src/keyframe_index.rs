@@ -65,6 +65,9 @@ pub trait FrameSources: Send + Sync {
     /// Number of the source of each column of the array; empty where there is one, or more than have a curve each.
     fn source_of(&self) -> Arc<[usize]>;
 
+    /// The most that noise adds up to, ticks above rest: of all sources, and of each.
+    fn noise(&self) -> (u32, Vec<u32>);
+
     /// The sensor of each source.
     fn sensors(&self) -> Vec<Array>;
 

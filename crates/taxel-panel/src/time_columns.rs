@@ -20,18 +20,18 @@ pub const LATE_US: i64 = 120_000;
 /// Columns of time in a block of a [`TimeColumns`].
 const BLOCK: i64 = 250;
 
+/// The ticks above rest of a channel at no time: the least above the greatest.
+const NO_CHANNEL: (u16, u16) = (u16::MAX, 0);
+
 /// Maximum number of channels that each have a curve.
 const MOST_CHANNELS: usize = 64;
-
-/// What is stored of a source: its sum, and the bits of the coordinates of its centre.
-pub(super) const OF_SOURCE: usize = 3;
 
 /// A touch exceeds the quiet force by this part of the greatest excess: one in so many.
 const TOUCH_SHARE: u32 = 4;
 /// The force of one column in so many, the least ones, is that of a sensor at rest.
 const QUIET_SHARE: usize = 5;
 
-/// The contact as a whole at the end of a column of time.
+/// The contact as a whole at a time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Curve {
     /// Sum of ticks above rest.
@@ -44,12 +44,66 @@ pub struct Curve {
     pub y: f32,
 }
 
-impl Curve {
-    /// What is stored of a source with this curve; [`MISSING_SUM`] everywhere, which is no number, for one without values.
-    pub(super) fn of_source(self) -> [u32; OF_SOURCE] {
-        let missing = self.area == MISSING.area;
-        if missing { [MISSING_SUM; OF_SOURCE] } else { [self.sum, self.x.to_bits(), self.y.to_bits()] }
+/// The least and the greatest of each value of a [`Curve`] over a stretch of time.
+#[derive(Debug, Clone, Copy)]
+pub struct Extent {
+    /// Of the sum; the least above the greatest where no taxel had a value.
+    pub sum: (u32, u32),
+    /// Of the number of taxels above rest.
+    pub area: (u32, u32),
+    /// Of the column of the centre; NaN where nothing was pressed.
+    pub x: (f32, f32),
+    /// Of the row of the centre.
+    pub y: (f32, f32),
+}
+
+impl Extent {
+    /// That of no time.
+    pub const NOTHING: Self =
+        Self { sum: (u32::MAX, 0), area: (u32::MAX, 0), x: (f32::NAN, f32::NAN), y: (f32::NAN, f32::NAN) };
+
+    /// Extends it to a time with this curve.
+    pub(super) fn extend(&mut self, curve: &Curve) {
+        if curve.area != MISSING.area {
+            let both = |value| (value, value);
+            let Curve { sum, area, x, y } = *curve;
+            self.join(&Self { sum: both(sum), area: both(area), x: (x, x), y: (y, y) });
+        }
     }
+
+    /// Extends it to another stretch of time.
+    pub(super) fn join(&mut self, other: &Self) {
+        let whole = |a: (u32, u32), b: (u32, u32)| (a.0.min(b.0), a.1.max(b.1));
+        // The least and the greatest of a number and NaN are the number.
+        let real = |a: (f32, f32), b: (f32, f32)| (a.0.min(b.0), a.1.max(b.1));
+        (self.sum, self.area) = (whole(self.sum, other.sum), whole(self.area, other.area));
+        (self.x, self.y) = (real(self.x, other.x), real(self.y, other.y));
+    }
+
+    fn bits(&self) -> [u32; 8] {
+        let Self { sum, area, x, y } = self;
+        [sum.0, sum.1, area.0, area.1, x.0.to_bits(), x.1.to_bits(), y.0.to_bits(), y.1.to_bits()]
+    }
+
+    /// Appends it as frames have it.
+    pub(super) fn write(&self, out: &mut Vec<u8>) {
+        self.bits().iter().for_each(|word| out.extend(word.to_le_bytes()));
+    }
+}
+
+impl PartialEq for Extent {
+    fn eq(&self, other: &Self) -> bool {
+        self.bits() == other.bits()
+    }
+}
+
+/// The curves of a stretch of time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curves {
+    /// Of all taxels, then of each of several sources.
+    pub sums: Vec<Extent>,
+    /// The least and the greatest ticks above rest of each channel.
+    pub channels: Vec<(u16, u16)>,
 }
 
 /// Number of the column of time that holds `t` (us), of columns `column_us` wide.
@@ -65,11 +119,16 @@ pub fn is_column(us: i64) -> bool {
     (least..=most).contains(&us) && us % least == 0 && (us / least).count_ones() == 1
 }
 
+/// The curves of a column, of the sums and of the channels.
+type OfColumn<'a> = (&'a [Extent], &'a [(u16, u16)]);
+
 #[derive(Debug, Clone)]
 struct ColumnBlock {
     raster: Vec<u8>,
-    curves: Vec<Curve>,
-    values: Vec<u32>,
+    /// The curves of its first columns, column after column.
+    during: Curves,
+    /// Those of all later ones.
+    after: Curves,
 }
 
 /// What a column of time holds of each row, of each channel, and of each of several sources.
@@ -86,23 +145,36 @@ impl ColumnShape {
         Self { rows: array.rows.into(), channels, sources: 0 }
     }
 
-    /// Number of values that have a curve of their own.
-    fn values(self) -> usize {
-        self.channels + OF_SOURCE * self.sources
+    fn block_bytes(self) -> usize {
+        let curves = (1 + self.sources) * size_of::<Extent>() + self.channels * size_of::<(u16, u16)>();
+        BLOCK.unsigned_abs() as usize * (self.rows + curves)
     }
 
-    fn block_bytes(self) -> usize {
-        let curves = std::mem::size_of::<Curve>() + self.values() * std::mem::size_of::<u32>();
-        BLOCK.unsigned_abs() as usize * (self.rows + curves)
+    /// The curves of no time.
+    fn nothing(self) -> Curves {
+        Curves { sums: vec![Extent::NOTHING; 1 + self.sources], channels: vec![NO_CHANNEL; self.channels] }
     }
 }
 
 impl ColumnBlock {
-    /// Repeats the values of its column `k`, so many, up to its end.
-    fn repeat_values(&mut self, k: usize, count: usize) {
-        for later in k + 1..BLOCK.unsigned_abs() as usize {
-            self.values.copy_within(k * count..(k + 1) * count, later * count);
+    /// Number of columns whose curves it has.
+    fn len(&self) -> usize {
+        self.during.sums.len() / self.after.sums.len()
+    }
+
+    /// The curves of its column `k`.
+    fn curves(&self, k: usize) -> OfColumn<'_> {
+        if k >= self.len() {
+            return (&self.after.sums, &self.after.channels);
         }
+        let (sums, channels) = (self.after.sums.len(), self.after.channels.len());
+        (&self.during.sums[k * sums..(k + 1) * sums], &self.during.channels[k * channels..(k + 1) * channels])
+    }
+
+    /// Removes the curves of its columns from `k` on.
+    fn truncate(&mut self, k: usize) {
+        self.during.sums.truncate(k * self.after.sums.len());
+        self.during.channels.truncate(k * self.after.channels.len());
     }
 }
 
@@ -116,9 +188,6 @@ pub struct TimeColumns {
     reach: Option<(i64, i64)>,
     /// Maximum number of blocks.
     max_blocks: usize,
-    /// Up to this sum of ticks above rest there is noise alone, and no centre; of each of several sources.
-    noise: u32,
-    source_noise: Vec<u32>,
 }
 
 impl TimeColumns {
@@ -132,8 +201,6 @@ impl TimeColumns {
             blocks: VecDeque::new(),
             reach: None,
             max_blocks: (bytes / block).max(SPAN.unsigned_abs() as usize / BLOCK.unsigned_abs() as usize + 2),
-            noise: 0,
-            source_noise: vec![],
         }
     }
 
@@ -143,26 +210,6 @@ impl TimeColumns {
         debug_assert!(self.blocks.is_empty());
         self.shape.sources = sources;
         self
-    }
-
-    /// The same with these sums as the most that noise adds up to, of each source.
-    #[must_use]
-    pub(super) fn with_noise(mut self, each: Vec<u32>) -> Self {
-        self.noise = each.iter().fold(0, |sum, &noise| sum.saturating_add(noise));
-        self.source_noise = each;
-        self
-    }
-
-    /// The most that noise adds up to, ticks above rest.
-    #[must_use]
-    pub fn noise(&self) -> u32 {
-        self.noise
-    }
-
-    /// The most that noise of each source adds up to, ticks above rest.
-    #[must_use]
-    pub fn source_noise(&self) -> &[u32] {
-        &self.source_noise
     }
 
     /// Bytes that `columns` columns of an array take.
@@ -183,10 +230,10 @@ impl TimeColumns {
         self.shape.channels
     }
 
-    /// Number of values that have a curve each: of channels, and then the sum and the centre of each source if there are several.
+    /// The curves of no time.
     #[must_use]
-    pub fn value_count(&self) -> usize {
-        self.shape.values()
+    pub fn no_curves(&self) -> Curves {
+        self.shape.nothing()
     }
 
     /// First and last known column.
@@ -204,7 +251,7 @@ impl TimeColumns {
     }
 
     fn block(&mut self, column: i64) -> (&mut ColumnBlock, usize) {
-        let (key, rows, count) = (column.div_euclid(BLOCK), self.shape.rows, self.shape.values());
+        let (key, rows) = (column.div_euclid(BLOCK), self.shape.rows);
         let index = match self.block_index(key) {
             Ok(index) => index,
             Err(mut index) => {
@@ -217,10 +264,10 @@ impl TimeColumns {
                     }
                 }
                 let n = BLOCK.unsigned_abs() as usize;
-                let before = index.checked_sub(1).map(|before| &self.blocks[before].1);
-                let curve = before.map_or(NOTHING, |before| before.curves[n - 1]);
-                let values = before.map_or_else(|| vec![0; count], |b| b.values[(n - 1) * count..].to_vec());
-                let block = ColumnBlock { raster: vec![0; n * rows], curves: vec![curve; n], values: values.repeat(n) };
+                let before = index.checked_sub(1).map(|before| self.blocks[before].1.after.clone());
+                let during = Curves { sums: vec![], channels: vec![] };
+                let after = before.unwrap_or_else(|| self.shape.nothing());
+                let block = ColumnBlock { raster: vec![0; n * rows], during, after };
                 self.blocks.insert(index, (key, block));
                 index
             }
@@ -246,9 +293,7 @@ impl TimeColumns {
             let block = &mut self.blocks[index].1;
             let k = usize::try_from(column.rem_euclid(BLOCK)).unwrap_or(0);
             block.raster[(k + 1) * self.shape.rows..].fill(0);
-            let curve = block.curves[k];
-            block.curves[k + 1..].fill(curve);
-            block.repeat_values(k, self.shape.values());
+            block.truncate(k + 1);
         }
     }
 
@@ -267,92 +312,71 @@ impl TimeColumns {
         }
     }
 
-    /// Sets the curve from this column to the end of its block.
-    pub(super) fn set_curve(&mut self, column: i64, curve: Curve) {
-        let before = self.curve(column);
-        let same = before.sum == curve.sum
-            && before.area == curve.area
-            && before.x.to_bits() == curve.x.to_bits()
-            && before.y.to_bits() == curve.y.to_bits();
-        // A stretch without events repeats the curve before it, so it needs no block.
-        if !same {
-            let (block, k) = self.block(column);
-            block.curves[k..].fill(curve);
-        }
-    }
-
-    /// Sets the values that have a curve each, from this column to the end of its block: ticks above rest of the channels,
-    /// and what is stored of the sources ([`Curve::of_source`]).
-    pub(super) fn set_values(&mut self, column: i64, values: &[u32]) {
-        let count = self.shape.values();
-        if values.len() == count && self.values_at(column).is_none_or(|before| before != values) {
-            let (block, k) = self.block(column);
-            block.values[k * count..(k + 1) * count].copy_from_slice(values);
-            block.repeat_values(k, count);
-        }
-    }
-
-    /// The values at the end of a column; `None` before the first block.
-    fn values_at(&self, column: i64) -> Option<&[u32]> {
-        let (key, n, count) = (column.div_euclid(BLOCK), BLOCK.unsigned_abs() as usize, self.shape.values());
-        let (index, k) = match self.block_index(key) {
-            Ok(index) => (index, column.rem_euclid(BLOCK).unsigned_abs() as usize),
-            Err(index) => (index.checked_sub(1)?, n - 1),
+    /// Sets the curves of a column, and those from its end on.
+    pub(super) fn set_curves(&mut self, column: i64, during: &Curves, after: &Curves) {
+        let same = |column: i64, curves: &Curves| {
+            self.curves(column).is_some_and(|(sums, channels)| *sums == curves.sums && *channels == curves.channels)
         };
-        Some(&self.blocks[index].1.values[k * count..(k + 1) * count])
+        // A stretch without events repeats what was before it, so it needs no block.
+        if !(same(column, during) && same(column + 1, after)) {
+            let (block, k) = self.block(column);
+            block.truncate(k);
+            while block.len() < k {
+                block.during.sums.extend_from_slice(&block.after.sums);
+                block.during.channels.extend_from_slice(&block.after.channels);
+            }
+            block.during.sums.extend_from_slice(&during.sums);
+            block.during.channels.extend_from_slice(&during.channels);
+            block.after.clone_from(after);
+        }
     }
 
-    /// Raises the values in `out` to the greatest of each in columns, and the sources to where the sum of each is greatest;
-    /// any sum is greater than [`MISSING_SUM`].
-    pub fn raise_values(&self, columns: Range<i64>, out: &mut [u32]) {
-        let (channels, sources) = out.split_at_mut(self.shape.channels);
-        for values in self.differing(columns).filter_map(|column| self.values_at(column)) {
-            let (of_channels, of_sources) = values.split_at(self.shape.channels);
-            channels.iter_mut().zip(of_channels).for_each(|(most, &value)| *most = value.max(*most));
-            for (most, source) in sources.chunks_exact_mut(OF_SOURCE).zip(of_sources.chunks_exact(OF_SOURCE)) {
-                // What is missing wraps to 0.
-                if source[0].wrapping_add(1) > most[0].wrapping_add(1) {
-                    most.copy_from_slice(source);
-                }
+    /// The curves of a column; `None` before the first block.
+    fn curves(&self, column: i64) -> Option<OfColumn<'_>> {
+        let (key, k) = (column.div_euclid(BLOCK), column.rem_euclid(BLOCK).unsigned_abs() as usize);
+        match self.block_index(key) {
+            Ok(index) => Some(self.blocks[index].1.curves(k)),
+            Err(index) => {
+                let after = &self.blocks[index.checked_sub(1)?].1.after;
+                Some((&after.sums, &after.channels))
             }
         }
     }
 
-    /// The curves where the force is greatest in columns.
-    #[must_use]
-    pub fn greatest(&self, columns: Range<i64>) -> Curve {
-        let greatest = |most: Curve, column| match self.curve(column) {
-            curve if curve.sum > most.sum || most.area == MISSING.area => curve,
-            _ => most,
-        };
-        let first = self.curve(columns.start);
-        self.differing(columns).fold(first, greatest)
-    }
-
-    /// The first of columns, and those that a block stores: all others are as the one before.
-    fn differing(&self, columns: Range<i64>) -> impl Iterator<Item = i64> {
+    /// Extends curves to those of columns.
+    pub fn join_curves(&self, columns: Range<i64>, sums: &mut [Extent], channels: &mut [(u16, u16)]) {
         let Range { start, end } = columns;
-        let from = self.blocks.partition_point(|(key, _)| (key + 1) * BLOCK <= start + 1);
-        let stored = self.blocks.range(from..).map(|(key, _)| key * BLOCK).take_while(move |&first| first < end);
-        (start..end.min(start + 1)).chain(stored.flat_map(move |first| first.max(start + 1)..end.min(first + BLOCK)))
-    }
-
-    /// The curves at the end of a column.
-    #[must_use]
-    pub fn curve(&self, column: i64) -> Curve {
-        let (key, k) = (column.div_euclid(BLOCK), column.rem_euclid(BLOCK).unsigned_abs() as usize);
-        match self.block_index(key) {
-            Ok(index) => self.blocks[index].1.curves[k],
-            Err(0) => NOTHING,
-            Err(index) => self.blocks[index - 1].1.curves.last().copied().unwrap_or(NOTHING),
+        if start >= end {
+            return;
+        }
+        let mut join = |(more_sums, more_channels): OfColumn<'_>| {
+            sums.iter_mut().zip(more_sums).for_each(|(sum, more)| sum.join(more));
+            let widen = |(all, more): (&mut (u16, u16), &(u16, u16))| *all = (all.0.min(more.0), all.1.max(more.1));
+            channels.iter_mut().zip(more_channels).for_each(widen);
+        };
+        self.curves(start).into_iter().for_each(&mut join);
+        // All that are not stored are as the end of the one before.
+        let from = self.blocks.partition_point(|(key, _)| (key + 1) * BLOCK <= start);
+        for (key, block) in self.blocks.range(from..).take_while(|(key, _)| key * BLOCK < end) {
+            let within = |column: i64| usize::try_from((column - key * BLOCK).clamp(0, BLOCK)).unwrap_or(0);
+            (within(start)..within(end).min(block.len())).for_each(|k| join(block.curves(k)));
         }
     }
 
-    /// The columns that are stored, each with its curves; a stretch without events is left out.
-    fn stored(&self) -> impl Iterator<Item = (i64, &Curve)> {
+    /// The curve of all taxels in a column.
+    #[must_use]
+    pub fn curve(&self, column: i64) -> Extent {
+        self.curves(column).map_or(Extent::NOTHING, |(sums, _)| sums[0])
+    }
+
+    /// The columns that are stored, each with its greatest sum of ticks above rest; a stretch without events is left out.
+    fn stored(&self) -> impl Iterator<Item = (i64, u32)> {
         let (first, last) = self.reach.unwrap_or((0, -1));
-        let all = self.blocks.iter().flat_map(|(key, block)| (key * BLOCK..).zip(&block.curves));
-        all.filter(move |(column, _)| (first..=last).contains(column))
+        let of_block = |(key, block): &(i64, ColumnBlock)| {
+            let sums: Vec<u32> = (0..BLOCK.unsigned_abs() as usize).map(|k| block.curves(k).0[0].sum.1).collect();
+            (key * BLOCK..).zip(sums)
+        };
+        self.blocks.iter().flat_map(of_block).filter(move |(column, _)| (first..=last).contains(column))
     }
 
     /// The greatest sum of ticks above rest in each of `bins` stretches of `step` us, the first of which begins at `start` (us), of
@@ -361,11 +385,11 @@ impl TimeColumns {
     pub fn greatest_sums(&self, start: i64, step: i64, bins: usize, column_us: i64) -> Vec<u32> {
         // At the beginning of a stretch the force is what it was before, also where nothing is stored.
         let begin = |bin: usize| start + i64::try_from(bin).unwrap_or(0) * step;
-        let mut sums: Vec<u32> = (0..bins).map(|bin| self.curve(column_of(begin(bin), column_us)).sum).collect();
-        for (column, curve) in self.stored() {
+        let mut sums: Vec<u32> = (0..bins).map(|bin| self.curve(column_of(begin(bin), column_us)).sum.1).collect();
+        for (column, most) in self.stored() {
             let bin = (column * column_us - start).div_euclid(step);
             if let Some(sum) = usize::try_from(bin).ok().and_then(|bin| sums.get_mut(bin)) {
-                *sum = (*sum).max(curve.sum);
+                *sum = (*sum).max(most);
             }
         }
         sums
@@ -374,16 +398,15 @@ impl TimeColumns {
     /// The column of greatest force in the first touch; `None` where there is no force.
     #[must_use]
     pub fn first_touch(&self) -> Option<i64> {
-        let mut sums: Vec<u32> = self.stored().map(|(_, curve)| curve.sum).collect();
+        let mut sums: Vec<u32> = self.stored().map(|(_, sum)| sum).collect();
         let most = *sums.iter().max()?;
         let rank = sums.len() / QUIET_SHARE;
         let (_, &mut quiet, _) = sums.select_nth_unstable(rank);
         let least = quiet + ((most - quiet) / TOUCH_SHARE).max(1);
-        let touch =
-            self.stored().skip_while(|(_, curve)| curve.sum < least).take_while(|(_, curve)| curve.sum >= least);
-        let greatest = |found: Option<(i64, u32)>, (column, curve): (i64, &Curve)| match found {
-            Some((_, sum)) if curve.sum <= sum => found,
-            _ => Some((column, curve.sum)),
+        let touch = self.stored().skip_while(|&(_, sum)| sum < least).take_while(|&(_, sum)| sum >= least);
+        let greatest = |found: Option<(i64, u32)>, (column, sum): (i64, u32)| match found {
+            Some((_, most)) if sum <= most => found,
+            _ => Some((column, sum)),
         };
         touch.take(BLOCK.unsigned_abs() as usize).fold(None, greatest).map(|(column, _)| column)
     }
@@ -406,9 +429,6 @@ impl TimeColumns {
 
 /// The curve while nothing is pressed.
 pub const NOTHING: Curve = Curve { sum: 0, area: 0, x: f32::NAN, y: f32::NAN };
-
-/// The sum of a source of which no taxel has a value.
-pub const MISSING_SUM: u32 = u32::MAX;
 
 /// The curve of a frame in which no taxel has a value.
 pub const MISSING: Curve = Curve { area: u32::MAX, ..NOTHING };

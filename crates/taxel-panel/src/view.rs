@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value, json};
 use taxel_core::encode::Encoder;
+use taxel_core::held::UNKNOWN;
 use taxel_core::problem;
 use taxel_live::Result;
 use taxel_live::locked::lock;
@@ -19,7 +20,7 @@ use crate::keyframe_index::KeyframeIndex;
 use crate::live_source::LiveSource;
 use crate::readout_encoders::{ReadoutEncoders, ViewEncoder};
 use crate::shown::Shown;
-use crate::time_columns::{COLUMN_US, COLUMNS_US, is_column};
+use crate::time_columns::{COLUMN_US, COLUMNS_US, Curve, MISSING, is_column};
 use delivered::Delivered;
 use encoded_spikes::EncodedSpikes;
 use following::Following;
@@ -132,6 +133,26 @@ impl View {
             (None, Some(live)) => Ok(Arc::new(live.index.clone())),
             (None, None) => Err(problem!("nothing is shown: open a recording first").into()),
         }
+    }
+
+    /// Makes the `values` message of a time, us: the curves, and what the watched taxel holds then. It takes as long as
+    /// [`View::seek`], without the view.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where nothing is shown; what it returns, as [`Player::open`].
+    pub fn values(&self) -> Result<impl FnOnce(i64) -> Result<Value> + Send + use<>> {
+        let (index, watched) = (self.index()?, self.options.watched);
+        Ok(move |t| {
+            let player = Player::open(index, t, ViewOptions::plain(COLUMNS_US.0))?;
+            let state = player.state();
+            let curves = state.curves().map(|Curve { sum, area, x, y }| match area {
+                area if area == MISSING.area => Value::Null,
+                area => json!({ "sum": sum, "area": area, "x": x, "y": y }),
+            });
+            let taxel = watched.map(|taxel| state.held()[taxel as usize]).filter(|&held| held != UNKNOWN);
+            Ok(json!({ "type": "values", "t_us": t, "curves": curves.collect::<Vec<_>>(), "taxel": taxel }))
+        })
     }
 
     fn warn(&mut self, error: &taxel_live::Error) {

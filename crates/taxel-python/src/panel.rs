@@ -310,6 +310,14 @@ impl PanelView {
         self.with(py, |view| view.seek(t_us))
     }
 
+    /// The message of the values at a time, us.
+    fn values(&self, py: Python<'_>, t_us: i64) -> PyResult<String> {
+        enter(py, |_| {
+            let read = self.lock().values()?;
+            read(t_us).map(|values| values.to_string())
+        })
+    }
+
     /// Plays at a speed, or at the last one.
     fn play(&self, py: Python<'_>, speed: Option<f64>) -> PyResult<()> {
         self.with(py, |view| view.play(speed))

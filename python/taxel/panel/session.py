@@ -309,6 +309,11 @@ class Session:
         except (OSError, _core.Error) as error:
             await self.say({"type": "warning", "text": reason(error)})
 
+    @long_request
+    async def values(self, t_us: Time) -> None:
+        """Send `values`: the sums, areas and centres at this time of what this view shows, and of the watched taxel."""
+        await self.say(await in_thread(self.view.values, t_us))
+
     @request
     async def overview(self) -> None:
         """Send `overview` of what this view shows: events and the greatest force over time, for the strip."""

@@ -20,7 +20,7 @@ use crate::array_state::{Keyframe, RestSource};
 use crate::load::Coordinates;
 use crate::load::Load;
 use crate::load::Weights;
-use crate::time_columns::{COLUMN_US, MISSING, MISSING_SUM, OF_SOURCE, TimeColumns, column_of};
+use crate::time_columns::{COLUMN_US, Curves, TimeColumns, column_of};
 
 /// Memory that the curves may take, bytes.
 const TIME_COLUMN_BYTES: usize = 256 << 20;
@@ -76,6 +76,8 @@ pub struct FrameIndex {
     array: Array,
     sources: Vec<SteppedFrames>,
     time_columns: Option<TimeColumns>,
+    /// Up to this sum of ticks above rest there is noise alone, of each source.
+    noise: Vec<u32>,
     range: Option<(i64, i64)>,
 }
 
@@ -104,8 +106,10 @@ impl FrameIndex {
             array,
             sources,
             time_columns: None,
+            noise: vec![],
         };
-        index.measure();
+        index.noise = index.measure_noise();
+        index.time_columns = index.measure();
         index
     }
 
@@ -156,48 +160,73 @@ impl FrameIndex {
         (first, step, usize::try_from((last - first) / step).unwrap_or(0) + 1)
     }
 
-    /// Computes the curves of the whole recording.
-    fn measure(&mut self) {
-        let Some((first, _)) = self.range else { return };
+    /// The most that noise adds up to, of each source.
+    fn measure_noise(&self) -> Vec<u32> {
+        let at = Coordinates::new(&self.array);
+        // Noise is what is above a rest that was found: above a given one any value is load.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let most = |source: &SteppedFrames| match source.rest_source {
+            RestSource::Quiet => {
+                let mut noise = FrameNoise::default();
+                for (k, &t) in source.t.iter().enumerate().filter(|&(k, _)| source.knows(k)) {
+                    let curve = self.load(source, k, &at).curve(&at, &self.weights, 0);
+                    noise.take(t, curve.sum.into());
+                }
+                noise.most(self.floor.into()) as u32
+            }
+            RestSource::Given | RestSource::None => 0,
+        };
+        self.sources.iter().map(most).collect()
+    }
+
+    /// The curves of the whole recording; `None` where they take too much memory.
+    fn measure(&self) -> Option<TimeColumns> {
+        let (first, _) = self.range?;
         let mut columns = TimeColumns::new(&self.array, TIME_COLUMN_BYTES).with_sources(self.curves());
-        let mut values = vec![0; columns.value_count()];
-        let channels = columns.channel_count();
-        values[channels..].fill(MISSING_SUM);
-        let mut noise = vec![FrameNoise::default(); self.sources.len()];
-        let mut cursor = vec![0; self.sources.len()];
-        let mut loads = vec![None; self.sources.len()];
+        let mut channels = vec![0; columns.channel_count()];
+        let mut loads: Vec<Option<Load>> = vec![None; self.sources.len()];
+        let (mut cursor, mut latest) = (vec![0; self.sources.len()], None);
+        let mut during = columns.no_curves();
         let at = Coordinates::new(&self.array);
         while let Some((source, k, t)) = self.next(&cursor) {
             cursor[source] += 1;
-            let known = self.sources[source].frame(k).iter().any(|&ticks| ticks != UNKNOWN);
-            loads[source] = known.then(|| self.load(&self.sources[source], k, &at));
-            let column = column_of(t, COLUMN_US);
-            columns.extend_to(column);
-            let curve = |load: Option<Load>| load.map_or(MISSING, |load| load.curve(&at, &self.weights));
-            columns.set_curve(column, curve(loads.iter().flatten().copied().reduce(|sum, load| sum.plus(&load))));
-            let curve = curve(loads[source]);
-            if known {
-                noise[source].take(t, curve.sum.into());
+            if let Some(before) = latest.filter(|&before| t > before) {
+                self.extend(&mut during, &loads, &channels, &at);
+                let (now, next) = (column_of(before, COLUMN_US), column_of(t, COLUMN_US));
+                if next > now {
+                    let mut after = columns.no_curves();
+                    self.extend(&mut after, &loads, &channels, &at);
+                    columns.set_curves(now, &during, &after);
+                    during = if t > next * COLUMN_US { after } else { columns.no_curves() };
+                }
             }
-            if !values.is_empty() {
-                if channels > 0 {
-                    self.above(&self.sources[source], k).for_each(|(taxel, above)| values[taxel] = above.into());
-                }
-                if let Some(of_source) = values[channels..].chunks_exact_mut(OF_SOURCE).nth(source) {
-                    of_source.copy_from_slice(&curve.of_source());
-                }
-                columns.set_values(column, &values);
+            latest = Some(t);
+            columns.extend_to(column_of(t, COLUMN_US));
+            loads[source] = self.sources[source].knows(k).then(|| self.load(&self.sources[source], k, &at));
+            if !channels.is_empty() {
+                self.above(&self.sources[source], k).for_each(|(taxel, above)| channels[taxel] = above);
             }
         }
-        let complete = columns.reach().is_none_or(|(begin, _)| begin <= column_of(first, COLUMN_US));
-        // Noise is what is above a rest that was found: above a given one any value is load.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let most = |(source, noise): (&SteppedFrames, FrameNoise)| match source.rest_source {
-            RestSource::Quiet => noise.most(self.floor.into()) as u32,
-            RestSource::Given | RestSource::None => 0,
-        };
-        let noise = self.sources.iter().zip(noise).map(most).collect();
-        self.time_columns = complete.then(|| columns.with_noise(noise));
+        if let Some(last) = latest {
+            self.extend(&mut during, &loads, &channels, &at);
+            columns.set_curves(column_of(last, COLUMN_US), &during, &during);
+        }
+        columns.reach().is_none_or(|(begin, _)| begin <= column_of(first, COLUMN_US)).then_some(columns)
+    }
+
+    /// Extends curves to a time with these loads of the sources, of which those without values have none.
+    fn extend(&self, curves: &mut Curves, loads: &[Option<Load>], channels: &[u16], at: &Coordinates) {
+        let (noise, each) = FrameSources::noise(self);
+        let curve = |load: &Load, noise: u32| load.curve(at, &self.weights, noise);
+        let (all, of_sources) = curves.sums.split_at_mut(1);
+        if let Some(load) = loads.iter().flatten().copied().reduce(|sum, load| sum.plus(&load)) {
+            all[0].extend(&curve(&load, noise));
+        }
+        for ((extent, load), &noise) in of_sources.iter_mut().zip(loads).zip(&each) {
+            load.iter().for_each(|load| extent.extend(&curve(load, noise)));
+        }
+        let widen = |(all, above): (&mut (u16, u16), &u16)| *all = (all.0.min(*above), all.1.max(*above));
+        curves.channels.iter_mut().zip(channels).for_each(widen);
     }
 
     /// The number of sources that have a curve each.
@@ -307,6 +336,10 @@ impl FrameSources for FrameIndex {
         (0..self.array.columns).map(source).collect()
     }
 
+    fn noise(&self) -> (u32, Vec<u32>) {
+        (self.noise.iter().fold(0, |sum: u32, &noise| sum.saturating_add(noise)), self.noise.clone())
+    }
+
     fn sensors(&self) -> Vec<Array> {
         let sensor = |source: &SteppedFrames| {
             let taxels: Vec<usize> = source.taxels(self.array.columns).collect();
@@ -405,6 +438,7 @@ impl KeyframeIndex for Arc<FrameIndex> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::time_columns::{Curve, MISSING};
     use crate::view::player::{Player, ViewOptions};
     use rand::{Rng, SeedableRng, rngs::StdRng};
 
@@ -491,19 +525,13 @@ mod tests {
                 }
                 sought.state_mut().update_curve();
                 let column = column_of(t, COLUMN_US);
-                let of_state = sought.state().time_columns();
-                let curve = of_state.curve(column);
-                let load = f64::from(curve.sum) * index.step;
+                let curves: Vec<Curve> = sought.state().curves().collect();
+                let load = f64::from(curves[0].sum) * index.step;
                 let sum: f32 = sums.iter().flatten().sum();
                 assert!((load - f64::from(sum)).abs() < 12.0 * index.step, "{load} {sum}");
-                let each = |columns: &TimeColumns| {
-                    let mut each = [MISSING_SUM; 2 * OF_SOURCE];
-                    columns.raise_values(column..column + 1, &mut each);
-                    each
-                };
-                for (source, (ours, theirs)) in each(of_state).chunks(OF_SOURCE).zip(sums).enumerate() {
-                    let (sum, x, y) = (ours[0], f32::from_bits(ours[1]), f32::from_bits(ours[2]));
-                    assert_eq!(sum == MISSING_SUM, theirs.is_none());
+                for (source, (curve, theirs)) in curves[1..].iter().zip(sums).enumerate() {
+                    let Curve { sum, x, y, .. } = *curve;
+                    assert_eq!(curve.area == MISSING.area, theirs.is_none());
                     let near =
                         |expected: f32| (f64::from(sum) * index.step - f64::from(expected)).abs() < 6.0 * index.step;
                     assert!(theirs.is_none_or(near), "{sum} {theirs:?}");
@@ -520,8 +548,12 @@ mod tests {
                     assert!(mass < 30.0 || !(far(x, at[0]) || far(y, at[1])), "{source}: {x}, {y} of {at:?} / {mass}");
                 }
                 if sought.t() == last {
-                    let whole = shared.time_columns().unwrap();
-                    assert_eq!((whole.curve(column).sum, each(whole)), (curve.sum, each(of_state)));
+                    let of = |columns: &TimeColumns| {
+                        let mut curves = columns.no_curves();
+                        columns.join_curves(column..column + 1, &mut curves.sums, &mut curves.channels);
+                        curves
+                    };
+                    assert_eq!(of(shared.time_columns().unwrap()), of(sought.state().time_columns()));
                 }
             }
         }
@@ -556,10 +588,11 @@ mod tests {
             });
             let array = Array::new(4, 9, 1.0, "feet").unwrap();
             let index = FrameIndex::new(array, FrameFile::default(), sources.collect());
-            let columns = index.time_columns.as_ref().unwrap();
+            let at = Coordinates::new(&index.array);
             for k in 0..600 {
-                let sum = columns.curve(column_of(10_000 * k as i64, COLUMN_US)).sum;
-                let (touches, noise) = (stands(0, k) || stands(1, k), columns.noise());
+                let load = |foot: usize| index.load(&index.sources[foot], k, &at);
+                let sum = load(0).plus(&load(1)).curve(&at, &index.weights, 0).sum;
+                let (touches, (noise, _)) = (stands(0, k) || stands(1, k), FrameSources::noise(&index));
                 assert_eq!(sum > noise, touches, "spread {spread}, frame {k}: {sum} of {noise}");
             }
         }
@@ -586,7 +619,7 @@ mod tests {
             });
             let array = Array::new(2, 7, 1.0, "feet").unwrap();
             let index = FrameIndex::new(array, FrameFile::default(), sources.into());
-            index.time_columns.unwrap().source_noise().to_vec()
+            index.noise
         });
         assert_eq!(noise[0], noise[1]);
         assert!(noise[0][1] > 4 * 7);

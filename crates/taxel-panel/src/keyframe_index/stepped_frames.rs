@@ -138,6 +138,11 @@ impl SteppedFrames {
         &self.ticks[k * self.cells()..(k + 1) * self.cells()]
     }
 
+    /// Whether a frame has any value.
+    pub(super) fn knows(&self, k: usize) -> bool {
+        self.frame(k).iter().any(|&ticks| ticks != UNKNOWN)
+    }
+
     /// Number of frames up to a time.
     pub(super) fn until(&self, t: i64) -> usize {
         self.t.partition_point(|&at| at <= t)

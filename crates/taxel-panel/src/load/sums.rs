@@ -53,12 +53,15 @@ impl Load {
         }
     }
 
-    /// Its curve: the sum, the area and the centre of the loaded taxels.
-    pub(crate) fn curve(&self, at: &Coordinates, weights: &Weights) -> Curve {
+    /// Its curve: the sum, the area and the centre of the loaded taxels; up to a sum of `noise` there is noise alone, and no
+    /// centre.
+    pub(crate) fn curve(&self, at: &Coordinates, weights: &Weights, noise: u32) -> Curve {
         if self.sum == 0 {
             return NOTHING;
         }
-        let (x, y) = at.centre(self.loaded, self.loaded_x, self.loaded_y);
-        Curve { sum: weights.sum(self.sum, self.weighted), area: self.area, x, y }
+        let sum = weights.sum(self.sum, self.weighted);
+        let loaded = if sum > noise { self.loaded } else { 0 };
+        let (x, y) = at.centre(loaded, self.loaded_x, self.loaded_y);
+        Curve { sum, area: self.area, x, y }
     }
 }

@@ -8,7 +8,7 @@ use super::encoded_spikes::EncodedSpikes;
 use super::player::Player;
 use crate::array_state::{ArrayState, RestSource};
 use crate::taxel_history::TaxelHistory;
-use crate::time_columns::{COLUMN_US, Curve, MISSING, MISSING_SUM, NOTHING, OF_SOURCE, SPAN, TimeColumns, column_of};
+use crate::time_columns::{COLUMN_US, Curve, Curves, SPAN, TimeColumns, column_of};
 
 /// Bytes of the header.
 const HEADER: usize = 144;
@@ -50,8 +50,6 @@ struct ShownColumns<'a> {
     last: i64,
     /// Stored columns in one shown column.
     factor: i64,
-    /// The most that noise adds up to, and that of each of several sources.
-    noise: (u32, &'a [u32]),
 }
 
 impl<'a> ShownColumns<'a> {
@@ -61,13 +59,12 @@ impl<'a> ShownColumns<'a> {
         all_columns: Option<&'a TimeColumns>,
         latest: Option<i64>,
         column_us: i64,
-        noise: (u32, &'a [u32]),
     ) -> Self {
         let stored_us = column_us.min(COLUMN_US);
         let last = latest.map_or(i64::MIN, |t| column_of(t, stored_us));
         // A view that has played for long has dropped the beginning of its own columns.
         let first_of_view = first_of_view.max(of_view.reach().map_or(i64::MAX, |(first, _)| first));
-        Self { of_view, first_of_view, all_columns, latest, last, factor: column_us / stored_us, noise }
+        Self { of_view, first_of_view, all_columns, latest, last, factor: column_us / stored_us }
     }
 
     /// The first known column.
@@ -94,28 +91,16 @@ impl<'a> ShownColumns<'a> {
         }
     }
 
-    fn curve(&self, column: i64) -> Curve {
-        let parts = self.parts(column).into_iter().filter(|(_, columns)| !columns.is_empty());
-        let greatest =
-            |most: Curve, curve: Curve| if curve.sum > most.sum || most.area == MISSING.area { curve } else { most };
-        let curve = parts.map(|(store, columns)| store.greatest(columns)).reduce(greatest).unwrap_or(NOTHING);
-        if curve.sum > self.noise.0 { curve } else { Curve { x: f32::NAN, y: f32::NAN, ..curve } }
-    }
-
-    /// The values that have a curve each, column after column.
-    fn values(&self, columns: Range<i64>) -> Vec<u32> {
-        let mut all = vec![];
+    /// The curves of columns, column after column.
+    fn curves(&self, columns: Range<i64>) -> Curves {
+        let mut all = Curves { sums: vec![], channels: vec![] };
         for column in columns {
-            let begin = all.len();
-            all.resize(begin + self.of_view.channel_count(), 0);
-            all.resize(begin + self.of_view.value_count(), MISSING_SUM);
+            let mut of_column = self.of_view.no_curves();
             for (store, columns) in self.parts(column) {
-                store.raise_values(columns, &mut all[begin..]);
+                store.join_curves(columns, &mut of_column.sums, &mut of_column.channels);
             }
-            let sources = all[begin + self.of_view.channel_count()..].chunks_exact_mut(OF_SOURCE);
-            for (source, _) in sources.zip(self.noise.1).filter(|(source, noise)| source[0] <= **noise) {
-                source[1..].fill(f32::NAN.to_bits());
-            }
+            all.sums.append(&mut of_column.sums);
+            all.channels.append(&mut of_column.channels);
         }
         all
     }
@@ -142,7 +127,7 @@ pub(crate) fn of_state(
         None if about.column_us < COLUMN_US => (state.time_columns(), i64::MAX),
         None => (state.time_columns(), i64::MIN),
     };
-    let shown = ShownColumns::new(of_view, first_of_view, None, state.latest(), about.column_us, (0, &[]));
+    let shown = ShownColumns::new(of_view, first_of_view, None, state.latest(), about.column_us);
     write(state, columns, &shown, history, spikes, about)
 }
 
@@ -159,8 +144,7 @@ pub(crate) fn of_player(player: &mut Player, window: Option<&mut Player>, about:
         None => player,
     };
     let (of_view, first_of_view, all_columns) = beside.time_columns();
-    let noise = player.index().time_columns().map_or((0, &[][..]), |all| (all.noise(), all.source_noise()));
-    let shown = ShownColumns::new(of_view, first_of_view, all_columns, beside.state().latest(), about.column_us, noise);
+    let shown = ShownColumns::new(of_view, first_of_view, all_columns, beside.state().latest(), about.column_us);
     write(player.state(), player.index().array().columns, &shown, beside.history(), beside.spikes(), about)
 }
 
@@ -178,7 +162,7 @@ fn write(
     let first = about.from.max(shown.first()).max(last.saturating_add(1 - SPAN));
     let range = if first <= last { first..last + 1 } else { 0..0 };
     let count = usize::try_from(range.end - range.start).unwrap_or(0);
-    let mut out = Vec::with_capacity(HEADER + taxels * 5 + count * (2 * rows + 22) + 64);
+    let mut out = Vec::with_capacity(HEADER + taxels * 5 + count * (2 * rows + 38) + 64);
     out.resize(HEADER, 0);
     let mut sections = [(0_usize, 0_usize); SECTION_COUNT];
     let mut section = |out: &mut Vec<u8>, number: usize, write: &dyn Fn(&mut Vec<u8>)| {
@@ -192,14 +176,9 @@ fn write(
     section(&mut out, 0, &|out| values(state.held(), out));
     section(&mut out, 1, &|out| out.extend(state.change().iter().map(|&change| change.to_le_bytes()[0])));
     section(&mut out, 2, &|out| range.clone().for_each(|column| shown.raster(column, out)));
-    section(&mut out, 3, &|out| {
-        for curve in range.clone().map(|column| shown.curve(column)) {
-            out.extend_from_slice(&curve.sum.to_le_bytes());
-            out.extend_from_slice(&curve.area.to_le_bytes());
-            out.extend_from_slice(&curve.x.to_le_bytes());
-            out.extend_from_slice(&curve.y.to_le_bytes());
-        }
-    });
+    let curves = shown.curves(range.clone());
+    let each = || curves.sums.chunks_exact(shown.of_view.no_curves().sums.len());
+    section(&mut out, 3, &|out| each().for_each(|sums| sums[0].write(out)));
     if let Some(history) = history {
         section(&mut out, 4, &|out| history.write(range.clone(), out));
     }
@@ -209,17 +188,14 @@ fn write(
     if let Some(spikes) = spikes {
         section(&mut out, 6, &|out| spikes.write(range.clone(), out));
     }
-    let (of_view, of_all) = (shown.of_view, shown.values(range.clone()));
-    let each = || of_all.chunks_exact(of_view.value_count().max(1)).map(|all| all.split_at(of_view.channel_count()));
     section(&mut out, 7, &|out| {
-        // Values above rest have 16 bits.
-        #[allow(clippy::cast_possible_truncation)]
-        each().for_each(|(channels, _)| channels.iter().for_each(|&v| out.extend((v as u16).to_le_bytes())));
+        curves.channels.iter().for_each(|(least, greatest)| values(&[*least, *greatest], out));
     });
-    let sources = || each().flat_map(|(_, sources)| sources.chunks_exact(OF_SOURCE));
-    section(&mut out, 8, &|out| sources().for_each(|source| out.extend(source[0].to_le_bytes())));
+    section(&mut out, 8, &|out| each().for_each(|sums| sums[1..].iter().for_each(|sum| sum.write(out))));
     section(&mut out, 9, &|out| {
-        sources().flat_map(|source| &source[1..]).for_each(|at| out.extend(at.to_le_bytes()));
+        for Curve { sum, area, x, y } in state.curves() {
+            [sum, area, x.to_bits(), y.to_bits()].iter().for_each(|word| out.extend(word.to_le_bytes()));
+        }
     });
     let mut put = |at: usize, bytes: &[u8]| out[at..at + bytes.len()].copy_from_slice(bytes);
     put(0, b"TXF1");

@@ -82,7 +82,7 @@ impl Player {
         let mut state = ArrayState::new(index.array(), index.noise_floor(), &keyframe, unit_us, bytes);
         if let Some(frames) = index.frames() {
             let (rest, floor) = (frames.rest_source(), frames.sum_floor());
-            state = state.of_frames(&keyframe, rest, floor, frames.weights(), frames.source_of());
+            state = state.of_frames(&keyframe, rest, floor, frames.weights(), frames.source_of(), frames.noise());
         }
         let first_of_view = keyframe.latest.map_or(i64::MIN, |latest| column_of(latest + LATE_US, unit_us));
         let history = options.watched.map(|taxel| {

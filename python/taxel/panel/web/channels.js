@@ -61,7 +61,7 @@ export class Channels {
     // A column more on the left, so that curves begin at the edge.
     const shown = Array.from({ length: last - first + 2 }, (_, i) => timeline.known(first - 1 + i));
     let most = LEAST;
-    for (const column of shown) if (column >= 0) for (const channel of taxels) most = Math.max(most, channels[column * all + channel]);
+    for (const column of shown) if (column >= 0) for (const channel of taxels) most = Math.max(most, channels[2 * (column * all + channel) + 1]);
     const high = height / taxels.length;
     const [line, chosen, grid] = ["more", "less", "grid"].map(themed);
     context.lineWidth = 1.25;
@@ -71,31 +71,31 @@ export class Channels {
       context.fillRect(0, floor, width, 0.5);
       context.strokeStyle = context.fillStyle = channel === watched ? chosen : line;
       const [curve, area] = [new Path2D(), new Path2D()];
-      // Where the curve begins after a gap, and where it is.
-      let [from, x] = [NaN, 0];
+      // The points since the last gap: where they are, the least and the greatest of each.
+      /** @type {[number, number, number][]} */
+      let points = [];
       const end = () => {
-        if (Number.isNaN(from)) return;
-        area.lineTo(x, floor);
-        area.lineTo(from, floor);
-        from = NaN;
+        if (!points.length) return;
+        const [[from], [to]] = [points[0], points[points.length - 1]];
+        area.moveTo(from, floor);
+        for (const [x, , high] of points) area.lineTo(x, high);
+        area.lineTo(to, floor);
+        points.forEach(([x, , high], i) => (i ? curve.lineTo(x, high) : curve.moveTo(x, high)));
+        for (const [x, low] of points.reverse()) curve.lineTo(x, low);
+        curve.closePath();
+        points = [];
       };
       shown.forEach((column, i) => {
-        if (column < 0) return end();
-        // A curve has the value at the end of its column.
-        x = (((first + i) * column_us - window[0]) / span_us) * width;
-        const y = floor - (channels[column * all + channel] / most) * (high - GAP);
-        if (Number.isNaN(from)) {
-          from = x;
-          curve.moveTo(x, y);
-          area.moveTo(x, y);
-        }
-        curve.lineTo(x, y);
-        area.lineTo(x, y);
+        const at = 2 * (column * all + channel);
+        if (column < 0 || channels[at] > channels[at + 1]) return end();
+        const [low, top] = [channels[at], channels[at + 1]].map((ticks) => floor - (ticks / most) * (high - GAP));
+        points.push([(((first - 0.5 + i) * column_us - window[0]) / span_us) * width, low, top]);
       });
       end();
       context.globalAlpha = 0.25;
       context.fill(area);
       context.globalAlpha = 1;
+      context.fill(curve);
       context.stroke(curve);
     });
     return `each up to ${rounded(most * values.step)} ${values.unit}`;

@@ -9,6 +9,7 @@ import uPlot from "./vendor/uPlot.js";
 import { rounded, integer } from "./words.js";
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
+/** @typedef {import("./timeline.js").Values} Values */
 /** @typedef {{ draw: (timeline: Timeline, shown: Shown) => string, colour?: () => void }} Painter `draw` returns what the heading says;
  *   `colour` is called before it, and for each theme */
 /** @typedef {{ scales: uPlot.Scales, series: uPlot.Series[], axes: uPlot.Axis[], bands?: uPlot.Band[] }} Plan of the curves, without the axis of time */
@@ -38,8 +39,8 @@ import { rounded, integer } from "./words.js";
  * @property {(shown: Shown) => boolean} [fits] whether it has anything to show of this source; without it: of all
  * @property {(shown: Shown, sources: string[]) => (Node | string)[]} heading
  * @property {(shown: () => Shown, sources: string[]) => Plan} [plan]
- * @property {(shown: Shown, timeline: Timeline, column: number) => (number | null)[]} [at] values of all curves in a column
- * @property {(shown: Shown, timeline: Timeline, column: number) => string[]} [says] texts of the outputs in its heading, of a column
+ * @property {(shown: Shown, timeline: Timeline, column: number) => (number | null)[]} [at] values of all series in a column
+ * @property {(shown: Shown, values: Values) => string[]} [says] texts of the outputs in its heading
  * @property {(element: HTMLElement) => Painter} [painter]
  */
 
@@ -75,25 +76,41 @@ const axis = (scale, side, stroke) => ({
 });
 /** @param {string} stroke @param {string} scale @param {number[]} [dash] @returns {uPlot.Series} */
 const line = (stroke, scale, dash) => ({ stroke, scale, width: 1.25, points: { show: false }, ...(dash ? { dash } : {}) });
+/**
+ * Curves that are drawn from least to greatest.
+ * @param {string[]} strokes the colour of each
+ * @param {string} scale
+ * @param {(number[] | undefined)[]} [dashes]
+ * @returns {{ series: uPlot.Series[], bands: uPlot.Band[] }}
+ */
+const extents = (strokes, scale, dashes = []) => ({
+  series: strokes.flatMap((stroke, k) => [line(stroke, scale, dashes[k]), line(stroke, scale, dashes[k])]),
+  bands: strokes.map((fill, k) => ({ series: [2 * k + 2, 2 * k + 1], fill })),
+});
+/** @param {import("./timeline.js").Extent | null} extent @param {number} [step] @returns {(number | null)[]} what is drawn of it */
+const ends = (extent, step = 1) => (extent ? extent.map((value) => value * step) : [null, null]);
 /** @param {() => number} least of its end @returns {uPlot.Scale.Range} */
 const fromZero = (least) => (_, __, greatest) => [0, Math.max(least(), (greatest ?? 0) * 1.1)];
 /** @param {string[]} sources @returns {string[]} the colour of each, or of one curve for all */
 const coloured = (sources) => (sources.length ? COLOURS.slice(0, sources.length) : COLOURS.slice(0, 1)).map(themed);
 
-/** @param {Shown} shown @param {Timeline} timeline @param {number} column @returns {string[]} the sum, of several sources of each */
-const sumsAt = ({ sums: { unit, step } }, timeline, column) =>
-  timeline.sums(column).map((sum) => (Number.isNaN(sum) ? "missing" : `${step === 1 ? integer(sum) : rounded(sum * step)} ${unit}`));
+/** @param {Values} values @returns {import("./timeline.js").Curve[]} of each of several sources, or of all */
+const each = ({ curves }) => (curves.length > 1 ? curves.slice(1) : curves);
 
-/** @param {Shown} shown @param {Timeline} timeline @param {number} column @returns {string} the number of taxels that are pressed */
-const areaAt = ({ sensor }, timeline, column) => (Number.isNaN(timeline.area[column]) ? "" : sensor.area(timeline.area[column]));
+/** @param {Shown} shown @param {Values} values @returns {string[]} the sum, of several sources of each */
+const sumsAt = ({ sums: { unit, step } }, values) =>
+  each(values).map((curve) => (curve ? `${step === 1 ? integer(curve.sum) : rounded(curve.sum * step)} ${unit}` : "missing"));
 
-/** @param {Shown} shown @param {Timeline} timeline @param {number} column @returns {string} the centre of pressure, of several sources of each that is pressed */
-function centreAt({ sensor }, timeline, column) {
-  const [first, ...others] = timeline.centres(column);
-  if (sensor.kind === "channels" || Number.isNaN(timeline.sum[column])) return "";
-  if (timeline.area[column] <= 1) return "";
-  if (!others.length) return Number.isNaN(first[0]) ? "nothing pressed" : sensor.centre(...first);
-  const pressed = [first, ...others].flatMap((at, k) => (Number.isNaN(at[0]) ? [] : [`${sensor.sources[k].name} ${sensor.within(k, at)}`]));
+/** @param {Shown} shown @param {Values} values @returns {string} the number of taxels that are pressed */
+const areaAt = ({ sensor }, { curves: [all] }) => (all ? sensor.area(all.area) : "");
+
+/** @param {Shown} shown @param {Values} values @returns {string} the centre of pressure, of several sources of each that is pressed */
+function centreAt({ sensor }, values) {
+  const [all] = values.curves;
+  if (sensor.kind === "channels" || !all || all.area <= 1) return "";
+  const of = each(values);
+  if (of.length === 1) return Number.isNaN(all.x) ? "nothing pressed" : sensor.centre(all.x, all.y);
+  const pressed = of.flatMap((curve, k) => (!curve || Number.isNaN(curve.x) ? [] : [`${sensor.sources[k].name} ${sensor.within(k, [curve.x, curve.y])}`]));
   return pressed.length ? pressed.join(", ") + sensor.unit : "nothing pressed";
 }
 
@@ -120,12 +137,7 @@ export const LANES = [
     setting: "showTaxel", box: "Taxel",
     fits: ({ taxel }) => taxel !== null,
     heading: () => ["Taxel ", make("span", {}, "least to greatest, last"), " ", output()],
-    says: ({ values: { unit, step, zero } }, timeline, column) => {
-      const [least, greatest, last] = timeline.history.subarray(3 * column, 3 * column + 3);
-      if (last === UNKNOWN_VALUE) return [];
-      const value = (/** @type {number} */ ticks) => rounded((ticks - zero) * step);
-      return [`${value(last)} ${unit}${least === greatest ? "" : ` (${value(least)} to ${value(greatest)})`}`];
-    },
+    says: ({ values: { unit, step, zero } }, { taxel }) => (taxel === null ? [] : [`${rounded((taxel - zero) * step)} ${unit}`]),
     plan: (shown) => {
       /** @type {uPlot.Series} the edge of a band */
       const bound = { scale: "value", points: { show: false } };
@@ -151,19 +163,19 @@ export const LANES = [
     says: sumsAt,
     plan: (shown, sources) => ({
       scales: { force: { range: fromZero(() => 8 * shown().sums.step) } },
-      series: coloured(sources).map((colour) => line(colour, "force")),
+      ...extents(coloured(sources), "force"),
       axes: [axis("force", 3, sources.length ? themed("dim") : themed("more"))],
     }),
-    at: ({ sums: { step } }, timeline, column) => timeline.sums(column).map((sum) => (sum >= 0 ? sum * step : null)),
+    at: ({ sums: { step } }, timeline, column) => timeline.drawn.flatMap((curve) => ends(timeline.sumIn(column, curve), step)),
   },
   {
     name: "area", label: "Number of taxels pressed", kind: "low", least: 54,
     setting: "showArea", box: "Area",
     fits: ({ sensor }) => sensor.kind !== "channels",
     heading: () => ["Area ", swatch("less"), " ", output({ id: "area-now" })],
-    says: (shown, timeline, column) => [areaAt(shown, timeline, column)],
-    plan: () => ({ scales: { area: { range: fromZero(() => 8) } }, series: [line(themed("less"), "area")], axes: [{ ...axis("area", 3, themed("less")), incrs: WHOLE }] }),
-    at: (_, timeline, column) => [timeline.area[column] >= 0 ? timeline.area[column] : null],
+    says: (shown, values) => [areaAt(shown, values)],
+    plan: () => ({ scales: { area: { range: fromZero(() => 8) } }, ...extents([themed("less")], "area"), axes: [{ ...axis("area", 3, themed("less")), incrs: WHOLE }] }),
+    at: (_, timeline, column) => ends(timeline.areaIn(column)),
   },
   {
     name: "centre", label: "Centre of pressure", kind: "low", least: 62,
@@ -172,19 +184,25 @@ export const LANES = [
     heading: ({ sensor: { axes: [across, down] } }, sources) =>
       // Of several sources each value has the name of its axis.
       ["Centre ", make("span", { class: sources.length ? "apart" : "" }, swatch("more"), sources.length ? " " : ` ${across} `, swatch("less dashed"), sources.length ? "" : ` ${down}`), " ", output({ id: "centre-now" })],
-    says: (shown, timeline, column) => [centreAt(shown, timeline, column)],
+    says: (shown, values) => [centreAt(shown, values)],
     plan: (shown, sources) => {
       const [low, high] = shown().sensor.limits;
       const down = themed("less");
+      const colours = coloured(sources).flatMap((colour) => [colour, sources.length ? colour : down]);
       return {
         scales: { centre: { range: [low, high] } },
-        series: coloured(sources).flatMap((colour) => [line(colour, "centre"), line(sources.length ? colour : down, "centre", [5, 3])]),
+        ...extents(colours, "centre", colours.map((_, k) => (k % 2 ? [5, 3] : undefined))),
         axes: [{ ...axis("centre", 3, themed("dim")), splits: () => [low, (low + high) / 2, high], values: (_, marks) => marks.map(rounded) }],
       };
     },
     // A single loaded taxel has no centre of its own.
     at: ({ sensor }, timeline, column) =>
-      timeline.area[column] <= 1 ? [] : timeline.centres(column).flatMap(([x, y], k) => (Number.isNaN(x) ? [null, null] : [sensor.kind === "channels" ? x : sensor.across(k, x), y])),
+      (timeline.areaIn(column)?.[1] ?? 0) <= 1
+        ? []
+        : timeline.drawn.flatMap((curve, k) => {
+            const [x, y] = timeline.centreIn(column, curve);
+            return [...ends(sensor.kind === "channels" || !x ? x : [sensor.across(k, x[0]), sensor.across(k, x[1])]), ...ends(y)];
+          }),
   },
 ];
 
@@ -291,25 +309,24 @@ export class Lanes {
         const values = column < 0 || gaps.has(number) ? [] : lane.at(shown, timeline, column);
         curves.forEach((curve, k) => curve.push(values[k] ?? null));
       }
-      // A curve has the value at the end of its column.
-      plot.setData([numbers.map((number) => ((number + 1) * column_us - window[0]) / 1e6), ...curves]);
+      plot.setData([numbers.map((number) => ((number + 0.5) * column_us - window[0]) / 1e6), ...curves]);
     }
   }
 
   /** Writes the values at the cursor, or at the time shown. @param {Timeline | null} timeline */
   write(timeline) {
     const shown = this.shown();
-    const column = timeline?.pointed ?? -1;
+    const values = timeline?.values ?? null;
     for (const { lane, heading } of this.all) {
       if (!lane.says) continue;
-      const texts = timeline && column >= 0 ? lane.says(shown, timeline, column) : [];
+      const texts = values ? lane.says(shown, values) : [];
       heading.querySelectorAll("output").forEach((output, k) => write(output, texts[k] ?? ""));
     }
-    if (!timeline || column < 0) return;
+    if (!values) return;
     const { sensor } = shown;
-    const sums = sumsAt(shown, timeline, column);
+    const sums = sumsAt(shown, values);
     const sum = sums.length > 1 ? sums.map((text, k) => `${sensor.sources[k].name} ${text}`).join(", ") : sums[0];
-    const more = sensor.kind === "channels" ? "" : ` over ${areaAt(shown, timeline, column)}, centre (${sensor.axes.join(", ")}): ${centreAt(shown, timeline, column)}`;
-    write(part("shown-info", HTMLElement), Number.isNaN(timeline.sum[column]) ? "missing" : `${sum}${more}`);
+    const more = sensor.kind === "channels" ? "" : ` over ${areaAt(shown, values)}, centre (${sensor.axes.join(", ")}): ${centreAt(shown, values)}`;
+    write(part("shown-info", HTMLElement), values.curves[0] ? `${sum}${more}` : "missing");
   }
 }

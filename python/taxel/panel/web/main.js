@@ -16,6 +16,7 @@ import { Notes } from "./notes.js";
 import { failed, notify, silence } from "./notice.js";
 import { Player } from "./player.js";
 import { readFrame } from "./protocol.js";
+import { Pointed } from "./pointed.js";
 import { Recorder } from "./recorder.js";
 import { Sensor } from "./sensor.js";
 import { Server } from "./server.js";
@@ -54,6 +55,7 @@ const timeWindow = new TimeWindow(server, player, () => timeline, () => hello?.c
   lanesDue = marksDue = true;
 });
 const cursor = new Cursor(() => timeline, (t_us) => player.seek(t_us), timeWindow, mark);
+const pointed = new Pointed(server, () => timeline);
 const maps = new Maps(settings, watch);
 const lanes = new Lanes(settings, shown);
 const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), (from, to) => timeWindow.closer(from, to), listRecordings);
@@ -281,6 +283,9 @@ function receive(message) {
     case "zeroed":
       zeroed = message.taxels;
       return showZeroed();
+    case "values":
+      pointed.take(message);
+      return lanes.write(timeline);
     case "ports":
       return sensor.offer(message);
     case "guess":
@@ -516,6 +521,7 @@ function writeText() {
   writeCounters(counters, drawn);
   timeWindow.write();
   if (training.since !== null) training.write();
+  pointed.ask();
   lanes.write(timeline);
   player.write();
   strip.draw();

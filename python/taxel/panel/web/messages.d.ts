@@ -711,6 +711,22 @@ export interface Guess {
   source: string;
 }
 
+/** When asked: what the curves are at a time, of all taxels and then of each of several sources; null where none has a value. */
+export interface Values {
+  type: "values";
+  t_us: number;
+  /** Ticks, taxels, column and row; the centre is null where nothing is pressed. */
+  curves: ({ sum: number, area: number, x: number | null, y: number | null } | null)[];
+  /** What the watched taxel holds, ticks; null where that is not known, or none is watched. */
+  taxel: number | null;
+}
+
+export interface ValuesRequest {
+  type: "values";
+  id?: number;
+  t_us: number;
+}
+
 export interface ChangeRequest {
   type: "change";
   id?: number;
@@ -768,6 +784,7 @@ export type Message =
   | Done
   | Refused
   | Warning
+  | Values
   | Ports
   | Guess;
 
@@ -779,6 +796,7 @@ export type Request =
   | EncodeRequest
   | ZoomRequest
   | SeekRequest
+  | ValuesRequest
   | PlayRequest
   | PauseRequest
   | StepRequest

@@ -1,10 +1,10 @@
-// Frames, the binary messages of the server: ../protocol.md, version 1. Those that are text are in messages.d.ts.
+// Frames, the binary messages of the server: docs/panel-protocol.md, version 1. Those that are text are in messages.d.ts.
 
 export const VERSION = 1;
 
 /** The value of a taxel without any event so far. */
 export const UNKNOWN_VALUE = 65535;
-/** The area of a frame in which no taxel has a value, and the sum of a source of which none has one. */
+/** The area where no taxel has a value. */
 export const MISSING = 0xffffffff;
 
 /**
@@ -26,15 +26,17 @@ export const MISSING = 0xffffffff;
  * @property {Uint16Array | null} pressure
  * @property {Int8Array | null} change
  * @property {Uint8Array | null} raster
- * @property {Uint32Array | null} sums four words a column: ticks, taxels, and the centre that `centres` reads
- * @property {Float32Array | null} centres the same words as floats: x at 2, y at 3
+ * @property {Uint32Array | null} sums eight words a column: least and greatest ticks and taxels, and of the centre what `centres` reads
+ * @property {Float32Array | null} centres the same words as floats: least and greatest x at 4, y at 6
  * @property {Uint16Array | null} history least, greatest, last
  * @property {Uint16Array | null} rest
  * @property {"given" | "quiet" | "none"} restFrom where the rest comes from
  * @property {Uint8Array | null} spikes of the encoder, as the raster
- * @property {Uint16Array | null} channels ticks above rest of each channel, column after column
- * @property {Uint32Array | null} sources sum of each of several sources, column after column
- * @property {Float32Array | null} sourceCentres centre of each of them, x and y, column after column
+ * @property {Uint16Array | null} channels least and greatest ticks above rest of each channel, column after column
+ * @property {Uint32Array | null} sources as `sums`, of each of several sources, column after column
+ * @property {Float32Array | null} sourceCentres the same words as floats
+ * @property {Uint32Array | null} now four words of all taxels, and then of each of several sources, at the time of the frame: ticks, taxels, and the centre
+ * @property {Float32Array | null} nowCentres the same words as floats: x at 2, y at 3
  */
 
 /**
@@ -88,6 +90,8 @@ export function readFrame(buffer) {
     spikes: words(6, Uint8Array),
     channels: words(7, Uint16Array),
     sources: words(8, Uint32Array),
-    sourceCentres: words(9, Float32Array),
+    sourceCentres: words(8, Float32Array),
+    now: words(9, Uint32Array),
+    nowCentres: words(9, Float32Array),
   };
 }

@@ -5,6 +5,9 @@ import { numbering, seconds, short } from "./words.js";
 
 /** @typedef {import("./protocol.js").Frame} Frame */
 /** @typedef {{ share: number, text: string }} Tick */
+/** @typedef {{ sum: number, area: number, x: number, y: number } | null} Curve the values at a time; null where no taxel has a value, and a centre that is no number where nothing is pressed */
+/** @typedef {{ curves: Curve[], taxel: number | null }} Values of all taxels, then of each of several sources; what the watched taxel holds */
+/** @typedef {[number, number]} Extent least and greatest */
 
 /** Columns that are stored; the window shows one less at most, as it need not begin where a column does. */
 export const SPAN = 1250;
@@ -22,18 +25,18 @@ export class Timeline {
     this.column_us = column_us;
     this.raster = new Uint8Array(SPAN * rows);
     this.spikes = new Uint8Array(SPAN * rows);
-    this.sum = new Float64Array(SPAN);
-    this.area = new Float64Array(SPAN);
-    this.x = new Float32Array(SPAN);
-    this.y = new Float32Array(SPAN);
     this.history = new Uint16Array(SPAN * 3);
-    /** How many channels have a curve each, and their ticks above rest, column after column. */
+    /** How many channels have a curve each, and their least and greatest ticks above rest, column after column. */
     this.channel_count = 0;
     this.channels = new Uint16Array(0);
-    /** How many of several sources have curves of their own, their sums, and their centres, x and y. */
-    this.source_count = 0;
-    this.sources = new Uint32Array(0);
-    this.sourceCentres = new Float32Array(0);
+    /** How many curves there are, of all taxels and then of each of several sources: eight words each of a column, as in frames. */
+    this.curve_count = 1;
+    this.sums = new Uint32Array(SPAN * 8);
+    this.centres = new Float32Array(this.sums.buffer);
+    /** The values at the time shown. @type {Values | null} */
+    this.now = null;
+    /** The values at the cursor, once they have come, and their time. @type {Values & { t_us: number } | null} */
+    this.pointed = null;
     this.number = new Float64Array(SPAN);
     /** The window, us from its left edge to its right one; null before the first frame. @type {[number, number] | null} */
     this.window = null;
@@ -95,7 +98,10 @@ export class Timeline {
    * @param {Frame} frame
    */
   put(frame) {
-    if (frame.restart || frame.column_us !== this.column_us) this.number.fill(NaN);
+    if (frame.restart || frame.column_us !== this.column_us) {
+      this.number.fill(NaN);
+      this.pointed = null;
+    }
     this.column_us = frame.column_us;
     this.t_us = frame.t_us;
     this.following = frame.following;
@@ -104,13 +110,19 @@ export class Timeline {
       const end = (Math.floor(frame.t_us / this.column_us) + 1) * this.column_us;
       this.window = [end - this.span_us, end];
     }
-    const { first, count, raster, spikes, sums, centres, history, channels, sources, sourceCentres } = frame;
-    const each = channels && count ? channels.length / count : this.channel_count;
-    if (each !== this.channel_count) [this.channel_count, this.channels] = [each, new Uint16Array(SPAN * each)];
-    const several = count ? (sources?.length ?? 0) / count : this.source_count;
-    if (several !== this.source_count) {
-      this.source_count = several;
-      [this.sources, this.sourceCentres] = [new Uint32Array(SPAN * several), new Float32Array(SPAN * several * 2)];
+    const { first, count, raster, spikes, sums, history, channels, sources, now, nowCentres } = frame;
+    const each = channels && count ? channels.length / count / 2 : this.channel_count;
+    if (each !== this.channel_count) [this.channel_count, this.channels] = [each, new Uint16Array(SPAN * each * 2)];
+    const several = now ? now.length / 4 : this.curve_count;
+    if (several !== this.curve_count) {
+      [this.curve_count, this.sums] = [several, new Uint32Array(SPAN * several * 8)];
+      this.centres = new Float32Array(this.sums.buffer);
+    }
+    if (now && nowCentres) {
+      const curves = Array.from({ length: several }, (_, k) =>
+        now[4 * k + 1] === MISSING ? null : { sum: now[4 * k], area: now[4 * k + 1], x: nowCentres[4 * k + 2], y: nowCentres[4 * k + 3] });
+      const held = frame.watched === null ? UNKNOWN_VALUE : (frame.pressure?.[frame.watched] ?? UNKNOWN_VALUE);
+      this.now = { curves, taxel: held === UNKNOWN_VALUE ? null : held };
     }
     for (let i = 0; i < count; i++) {
       const column = this.columnOf(first + i);
@@ -118,38 +130,50 @@ export class Timeline {
       if (raster) this.raster.set(raster.subarray(i * this.rows, (i + 1) * this.rows), column * this.rows);
       if (spikes) this.spikes.set(spikes.subarray(i * this.rows, (i + 1) * this.rows), column * this.rows);
       else this.spikes.fill(0, column * this.rows, (column + 1) * this.rows);
-      if (sums && centres) {
-        const missing = sums[4 * i + 1] === MISSING;
-        this.sum[column] = missing ? NaN : sums[4 * i];
-        this.area[column] = missing ? NaN : sums[4 * i + 1];
-        this.x[column] = centres[4 * i + 2];
-        this.y[column] = centres[4 * i + 3];
-      }
-      if (sources) this.sources.set(sources.subarray(i * several, (i + 1) * several), column * several);
-      if (sourceCentres) this.sourceCentres.set(sourceCentres.subarray(2 * i * several, 2 * (i + 1) * several), 2 * column * several);
-      if (channels) this.channels.set(channels.subarray(i * each, (i + 1) * each), column * each);
+      if (sums) this.sums.set(sums.subarray(8 * i, 8 * i + 8), 8 * column * several);
+      if (sources) this.sums.set(sources.subarray(8 * i * (several - 1), 8 * (i + 1) * (several - 1)), 8 * (column * several + 1));
+      if (channels) this.channels.set(channels.subarray(2 * i * each, 2 * (i + 1) * each), 2 * column * each);
       if (history) this.history.set(history.subarray(3 * i, 3 * i + 3), 3 * column);
       else this.history.fill(UNKNOWN_VALUE, 3 * column, 3 * column + 3);
     }
   }
 
-  /** @param {number} column @returns {number[]} the sum of each of several sources, or of all; not a number where no taxel has a value */
-  sums(column) {
-    const { source_count: count, sources } = this;
-    if (!count) return [this.sum[column]];
-    return Array.from(sources.subarray(column * count, (column + 1) * count), (sum) => (sum === MISSING ? NaN : sum));
+  /** @returns {number} how many sources have curves of their own; 0: one for all */
+  get source_count() {
+    return this.curve_count - 1;
   }
 
-  /** @param {number} column @returns {[number, number][]} the centre of each of several sources, or of all; not a number where nothing is pressed */
-  centres(column) {
-    const { source_count: count, sourceCentres: all } = this;
-    if (!count) return [[this.x[column], this.y[column]]];
-    return Array.from({ length: count }, (_, k) => [all[2 * (column * count + k)], all[2 * (column * count + k) + 1]]);
+  /** @returns {number[]} the numbers of the curves that are drawn: of each of several sources, or of all */
+  get drawn() {
+    return Array.from({ length: Math.max(1, this.source_count) }, (_, k) => k + (this.source_count ? 1 : 0));
+  }
+
+  /** @param {number} column @param {number} curve its number @returns {Extent | null} the sum; null where no taxel has a value */
+  sumIn(column, curve) {
+    return this.extent(this.sums, column, curve, 0);
+  }
+
+  /** @param {number} column @returns {Extent | null} the number of taxels that are pressed */
+  areaIn(column) {
+    return this.extent(this.sums, column, 0, 2);
+  }
+
+  /** @param {number} column @param {number} curve its number @returns {[Extent | null, Extent | null]} x and y of the centre; null where nothing is pressed */
+  centreIn(column, curve) {
+    return [this.extent(this.centres, column, curve, 4), this.extent(this.centres, column, curve, 6)];
+  }
+
+  /** @param {Uint32Array | Float32Array} words @param {number} column @param {number} curve @param {number} word @returns {Extent | null} */
+  extent(words, column, curve, word) {
+    const at = 8 * (column * this.curve_count + curve) + word;
+    // Of no time the least is above the greatest.
+    return words[at] <= words[at + 1] ? [words[at], words[at + 1]] : null;
   }
 
   /** Another taxel is watched: the values of the last one are discarded. */
   unwatch() {
     this.history.fill(UNKNOWN_VALUE);
+    this.pointed = null;
   }
 
   /** @returns {[number, number] | null} the numbers of the first and the last column in the window */
@@ -169,10 +193,11 @@ export class Timeline {
     return this.window && Math.round(this.window[0] + share * this.span_us);
   }
 
-  /** @returns {number} the column that the cursor points at, or of the time shown; -1: not known */
-  get pointed() {
-    const t = this.cursor_us ?? this.t_us;
-    return t === null ? -1 : this.known(Math.floor(t / this.column_us));
+  /** @returns {Values | null} the values at the cursor, or at the time shown; null: not known */
+  get values() {
+    const { cursor_us, pointed } = this;
+    if (cursor_us === null) return this.now;
+    return pointed?.t_us === cursor_us && this.known(Math.floor(cursor_us / this.column_us)) >= 0 ? pointed : null;
   }
 
   /**

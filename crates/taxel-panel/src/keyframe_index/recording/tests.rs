@@ -7,7 +7,7 @@ use taxel_core::wire::{Command, Registers};
 
 use super::*;
 use crate::readout_encoders::ViewEncoder;
-use crate::time_columns::SPAN;
+use crate::time_columns::{Extent, SPAN};
 use crate::view::encoded_spikes::EncodedSpikes;
 use crate::view::frame::{About, of_player};
 use crate::view::player::{Player, ViewOptions};
@@ -151,7 +151,7 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
             slow.advance(t);
             slow.update_curve();
             assert_eq!(player.state().change(), slow.change(), "{ending} at {t} us");
-            // A column wider than those that are stored has the greatest force of its parts.
+            // A column wider than those that are stored has the least and the greatest of its parts.
             let part_us = us.min(COLUMN_US);
             let mut parts = ArrayState::new(&index.header.array, index.noise_floor(), &blank, part_us, 1 << 28);
             changes.iter().filter(|change| change.t <= t).for_each(|change| parts.apply_one(change));
@@ -160,12 +160,9 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
             let mut same = vec![];
             for column in columns.clone() {
                 let last = (((column + 1) * us - 1).div_euclid(part_us)).min(column_of(t, part_us));
-                let of_parts = (column * us / part_us..=last).map(|part| parts.time_columns().curve(part));
-                let curve = of_parts.reduce(|most, curve| if curve.sum > most.sum { curve } else { most }).unwrap();
-                same.extend_from_slice(&curve.sum.to_le_bytes());
-                same.extend_from_slice(&curve.area.to_le_bytes());
-                same.extend_from_slice(&curve.x.to_le_bytes());
-                same.extend_from_slice(&curve.y.to_le_bytes());
+                let mut whole = Extent::NOTHING;
+                (column * us / part_us..=last).for_each(|part| whole.join(&parts.time_columns().curve(part)));
+                whole.write(&mut same);
             }
             assert!(curves == same, "{ending}: curves at {t} us by {us} us");
             // An encoder that is given all changes from the beginning has the same spikes. Where stamps are not multiples of
