@@ -48,7 +48,7 @@ def test_a_recording_opens_on_all_of_its_time_and_its_first_touch(replay: Any) -
     assert replay.locator("#tab-labels").get_attribute("aria-selected") == "true"
 
 
-def test_the_numbers_are_those_of_the_cursor_s_time(chromium: Any, tmp_path: Path) -> None:
+def test_the_numbers_are_those_of_the_cursor_s_time_and_a_second_cursor_measures(chromium: Any, tmp_path: Path) -> None:
     draw = np.random.default_rng(4)
     values = draw.integers(0, 90, (1200, 3, 4)) * (draw.random((1200, 1, 1)) < 0.1)
     frames = taxel.Frames(values, np.arange(1200) * 50_000, unit="N", array=taxel.Array(3, 4))
@@ -66,6 +66,15 @@ def test_the_numbers_are_those_of_the_cursor_s_time(chromium: Any, tmp_path: Pat
                 expected = int(values[int(t_us // 50_000)].sum())
                 shows(page, "force-sum", f"^{expected} N$")
         assert tried > 20
+        page.mouse.move(pixel(page, 10.0), lane["y"] + 9)
+        first = float(page.locator("#cursor-time").inner_text()[:-2])
+        press(page, "s")
+        page.mouse.move(pixel(page, 42.0), lane["y"] + 9)
+        second = float(page.locator("#cursor-time").inner_text()[:-2])
+        shows(page, "second-time", r"^\+\d+\.\d{3} s$")
+        assert float(page.locator("#second-time").inner_text()[1:-2]) == pytest.approx(second - first, abs=0.002)
+        press(page, "s")
+        until(lambda: page.locator("#second-line").is_hidden(), "it is taken away")
 
 
 def test_the_lanes_zoom_and_scroll_as_a_time_axis(replay: Any) -> None:

@@ -16,6 +16,7 @@ import { showTab } from "./tabs.js";
  * @property {import("./mistakes.js").Mistakes} mistakes
  * @property {import("./view.js").View} view
  * @property {import("./maps.js").Maps} maps
+ * @property {import("./cursor.js").Cursor} cursor
  * @property {import("./window.js").TimeWindow} window
  */
 
@@ -26,7 +27,7 @@ import { showTab } from "./tabs.js";
  * @param {Parts} parts
  * @param {() => Timeline | null} timeline
  */
-export function bindActions({ server, player, settings, recorder, labels, mistakes, view, maps, window }, timeline) {
+export function bindActions({ server, player, settings, recorder, labels, mistakes, view, maps, cursor, window }, timeline) {
   const help = part("help", HTMLDialogElement);
   const cutHere = (/** @type {0 | 1} */ end) => player.timeToMark(timeline()?.cursor_us).then((t_us) => view.setCut(end, t_us));
   const step = (/** @type {KeyboardEvent} */ event) => (event.shiftKey ? 1e6 : 1e5);
@@ -69,6 +70,7 @@ export function bindActions({ server, player, settings, recorder, labels, mistak
       slower: () => player.faster(-1),
       zoomIn: () => window.halve(),
       zoomOut: () => window.double(),
+      second: () => cursor.second(),
       showAll: () => window.showAll(),
       live: () => player.follow(),
       mark: () => labels.markHere(),

@@ -1,7 +1,7 @@
 // The time cursor over the lanes; what pointer and wheel do there.
 
 import { part, write } from "./dom.js";
-import { seconds } from "./words.js";
+import { numbering, seconds, short } from "./words.js";
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
@@ -13,6 +13,9 @@ const LINE_PX = 30;
 const DRAG = 4;
 /** Where a press is for another control. */
 const NOT_TIME = "#label-lane, button";
+
+/** @param {number} us @returns {string} a time between, to the millisecond or closer */
+const length = (us) => (us < 1e6 || numbering.number_us ? short(us) : `${(us / 1e6).toFixed(3)} s`);
 
 export class Cursor {
   /**
@@ -27,6 +30,8 @@ export class Cursor {
     this.track = part("track", HTMLElement);
     /** Where a press began, and whether it has become a drag. @type {{ x: number, drags: boolean } | null} */
     this.press = null;
+    /** The second cursor. @type {number | null} */
+    this.second_us = null;
     const lanes = part("lanes", HTMLElement);
     /** @param {number | null} t_us */
     const point = (t_us) => {
@@ -96,7 +101,14 @@ export class Cursor {
     event.preventDefault();
   }
 
-  /** Draws the lines at the cursor and at the time shown. */
+  /** Puts the second cursor at the cursor, or at the time shown, or takes it away. */
+  second() {
+    const timeline = this.timeline();
+    this.second_us = this.second_us === null ? (timeline?.cursor_us ?? timeline?.t_us ?? null) : null;
+    this.draw();
+  }
+
+  /** Draws the lines at the cursors and at the time shown. */
   draw() {
     const timeline = this.timeline();
     const moveTo = (/** @type {HTMLElement} */ line, /** @type {number | null} */ t_us) => {
@@ -107,6 +119,9 @@ export class Cursor {
     const cursor = timeline?.cursor_us ?? null;
     moveTo(part("cursor-line", HTMLElement), cursor);
     write(part("cursor-time", HTMLElement), cursor === null ? "" : seconds(cursor));
+    moveTo(part("second-line", HTMLElement), this.second_us);
+    const between = cursor === null || this.second_us === null ? null : cursor - this.second_us;
+    write(part("second-time", HTMLElement), between === null ? "" : `${between < 0 ? "−" : "+"}${length(Math.abs(between))}`);
     const t_us = timeline?.t_us ?? null;
     moveTo(part("time-line", HTMLElement), timeline?.following ? null : t_us);
   }

@@ -19,6 +19,7 @@ export const KEYS = [
   { keys: ["z"], shown: "Z", text: "lanes: show half the time, around the cursor", action: "zoomIn" },
   { keys: ["x"], shown: "X", text: "lanes: show twice the time", action: "zoomOut" },
   { keys: ["a"], shown: "A", text: "lanes: show all of the time", action: "showAll" },
+  { keys: ["s"], shown: "S", text: "put a second cursor at the cursor, or take it away: the time between both is shown", action: "second" },
   { keys: ["l"], shown: "L", text: "follow the board live", action: "live" },
   { keys: ["m"], shown: "M", text: "add a label at the cursor, or without a cursor at the time shown", action: "mark" },
   { keys: ["n"], shown: "N", text: "go to the next label", action: "nextLabel" },

@@ -404,6 +404,7 @@ function open(message) {
   strip.overview = null;
   showUnits();
   resize(message.array);
+  if (!again) cursor.second_us = null;
   timeWindow.forget();
   if (!again) turnTo(message);
   if (timeline && !again) {
@@ -564,7 +565,7 @@ matchMedia("(prefers-color-scheme: light)").addEventListener("change", applyThem
 
 // ------------------------------------------------------------------------------------------------ start
 
-bindActions({ server, player, settings, recorder, labels, mistakes, view, maps, window: timeWindow }, () => timeline);
+bindActions({ server, player, settings, recorder, labels, mistakes, view, maps, cursor, window: timeWindow }, () => timeline);
 part("files", HTMLSelectElement).onchange = ({ target }) => {
   const { value } = /** @type {HTMLSelectElement} */ (target);
   if (value) ask(value);
