@@ -25,7 +25,7 @@ from taxel.array import Array
 from taxel.cli._say import say
 from taxel.cli._task import FullReading, Output, over_files, progress, say_failures, say_warnings
 from taxel.cli._topics import list_topics
-from taxel.cli.app import App, Flat
+from taxel.cli.app import OUTSIDE, App, Flat
 from taxel.clock import doubt
 from taxel.spikes import SpikeTrains, to_ms
 
@@ -63,7 +63,7 @@ def info(
     For a ROS bag without --topic: the topics that hold numbers, with shapes and rates.
 
     For several recordings, such as a folder: a row for each, and their sum. Files that cannot be read are named at the
-    end, with exit code 2; --jobs reads several at once.
+    end, with exit code 2; --jobs reads several at once. Exit code 3: a recording was cut off, as where a disk was full.
 
     Example: taxel info walk.mcap --picture walk.png --table walk.csv
     Example: taxel info grasp.db3 --topic /palm --field taxels --array 24x32
@@ -117,7 +117,7 @@ def info(
                 example = trial_name(recordings[0])
                 say(f"labels of these trials need a column recording with the trial's name, for example {example}")
             say_warnings(dict.fromkeys(text for found in infos for text in found.warnings))
-            return 0
+            return _code(of_each)
         found = taxel.tasks.info(recording, tare)
         facts, pressed = found.facts, found.pressed
         facts["array_assumed"] &= not reading.array
@@ -130,7 +130,12 @@ def info(
         facts["table"] = str(table)
     facts |= _draw(picture, [recording], tare, overwrite)
     say(*([json.dumps(facts)] if as_json else _page(facts)))
-    return 0
+    return _code([facts])
+
+
+def _code(of_each: Iterable[dict[str, Any]]) -> int:
+    """Return the exit code: whether a recording was cut off."""
+    return OUTSIDE if any(facts["truncated"] for facts in of_each) else 0
 
 
 def _infos(opener: TextOptions, tare: str | None, file: Path) -> list[dict[str, Any]]:
@@ -153,7 +158,7 @@ def _of_files(
         say(json.dumps([*facts, *failed]))
     elif facts:
         say(*_of_several(folder, facts, {}, as_json=False, each=each))
-    return say_failures(files, found)
+    return say_failures(files, found) or _code(facts)
 
 
 def _spikes(file: Path, as_json: bool, *, drawn: bool) -> list[str]:
