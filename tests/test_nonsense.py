@@ -14,7 +14,6 @@ from sound import LEFT_OUT, OBJECTS, SMALL, USES, VALUES, write_files
 
 import taxel
 from taxel._base.saved import Saved
-from taxel.information.spiking import NeuronPerClass
 from taxel.learn._learner import SpikeLearner
 
 mpl.use("Agg")
@@ -55,7 +54,7 @@ def public_of(rooms: list[Any]) -> dict[str, Any]:
             names.add(id(value))
             found[f"{module.__name__}.{name}"] = value
             if inspect.isclass(value) and not issubclass(value, BaseException):
-                shared = (Saved, NeuronPerClass, SpikeLearner)
+                shared = (Saved, SpikeLearner)
                 own = [b for b in reversed(value.__mro__) if b is value or b.__name__.startswith("_") or b in shared]
                 for part in {part for base in own for part in vars(base)}:
                     member = getattr(value, part)

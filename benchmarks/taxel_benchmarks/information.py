@@ -43,7 +43,7 @@ ROWS, SAMPLE_US = 42, 10_000
 #: How long before the listed contact of a stride its own is searched, us.
 BEFORE_US = 100_000
 GOALS_S = {"footfalls": 40.0, "strides": 60.0}
-QUICK = ("--draws", "1", "--shuffles", "2", "--periods", "10", "--taxels", "4", "--pools", "2")
+QUICK = ("--draws", "1", "--shuffles", "2", "--periods", "10", "--taxels", "4")
 
 
 @dataclass(frozen=True)

@@ -70,10 +70,6 @@ def _between_commas(number_of: Callable[[str], Any], must: str) -> Callable[[Any
     return read
 
 
-def _names(text: str) -> str:
-    return text.strip()
-
-
 #: How the parameters of an encoder or a recipe are typed: ``--set KEY=VALUE``, as often as is needed.
 Settings = Annotated[
     Mapping[str, Any],
@@ -291,8 +287,6 @@ class InformationOptions:
         Sampling periods, ms, for example 1,2,5.
     taxels : sequence of int, optional
         Sizes of subsets of taxels, drawn at random, for example 10,30,100.
-    pools : sequence of int, optional
-        Sides of squares of taxels, each averaged to one taxel, for example 2,4.
     draws : int, 1 or more
         Number of random phases of the sampling; the results are means over these phases.
     shuffles : int, 1 or more
@@ -301,8 +295,6 @@ class InformationOptions:
         Number of folds; all trials of a group are in the same fold.
     seed : int, 0 or more
         Seed of the random phases, folds, taxels and bootstrap.
-    classifiers : sequence of {"neighbours", "cone_r"}
-        Further classifiers: neighbours, cone_r, and, if taxel_rules is installed, tempotron.
 
     Raises
     ------
@@ -310,7 +302,7 @@ class InformationOptions:
 
     Examples
     --------
-    >>> InformationOptions(window_ms=50.0, classifiers=[]).folds
+    >>> InformationOptions(window_ms=50.0).folds
     10
     """
 
@@ -320,14 +312,10 @@ class InformationOptions:
     windows_ms: Annotated[Sequence[float] | None, Parameter(name="--windows", n_tokens=1, converter=_FLOATS)] = None
     periods_ms: Annotated[Sequence[float] | None, Parameter(name="--periods", n_tokens=1, converter=_FLOATS)] = None
     taxels: Annotated[Sequence[int] | None, Parameter(n_tokens=1, converter=_INTS)] = None
-    pools: Annotated[Sequence[int] | None, Parameter(n_tokens=1, converter=_INTS)] = None
     draws: int = 5
     shuffles: int = 20
     folds: int = 10
     seed: int = 0
-    classifiers: Annotated[
-        Sequence[str], Parameter(name="--also", n_tokens=1, converter=_between_commas(_names, "names"))
-    ] = ("neighbours",)
 
     def __post_init__(self) -> None:
         """Refuse anything but an encoder, before the recordings are read."""

@@ -6,7 +6,6 @@ from taxel_rules.fp import FP as FP
 from taxel_rules.htp import HTP as HTP
 from taxel_rules.inst import INST as INST
 from taxel_rules.psd import PSD as PSD
-from taxel_rules.readout import TempotronReadout as TempotronReadout
 from taxel_rules.resume import ReSuMe as ReSuMe
 from taxel_rules.skim import SKIM as SKIM
 from taxel_rules.span import SPAN as SPAN

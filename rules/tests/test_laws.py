@@ -42,7 +42,6 @@ OBJECTS |= {
     "STDP.partial_fit": taxel_rules.STDP,
     "STDP": lambda: taxel_rules.STDP().fit([PLAIN]),
     "Tempotron": lambda: taxel_rules.Tempotron(eta=0.1, epochs=5).fit([PLAIN], [True]),
-    "TempotronReadout": lambda: taxel_rules.TempotronReadout(epochs=3).fit([PLAIN, PLAIN], [0, 1]),
 }
 VALUES: dict[str, Callable[[], Any]] = {name: (lambda value=value: value) for name, value in GIVEN.items()}
 VALUES |= {
@@ -52,9 +51,6 @@ VALUES |= {
     "change.label": lambda: True,
     "Tempotron.fit.labels": lambda: [True],
     "Tempotron.score.labels": lambda: [True],
-    "TempotronReadout.fit.patterns": lambda: [PLAIN, PLAIN],
-    "TempotronReadout.fit.y": lambda: [0, 1],
-    "TempotronReadout.score.y": lambda: [0],
 }
 
 

@@ -16,7 +16,6 @@ from taxel.array import Array
 from taxel.encode import ChangeEvents
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.information.nested import majority, squared_distances
 from taxel.report import write_whole
 from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import to_ms
@@ -379,7 +378,8 @@ def spatial_grams(
 
 def distances_of(gram: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the Euclidean distances of trials from their inner products."""
-    return np.asarray(np.sqrt(np.maximum(squared_distances(gram), 0.0)))
+    length = np.diag(gram)
+    return np.asarray(np.sqrt(np.maximum(length + length[:, None] - 2 * gram, 0.0)))
 
 
 def named_by_neighbours(distances: NDArray[np.float64], y: NDArray[np.int64], neighbours: int) -> NDArray[np.int64]:
@@ -388,4 +388,15 @@ def named_by_neighbours(distances: NDArray[np.float64], y: NDArray[np.int64], ne
     np.fill_diagonal(apart, np.inf)
     near = np.argsort(apart, axis=1, kind="stable")[:, :neighbours]
     classes, row = np.unique(y, return_inverse=True)
-    return np.asarray(classes[majority(row[near], len(classes))])
+    return np.asarray(classes[_majority(row[near], len(classes))])
+
+
+def _majority(near: NDArray[np.int64], classes: int) -> NDArray[np.int64]:
+    """Return the most frequent class of each row; on a tie, the class whose members come first."""
+    votes = np.zeros((len(near), classes))
+    rows = np.repeat(np.arange(len(near)), near.shape[1])
+    np.add.at(votes, (rows, near.ravel()), 1.0)
+    # One vote outweighs all differences in place.
+    tie = np.tile(np.linspace(0, 1, near.shape[1]) / (near.shape[1] + 1), len(near))
+    np.add.at(votes, (rows, near.ravel()), -tie / near.shape[1])
+    return np.asarray(votes.argmax(1))

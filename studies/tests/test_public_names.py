@@ -26,7 +26,6 @@ OF_LEARNERS = {
     "taxel._base.arguments",
     "taxel._base.errors",
     "taxel._base.parameters",
-    "taxel.information.spiking",
     "taxel.learn._examples",
     "taxel.learn._learner",
 }

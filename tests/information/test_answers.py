@@ -1,5 +1,7 @@
 """Sampling and the whole question, on touches whose information is known."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,9 +10,8 @@ from hypothesis import strategies as st
 import taxel
 from taxel.encode import FA1, ChangeEvents
 from taxel.information import LabelledTrial, answer
-from taxel.information.rasters import event_grams, features, frame_grams
-from taxel.information.sampling import HeldValues, SampledEvents, contacts, finest_us, frames_of, spikes_of
-from taxel.information.spiking import ConeRReadout, patterns_of
+from taxel.information.rasters import event_grams, features
+from taxel.information.sampling import HeldValues, SampledEvents, contacts, finest_us, spikes_of
 from taxel.information.wire_rate import kilobits_per_second
 
 from .touches import ordered
@@ -53,7 +54,6 @@ def test_held_values_are_those_of_the_frames_that_events_make(rows, data):
 def test_events_without_values_count_as_steps():
     events = taxel.Events([0, 5, 5, 9], [0, 0, 1, 0], [0] * 4, [True, True, False, False], array=taxel.Array(1, 2))
     assert HeldValues(events).at(np.array([0, 5, 9])).tolist() == [[1, 0], [2, -1], [1, -1]]
-    assert not HeldValues(events).has_values
 
 
 def test_many_events_are_held_across_kept_states():
@@ -132,22 +132,8 @@ def test_inner_products_by_bins_are_those_of_whole_rasters(tau):
         assert size == max(1, len({(x, b) for k, x, b in rows if b < bins[k]}))
 
 
-def test_frames_are_taken_at_the_times_of_the_events():
-    trials = trials_of(20)
-    held, at, spikes = sampled(trials, 1000)
-    values = frames_of(trials, held, spikes, at, 10)
-    assert values.shape == (10, 20, 2)
-    assert (values[0].sum(1) == 100).all()
-    assert (values[9] == 100).all()
-    gram = frame_grams(values, spikes, [60_000.0])[0]
-    assert np.allclose(gram, np.einsum("bnt,bmt->nm", values, values))
-
-
-def test_pooled_taxels_hold_the_mean_and_few_are_aligned_on_their_own_first_event():
+def test_few_taxels_are_aligned_on_their_own_first_event():
     trials = trials_of(10)
-    _, _, pooled = sampled(trials, 1000, pool=2)
-    assert pooled.taxels == 4
-    assert set(pooled.taxel) == {0}
     _, _, all_ = sampled(trials, 1000)
     second = all_.select(np.array([1]))
     assert (second.bin == 0).all()
@@ -195,7 +181,6 @@ def answered():
         windows_ms=[2, 10],
         periods_ms=[1, 2, 10],
         taxels=[1],
-        pools=[2],
         draws=2,
         shuffles=8,
         seed=1,
@@ -208,13 +193,12 @@ def test_order_is_known_at_a_fast_period_and_lost_at_a_slow_one(answered):
     assert bits[1, 60] == bits[2, 60] == bits[1, 2] == 1.0
     assert bits[10, 60] < 0.4  # a sample falls between in 3 of 10
     assert {p.period_ms: p.verdict and p.verdict.says for p in answered.by_period} == {1: None, 2: "keeps", 10: "loses"}
-    pooled = next(p for p in answered.taxels if p.kind == "pooled")
-    assert pooled.found.bits < 0.05  # one large taxel cannot tell left from right
     assert {p.verdict for p in answered.taxels} == {p.verdict for p in answered.points if p.window_ms < 60} == {None}
     assert answered.cheapest.found.bits > 0.9
     assert answered.cheapest.kbps == min(p.kbps for p in answered.by_period if p.period_ms < 10)
     assert answered.zero.level < 0.15
-    assert answered.classifiers["neighbours"].bits > 0.9
+    assert answered.control.found.bits < 0.2
+    assert any("no groups" in note for note in answered.notes)
 
 
 def test_progress_counts_every_step_and_settings_are_told_as_they_are_done():
@@ -226,10 +210,8 @@ def test_progress_counts_every_step_and_settings_are_told_as_they_are_done():
         windows_ms=[10],
         periods_ms=[1, 10],
         taxels=[1],
-        pools=[2],
         draws=3,
         shuffles=4,
-        classifiers=["neighbours", "cone_r"],
         progress=lambda what, done, of: steps.append((what, done, of)),
         watch=lambda *point: told.append(point),
     )
@@ -237,24 +219,6 @@ def test_progress_counts_every_step_and_settings_are_told_as_they_are_done():
     assert {of for _, _, of in steps} == {len(steps)}
     assert [point[:2] for point in told] == [(1, 10), (1, 60), (10, 10), (10, 60)] * 3
     assert {point[:2]: point[2] for point in told} == {(p.period_ms, p.window_ms): p.found.bits for p in found.points}
-
-
-def test_frames_and_controls_stand_beside_it(answered):
-    controls = {c.name: c for c in answered.controls}
-    assert set(controls) == {"before contact", "length", "event count"}
-    assert controls["event count"].found.bits < 0.1
-    assert answered.frames[1.0].bits > 0.9
-    assert any("no groups" in note for note in answered.notes)
-
-
-@pytest.mark.parametrize(("before", "tells"), [("tells", True), ("never mind", False)])
-def test_what_lies_before_the_contact_is_told_apart(before, tells):
-    trials = trials_of(60, before=before)
-    found = answer(
-        trials, encoder=ENCODER, window_ms=60, windows_ms=[60], periods_ms=[1], taxels=[], pools=[], draws=1, shuffles=2
-    )
-    control = next(c for c in found.controls if c.name == "before contact")
-    assert (control.found.bits > 0.8) is tells
 
 
 def test_events_by_fa1_do_as_well():
@@ -265,38 +229,10 @@ def test_events_by_fa1_do_as_well():
         windows_ms=[20],
         periods_ms=[1],
         taxels=[],
-        pools=[],
         draws=1,
         shuffles=2,
     )
     assert found.full.found.bits > 0.9
-
-
-def test_parameters_are_asked_for_like_labels():
-    plain = trials_of(60)
-    random = np.random.default_rng(2)
-    told = [
-        LabelledTrial(
-            t.source, t.label, t.start_us, None, "", {"side": t.label, "day": str(random.integers(2)), "rig": "one"}
-        )
-        for t in plain
-    ]
-    found = answer(
-        told, encoder=ENCODER, window_ms=20, windows_ms=[20], periods_ms=[1], taxels=[], pools=[], draws=1, shuffles=2
-    )
-    assert set(found.parameters) == {"day"}  # the side is the label, and there is one rig
-    assert found.parameters["day"][0].found.bits < 0.2
-
-
-def test_neurons_name_touches_too():
-    trials = trials_of(24)
-    _, _, spikes = sampled(trials, 1000)
-    labels = np.array([t.label for t in trials])
-    patterns = patterns_of(spikes, 60_000.0)
-    assert [len(p.times) for p in patterns] == [2] * 24
-    model = ConeRReadout(tau=30.0, bound=2.0).fit(patterns[:16], labels[:16])
-    assert (model.predict(patterns[16:]) == labels[16:]).mean() >= 0.9
-    assert set(model.get_params()) >= {"tau", "max_seconds"}
 
 
 def test_recordings_show_their_own_period():
@@ -323,7 +259,7 @@ def pulsed(touches):
 
 
 def asked(trials, **what):
-    few = {"periods_ms": [1, 5], "windows_ms": [20], "taxels": [3], "pools": [], "draws": 1, "shuffles": 19}
+    few = {"periods_ms": [1, 5], "windows_ms": [20], "taxels": [3], "draws": 1, "shuffles": 19}
     return answer(trials, **(few | what))
 
 
@@ -346,15 +282,16 @@ def test_bits_that_shuffled_labels_reach_are_told_from_nothing_nowhere():
     assert any("guessing gives 50 %" in text for text in found.warnings)
 
 
-def test_a_control_that_tells_as_much_is_warned_of():
+def test_a_length_that_tells_as_much_is_warned_of():
     random = np.random.default_rng(3)
     touches = [
-        (["three", "five"][k % 2], "", tuple((8 * j + random.uniform(0, 4), 0) for j in range(3 + 2 * (k % 2))))
-        for k in range(80)
+        (["short", "long"][k % 2], "", ((random.uniform(0, 4), k % 2), (random.uniform(8, 10), 7))) for k in range(80)
     ]
-    warnings = asked(pulsed(touches), taxels=[]).warnings
-    assert [text for text in warnings if text.startswith("event count alone gives")]
-    assert not [text for text in warnings if text.startswith(("before contact", "length", "not told"))]
+    trials = [
+        dataclasses.replace(trial, stop_us=trial.start_us + 30_000 + 20_000 * (trial.label == "long"))
+        for trial in pulsed(touches)
+    ]
+    assert [text for text in asked(trials, taxels=[]).warnings if text.startswith("the length alone gives")]
 
 
 def test_what_is_told_plainly_bears_no_warning():

@@ -178,11 +178,9 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
         (GOOD, ["--periods", "fast"], "must be numbers, for example 1,2,5"),
         (GOOD, ["--periods", "0"], "--periods is [0.0]: must be whole us"),
         (GOOD, ["--windows", "1000"], "--windows is [1000.0]: must be from"),
-        (GOOD, ["--pools", "40"], "--pools is [40]: must fit the array"),
         (GOOD, ["--folds", "1"], "--folds is 1: must be a whole number from 2"),
         (GOOD, ["--taxels", "1.5"], "--taxels 1.5: must be whole numbers"),
         (GOOD, ["--encoder", "level_crossing"], "must be change_events or fa1"),
-        (GOOD, ["--also", "forest"], "--also is 'forest': must be one of"),
     ],
 )
 def test_what_is_wrong_is_one_clear_error(tmp_path, table, arguments, text):
@@ -190,7 +188,7 @@ def test_what_is_wrong_is_one_clear_error(tmp_path, table, arguments, text):
     taxel.convert(events, tmp_path / "touches.npz")
     (tmp_path / "labels.csv").write_text(table)
     page = tmp_path / "page.html"
-    usual = {"--draws": "1", "--shuffles": "1", "--taxels": "1", "--pools": "2", "--periods": "5"}
+    usual = {"--draws": "1", "--shuffles": "1", "--taxels": "1", "--periods": "5"}
     quick = [word for option, value in usual.items() if option not in arguments for word in (option, value)] + arguments
     done = run(tmp_path / "touches.npz", "--labels", tmp_path / "labels.csv", "--report", page, *quick)
     if text is None:  # fewer groups than folds: as many folds as groups
@@ -226,7 +224,7 @@ def test_a_folder_stands_for_its_recordings(tmp_path):
     assert sum(json.loads(done.stdout)["labels"].values()) == 24
 
 
-def test_parameters_and_groups_are_read(tmp_path):
+def test_groups_are_read_and_other_columns_are_not(tmp_path):
     events, _ = ordered(4)
     taxel.convert(events, tmp_path / "touches.npz")
     (tmp_path / "labels.csv").write_text(
@@ -234,9 +232,9 @@ def test_parameters_and_groups_are_read(tmp_path):
         "edge,35,touches.npz,500000,tuesday,\n"
     )
     trials = read_trials(tmp_path / "labels.csv", [taxel.open(tmp_path / "touches.npz")], window_ms=50)
-    assert [(t.label, t.start_us, t.stop_us, t.group, dict(t.parameters)) for t in trials] == [
-        ("ball", 100_000, 200_000, "monday", {"radius": "25"}),
-        ("edge", 500_000, None, "tuesday", {"radius": "35"}),
+    assert [(t.label, t.start_us, t.stop_us, t.group) for t in trials] == [
+        ("ball", 100_000, 200_000, "monday"),
+        ("edge", 500_000, None, "tuesday"),
     ]
     assert np.array_equal(trials[0].source.t, events.t)
 

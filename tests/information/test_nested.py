@@ -1,13 +1,10 @@
-"""Nested predictions: what they choose inside the folds and what they refuse; neurons as classifiers."""
+"""Nested predictions: what they choose inside the folds and what they refuse."""
 
 import numpy as np
 import pytest
 from refusal import refused
-from sklearn.base import clone
-from sklearn.model_selection import cross_val_score
 
-from taxel import SpikeTrains
-from taxel.information import ConeRReadout, nested_predictions
+from taxel.information import nested_predictions
 
 
 def clouds(trials, features, classes, seed, apart=1.0):
@@ -46,13 +43,6 @@ def test_nothing_is_learnt_from_the_trials_that_are_tested():
     assert abs(np.mean(right) - 1 / 3) < 0.06
 
 
-def test_neighbours_are_chosen_inside_the_folds_too():
-    x, y = clouds(90, 6, 3, 30, apart=2.0)
-    found = nested_predictions([x @ x.T], [6], y, count=5, neighbours=(1, 5, 9))
-    assert (found.responses == y).mean() > 0.7
-    assert {ridge for _, ridge in found.chosen.values()} <= {1.0, 5.0, 9.0}
-
-
 def test_a_class_that_a_training_set_lacks_is_said():
     y = np.array([0, 0, 0, 1, 1, 1, 2, 2, 2, 2])
     groups = np.array([0, 1, 2, 0, 1, 2, 3, 3, 3, 4])
@@ -66,21 +56,3 @@ def test_a_class_that_a_training_set_lacks_is_said():
     x = random.normal(size=(18, 30)) + 3 * np.eye(3, 30)[one]
     both = nested_predictions([x @ x.T], [30], one, groups=apart_, count=2, inner=2)
     assert isinstance(both.missing, tuple)
-
-
-def test_scikit_learn_can_clone_and_cross_validate_neurons():
-    assert clone(ConeRReadout(tau=5.0)).get_params() == {"tau": 5.0, "bound": 0.3, "max_seconds": 10.0}
-    patterns = [SpikeTrains.from_lists([[t], [30.0 - t]], stop=30.0) for t in np.linspace(1, 9, 12) + [0, 20] * 6]
-    shares = cross_val_score(ConeRReadout(tau=5.0, bound=1.0), patterns, [0, 1] * 6, cv=3)
-    assert shares.mean() > 0.7
-
-
-def test_a_readout_of_classes_refuses_graded_trains_by_name():
-    graded, plain = (
-        [SpikeTrains.from_lists([[1.0 + k], [2.0]], stop=10.0, values=values, kind=kind) for k in range(4)]
-        for values, kind in (([[2.0], [1.0]], "graded"), (None, None))
-    )
-    one = ConeRReadout().fit(plain, [0, 0, 1, 1])
-    for call in (lambda: ConeRReadout().fit(graded, [0, 0, 1, 1]), lambda: one.predict(graded)):
-        with refused():
-            call()

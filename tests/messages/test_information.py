@@ -4,9 +4,8 @@ import numpy as np
 from refusal import messages
 
 import taxel
-from taxel import Frames, SpikeTrains
+from taxel import Frames
 from taxel.information import (
-    ConeRReadout,
     LabelledTrial,
     answer,
     confusion_matrix,
@@ -17,7 +16,6 @@ from taxel.information import (
     plug_in,
 )
 
-GRADED = [SpikeTrains.from_lists([[1.0]], values=[[2.0]], kind="graded")] * 2
 CALLS = {
     "classes": lambda _: estimate(["a", "a"], ["a", "b"]),
     "responses": lambda _: estimate(["a", "b"], ["a"]),
@@ -35,8 +33,6 @@ CALLS = {
     "features": lambda _: nested_predictions([np.eye(4)], [4, 4], [0, 1, 0, 1], count=2),
     "ridge": lambda _: nested_predictions([np.eye(4)], [4], [0, 1, 0, 1], count=2, ridges=[0.0]),
     "not symmetric": lambda _: nested_predictions([[[1.0, 2.0], [3.0, 1.0]]], [3], [0, 1], count=2),
-    "not fitted": lambda _: ConeRReadout().predict([]),
-    "graded": lambda _: ConeRReadout().fit(GRADED, [0, 1]),
     "arrays": lambda _: answer(
         [LabelledTrial(Frames(np.zeros((5, 1, n)), np.arange(5)), str(n), 0) for n in (2, 3)], window_ms=20
     ),

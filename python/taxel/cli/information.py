@@ -41,8 +41,8 @@ def information(
     recordings
         Recordings, or folders of them: .mcap, .lsa, .npz, .csv, other makers' files.
     labels
-        A CSV with a row for each trial: recording,t_us,label[,stop_us][,group] and columns of parameters; for a single
-        recording the column recording may be left out. Or the word notes: each note of the recordings is a trial that
+        A CSV with a row for each trial: recording,t_us,label[,stop_us][,group]; for a single recording the column
+        recording may be left out. Or the word notes: each note of the recordings is a trial that
         begins at the time of the note, and the text of the note is the label. Default: each recording is a trial, and
         its folder's name is the label.
     report
@@ -96,67 +96,55 @@ class _KnownBits:
 
 
 def lines(answer: Answer) -> list[str]:
-    """Return the lines that are printed of an answer."""
+    """Return the lines that are printed of an answer: what was asked, and one table of all settings."""
     sizes = sorted(set(answer.labels.values()))
     each = f"{sizes[0]}" if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"
     trials, labels = counted(sum(answer.labels.values()), "trial"), counted(len(answer.labels), "label")
-    full = answer.full
+    full, length = answer.full, answer.control
     text = [
         f"{trials}, {labels} x {each}, {counted(answer.groups, 'group') if answer.groups else 'no groups'}",
         f"labels shuffled: {answer.zero}",
-        "controls: " + " | ".join(f"{c.name} {_bits(c.found)} ({c.about})" for c in answer.controls),
+        f"the length alone ({length.about}): {_interval(length.found)}",
         f"full: {full.period_ms:g} ms, {counted(full.taxels, 'taxel')}, to {full.window_ms:g} ms: "
-        f"{_interval(full.found)}, "
-        f"{100 * full.found.right:.0f} % right"
-        + "".join(f"; frames {e.bits:.2f}" for p, e in answer.frames.items() if p == full.period_ms)
-        + "".join(f"; {name} {e.bits:.2f}" for name, e in answer.classifiers.items()),
+        f"{_interval(full.found)}, {100 * full.found.right:.0f} % right",
         "in brackets: the range of the bits in 95 % of new draws of these trials, or of whole groups; with few trials, "
         "the true bits are outside this range more often",
+        *(f"warning: {warning}" for warning in answer.warnings),
+        "",
+        _row("period", "to", "taxels", "bits", "[95 %]", "events", "kbit/s", "silent", "keeps 95 % of the full bits?"),
     ]
-    text += [f"warning: {warning}" for warning in answer.warnings]
-    columns = ("bits", "events", "millibits/event", "kb/s", "silent")
-    text += ["", _row("period", *columns, "keeps 95 % of the full bits?")]
-    text += [_row(f"{p.period_ms:g} ms", *_figures(p), _verdict(p, answer)) for p in answer.by_period]
-    if answer.taxels:
-        text += ["", _row(f"taxels at {answer.taxels[0].period_ms:g} ms", *columns, "")]
-        text += [_row(f"{p.taxels} {p.kind}", *_figures(p), "") for p in answer.taxels]
-    text += [""]
-    for window in sorted({p.window_ms for p in answer.points} - {full.window_ms}):
-        here = [p for p in answer.points if p.window_ms == window]
-        by_period = "; ".join(f"{p.period_ms:g} ms {p.found.bits:.2f}" for p in here)
-        text.append(f"to {window:g} ms after contact: {by_period}")
-    for name, points in answer.parameters.items():
-        text.append(
-            f"{name} ({points[0].found.most:.2f} bits at most): "
-            + "; ".join(f"{p.period_ms:g} ms {p.found.bits:.2f}" for p in points)
-        )
-    text += [f"note: {note}" for note in answer.notes]
+    text += [_row(*_cells(point), _verdict(point, answer)) for point in (*answer.points, *answer.taxels)]
+    text += ["", *(f"note: {note}" for note in answer.notes)]
     text.append(f"rates are of {answer.wire}")
     return text
 
 
 def _verdict(point: Point, answer: Answer) -> str:
-    verdict = "the full setting" if point.verdict is None else str(point.verdict)
+    verdict = "" if point.verdict is None else str(point.verdict)
+    if point is answer.full:
+        verdict = "the full setting"
     return verdict + " <- cheapest" * (point is answer.cheapest and not answer.empty)
 
 
-def _figures(point: Point) -> tuple[str, ...]:
+def _cells(point: Point) -> tuple[str, ...]:
+    low, high = point.found.interval
     return (
+        f"{point.period_ms:g} ms",
+        f"{point.window_ms:g} ms",
+        f"{point.taxels}",
         f"{point.found.bits:.2f}",
+        f"[{low:.2f} {high:.2f}]",
         f"{point.events:.4g}",
-        f"{point.millibits_per_event:.3g}",
         f"{point.kbps:.3g}",
         f"{100 * point.silent:.0f} %",
     )
 
 
 def _row(*cells: str) -> str:
-    name, bits, events, each, rate, silent, verdict = cells
-    return f"{name:<18} {bits:>6} {events:>8} {each:>16} {rate:>8} {silent:>7}  {verdict}".rstrip()
-
-
-def _bits(estimate: Estimate | None) -> str:
-    return "-" if estimate is None else f"{estimate.bits:.2f}"
+    period, window, taxels, bits, interval, events, rate, silent, verdict = cells
+    return (
+        f"{period:<8} {window:>8} {taxels:>7} {bits:>6} {interval:>12} {events:>8} {rate:>8} {silent:>7}  {verdict}"
+    ).rstrip()
 
 
 def _interval(estimate: Estimate) -> str:

@@ -15,12 +15,10 @@ from taxel.information.estimate import Estimate, ZeroTest, estimate, zero_test
 from taxel.information.folds import folds
 from taxel.information.keeping import Keeping, keeps
 from taxel.information.nested import Nested, nested_predictions
-from taxel.information.spiking import ConeRReadout
 from taxel.information.trials import LabelledTrial, notes_as_trials, read_trials, recordings_as_trials
 
 __all__ = [
     "Answer",
-    "ConeRReadout",
     "Control",
     "Estimate",
     "Keeping",

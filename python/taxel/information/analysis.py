@@ -9,31 +9,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import callback, instance, integer, several, text
+from taxel._base.arguments import callback, instance, integer, several
 from taxel.encode import ChangeEvents, Encoder
 from taxel.information._threads import threads
-from taxel.information.answers import Answer, Point, is_above_chance
-from taxel.information.controls import controls
+from taxel.information.answers import Answer, Control, Point, is_above_chance
 from taxel.information.estimate import Estimate, bits_of, zero_test
 from taxel.information.keeping import Keeping, keeps
 from taxel.information.nested import WORTH_THREADS, Matrices, predictions
 from taxel.information.question import Question
-from taxel.information.rasters import frame_grams
-from taxel.information.sampling import (
-    SampledEvents,
-    frames_of,
-)
-from taxel.information.spiking import readout_names, readout_responses
+from taxel.information.sampling import SampledEvents
 from taxel.information.trials import LabelledTrial
 from taxel.information.wire_rate import kilobits_per_second
 from taxel.spikes import to_ms
 
 __all__ = ["answer"]
-
-#: Numbers of neighbours that are tried.
-NEIGHBOURS = (1, 3, 5, 9, 15)
-#: Frames are compared with events only where they have at most so many values.
-_MOST_VALUES = 2**28
 
 
 def answer(
@@ -44,12 +33,9 @@ def answer(
     windows_ms: Sequence[float] | None = None,
     periods_ms: Sequence[float] | None = None,
     taxels: Sequence[int] | None = None,
-    pools: Sequence[int] | None = None,
-    taxels_at_ms: float | None = None,
     draws: int = 5,
     folds: int = 10,
     shuffles: int = 20,
-    classifiers: Sequence[str] = ("neighbours",),
     seed: int = 0,
     progress: Callable[[str, int, int], object] | None = None,
     watch: Callable[[float, float, float], object] | None = None,
@@ -69,19 +55,13 @@ def answer(
         Default: steps of 1, 2, 5: windows from a fortieth of the longest, periods from the finest that the recordings
         show, or a 500th of the window.
     taxels : sequence of int, optional
-        Numbers of taxels that are drawn at random among those that ever send an event. Default: 10, 30, 100, 300.
-    pools : sequence of int, optional
-        Sides of the squares of taxels that are averaged into one. Default: 2, 4 and 7.
-    taxels_at_ms : float, ms, optional
-        The period at which taxels are left out or pooled, one of `periods_ms`. Default: the finest.
+        Numbers of taxels that are drawn at random among those that ever send an event, at the finest period. Default:
+        10, 30, 100, 300.
     draws : int, 1 or more
         Number of draws of sampling phases and of random taxels; results are means over draws.
     folds : int, 2 or more
     shuffles : int, 1 or more
         Number of shuffles of the labels in the test against zero.
-    classifiers : sequence of str
-        Further classifiers beside the discriminants, at the full setting: "neighbours", "cone_r", or the name of an
-        entry point of the group ``taxel.classifiers``, such as "tempotron" if taxel_rules is installed.
     seed : int, 0 or more
     progress : function of (what, done, all), optional
         Called before each step with its name, the number of steps done and that of all. An exception that it raises
@@ -104,13 +84,11 @@ def answer(
             callback(name, function)
     for name, value, least in (("draws", draws, 1), ("folds", folds, 2), ("shuffles", shuffles, 1), ("seed", seed, 0)):
         integer(name, value, least)
-    names = ("neighbours", *readout_names())
-    also = [text("classifiers", classifier, names) for classifier in several("classifiers", classifiers)]
     answering = _Answering(listed, encoder, window_ms, int(draws), int(folds), int(seed))
-    answering.set_out(periods_ms, windows_ms, taxels, pools, taxels_at_ms)
+    answering.set_out(periods_ms, windows_ms, taxels)
     # On small matrices several threads are slower than one, and far slower where other processes compute as well.
     with threads(several=len(listed) >= WORTH_THREADS):
-        return answering.answer(also, int(shuffles), progress, watch)
+        return answering.answer(int(shuffles), progress, watch)
 
 
 class _Answering(Question):
@@ -118,20 +96,16 @@ class _Answering(Question):
 
     def answer(
         self,
-        classifiers: list[str],
         shuffles: int,
         progress: Callable[[str, int, int], object] | None,
         watch: Callable[[float, float, float], object] | None,
     ) -> Answer:
         """Return the answer for all settings."""
-        settings = [*(("random", n) for n in self.random_taxels), *(("pooled", n) for n in self.pools)]
         self._progress, self._done = progress, 0
-        self._steps = self.draws * (len(self.periods) + len(settings)) + shuffles + len(classifiers) + 2
+        self._steps = self.draws * (len(self.periods) + len(self.random_taxels)) + shuffles + 1
         values = isinstance(self.encoder, ChangeEvents) and self.encoder.bits > 1
         responses_at: dict[tuple[int, float], list[Any]] = {}
         about: dict[tuple[int, float], list[tuple[float, float, float]]] = {}
-        frames: dict[int, list[Any]] = {}
-        by_column: dict[tuple[str, int], list[Any]] = {}
         reference: tuple[SampledEvents, Matrices] | None = None
         missing: set[str] = set()
         for draw in range(self.draws):
@@ -139,7 +113,7 @@ class _Answering(Question):
                 self._begin(f"{to_ms(period):g} ms, draw {draw + 1}")
                 spikes = self.spikes(period, draw)
                 for window, matrices in zip(self.windows, self.matrices(spikes, self.windows), strict=True):
-                    nested = self.nested(matrices, draw=draw)
+                    nested = self.nested(matrices, draw)
                     responses_at.setdefault((period, window), []).append(nested.responses)
                     about.setdefault((period, window), []).append(_about(spikes, window, values))
                     missing |= {f"fold {fold + 1} has no training trial of {name}" for fold, name in nested.missing}
@@ -147,11 +121,6 @@ class _Answering(Question):
                         reference = spikes, matrices
                     if watch is not None:
                         watch(to_ms(period), to_ms(window), bits_of(self.labels, responses_at[period, window]))
-                for name in self.columns:
-                    by_column.setdefault((name, period), []).append(self.nested(matrices, name, draw).responses)
-                of_frames = self._frames(spikes)
-                if of_frames is not None:
-                    frames.setdefault(period, []).append(self.nested(of_frames, draw=draw).responses)
         assert reference is not None  # there are a period, a draw and a window at least
         self._begin("intervals")
         estimates = {key: self.estimate(responses) for key, responses in responses_at.items()}
@@ -161,7 +130,7 @@ class _Answering(Question):
             verdict = None
             if window == longest and period != finest:
                 verdict = keeps(bits, estimates[finest, longest], groups=self.groups)
-            points.append(_point(period, window, everything, "all", bits, about[period, window], verdict))
+            points.append(_point(period, window, everything, bits, about[period, window], verdict))
         full = next(p for p in points if (p.period_ms, p.window_ms) == (to_ms(finest), to_ms(longest)))
         spikes, matrices = reference
         zero = zero_test(
@@ -173,10 +142,7 @@ class _Answering(Question):
             seed=self.seed,
         )
         self._warn(missing)
-        taxels = self._by_taxels(settings, values)
-        answered = self._columns_answered(by_column, about, everything)
-        self._begin("controls")
-        beside = controls(self)
+        taxels = self._by_taxels(values)
         if not is_above_chance(full.found, zero):
             points = [_with_nothing(p) for p in points]
         return Answer(
@@ -186,11 +152,8 @@ class _Answering(Question):
             full=full,
             points=tuple(points),
             taxels=taxels,
-            frames={to_ms(period): self.estimate(responses) for period, responses in frames.items()},
-            controls=beside,
+            control=self._length(spikes),
             zero=zero,
-            classifiers={name: self._classified(name, spikes, matrices) for name in classifiers},
-            parameters=answered,
             notes=tuple(self.notes),
             draws=self.draws,
             seed=self.seed,
@@ -206,58 +169,37 @@ class _Answering(Question):
         self._begin("labels shuffled")
         return predictions(matrices, self.split(labels)).responses
 
-    def _frames(self, spikes: SampledEvents) -> Matrices | None:
-        """Return the frames' inner products to the whole window; None without values, or where they are too many."""
-        bins = int(spikes.bins_to(self.window_us).max(initial=0))
-        active = len(np.unique(spikes.taxel))
-        if not all(held.has_values for held in self.held) or not 0 < bins * active * spikes.trials <= _MOST_VALUES:
-            return None
-        values = frames_of(self.trials, self.held, spikes, self.contact, bins)
-        return Matrices(frame_grams(values, spikes, [self.window_us]), [bins * active])
-
-    def _by_taxels(self, settings: Sequence[tuple[str, int]], values: bool) -> tuple[Point, ...]:
-        """Return the points with fewer or larger taxels."""
-        period = self.taxels_at
-        window = self.window_us
-        responses: dict[tuple[str, int], list[Any]] = {setting: [] for setting in settings}
-        about: dict[tuple[str, int], list[Any]] = {setting: [] for setting in settings}
-        taxels = {setting: setting[1] for setting in settings}
+    def _by_taxels(self, values: bool) -> tuple[Point, ...]:
+        """Return the points with fewer taxels, at the finest period and to the whole window."""
+        period, window = self.periods[0], self.window_us
+        responses: dict[int, list[Any]] = {size: [] for size in self.random_taxels}
+        about: dict[int, list[Any]] = {size: [] for size in self.random_taxels}
         for draw in range(self.draws):
             all_spikes = self.spikes(period, draw)
-            for kind, size in settings:
-                step = f"{size} taxels at random" if kind == "random" else f"taxels of {size} x {size}"
-                self._begin(step)
-                if kind == "random":
-                    random = np.random.default_rng([self.seed, draw, size, 1])
-                    spikes = all_spikes.select(np.sort(random.choice(self.active, size, replace=False)))
-                else:
-                    spikes = self.spikes(period, draw, size)
-                    taxels[kind, size] = spikes.taxels
-                nested = self.nested(self.matrices(spikes, [window])[0], draw=draw)
-                responses[kind, size].append(nested.responses)
-                about[kind, size].append(_about(spikes, window, values))
-        points = []
-        for kind, size in settings:
-            bits, point = self.estimate(responses[kind, size]), (kind, size)
-            points.append(_point(period, window, taxels[point], kind, bits, about[point], None))
-        return tuple(points)
+            for size in self.random_taxels:
+                self._begin(f"{size} taxels at random")
+                random = np.random.default_rng([self.seed, draw, size, 1])
+                spikes = all_spikes.select(np.sort(random.choice(self.active, size, replace=False)))
+                nested = self.nested(self.matrices(spikes, [window])[0], draw)
+                responses[size].append(nested.responses)
+                about[size].append(_about(spikes, window, values))
+        return tuple(
+            _point(period, window, size, self.estimate(responses[size]), about[size], None)
+            for size in self.random_taxels
+        )
 
-    def _classified(self, name: str, spikes: SampledEvents, matrices: Matrices) -> Estimate:
-        self._begin(name)
-        if name == "neighbours":
-            return self.estimate(self.nested(matrices, neighbours=NEIGHBOURS).responses)
-        return self.estimate(readout_responses(name, spikes, self.window_us, self.labels, self.split(self.labels).fold))
-
-    def _columns_answered(
-        self, by_column: dict[tuple[str, int], list[Any]], about: dict[Any, Any], everything: int
-    ) -> dict[str, tuple[Point, ...]]:
-        by_name: dict[str, list[Point]] = {}
-        for (name, period), responses in by_column.items():
-            bits = self.estimate(responses, self.columns[name])
-            by_name.setdefault(name, []).append(
-                _point(period, self.windows[-1], everything, "all", bits, about[period, self.windows[-1]], None)
-            )
-        return {name: tuple(points) for name, points in by_name.items()}
+    def _length(self, spikes: SampledEvents) -> Control:
+        """Return the bits of the time from contact to the trial's end, or to the last event in the window."""
+        if self.ended:
+            about, length = "from contact to the trial's end", to_ms(spikes.length_us)
+        else:
+            about, length = "from contact to the last event in the window", np.zeros(len(self.trials))
+            np.maximum.at(length, spikes.trial, to_ms(spikes.first_us[spikes.trial] + spikes.bin * spikes.period_us))
+        length = np.nan_to_num(length)
+        if np.ptp(length) == 0:
+            return Control(self.estimate(np.full(len(length), self.labels[0])), about)
+        unit = ((length - length.mean()) / length.std())[:, None]
+        return Control(self.estimate(self.nested(Matrices([unit @ unit.T], [1])).responses), about)
 
     def _warn(self, missing: set[str]) -> None:
         self.notes += sorted(missing)[:3]
@@ -278,8 +220,7 @@ class _Answering(Question):
             )
         if not self.ended:
             self.notes.append(
-                "trials have no stop_us: the control 'length' uses the last event in the window instead "
-                "of the trial's end"
+                "trials have no stop_us: the length uses the last event in the window instead of the trial's end"
             )
 
 
@@ -289,12 +230,10 @@ def _about(spikes: SampledEvents, window: float, values: bool) -> tuple[float, f
 
 
 def _point(
-    period: int, window: float, taxels: int, kind: str, estimated: Estimate, about: list[Any], verdict: Keeping | None
+    period: int, window: float, taxels: int, estimated: Estimate, about: list[Any], verdict: Keeping | None
 ) -> Point:
     events, silent, kbps = np.mean(about, axis=0)
-    return Point(
-        to_ms(period), to_ms(window), taxels, kind, estimated, float(events), float(silent), float(kbps), verdict
-    )
+    return Point(to_ms(period), to_ms(window), taxels, estimated, float(events), float(silent), float(kbps), verdict)
 
 
 def _with_nothing(point: Point) -> Point:

@@ -1,9 +1,9 @@
-"""The answer about a user's own sensor: bits by setting, their cost, and controls."""
+"""The answer about a user's own sensor: bits by setting, and their cost."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from taxel.information.wire_rate import WIRE
 
 __all__ = ["Answer", "Control", "Point", "is_above_chance"]
 
-#: A control with at least this share of the answer's bits is reported as a warning.
+#: A length with at least this share of the answer's bits is reported as a warning.
 _NEAR = 0.8
 
 
@@ -25,8 +25,7 @@ class Point:
     ----------
     period_ms, window_ms : float, ms
     taxels : int, 1 or more
-    kind : {"all", "random", "pooled"}
-        All taxels that ever send an event, some of them, drawn again in each draw, or the means of squares of all.
+        All that ever send an event, or some of them, drawn again in each draw.
     found : Estimate
     events : float, 0 or more
         Events in a trial, up to the end of the window.
@@ -41,17 +40,11 @@ class Point:
     period_ms: float
     window_ms: float
     taxels: int
-    kind: str
     found: Estimate
     events: float
     silent: float
     kbps: float
     verdict: Keeping | None = None
-
-    @property
-    def millibits_per_event(self) -> float:
-        """Bits divided by events, in thousandths. Not a figure of merit: it is highest where the bits are lowest."""
-        return 1000.0 * self.found.bits / self.events if self.events else 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, as JSON holds them."""
@@ -61,37 +54,30 @@ class Point:
                 "says": self.verdict.says,
                 "margin": round(self.verdict.margin, 4),
                 "error": round(self.verdict.error, 4),
-                "trials_to_settle": self.verdict.trials_to_settle,
             }
         return {
             "period_ms": self.period_ms,
             "window_ms": self.window_ms,
             "taxels": self.taxels,
-            "kind": self.kind,
             **self.found.to_dict(),
             "events": round(self.events, 2),
-            "millibits_per_event": round(self.millibits_per_event, 3),
             "silent": round(self.silent, 4),
             "kbps": round(self.kbps, 2),
             "verdict": verdict,
         }
 
 
-@dataclass(frozen=True, eq=False)
-class Control:
-    """Hold the bits of a control: of a measurement other than the touch's pattern.
+class Control(NamedTuple):
+    """Hold the bits of the length of a touch alone, without its pattern.
 
     Attributes
     ----------
-    name : str
-    found : Estimate, or None
-        None if the recordings lack the data for it.
+    found : Estimate
     about : str
-        Description of the measurement, in one sentence.
+        From when to when it is measured.
     """
 
-    name: str
-    found: Estimate | None
+    found: Estimate
     about: str
 
 
@@ -112,14 +98,8 @@ class Answer:
         Results by period and window, with all taxels.
     taxels : tuple of Point
         Results by number of taxels, at one period.
-    frames : dict of float to Estimate
-        Results by period, ms, of frames instead of events, in the whole window.
-    controls : tuple of Control
+    control : Control
     zero : ZeroTest
-    classifiers : dict of str to Estimate
-        Results of the further classifiers, at the full setting.
-    parameters : dict of str to tuple of Point
-        For each column of the table: the bits about it, by period.
     notes : tuple of str
         Questions that these recordings cannot answer, and results that were left out.
     draws : int, 1 or more
@@ -134,11 +114,8 @@ class Answer:
     full: Point
     points: tuple[Point, ...]
     taxels: tuple[Point, ...]
-    frames: dict[float, Estimate]
-    controls: tuple[Control, ...]
+    control: Control
     zero: ZeroTest
-    classifiers: dict[str, Estimate]
-    parameters: dict[str, tuple[Point, ...]]
     notes: tuple[str, ...]
     draws: int
     seed: int
@@ -158,7 +135,7 @@ class Answer:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Reasons to doubt the full setting's bits: shuffled labels, wrong answers or a control give about as much."""
+        """Reasons to doubt the full setting's bits: shuffled labels, wrong answers or the length give about as much."""
         estimate = self.full.found
         lines = []
         if estimate.bits <= self.zero.level:
@@ -174,12 +151,9 @@ class Answer:
                 "the bits come from the wrong answers"
                 + (", for example if a group has mostly one label" if self.groups else "")
             )
-        if not self.empty:
-            lines += [
-                f"{c.name} alone gives {c.found.bits:.2f} bits: the answer may be about this measurement only"
-                for c in self.controls
-                if c.found is not None and c.found.interval[0] > 0 and c.found.bits >= _NEAR * estimate.bits
-            ]
+        length = self.control.found
+        if not self.empty and length.interval[0] > 0 and length.bits >= _NEAR * estimate.bits:
+            lines.append(f"the length alone gives {length.bits:.2f} bits: the answer may be about it only")
         return (*lines, *estimate.warnings)
 
     @property
@@ -197,18 +171,12 @@ class Answer:
             "full": self.full.to_dict(),
             "points": [point.to_dict() for point in self.points],
             "taxels": [point.to_dict() for point in self.taxels],
-            "frames": [{"period_ms": period, **estimate.to_dict()} for period, estimate in self.frames.items()],
-            "controls": [
-                {"name": c.name, "about": c.about, **({} if c.found is None else c.found.to_dict())}
-                for c in self.controls
-            ],
+            "length": {"about": self.control.about, **self.control.found.to_dict()},
             "zero": {
                 "level": round(self.zero.level, 4),
                 "p": round(self.zero.p, 4),
                 "shuffles": len(self.zero.shuffled),
             },
-            "classifiers": {name: estimate.to_dict() for name, estimate in self.classifiers.items()},
-            "parameters": {name: [p.to_dict() for p in points] for name, points in self.parameters.items()},
             "cheapest": self.cheapest.to_dict(),
             "warnings": list(self.warnings),
             "confusion": {

@@ -34,8 +34,6 @@ _CELLS = 1 << 21
 _DRAWN = 1 << 19
 #: Number of counts that distinguishes shares finely enough.
 _FINE = 1 << 36
-#: A tenth of a bit either way.
-_FIFTH = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +63,6 @@ class Estimate:
     classes : labels, shape (labels,)
     local : float64, shape (trials,), bits
         Information of each trial's answer, the mean over draws.
-    trials_for_tenth : int, 0 or more
-        Number of trials that would narrow the interval (95 %) to a tenth of a bit either way.
     warnings : tuple of str
         Warnings about the number of trials for each label and about the interval.
     """
@@ -81,7 +77,6 @@ class Estimate:
     counts: NDArray[np.int64]
     classes: NDArray[np.generic]
     local: NDArray[np.float64] = field(repr=False)
-    trials_for_tenth: int = 0
     warnings: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
@@ -94,7 +89,6 @@ class Estimate:
             "corrected": round(self.corrected, 4),
             "most": round(self.most, 4),
             "right": round(self.right, 4),
-            "trials_for_tenth": self.trials_for_tenth,
             "warnings": list(self.warnings),
         }
 
@@ -200,14 +194,10 @@ def estimate(
     local = np.mean([local_information(table).ravel()[cell] for table, cell in zip(counts, cells, strict=True)], 0)
     low, high = _interval(cells, row, belongs, len(classes), rounds, share, random)
     n = np.bincount(row)
-    tenth = int(np.ceil(384.0 * np.var(local)))
     prior, wrong = n[n > 0] / len(truth), int((row != counts.sum(0).argmax(0)[column]).any(0).sum())
     if wrong <= len(prior):
         # With so few errors, redraws do not show where others would lie.
-        low = min(low, most - bits - float(_left_open(prior, np.array(wrong), np.array(len(truth)), share)))
-        times = np.geomspace(1, 100, 400)
-        few = np.flatnonzero(_left_open(prior, times * wrong, times * len(truth), 0.95) <= _FIFTH)
-        tenth = max(tenth, int(np.ceil(len(truth) * (times[few[0]] if len(few) else 100))))
+        low = min(low, most - bits - _left_open(prior, wrong, len(truth), share))
     relevant = relevant_responses(counts)[:, np.unique(row)].mean()
     interval = max(0.0, bits + low), min(most, bits + high)
     return Estimate(
@@ -223,8 +213,7 @@ def estimate(
         counts=counts,
         classes=classes,
         local=local,
-        trials_for_tenth=tenth,
-        warnings=_warnings(int(n[n > 0].min()), float(relevant), interval, tenth),
+        warnings=_warnings(int(n[n > 0].min()), float(relevant), interval),
     )
 
 
@@ -398,20 +387,18 @@ def _redrawn(random: np.random.Generator, units: int, count: int) -> NDArray[np.
     return draws
 
 
-def _left_open(
-    prior: NDArray[np.float64], wrong: NDArray[Any], trials: NDArray[Any], confidence: float
-) -> NDArray[np.float64]:
+def _left_open(prior: NDArray[np.float64], wrong: int, trials: int, confidence: float) -> float:
     """Return how many bits the labels may lose where so few of so many trials were named wrongly.
 
     By Fano's inequality, with Clopper and Pearson's upper end for the share of errors.
     """
-    share = scipy.special.betaincinv(wrong + 1, np.maximum(trials - wrong, 1e-9), (1 + confidence) / 2)[..., None, None]
+    share = float(scipy.special.betaincinv(wrong + 1, max(trials - wrong, 1e-9), (1 + confidence) / 2))
     even = np.where(np.eye(len(prior), dtype=bool), 1 - share, share / (len(prior) - 1))
     table = np.rint(_FINE * prior[:, None] * even)
-    return np.asarray(label_entropy(table) - plug_in(table))
+    return float(label_entropy(table) - plug_in(table))
 
 
-def _warnings(least: int, relevant: float, interval: tuple[float, float], tenth: int) -> tuple[str, ...]:
+def _warnings(least: int, relevant: float, interval: tuple[float, float]) -> tuple[str, ...]:
     lines = []
     needed = int(np.ceil(TRIALS_A_RESPONSE * relevant))
     if least < needed:
@@ -420,5 +407,5 @@ def _warnings(least: int, relevant: float, interval: tuple[float, float], tenth:
         )
     half = (interval[1] - interval[0]) / 2
     if half > 0.1:
-        lines.append(f"uncertain by {half:.2f} bit: for 0.1 bit, about {tenth} trials are needed")
+        lines.append(f"uncertain by {half:.2f} bit: more trials narrow it")
     return tuple(lines)

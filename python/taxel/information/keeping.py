@@ -32,22 +32,14 @@ class Keeping:
         Its bits minus the share of the other setting's bits.
     error : float, bits
         Standard error of the margin, from pairs of trials or groups.
-    trials_to_settle : int, 1 or more, optional
-        Number of trials that would settle an open verdict if the margin is as estimated; None if the margin is 0 or the
-        verdict is settled.
     """
 
     says: str
     margin: float
     error: float
-    trials_to_settle: int | None = None
 
     def __str__(self) -> str:
-        if self.says == "nothing":
-            return "nothing to keep"
-        if self.says != "open":
-            return self.says
-        return "open" if self.trials_to_settle is None else f"open ({self.trials_to_settle} trials)"
+        return "nothing to keep" if self.says == "nothing" else self.says
 
 
 def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: ArrayLike | None = None) -> Keeping:
@@ -105,5 +97,4 @@ def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: Array
         return Keeping("keeps", margin, error)
     if margin < -reach * error:
         return Keeping("loses", margin, error)
-    needed = (reach * error / margin) ** 2 * len(a) if margin else np.inf
-    return Keeping("open", margin, error, int(np.ceil(needed)) if needed < 1e6 else None)
+    return Keeping("open", margin, error)

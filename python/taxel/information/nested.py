@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -20,10 +19,8 @@ __all__ = [
     "WORTH_THREADS",
     "Matrices",
     "Nested",
-    "majority",
     "nested_predictions",
     "predictions",
-    "squared_distances",
 ]
 
 #: Ridges that are tried, in units of the mean variance.
@@ -42,7 +39,7 @@ class Nested:
     folds : int64, shape (trials,), counted from 0
         Fold in which each trial was tested.
     chosen : dict from fold to (int, float)
-        The matrix and the ridge (or number of neighbours) that each fold's training trials chose among themselves.
+        The matrix and the ridge that each fold's training trials chose among themselves.
     missing : tuple of (fold, class)
         Training sets without a class, which they cannot predict.
     """
@@ -62,7 +59,6 @@ def nested_predictions(
     count: int = 10,
     inner: int = 5,
     ridges: Sequence[float] = RIDGES,
-    neighbours: Sequence[int] = (),
     seed: int = 0,
 ) -> Nested:
     """Predict each trial by linear discriminants of the other folds, chosen among matrices and ridges inside these.
@@ -81,8 +77,6 @@ def nested_predictions(
         Number of folds, and of folds among the training trials.
     ridges : sequence of float, above 0
         In units of the mean variance over features and all trials (which does not depend on labels).
-    neighbours : sequence of int, 1 or more
-        If given, these numbers of nearest neighbours are tried instead of discriminants.
     seed : int, 0 or more
 
     Returns
@@ -103,23 +97,16 @@ def nested_predictions(
     levels = numbers("ridges", ridges, np.float64)
     if levels.ndim != 1 or not len(levels) or not ((levels > 0) & (levels <= LARGEST_RIDGE)).all():
         raise refused("ridges", f" is {shown(ridges)}: must be numbers above 0, at most {LARGEST_RIDGE:g}")
-    nearest = tuple(integer("neighbours", k, 1) for k in several("neighbours", neighbours))
     parts = integer("inner", inner, 2)
     dealt = split(y, matrices.trials, count=count, inner=parts, groups=groups, seed=seed)
     with threads(several=matrices.trials >= WORTH_THREADS):
-        return predictions(matrices, dealt, ridges=tuple(levels.tolist()), neighbours=nearest)
+        return predictions(matrices, dealt, ridges=tuple(levels.tolist()))
 
 
-def predictions(
-    matrices: Matrices, dealt: Split, *, ridges: tuple[float, ...] = RIDGES, neighbours: tuple[int, ...] = ()
-) -> Nested:
+def predictions(matrices: Matrices, dealt: Split, *, ridges: tuple[float, ...] = RIDGES) -> Nested:
     """Predict each trial as `nested_predictions` does, from what other questions about the same trials share."""
-    row, classes = dealt.row, len(dealt.classes)
-    ways: _Ways
-    if neighbours:
-        ways = _Neighbours(matrices, row, classes, neighbours)
-    else:
-        ways = _Discriminants(matrices, dealt.is_class, ridges)
+    row = dealt.row
+    ways = _Discriminants(matrices, dealt.is_class, ridges)
     best = _best(ways, dealt) if ways.count > 1 else np.zeros(len(dealt.parts), np.int64)
     predicted = np.empty(len(row), np.int64)
     for folds, out in _of_one_size([part.test for part in dealt.parts]):
@@ -127,13 +114,13 @@ def predictions(
     missing = [
         (name, str(dealt.classes[k]))
         for name, part in enumerate(dealt.parts)
-        for k in np.setdiff1d(np.arange(classes), row[part.train])
+        for k in np.setdiff1d(np.arange(len(dealt.classes)), row[part.train])
     ]
     chosen = {name: ways.way(int(number)) for name, number in enumerate(best)}
     return Nested(dealt.classes[predicted], dealt.fold, chosen, tuple(missing))
 
 
-def _best(ways: _Ways, dealt: Split) -> NDArray[np.int64]:
+def _best(ways: _Discriminants, dealt: Split) -> NDArray[np.int64]:
     """Return for each fold the way that classifies most of its training trials correctly, in folds among themselves."""
     right = np.zeros((len(dealt.parts), ways.count), np.int64)
     inner = [(name, test) for name, part in enumerate(dealt.parts) for test in part.inner]
@@ -198,70 +185,22 @@ class Matrices:
         return self._residuals[ridges]
 
 
-class _Ways(ABC):
-    """The classifiers to choose among ("ways"): their predictions of trials that are left out."""
+class _Discriminants:
+    """The discriminants to choose among ("ways"): their predictions of trials that are left out."""
 
-    count: int
-
-    @abstractmethod
-    def predict(self, number: NDArray[np.int64], out: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return one way's predictions of trials that are left out; number (cases,), out and result (cases, trials)."""
-
-    @abstractmethod
-    def way(self, number: int) -> tuple[int, float]:
-        """Return the matrix and the ridge or number of neighbours of a way."""
-
-    def predict_all(self, out: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return all ways' predictions of trials that are left out; shapes (cases, trials), (ways, cases, trials)."""
-        number = np.repeat(np.arange(self.count), len(out))
-        return self.predict(number, np.tile(out, (self.count, 1))).reshape(self.count, *out.shape)
-
-
-class _Discriminants(_Ways):
     def __init__(self, matrices: Matrices, is_class: NDArray[np.float64], ridges: tuple[float, ...]) -> None:
         self._ridges, self._regressions = ridges, Regressions(matrices.residuals(ridges), is_class)
         self.count = len(matrices.squares) * len(ridges)
 
     def way(self, number: int) -> tuple[int, float]:
+        """Return the matrix and the ridge of a way."""
         return number // len(self._ridges), float(self._ridges[number % len(self._ridges)])
 
     def predict(self, number: NDArray[np.int64], out: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return one way's predictions of trials that are left out; number (cases,), out and result (cases, trials)."""
         return self._regressions.left_out(number, out)
 
-
-class _Neighbours(_Ways):
-    def __init__(self, matrices: Matrices, row: NDArray[np.int64], classes: int, nearest: tuple[int, ...]) -> None:
-        self._row, self._classes, self._nearest = row, classes, nearest
-        self._order = [np.argsort(squared_distances(square), axis=1, kind="stable") for square in matrices.squares]
-        self.count = len(matrices.squares) * len(nearest)
-
-    def way(self, number: int) -> tuple[int, float]:
-        return number // len(self._nearest), float(self._nearest[number % len(self._nearest)])
-
-    def predict(self, number: NDArray[np.int64], out: NDArray[np.int64]) -> NDArray[np.int64]:
-        predicted = np.empty(out.shape, np.int64)
-        for case, (way, tested) in enumerate(zip(number, out, strict=True)):
-            matrix, neighbours = self.way(int(way))
-            training = np.ones(len(self._row), bool)
-            training[tested] = False
-            order = self._order[matrix][tested]
-            near = order[training[order]].reshape(len(tested), -1)[:, : int(neighbours)]
-            predicted[case] = majority(self._row[near], self._classes)
-        return predicted
-
-
-def squared_distances(square: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the squared distances of inner products; rounding errors may leave some below 0."""
-    length = np.diag(square)
-    return np.asarray(length + length[:, None] - 2 * square)
-
-
-def majority(near: NDArray[np.int64], classes: int) -> NDArray[np.int64]:
-    """Return the most frequent class of each row; on a tie, the class whose members come first."""
-    votes = np.zeros((len(near), classes))
-    rows = np.repeat(np.arange(len(near)), near.shape[1])
-    np.add.at(votes, (rows, near.ravel()), 1.0)
-    # One vote outweighs all differences in place.
-    tie = np.tile(np.linspace(0, 1, near.shape[1]) / (near.shape[1] + 1), len(near))
-    np.add.at(votes, (rows, near.ravel()), -tie / near.shape[1])
-    return np.asarray(votes.argmax(1))
+    def predict_all(self, out: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return all ways' predictions of trials that are left out; shapes (cases, trials), (ways, cases, trials)."""
+        number = np.repeat(np.arange(self.count), len(out))
+        return self.predict(number, np.tile(out, (self.count, 1))).reshape(self.count, *out.shape)

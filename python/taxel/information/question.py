@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from taxel._base.arguments import integer, number, several, shown
 from taxel._base.errors import refused
@@ -51,7 +50,7 @@ class Question:
     folds: int
     seed: int
     notes: list[str] = field(default_factory=list)
-    _splits: dict[tuple[str, int], Split] = field(default_factory=dict, repr=False)
+    _splits: dict[int, Split] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         if not self.trials:
@@ -114,8 +113,6 @@ class Question:
         periods_ms: Sequence[float] | None,
         windows_ms: Sequence[float] | None,
         taxels: Sequence[int] | None,
-        pools: Sequence[int] | None,
-        taxels_at_ms: float | None,
     ) -> None:
         """Choose the settings."""
         window = self.window_us
@@ -139,15 +136,8 @@ class Question:
                     f" is {shown(windows_ms)}: must be from {to_ms(self.finest):g} to {to_ms(window):g} ms",
                 )
             self.windows = sorted({*chosen_windows, window})
-        self.taxels_at = self.periods[0]
-        if taxels_at_ms is not None:
-            at = to_us(number("taxels_at_ms", taxels_at_ms))
-            self.taxels_at = next((p for p in self.periods if p == at), 0)
-            if not self.taxels_at:
-                listed = ", ".join(f"{to_ms(p):g}" for p in self.periods)
-                raise refused("taxels_at_ms", f" is {shown(taxels_at_ms)}: must be one of the periods {listed} ms")
-        spikes = self.spikes(self.taxels_at, 0)
-        self.active, self.events = np.unique(spikes.taxel), len(spikes.taxel)
+        spikes = self.spikes(self.periods[0], 0)
+        self.active = np.unique(spikes.taxel)
         there = len(self.active)
         numbers = [integer("taxels", n, 1) for n in several("taxels", (10, 30, 100, 300) if taxels is None else taxels)]
         if taxels is not None and any(n > there for n in numbers):
@@ -155,14 +145,8 @@ class Question:
                 "taxels", f" is {shown(taxels)}: must be at most {there}, because only these taxels send events"
             )
         self.random_taxels = [n for n in numbers if n < there]
-        sides = [integer("pools", n, 2) for n in several("pools", (2, 4, 7) if pools is None else pools)]
-        rows, columns = self.trials[0].array.shape
-        if pools is not None and any(n > max(rows, columns) for n in sides):
-            raise refused("pools", f" is {shown(pools)}: must fit the array of {rows} x {columns} taxels")
-        self.pools = [n for n in sides if n <= max(rows, columns)]
-        self.columns = self._parameter_columns()
 
-    def spikes(self, period: int, draw: int, pool: int = 1) -> SampledEvents:
+    def spikes(self, period: int, draw: int) -> SampledEvents:
         """Return the spikes of all trials at a period (us), in one draw of the sampling phases."""
         assert self.encoder is not None  # the constructor has set the default
         return spikes_of(
@@ -173,23 +157,21 @@ class Question:
             contact_us=self.contact,
             window_us=self.window_us,
             random=np.random.default_rng([self.seed, draw, period]),
-            pool=pool,
         )
 
-    def nested(self, matrices: Matrices, column: str = "", draw: int = 0, **ways: Any) -> Nested:
-        """Return the predictions for all trials in nested folds, of the labels or of a column of parameters."""
-        if (column, draw) not in self._splits:
-            self._splits[column, draw] = self.split(self.columns[column] if column else self.labels, draw)
-        return predictions(matrices, self._splits[column, draw], **ways)
+    def nested(self, matrices: Matrices, draw: int = 0) -> Nested:
+        """Return the predictions for all trials in nested folds."""
+        if draw not in self._splits:
+            self._splits[draw] = self.split(self.labels, draw)
+        return predictions(matrices, self._splits[draw])
 
     def split(self, labels: Any, draw: int = 0) -> Split:
         """Return labels dealt out to folds."""
         return split(labels, len(self.trials), count=self.folds, groups=self.groups, seed=self.seed + draw)
 
-    def estimate(self, responses: Any, labels: Any = None) -> Estimate:
+    def estimate(self, responses: Any) -> Estimate:
         """Return the information of responses (or draws of them) about the labels."""
-        truth = self.labels if labels is None else labels
-        return estimate(truth, responses, groups=self.groups, seed=self.seed)
+        return estimate(self.labels, responses, groups=self.groups, seed=self.seed)
 
     def smoothings(self, period: int) -> list[float]:
         """Return the smoothings, ms, that a period (us) can tell apart."""
@@ -202,25 +184,6 @@ class Question:
         by_tau = [event_grams(spikes, windows, tau) for tau in taus]
         sizes = features(spikes, windows)
         return [Matrices(grams, [size] * len(taus)) for size, *grams in zip(sizes, *by_tau, strict=True)]
-
-    def _parameter_columns(self) -> dict[str, NDArray[np.generic]]:
-        """Return the columns of parameters that can be used like labels; the notes name the others."""
-        columns = {}
-        for name in self.trials[0].parameters:
-            column = np.array([trial.parameters.get(name, "") for trial in self.trials])
-            if (column == self.labels).all():
-                self.notes.append(f"parameter {name} is left out: it is the same as the label")
-                continue
-            if (column == "").any():
-                self.notes.append(f"parameter {name} is left out: some trials have no value")
-                continue
-            try:
-                stratified(column, count=self.folds, groups=self.groups, seed=self.seed)
-            except ProblemError as error:
-                self.notes.append(f"parameter {name} is left out: {error}")
-                continue
-            columns[name] = column
-        return columns
 
 
 def floor_of(trials: Sequence[LabelledTrial]) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from taxel.information.sampling import SampledEvents
 from taxel.spikes import to_ms
 
-__all__ = ["event_grams", "features", "frame_grams"]
+__all__ = ["event_grams", "features"]
 
 
 def event_grams(spikes: SampledEvents, windows_us: Sequence[float], tau_ms: float) -> list[NDArray[np.float64]]:
@@ -45,28 +45,6 @@ def event_grams(spikes: SampledEvents, windows_us: Sequence[float], tau_ms: floa
         state *= decay
         here = slice(begins[b], begins[b + 1])
         np.add.at(state.ravel(), flat[here], spikes.value[here])
-        sums.add(state)
-    return sums.finish()
-
-
-def frame_grams(
-    values: NDArray[np.float32], spikes: SampledEvents, windows_us: Sequence[float]
-) -> list[NDArray[np.float64]]:
-    """Return the inner products of frames instead of events, at the same period, aligned in the same way.
-
-    Parameters
-    ----------
-    values : float32, shape (bins, trials, taxels)
-        The change of each taxel since before the touch; bin 0 is that of the first event.
-    spikes : SampledEvents
-    windows_us : sequence of float, us, ascending
-
-    Returns
-    -------
-    list of float64, shape (trials, trials)
-    """
-    sums = _Sums(spikes, windows_us)
-    for state in values[: sums.bins]:
         sums.add(state)
     return sums.finish()
 

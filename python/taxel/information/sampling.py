@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,6 @@ __all__ = [
     "checked_periods",
     "contacts",
     "finest_us",
-    "frames_of",
     "spikes_of",
 ]
 
@@ -53,11 +52,6 @@ class HeldValues:
             self._values = values if exists.all() else values[:, self.taxels]
         else:
             self._held = _core.HeldValues(source._parts(), self.taxels.astype(np.uint32), None)
-
-    @property
-    def has_values(self) -> bool:
-        """Whether there are values, and not only steps up and down."""
-        return isinstance(self.source, Frames) or self.source.intensity is not None
 
     def at(self, times: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return the held values, shape (times, existing taxels); before the first frame, the first frame.
@@ -141,13 +135,6 @@ class SampledEvents:
         )
 
 
-class _Pools(NamedTuple):
-    """Squares of taxels: of each rank, the squares that have so many taxels and that taxel; one over their sizes."""
-
-    members: list[tuple[NDArray[np.int64], NDArray[np.int64]]]
-    share: NDArray[np.float64]
-
-
 def finest_us(sources: Sequence[Events | Frames]) -> int:
     """Return the finest period that recordings can show, us: between frames, or what all stamps are multiples of."""
     periods = [
@@ -187,7 +174,6 @@ def spikes_of(
     contact_us: NDArray[np.float64],
     window_us: float,
     random: np.random.Generator,
-    pool: int = 1,
 ) -> SampledEvents:
     """Sample all trials at one period, each at a phase that is drawn, and encode the samples.
 
@@ -205,8 +191,6 @@ def spikes_of(
         Time after the contact that counts.
     random : numpy.random.Generator
         Source of the random phases.
-    pool : int
-        Squares of so many by so many taxels are averaged into one.
 
     Returns
     -------
@@ -217,13 +201,9 @@ def spikes_of(
     first = np.full(len(trials), np.inf)
     length = np.zeros(len(trials))
     phases = random.random(len(trials))
-    pools: dict[int, _Pools | None] = {}
     taxels = 1
     for k, (trial, values) in enumerate(zip(trials, held, strict=True)):
-        if id(values) not in pools:
-            pools[id(values)] = _pooling(values, pool)
-        pooled = pools[id(values)]
-        taxels = len(values.taxels) if pooled is None else len(pooled.share)
+        taxels = len(values.taxels)
         if np.isnan(contact_us[k]):
             continue
         length[k] = np.inf if trial.stop_us is None else trial.stop_us - contact_us[k]
@@ -233,7 +213,7 @@ def spikes_of(
         grid = np.arange(begin, int(np.ceil(stop)), period_us)
         if len(grid) < 2:
             continue
-        bins, taxel, value = _encoded(encoder, values, grid, period_us, pooled)
+        bins, taxel, value = _encoded(encoder, values, grid, period_us)
         late = grid[bins] >= contact_us[k]
         bins, taxel, value = bins[late], taxel[late], value[late]
         if not len(bins):
@@ -247,52 +227,14 @@ def spikes_of(
     return SampledEvents(period_us, taxels, trial_, taxel_, bin_, value_.astype(np.float32), first, length)
 
 
-def frames_of(
-    trials: Sequence[LabelledTrial],
-    held: Sequence[HeldValues],
-    spikes: SampledEvents,
-    contact_us: NDArray[np.float64],
-    bins: int,
-) -> NDArray[np.float32]:
-    """Return frames at the same times as the events: the change since before the touch.
-
-    Parameters
-    ----------
-    trials, held, contact_us
-        As given to `spikes_of`.
-    spikes : SampledEvents
-    bins : int
-
-    Returns
-    -------
-    float32, shape (bins, trials, taxels that ever send an event)
-    """
-    active = np.unique(spikes.taxel)
-    changes = np.zeros((bins, len(trials), len(active)), np.float32)
-    for k, values in enumerate(held):
-        if np.isfinite(spikes.first_us[k]):
-            zero = int(contact_us[k] + spikes.first_us[k])
-            frames = values.at(zero + spikes.period_us * np.arange(-1, bins))[:, active]
-            changes[:, k] = frames[1:] - frames[0]
-    return changes
-
-
 def _encoded(
     encoder: Encoder,
     held: HeldValues,
     grid: NDArray[np.int64],
     period_us: int,
-    pooled: _Pools | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
     """Return bin, taxel and value of the events that an encoder makes of the values held at a grid of times."""
     values = held.at(grid)
-    if pooled is not None:
-        members, share = pooled
-        sums = np.zeros((len(values), len(share)), np.float32)
-        # Sums begin with each square's first taxel and end with its last.
-        for cells, taxels in members:
-            sums[:, cells] += values[:, taxels]
-        values = (sums * share).astype(np.float32)
     frames = Frames(values[:, None, :], grid, unit="held", array=Array(1, values.shape[1]))
     trains = _at_period(encoder, period_us).encode(frames)
     taxel = np.repeat(np.arange(len(trains)), trains.counts)
@@ -305,22 +247,6 @@ def _at_period(encoder: Encoder, period_us: int) -> Encoder:
     if isinstance(encoder, FA1):
         return FA1(**{**encoder.get_params(), "period_ms": to_ms(period_us)})
     return instance("encoder", encoder, ChangeEvents)
-
-
-def _pooling(held: HeldValues, pool: int) -> _Pools | None:
-    """Return the taxels that are averaged into each; None where each stands for itself."""
-    if pool == 1:
-        return None
-    row, column = np.divmod(held.taxels, held.array.columns)
-    square = (row // pool) * held.array.columns + column // pool
-    _, where, size = np.unique(square, return_inverse=True, return_counts=True)
-    order = np.argsort(where, kind="stable")
-    begins = np.cumsum(size) - size
-    members = []
-    for rank in range(int(size.max())):
-        large = np.flatnonzero(size > rank)
-        members.append((large, order[begins[large] + rank]))
-    return _Pools(members, 1.0 / size)
 
 
 def checked_periods(periods_us: Sequence[int], finest: int) -> list[int]:

@@ -1,17 +1,17 @@
-"""Trials: labelled stretches of recordings, with their groups and parameters."""
+"""Trials: labelled stretches of recordings, with their groups."""
 
 from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from taxel._base.arguments import checked_path, instance, integer, mapping, number, several, shown, text
+from taxel._base.arguments import checked_path, instance, integer, number, several, shown, text
 from taxel._base.errors import helped, placed, refused, unreadable
 from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.number_text import float_of, int_of
@@ -27,7 +27,6 @@ from taxel.spikes import to_ms, to_us
 __all__ = ["LabelledTrial", "notes_as_trials", "read_trials", "recordings_as_trials"]
 
 _COLUMNS = ("recording", "t_us", "label")
-_KNOWN = (*_COLUMNS, "stop_us", "group", "host_ns")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +48,6 @@ class LabelledTrial:
     group : str
         Trials of a group (person, session, pose) are not split between folds; if it is empty, the trial is a group by
         itself.
-    parameters : mapping of str to str
-        Further known values: radius, height, slant ...
     name : str
         Place of the trial, for errors.
 
@@ -70,7 +67,6 @@ class LabelledTrial:
     start_us: int
     stop_us: int | None = None
     group: str = ""
-    parameters: Mapping[str, str] = field(default_factory=dict)
     name: str = "trial"
 
     def __post_init__(self) -> None:
@@ -79,7 +75,6 @@ class LabelledTrial:
         if not text("label", self.label):
             raise ProblemError(f"{self.name}: label is empty")
         text("group", self.group)
-        mapping("parameters", self.parameters)
         object.__setattr__(self, "start_us", integer("start_us", self.start_us))
         if self.stop_us is not None:
             object.__setattr__(self, "stop_us", integer("stop_us", self.stop_us))
@@ -95,7 +90,7 @@ class LabelledTrial:
 def read_trials(
     table: str | os.PathLike[str], recordings: Sequence[Recording], *, window_ms: float | None = None
 ) -> list[LabelledTrial]:
-    """Read a table of trials: ``recording,t_us,label[,stop_us][,group][,host_ns]`` and columns of parameters.
+    """Read a table of trials: ``recording,t_us,label[,stop_us][,group][,host_ns]``; other columns are not read.
 
     Parameters
     ----------
@@ -170,8 +165,7 @@ def read_trials(
                 file,
                 line=line,
             )
-        more = {name: cell for name, cell in row.items() if name not in _KNOWN}
-        trials.append(LabelledTrial(source, row["label"], start, stop, row.get("group", ""), more, where))
+        trials.append(LabelledTrial(source, row["label"], start, stop, row.get("group", ""), where))
         _inside(trials[-1], recording.name, span, window_us)
     if any(trial.group for trial in trials) and not all(trial.group for trial in trials):
         nameless = next(trial for trial in trials if not trial.group)

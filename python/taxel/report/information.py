@@ -1,4 +1,4 @@
-"""The page of ``taxel information``: bits by period, time and taxels, and the confusion matrix."""
+"""The page of ``taxel information``: a table of all settings, a curve, and the confusion matrix."""
 
 from __future__ import annotations
 
@@ -43,40 +43,25 @@ def write_information(path: str | os.PathLike[str], answer: Answer, *, overwrite
     """
     checked = instance("answer", answer, Answer)
     with mpl.rc_context(STYLE):
-        drawn = {"curves": picture(_curves(checked)), "confusion": picture(_confusion(checked))}
+        drawn = {"curve": picture(_curve(checked)), "confusion": picture(_confusion(checked))}
     text = render("report/information.html.j2", answer=checked, pictures=drawn, labels=sum(checked.labels.values()))
     return write_whole(path, lambda file: file.write(text.encode()), overwrite=overwrite)
 
 
-def _curves(answer: Answer) -> Figure:
-    """Draw bits by sampling period, by time since contact and by number of taxels."""
-    figure = Figure(figsize=(10.5, 3.2), layout="constrained")
-    by_period, by_time, by_taxels = figure.subplots(1, 3, sharey=True)
-    line = answer.by_period
-    bits, ends = np.array([p.found.bits for p in line]), np.array([p.found.interval for p in line])
-    x = [p.period_ms for p in line]
-    by_period.errorbar(x, bits, [bits - ends[:, 0], ends[:, 1] - bits], marker="o", ms=4, capsize=2, label="events")
-    if answer.frames:
-        frames = [found.bits for found in answer.frames.values()]
-        by_period.plot(list(answer.frames), frames, "--", color="0.5", label="frames")
-    for name, points in answer.parameters.items():
-        label = f"{name} (of {points[0].found.most:.2f})"
-        by_period.plot([p.period_ms for p in points], [p.found.bits for p in points], marker=".", lw=1, label=label)
+def _curve(answer: Answer) -> Figure:
+    """Draw bits by time since contact, a line for each sampling period."""
+    figure = Figure(figsize=(6.4, 3.6), layout="constrained")
+    axis = figure.subplots()
     for period in sorted({p.period_ms for p in answer.points}):
-        of_period = [p for p in answer.points if p.period_ms == period]
-        by_time.plot(
-            [p.window_ms for p in of_period], [p.found.bits for p in of_period], "o-", ms=3, label=f"{period:g} ms"
+        line = sorted((p for p in answer.points if p.period_ms == period), key=lambda p: p.window_ms)
+        bits, ends = np.array([p.found.bits for p in line]), np.array([p.found.interval for p in line])
+        x = [p.window_ms for p in line]
+        axis.errorbar(
+            x, bits, [bits - ends[:, 0], ends[:, 1] - bits], marker="o", ms=3, capsize=2, label=f"{period:g} ms"
         )
-    for kind, style in (("random", "o-"), ("pooled", "s--")):
-        of_kind = sorted((p for p in answer.taxels if p.kind == kind), key=lambda p: p.taxels)
-        by_taxels.plot([p.taxels for p in of_kind], [p.found.bits for p in of_kind], style, ms=4, label=kind)
-    by_period.set(xlabel="sampling period, ms", ylabel="bits", title=f"to {answer.full.window_ms:g} ms after contact")
-    by_time.set(xlabel="time since contact, ms", title="by period")
-    by_taxels.set(xlabel="taxels")
-    for axis in (by_period, by_time, by_taxels):
-        axis.set(xscale="log")
-        axis.axhline(answer.full.found.most, color="0.8", lw=1)
-        axis.legend(frameon=False)
+    axis.set(xlabel="time since contact, ms", ylabel="bits", xscale="log", title="by sampling period")
+    axis.axhline(answer.full.found.most, color="0.8", lw=1)
+    axis.legend(frameon=False)
     return figure
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from taxel._base.arguments import checked_path, instance, integer, several
+from taxel._base.arguments import checked_path, instance, integer
 from taxel._base.errors import helped, refused
 from taxel._base.messages import collected, counted
 from taxel._base.progress import Progress, reporting
@@ -92,11 +92,9 @@ def information(
             windows_ms=options.windows_ms,
             periods_ms=options.periods_ms,
             taxels=options.taxels,
-            pools=options.pools,
             draws=options.draws,
             folds=options.folds,
             shuffles=options.shuffles,
-            classifiers=several("classifiers", options.classifiers),
             seed=options.seed,
             progress=show,
             watch=watch,

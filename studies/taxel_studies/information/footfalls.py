@@ -25,7 +25,6 @@ USES = (
     "window_ms",
     "floor_counts",
     "taxels",
-    "pools",
     "draws",
     "shuffles",
     "most_trials",
@@ -54,9 +53,7 @@ def footfalls(folder: Path, ask: str, most: int = 0) -> list[LabelledTrial]:
         label = trial.person if ask == "person" else condition
         group = "" if ask == "person" else trial.person
         frames, contact = _placed(trial)
-        labelled.append(
-            LabelledTrial(frames, label, contact, int(trial.truth["foot_off"][0]), group, {}, name=trial.name)
-        )
+        labelled.append(LabelledTrial(frames, label, contact, int(trial.truth["foot_off"][0]), group, trial.name))
     return labelled
 
 
@@ -85,8 +82,6 @@ def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
         windows_ms=params["windows_ms"],
         periods_ms=params["periods_ms"],
         taxels=params["taxels"],
-        pools=params["pools"],
-        taxels_at_ms=20.0 if 20.0 in params["periods_ms"] else None,
         draws=params["draws"],
         shuffles=params["shuffles"],
         seed=seed,
@@ -130,14 +125,13 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             )
     if "condition" in summary:
         condition = summary["condition"]
-        length = next((c["bits"] for c in condition["controls"] if c["name"] == "length"), None)
-        full = condition["full"]["bits"]
+        length, full = condition["length"]["bits"], condition["full"]["bits"]
         judged.append(
             Statement(
                 "How fast a person not trained on walked: the length of the stance has more bits than the events.",
                 "length .89; events to 400 ms .47",
-                f"length {length:.2f}; events {full:.2f}" if length is not None else "no length",
-                length > full if whole and length is not None else None,
+                f"length {length:.2f}; events {full:.2f}",
+                length > full if whole else None,
                 "people left out; six people carry no curve",
             )
         )
@@ -158,10 +152,8 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
                 [f"{period:g} ms", *(f"{cells[w]['bits']:.2f}" for w in windows), f"{last['kbps']:.3g}", verdict]
             )
         beside = [f"chance {one['zero']['level']:.2f} (labels shuffled, 95 % below)"]
-        beside += [f"{c['name']} {c['bits']:.2f}" for c in one["controls"] if "bits" in c]
-        beside += [f"frames at {f['period_ms']:g} ms {f['bits']:.2f}" for f in one["frames"][:1]]
-        beside += [f"{name} {c['bits']:.2f}" for name, c in one["classifiers"].items()]
-        beside += [f"{q['taxels']} taxels {q['kind']} {q['bits']:.2f}" for q in one["taxels"]]
+        beside.append(f"length {one['length']['bits']:.2f}")
+        beside += [f"{q['taxels']} taxels {q['bits']:.2f}" for q in one["taxels"]]
         low, high = one["full"]["interval"]
         beside.append(f"full [{low:.2f} {high:.2f}] of {one['full']['most']:.2f}")
         head = [ask, *(f"to {w:g} ms" for w in windows), "kbit/s", "keeps 95 %?"]
@@ -177,12 +169,9 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
         for period in p["periods_ms"]:
             line = [q for q in one["points"] if q["period_ms"] == period]
             ax.plot([q["window_ms"] for q in line], [q["bits"] for q in line], marker="o", ms=3, label=f"{period:g} ms")
-        for control in one["controls"]:
-            if "bits" in control:
-                ax.axhline(control["bits"], color="0.6", lw=1, ls=":")
-                ax.text(
-                    p["window_ms"], control["bits"], control["name"], ha="right", va="bottom", fontsize=8, color="0.4"
-                )
+        length = one["length"]["bits"]
+        ax.axhline(length, color="0.6", lw=1, ls=":")
+        ax.text(p["window_ms"], length, "length", ha="right", va="bottom", fontsize=8, color="0.4")
         ax.set(
             xscale="log",
             ylim=(0, one["full"]["most"] * 1.03),
