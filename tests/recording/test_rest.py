@@ -152,14 +152,20 @@ def test_what_lay_on_the_array_in_its_quiet_stretch_is_said_and_is_no_rest_of_a_
     trained = run("train", path, "--recipe", "touch", "--folds", "0", "-o", tmp_path / "r.json", "--overwrite")
     assert where in trained.stderr
     assert "so the tare is measured at a time when nothing was on the sensor" in trained.stderr
-    assert "tare: measured in the recording from 800 to 19" in trained.stdout.replace("from 810", "from 800")
+    assert 0.8 <= _rest_s(trained.stdout)[0] <= 0.81
     # Until the first label: then the tare is of a later quiet stretch.
     source, _ = preloaded(until_s=2, events=events)
     taxel.convert(source, path, overwrite=True)
     trained = run("train", path, "--recipe", "touch", "--folds", "0", "-o", tmp_path / "r.json", "--overwrite")
     assert "so the tare is measured at a time when nothing was on the sensor" in trained.stderr
-    begin, end = map(float, re.findall(r"measured in the recording from ([\d.]+) to ([\d.]+) ms", trained.stdout)[0])
-    assert 2000 < begin < end
+    begin, end = _rest_s(trained.stdout)
+    assert 2 < begin < end
+
+
+def _rest_s(said: str) -> tuple[float, float]:
+    """Return from when to when a training took the rest, s."""
+    begin, end = re.findall(r"^rest: its first quiet stretch, ([\d.]+) to ([\d.]+) s", said, re.MULTILINE)[0]
+    return float(begin), float(end)
 
 
 @pytest.mark.parametrize("drift", [0.0, 30.0])

@@ -135,7 +135,8 @@ def info(
 
 def _code(of_each: Iterable[dict[str, Any]]) -> int:
     """Return the exit code: whether a recording was cut off."""
-    return OUTSIDE if any(facts["truncated"] for facts in of_each) else 0
+    sources = (source for facts in of_each for source in facts.get("sources", {"": facts}).values())
+    return OUTSIDE if any(source["truncated"] for source in sources) else 0
 
 
 def _infos(opener: TextOptions, tare: str | None, file: Path) -> list[dict[str, Any]]:
