@@ -3,7 +3,7 @@
 Five drawn trainings on 16 x 16 taxels at 60 Hz: 20 taps (.1 to .2 s) and 10 presses (1.2 to 2.2 s) of the same size and
 force to learn from, 40 and 20 others to judge. A touch is told right if its label is found within 50 ms of its onset.
 
-Unit: touches told right, and false detections. Goal: 98 % right and 1 % false over the five.
+Peer: none. Unit: touches told right, and false detections. Goal: 98 % right and 1 % false over the five.
 """
 
 from __future__ import annotations

@@ -10,11 +10,10 @@ table, all in the page cache. A client's times of opening are from its request t
 the whole; the page's, in Chromium without GPU at 1300 x 900, from its address to a map and an overview that are drawn.
 CPU is of this process and its children, medians of rounds. Commands are processes of their own.
 
-Peer: none but ten clients of its own, as nothing else speaks its protocol. Unit: frames; cores; ms of a seek; s.
-Goal: 50 frames/s beside nine others and in Chromium, nothing lost, .06 core of the server alone and .14 with the
-others, a GB indexed within 2 s (scaled from 218 and 135 MB), any time within 50 ms; an hour of insoles opens
-in 2 s and is complete within 5, a text table shows its first frame in 2 s, then progress; taxel view answers within
-1 s.
+Peer: none but ten clients, as nothing else speaks its protocol. Unit: frames; cores; ms of a seek; s. Goal: 50 frames
+a second beside nine others and in Chromium, nothing lost, .06 core of the server alone and .14 with the others, a GB
+indexed within 2 s (scaled from 218 and 135 MB), any time within 50 ms; an hour of insoles opens in 2 s and is complete
+within 5, a text table shows its first frame in 2 s, then progress; taxel view answers within 1 s.
 """
 
 from __future__ import annotations
