@@ -140,7 +140,7 @@ impl View {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where nothing is shown; what it returns, as [`Player::open`].
+    /// `Core(Problem)` where nothing is shown; `File` or `Core` where the recording cannot be read.
     pub fn values(&self) -> Result<impl FnOnce(i64) -> Result<Value> + Send + use<>> {
         let (index, watched) = (self.index()?, self.options.watched);
         Ok(move |t| {
@@ -393,7 +393,7 @@ impl View {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` for a taxel outside the array; as [`Player::open`].
+    /// `Core(Problem)` for a taxel outside the array; `File` or `Core` where the recording cannot be read.
     pub fn watch(&mut self, taxel: Option<(u16, u16)>) -> Result<()> {
         let index = self.index()?;
         let array = index.array();
@@ -430,7 +430,7 @@ impl View {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` for a width that does not exist; as [`Player::open`].
+    /// `Core(Problem)` for a width that does not exist; `File` or `Core` where the recording cannot be read.
     pub fn zoom(&mut self, column_us: i64, end_us: Option<i64>) -> Result<()> {
         if !is_column(column_us) {
             let (least, most) = COLUMNS_US;
@@ -445,7 +445,7 @@ impl View {
     ///
     /// # Errors
     ///
-    /// As [`Player::open`].
+    /// `File` or `Core` where the recording cannot be read.
     pub fn seek(&mut self, t: i64) -> Result<()> {
         self.playback.pause();
         self.go(t)
@@ -491,7 +491,7 @@ impl View {
     ///
     /// # Errors
     ///
-    /// As [`View::pause`] and [`Player::open`].
+    /// As [`View::pause`]; `File` or `Core` where the recording cannot be read.
     pub fn step(&mut self, steps: i64) -> Result<()> {
         self.pause()?;
         for _ in 0..steps.unsigned_abs() {
@@ -525,7 +525,7 @@ impl View {
     ///
     /// # Errors
     ///
-    /// As [`Player::open`].
+    /// `File` or `Core` where the recording cannot be read.
     pub fn show(&mut self, recording: Shown, t: Option<i64>) -> Result<()> {
         let index = recording.index();
         self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < index.array().len());
