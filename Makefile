@@ -151,11 +151,11 @@ $(RTL)/.installed: rtl/requirements.txt
 	@$(RTL)/bin/python -m pip install --quiet --disable-pip-version-check -r rtl/requirements.txt
 	@touch $@
 
-# The modules by themselves: what PyPI has, g++, make and perl are enough.
+# The modules by themselves, and the tools: what PyPI has, g++, make and perl are enough.
 rtl-modules: $(RTL)/.installed
-	$(RTL)/bin/python rtl/bench/modules/run.py
+	$(RTL)/bin/python -m pytest -q -n 2 rtl/dv/modules rtl/tools
 
-.PHONY: rtl-tools rtl-modules rtl-registers rtl-lint rtl-test rtl-slow rtl-timing rtl-bitstream
+.PHONY: rtl-tools rtl-modules rtl-registers rtl-lint rtl-test rtl-pair rtl-prove rtl-slow rtl-timing rtl-bitstream
 rtl-tools: $(RTL)/.installed
 
 # The RTL's package of registers, from the registers' one source.
@@ -163,23 +163,27 @@ rtl-registers:
 	$(PYTHON) rtl/tools/registers.py
 
 # Where Verilator is there; else it says so.
-rtl-lint: $(VENV)/.installed
-	@$(BIN)/python rtl/tools/lint.py
+rtl-lint:
+	@$(PYTHON) rtl/tools/lint.py
 lint: rtl-lint
 
-# All tests of the RTL, on two cores.
-rtl-test: $(RTL)/.installed released $(VENV)/.for-test rtl-lint
-	$(BIN)/python -m pytest -q -n 2 rtl/tests -m "not slow"
+# All tests of the RTL, on two cores: the modules, and whole frames beside the emulated board, which cargo builds.
+rtl-test: rtl-lint rtl-modules rtl-pair
+rtl-pair: $(RTL)/.installed released $(VENV)/.for-test
+	$(BIN)/python -m pytest -q -n 2 rtl/dv/test_*.py -m "not slow"
 
-# Planted faults, and proofs without bound with planted faults of their own.
-rtl-slow: released $(VENV)/.for-test
-	$(BIN)/python -m pytest -q rtl/tests -m slow
-	$(BIN)/python rtl/tools/prove.py
+# Proofs without bound; faults drawn anew, which proofs find, or tests of modules, or the pair.
+rtl-prove: $(RTL)/.installed
+	$(RTL)/bin/python rtl/tools/prove.py
+rtl-slow: rtl-prove released $(VENV)/.for-test
+	$(BIN)/python -m pytest -q rtl/dv/test_*.py -m slow
+	$(BIN)/python rtl/tools/faults.py
+	$(BIN)/python rtl/tools/faults.py --proofs
 slow: rtl-slow
 
 # The core, and a board, are placed for an ECP5 with five seeds, of which four must meet every clock.
-rtl-timing: $(RTL)/.installed $(VENV)/.installed
-	$(BIN)/python rtl/tools/timing.py
+rtl-timing: $(RTL)/.installed
+	$(RTL)/bin/python rtl/tools/timing.py
 slow: rtl-timing
 
 # The bitstream of the Colorlight i9, to rtl/build/colorlight_i9.bit.

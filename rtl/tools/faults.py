@@ -1,16 +1,17 @@
-"""Draw one-line faults by a seed over all modules, and say what catches each: its module's test, a proof, or whole frames.
+"""Draw one-line faults by a seed over all modules, and say what catches each: its module's test, whole frames, or a proof.
 
-Usage: python rtl/tools/faults.py [--seed N] [--count N] [--to FILE]. With the Python of `.venv`. It writes a line a fault to FILE, by
-default `rtl/build/faults-SEED.tsv`, and goes on where it was stopped. A fault takes ten minutes at most. `rtl/tools/faults.md` has the
-faults that were drawn once, and what those change that nothing caught.
+Usage: python rtl/tools/faults.py [--seed N] [--count N] [--to FILE] [--proofs]. With the Python of `.venv`. It writes a line a fault to FILE,
+by default `rtl/build/faults-SEED.tsv`, and goes on where it was stopped; it fails where fewer than `ENOUGH` of them are caught. A fault takes
+ten minutes at most. `rtl/tools/faults.md` has the faults that were drawn once, and what those change that nothing caught. With `--proofs`
+faults are drawn for each proof until it finds one; a proof that finds none of `TRIES` fails.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import random
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -19,22 +20,22 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-RTL = Path(__file__).parents[1]
-sys.path[:0] = [str(RTL / folder) for folder in ("tools", "tests", "bench", "bench/modules")]
+sys.path.insert(0, str(Path(__file__).parents[1] / "dv"))
 
-from builds import MODULES  # noqa: E402
-from prove import PROOFS, checked  # noqa: E402
-from test_planted_faults import differs, differs_in_spikes, differs_in_version_2  # noqa: E402
-
-from logic import PACKAGES, QUIET, run  # noqa: E402
-from pair import Pair  # noqa: E402
+from prove import PROOFS, Proof, checked
+from scenes import SCENES
+from verilated import QUIET, RTL, SOURCES, copied, listed, run
 
 #: A fault is looked for so long, s.
 LONGEST = 600
 #: Seeds of a module's test.
 SEEDS = (1, 2)
-#: Made from registers.toml, or without a line that does anything.
-LEFT_OUT = ("taxel_registers", "taxel_power_law", "taxel_types")
+#: Of faults that are drawn, how many must be caught: of fifty, six changed nothing that a board does.
+ENOUGH = 0.8
+#: How many faults a proof has at most to find one, and for how long it looks for each, s.
+TRIES, LOOKS = 12, 300
+#: Made from registers.toml.
+LEFT_OUT = ("taxel_registers", "taxel_power_law")
 
 #: What stands in a line, and what stands there instead, by kinds. A comparison stands behind a name or a bracket within a condition.
 EDITS: dict[str, list[tuple[str, str]]] = {
@@ -99,10 +100,10 @@ def sites(module: str) -> dict[str, list[Fault]]:
     """Return all faults of a module by their kinds: comments, parameters' checks and what is asserted have none."""
     found: dict[str, list[Fault]] = {kind: [] for kind in EDITS}
     body = False
-    lines = (RTL / f"{module}.sv").read_text().splitlines()
+    lines = (SOURCES / f"{module}.sv").read_text().splitlines()
     for number, (line, next_line) in enumerate(zip(lines, [*lines[1:], ""], strict=True), 1):
         code = line.split("//")[0]
-        body = body or code.startswith(");")
+        body = body or code.startswith((");", "package "))
         # What a build's parameters must obey stands over its $error.
         if not body or "$error" in next_line or re.search(r"\$error|assert|localparam|genvar|parameter", code):
             continue
@@ -119,7 +120,7 @@ def sites(module: str) -> dict[str, list[Fault]]:
 def drawn(seed: int) -> Iterator[Fault]:
     """Draw faults, each another one: first the kind, then the module, then the place."""
     rng = random.Random(seed)
-    modules = sorted(file.stem for file in RTL.glob("taxel_*.sv") if file.stem not in LEFT_OUT)
+    modules = sorted(file.stem for file in listed() if file.stem not in LEFT_OUT)
     places = {module: sites(module) for module in modules}
     seen: set[Fault] = set()
     while True:
@@ -133,8 +134,7 @@ def drawn(seed: int) -> Iterator[Fault]:
 
 def plant(fault: Fault, to: Path) -> bool:
     """Write the sources with the fault; return whether they can be elaborated."""
-    for source in RTL.glob("*.sv"):
-        shutil.copy(source, to)
+    copied(to)
     file = to / f"{fault.module}.sv"
     lines = file.read_text().splitlines()
     lines[fault.line - 1] = fault.instead
@@ -142,8 +142,8 @@ def plant(fault: Fault, to: Path) -> bool:
     top = "taxel_ethernet_board"
     try:
         run(
-            *("verilator", "--lint-only", *QUIET, "-Wno-fatal", f"-I{to}", f"-I{RTL / 'bench'}", "--top-module", top),
-            *(to / name for name in (*PACKAGES, f"{top}.sv")),
+            *("verilator", "--lint-only", *QUIET, "-Wno-fatal", f"-I{RTL / 'dv'}", "--top-module", top),
+            *("-F", to / "taxel.f"),
         )
     except RuntimeError:
         return False
@@ -151,27 +151,24 @@ def plant(fault: Fault, to: Path) -> bool:
 
 
 def by_module(fault: Fault, source: Path, until: float) -> str | None:
-    """Run the test of the module, all builds with two seeds; return which build and seed caught the fault."""
-    module = fault.module.removeprefix("taxel_")
+    """Run the test of the module, all builds with two seeds; return which seed caught the fault."""
+    test = RTL / "dv" / "modules" / f"{fault.module.replace('taxel', 'test', 1)}.py"
     python = RTL.parent / ".venv-rtl" / "bin" / "python"
-    for seed in SEEDS:
-        for build in MODULES[module]:
-            command = [python, RTL / "bench" / "modules" / "run.py", module, *build.split(), "--source", source]
-            left = max(until - time.monotonic(), 1)
-            # Its simulator is ended with it, by its own limit.
-            result = subprocess.run([*command, "--seed", str(seed)], capture_output=True, check=False, timeout=left)
-            if result.returncode == 2:
-                return f"test, seed {seed}"
+    for seed in SEEDS if test.exists() else ():
+        command = [python, "-m", "pytest", "-q", "-x", test, "-k", test.stem, "--source", source, "--seed", str(seed)]
+        left = max(until - time.monotonic(), 1)
+        result = subprocess.run(command, capture_output=True, check=False, timeout=left)
+        if result.returncode == 1:
+            return f"test, seed {seed}"
     return None
 
 
 def by_proof(fault: Fault, source: Path, until: float) -> str | None:
     """Run the proofs of the module; return which one caught the fault."""
     for proof in PROOFS:
-        if f"{fault.module}.sv" in proof.sources:
-            mode = "bmc" if proof.engine.startswith("smtbmc") else "prove"
+        if fault.module in proof.sources:
             left = max(until - time.monotonic(), 1)
-            if checked(proof, f"{proof.name}_drawn", mode, source=source, longest=left) == "FAIL":
+            if checked(proof, proof.looking, source, left) == "FAIL":
                 return proof.name
     return None
 
@@ -186,9 +183,29 @@ def by_frames(source: Path, until: float) -> str | None:
 
 def frames(source: Path) -> int:
     """Return 0 where whole frames of these sources are the emulated board's."""
-    return int(
-        differs(Pair(8, 8, source=source)) or differs_in_version_2(source) or differs_in_spikes(source, "difference")
-    )
+    return int(any(differs(source) for differs in SCENES.values()))
+
+
+def can_fail(proof: Proof, seed: int) -> bool:
+    """Return whether a proof finds one of some faults that are drawn in its sources."""
+    rng = random.Random(f"{seed} {proof.name}")
+    # A package that is made is no module, but its rules are what a proof is of.
+    places = [
+        fault
+        for name in proof.sources
+        if not name.startswith("fpv/")
+        for kind in sites(name).values()
+        for fault in kind
+    ]
+    for fault in rng.sample(places, min(TRIES, len(places))):
+        with tempfile.TemporaryDirectory() as folder:
+            source = Path(folder)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                if plant(fault, source) and checked(proof, proof.looking, source, LOOKS) == "FAIL":
+                    print(f"{proof.name} finds {fault.module}:{fault.line} {fault.instead.strip()}", flush=True)
+                    return True
+    print(f"{proof.name}: found none of the faults that were drawn", flush=True)
+    return False
 
 
 def caught(fault: Fault, source: Path) -> str:
@@ -211,17 +228,26 @@ def caught(fault: Fault, source: Path) -> str:
 def main() -> int:
     """Draw faults and look for each; return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--seed",
+        type=int,
+        default=random.SystemRandom().randrange(1 << 31),
+        help="another one each time where none is given",
+    )
     parser.add_argument("--count", type=int, default=50)
     parser.add_argument("--to", type=Path)
+    parser.add_argument("--proofs", action="store_true", help="look for faults with each proof instead")
     parser.add_argument("--frames", type=Path, help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.frames:
         return frames(given.frames)
+    if given.proofs:
+        return sum(not can_fail(proof, given.seed) for proof in PROOFS)
     table = given.to or RTL / "build" / f"faults-{given.seed}.tsv"
+    print(f"seed {given.seed}", flush=True)
     table.parent.mkdir(exist_ok=True)
     done = table.read_text().splitlines() if table.exists() else []
-    left = 0
+    left = found = 0
     for number, fault in enumerate(drawn(given.seed), 1):
         row = f"{number}\t{fault.kind}\t{fault.module}:{fault.line}\t{fault.there}\t{fault.instead.strip()}\t"
         if (before := next((line for line in done if line.startswith(row)), None)) is None:
@@ -232,9 +258,11 @@ def main() -> int:
                 file.write(before + "\n")
             print(before, flush=True)
         left += not before.endswith("not elaborated")
+        found += not before.endswith(("not elaborated", "\tnothing", "\tnothing in ten minutes"))
         if left == given.count:
             break
-    return 0
+    print(f"{found} of {left} were caught")
+    return 0 if found >= ENOUGH * left else 1
 
 
 if __name__ == "__main__":

@@ -11,9 +11,9 @@ import re
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "dv"))
 
-from logic import PACKAGES, QUIET, RTL, run, verilator
+from verilated import QUIET, RTL, SOURCES, listed, run, verilator
 
 #: Builds that differ in what is elaborated; a board is one with the cells' models of the bench.
 BUILDS: tuple[tuple[str, dict[str, int]], ...] = (
@@ -33,7 +33,7 @@ def unstated() -> list[str]:
     Packages are imported behind a module's ports: not all front ends read them before.
     """
     errors = []
-    for file in sorted(RTL.glob("taxel_*.sv")):
+    for file in listed():
         head, module, body = re.split(r"^(module|package)\b", file.read_text(), maxsplit=1, flags=re.MULTILINE)
         if module == "module":
             lines = head.splitlines()
@@ -57,10 +57,11 @@ def main() -> int:
         return 0
     for top, parameters in BUILDS:
         options = [f"-G{name}={value}" for name, value in parameters.items()]
-        sources = [RTL / name for name in (*PACKAGES, f"{top}.sv")]
-        folders = [f"-I{RTL}", f"-I{RTL / 'bench'}"]
         try:
-            run("verilator", "--lint-only", "-Wall", *QUIET, *folders, "--top-module", top, *options, *sources)
+            run(
+                *("verilator", "--lint-only", "-Wall", *QUIET, f"-I{RTL / 'dv'}", "--top-module", top, *options),
+                *("-F", SOURCES / "taxel.f"),
+            )
         except RuntimeError as error:
             print(error)
             return 1

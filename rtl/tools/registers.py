@@ -237,7 +237,7 @@ MADE = {"taxel_registers.sv": package, "taxel_power_law.sv": compression}
 
 def main() -> None:
     """Write every file."""
-    to = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "rtl"
+    to = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "rtl" / "src"
     source = read(ROOT / "registers.toml")
     for name, make in MADE.items():
         (to / name).write_text(make(source))

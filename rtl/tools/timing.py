@@ -17,11 +17,13 @@ from typing import Any
 
 RTL = Path(__file__).parents[1]
 ROOT = RTL.parent
-sys.path.append(str(ROOT / "tools"))
+sys.path.extend(str(ROOT / folder) for folder in ("tools", "rtl/dv"))
+
+from registers_source import read  # noqa: E402
 
 from crossings import unlisted  # noqa: E402
 from output_registers import merged  # noqa: E402
-from registers_source import read  # noqa: E402
+from verilated import listed  # noqa: E402
 
 TOOLS = ROOT / ".venv-rtl" / "bin"
 WORK = RTL / "build" / "timing"
@@ -71,11 +73,9 @@ def run(program: str, *options: str) -> None:
 def synthesised(build: Build) -> Path:
     """Return the netlist of a build."""
     WORK.mkdir(parents=True, exist_ok=True)
-    packages = [RTL / "taxel_types.sv", RTL / "taxel_registers.sv"]
-    modules = sorted(set(RTL.glob("taxel_*.sv")) - set(packages))
-    wrapped = [] if build.board else [RTL / "timing" / "timed_core.sv"]
+    wrapped = [] if build.board else [RTL / "boards" / "timed_core.sv"]
     top = "taxel_ethernet_board" if build.board else "timed_core"
-    sources = [str(path.relative_to(ROOT)) for path in (*packages, *modules, *wrapped)]
+    sources = [str(path.relative_to(ROOT)) for path in (*listed(), *wrapped)]
     netlist = (WORK / f"{build.name}.json").relative_to(ROOT)
     parameters = " ".join(f"-G {name}={value}" for name, value in build.parameters.items())
     script = WORK / f"{build.name}.ys"

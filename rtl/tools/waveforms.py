@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 ROOT = Path(__file__).parents[2]
-sys.path.append(str(ROOT / "rtl" / "bench"))
+sys.path.append(str(ROOT / "rtl" / "dv"))
 
 from logic import Logic  # noqa: E402
 
