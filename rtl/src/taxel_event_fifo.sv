@@ -29,18 +29,20 @@ module taxel_event_fifo #(
   localparam int PLACES = $clog2(DEPTH);
   localparam int SLICES = (BITS + WIDTH - 1) / WIDTH;
 
+  // A word goes from `held`, before the ring, into the ring in the clock that has `stored`. Behind it the blocks read it into
+  // `fetched`; `land` takes it on into `landed`, the blocks' own registers, and `move` from there to `oldest`.
   logic [PLACES-1:0] write, read;
-  logic [PLACES:0] waiting;  // in the ring and before it
-  logic [BITS-1:0] held;     // before it
-  logic stored;              // into the ring, in this clock
+  logic [PLACES:0] waiting;  // words in the ring and before it
+  logic [BITS-1:0] held;
+  logic stored;
   logic [SLICES-1:0][WIDTH-1:0] fetched, landed;
   logic fetched_valid, land, move;
-  logic landing;  // the blocks' registers are free: they take what was read
-  logic none;     // in the ring
+  logic landed_free;  // `landed` takes what was read
+  logic ring_empty;
 
-  assign empty = none && !stored && landing && !ready;
-  assign land  = fetched_valid && landing;
-  assign move  = !landing && !ready;
+  assign empty = ring_empty && !stored && landed_free && !ready;
+  assign land  = fetched_valid && landed_free;
+  assign move  = !landed_free && !ready;
 
   for (genvar k = 0; k < SLICES; k++) begin : g_slice
     logic [WIDTH-1:0] ring[DEPTH];
@@ -62,11 +64,11 @@ module taxel_event_fifo #(
     end
     // A word that is pushed now is in the ring after the next clock. In the clock after a word has landed no
     // other does, and the next place is read.
-    none          <= waiting == (PLACES + 1)'(land);
-    fetched_valid <= !none;
-    if (landing) landed <= fetched;
-    if (land) landing <= 1'b0;
-    else if (move) landing <= 1'b1;
+    ring_empty    <= waiting == (PLACES + 1)'(land);
+    fetched_valid <= !ring_empty;
+    if (landed_free) landed <= fetched;
+    if (land) landed_free <= 1'b0;
+    else if (move) landed_free <= 1'b1;
     if (move) oldest <= BITS'(landed);
     if (move) ready <= 1'b1;
     else if (pop) ready <= 1'b0;
@@ -76,9 +78,9 @@ module taxel_event_fifo #(
       waiting       <= '0;
       stored        <= 1'b0;
       full          <= 1'b0;
-      none          <= 1'b1;
+      ring_empty    <= 1'b1;
       fetched_valid <= 1'b0;
-      landing       <= 1'b1;
+      landed_free   <= 1'b1;
       ready         <= 1'b0;
     end
   end
