@@ -207,8 +207,7 @@ def _losses(summary: Summary, dropped: int) -> Finding:
 def _taxels(events: Events, registers: Registers) -> Finding:
     """Tell which taxels the pattern, which reaches all of them, has reached."""
     array = events.array
-    seen = np.zeros(array.shape, bool)
-    seen[events.y, events.x] = True
+    seen = _sent(events)
     period = max(256 << (array.columns - 1).bit_length(), 32 << (array.rows - 1).bit_length())
     frames = events.duration_us / registers.frame_us
     words = f"{int(seen.sum())} of {seen.size} taxels sent an event in {counted(int(frames), 'frame')}"
@@ -259,12 +258,21 @@ def _pattern(events: Events, array: Array, registers: Registers) -> Finding:
     return Finding("pattern", False, f"{words} ({x[k]}, {y[k]}), and must be {right[k]}{bit}")
 
 
+def _sent(events: Events) -> NDArray[np.bool_]:
+    """Return which taxels sent a value, not only the board's refresh: a comparator that never returns has none."""
+    own = np.ones(len(events), bool) if events.repaired is None else ~events.repaired
+    sent = np.zeros(events.array.shape, bool)
+    sent[events.y[own], events.x[own]] = True
+    return sent
+
+
 def _at_rest(recording: Recording, registers: Registers) -> NDArray[np.float64]:
-    """Return what taxels read at last, in ticks, shape (n, rows, columns), once the ramp was set."""
+    """Return what taxels read at last, in ticks, shape (n, rows, columns), once the ramp was set; 0 where none came."""
     first, last = (int(t) for t in recording.events.t[[0, -1]])
     set_us = min(_AHEAD * registers.frame_us, (last - first) / 2)
     begin = max(first + set_us, last - _LAST * registers.frame_us)
-    return recording.between(begin, last + 1).frames(1e6 / registers.frame_us).values.astype(np.float64)
+    values = recording.between(begin, last + 1).frames(1e6 / registers.frame_us).values.astype(np.float64)
+    return np.where(_sent(recording.events), values, 0.0)
 
 
 def _rest(mean: NDArray[np.float64], noise: NDArray[np.float64], registers: Registers, late: int) -> Finding:

@@ -257,7 +257,7 @@ def test_a_large_table_is_shown_from_its_beginning_and_then_whole(tmp_path, monk
     reading = shown_files.ShownFiles.opened
 
     def slowly(self, path, trial):
-        time.sleep(2.5)
+        time.sleep(6)
         return reading(self, path, trial)
 
     monkeypatch.setattr(shown_files.ShownFiles, "opened", slowly)
