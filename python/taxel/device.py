@@ -57,8 +57,6 @@ class Port:
 def ports() -> list[Port]:
     """Return the serial ports of the system, USB devices first.
 
-    Pseudo-terminals, as `taxel emulate --line` makes, are not among them.
-
     Returns
     -------
     list of Port

@@ -179,19 +179,6 @@ def datasets(file: h5py.File) -> dict[str, h5py.Dataset]:
     return found
 
 
-def read_dataset(file: h5py.File, name: str) -> NDArray[Any]:
-    """Return a data set of numbers.
-
-    Raises
-    ------
-    FormatError : other values, or more than the memory that is available
-    """
-    item = file[name]
-    if not hasattr(item, "dtype") or item.shape is None:
-        raise unreadable(f"{name}: must be an array", file.filename)
-    return _read(file.filename, f"array {name}: ", _of_dataset(item), None, _NUMBERS)
-
-
 def write_hdf5(path: str | os.PathLike[str], write: Callable[[h5py.File], object], *, overwrite: bool = False) -> None:
     """Write a HDF5 file as a whole, or nothing: it is complete in memory before the disk has any of it.
 

@@ -31,13 +31,6 @@ impl From<PlainRule> for Detector {
 }
 
 impl Detector {
-    /// Whether a file that begins with these bytes holds a detector, sound or not.
-    #[must_use]
-    pub fn is_begun_by(begin: &[u8]) -> bool {
-        let text = String::from_utf8_lossy(begin);
-        [Readout::FORMAT, PlainRule::FORMAT].iter().any(|format| text.contains(&format!("\"format\": \"{format}\"")))
-    }
-
     /// Reads a readout or a plain rule from the text of its file, whichever it is, and checks it.
     ///
     /// # Errors
