@@ -12,7 +12,6 @@ import pytest
 
 import taxel
 from taxel.reading import Facts, InMemory
-from taxel.recording.analysis import pressure
 from taxel.recording.analysis.pressure import series
 from taxel.recording.recording import Recording
 
@@ -134,53 +133,11 @@ def test_frames_of_missing_values_alone_are_no_peak(tmp_path: Path) -> None:
     assert (found["peak"], found["sum"]["most"]) == ({"most": 7.0, "t_us": 100_000}, 112.0)
 
 
-@pytest.mark.parametrize("seed", range(24))
-def test_silence_is_read_at_few_times_and_shows_the_same(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
-    random = np.random.default_rng(seed)
-    at, stretches = int(random.integers(-1_000_000, 1_000_000)), []
-    for _ in range(random.integers(1, 6)):
-        within = int(random.choice([1, 1_000, 100_000, 1_000_000]))
-        stretches.append(at + np.sort(random.integers(0, within, random.integers(1, 80))))
-        at = int(stretches[-1][-1]) + int(random.integers(0, random.choice([100_000, 1_000_000, 30_000_000, 10**9])))
-    t, array = np.concatenate(stretches), taxel.Array(5, 6)
-    n = len(t)
-    x, y, p, ticks = (random.integers(0, most, n) for most in (6, 5, 2, 200))
-    events = taxel.Events(t, x, y, p.astype(bool), array=array, intensity=ticks)
-    recording = Recording.of(InMemory(Facts(array=events.array), events))
-
-    def every(drawn: pressure._Drawn) -> tuple[np.ndarray, np.ndarray]:
-        times = np.union1d(drawn.t, np.arange(drawn.t[0], drawn.t[-1], 50_000))
-        return times, np.ones(len(times), np.int64)
-
-    drawn = pressure._Drawn.from_recording(recording)
-    times, stand_for = drawn.sampled
-    assert np.isin(times, every(drawn)[0]).all()
-    assert stand_for.min() > 0
-    assert stand_for.sum() == len(every(drawn)[0])
-    few = series(recording)
-    monkeypatch.setattr(pressure._Drawn, "sampled", property(every))
-    all_of_them = series(recording)
-    assert few is not None
-    assert all_of_them is not None
-    assert (few.rest.source, few.rest.quiet_us, few.rest.preload_at) == (
-        all_of_them.rest.source,
-        all_of_them.rest.quiet_us,
-        all_of_them.rest.preload_at,
-    )
-    for name in ("t", "area", "peak", "total", "centre"):
-        np.testing.assert_allclose(getattr(few, name), getattr(all_of_them, name), rtol=1e-3, atol=1e-2)
-    np.testing.assert_allclose(few.rest.values, all_of_them.rest.values, atol=1e-3)
-    lay, same = (np.array([] if one.rest.preload is None else one.rest.preload) for one in (few, all_of_them))
-    np.testing.assert_allclose(lay, same, atol=1e-3)
-
-
 @pytest.mark.parametrize("wrong_us", [10**11, 10**15, -(10**15)])
 def test_what_info_takes_does_not_grow_with_a_time_that_is_wrong(tmp_path: Path, wrong_us: int) -> None:
     t = np.sort(np.append(np.arange(3000) * 1000, wrong_us))
     x, y, p, ticks = (np.random.default_rng(2).integers(0, most, len(t)) for most in (8, 8, 2, 90))
     events = taxel.Events(t, x, y, p.astype(bool), array=taxel.Array(8, 8), intensity=ticks)
-    drawn = pressure._Drawn.from_recording(Recording.of(InMemory(Facts(array=events.array), events)))
-    assert len(drawn.sampled[0]) < 20_000
     taxel.convert(events, tmp_path / "wrong.npz")
     begin = perf_counter()
     assert run("info", tmp_path / "wrong.npz").returncode == 0

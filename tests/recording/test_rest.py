@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import taxel
+from taxel._base.messages import collected
 from taxel.recording.analysis.pressure import above_rest, series
 from taxel.recording.analysis.rest import by_unit
 
@@ -139,33 +139,21 @@ def preloaded(
     return taxel.Events(t, x, y, p, array=frames.array, intensity=ticks.astype(int)), truth
 
 
+@pytest.mark.parametrize("until_s", [0.8, 2])
 @pytest.mark.parametrize("events", [False, True])
 def test_what_lay_on_the_array_in_its_quiet_stretch_is_said_and_is_no_rest_of_a_training(
-    tmp_path: Path, events: bool
+    tmp_path: Path, events: bool, until_s: float
 ) -> None:
-    source, truth = preloaded(events=events)
+    source, _ = preloaded(until_s=until_s, events=events)
     path, where = tmp_path / "a.npz", "something was on rows 2 to 4, columns 5 to 7 (up to 4"
     taxel.convert(source, path)
-    rows = sorted((t, label) for label, times in truth.items() for t in times)
-    (tmp_path / "a.notes.csv").write_text("label,t_us\n" + "".join(f"{label},{t}\n" for t, label in rows))
     assert where in run("info", path).stdout
-    trained = run("train", path, "--recipe", "touch", "--folds", "0", "-o", tmp_path / "r.json", "--overwrite")
-    assert where in trained.stderr
-    assert "so the tare is measured at a time when nothing was on the sensor" in trained.stderr
-    assert 0.8 <= _rest_s(trained.stdout)[0] <= 0.81
-    # Until the first label: then the tare is of a later quiet stretch.
-    source, _ = preloaded(until_s=2, events=events)
-    taxel.convert(source, path, overwrite=True)
-    trained = run("train", path, "--recipe", "touch", "--folds", "0", "-o", tmp_path / "r.json", "--overwrite")
-    assert "so the tare is measured at a time when nothing was on the sensor" in trained.stderr
-    begin, end = _rest_s(trained.stdout)
-    assert 2 < begin < end
-
-
-def _rest_s(said: str) -> tuple[float, float]:
-    """Return from when to when a training took the rest, s."""
-    begin, end = re.findall(r"^rest: its first quiet stretch, ([\d.]+) to ([\d.]+) s", said, re.MULTILINE)[0]
-    return float(begin), float(end)
+    with collected() as warnings:
+        taken = taxel.tasks.rest(taxel.open(path))
+    assert any(where in line and "the tare is without it" in line for line in warnings)
+    assert taken.source == "quiet"
+    # Events differ from the last one of their taxel by more than 3 ticks.
+    assert np.abs(taken.tare.rest - 50).max() < (4 if events else 1)
 
 
 @pytest.mark.parametrize("drift", [0.0, 30.0])

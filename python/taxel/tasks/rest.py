@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from errno import ENOENT
@@ -24,9 +25,8 @@ from taxel.frames import Frames
 from taxel.options import GivenTare, check_tare, seconds_of
 from taxel.recorded import recorded
 from taxel.recording import Recording, open_one
-from taxel.recording.analysis.preload import free_of_preload, standing
 from taxel.recording.analysis.pressure import quiet_rest
-from taxel.recording.analysis.rest import by_unit, of_quiet, quantile
+from taxel.recording.analysis.rest import by_unit, of_quiet, quantile, standing
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 
@@ -137,11 +137,13 @@ def rest(
         return TakenRest("given" if seconds is None else "beginning", given_tare(tare, recording), begin_us)
     if (zero := zero_by_unit(recording)) is not None:
         return TakenRest("unit", zero, begin_us)
-    span, warning = _quiet_us(recording, source)
-    if warning:
-        warn(warning, stacklevel=2)
-    if span is not None:
-        return TakenRest("quiet", _measured(recording, recorded(recording), span[1], span[0]), begin_us)
+    found = of_quiet(source) if isinstance(source, Frames) else quiet_rest(recording)
+    if found is not None and found.quiet_us is not None:
+        quiet = _measured(recording, recorded(recording), found.quiet_us[1], found.quiet_us[0])
+        if found.preload_at and found.preload is not None:
+            warn(f"{recording.path}: the rest is {found}; the tare is without it", stacklevel=2)
+            quiet = _without(quiet, found.preload)
+        return TakenRest("quiet", quiet, begin_us)
     before = None if labels is None else _before(recorded(recording), labels)
     if before is None:
         why = "no half second is quiet" + " and no label is late enough" * (labels is not None)
@@ -165,12 +167,11 @@ def _before(source: Events | Frames, labels: Mapping[str, NDArray[np.int64]]) ->
     return None if few else min(ends)
 
 
-def _quiet_us(recording: Recording, source: Events | Frames) -> tuple[tuple[int, int] | None, str]:
-    """Return the first quiet stretch with nothing on the array, us, if any, and the line on what lay on it, or ""."""
-    found = of_quiet(source) if isinstance(source, Frames) else quiet_rest(recording)
-    if found is None or not found.preload_at:
-        return None if found is None else found.quiet_us, ""
-    return free_of_preload(recording, found)
+def _without(tare: Tare, load: NDArray[np.float64]) -> Tare:
+    """Return a tare less what lay on the taxels while it was measured."""
+    document = json.loads(tare.to_json())
+    rest = [None if value is None else value - less for value, less in zip(document["rest"], load, strict=True)]
+    return Tare.from_json(json.dumps(document | {"rest": rest}))
 
 
 def given_tare(tare: GivenTare, recording: Recording) -> Tare:

@@ -49,8 +49,8 @@ _SMALL = 9
 #: more, for less than two frames at a time, while all but one of its neighbours move less than this share of it.
 #: At most one in so many taxels is taken for one.
 _FLICKERS, _ALONE, _FEW = 10, 1 / 8, 16
-#: So many frames or fewer give a taxel's median.
-_MEDIAN_OF = 2000
+#: So many frames or fewer give a taxel's median, and what it reads in all but this share of them.
+_MEDIAN_OF, _LOWEST = 2000, 0.05
 
 #: Values in a block of frames.
 _BLOCK = 1 << 16
@@ -266,8 +266,6 @@ def find_rest(
     scale: float = 1.0,
     *,
     falls: bool = False,
-    corner: tuple[int, int] = (0, 0),
-    stands_for: NDArray[np.int64] | None = None,
 ) -> Rest:
     """Return the rest that a quiet stretch of frames shows (`_core.TrackedRest`), or none.
 
@@ -280,10 +278,6 @@ def find_rest(
         Ticks by the sensor's unit.
     falls : bool
         Whether values fall from the rest with pressure.
-    corner : (int, int)
-        Row and column of the first taxel, for text.
-    stands_for : int64, shape (frames,), optional
-        Number of equal frames that each frame stands for; default 1.
     """
     rest = _core.TrackedRest(columns, NOISE_FLOOR, np.full(taxels, np.nan), falls)
     begin_us = None
@@ -295,26 +289,21 @@ def find_rest(
         return Rest("none", unknown)
     begins, known = rest.begins / scale, np.zeros(taxels, np.int64)
     released, less, quiet, in_quiet = known.copy(), np.zeros(taxels), np.zeros(taxels), known.copy()
-    first = 0
     for t, values in blocks():
-        weights = np.ones((len(t), 1), np.int64) if stands_for is None else stands_for[first : first + len(t), None]
-        first += len(t)
         load = begins - values if falls else values - begins
         far = load < -LOADED_TICKS / scale
-        if far.any():
-            released += (far * weights).sum(axis=0)
-            less -= (np.where(far, load, 0.0) * weights).sum(axis=0)
-        missing = np.isnan(load)
-        known += weights.sum() - ((missing * weights).sum(axis=0) if missing.any() else 0)
-        within = slice(*np.searchsorted(t, rest.quiet))
-        quiet += (np.where(missing[within], 0.0, load[within]) * weights[within]).sum(axis=0)
-        in_quiet += (~missing[within] * weights[within]).sum(axis=0)
+        released += far.sum(axis=0)
+        less -= np.where(far, load, 0.0).sum(axis=0)
+        known += np.count_nonzero(~np.isnan(load), axis=0)
+        within = load[slice(*np.searchsorted(t, rest.quiet))]
+        quiet += np.nan_to_num(within).sum(axis=0)
+        in_quiet += np.count_nonzero(~np.isnan(within), axis=0)
     loaded = released > LOADED_SHARE * known
     begins[loaded] = np.nan
     if np.isnan(begins).all():
         return Rest("none", unknown)
     loads = quiet / np.maximum(in_quiet, 1) + np.where(loaded, less / np.maximum(released, 1), 0.0)
-    preload, where = _core.preload(np.where(known > 0, loads, np.nan), columns, LOADED_TICKS / scale, corner)
+    preload, where = _core.preload(np.where(known > 0, loads, np.nan), columns, LOADED_TICKS / scale, (0, 0))
     return Rest("quiet", begins, rest.quiet, begin_us or 0, falls=falls, preload=preload, preload_at=where)
 
 
@@ -329,6 +318,19 @@ def quantile(values: NDArray[np.float32], shares: float | tuple[float, ...]) -> 
     """Return quantiles over frames, without missing values; NumPy takes far longer to look for these."""
     find = np.nanquantile if np.isnan(values.min(initial=0.0)) else np.quantile
     return np.asarray(find(values, shares, axis=0))
+
+
+def standing(frames: Frames) -> str:
+    """Return on which taxels of a grid, in a unit of force, an object is from beginning to end; "" if none is.
+
+    They read more than 0 in nearly all frames, by more than the rest of any recording may be off.
+    """
+    if frames.unit not in FORCE_UNITS or min(frames.array.shape) == 1 or not len(frames):
+        return ""
+    lowest = quantile(frames.values[:: 1 + len(frames) // _MEDIAN_OF], _LOWEST).reshape(-1)
+    above = LOADED_TICKS / ticks_by_unit(frames)
+    _, where = _core.preload(lowest.astype(np.float64), frames.array.columns, above, (0, 0))
+    return where.replace(" above rest", f" {frames.unit} in every frame")
 
 
 @_once
