@@ -7,7 +7,6 @@ that have no kept result.
 
 from __future__ import annotations
 
-import importlib
 import json
 from pathlib import Path
 from statistics import median
@@ -15,13 +14,15 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
-from taxel_benchmarks._command import doubts_of, goals_of
+from taxel_benchmarks._command import benchmarks as known_benchmarks
+from taxel_benchmarks._command import doubts_of
 from taxel_studies import STUDIES
 
 DOCS = Path(__file__).resolve().parent
 BENCHMARKS = DOCS.parent / "benchmarks"
 RESULTS = BENCHMARKS / "results"
 VERDICTS = {True: "yes", False: "**no**", None: ""}
+KNOWN_BENCHMARKS = known_benchmarks()
 KNOWN = "known at first impacts, ms"
 #: The array of the benchmark of latency that other pages cite.
 ARRAY = "64 x 64 at 5.2 kHz"
@@ -104,18 +105,18 @@ def _detections(rows: dict[tuple[str, str], str]) -> list[list[str]]:
 def benchmark(file: Path) -> dict[str, Any]:
     """Return what the page shows of a benchmark's result: a row for each ratio and each goal."""
     result, name = json.loads(file.read_text(encoding="utf-8")), file.stem
-    goals = {}
-    if (BENCHMARKS / "taxel_benchmarks" / f"{name}.py").exists():
-        goals = {goal.what: goal for goal in goals_of(importlib.import_module(f"taxel_benchmarks.{name}"), result)}
+    goals = {goal.what: goal for goal in KNOWN_BENCHMARKS[name].goals(result)} if name in KNOWN_BENCHMARKS else {}
     rows = []
     for what, figure in (result.get("ratios", {}) | {what: goal.figure for what, goal in goals.items()}).items():
         goal, spread = goals.get(what), result.get("spread", {}).get(what)
         bound = "> " * (what.removeprefix("AVX2: ") in result.get("larger", ()))
         quartiles = f"{number(spread[0])} to {number(spread[1])}" if spread else ""
         limit = f"{'at most ' if goal.at_most else 'at least '}{number(goal.limit)}" if goal else ""
-        rows.append([what, bound + number(figure), quartiles, limit, VERDICTS[goal.reached if goal else None]])
+        rows.append(
+            [what, bound + number(figure), quartiles, limit, VERDICTS[goal.verdict == "reached" if goal else None]]
+        )
     main = [("", ["figure", "value or median", "quartiles of rounds", "goal", "reached"], rows)] if rows else []
-    reached = [goal.reached for goal in goals.values()]
+    reached = [goal.verdict == "reached" for goal in goals.values()]
     return {
         "name": name,
         "result": result,

@@ -20,11 +20,13 @@ class Goal:
     at_most: bool = False
 
     @property
-    def reached(self) -> bool:
+    def verdict(self) -> str:
         """Whether the figure was measured and keeps the limit."""
         if self.figure is None:
-            return False
-        return self.figure <= self.limit if self.at_most else self.figure >= self.limit
+            return "not measured"
+        return (
+            "reached" if (self.figure <= self.limit if self.at_most else self.figure >= self.limit) else "not reached"
+        )
 
 
 def at_least(limits: Mapping[str, float], figures: Mapping[str, float]) -> list[Goal]:
@@ -35,13 +37,6 @@ def at_least(limits: Mapping[str, float], figures: Mapping[str, float]) -> list[
 def at_most(limits: Mapping[str, float], figures: Mapping[str, float]) -> list[Goal]:
     """Return the goals of figures by name that must not be larger than their limits."""
     return [Goal(name, figures.get(name), limit, at_most=True) for name, limit in limits.items()]
-
-
-def times_real_time(limits: Mapping[str, float], result: Mapping[str, Any], share: float = 1.0) -> list[Goal]:
-    """Return the goals of our encoders: times real time on one core, and a share of NumPy's spikes."""
-    fast = {f"taxel, {name}, times real time": limit for name, limit in limits.items()}
-    equal = {f"{name}: spikes as NumPy's, share": one for name, one in result.get("equal spikes", {}).items()}
-    return at_least(fast, result["ratios"]) + at_least(dict.fromkeys(equal, share), equal)
 
 
 def not_slower(result: Mapping[str, Any], *peers: str) -> list[Goal]:

@@ -22,8 +22,12 @@ LIMIT_S, QUICK_S = 60, 3
 OFTEN_S = 3
 
 
+#: The packages of modules that have another name.
+PACKAGES = {"sklearn": "scikit-learn"}
+
+
 def missing(peers: Mapping[str, str]) -> dict[str, str]:
-    """Return the peers that cannot be measured here, and why.
+    """Return the peers that cannot be measured here, and how to install them.
 
     Parameters
     ----------
@@ -33,7 +37,11 @@ def missing(peers: Mapping[str, str]) -> dict[str, str]:
         name: [module for module in modules.split() if importlib.util.find_spec(module) is None]
         for name, modules in peers.items()
     }
-    return {name: f"{' and '.join(modules)} not installed" for name, modules in lacks.items() if modules}
+    return {
+        name: f"{' and '.join(modules)} not installed: pip install {' '.join(PACKAGES.get(m, m) for m in modules)}"
+        for name, modules in lacks.items()
+        if modules
+    }
 
 
 def ask(script: str, *arguments: object, quick: bool) -> dict[str, Any]:

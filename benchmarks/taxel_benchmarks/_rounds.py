@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from importlib import metadata
+from importlib import import_module, metadata
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +19,8 @@ import numpy as np
 import scipy.linalg  # noqa: F401  its pool of threads can be limited once it is loaded
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
+
+from taxel import Error, ProblemError
 
 #: A ratio is not stable if the interquartile range of the rounds is larger than this share of the median.
 WIDEST = 0.15
@@ -100,7 +106,7 @@ def stamp(*packages: str) -> dict[str, Any]:
     from taxel_studies.commit import code_version  # noqa: PLC0415  what a benchmark measures is loaded by itself
 
     versions = {"python": platform.python_version()}
-    versions |= {package: version(package) for package in ("taxel", "numpy", *packages)}
+    versions |= {package: _version(package) for package in ("taxel", "numpy", *packages)}
     return {
         "machine": {
             "cpu": processor(),
@@ -115,22 +121,51 @@ def stamp(*packages: str) -> dict[str, Any]:
 
 def processor() -> str:
     """Return the processor's model and its widest vectors, as models of one name have AVX-512 or not."""
-    about = dict(map(str.strip, line.partition(":")[::2]) for line in _read("/proc/cpuinfo"))
-    flags = about.get("flags", "").split()
+    about = Path("/proc/cpuinfo")
+    lines = about.read_text().splitlines() if about.exists() else []
+    named = dict(map(str.strip, line.partition(":")[::2]) for line in lines)
+    flags = named.get("flags", "").split()
     widest = next((name for flag, name in (("avx512f", "AVX-512"), ("avx2", "AVX2")) if flag in flags), None)
-    return ", ".join(filter(None, (about.get("model name", platform.processor()), widest)))
+    return ", ".join(filter(None, (named.get("model name", platform.processor()), widest)))
 
 
-def version(package: str) -> str:
-    """Return the version of an installed package."""
+def _version(package: str) -> str:
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
-        return "in the checkout" if package == "taxel" else "absent"
+        return "absent"
 
 
-def _read(path: str) -> list[str]:
+def alone(name: str, *, quick: bool, environment: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """Run a benchmark in a process of its own.
+
+    Benchmarks of one command do not share libraries, threads and memory then, and no peer pays for the command line's
+    stack of calls (ContactMechanics looks through the stack in each step, which made it up to five times slower).
+
+    Raises
+    ------
+    ProblemError : it ended without a result
+    """
+    command = [sys.executable, "-P", "-m", "taxel_benchmarks._rounds", name, "quick" if quick else "whole"]
+    done = subprocess.run(
+        command, stdout=subprocess.PIPE, text=True, check=False, env=os.environ | dict(environment or {})
+    )
+    if done.returncode:
+        raise ProblemError(f"{name}: ended with status {done.returncode}, without a result")
+    result: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return result
+
+
+def _main(name: str, size: str) -> None:
+    # Only the module that has it is loaded: `encode` has encode_fa1.
+    stem = name if find_spec(f"taxel_benchmarks.{name}") is not None else name.partition("_")[0]
+    module = import_module(f"taxel_benchmarks.{stem}")
+    benchmark = getattr(module, "BENCHMARKS", {name: module})[name]
     try:
-        return Path(path).read_text().splitlines()
-    except OSError:
-        return []
+        print(json.dumps(benchmark.run(quick=size == "quick")))
+    except Error as error:
+        sys.exit(f"{name}: {error}")
+
+
+if __name__ == "__main__":
+    _main(*sys.argv[1:])

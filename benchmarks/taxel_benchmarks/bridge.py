@@ -28,8 +28,6 @@ STREAMS = {
     "a foot: 5000 datagrams/s of 640 bytes": (5, 640),
     "full frames: 10 000 datagrams/s of 1400 bytes": (10, 1400),
 }
-#: Words of the figures that are better when smaller.
-SMALLER = ("latency",)
 
 #: Sends datagrams of version 2's first byte that hold the time; prints how many.
 SEND = """

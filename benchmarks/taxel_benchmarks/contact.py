@@ -134,10 +134,6 @@ def scenes() -> dict[str, Scene]:
     }
 
 
-#: Words of the figures that are better when smaller.
-SMALLER = (", us", "board's frame", "furthest off")
-
-
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals with what a result reached."""
     fast = dict.fromkeys((f"{what}, both / ContactMechanics" for what in ALIKE[:2]), 100.0)

@@ -71,10 +71,6 @@ def training(seed: int) -> dict[str, Any]:
     }
 
 
-#: Words of the figures that are better when smaller.
-SMALLER = ("false",)
-
-
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals with what a result reached."""
     shares = result.get("shares")

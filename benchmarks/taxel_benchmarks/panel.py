@@ -62,8 +62,6 @@ finally:
 """
 #: Goals for the server's cores, by the number of other clients.
 CORES = {0: 0.06, 9: 0.14}
-#: Words of the figures that are better when smaller.
-SMALLER = ("cores",)
 
 #: Notes in a page when its map showed more than one colour and its overview had bins, and counts the frames drawn.
 WATCH = """

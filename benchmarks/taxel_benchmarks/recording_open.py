@@ -26,9 +26,6 @@ from taxel_benchmarks._opening import STEPS
 from taxel_benchmarks._rounds import compared, stamp, summary
 from taxel_benchmarks.recording_write import BYTES, HEADER, datagrams
 
-#: Words of the figures that are better when smaller.
-SMALLER = ("/ decoded",)
-
 
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals with what a result reached."""

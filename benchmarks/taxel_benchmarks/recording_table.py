@@ -25,7 +25,6 @@ import taxel
 from taxel_benchmarks._goals import Goal, at_least, at_most
 from taxel_benchmarks._rounds import compared, measure, stamp
 
-SMALLER = ("memory",)
 _SENSORS = 99
 #: Separator and decimal mark of each table.
 _FORMS = {"points": (",", "."), "decimal commas": (";", ",")}

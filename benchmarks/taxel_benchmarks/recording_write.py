@@ -30,8 +30,6 @@ BYTES = WORDS * 5
 #: 21.3 million words/s, the sensor's worst case.
 WORST = 107e6
 
-#: Words of the figures that are better when smaller.
-SMALLER = ("cores",)
 
 HEADER = json.dumps({"array": {"rows": 64, "columns": 64, "pitch_mm": 2.67, "name": "thesis 64x64"}})
 

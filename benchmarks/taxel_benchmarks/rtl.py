@@ -26,7 +26,7 @@ import taxel
 from taxel.wire import Decoder
 from taxel_benchmarks._goals import Goal, at_most
 from taxel_benchmarks._rounds import stamp
-from taxel_benchmarks._touch import scene
+from taxel_benchmarks.encode import scene
 
 sys.path.append(str(Path(__file__).parents[2] / "rtl" / "dv"))
 
@@ -82,10 +82,6 @@ def played(build: Build, ticks: Any, seconds: float) -> dict[str, float]:
         raise taxel.Error("the logic's datagrams differ from the emulated board's")
     pair.logic.close()
     return {"bench": bench / seconds, "whole": whole / seconds, "events": events}
-
-
-#: Words of the figures that are better when smaller.
-SMALLER = ("CPU s",)
 
 
 def goals(result: Mapping[str, Any]) -> list[Goal]:

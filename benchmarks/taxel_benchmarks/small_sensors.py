@@ -125,10 +125,6 @@ def excess(result: Mapping[str, Any]) -> float:
     )
 
 
-#: Words of the figures that are better when smaller.
-SMALLER = ("worst",)
-
-
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals with what a result reached: by number of taxels the worst case."""
     worst: dict[str, float] = {}

@@ -273,12 +273,6 @@ def summed(results: dict[str, Any]) -> dict[str, Any]:
     return sums
 
 
-#: Words of the figures that are better when smaller.
-SMALLER = ("false", "wrong", "less rule", "wall s")
-#: Words of the figures that are counts.
-COUNTS = ("touches",)
-
-
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals with what a result reached."""
     sums = result["ratios"]

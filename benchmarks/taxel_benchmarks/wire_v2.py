@@ -148,10 +148,6 @@ def stream(frames: Frames, version: int, events: int) -> Stream:
     return Stream(b"".join(out), np.array([len(datagram) for datagram in out]), count, b"".join(empty))
 
 
-#: Words of the figures that are better when smaller.
-SMALLER = ("bytes an event", "heartbeat")
-
-
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals with what a result reached."""
     size = {f"bytes an event, {name} / version 1": limit for name, limit in BYTES.items()}

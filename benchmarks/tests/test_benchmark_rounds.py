@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from taxel import Array, SpikeTrains, wire
-from taxel_benchmarks import _memory, _peer, _rounds, _touch, latency, learn_cone_x, wire_decode
+from taxel_benchmarks import _memory, _peer, _rounds, encode, latency, learn_cone_x, wire_decode
 
 
 class Clock:
@@ -127,7 +127,7 @@ def test_peers_run_in_turn_with_ours_and_long_ones_once(clock: Clock) -> None:
 def test_spikes_are_equal_in_time_train_and_value(theirs: list[tuple[int, ...]], share: float) -> None:
     """Ours may go on after the last of the NumPy version, and must not have others before."""
     ours = SpikeTrains.from_lists([[1.0], [3.0]], stop=4.0, values=[[1.0], [-1.0]])
-    assert _touch.shared(ours, theirs) == share
+    assert encode.shared(ours, theirs) == share
 
 
 def test_latencies_of_rounds_are_summed_where_they_count_and_else_the_median() -> None:
@@ -173,7 +173,11 @@ def judged(**of_peer: Any) -> dict[str, bool]:
     name = next(iter(learn_cone_x.PEERS))
     peer = {"verdict": "solved", "objective, relative difference": 1e-9} | of_peer
     cases = {"1/1": {"ConeX": ours[0], name: peer}, "2/2": {"ConeX": ours[1], name: {"verdict": "infeasible"}}}
-    return {goal.what: goal.reached for goal in learn_cone_x.goals({"cases": cases}) if "times" not in goal.what}
+    return {
+        goal.what: goal.verdict == "reached"
+        for goal in learn_cone_x.goals({"cases": cases})
+        if "times" not in goal.what
+    }
 
 
 def test_conex_must_agree_with_its_peers() -> None:

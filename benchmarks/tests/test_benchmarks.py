@@ -65,9 +65,9 @@ def test_a_benchmark_states_its_peer_unit_and_goal(path: Path) -> None:
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("path", BENCHMARKS, ids=lambda path: path.stem)
 def test_a_benchmark_runs_without_peers_and_names_those_that_it_leaves_out(path: Path) -> None:
-    done = without_peers("bench", path.stem, "--quick")
+    done = without_peers("bench", "encode_peak" if path.stem == "encode" else path.stem, "--quick")
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
-    assert done.stdout.startswith(f"{path.stem}: ratios")
+    assert re.match(rf"{path.stem}\w*: ratios", done.stdout)
     wanted = re.search(r"^PEERS\b[^{]*\{(.*?)\}", path.read_text(), re.MULTILINE | re.DOTALL)
     named = re.findall(r'"([^"]+)":', wanted[1]) if wanted else []
     assert [name for name in named if f"left out: {name}" not in done.stdout] == []
@@ -76,5 +76,5 @@ def test_a_benchmark_runs_without_peers_and_names_those_that_it_leaves_out(path:
 def test_a_peer_that_is_not_installed_is_left_out_and_named() -> None:
     done = without_peers("bench", "recording_write", "--quick")
     assert (done.returncode, done.stderr) == (0, "")
-    assert "left out: mcap (Python): mcap not installed" in done.stdout
+    assert "left out: mcap (Python): mcap not installed: pip install mcap" in done.stdout
     assert "taxel, lz4, MB per CPU second" in done.stdout
