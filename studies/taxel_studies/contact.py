@@ -24,9 +24,8 @@ PROTOCOL = (
     "Finite elements of our own: plane stress, incompressible Yeoh (Table 5.2), bilinear quadrilaterals, contact "
     "with friction 0.7, quasi-static. The block is 16 mm wide and 5 mm high and its base is held; the half disc's "
     "flat top is moved along the path. 75 paths serve the 300 conditions, as each depth is reached in 100 ms. "
-    "Pressure is the normal traction at the base. What the thesis leaves open stands on the page Readings, and how "
-    "much each choice matters in the study contact_choices. Courses are kept beside the report and shared by "
-    "figures 5.5 to 5.8."
+    "Pressure is the normal traction at the base. What the thesis leaves open stands on the page Readings. Courses are "
+    "kept beside the report and shared by figures 5.5 to 5.8."
 )
 COURSES = True
 

@@ -10,9 +10,7 @@ __all__ = ["CPU_SECONDS", "LONG_S", "forecast", "forecast_all"]
 #: or an Intel Xeon; `studies/tests/test_durations.py` compares them with the kept figures.
 CPU_SECONDS = {
     "contact": ("full", 3421),
-    "contact_choices": ("coarse", 326),
     "asynchronous": ("full", 200),
-    "codes": ("full", 86),
     "drops": ("full", 294),
     "fa1": ("full", 94),
     "fig5.5": ("full", 5152),
@@ -23,7 +21,6 @@ CPU_SECONDS = {
     "fig6.10": ("full", 151),
     "fig6.15": ("full", 339),
     "gait": ("full", 457),
-    "information": ("full", 134),
     "rivals": ("full", 2437),
     "stdp": ("full", 2520),
     "tempotron": ("full", 329),

@@ -1,6 +1,6 @@
 """Which properties of the FA-1 afferent are worth keeping (thesis 7.2): each taken away, in bits and in events.
 
-The drops of the study `codes`: balls of three radii from three heights, taxels and foam drawn anew. FA-1 afferents with
+Balls of three radii fall from three heights on the emulated board, taxels and foam drawn anew. FA-1 afferents with
 everything: adapting threshold, polarity, power law, and a spread of their thresholds. Then each of these is taken away.
 """
 
@@ -16,13 +16,14 @@ from taxel.encode import FA1
 from taxel.frames import Frames
 from taxel.spikes import SpikeTrains
 from taxel_studies import spike_codes
-from taxel_studies.codes import PERIOD_US, SIDE, drop, drop_tasks, kinds_of, since_contact
 from taxel_studies.runner import Task
+from taxel_studies.spike_codes import PERIOD_US, SIDE, drop, drop_tasks, kinds_of, since_contact
 from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
 WHERE = "thesis 7.2, which asks it"
 PROTOCOL = (
-    "The drops of the study codes. FA-1 (Table 5.3), one sample a frame of 192 us, thresholds spread by a "
+    "Balls of three radii from three heights, 30 drops each, foam and taxels drawn; place within a taxel of the "
+    "middle. FA-1 (Table 5.3) on the 20 x 20 taxels there, one sample a frame of 192 us, thresholds spread by a "
     "factor with the log-sd given, drawn once. Taken away: the threshold's rise and decay (A and B 0), the sign of "
     "spikes, the power law (alpha 1), the spread. Discriminants on counts and on first-spike latencies, 10 folds; the "
     "more telling of the two; bits corrected, 95 % intervals over trials."

@@ -1,18 +1,38 @@
-"""Spike codes of a population: rate, first-spike latency, relative latency, rank order (thesis 2.3.2, figure 2.7)."""
+"""Spike codes of a population (thesis 2.3.2): rate, first-spike and relative latency; and the drops that they read."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel import SpikeTrains
+from taxel import Frames, SpikeTrains, Tare
 from taxel.information import Estimate, estimate, nested_predictions
+from taxel.simulate import Act, Scene, Silence, play, truth
+from taxel_studies.runner import Task
+from taxel_studies.study import Parameters, Row
 
-__all__ = ["Code", "FirstSpikeLatency", "RankOrder", "RateCode", "RelativeLatency", "compare_codes"]
+__all__ = [
+    "PERIOD_US",
+    "SIDE",
+    "Code",
+    "FirstSpikeLatency",
+    "RateCode",
+    "RelativeLatency",
+    "compare_codes",
+    "drop",
+    "drop_tasks",
+    "kinds_of",
+    "since_contact",
+]
+
+#: Taxels along a side of the region under the impact, and the period of the afferents: whole frames of 192 us.
+SIDE = 20
+PERIOD_US = 192
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,29 +128,6 @@ class RelativeLatency(Code):
         return self._rounded(first - first.min()) if np.isfinite(first).any() else first
 
 
-@dataclass(frozen=True, kw_only=True)
-class RankOrder(RelativeLatency):
-    """Read values from the order of the trains' first spikes alone.
-
-    The first reads 1, the others the share of trains that they do not follow; those that came together share a rank.
-
-    Examples
-    --------
-    >>> RankOrder(window_ms=10.0).decode(SpikeTrains.from_lists([[1.0], [8.0], [2.0], []], stop=10.0), 0.0)
-    array([1.  , 0.5 , 0.75, 0.  ])
-    """
-
-    def decode(self, trains: SpikeTrains, onset_ms: float) -> NDArray[np.float64]:
-        """Return one value for each train."""
-        since = self._since(trains, onset_ms)
-        fired = since < self.window_ms
-        values, order = np.zeros(len(since)), np.sort(since[fired])
-        # Spikes at the same time share the mean of their ranks.
-        before = np.searchsorted(order, since[fired]), np.searchsorted(order, since[fired], side="right")
-        values[fired] = 1.0 - (sum(before) - 1.0) / 2.0 / len(since)
-        return values
-
-
 def compare_codes(
     trials: Sequence[SpikeTrains],
     labels: ArrayLike,
@@ -163,3 +160,45 @@ def compare_codes(
         nested = nested_predictions([read @ read.T], [vary], labels, count=folds, seed=seed)
         estimates[name] = estimate(labels, nested.responses, seed=seed)
     return estimates
+
+
+def drop_tasks(p: Parameters, *, apart: int = 100, **shared: Any) -> list[Task]:
+    """List one drop a task; the seeds of two kinds of drop lie this far apart, or a multiple of it."""
+    shared |= {"listen_ms": max(p["windows_ms"])}
+    return [
+        Task({**shared, "radius_mm": r, "drop_mm": d}, 10_000 * p["seed"] + apart * (3 * i + j) + k)
+        for i, r in enumerate(p["radii_mm"])
+        for j, d in enumerate(p["drops_mm"])
+        for k in range(p["trials"])
+    ]
+
+
+def kinds_of(rows: Sequence[Row]) -> list[str]:
+    """Return the kind of drop of each realisation: which ball, from which height."""
+    return [f"{r.params['radius_mm']:g} mm from {r.params['drop_mm']:g} mm" for r in rows]
+
+
+def drop(radius_mm: float, drop_mm: float, listen_ms: float, seed: int) -> tuple[Frames, float]:
+    """Return what the taxels under an impact read above rest, a frame each 192 us, and when the ball touches, us.
+
+    Frames begin before contact, so that afferents have settled.
+    """
+    random = np.random.default_rng([seed, 232])
+    x, y = (32 * 2.67 + random.uniform(-2.67, 2.67, 2)).tolist()
+    ball: dict[str, Any] = {"shape": {"sphere": {"radius_mm": radius_mm}}, "x_mm": x, "y_mm": y}
+    scene = Scene.draw(seed).body(**ball, motion={"dropped": {"height_mm": drop_mm}})
+    acts: list[Act] = [Silence(60.0), scene]
+    contact = truth(acts)[0][0].start_us
+    events = play(acts, seed=seed).events
+    tare = Tare.take(events, stop_us=events.markers[0][0])
+    start = int(contact) - 50 * PERIOD_US
+    stop = int(contact + 1000.0 * (listen_ms + 2.0))
+    frames = tare.off(Frames.from_events(events, PERIOD_US, start, stop))
+    middle = 32 - SIDE // 2
+    return frames.region(slice(middle, middle + SIDE), slice(middle, middle + SIDE)), contact
+
+
+def since_contact(trains: SpikeTrains, contact_us: float, listen_ms: float) -> list[list[float]]:
+    """Return the times of each train's spikes within so long after contact, ms."""
+    since = [times - contact_us * 1e-3 for times in trains]
+    return [[round(float(t), 4) for t in times[(times >= 0) & (times < listen_ms)]] for times in since]

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from taxel import Frames, ProblemError
 from taxel.encode import FA1
-from taxel_studies import contact, contact_choices, fig5_5, fig5_7, indented, load
+from taxel_studies import contact, fig5_5, fig5_7, indented, load
 from taxel_studies.fem import Course, Indentation, KeptCourses, SamplingGrid, press
 from taxel_studies.runner import SharedFolder, Task
 from taxel_studies.study import Row
@@ -170,23 +170,3 @@ def test_the_beginning_of_a_contact_is_told_as_of_the_whole_one(courses):
     part = fig5_5.realise({**asked, "ask": "part", "until_ms": 20.0}, 1, courses)
     assert part["times"] == whole["times"]
     assert part["times"][-1][1] > 0.5
-
-
-def test_contact_choices_begins_with_fig5_5_and_every_choice_changes_something(courses):
-    p, q = load("contact_choices").set("toy"), load("fig5.5").set("toy")
-    rows = rows_of(load("contact_choices"), p, courses)
-    mine = contact_choices.then(p, rows)
-    plain = next(t for t in mine if t.params["choice"] == "as it is" and t.params["period_ms"] == 10.0)
-    own = [row for row in rows if row.params["course"]["height_mm"] == 5.0]
-    asked = fig5_5.then(q, own)
-    other = next(t for t in asked if t.params["period_ms"] == 10.0 and t.params["alpha"] == 0.7)
-    found = contact_choices.realise(plain.params, plain.seed, courses)
-    assert found["bits"] == pytest.approx(fig5_5.realise(other.params, other.seed, courses)["bits"], abs=0.05)
-    changed = [contact_choices.CHOICES[name] for name in contact_choices.CHOICES if name != "as it is"]
-    assert all(changed)
-    pressed = {
-        choice: frozenset(contact_choices.courses_under(p, choice).values()) for choice in contact_choices.CHOICES
-    }
-    by_press = [choice for choice, changes in contact_choices.CHOICES.items() if "press" in changes]
-    assert all(pressed[choice] != pressed["as it is"] for choice in by_press)
-    assert len({pressed[choice] for choice in by_press}) == len(by_press)

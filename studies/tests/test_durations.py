@@ -30,7 +30,7 @@ def test_a_long_study_says_how_long_by_what_is_left_and_its_processes(jobs: int,
 
 
 def test_all_studies_say_how_long_together() -> None:
-    assert durations.forecast_all(STUDIES, "full", 1).startswith("about 5.8 h in 1 process, less what is there: ")
+    assert durations.forecast_all(STUDIES, "full", 1).startswith("about 5.7 h in 1 process, less what is there: ")
     assert durations.forecast_all(STUDIES, "toy", 1) == ""
 
 

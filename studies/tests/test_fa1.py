@@ -6,7 +6,7 @@ import numpy as np
 
 from taxel import Frames
 from taxel_studies import fa1
-from taxel_studies.codes import PERIOD_US, SIDE
+from taxel_studies.spike_codes import PERIOD_US, SIDE
 
 
 def frames() -> Frames:

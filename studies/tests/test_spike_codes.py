@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import rankdata
 
 from taxel import SpikeTrains
-from taxel_studies.spike_codes import FirstSpikeLatency, RankOrder, RateCode, RelativeLatency, compare_codes
+from taxel_studies.spike_codes import FirstSpikeLatency, RateCode, RelativeLatency, compare_codes
 
 #: A difference larger than rounding errors, so that a comparison is reliable.
 values = st.lists(st.integers(0, 1000), min_size=1, max_size=30).map(lambda v: np.array(v) / 1000)
@@ -40,11 +39,9 @@ def test_a_rate_is_read_back_to_within_half_a_spike(v, window):
 
 @given(values, windows, onsets, st.floats(0, 50))
 def test_relative_codes_need_no_reference_and_latency_does(v, window, onset, late):
-    relative, rank = RelativeLatency(window_ms=window), RankOrder(window_ms=window)
+    relative = RelativeLatency(window_ms=window)
     trains = latencies(v, window, onset)
-    for code in (relative, rank):
-        earlier = code.decode(trains, onset - late)
-        assert earlier == pytest.approx(code.decode(trains, onset), abs=1e-12)
+    assert relative.decode(trains, onset - late) == pytest.approx(relative.decode(trains, onset), abs=1e-12)
     if (v > 0).any():
         slip = 1e-9 * (1 + abs(onset) / window * 1e3)
         assert relative.decode(trains, onset)[v > 0] == pytest.approx((v + 1 - v.max())[v > 0], abs=slip)
@@ -55,24 +52,10 @@ def test_a_reference_that_slips_moves_a_latency_code():
     assert FirstSpikeLatency(window_ms=10.0).decode(trains, -2.0) == pytest.approx([0.8, 0.3])
 
 
-@given(values, st.floats(0.2, 5.0))
-def test_a_rank_knows_the_order_and_nothing_else(v, power):
-    code = RankOrder(window_ms=100.0)
-    read = code.decode(latencies(v, 100.0), 0.0)
-    assert rankdata(read[v > 0]).tolist() == rankdata(v[v > 0]).tolist()
-    # Times that are stretched monotonically give the same code.
-    stretched = SpikeTrains.from_lists(
-        [[100.0 * ((1 - x) ** power) * 0.999] if x > 0 else [] for x in v], start=0.0, stop=100.0
-    )
-    assert code.decode(stretched, 0.0) == pytest.approx(read, abs=1e-12)
-
-
 def test_who_cannot_tell_times_apart_reads_them_as_one():
     """Figure 2.7: spikes of C, D and E seem to come together."""
     trains = SpikeTrains.from_lists([[5.0], [5.4], [5.9], [7.0]], start=0.0, stop=10.0)
     assert RelativeLatency(window_ms=10.0, resolution_ms=1.0).decode(trains, 0.0).tolist() == [1.0, 1.0, 1.0, 0.8]
-    assert RankOrder(window_ms=10.0, resolution_ms=1.0).decode(trains, 0.0).tolist() == [0.75, 0.75, 0.75, 0.25]
-    assert len(set(RankOrder(window_ms=10.0).decode(trains, 0.0))) == 4
 
 
 def test_what_comes_before_the_reference_or_after_the_window_is_not_heard():
@@ -80,7 +63,7 @@ def test_what_comes_before_the_reference_or_after_the_window_is_not_heard():
     assert FirstSpikeLatency(window_ms=10.0).decode(trains, 10.0).tolist() == [0.8, 0.0, 0.0]
     assert RateCode(window_ms=10.0, most_hz=100.0).decode(trains, 10.0).tolist() == [1.0, 0.0, 0.0]
     silent = SpikeTrains.from_lists([[], []], start=0.0, stop=5.0)
-    for code in (RelativeLatency(window_ms=5.0), RankOrder(window_ms=5.0), FirstSpikeLatency(window_ms=5.0)):
+    for code in (RelativeLatency(window_ms=5.0), FirstSpikeLatency(window_ms=5.0)):
         assert code.decode(silent, 0.0).tolist() == [0.0, 0.0]
 
 
@@ -95,7 +78,6 @@ CODES = {
     "rate": RateCode(window_ms=50.0, most_hz=200.0),
     "first": FirstSpikeLatency(window_ms=50.0),
     "relative": RelativeLatency(window_ms=50.0),
-    "rank": RankOrder(window_ms=50.0),
 }
 
 
@@ -105,7 +87,7 @@ def test_what_lies_in_the_order_alone_is_lost_to_a_rate():
         return [[t] for t in (times if label else times[::-1])]
 
     bits = {name: one.bits for name, one in compare_codes(*trials(order), CODES).items()}
-    assert bits["rank"] > 0.9
+    assert bits["relative"] > 0.9
     assert bits["rate"] < 0.1
 
 
@@ -116,7 +98,7 @@ def test_what_lies_in_the_counts_alone_is_lost_to_latencies():
 
     bits = {name: one.bits for name, one in compare_codes(*trials(count), CODES).items()}
     assert bits["rate"] > 0.9
-    assert max(bits["first"], bits["relative"], bits["rank"]) < 0.2
+    assert max(bits["first"], bits["relative"]) < 0.2
 
 
 def test_what_lies_in_the_common_latency_alone_is_lost_without_a_reference():
@@ -125,4 +107,4 @@ def test_what_lies_in_the_common_latency_alone_is_lost_without_a_reference():
 
     bits = {name: one.bits for name, one in compare_codes(*trials(late), CODES).items()}
     assert bits["first"] > 0.9
-    assert max(bits["relative"], bits["rank"]) < 0.2
+    assert bits["relative"] < 0.2
