@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import itertools
-import os
 import re
 import subprocess
 import sys
-import threading
-import time
 from pathlib import Path
 
 import h5py
@@ -223,13 +220,6 @@ def test_a_shell_counts_the_seconds_of_a_stretch_as_info_does(begin_us: int, tmp
 
 # notes while recording
 
-#: Program of a child process: makes its standard input the controlling terminal, then executes taxel.
-AT_A_TERMINAL = """
-import fcntl, os, sys, termios
-fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-os.execv(sys.executable, [sys.executable, "-m", "taxel", *sys.argv[1:]])
-"""
-
 
 def test_a_line_on_standard_input_is_a_note_of_the_recording(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
@@ -238,28 +228,3 @@ def test_a_line_on_standard_input_is_a_note_of_the_recording(tmp_path: Path) -> 
     said = subprocess.run(command, input=lines, capture_output=True, text=True, check=False)
     assert "each line on standard input is saved as a note" in said.stderr
     assert [n.text for n in taxel.open(path).notes] == ["heel", "toe off", "last"]
-
-
-def test_a_key_on_a_terminal_is_a_note_of_the_recording(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
-    master, slave = os.openpty()
-
-    arguments = ["record", path, "--port", "0", "--host", "127.0.0.1", "--seconds", "4"]
-    with subprocess.Popen(
-        [sys.executable, "-c", AT_A_TERMINAL, *map(str, arguments)],
-        stdin=slave,
-        stderr=subprocess.PIPE,
-        start_new_session=True,
-    ) as process:
-        assert process.stderr is not None
-        while b"press a key to write a note" not in (said := process.stderr.readline()):
-            assert said, "it never said so"
-        threading.Thread(target=process.stderr.read, daemon=True).start()
-        # Another key's sequence is no note; two keys at once are two.
-        for keys in (b"h", b"\x1b[A", b"t "):
-            os.write(master, keys)
-            time.sleep(0.5)
-        process.wait()
-    os.close(master)
-    os.close(slave)
-    assert [n.text for n in taxel.open(path).notes] == ["h", "t", "mark"]

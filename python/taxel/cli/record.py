@@ -83,13 +83,13 @@ def record(
 ) -> int:
     """Record what a board sends by UDP, and report what was lost.
 
-    Ends with Ctrl-C, SIGTERM or SIGHUP, after --seconds, or with the board's stop marker (--markers). With --length it
-    records one trial after another, with a number appended to the name and a countdown with beeps before each. The
-    board is received during countdowns too, so each trial begins with the values of all taxels; with --countdown 0
-    nothing is lost between two trials. An empty trial is not saved, and its number is used again; with --trials, three
-    empty trials in a row end the command with exit code 3. While it records, a key on the terminal, or a line on any
-    other standard input, writes a note with that label and the board's time into the .mcap (add < /dev/null if the
-    input is not for taxel). --source names what is received, each source with its own clock: frames of numbers, boards,
+    Ends with Ctrl-C, SIGTERM or SIGHUP, after --seconds, or with the board's stop marker (--markers). With --length
+    it records one trial after another, with a number appended to the name and a countdown with beeps before each.
+    The board is received during countdowns too, so each trial begins with the values of all taxels; with
+    --countdown 0 nothing is lost between two trials. An empty trial is not saved, and its number is used again;
+    with --trials, three empty trials in a row end the command with exit code 3. While it records, a line on
+    standard input writes a note with that label and the board's time into the .mcap (add < /dev/null if the input
+    is not for taxel). --source names what is received, each source with its own clock: frames of numbers, boards,
     lines of numbers. Exit code 3: nothing was received, or data were lost after they had arrived, such as bytes
     outside the lines of a source; 2: the board has more taxels than --array.
 
