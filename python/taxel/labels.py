@@ -20,9 +20,8 @@ from taxel._base.files import beside as beside_file
 from taxel._base.files import named
 from taxel._base.header_table import HeaderTable, separator_of, text_of
 from taxel._base.messages import counted, escaped
-from taxel._base.number_text import int_of
 from taxel._base.times import SINCE_1970_US
-from taxel._core import FormatError, ProblemError
+from taxel._core import ProblemError
 from taxel.clock import Clock
 from taxel.event_table import are_of_bids, is_of_track, track, with_known_columns
 from taxel.recorded import Recorded
@@ -99,13 +98,10 @@ class Labels:
         of its recording. A source that was a topic of a ROS bag may have the topic's name; a source of a known side may
         have the name of the side, left or right. A row with `replaces_us` replaces the recording's own note of that
         time; if it has no label, it removes that note. Other columns are kept (`Note.others`). An empty text has no
-        labels. Tables of other programs are read too. Without `t_us`, times are in a column whose name shows that:
-        numbers in the unit that the name states ("Zeit [s]", "t_ms"), or dates, which count from 1970. Without `label`,
-        labels are in a column of that name in capitals, in one of the names event, Ereignis, name, marker or
-        annotation, or in the only column of texts. Without `recording`, recordings are in a column of texts of the name
-        trial, Versuch, file, filename, Datei or Aufnahme. Times of a table of BIDS (`onset`, `duration`, s) and of a
-        label track of Audacity count from the beginning of the recording, and so does a time before 2001 where the
-        clock of the recording counts from 1970; a label is at the begin of its region.
+        labels. Tables of other programs are read too: with times in ms or s (`t_ms`, `t_s`), those of BIDS (`onset`,
+        `duration`, `trial_type`) and label tracks of Audacity. Times of the last two count from the beginning of the
+        recording, and so does a time before 2001 where the clock of the recording counts from 1970; a label is at the
+        begin of its region.
 
     Attributes
     ----------
@@ -359,14 +355,9 @@ def rows_of(location: str | Path, lines: Iterable[str]) -> tuple[tuple[Note, ...
 def _table(file: Path) -> tuple[tuple[str, ...], HeaderTable, bool]:
     """Return the columns of a table, it in columns of taxel, and whether its times count from the beginning.
 
-    A table of another program may be in Windows-1252 too.
+    A table may be in Windows-1252 too.
     """
-    try:
-        lines = text_of(file)
-    except FormatError:
-        lines = text_of(file, otherwise="cp1252")
-        if set(_WANTED) <= set(HeaderTable.read(file, lines).header):
-            raise
+    lines = text_of(file, otherwise="cp1252")
     names = next((line for line in lines if line.strip()), "")
     if is_of_track(names):
         table = track(str(file), lines)
@@ -433,7 +424,7 @@ def _row(location: str, line: int, cells: Mapping[str, str]) -> Note:
         if not written and name != "t_us":
             continue
         try:
-            times[name] = int_of(written)
+            times[name] = int(written)
         except ValueError:
             raise unreadable(f"{name} is {shown(written)}; must be whole {name[-2:]}", location, line=line) from None
     replaces = times.get("replaces_us")

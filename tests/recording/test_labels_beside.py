@@ -13,7 +13,7 @@ from taxel.tasks.labels import references
 
 BIDS = "onset\tduration\ttrial_type\tvalue\n0.25\t0.1\theel\t1\n0.5\t0\tn/a\t2\n0.75\tn/a\ttoe\t3\n"
 TRACK = "0.250000\t0.350000\theel\n\\\t100.0\t200.0\n0.750000\t0.750000\ttoe\n"
-GERMAN = "Zeit [s];Ereignis;Bemerkung\n0,25;heel;spät\n0,75;toe;\n"
+GERMAN = "t_s;label;Bemerkung\n0,25;heel;spät\n0,75;toe;\n"
 EXPECTED = [("heel", 250_000), ("toe", 750_000)]
 
 
@@ -32,11 +32,11 @@ def noted(place: Path) -> list[tuple[str, int | None]]:
     [
         ("_events.csv", "label,t_us\nheel,250000\ntoe,750000\n"),
         ("_labels.csv", GERMAN),
-        ("_labels.csv", "t_ms;what\n250;heel\n750;toe\n"),
+        ("_labels.csv", "t_ms;Label\n250;heel\n750;toe\n"),
         ("_events.tsv", BIDS),
         (".txt", TRACK),
         (".txt", TRACK.replace(".", ",")),
-        (".txt", "Time (s)\tLabel\n0.25\theel\n0.75\ttoe\n"),
+        (".txt", "t_s\tLabel\n0.25\theel\n0.75\ttoe\n"),
     ],
 )
 @pytest.mark.parametrize("stem", ["walk", "Gäng Müller 1.5 N"])

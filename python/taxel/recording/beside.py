@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from itertools import islice
 from pathlib import Path
 
 from taxel._base.files import beside as beside_file
@@ -116,15 +115,15 @@ def _begin_of(sources: Mapping[str, SourceView], labels: Labels) -> Callable[[],
 def is_label_table(path: Path) -> bool:
     """Return whether a text is a table of labels (`taxel.Labels`): by its first lines, or empty by its name."""
     try:
-        first, second = [*islice(Text(path).lines(), 2), "", ""][:2]
+        first = next(iter(Text(path).lines()), "")
     except FormatError:
         # The reader of tables reports what is no text.
         return False
-    (names, _), (cells, _), is_named = names_in(first), names_in(second), path.name.endswith(TABLES[:-1])
+    (names, _), is_named = names_in(first), path.name.endswith(TABLES[:-1])
     if {"label", "t_us"} <= set(names) or is_of_track(first):
         return True
     is_empty = names == [""] and (is_named or path.name == LABELS or path.name.endswith(".notes.csv"))
-    return is_empty or are_of_events(names, cells, named=is_named)
+    return is_empty or are_of_events(names, named=is_named)
 
 
 def label_tables(recording: Path) -> list[Path]:
