@@ -16,15 +16,12 @@ import numpy as np
 import pytest
 from loopback import free_port, until
 from recording.making import some_events
-from refusal import refused
 from shell import run
 
 import taxel
 from taxel import Frames, Labels
-from taxel._base.arguments import checked_path
 from taxel._base.files import create, write_whole
 from taxel._base.stopping import asked_to_end
-from taxel._base.windows_names import name_fault
 from taxel.live import Live
 from taxel.panel.label_file import LabelFile
 
@@ -71,33 +68,6 @@ def test_a_board_is_recorded_and_labelled_in_any_folder(folder: Path) -> None:
     for t in (7, 9):
         LabelFile(table, frozenset({""})).change([[(None, taxel.Note("heel ł", t))]])
     assert [(row.text, row.t) for row in taxel.Labels(table).rows] == [("heel ł", 7), ("heel ł", 9)]
-
-
-@pytest.mark.parametrize(
-    ("path", "fault"),
-    [
-        ("aux.mcap", "device"), ("data/Com1", "device"), ("nul .tar.gz", "device"), ("CON", "device"),
-        ("lpt²", "device"), ("12:30.mcap", "':'"), ("a/what?.csv", "'?'"), ('"', "contains '\"'"),
-        ("x\n", "contains '\\n'"), ("walk. ", "ends with ' '"), ("data./walk.mcap", "ends with '.'"),
-    ],
-)  # fmt: skip
-def test_a_name_that_windows_forbids_is_refused_there(path: str, fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert fault in name_fault(path)
-    with monkeypatch.context() as patched:
-        patched.setattr(sys, "platform", "win32")
-        with refused(argument="path"):
-            checked_path("path", path)
-        patched.setattr(sys, "platform", "linux")
-        assert checked_path("path", path) == path
-
-
-@pytest.mark.parametrize(
-    "path",
-    ["walk.mcap", "auxiliary.mcap", "com10", "a/../b", "./walk", r"C:\data\walk.mcap", r"\\server\share\walk.mcap",
-     "com0", r"\\?\C:\data\walk.mcap", "C:walk.mcap", "...walk", "Messung ä ł 足", "con-1/walk.npz", "/home/walk.mcap"],
-)  # fmt: skip
-def test_any_other_name_is_none(path: str) -> None:
-    assert name_fault(path) == ""
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"], ids=["LF", "CRLF"])

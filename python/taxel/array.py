@@ -551,7 +551,7 @@ def _pitch(pitch: object) -> float | tuple[float, float]:
     if pair and len(pitch) != 2:  # type: ignore[arg-type]
         raise refused("pitch_mm", f" is {shown(pitch)}: must be a number, or two numbers, for rows and for columns")
     values = list(pitch) if pair else [pitch]  # type: ignore[call-overload]
-    each = [number("pitch_mm", value, "mm") for value in values]
+    each = [number("pitch_mm", value) for value in values]
     if not all(np.isfinite(distance) and distance > 0 for distance in each):
         raise refused("pitch_mm", f" is {shown(pitch)}: must be above 0 and finite")
     return each[0] if each[0] == each[-1] else (each[0], each[1])

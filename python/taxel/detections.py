@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import bare, checked_path, column, fields, instance, nth, several, shown, window
+from taxel._base.arguments import checked_path, column, fields, instance, nth, several, shown, window
 from taxel._base.columns import FrozenColumns, frozen, frozen_column, frozen_copy
 from taxel._base.drawing import draw
 from taxel._base.errors import refused, unreadable
 from taxel._base.files import write_whole
 from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.messages import escaped
-from taxel._base.number_text import float_of, int_of
 from taxel._core import ProblemError
 
 if TYPE_CHECKING:
@@ -150,7 +149,7 @@ class Detections(FrozenColumns):
         repaired: ArrayLike | None,
     ) -> None:
         try:
-            labels = np.asarray(bare("label", label))
+            labels = np.asarray(label)
             labels = labels.astype(np.str_) if labels.size == 0 else labels
         except (TypeError, ValueError) as error:
             raise ProblemError(f"label: {error}") from None
@@ -370,9 +369,9 @@ class Detections(FrozenColumns):
         rows: list[tuple[str, int, int, float]] = []
         for line, row in table.rows:
             try:
-                rows.append((row[0], int_of(row[1]), int_of(row[2]), float_of(row[3])))
+                rows.append((row[0], int(row[1]), int(row[2]), float(row[3])))
                 for name, value in zip(more, row[4:], strict=True):
-                    more[name].append(int_of(value))
+                    more[name].append(int(value))
             except ValueError as error:
                 raise unreadable(f"{error}", file, line=line) from None
         label, t, known, slope = zip(*rows, strict=True) if rows else ((), (), (), ())

@@ -475,7 +475,7 @@ class Events(FrozenColumns):
 def _markers(markers: Sequence[tuple[int, bool]]) -> tuple[tuple[int, bool], ...]:
     try:
         pairs = [(at, start) for at, start in markers]
-        t = column("markers", [at for at, _ in pairs], np.int64, "us")
+        t = column("markers", [at for at, _ in pairs], np.int64)
         starts = column("markers", [start for _, start in pairs], np.bool_)
     except (TypeError, ValueError):
         raise refused(

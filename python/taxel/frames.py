@@ -120,11 +120,11 @@ class Frames(FrozenColumns):
         instance("events", events, Events)
         if events.intensity is None or events.present is None:
             raise ProblemError("these events have no intensities, so no frames can be made from them")
-        period, array = integer("period_us", period_us, 1, unit="us"), events.array
+        period, array = integer("period_us", period_us, 1), events.array
         first = int(events.t.min()) if len(events) else 0
-        first = first if start is None else integer("start", start, unit="us")
+        first = first if start is None else integer("start", start)
         end = int(events.t.max()) + 1 if len(events) else first
-        end = end if stop is None else integer("stop", stop, unit="us")
+        end = end if stop is None else integer("stop", stop)
         count = max(0, -((first - end) // period))
         if count * array.rows * array.columns > MOST_VALUES:
             raise ProblemError(

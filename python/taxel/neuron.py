@@ -210,8 +210,8 @@ class Neuron(Value):
             self._json(),
             floats("weights", weights),
             _trains(trains)._parts(),
-            floats("times", times, "ms"),
-            floats("spikes", spikes, "ms"),
+            floats("times", times),
+            floats("spikes", spikes),
         )
 
     def _run(

@@ -17,7 +17,6 @@ from cyclopts import Parameter
 from taxel._base.arguments import checked_path, finite, flag, integer, mapping, number, parameters, short, text
 from taxel._base.documents import of_toml
 from taxel._base.errors import refused
-from taxel._base.number_text import float_of, int_of
 from taxel._core import FormatError, ProblemError, encoder_names
 from taxel.tare import Tare
 
@@ -78,8 +77,8 @@ Settings = Annotated[
 _TypedTare = Annotated[
     GivenTare | None, Parameter(metavar="SECONDS|FILE", n_tokens=1, accepts_keys=False, converter=_typed)
 ]
-_FLOATS = _between_commas(float_of, "numbers, for example 1,2,5")
-_INTS = _between_commas(int_of, "whole numbers, for example 10,30")
+_FLOATS = _between_commas(float, "numbers, for example 1,2,5")
+_INTS = _between_commas(int, "whole numbers, for example 10,30")
 _Path = Annotated[
     str | os.PathLike[str] | None, Parameter(metavar="FILE", n_tokens=1, accepts_keys=False, converter=_typed)
 ]
@@ -90,9 +89,9 @@ def seconds_of(tare: GivenTare) -> float | None:
     if isinstance(tare, Tare | os.PathLike):
         return None
     if not isinstance(tare, str):
-        return number("tare", tare, "s")
+        return number("tare", tare)
     try:
-        return float_of(tare)
+        return float(tare)
     except ValueError:
         return None
 
@@ -106,7 +105,7 @@ def check_tare(tare: GivenTare | None) -> None:
 
 def check_shift(shift_ms: float) -> None:
     """Refuse a shift of labels that is not a number of ms within 41 days."""
-    finite("shift_ms", shift_ms, "ms", least=-3.6e9, most=3.6e9)
+    finite("shift_ms", shift_ms, least=-3.6e9, most=3.6e9)
 
 
 def encoder_of(name: str | None, values: Mapping[str, Any]) -> Encoder:
@@ -165,7 +164,7 @@ class TrainOptions:
         mapping("changes", self.changes)
         check_tare(self.tare)
         check_shift(self.shift_ms)
-        finite("window_ms", self.window_ms, "ms", least=0.0)
+        finite("window_ms", self.window_ms, least=0.0)
         if self.folds is not None and integer("folds", self.folds, 0) == 1:
             raise refused("folds", " is 1: must be 2 or more, or 0 for none")
         self._plan()
@@ -222,8 +221,8 @@ class DetectOptions:
     def __post_init__(self) -> None:
         """Refuse values that no recordings could make valid, before these are read."""
         check_tare(self.tare)
-        finite("frame_us", 1.0 if self.frame_us is None else self.frame_us, "us", least=1.0, most=3.6e9)
-        finite("window_ms", self.window_ms, "ms", least=0.0)
+        finite("frame_us", 1.0 if self.frame_us is None else self.frame_us, least=1.0, most=3.6e9)
+        finite("window_ms", self.window_ms, least=0.0)
         check_shift(self.shift_ms)
         if not isinstance(self.use, str) or self.use != "better":
             from taxel.detect.readout import USES  # noqa: PLC0415  loads slowly

@@ -97,8 +97,8 @@ class Tare(Saved):
         """
         note = checked_text("note", note)
         window = (
-            None if start_us is None else integer("start_us", start_us, unit="us"),
-            None if stop_us is None else integer("stop_us", stop_us, unit="us"),
+            None if start_us is None else integer("start_us", start_us),
+            None if stop_us is None else integer("stop_us", stop_us),
         )
         given, x = x, recorded(x)
         if isinstance(x, Events | Frames) and not len(x.t):

@@ -131,7 +131,7 @@ class EpochLearner(SpikeLearner):
         """
         trains = instance("pattern", pattern, SpikeTrains)._parts()
         change, spikes = _rules.change_epochs(
-            self._json(), floats("weights", weights), trains, floats("targets", targets, "ms")
+            self._json(), floats("weights", weights), trains, floats("targets", targets)
         )
         return change, spikes
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from loopback import until
 
 import taxel
-from taxel._base.cells import seconds_of
+from taxel._core import seconds_of
 from taxel.live import Live
 
 #: How a logger prints a time, with the separator of its cells.

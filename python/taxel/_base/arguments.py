@@ -8,8 +8,6 @@ import operator
 import os
 import sys
 from collections.abc import Callable, Collection, Mapping
-from decimal import Decimal
-from itertools import chain, islice
 from typing import Any, SupportsIndex, TypeVar
 
 import numpy as np
@@ -17,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.errors import refused
 from taxel._base.messages import plain
-from taxel._base.windows_names import name_fault
 from taxel._core import ProblemError
 
 T = TypeVar("T")
@@ -26,14 +23,6 @@ R = TypeVar("R")
 
 #: The most characters of a value that an error shows.
 _SHOWN = 60
-#: The most values that a parameter may hold.
-_MOST = 10_000_000
-#: How many values are compared at once with what they were converted to.
-_COMPARED = 1 << 20
-#: The most entries that are read of an iterator, which may be infinite.
-_MOST_ENTRIES = 1_000_000
-#: The most values to which an array that NumPy repeats (`np.broadcast_to`) is copied.
-_MOST_REPEATED = 100_000_000
 
 
 def shown(value: object) -> str:
@@ -90,15 +79,10 @@ def public_name(kind: type[object]) -> str:
 
 def several(name: str, values: object) -> list[Any]:
     """Return the entries of an iterable as a list; refuse any other value."""
-    _refuse_repeated(name, values)
     try:
-        sized = hasattr(values, "__len__")
-        entries = list(values) if sized else list(islice(values, _MOST_ENTRIES + 1))  # type: ignore[call-overload]
+        return list(values)  # type: ignore[call-overload, no-any-return]
     except TypeError:
         raise refused(name, f" is {shown(values)}: must be a sequence") from None
-    if not sized and len(entries) > _MOST_ENTRIES:
-        raise refused(name, f" is {shown(values)}: must have at most {_MOST_ENTRIES} entries")
-    return entries
 
 
 def optional(check: Callable[[str, T], R], name: str, value: T | None) -> R | None:
@@ -122,103 +106,26 @@ def mapping(name: str, value: object) -> dict[str, Any]:
 
 #: Classes of which NumPy makes floats although they are no numbers.
 _NO_NUMBERS = (str, bytes, type(None), np.timedelta64, np.datetime64)
-#: The greatest depth of nested lists, above NumPy's limit of dimensions.
-DEPTH = 65
-#: The most frequent classes of arguments, which have no unit and no entries; they skip the slow inspection.
-_PLAIN: frozenset[type[Any]] = frozenset(
-    {bool, int, float, str, type(None), np.float64, np.float32, np.int64, np.bool_}
-)
 
 
-def bare(name: str, values: Any, unit: str | None = None) -> Any:
-    """Return plain numbers: quantities (of neo, quantities, pint, astropy ...) are converted to `unit` or refused.
-
-    Without a `unit`, a dimensionless quantity passes. A value without quantities is returned unchanged.
-
-    Raises
-    ------
-    ProblemError : a quantity that does not convert to `unit`, or quantities among plain numbers
-    """
-    kind = type(values)
-    if kind in _PLAIN or (kind is np.ndarray and values.dtype != object):
-        return values
-    level = [values]
-    for _ in range(DEPTH):
-        kinds = set(map(type, level))
-        if any(issubclass(kind, np.ma.MaskedArray) for kind in kinds):
-            _refuse_masked(name, level)
-        if any(map(_has_unit, kinds)):
-            return _converted(name, values, unit)
-        # A list that contains itself twice would double the work at each level, so each list is visited once a level.
-        nested = {id(value): value for value in level if _is_nested(value)} if any(map(_may_nest, kinds)) else {}
-        for value in nested.values():
-            _refuse_repeated(name, value)
-        level = list(chain.from_iterable(nested.values()))
-        if not level:
-            return values
-    raise refused(name, f" is {shown(values)}: must have fewer than {DEPTH} levels of nesting")
+def _refuse_units(name: str, values: object) -> None:
+    """Refuse what NumPy would read without its unit or its mask: quantities, masked arrays, and a list of them."""
+    kinds = {type(values), *(map(type, values) if isinstance(values, list | tuple) else ())}
+    has_units = any(hasattr(kind, word) for kind in kinds for word in ("units", "unit", "dimensions"))
+    if has_units or isinstance(values, np.ma.MaskedArray):
+        raise refused(name, f" is {shown(values)}: must be plain numbers, without a unit or a mask")
 
 
-def _refuse_masked(name: str, values: list[Any]) -> None:
-    """Refuse masked entries, for which NumPy would return the arbitrary value below the mask."""
-    for value in values:
-        if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-            raise refused(name, f" is {shown(value)}: must not have masked entries")
-
-
-def _has_unit(kind: type[Any]) -> bool:
-    """Return whether values of a class have a unit; Brian's attribute for it is `dimensions`."""
-    return kind not in _PLAIN and any(hasattr(kind, word) for word in ("units", "unit", "dimensions"))
-
-
-def _may_nest(kind: type[Any]) -> bool:
-    return issubclass(kind, list | tuple | np.ndarray)
-
-
-def _is_nested(value: object) -> bool:
-    return isinstance(value, list | tuple) or (
-        isinstance(value, np.ndarray) and value.dtype == object and value.ndim > 0
-    )
-
-
-def _converted(name: str, values: Any, unit: str | None) -> Any:
-    """Return the values of a quantity, or of a list of them, in `unit`."""
-    if not _has_unit(type(values)):
-        if not _is_nested(values):
-            return values
-        if {_has_unit(kind) for kind in map(type, values) if not _may_nest(kind) or _has_unit(kind)} == {True, False}:
-            raise refused(name, f" is {shown(values)}: mixes quantities and numbers without a unit")
-        return [_converted(f"{name}[{k}]", value, unit) for k, value in enumerate(values)]
-    try:
-        convert = values.rescale if hasattr(values, "rescale") else values.to
-        in_unit = convert(unit or "dimensionless")
-        plain = np.asarray(in_unit.magnitude if hasattr(in_unit, "magnitude") else in_unit.value, np.float64)
-        # 7 ms in s and back is 7.000000000000001 ms; such values are rounded to whole numbers, so that stamps are
-        # restored.
-        rounded = np.rint(plain)
-        return np.where(np.abs(plain - rounded) <= 1e-15 * np.abs(plain), rounded, plain)
-    except Exception:  # each library has its own errors for units that do not fit
-        right = "a plain number" if unit is None else f"a number of {unit}, or a quantity that converts to {unit}"
-        raise refused(name, f" is {shown(values)}: must be {right}") from None
-
-
-def _one(values: NDArray[np.float64]) -> object:
-    """Return the number in a 0-dimensional array; return any other array unchanged."""
-    return values.item() if values.ndim == 0 else values
-
-
-def number(name: str, value: object, unit: str | None = None) -> float:
-    """Return a float, which may be infinite, for a quantity its value in `unit`; refuse any other value, and NaN."""
-    real = _real(name, value, unit)
+def number(name: str, value: object) -> float:
+    """Return a float, which may be infinite; refuse any other value, and NaN."""
+    real = _real(name, value)
     if math.isnan(real):
         raise refused(name, " is nan: must be a number")
     return real
 
 
-def _real(name: str, value: object, unit: str | None = None) -> float:
+def _real(name: str, value: object) -> float:
     """Return a float, NaN too; refuse any other value. -0.0 becomes 0.0, as no argument means anything else by it."""
-    if _has_unit(type(value)):
-        value = _one(bare(name, value, unit))
     if isinstance(value, bool | np.timedelta64) or not isinstance(value, int | float | np.integer | np.floating):
         raise refused(name, f" is {shown(value)}: must be a number")
     try:
@@ -227,11 +134,9 @@ def _real(name: str, value: object, unit: str | None = None) -> float:
         raise refused(name, f" is {shown(value)}: must fit a float") from None
 
 
-def finite(
-    name: str, value: object, unit: str | None = None, *, least: float = -math.inf, most: float = math.inf
-) -> float:
+def finite(name: str, value: object, *, least: float = -math.inf, most: float = math.inf) -> float:
     """Return a finite float from `least` to `most`; refuse any other value."""
-    real = _real(name, value, unit)
+    real = _real(name, value)
     if not (math.isfinite(real) and least <= real <= most):
         low, high = math.isfinite(least), math.isfinite(most)
         right = f"{least:g} or more and finite" if low else f"at most {most:g} and finite" if high else "finite"
@@ -240,10 +145,8 @@ def finite(
     return real
 
 
-def integer(name: str, value: object, least: int = -(2**63), most: int = 2**63 - 1, unit: str | None = None) -> int:
-    """Return a whole number within limits, for a quantity its value in `unit`; a float with an integer value passes."""
-    if _has_unit(type(value)):
-        value = _one(bare(name, value, unit))
+def integer(name: str, value: object, least: int = -(2**63), most: int = 2**63 - 1) -> int:
+    """Return a whole number within limits; a float with an integer value passes."""
     real = isinstance(value, float | np.floating) and float(value).is_integer()
     is_whole = real or (isinstance(value, int | np.integer) and not isinstance(value, bool | np.timedelta64))
     if not is_whole or not least <= value <= most:  # type: ignore[operator]
@@ -278,28 +181,25 @@ def checked_path(name: str, value: object) -> str:
         encoded = b""
     if not isinstance(plain, str) or not encoded or b"\0" in encoded:
         raise refused(name, f" is {shown(value)}: must be a path")
-    if sys.platform == "win32" and (fault := name_fault(plain)):
-        raise refused(name, f" is {shown(value)}: {fault}")
     return plain
 
 
 def window(unit: str, start: object, stop: object) -> tuple[float, float]:
     """Return an interval of time whose start is not after its stop; either may be infinite."""
-    first, last = number("start", start, unit), number("stop", stop, unit)
+    first, last = number("start", start), number("stop", stop)
     if not first <= last:
         raise ProblemError(f"window {plain(first)} to {plain(last)} {unit}: start must not be after stop")
     return first, last
 
 
-def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
-    """Return a contiguous array of any shape; refuse values that are not numbers, or that the conversion would change.
+def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str = "") -> NDArray[Any]:
+    """Return a contiguous array of any shape; refuse what is not numbers, or what the conversion would change.
 
-    Quantities are converted to `unit` (`bare`).
+    `unit`, of whole numbers, is said in the error: it is most often another one.
     """
-    plain = bare(name, values, unit)
-    _refuse_repeated(name, plain)
+    _refuse_units(name, values)
     try:
-        received = np.asarray(plain)
+        received = np.asarray(values)
         if received.dtype == object:
             _refuse_others(name, received)
         if received.size == 0 and received.dtype.kind not in "biuf":
@@ -315,9 +215,7 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = N
     return array
 
 
-def refuse_changed(
-    name: str, received: NDArray[Any], array: NDArray[Any], unit: str | None = None, *, begin: int = 0
-) -> None:
+def refuse_changed(name: str, received: NDArray[Any], array: NDArray[Any], unit: str = "", *, begin: int = 0) -> None:
     """Refuse values that a conversion of `received` to `array` changed; `begin` is the place of the first in errors."""
     if received.dtype == array.dtype:
         return
@@ -337,22 +235,13 @@ def _first_changed(received: NDArray[Any], array: NDArray[Any]) -> tuple[int, ..
     A float may be rounded (to float32) but must not become infinite.
     """
     to_float = array.dtype.kind == "f"
-    from_float = received.dtype.kind == "f" and received.dtype.itemsize > array.dtype.itemsize
     # Whole numbers of 64 bits fit a float of 32.
-    if not array.size or (to_float and not from_float and received.dtype != object and array.dtype.itemsize >= 4):
+    if not array.size or (to_float and received.dtype.kind in "biu"):
         return None
-    step = max(1, _COMPARED // array[:1].size)
-    for begin in range(0, len(array), step):
-        before, after = received[begin : begin + step], array[begin : begin + step]
-        try:
-            unlike = np.isinf(after) & ~np.isinf(before.astype(np.float64)) if to_float else before != after
-        except ArithmeticError:  # a signalling NaN cannot be compared
-            unlike = np.frompyfunc(lambda value: isinstance(value, Decimal) and value.is_snan(), 1, 1)(before)
-        changed = np.asarray(unlike, np.bool_)
-        if changed.any():
-            first, *rest = np.unravel_index(int(np.argmax(changed)), changed.shape)
-            return (begin + int(first), *map(int, rest))
-    return None
+    changed = np.isinf(array) & ~np.isinf(received.astype(np.float64)) if to_float else received != array
+    if not changed.any():
+        return None
+    return tuple(map(int, np.unravel_index(int(np.argmax(changed)), changed.shape)))
 
 
 def _refuse_others(name: str, values: NDArray[Any]) -> None:
@@ -363,15 +252,9 @@ def _refuse_others(name: str, values: NDArray[Any]) -> None:
         raise refused(f"{name}{where}", f" is {shown(value)}: must be a number")
 
 
-def _refuse_repeated(name: str, values: object) -> None:
-    """Refuse a broadcast array whose copy would exceed the memory limit."""
-    if isinstance(values, np.ndarray) and values.size > _MOST_REPEATED and 0 in values.strides:
-        raise refused(name, f" is an array broadcast to {values.size} values: must have at most {_MOST_REPEATED}")
-
-
-def finite_numbers(name: str, values: ArrayLike, unit: str | None = None) -> NDArray[np.float64]:
+def finite_numbers(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return a contiguous float64 array of any shape; refuse other values, infinity and NaN."""
-    array = numbers(name, values, np.float64, unit)
+    array = numbers(name, values, np.float64)
     if not np.isfinite(array).all():
         index = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
         where = f"[{', '.join(map(str, index))}]" if index else ""
@@ -379,7 +262,7 @@ def finite_numbers(name: str, values: ArrayLike, unit: str | None = None) -> NDA
     return array
 
 
-def column(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
+def column(name: str, values: ArrayLike, dtype: type[Any], unit: str = "") -> NDArray[Any]:
     """Return a contiguous array of one dimension; refuse values that the conversion would change."""
     array = numbers(name, values, dtype, unit)
     if array.ndim != 1:
@@ -387,15 +270,15 @@ def column(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = No
     return array
 
 
-def floats(name: str, values: ArrayLike, unit: str | None = None) -> NDArray[np.float64]:
+def floats(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return a contiguous float64 array of one dimension; refuse any other value."""
-    return column(name, values, np.float64, unit)
+    return column(name, values, np.float64)
 
 
 def rows(name: str, chosen: object, length: int) -> NDArray[Any]:
     """Return a mask over all rows, or row numbers, as an index; refuse any other value."""
     try:
-        index = np.asarray(bare(name, chosen))
+        index = np.asarray(chosen)
     except ValueError:
         index = np.empty(0, object)
     if index.size == 0 and index.ndim == 1 and index.dtype.kind in "fi":
@@ -452,24 +335,14 @@ def fields(records: object, required: tuple[str, ...]) -> tuple[str, ...]:
 
 def parameters(values: Mapping[str, object]) -> str:
     """Return parameters as JSON for the compiled part, which checks them; NaN is refused here, as JSON has none."""
-    left = _MOST
 
-    def plain(name: str, value: object, depth: int) -> object:
-        nonlocal left
-        value = bare(name, value)
-        if isinstance(value, Mapping | list | tuple | np.ndarray):
-            left -= value.size if isinstance(value, np.ndarray) else len(value)
-            if left < 0:
-                raise refused(name, f" is {shown(value)}: must have at most {_MOST} entries")
-            if depth == DEPTH:
-                raise ProblemError(f"{name[:_SHOWN]}...: must have fewer than {DEPTH} levels of nesting")
-            if isinstance(value, Mapping):
-                return {
-                    text(f"a name in {name}", key): plain(f"{name}.{key}", entry, depth + 1)
-                    for key, entry in value.items()
-                }
+    def plain(name: str, value: object) -> object:
+        if isinstance(value, Mapping):
+            return {text(f"a name in {name}", key): plain(f"{name}.{key}", entry) for key, entry in value.items()}
+        if isinstance(value, list | tuple | np.ndarray):
+            _refuse_units(name, value)
             entries = np.atleast_1d(value) if isinstance(value, np.ndarray) else value
-            return [plain(f"{name}[{k}]", entry, depth + 1) for k, entry in enumerate(entries)]
+            return [plain(f"{name}[{k}]", entry) for k, entry in enumerate(entries)]
         if value is None or isinstance(value, bool | np.bool_):
             return None if value is None else bool(value)
         if isinstance(value, str):
@@ -479,4 +352,4 @@ def parameters(values: Mapping[str, object]) -> str:
         return finite(name, value)
 
     named = {text("a parameter's name", name): value for name, value in values.items()}
-    return json.dumps({name: plain(name, value, 0) for name, value in named.items()})
+    return json.dumps({name: plain(name, value) for name, value in named.items()})

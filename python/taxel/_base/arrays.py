@@ -1,7 +1,6 @@
 """Reads arrays of numbers of .npy, .npz, HDF5 and MATLAB files by name, and writes HDF5 files.
 
-No code of a file is run, and no file is read that another one refers to. A damaged HDF5 or MATLAB file may crash the
-library that reads it.
+No code of a file is run. A damaged HDF5 or MATLAB file may crash the library that reads it.
 """
 
 from __future__ import annotations
@@ -85,7 +84,7 @@ def shapes(path: str | os.PathLike[str], *, with_texts: bool = False) -> dict[st
 
     Raises
     ------
-    FormatError : damage, or a HDF5 file that refers to another file
+    FormatError : damage
     OSError : the file is not there, or cannot be read
 
     Examples
@@ -119,8 +118,8 @@ def read_arrays(
 
     Raises
     ------
-    FormatError : damage, no numbers, a number that another dtype than a float does not hold, a HDF5 file that refers to
-        another file, or an array larger than the memory that is available (names the array)
+    FormatError : damage, no numbers, a number that another dtype than a float does not hold, or an array larger than
+        the memory that is available (names the array)
     OSError : the file is not there, or cannot be read
 
     Examples
@@ -147,7 +146,7 @@ def hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
 
     Raises
     ------
-    FormatError : a damaged file; one of which a link or a data set leads to another file (names it)
+    FormatError : a damaged file
     OSError : the file is not there, or cannot be read
     """
     import h5py  # noqa: PLC0415  loads slowly
@@ -155,28 +154,17 @@ def hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
     # Python's errors are clearer than those of the library.
     open(path, "rb").close()
     with _reading(path, "HDF5 file"), h5py.File(path) as file:
-        for name, link in _links(file).items():
-            if isinstance(link, h5py.ExternalLink):
-                raise unreadable(f"{name}: a link to another file (an external link)", path)
-        file.visititems(partial(_refuse_external_values, path))
         yield file
 
 
 def datasets(file: h5py.File) -> dict[str, h5py.Dataset]:
-    """Return the data sets of a HDF5 file by their paths; one that several paths lead to has several.
-
-    Soft links that lead nowhere, and data sets without values, are left out.
-    """
+    """Return the data sets of a HDF5 file that have values, by their paths; soft and external links are left out."""
     import h5py  # noqa: PLC0415  `hdf5` has loaded it
 
-    found = {}
-    for name, link in _links(file).items():
-        # The errors of soft links that lead nowhere, or in a circle, are of several classes.
-        with contextlib.suppress(*([Exception] if isinstance(link, h5py.SoftLink) else [])):
-            item = file[name]
-            if isinstance(item, h5py.Dataset) and item.shape is not None:
-                found[name] = item
-    return found
+    items: dict[str, object] = {}
+    # What is raised within this call is lost.
+    file.visititems(items.__setitem__)
+    return {name: item for name, item in items.items() if isinstance(item, h5py.Dataset) and item.shape is not None}
 
 
 def write_hdf5(path: str | os.PathLike[str], write: Callable[[h5py.File], object], *, overwrite: bool = False) -> None:
@@ -303,26 +291,6 @@ def _of_dataset(data: h5py.Dataset, *, is_matlab: bool = False) -> _Stored:
     if is_matlab:
         return _Stored(data.shape[::-1], dtype, lambda: np.asarray(data[()]).T)
     return _Stored(data.shape, dtype, lambda: np.asarray(data[()]))
-
-
-def _links(file: h5py.File) -> dict[str, object]:
-    """Return the links of a HDF5 file by their paths."""
-    links: dict[str, object] = {}
-    # What is raised within this call is lost.
-    file.visititems_links(links.__setitem__)
-    return links
-
-
-def _refuse_external_values(path: str | os.PathLike[str], name: str, item: object) -> None:
-    import h5py  # noqa: PLC0415  `hdf5` has loaded it
-
-    if not isinstance(item, h5py.Dataset):
-        return
-    if item.external:
-        raise unreadable(f"{name}: its values are in another file (external storage)", path)
-    # A file names itself by a dot.
-    if item.is_virtual and any(source.file_name != "." for source in item.virtual_sources()):
-        raise unreadable(f"{name}: its values are in another file (a virtual data set)", path)
 
 
 def _read(

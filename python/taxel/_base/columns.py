@@ -35,14 +35,14 @@ def frozen_whole(array: NDArray[Any]) -> NDArray[Any]:
     return array
 
 
-def frozen_column(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
+def frozen_column(name: str, values: ArrayLike, dtype: type[Any], unit: str = "") -> NDArray[Any]:
     """Return a read-only column (see `column`), copied if it shares memory with a caller's writable array."""
     return frozen_copy(column(name, values, dtype, unit), values)
 
 
-def frozen_numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
+def frozen_numbers(name: str, values: ArrayLike, dtype: type[Any]) -> NDArray[Any]:
     """Return a read-only array of any shape (see `numbers`), copied as by `frozen_column`."""
-    return frozen_copy(numbers(name, values, dtype, unit), values)
+    return frozen_copy(numbers(name, values, dtype), values)
 
 
 def frozen_copy(array: NDArray[Any], source: ArrayLike) -> NDArray[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import json
 import os
 import re
@@ -9,12 +10,26 @@ import tomllib
 from contextlib import suppress
 from typing import Any
 
-from taxel._base.encodings import mark_of
 from taxel._base.errors import unreadable
 from taxel._base.messages import first_line
 
 #: How tomllib ends what it says about a line.
 _AT_LINE = re.compile(r" \(at line (\d+), (column \d+)\)$")
+
+
+#: Byte-order marks, and the encoding of what follows them.
+_MARKS = {codecs.BOM_UTF8: "utf-8", codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
+
+
+def mark_of(data: bytes) -> tuple[bytes, str]:
+    r"""Return the byte-order mark that a text begins with, b"" without one, and its encoding.
+
+    Examples
+    --------
+    >>> mark_of(b"\xff\xfet\0")
+    (b'\xff\xfe', 'utf-16-le')
+    """
+    return next(((mark, name) for mark, name in _MARKS.items() if data.startswith(mark)), (b"", "utf-8"))
 
 
 def read_text(path: str | os.PathLike[str], otherwise: str = "") -> str:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
@@ -53,46 +52,13 @@ class HeaderTable:
         >>> table.header, list(table)
         (('label', 't_us'), [(3, {'label': 'heel', 't_us': '400'})])
         """
-        rows = _rows(location, lines)
-        return replace(cls.head(location, rows), lines=tuple(rows))
-
-    @classmethod
-    def head(cls, location: str | Path, rows: Iterator[tuple[int, tuple[str, ...]]]) -> HeaderTable:
-        """Read the names of a table from its first row; the others are left in the iterator.
-
-        Raises
-        ------
-        FormatError : a duplicate column (names the line)
-        """
-        line, first = next(rows, (1, ()))
+        rows = tuple(_rows(location, lines))
+        line, first = next(iter(rows), (1, ()))
         header = tuple(name.strip() for name in first)
-        repeated = next((name for name, count in Counter(header).items() if name and count > 1), None)
+        repeated = next((name for name in header if name and header.count(name) > 1), None)
         if repeated is not None:
             raise unreadable(f"column {shown(repeated)} appears twice", location, line=line)
-        return cls(str(location), header, ())
-
-    @classmethod
-    def stream(
-        cls, location: str | Path, lines: Iterable[str], required: Sequence[str]
-    ) -> Iterator[tuple[int, dict[str, str]]]:
-        """Yield the rows of a table as iterating over one does, without holding them.
-
-        Parameters
-        ----------
-        place, lines
-            As of `read`.
-        required : sequence of str
-            Columns that must be there.
-
-        Raises
-        ------
-        FormatError : as of `read`, `has` and iterating
-        """
-        rows = _rows(location, lines)
-        table = cls.head(location, rows)
-        table.has(required)
-        for row in rows:
-            yield from replace(table, lines=(row,))
+        return cls(str(location), header, rows[1:])
 
     @property
     def rows(self) -> tuple[tuple[int, tuple[str, ...]], ...]:

@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from itertools import chain
 
 #: C0, DEL and C1, the marks and overrides of direction, the separators of lines and paragraphs, and halves of surrogate
 #: pairs, which represent bytes of file names that are not UTF-8. `python/taxel/panel/web/dom.js` has the same.
@@ -90,79 +89,6 @@ def three_digits(value: float, sign: str = "") -> str:
     ('0.123', '+1000', '1004', '-2e+06')
     """
     return f"{value:{sign}.0f}" if 999.5 <= abs(value) < 1e6 else f"{value:{sign}.3g}"
-
-
-#: At most so many numbers, the largest of which is so many times the least, are all listed.
-_MOST_LISTED, _FAR_APART = 6, 1.5
-#: Numbers in a text, ranges of them, and times among them.
-_NUMBER = r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)"
-_RANGE, _SECONDS = re.compile(f"{_NUMBER}(?: to {_NUMBER})?"), re.compile(r"\d s\b")
-
-
-def of_names(named: Sequence[tuple[str, str]], total: int) -> list[str]:
-    """Return texts with their names before them; a text that several names share is returned once.
-
-    Texts that differ only in numbers become one text with the ranges of the numbers, unless these are times, or several
-    numbers differ between few names. Where a single number differs, of few names, and by far, it has that of each name
-    in their order. A text of all names begins with how many these are; if there is a single name, it is left out.
-
-    Parameters
-    ----------
-    named : sequence of (str, str)
-        Names and texts.
-    total : int
-        How many names there are.
-
-    Examples
-    --------
-    >>> of_names([("a", "2 of 4 are far"), ("b", "3 of 4 are far"), ("b", "noisy")], 2)
-    ['all 2: 2 to 3 of 4 are far', 'b: noisy']
-    >>> of_names([("a", "51 to 52 ms later"), ("b", "52 to 53 ms later"), ("c", "54 ms later")], 3)
-    ['all 3: 51 to 54 ms later']
-    >>> of_names([(name, f"{ratio} times as strong") for name, ratio in (("a", 0.3), ("b", 0.9), ("c", 0.4))], 4)
-    ['a, b, c: 0.3, 0.9 and 0.4 times as strong']
-    >>> of_names([("a", "3 of 33 are far"), ("b", "30 of 63 are far")], 2)
-    ['a: 3 of 33 are far', 'b: 30 of 63 are far']
-    """
-    alike: dict[str, list[tuple[str, str]]] = {}
-    for name, text in named:
-        key = text if _SECONDS.search(text) else _RANGE.sub("\0", text)
-        alike.setdefault(key, []).append((name, text))
-    texts = []
-    for pairs in chain.from_iterable(map(_readable, alike.values())):
-        names = list(dict.fromkeys(name for name, _ in pairs))
-        who = f"all {total}" if len(names) == total else ", ".join(names)
-        texts.append(
-            f"{who}: " * (total > 1) + _with_ranges([text for _, text in pairs], is_of_each=len(names) == len(pairs))
-        )
-    return texts
-
-
-def _readable(pairs: list[tuple[str, str]]) -> list[list[tuple[str, str]]]:
-    """Return names and texts that differ in numbers alone, those of few names by their texts if several numbers do."""
-    numbers = zip(*(_RANGE.findall(text) for _, text in pairs), strict=True)
-    if len(pairs) > _MOST_LISTED or sum(len(set(of_each)) > 1 for of_each in numbers) < 2:
-        return [pairs]
-    same: dict[str, list[tuple[str, str]]] = {}
-    for name, text in pairs:
-        same.setdefault(text if name else "", []).append((name, text))
-    return list(same.values())
-
-
-def _with_ranges(texts: Sequence[str], *, is_of_each: bool) -> str:
-    """Return texts that differ in numbers alone as one, with the least and the largest of each, or all of them."""
-    each = [list(n) for n in zip(*(_RANGE.findall(text) for text in texts), strict=True)]
-    is_listed = is_of_each and len(texts) <= _MOST_LISTED and sum(len(set(n)) > 1 for n in each) == 1
-    ranges = iter([_range(n, is_listed=is_listed) for n in each])
-    return _RANGE.sub(lambda _: next(ranges), texts[0])
-
-
-def _range(numbers: Sequence[str], *, is_listed: bool) -> str:
-    edges = [edge for found in numbers for edge in found.split(" to ")]
-    least, most = min(edges, key=float), max(edges, key=float)
-    if is_listed and float(most) > _FAR_APART * float(least):
-        return f"{', '.join(numbers[:-1])} and {numbers[-1]}"
-    return " to ".join(dict.fromkeys((least, most)))
 
 
 def first_line(error: BaseException) -> str:

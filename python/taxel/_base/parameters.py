@@ -12,7 +12,7 @@ from types import SimpleNamespace
 from typing import Any, ClassVar, Self
 
 from taxel import _core
-from taxel._base.arguments import bare, flag, instance, parameters, shown
+from taxel._base.arguments import flag, instance, parameters, shown
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 
@@ -95,7 +95,6 @@ class Parameters:
     def _plain(self) -> dict[str, Any]:
         """Return the parameters as the compiled part reads them, which fills in the defaults of an omitted group."""
         plain: dict[str, Any] = {}
-        units = ranges(self._kind, self._compiled)
         for name, value in self._values().items():
             if value is None and self._stands_for(name) is not None:
                 continue
@@ -103,7 +102,7 @@ class Parameters:
             if group is not None and value is not None:
                 plain[name] = instance(name, value, group)._plain()
             else:
-                plain[name] = bare(name, value, units.get(name, {}).get("unit") or None)
+                plain[name] = value
         return plain
 
     def _json(self) -> str:

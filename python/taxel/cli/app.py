@@ -19,7 +19,6 @@ import cyclopts
 from cyclopts import Parameter
 
 from taxel._base.arguments import finite, integer, shown
-from taxel._base.number_text import float_of
 from taxel._core import ProblemError
 from taxel.cli._say import WIDTH, say, table
 
@@ -206,7 +205,7 @@ def _wrong(name: str, argument: Any, value: Any) -> str:
     if kind not in (int, float):
         return ""
     with contextlib.suppress(ValueError):
-        value = float_of(value)
+        value = float(value)
     limits = next((one for one in argument.parameter.validator if isinstance(one, Limits)), Limits())
     try:
         limits.check(name, value, kind)

@@ -15,7 +15,6 @@ from rich.table import Table
 
 from taxel._base.arguments import shown
 from taxel._base.messages import counted
-from taxel._base.number_text import float_of
 from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.array import Array, of_size
@@ -155,7 +154,7 @@ def _rest(value: str | None) -> Tare | float | None:
     if value is None:
         return None
     try:
-        seconds = float_of(value)
+        seconds = float(value)
     except ValueError:
         from taxel.tasks.rest import tare_of  # noqa: PLC0415  the command line starts quickly
 

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 
 import taxel
 from taxel._base.files import write_whole
-from taxel._base.messages import collected, of_names
+from taxel._base.messages import collected
 from taxel._base.parallel import Workers
 from taxel._base.times import begun
 from taxel.cli._say import say
@@ -125,7 +125,7 @@ def _lines(
     remarks = _remarks(found)
     if isinstance(readout, taxel.Readout) and len(readout.by_rule) < len(readout.labels):
         outside = [(outcome.name, text) for outcome in found.outcomes if (text := outcome.outside_text)]
-        remarks += of_names(outside, len(found.each))
+        remarks += _of_names(outside, len(found.each))
     for each in found.each:
         if found.score is None or lists or not several:
             rows = None if lists else _ROWS * (found.score is None)
@@ -140,7 +140,17 @@ def _lines(
 
 def _remarks(found: Detecting) -> list[str]:
     """Return the remarks on all recordings, those on several once."""
-    return of_names([(each.outcome.name, remark) for each in found.each for remark in each.remarks], len(found.each))
+    return _of_names([(each.outcome.name, remark) for each in found.each for remark in each.remarks], len(found.each))
+
+
+def _of_names(named: Sequence[tuple[str, str]], total: int) -> list[str]:
+    """Return texts, each once, with the names of the recordings that have it; of a single recording without a name."""
+    names: dict[str, list[str]] = {}
+    for name, text in named:
+        names.setdefault(text, []).append(name)
+    if total == 1:
+        return list(names)
+    return [f"{f'all {total}' if len(of) == total else ', '.join(of)}: {text}" for text, of in names.items()]
 
 
 def _are_several(recordings: Sequence[Path]) -> bool:

@@ -13,7 +13,6 @@ from rich.table import Table
 
 from taxel._base.arguments import text
 from taxel._base.messages import counted
-from taxel._base.number_text import float_of
 from taxel._core import ProblemError
 from taxel.board_check import check_board
 from taxel.cli._say import say
@@ -192,7 +191,7 @@ def _field(assignment: str) -> tuple[str, float]:
     """Return name and value of NAME=VALUE."""
     name, equals, value = assignment.partition("=")
     try:
-        number = float_of(value)
+        number = float(value)
     except ValueError:
         number = {"true": 1.0, "false": 0.0}.get(value, math.nan)
     if not equals or math.isnan(number):

@@ -17,7 +17,6 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from taxel._base.files import check_writable
 from taxel._base.messages import counted
-from taxel._base.number_text import float_of
 from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.cli._say import say
@@ -263,7 +262,7 @@ def _pairs(option: str, assignments: Iterable[str], known: Collection[str]) -> d
 def _number(option: str, name: str, value: str) -> float:
     """Return a number as it was typed: an error shows 2, not 2.0."""
     try:
-        number = float_of(value)
+        number = float(value)
     except ValueError:
         raise ProblemError(f"--{option} {name}={value}: must be a number") from None
     return int(number) if number.is_integer() else number

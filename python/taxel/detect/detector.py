@@ -185,7 +185,7 @@ class ReadoutStream:
         wire_version: int = 1,
     ) -> None:
         self._detector = detector("readout", readout)
-        self._frame_us = number("frame_us", frame_us, "us")
+        self._frame_us = number("frame_us", frame_us)
         self._rest, self._tare = tare, tare_text(tare)
         self._version = integer("wire_version", wire_version, 1, 2)
         self._core: _core.ReadoutStream | None = None

@@ -142,7 +142,7 @@ def check_examples(examples: Sequence[Example]) -> list[Example]:
         name = text(f"example {k}: name", name) or str(getattr(example[0], "title", f"example {k}"))
         if not isinstance(labels, Mapping):
             raise ProblemError(f"{name}: labels is {shown(labels)}: must be times (us) by label")
-        times = {text("label", label): column(f"labels[{label!r}]", t, np.int64, "us") for label, t in labels.items()}
+        times = {text("label", label): column(f"labels[{label!r}]", t, np.int64) for label, t in labels.items()}
         tare = None if tare is None else instance(f"{name}: tare", tare, Tare)
         group, labels_of = text(f"{name}: group", group), text(f"{name}: labels_of", labels_of)
         sound.append(Example(source, times, tare, group, name, labels_of))

@@ -178,10 +178,10 @@ class Fitter:
         progress: Progress | None = None,
     ) -> None:
         if frame_us is not None:
-            finite("frame_us", frame_us, "us", least=1.0, most=3.6e9)
+            finite("frame_us", frame_us, least=1.0, most=3.6e9)
         clocks = [clock_of(example, frame_us) for example in examples] if isinstance(examples, Sequence) else []
         self.examples, self.clocks = check_examples(examples), clocks
-        self.window_ms = finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6)
+        self.window_ms = finite("window_ms", window_ms, least=0.0, most=3.6e6)
         self.report = reporting(progress)
         #: All of the examples.
         self.whole = whole(self.examples)

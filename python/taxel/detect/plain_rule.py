@@ -117,7 +117,7 @@ class PlainRule(_Detector):
         tare: Tare | None = None,
     ) -> None:
         is_end = isinstance(age_ms, str) and age_ms == "end"
-        age = age_ms if age_ms is None or is_end else number("age_ms", age_ms, "ms")
+        age = age_ms if age_ms is None or is_end else number("age_ms", age_ms)
         self._hold(
             _core.make_plain_rule(
                 parameters(

@@ -129,7 +129,7 @@ class Readout(_Detector):
         }
         if not isinstance(delay_ms, Mapping):
             # Also where each neuron comes with its own.
-            number("delay_ms", delay_ms, "ms")
+            number("delay_ms", delay_ms)
         first = next(iter(trained.values())).neuron
         core = _core.make_readout(
             parameters(
@@ -140,7 +140,7 @@ class Readout(_Detector):
                     "time": first.time,
                     "after_spike": first.after_spike,
                     "run_threshold": number("run_threshold", run_threshold),
-                    "delays_ms": floats("delays_ms", delays_ms, "ms"),
+                    "delays_ms": floats("delays_ms", delays_ms),
                     "neurons": {
                         label: {
                             "neuron": json.loads(trained_neuron.neuron._json()),
@@ -445,7 +445,7 @@ def run_counting(
     Nothing is detected before `begin_us`, the end of a fresh tare, as live; spike trains have none.
     """
     text = detector("readout", readout)._at_noise_of(tare).to_json()
-    period = None if frame_us is None else number("frame_us", frame_us, "us")
+    period = None if frame_us is None else number("frame_us", frame_us)
     version = None if wire_version is None else integer("wire_version", wire_version, 1, 2)
     rest, zeroings = tare_text(tare), []
     if isinstance(source, Recording):
@@ -537,7 +537,7 @@ def _neuron_of(
     return TrainedNeuron(
         neuron,
         floats(f"{label}: weights", weights),
-        number(f"{label}: delay_ms", delay, "ms"),
+        number(f"{label}: delay_ms", delay),
         tuple(text(f"{label}: inputs", name) for name in several(f"{label}: inputs", named)),
     )
 

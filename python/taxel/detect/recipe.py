@@ -426,7 +426,7 @@ def learner_from(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
     if not isinstance(values, Mapping):
         raise refused(name, f" is {shown(values)}: must be parameters by name")
     values = {key: value for key, value in values.items() if key != "inputs"}
-    delay_ms = number(f"{name}.delay_ms", values.pop("delay_ms", 0.0), "ms")
+    delay_ms = number(f"{name}.delay_ms", values.pop("delay_ms", 0.0))
     # In a recipe a neuron's parameters stand among the learner's, which is trained on a grid whatever its clock.
     cone = ConeR()
     learner = [key for key in cone.get_params(deep=False) if key != "neuron"]

@@ -339,10 +339,10 @@ def _truth(detections: Detections, truth: Mapping[str, ArrayLike] | ArrayLike) -
         wrong = [label for label in truth if not isinstance(label, str)]
         if wrong:
             raise refused("truth", f": the label {shown(wrong[0])} must be a text")
-        columns = {label: column(f"truth[{label!r}]", times, np.int64, "us") for label, times in truth.items()}
+        columns = {label: column(f"truth[{label!r}]", times, np.int64) for label, times in truth.items()}
         labels = [label for label, times in columns.items() for _ in range(len(times))]
         return labels, np.concatenate([*columns.values(), np.empty(0, np.int64)])
-    times = column("truth", truth, np.int64, "us")
+    times = column("truth", truth, np.int64)
     if len(detections.labels) > 1:
         raise refused("truth", f" has no labels, found has {', '.join(detections.labels)}: give times by label")
     return [(detections.labels or ("event",))[0]] * len(times), times
@@ -358,7 +358,7 @@ def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
             of_label = np.array([name == label for name in labels])
             windows[of_label] = _windows([label] * int(of_label.sum()), window_ms[label])
         return windows
-    widths = numbers("window_ms", window_ms, np.float64, "ms")
+    widths = numbers("window_ms", window_ms, np.float64)
     if widths.ndim > 1 or (widths.ndim == 1 and len(widths) != len(labels)):
         raise refused(
             "window_ms",

@@ -149,7 +149,7 @@ def tune(
         sorted({name for example in sound for name in example.labels}) if labels is None else several("labels", labels)
     )
     names = [text("labels", name) for name in names]
-    width_ms = finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6)
+    width_ms = finite("window_ms", window_ms, least=0.0, most=3.6e6)
     floor = number("noise_floor", noise_floor)
     if any(isinstance(example.source, SpikeTrains) for example in sound):
         return dict.fromkeys(names)

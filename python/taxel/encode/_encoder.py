@@ -362,7 +362,7 @@ class EncoderStream:
         >>> len(stream.push(values).times), stream.advance(2000).times
         (0, array([0.5]))
         """
-        t = integer("t_us", t_us, -(2**60), 2**60, "us")
+        t = integer("t_us", t_us, -(2**60), 2**60)
         return self._spikes(None if self._core is None else self._core.advance(t))
 
     def finish(self) -> SpikeTrains:

@@ -44,7 +44,7 @@ class Tared(Encoder):
         if self.tare is None or isinstance(self.tare, Tare):
             return self.tare is not None
         try:
-            finite("tare", self.tare, "s")
+            finite("tare", self.tare)
         except ProblemError:
             raise refused("tare", f" is {shown(self.tare)}: must be a taxel.Tare, or a number of seconds") from None
         return False
@@ -78,7 +78,7 @@ class Tared(Encoder):
         if not isinstance(source, Events | Frames) or not len(source.t):
             return self, source
         first, last = int(source.t[0]), int(source.t[-1])
-        rest_us = integer("tare, us", round(1e6 * finite("tare", self.tare, "s")), 1, 2**53)
+        rest_us = integer("tare, us", round(1e6 * finite("tare", self.tare)), 1, 2**53)
         if 2 * rest_us > last - first:
             lasts = f"the recording lasts {(last - first) / 1e6:g} s"
             raise refused(

@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from taxel._base.cells import last_part, time_unit
-
 __all__ = [
     "AXES",
     "are_units",
@@ -22,6 +20,27 @@ __all__ = [
 ]
 
 AXES = ("x", "y", "z")
+
+#: Units of time as people write them.
+_UNITS_OF_TIME = {
+    "s": ("s", "sec", "secs", "second", "seconds", "sek", "sekunden"),
+    "ms": ("ms", "msec", "millis", "milliseconds", "millisekunden"),
+    "us": ("us", "µs", "μs", "usec", "micros", "microseconds"),
+    "ns": ("ns", "nsec", "nanos", "nanoseconds", "nsecs"),
+}
+_UNIT_OF_TIME = "|".join(word for words in _UNITS_OF_TIME.values() for word in words)
+#: What people call times, in some languages.
+_TIME = (
+    r"t|ts|(?:%|rel|abs|host|device|sample|frame|recv|unix|epoch|system|header)?[ ._]*(?:time|stamp|time[ _]?stamp)s?"
+    r"|elapsed(?:[ _]time)?|(?:mess|uhr|system)?zeit(?:stempel|punkt)?|temps|tiempo|tempo|tijd|tid"
+    r"|datetime|date[ _]time|clock|millis|micros|ms|msec|us|usec|secs?|seconds|sekunden"
+)
+#: Names of columns that hold times, with or without a unit: time, timestamp_us, Time (ms), t [s].
+_TIMES = re.compile(
+    rf"(?:{_TIME})"
+    rf"(?:[ _.]*[\[(/] *(?P<within>{_UNIT_OF_TIME}) *[\])]?|(?:, *(?:in )?| in |[ _.]+)(?P<after>{_UNIT_OF_TIME}))?",
+    re.IGNORECASE,
+)
 
 _COUNTERS = re.compile(
     r"(?:frame|sample|record|packet|line|row|msg|message)?[ ._]*"
@@ -61,6 +80,26 @@ _FORCES = re.compile(r"[mk]?N|kgf?|gf?|[hkM]?Pa|m?bar|psi|N/(?:cm|mm|m)[²2]|mmH
 _AXIS = re.compile(r"(.+?)[ _.\-]?[\[(]?([xyzXYZ])[\])]?(?: *[\[(][^\])]*[\])])?")
 _AXIS_OF_LIST = re.compile(r"(.+)\[([012])\]")
 _PLACE = re.compile(r"\D*?(\d+)\D+(\d+)\D*")
+
+
+def time_unit(name: str) -> str | None:
+    """Return the unit of time that the name of a column or an array states, "" if none; None of another name.
+
+    Examples
+    --------
+    >>> time_unit("Time (ms)"), time_unit("run1/time"), time_unit("Time[secs]"), time_unit("palm"), time_unit("%time")
+    ('ms', '', 's', None, '')
+    """
+    found = _TIMES.fullmatch(last_part(name))
+    if found is None:
+        return None
+    word = (found["within"] or found["after"] or name.strip("\"' ")).lower()
+    return next((unit for unit, words in _UNITS_OF_TIME.items() if word in words), "")
+
+
+def last_part(name: str) -> str:
+    """Return the last part of a path within a file or a message: header.seq, run1/time."""
+    return re.split(r"[/.](?=[^\W\d])", name.strip("\"' "))[-1]
 
 
 def is_counter(name: str) -> bool:

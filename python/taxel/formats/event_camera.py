@@ -70,7 +70,7 @@ class Reduction:
         if self.bin is not None:
             integer("bin", self.bin, 1, 65_535)
         if self.window_ms is not None:
-            window_us = to_us(finite("window_ms", self.window_ms, "ms", least=0.001, most=_LONGEST_MS))
+            window_us = to_us(finite("window_ms", self.window_ms, least=0.001, most=_LONGEST_MS))
             if round(window_us, 6) % 1:
                 raise ProblemError(f"window_ms is {shown(self.window_ms)}: must be a whole number of us")
         if self.polarity is not None:

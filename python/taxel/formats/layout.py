@@ -318,11 +318,11 @@ class Layout:
         if self.unit is not None and not text("unit", self.unit):
             raise refused("unit", " is '': must be the unit of the readings")
         if self.rate_hz is not None:
-            finite("rate_hz", self.rate_hz, "Hz", least=1e-9, most=1e6)
+            finite("rate_hz", self.rate_hz, least=1e-9, most=1e6)
         if self.axis is not None:
             text("axis", self.axis, (*AXES, "shear", "all"))
         if self.zeros_before_s is not None:
-            finite("zeros_before_s", self.zeros_before_s, "s", least=1e-6, most=60.0)
+            finite("zeros_before_s", self.zeros_before_s, least=1e-6, most=60.0)
         # Refuses a pitch beside places, and places of another number than rows x columns.
         self.array(self.places.x.size if self.places is not None else 1)
 

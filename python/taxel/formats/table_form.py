@@ -197,8 +197,7 @@ def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -
     fits.sort(key=lambda fit: (-fit.score, bool(size) and fit.count != size))
     if not fits:
         why = "contains no table of numbers; if it has one, describe it in [table] of a layout file (docs/files.md)"
-        is_empty = not any(line.strip() for line in lines)
-        raise unreadable("the file is empty; must be a recording" if is_empty else why, text.path)
+        raise unreadable(why, text.path)
     _refuse_lines_above(text, fits[0])
     reading = _reading(fits[0], shown)
     other = next((fit for fit in fits[1:] if _fits_as_well(fit, fits[0], size)), None)

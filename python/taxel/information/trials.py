@@ -14,7 +14,6 @@ import numpy as np
 from taxel._base.arguments import checked_path, instance, integer, number, several, shown, text
 from taxel._base.errors import helped, placed, refused, unreadable
 from taxel._base.header_table import HeaderTable, text_of
-from taxel._base.number_text import float_of, int_of
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -336,10 +335,10 @@ def _rows(file: Path, recordings: Sequence[Recording]) -> list[tuple[int, dict[s
 def _whole(file: Path, line: int, column: str, cell: str) -> int:
     value: int | None
     try:
-        value = int_of(cell)
+        value = int(cell)
     except ValueError:
         try:
-            real = float_of(cell)
+            real = float(cell)
         except ValueError:
             real = np.nan
         value = int(real) if np.isfinite(real) and real.is_integer() else None

@@ -30,7 +30,7 @@ def examples(patterns: object, targets: object) -> tuple[list[tuple[Any, ...]], 
             raise ProblemError(
                 f"targets of pattern {p} is {shown(of_pattern)}: must be a list of times (ms), empty for none"
             )
-        times.append(floats(f"targets of pattern {p}", of_pattern, "ms"))
+        times.append(floats(f"targets of pattern {p}", of_pattern))
     return trains, times
 
 
@@ -38,7 +38,7 @@ def windows(name: str, given: object) -> NDArray[float64] | None:
     """Return the windows in which silence counts as start, stop, start, stop ...; None for everywhere."""
     if given is None:
         return None
-    ends = numbers(name, given, np.float64, "ms")  # type: ignore[arg-type]
+    ends = numbers(name, given, np.float64)  # type: ignore[arg-type]
     if ends.size and (ends.ndim != 2 or ends.shape[1] != 2):
         raise refused(name, f" has shape {ends.shape}: must contain windows, each with a start and a stop")
     return ends.reshape(-1)

@@ -120,7 +120,7 @@ class Certificate:
         multipliers = floats("multipliers", held["multipliers"])
         if len(rows) != len(multipliers):
             raise refused("certificate", f": {counted(len(multipliers), 'multiplier')} for {counted(len(rows), 'row')}")
-        gap = number("gap", held["gap"], "mV")
+        gap = number("gap", held["gap"])
         return cls(rows, multipliers, gap, flag("at_all", held["at_all"]), str(held["text"]))
 
     def __str__(self) -> str:
@@ -561,7 +561,7 @@ def _name(row: object) -> tuple[str, int, float]:
         raise refused("row", f" is {shown(row)}: must be kind, pattern and target or time") from None
     if not isinstance(kind, str):
         raise refused("row", f" is {shown(row)}: its kind must be a text")
-    return kind, integer("pattern", pattern, 0), number("target or time", at, "ms")
+    return kind, integer("pattern", pattern, 0), number("target or time", at)
 
 
 def _multipliers(proof: Any) -> Multipliers:

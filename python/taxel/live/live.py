@@ -223,7 +223,7 @@ class Live:
         ...     live.next(0.0) is None
         True
         """
-        values = self._core.next(finite("timeout", timeout, "s", least=0.0, most=1e9))
+        values = self._core.next(finite("timeout", timeout, least=0.0, most=1e9))
         return None if values is None else Detection(**values)
 
     def __iter__(self) -> Iterator[Detection]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taxel import _core
-from taxel._base.arguments import bare, floats, instance, number, parameters, several, shown, text
+from taxel._base.arguments import floats, instance, number, parameters, several, shown, text
 from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._base.parameters import ranges
@@ -32,12 +32,9 @@ def _plain(metric: str, name: str, value: Any) -> Any:
     known = ranges(metric).get(name, {})
     if "infinite" in known:
         # JSON has no infinite numbers; for parameters that may be infinite the compiled part reads the text.
-        cost = number(name, value, known["unit"])
+        cost = number(name, value)
         return cost if math.isfinite(cost) else str(cost)
-    plain = bare(name, value, known.get("unit") or None)
-    if isinstance(plain, np.ndarray) and plain.ndim == 0:
-        return number(name, plain[()], known.get("unit") or None)
-    return plain
+    return value
 
 
 def distance(metric: str, a: Pattern, b: Pattern, options: Mapping[str, Any]) -> float:
@@ -52,7 +49,7 @@ def _one(metric: str, name: str, x: Pattern) -> tuple[Any, ...]:
     if isinstance(x, SpikeTrains):
         trains = _unvalued(metric, x)
         return name, 1, len(trains), trains.times, trains.offsets, False
-    times = floats(name, x, "ms")
+    times = floats(name, x)
     return name, 1, 1, times, np.array([0, len(times)]), False
 
 
@@ -65,7 +62,7 @@ def listed(metric: str, name: str, x: SpikeTrains | Sequence[Pattern]) -> tuple[
         return name, len(x), 1, x.times, x.offsets, True
     entries = several(name, x)
     if not any(isinstance(entry, SpikeTrains) for entry in entries):
-        times = [floats(f"{name}[{p}]", entry, "ms") for p, entry in enumerate(entries)]
+        times = [floats(f"{name}[{p}]", entry) for p, entry in enumerate(entries)]
         return name, len(times), 1, _joined(times), _offsets([len(t) for t in times]), True
     patterns = [instance(f"{name}[{p}]", entry, SpikeTrains) for p, entry in enumerate(entries)]
     patterns = [_unvalued(metric, p) for p in patterns]

@@ -78,11 +78,11 @@ def matching(
     >>> found.found, found.missed, found.false, found.errors_ms, found.f1
     (1, 1, 1, array([-2.]), 0.5)
     """
-    fired = [floats(f"spikes[{p}]", times, "ms") for p, times in enumerate(several("spikes", spikes))]
-    target_times = [floats(f"targets[{p}]", times, "ms") for p, times in enumerate(several("targets", targets))]
+    fired = [floats(f"spikes[{p}]", times) for p, times in enumerate(several("spikes", spikes))]
+    target_times = [floats(f"targets[{p}]", times) for p, times in enumerate(several("targets", targets))]
     if len(fired) != len(target_times):
         raise refused("targets", f": {len(target_times)} lists for {len(fired)} patterns; must be one per pattern")
-    pairs = _core.match_spikes(fired, target_times, number("window_ms", window_ms, "ms"))
+    pairs = _core.match_spikes(fired, target_times, number("window_ms", window_ms))
     errors = [fired[p][j] - target_times[p][i] for p, matched in enumerate(pairs) for j, i in matched]
     matched = len(errors)
     return Matching(

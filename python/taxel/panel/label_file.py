@@ -12,8 +12,7 @@ from typing import BinaryIO, TypeAlias
 
 from filelock import FileLock, Timeout
 
-from taxel._base.documents import decoded
-from taxel._base.encodings import mark_of
+from taxel._base.documents import decoded, mark_of
 from taxel._base.files import write_whole
 from taxel._base.header_table import lines_of, separator_of
 from taxel._core import FormatError, ProblemError

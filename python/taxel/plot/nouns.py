@@ -97,7 +97,7 @@ def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) 
     ('1.500 ms', '0.000 ms')
     """
     instance("frames", frames, Frames)
-    until = None if at is None else finite("at", at, "us")
+    until = None if at is None else finite("at", at)
     if not len(frames):
         raise ProblemError("no frame to draw: the frames are empty")
     ax = axes(ax, (5, 4.4))

@@ -58,9 +58,7 @@ def cut(
     """
     instance("recording", recording, Recording)
     start_us, stop_us = window("us", start_us, stop_us)
-    around = [
-        finite(name, value, "us", least=0.0) for name, value in (("before_us", before_us), ("after_us", after_us))
-    ]
+    around = [finite(name, value, least=0.0) for name, value in (("before_us", before_us), ("after_us", after_us))]
     is_whole = (start_us, stop_us) == (-np.inf, np.inf)
     time_slice = recording if is_whole else recording.between(start_us, stop_us)
     if label is None:

@@ -21,7 +21,7 @@ def period_us(name: str, rate_hz: float) -> int:
     ------
     ProblemError : not above 0, or above 1 MHz
     """
-    rate = number(name, rate_hz, "Hz")
+    rate = number(name, rate_hz)
     if not 0 < rate <= 1e6:
         raise refused(name, f" is {rate}: must be above 0, at most 1000000")
     if rate < 1e-9:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from taxel._base.arguments import shown
-from taxel._base.columns import frozen_whole
+from taxel._base.columns import frozen
 from taxel._base.errors import refused
 from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
@@ -100,7 +97,7 @@ def _apply_layout(source: SourceView, layout: Layout, *, given: bool) -> SourceV
     # Read at once, so that a layout that contradicts the file is refused where the file is opened.
     table = same.table
     assert isinstance(table, Frames)  # the facts say so
-    frames = _read(table, layout, full, name, is_alone=kind in _ALONE, strict=strict)
+    frames = _read(table, layout, full, name, strict=strict)
     untimed = not facts.timed and layout.rate_hz is None
     if layout.zeros_before_s is not None:
         if untimed:
@@ -135,19 +132,14 @@ def _array(source: SourceView, layout: Layout) -> Array:
     return array
 
 
-#: Kinds of files of one recording, whose times no other one has.
-_ALONE = ("table", "arrays", "npz", "h5", "csv")
-
-
 #: Kinds of files that state their sensor, unit, times, and whether readings were inverted, as far as these are known.
 _STATING = ("mcap", "npz", "h5")
 
 
-def _read(table: Frames, layout: Layout, full: float | None, name: str, *, is_alone: bool, strict: bool) -> Frames:
+def _read(table: Frames, layout: Layout, full: float | None, name: str, *, strict: bool) -> Frames:
     """Return frames in the unit and at the rate that a layout says, turned to `full` less the reading if it is given.
 
-    If it is not `strict`, the unit and the times of the file stay where it has them. No other code holds these frames
-    yet, so that `own` is changed in place: its times only if it is alone in its file.
+    If it is not `strict`, the unit and the times of the file stay where it has them.
     """
     unit, t, values = table.unit, table.t, table.values
     if layout.unit is not None:
@@ -156,29 +148,24 @@ def _read(table: Frames, layout: Layout, full: float | None, name: str, *, is_al
         elif strict and unit != layout.unit:
             raise FormatError(f"{layout.path}: states the unit {layout.unit}, but {name} is in {unit}")
     if layout.rate_hz is not None:
-        if _are_numbers(t):
+        if np.array_equal(t, np.arange(len(t))):
             try:
-                t = _times_at(layout.rate_hz, _writable(t) if is_alone else np.empty_like(t))
+                t = times_at(t, layout.rate_hz)
             except ProblemError as error:
                 raise FormatError(f"{layout.path}: {name}: {error}") from None
-        elif strict and len(t) > 1 and abs(layout.rate_hz * (step := _median_step(t)) / 1e6 - 1) > _SLACK:
+        elif strict and len(t) > 1 and abs(layout.rate_hz * (step := float(np.median(np.diff(t)))) / 1e6 - 1) > _SLACK:
             raise FormatError(
                 f"{layout.path}: states {layout.rate_hz:g} Hz, but the times of {name} give {1e6 / step:g} Hz"
             )
     if full is not None:
-        values = _writable(values)
-        step = max(1, _PIECE // max(1, values[:1].size))
-        for begin in range(0, len(values), step):
-            block = values[begin : begin + step]
-            with np.errstate(over="ignore"):
-                risen = np.float32(full) - block
-            if (large := np.isinf(risen)).any():
-                raise FormatError(
-                    f"{layout.path}: falls is {layout.falls}, but {name} contains {shown(block[large][0].item())}, and "
-                    "the difference does not fit 32 bits"
-                )
-            block[...] = risen
-        frozen_whole(values)
+        with np.errstate(over="ignore"):
+            risen = np.float32(full) - values
+        if (large := np.isinf(risen)).any():
+            raise FormatError(
+                f"{layout.path}: falls is {layout.falls}, but {name} contains {shown(values[large][0].item())}, and "
+                "the difference does not fit 32 bits"
+            )
+        values = frozen(risen)
     return Frames(values, t, unit=unit, array=table.array)
 
 
@@ -186,55 +173,13 @@ def _after_zeros(frames: Frames, seconds: float) -> Frames:
     """Return frames with frames of 0 before the first, so long, where the first is loaded; later times stay."""
     if len(frames) < _LEAST or not np.any(frames.values[0]):
         return frames
-    step = max(1, round(_median_step(frames.t)))
+    step = max(1, round(float(np.median(np.diff(frames.t)))))
     count = max(1, round(seconds * 1e6 / step))
     t = frames.t[0] + step * np.arange(-count, 0)
     values = np.concatenate([np.zeros((count, *frames.array.shape), np.float32), frames.values])
     return Frames(values, np.concatenate([t, frames.t]), unit=frames.unit, array=frames.array)
 
 
-def _blocks(length: int) -> Iterator[slice]:
-    """Yield the blocks of a column that are computed one after the other, beside which little memory is taken."""
-    return (slice(begin, min(begin + _PIECE, length)) for begin in range(0, length, _PIECE))
-
-
-def _are_numbers(t: NDArray[np.int64]) -> bool:
-    """Return whether times only number the frames: 0, 1, 2 ..."""
-    return all(np.array_equal(t[block], np.arange(block.start, block.stop)) for block in _blocks(len(t)))
-
-
-def _times_at(rate_hz: float, t: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Fill a column with the times of frames at a rate (`times_at`)."""
-    # The last is refused before the others change.
-    times_at(np.array([len(t) - 1]), rate_hz)
-    for block in _blocks(len(t)):
-        t[block] = times_at(np.arange(block.start, block.stop), rate_hz)
-    return frozen_whole(t)
-
-
-def _median_step(t: NDArray[np.int64]) -> float:
-    """Return the median of the steps between times, us, as exact as 32 bits."""
-    steps = np.empty(len(t) - 1, np.float32)
-    for block in _blocks(len(steps)):
-        steps[block] = np.diff(t[block.start : block.stop + 1])
-    return float(np.median(steps, overwrite_input=True))
-
-
-def _writable(array: NDArray[Any]) -> NDArray[Any]:
-    """Return an array that nobody else has, made writable again; a copy if its memory is not NumPy's."""
-    bases, base = list[NDArray[Any]](), array.base
-    while isinstance(base, np.ndarray):
-        bases.append(base)
-        base = base.base
-    if base is not None:
-        return array.copy()
-    for level in (*reversed(bases), array):
-        level.setflags(write=True)
-    return array
-
-
-#: Values, or times, that are computed at once.
-_PIECE = 1 << 17
 #: So many frames show how far apart they are.
 _LEAST = 2
 #: The share by which a rate that a layout says may differ from that of a file's own times.

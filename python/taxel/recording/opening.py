@@ -480,8 +480,6 @@ def _unknown(path: Path) -> FormatError:
     refuse_container(path)
     with open(path, "rb") as file:
         head = file.read(4)
-    if not head:
-        return FormatError(f"{path}: the file is empty; must be a recording")
     describes = advice(path, "describe a table or an array of another program")
     known = f"{', '.join(ENDINGS)}, and of event cameras {', '.join(CAMERA)}"
     begins = " ".join(f"{byte:02X}" for byte in head)
@@ -503,6 +501,8 @@ def _named(opened: Sequence[Recording], name: Path) -> list[tuple[Path, Recordin
 
 def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[Recording]:
     """Open a file, a ROS bag, or a folder of a maker by its layout; each trial is a recording."""
+    if path.is_file() and path.suffix.lower() not in (".lsa", ".mcap") and not path.stat().st_size:
+        raise FormatError(f"{path}: the file is empty; must be a recording")
     kind = kind_of(path)
     if kind is None:
         raise _unknown(path)

@@ -105,7 +105,7 @@ class Silence:
     ms: float
 
     def _part(self) -> Any:
-        return number("ms", self.ms, "ms")
+        return number("ms", self.ms)
 
 
 class Scene:
@@ -261,7 +261,7 @@ class Scene:
         >>> round(float(motion.force_n.max()), 1), len(motion.contacts)
         (20.3, 5)
         """
-        step = number("step_us", step_us, "us")
+        step = number("step_us", step_us)
         tracks, contacts, narrow = _core.motion(Array._of(array)._parts(), self._part(), step)
         self._warn(narrow)
         return Motion(float(step_us), [Track(**track) for track in tracks], [Contact(**touch) for touch in contacts])
@@ -349,7 +349,7 @@ class FrameSequence:
             raise refused("values", f" have shape {self.values.shape}: must be (n, rows, columns)")
         if not (np.all(self.values >= 0) and np.all(self.values <= 1)):
             raise refused("values", ": must be shares of the ramp, 0 to 1")
-        self.period_us = finite("period_us", period_us, "us", least=0.0)
+        self.period_us = finite("period_us", period_us, least=0.0)
 
     def _part(self) -> Any:
         return self.values.reshape(-1), self.period_us

@@ -87,7 +87,7 @@ class Fabric(Value):
         >>> Fabric().conductance([0.0]) == Fabric().rest_us
         array([ True])
         """
-        checked = finite_numbers("force_n", force_n, "N")
+        checked = finite_numbers("force_n", force_n)
         return _core.fabric(self._json(), checked.ravel(), False).reshape(checked.shape)
 
     def force(self, conductance_us: ArrayLike) -> Values:
@@ -111,7 +111,7 @@ class Fabric(Value):
         >>> fabric.force(fabric.conductance([0.0, 2.0])).round(6)
         array([0., 2.])
         """
-        checked = finite_numbers("conductance_us", conductance_us, "uS")
+        checked = finite_numbers("conductance_us", conductance_us)
         return _core.fabric(self._json(), checked.ravel(), True).reshape(checked.shape)
 
 
@@ -134,7 +134,7 @@ class _Lines(Value):
         ------
         ProblemError : an invalid conductance (names the taxel), or another shape
         """
-        checked = _frames("conductance_us", conductance_us, "uS")
+        checked = _frames("conductance_us", conductance_us)
         shape: tuple[int, int] = checked.shape[-2:]
         return _core.circuit_volts(self._kind, self._json(), shape, checked.ravel()).reshape(checked.shape)
 
@@ -153,7 +153,7 @@ class _Lines(Value):
         ------
         ProblemError : conductances that are not finite
         """
-        checked = finite_numbers("conductance_us", conductance_us, "uS")
+        checked = finite_numbers("conductance_us", conductance_us)
         return _core.circuit_volts_alone(self._kind, self._json(), checked.ravel()).reshape(checked.shape)
 
 
@@ -363,7 +363,7 @@ class Converter(Value):
         ------
         ProblemError : voltages that are not finite, or another shape
         """
-        checked = _frames("volts", volts, "V")
+        checked = _frames("volts", volts)
         if (np.abs(checked) > _MOST_V).any():
             raise refused("volts", f": must be from -{_MOST_V:g} to {_MOST_V:g} V")
         shape: tuple[int, int] = checked.shape[-2:]
@@ -409,7 +409,7 @@ class Converter(Value):
         ------
         ProblemError : voltages that are not finite
         """
-        checked = finite_numbers("volts", volts, "V")
+        checked = finite_numbers("volts", volts)
         return _core.converter_ramp(self._json(), checked.ravel(), True).reshape(checked.shape)
 
     def trace(self, line_v: Sequence[float], *, every_us: float = 0.01, stop_us: float = 3.0) -> Trace:
@@ -437,8 +437,8 @@ class Converter(Value):
         >>> len(trace.t_us), round(float(trace.ramp_v.max()), 2)
         (301, 3.0)
         """
-        lines = floats("line_v", line_v, "V").tolist()
-        period, stop = number("every_us", every_us, "us"), number("stop_us", stop_us, "us")
+        lines = floats("line_v", line_v).tolist()
+        period, stop = number("every_us", every_us), number("stop_us", stop_us)
         return Trace(**_core.converter_trace(self._json(), lines, period, stop))
 
 
@@ -524,10 +524,10 @@ class AdaptiveRamp(Value):
         ------
         ProblemError : voltages that are not finite, another shape, or so many that more than 2e8 readings could come
         """
-        checked = _frames("volts", volts, "V")
+        checked = _frames("volts", volts)
         frames = checked if checked.ndim == 3 else checked[None]
         shape: tuple[int, int] = frames.shape[1:]
-        period = number("period_us", period_us, "us")
+        period = number("period_us", period_us)
         read = _core.adaptive_convert(self._json(), shape, frames.ravel(), period)
         return Converted(read.t_us, read.ramp, read.ticks.reshape(-1, *shape), read.volts.reshape(-1, *shape))
 
@@ -578,8 +578,8 @@ class Circuit(Value):
         return (self.converter or Converter()).ticks(volts)
 
 
-def _frames(name: str, values: ArrayLike, unit: str) -> Values:
-    checked = finite_numbers(name, values, unit)
+def _frames(name: str, values: ArrayLike) -> Values:
+    checked = finite_numbers(name, values)
     if checked.ndim not in (2, 3) or 0 in checked.shape[-2:]:
         raise refused(name, f" has shape {checked.shape}: must be (rows, columns) or (n, rows, columns)")
     return checked

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import bare, checked_path, column, floats, instance, nth, number, several, shown, window
+from taxel._base.arguments import checked_path, column, floats, instance, nth, number, several, shown, window
 from taxel._base.arrays import read_arrays
 from taxel._base.columns import FrozenColumns, frozen, frozen_column
 from taxel._base.drawing import draw
@@ -76,13 +76,13 @@ class SpikeTrains(FrozenColumns):
         *,
         kind: Kind | None = None,
     ) -> None:
-        self.times: NDArray[np.float64] = frozen_column("times", times, np.float64, "ms")
+        self.times: NDArray[np.float64] = frozen_column("times", times, np.float64)
         self.offsets: NDArray[np.int64] = frozen_column("offsets", offsets, np.int64)
         self.values: NDArray[np.float32] | None = (
             None if values is None else frozen_column("values", values, np.float32)
         )
         self.kind: Kind = _kind(kind, self.values)
-        self.start, self.stop = number("start", start, "ms"), number("stop", stop, "ms")
+        self.start, self.stop = number("start", start), number("stop", stop)
         _core.check_spikes(self._parts())
 
     @classmethod
@@ -121,16 +121,16 @@ class SpikeTrains(FrozenColumns):
         >>> SpikeTrains.from_lists([[1.0, 5.0], []], stop=10.0)
         SpikeTrains(2 trains, 2 spikes, 0 to 10 ms)
         """
-        flat, counts = _by_train("times", bare("times", times, "ms"), np.float64)
+        flat, counts = _by_train("times", times, np.float64)
         valued = None
         if values is not None:
-            valued, lengths = _by_train("values", bare("values", values), np.float32)
+            valued, lengths = _by_train("values", values, np.float32)
             if lengths != counts:
                 raise refused("values", ": must have the lengths of the trains, one value per spike")
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         if stop is None:
             # Values that are not finite are refused below, with their positions.
-            stop = float(max(number("start", start, "ms"), np.max(flat[np.isfinite(flat)], initial=-np.inf)))
+            stop = float(max(number("start", start), np.max(flat[np.isfinite(flat)], initial=-np.inf)))
         return cls._of_own(flat, offsets, start, stop, valued, kind)
 
     def __len__(self) -> int:
@@ -286,7 +286,7 @@ class SpikeTrains(FrozenColumns):
         [array([3.]), array([1.])]
         """
         try:
-            chosen = np.atleast_1d(np.asarray(bare("trains", trains)))
+            chosen = np.atleast_1d(np.asarray(trains))
         except ValueError as error:
             raise refused("trains", f": {error}") from None
         if chosen.dtype == bool:
@@ -326,7 +326,7 @@ class SpikeTrains(FrozenColumns):
         >>> list(trains.delayed([0.0, 2.5]))
         [array([1.]), array([4.]), array([3.5]), array([6.5])]
         """
-        delays = floats("delays_ms", delays_ms, "ms")
+        delays = floats("delays_ms", delays_ms)
         wrong = np.flatnonzero(~(np.isfinite(delays) & (delays >= 0)))
         if len(wrong):
             raise refused("delays_ms", f"[{wrong[0]}] is {delays[wrong[0]]}: must be 0 or more and finite")

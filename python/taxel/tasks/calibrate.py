@@ -16,7 +16,6 @@ from taxel._base.arguments import text as checked_text
 from taxel._base.errors import helped, unreadable
 from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.messages import collected
-from taxel._base.number_text import float_of
 from taxel._base.times import beginning_us
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -67,7 +66,7 @@ class KnownLoad:
         checked_text("place", self.place)
         for name in ("from_s", "to_s"):
             if getattr(self, name) is not None:
-                finite(name, getattr(self, name), "s")
+                finite(name, getattr(self, name))
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +237,7 @@ def _rows(path: Path, columns: Sequence[str]) -> list[tuple[int, dict[str, str]]
 
 def _number(path: Path, line: int, name: str, cell: str) -> float:
     try:
-        return finite(name, float_of(cell))
+        return finite(name, float(cell))
     except (ValueError, ProblemError):
         raise unreadable(f"{name} is {shown(cell)}; must be a number", path.name, line=line) from None
 

@@ -210,9 +210,7 @@ def _mapped(source: GivenLabels, recordings: Sequence[Recording], argument: str)
         have = counted(len(recordings), "recording")
         raise refused(argument, f" is {counted(len(each), 'mapping')}: must be one for each of {have}")
     named = [mapping(argument, times) for times in each]
-    return [
-        {label: column(f"{argument}[{label!r}]", t, np.int64, "us") for label, t in labels.items()} for labels in named
-    ]
+    return [{label: column(f"{argument}[{label!r}]", t, np.int64) for label, t in labels.items()} for labels in named]
 
 
 def trial_name(recording: Recording) -> str:

@@ -341,4 +341,4 @@ def _turned_of(value: Any) -> float:
 
 
 def _frame_us_of(value: Any) -> float:
-    return finite("frame_us", value, "us", least=1.0, most=3.6e9)
+    return finite("frame_us", value, least=1.0, most=3.6e9)
