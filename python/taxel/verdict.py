@@ -14,9 +14,6 @@ Status = Literal["complete", "complete after arrival", "unknown", "damaged", "un
 #: All statuses, from the best to the worst.
 STATUSES: tuple[Status, ...] = get_args(Status)
 
-#: The whole numbers of a verdict, each a mapping from cause to number.
-_NUMBERS = ("lost", "damaged", "noted")
-
 
 class Verdict(str):
     """State what a recording lost: a line of text with a status, and numbers by cause.
@@ -58,14 +55,21 @@ class Verdict(str):
     - ``dropped_by_kernel``: messages; with ``UDP_GRO`` several datagrams each.
     - ``dropped_by_queue`` ("dropped by taxel's queue"), ``not_recorded`` ("received but not recorded").
     - ``bytes_in_no_line``: after 65 536 bytes of a line; before the first line, bytes that are not text.
-    - ``lost_on_the_way``, ``lost_on_the_way_or_dropped``: lost or damaged. The second: perhaps counted above too, or
-      dropped by a kernel that does not count.
-    - ``lost_in_file``: datagrams, lines or frames. ``notes_lost_in_file`` (also zeroed taxels), ``detections_...``,
-      ``registers_...``, ``changes_...`` (also resets), ``markers_...``, ``held_values_...`` (those at the beginning).
+    - ``lost_on_the_way``: lost or damaged: what the board's numbers lack beyond those dropped; with ``UDP_GRO``, or
+      where the kernel does not count, it may have dropped them.
+    - ``lost_in_file``: datagrams, lines or frames; ``notes_lost_in_file`` (also zeroed taxels),
+      ``detections_lost_in_file``, ``registers_lost_in_file``, ``changes_lost_in_file`` (also resets),
+      ``markers_lost_in_file``, ``held_values_lost_in_file`` (those at the beginning).
 
     Causes in `damaged`:
 
-    - ``datagrams_damaged``, ``bytes_skipped`` and others: unusable; datagrams also count as lost on the way.
+    - ``datagrams_damaged``: unusable; they also count as lost on the way.
+    - Version 1, unusable: ``bytes_skipped``, ``short_events``, ``contradictory_kinds``, ``outside_the_array``,
+      ``unpaired_intensities``, ``empty_datagrams``, ``bytes_of_version_1_refused`` (of a board of version 2).
+    - Version 2, unusable: ``taxels_outside_the_array``, ``datagrams_of_an_unknown_kind``, ``malformed_bodies``,
+      ``markers_with_an_unknown_code``, ``differences_from_an_unknown_value``; ``datagrams_with_unknown_flags`` (read).
+    - ``lines_that_could_not_be_read``: of streams of numbers.
+    - ``unknown_causes``: counted by a later version of taxel.
     - ``datagrams_of_another_board``: version 2: another board's number, or other contents under the same session and
       number.
     - ``datagrams_too_late``: by more than 65 536 numbers.
@@ -122,7 +126,7 @@ class Verdict(str):
     @classmethod
     def _from(cls, held: Mapping[str, Any]) -> Self:
         """Return the verdict that the compiled part states."""
-        verdict = str.__new__(cls, held["text"])
+        verdict = str.__new__(cls, _core.verdict_text(json.dumps(held)))
         verdict._held = held
         return verdict
 
@@ -138,13 +142,12 @@ class Verdict(str):
 
     def _later(self, shift: int) -> Self:
         """Return the verdict on the recording whose times are later by so many us."""
-        return self._of({"later": [shift, self._held]})
+        return self._from(_later(self._held, shift)) if shift else self
 
     def _noting(self, texts: Iterable[str], noted: Mapping[str, int]) -> Self:
-        """Return the same verdict with more texts at its end, and more events that are not losses."""
-        return self._from(
-            {**self._held, "text": "; ".join([str(self), *texts]), "noted": {**self._held["noted"], **noted}}
-        )
+        """Return the same verdict with more texts on what is known, and more events that are not losses."""
+        known = "; ".join([self._held["known"], *texts])
+        return self._from({**self._held, "known": known, "noted": {**self._held["noted"], **noted}})
 
     @property
     def status(self) -> Status:
@@ -183,8 +186,19 @@ class Verdict(str):
 
     def to_dict(self) -> dict[str, Any]:
         """Return text, status and numbers, ready for JSON."""
-        numbers = {name: dict(self._held[name]) for name in _NUMBERS}
+        numbers = {"lost": self.lost, "damaged": self.damaged, "noted": self.noted}
         parts = {name: verdict.to_dict() for name, verdict in self.parts.items()}
         about = {"status": self.status, "text": str(self), **numbers}
         rest = {"doubtful_after_us": self.doubtful_after_us, "steps_back": self.steps_back}
         return about | rest | {"parts": parts}
+
+
+def _later(held: Mapping[str, Any], shift: int) -> dict[str, Any]:
+    """Return what is known of the recording whose times are later by so many us."""
+    after = held["doubtful_after_us"]
+    return {
+        **held,
+        "doubtful_after_us": None if after is None else after + shift,
+        "steps_back": [{**step, "after_us": step["after_us"] + shift} for step in held["steps_back"]],
+        "parts": [(name, _later(part, shift)) for name, part in held["parts"]],
+    }

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 import taxel
-from taxel import _core
+from taxel import Verdict, _core
+from taxel.simulate import Board, Version2
+from taxel.verdict import STATUSES
+from taxel.wire import Registers
 
 HEADER = {
     "array": {"rows": 64, "columns": 64, "pitch_mm": 2.67, "name": "thesis 64x64"},
@@ -65,3 +69,20 @@ def record(
     writer.counts(at, json.dumps({"received": number, "recorded": number}))
     if finish:
         writer.finish(json.dumps({"received": number}))
+
+
+@cache
+def sent_by_a_board(version: int = 2, frames: int = 400) -> list[bytes]:
+    """The datagrams of a board of which some taxels change in each frame, in the order in which it sends them."""
+    board = Board(Registers(wire_version=version), version_2=Version2(states_us=0))
+    draw, held = np.random.default_rng(3), np.full(4096, 20, np.uint16)
+    sent = []
+    for _ in range(frames):
+        held[draw.integers(0, 4096, 200)] ^= 64
+        sent += board.frame(held)
+    return sent
+
+
+def at_least(verdict: Verdict, status: str) -> bool:
+    """Whether a status is that one or a worse one."""
+    return STATUSES.index(verdict.status) >= STATUSES.index(status)

@@ -326,8 +326,7 @@ def test_losses_while_recording_are_in_the_verdict(tmp_path: Path) -> None:
     writer.finish(json.dumps(said))
     rec = taxel.open(path)
     assert rec.verdict == (
-        "LOST: 2 messages dropped by the kernel, 2 datagrams dropped by taxel's queue; "
-        "in the bytes that arrived: 3 bytes skipped"
+        "LOST: 2 messages dropped by the kernel, 2 datagrams dropped by taxel's queue; damaged: 3 bytes skipped"
     )
 
 

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use serde::Serialize;
 use taxel_core::{Array, problem};
 
-use crate::recording::{DamageCounts, FrameProperties, SILENCES, SILENT_MS, StreamFaults, cells, date, number};
+use crate::recording::{Cause, Found, FrameProperties, StreamFaults, cells, date, number};
 use crate::text_lines::{LeftOut, TextLine};
 
 /// How lines of numbers make frames.
@@ -453,10 +453,10 @@ impl FrameAssembler {
 
     /// What is wrong with the lines until `now_ns` since 1970, as a verdict states it.
     #[must_use]
-    pub fn found(&self, now_ns: i64) -> DamageCounts {
+    pub fn found(&self, now_ns: i64) -> Found {
         let Silences { count, ns } = self.silences_until(now_ns);
         let mut found = self.faults.found();
-        found.damage.extend([(SILENCES, count), (SILENT_MS, ns / 1_000_000)].map(|(cause, n)| (cause.to_owned(), n)));
+        found.counts.extend([(Cause::Silences, count), (Cause::SilentMs, ns / 1_000_000)]);
         found
     }
 }
@@ -509,7 +509,7 @@ mod tests {
     #[test]
     fn what_follows_the_end_is_no_silence() {
         let mut frames = FrameAssembler::new(layout(2, &[]));
-        let silent_ms = |frames: &FrameAssembler, now_ns| frames.found(now_ns).damage[SILENT_MS];
+        let silent_ms = |frames: &FrameAssembler, now_ns| frames.found(now_ns).counts[Cause::SilentMs];
         frames.push(&line("1,2"), 0);
         frames.push(&line("1,2"), 3_000_000_000);
         assert_eq!(silent_ms(&frames, 8_000_000_000), 8_000);
@@ -526,7 +526,10 @@ mod tests {
         assert!(!["1,2", "", "1,2", "3,4"].into_iter().any(&mut push));
         assert!(push(""));
         let lost = |frames: &FrameAssembler| frames.unread().unfinished_frames.lines;
-        assert_eq!((lost(&frames), frames.found(0).strange(), frames.found(0).left_out().unfinished), (0, 0, 0));
+        assert_eq!(
+            (lost(&frames), frames.found(0).counts[Cause::Strange], frames.found(0).counts[Cause::UnfinishedLines]),
+            (0, 0, 0)
+        );
         for text in ["5,6", "", "7,8"] {
             frames.push(&line(text), 0);
         }
@@ -535,7 +538,10 @@ mod tests {
         assert_eq!(lost(&frames), 2);
         frames.push(&line("9,9"), 0);
         frames.push(&line(""), 0);
-        assert_eq!((lost(&frames), frames.found(0).strange(), frames.found(0).left_out().unfinished), (2, 2, 3));
+        assert_eq!(
+            (lost(&frames), frames.found(0).counts[Cause::Strange], frames.found(0).counts[Cause::UnfinishedLines]),
+            (2, 2, 3)
+        );
     }
 
     #[test]
@@ -543,7 +549,7 @@ mod tests {
         let mut frames = FrameAssembler::new(layout(2, &[]));
         let mut push = |text: &str| {
             frames.push(&line(text), 0);
-            (frames.found(0).strange(), frames.unread().text.lines, frames.unread().no_text.lines)
+            (frames.found(0).counts[Cause::Strange], frames.unread().text.lines, frames.unread().no_text.lines)
         };
         assert_eq!(
             ["rst:0x1 (POWERON RESET)", "\u{fffd}\u{1}", "1,2", "boot"].map(&mut push),
@@ -551,7 +557,7 @@ mod tests {
         );
         frames.restart();
         frames.push(&line("rst:0x1 (POWERON RESET)"), 0);
-        assert_eq!((frames.found(0).strange(), frames.unread().text.lines), (1, 3));
+        assert_eq!((frames.found(0).counts[Cause::Strange], frames.unread().text.lines), (1, 3));
     }
 
     #[test]

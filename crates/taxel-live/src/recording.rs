@@ -7,7 +7,7 @@
 //! A file is readable at any time: chunks are written whole, at the latest [`FLUSH_EVERY`] after their first datagram,
 //! and the reader rebuilds the index by walking the records, whether the file was finished or not.
 
-mod damage;
+mod causes;
 mod event_previews;
 mod frames;
 mod grey_preview;
@@ -27,8 +27,7 @@ use serde::{Deserialize, Serialize};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
-pub(crate) use damage::{ADDRESS, SILENCES, SILENT_MS};
-pub use damage::{DamageCounts, damage, damage_of_version_1};
+pub use causes::{Cause, CauseKind, Counts};
 pub use event_previews::EventPreviews;
 pub use frames::{FrameEncoding, FrameProperties, Frames};
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
@@ -38,8 +37,9 @@ pub use output::OutputFile;
 pub use stream::{Samples, StreamColumns, StreamFaults};
 pub(crate) use stream::{UNITS_US, cells, clock_unit_us, date, number};
 pub use topic::Topic;
-pub(crate) use verdict::JUMPED_BEFORE;
-pub use verdict::{Basis, Condition, FileEnding, NOTHING_LOST, Rebuilt, RecordingCounts, RecordingStatus, Verdict};
+pub use verdict::{
+    Basis, Condition, FileEnding, Found, NOTHING_LOST, Rebuilt, RecordingCounts, RecordingStatus, Verdict,
+};
 
 /// Longest time that a datagram waits until its chunk is closed and passed to the operating system.
 ///

@@ -176,7 +176,7 @@ fn a_recording_holds_the_events_that_the_board_sent() {
         true => ("losses unknown: the kernel does not count dropped datagrams", RecordingStatus::Unknown),
         false => (NOTHING_LOST, RecordingStatus::CompleteAfterArrival),
     };
-    assert_eq!((summary.verdict.text.as_str(), summary.verdict.status), (text, status));
+    assert_eq!((summary.verdict.text().as_str(), summary.verdict.status), (text, status));
     // The file says the same.
     let reader = Reader::open(&path.0).expect("a recording");
     let Some(FileEnding::Finished { counts }) = reader.ending() else { panic!("{:?}", reader.ending()) };
@@ -331,7 +331,7 @@ fn damaged_and_reordered_datagrams_are_counted_and_close_the_sum_of_bytes() {
     let kinds = w.changes + w.intensities + w.unpaired + w.markers + w.contradictory + w.outside;
     assert_eq!(w.words, kinds);
     for cause in ["bytes skipped", "short events", "events out of order"] {
-        assert!(summary.verdict.text.contains(cause), "{}", summary.verdict.text);
+        assert!(summary.verdict.text().contains(cause), "{}", summary.verdict.text());
     }
 }
 

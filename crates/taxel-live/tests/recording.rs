@@ -7,8 +7,8 @@ use taxel_core::wire::{self, Registers, v2};
 use taxel_core::{Array, Marker, Stop};
 use taxel_live::KernelDrops;
 use taxel_live::recording::{
-    Compression, FileEnding, Header, NOTHING_LOST, Reader, RecordingCounts, RecordingStatus, Topic, Writer,
-    WriterOptions, damage,
+    Cause, Compression, Counts, FileEnding, Header, NOTHING_LOST, Reader, RecordingCounts, RecordingStatus, Topic,
+    Writer, WriterOptions,
 };
 
 /// A folder that is gone when the test ends.
@@ -94,7 +94,7 @@ fn what_was_written_is_read_back_with_any_compression() {
             (3000, 4_200_000, 1)
         );
         let Some(FileEnding::Finished { counts }) = reader.ending() else { panic!("not finished") };
-        assert_eq!((counts.received, counts.recorded, counts.verdict().text.as_str()), (3000, 3000, NOTHING_LOST));
+        assert_eq!((counts.received, counts.recorded, counts.verdict().text().as_str()), (3000, 3000, NOTHING_LOST));
     }
 }
 
@@ -282,28 +282,28 @@ fn all_that_a_decoder_of_version_2_could_not_use_is_damage() {
         unknown_value: 11,
         ..v2::Counts::default()
     };
-    let (decoder, missing) = damage(&wire::Counts::default(), &found, &wire::SenderTotals::default());
-    let verdict =
-        RecordingCounts { received: 9, recorded: 9, missing, decoder, ..RecordingCounts::default() }.verdict();
+    let decoder = Counts::of_decoders(&wire::Counts::default(), &found, &wire::SenderTotals::default());
+    let counts = RecordingCounts { received: 9, recorded: 9, missing: Some(0), decoder, ..RecordingCounts::default() };
+    let verdict = counts.verdict();
     let expected = [
         ("datagrams_damaged", 2 + 3 + 4 + 5),
-        ("datagrams_of_an_unknown_kind", 6),
         ("datagrams_of_another_board", 12),
         ("datagrams_too_late", 1),
-        ("datagrams_with_unknown_flags", 7),
-        ("differences_from_an_unknown_value", 11),
-        ("malformed_bodies", 8),
-        ("markers_with_an_unknown_code", 10),
         ("taxels_outside_the_array", 9),
+        ("datagrams_of_an_unknown_kind", 6),
+        ("datagrams_with_unknown_flags", 7),
+        ("markers_with_an_unknown_code", 10),
+        ("malformed_bodies", 8),
+        ("differences_from_an_unknown_value", 11),
     ];
-    let damaged: Vec<_> = verdict.damaged.iter().map(|(cause, n)| (cause.as_str(), *n)).collect();
+    let damaged: Vec<_> = verdict.counts.iter().map(|(cause, n)| (cause.key(), n)).collect();
     assert_eq!((damaged, verdict.status), (expected.to_vec(), RecordingStatus::Damaged));
 }
 
 #[test]
 fn the_verdict_states_what_was_lost_where() {
     let sound = RecordingCounts { received: 10, recorded: 10, ..RecordingCounts::default() };
-    assert_eq!(sound.verdict().text, NOTHING_LOST);
+    assert_eq!(sound.verdict().text(), NOTHING_LOST);
     let lossy = RecordingCounts {
         received: 10,
         recorded: 6,
@@ -311,14 +311,14 @@ fn the_verdict_states_what_was_lost_where() {
         dropped_by_queue: 3,
         ..RecordingCounts::default()
     };
-    let verdict = lossy.verdict().text;
+    let verdict = lossy.verdict().text();
     for part in
         ["LOST: 2 messages dropped by the kernel", "3 datagrams dropped by taxel's queue", "1 datagram received"]
     {
         assert!(verdict.contains(part), "{verdict}");
     }
-    let damaged = RecordingCounts { decoder: [("skipped".to_owned(), 7), ("short".to_owned(), 0)].into(), ..sound };
-    assert_eq!(damaged.verdict().text, format!("{NOTHING_LOST}; in the bytes that arrived: 7 skipped"));
+    let damaged = RecordingCounts { decoder: [(Cause::BytesSkipped, 7)].into(), ..sound };
+    assert_eq!(damaged.verdict().text(), format!("{NOTHING_LOST}; damaged: 7 bytes skipped"));
 }
 
 #[test]
@@ -327,13 +327,13 @@ fn what_a_kernel_does_not_count_is_unknown_unless_the_board_numbers_what_it_send
     let uncounted = RecordingCounts { dropped_by_kernel: KernelDrops::UNKNOWN, ..sound.clone() };
     let verdict = uncounted.verdict();
     assert_eq!(verdict.status, RecordingStatus::Unknown);
-    assert_eq!(verdict.text, "losses unknown: the kernel does not count dropped datagrams");
+    assert_eq!(verdict.text(), "losses unknown: the kernel does not count dropped datagrams");
     let numbered = RecordingCounts { missing: Some(0), ..uncounted.clone() }.verdict();
-    assert_eq!((numbered.status, numbered.text.as_str()), (RecordingStatus::Complete, "nothing lost"));
+    assert_eq!((numbered.status, numbered.text().as_str()), (RecordingStatus::Complete, "nothing lost"));
     let missing = RecordingCounts { missing: Some(5), dropped_by_queue: 2, recorded: 8, ..uncounted.clone() }.verdict();
-    assert_eq!(missing.lost, [("dropped_by_queue".to_owned(), 2), ("lost_on_the_way_or_dropped".to_owned(), 3)].into());
+    assert_eq!(missing.counts, [(Cause::QueueDropped, 2), (Cause::OnTheWay, 3)].into());
     let dropped = RecordingCounts { dropped_by_queue: 1, recorded: 9, ..uncounted.clone() }.verdict();
-    assert_eq!(dropped.text, "LOST: 1 datagram dropped by taxel's queue, and losses in the kernel are unknown");
+    assert_eq!(dropped.text(), "LOST, at least: 1 datagram dropped by taxel's queue");
     // In a file it is null; a file that says nothing of it was written where the kernel counts.
     let json = serde_json::to_value(&uncounted).unwrap();
     assert_eq!(json["dropped_by_kernel"], serde_json::Value::Null);

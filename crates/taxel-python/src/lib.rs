@@ -79,7 +79,8 @@ mod _core {
     #[pymodule_export]
     use crate::recording::{
         DecodedDatagrams, DecodedLsa, RecordingReader, RecordingWriter, Remarks, Samples, clock_doubt, clock_lines,
-        numbered_path, read_lsa, recording_damage, recording_verdict, seconds_of, whole_frames, write_lsa,
+        numbered_path, read_lsa, recording_damage, recording_verdict, seconds_of, verdict_text, whole_frames,
+        write_lsa,
     };
     #[pymodule_export]
     use crate::simulate::{

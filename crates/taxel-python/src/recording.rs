@@ -1,6 +1,5 @@
 //! Recordings: the live format's reader and writer, and the manual's raw files.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -13,8 +12,8 @@ use taxel_core::encode::Zeroing;
 use taxel_core::{Marker, dates, wire};
 use taxel_live::clock::{self, BoardClock, Offset};
 use taxel_live::recording::{
-    Basis, BoardChange, FrameEncoding, Header, LsaWriter, Reader, RecordingCounts, SourceWriter, Verdict, Writer,
-    WriterOptions, damage_of_version_1, decode_lsa, numbered,
+    Basis, BoardChange, Counts, FrameEncoding, Header, LsaWriter, Reader, RecordingCounts, SourceWriter, Verdict,
+    Writer, WriterOptions, decode_lsa, numbered,
 };
 
 use crate::threaded::Threaded;
@@ -386,10 +385,16 @@ pub fn recording_verdict(basis: &str) -> PyResult<Plain<Value>> {
     Ok(Plain(json!(Verdict::new(parsed::<Basis>("verdict", basis)?))))
 }
 
+/// The line of a verdict, which is JSON.
+#[pyfunction]
+pub fn verdict_text(verdict: &str) -> PyResult<String> {
+    Ok(parsed::<Verdict>("verdict", verdict)?.text())
+}
+
 /// The damage among a decoder's counts, which are JSON.
 #[pyfunction]
-pub fn recording_damage(counts: &str) -> PyResult<Plain<BTreeMap<String, u64>>> {
-    Ok(Plain(damage_of_version_1(&parsed("counts", counts)?)))
+pub fn recording_damage(counts: &str) -> PyResult<Plain<Counts>> {
+    Ok(Plain(Counts::of_version_1(&parsed("counts", counts)?)))
 }
 
 /// Writes raw bytes as a new, complete `.lsa` with its `.lss`.
@@ -433,7 +438,7 @@ pub fn read_lsa(
         payload: column(py, read.bytes),
         events: from_events(py, read.events).into_pyobject(py)?.unbind(),
         counts: Plain(json!(read.counts)),
-        damage: Plain(json!(damage_of_version_1(&read.counts))),
+        damage: Plain(json!(Counts::of_version_1(&read.counts))),
         complete: read.complete,
     })
 }

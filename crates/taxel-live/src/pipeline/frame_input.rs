@@ -14,8 +14,8 @@ use crate::frame_lines::{FrameAssembler, FrameLayout, UnreadLines, write_message
 use crate::line_input::LineReader;
 use crate::line_place::LinePlace;
 use crate::locked::lock;
-use crate::recording::{DamageCounts, now_ns};
-use crate::text_lines::{LeftOut, TextLine};
+use crate::recording::{Cause, Found, now_ns};
+use crate::text_lines::TextLine;
 
 /// Interval at which a reader checks whether there is room for its frames.
 const ROOM_EVERY: Duration = Duration::from_millis(1);
@@ -39,18 +39,17 @@ pub struct LineCounts {
     pub unread: Option<UnreadLines>,
     /// What is wrong with the lines and stamps, as a verdict states it.
     #[serde(skip)]
-    pub faults: DamageCounts,
+    pub faults: Found,
 }
 
 impl LineCounts {
     /// The counts of so many lines with these faults.
-    pub(super) fn new(lines: u64, faults: DamageCounts, trouble: Option<String>) -> Self {
-        let LeftOut { in_no_line, unfinished } = faults.left_out();
+    pub(super) fn new(lines: u64, faults: Found, trouble: Option<String>) -> Self {
         Self {
             lines,
-            strange: faults.strange(),
-            bytes_in_no_line: in_no_line,
-            bytes_of_unfinished_lines: unfinished,
+            strange: faults.counts[Cause::Strange],
+            bytes_in_no_line: faults.counts[Cause::InNoLine],
+            bytes_of_unfinished_lines: faults.counts[Cause::UnfinishedLines],
             trouble,
             unread: None,
             faults,
@@ -59,9 +58,8 @@ impl LineCounts {
 
     /// The difference from earlier counts.
     pub(super) fn since(&self, earlier: &Self) -> Self {
-        let before = |cause: &String| earlier.faults.damage.get(cause).copied().unwrap_or(0);
-        let damage = self.faults.damage.iter().map(|(cause, n)| (cause.clone(), n - before(cause))).collect();
-        let faults = DamageCounts { damage, ..self.faults.clone() };
+        let counts = self.faults.counts.since(&earlier.faults.counts);
+        let faults = Found { counts, ..self.faults.clone() };
         let since = Self::new(self.lines - earlier.lines, faults, self.trouble.clone());
         Self { unread: self.unread.clone(), ..since }
     }

@@ -24,7 +24,7 @@ use crate::frame_lines::FrameLayout;
 use crate::line_input::LineReader;
 use crate::line_place::LinePlace;
 use crate::locked::lock;
-use crate::recording::{self, DamageCounts, SourceWriter, StreamColumns, StreamFaults, cells, now_ns};
+use crate::recording::{self, Found, SourceWriter, StreamColumns, StreamFaults, cells, now_ns};
 use crate::text_lines::{LeftOut, TextLine};
 use crate::{Error, Result};
 
@@ -146,7 +146,7 @@ impl NumberStream {
         self.counts_of(lines, faults)
     }
 
-    fn counts_of(&self, lines: u64, faults: DamageCounts) -> SourceCounts {
+    fn counts_of(&self, lines: u64, faults: Found) -> SourceCounts {
         SourceCounts::Numbers(Box::new(LineCounts::new(lines, faults, lock(&self.trouble).clone())))
     }
 
@@ -202,8 +202,8 @@ impl NumberStream {
 }
 
 /// The losses of a stream of numbers, as recordings state them.
-pub(super) fn losses_of_lines(lines: u64, faults: &DamageCounts) -> recording::RecordingCounts {
-    let decoder = faults.damage.clone();
+pub(super) fn losses_of_lines(lines: u64, faults: &Found) -> recording::RecordingCounts {
+    let decoder = faults.counts;
     recording::RecordingCounts { received: lines, recorded: lines, decoder, ..recording::RecordingCounts::default() }
 }
 

@@ -20,8 +20,8 @@ use taxel_core::{Events, Stop, problem};
 
 use super::stream::Sampling;
 use super::{
-    BoardChange, BoardChangeKind, Condition, DamageCounts, FileEnding, Frames, Header, Rebuilt, RecordingCounts,
-    Samples, Topic, limits,
+    BoardChange, BoardChangeKind, Cause, Condition, Counts, FileEnding, Found, Frames, Header, Rebuilt,
+    RecordingCounts, Samples, Topic, limits,
 };
 use crate::clock::leaves;
 use crate::{Error, Result};
@@ -96,13 +96,13 @@ pub struct DecodedRecording {
     /// Earliest time at which each datagram could leave the board, us; `i64::MIN` if it is not known.
     pub left: Vec<i64>,
     /// What the decoder could not use, as a verdict states it.
-    pub found: DamageCounts,
+    pub found: Found,
 }
 
 impl DecodedRecording {
     fn empty(events: Events) -> Self {
         let (counts, version_2) = (wire::Counts::default(), wire::v2::Counts::default());
-        Self { events, counts, version_2, arrived_ns: vec![], left: vec![], found: DamageCounts::default() }
+        Self { events, counts, version_2, arrived_ns: vec![], left: vec![], found: Found::default() }
     }
 }
 
@@ -164,7 +164,7 @@ impl Reader {
         };
         let ending = match &self.ending {
             Some(FileEnding::Finished { .. }) if source != 0 => {
-                self.ends.get(name).cloned().map(|counts| FileEnding::Finished { counts })
+                self.ends.get(name).cloned().map(|counts| FileEnding::Finished { counts: Box::new(counts) })
             }
             ending => ending.clone(),
         };
@@ -207,31 +207,30 @@ impl Reader {
         let read = |topic: Topic| remarks.messages.get(&topic).copied().unwrap_or(0);
         // A source of which nothing came has no counts in a file that was finished.
         let is_silent = self.source > 0 && read(data) == 0 && !self.rebuilt.unfinished;
-        let silent = is_silent.then(|| FileEnding::Finished { counts: RecordingCounts::default() });
+        let silent = is_silent.then(|| FileEnding::Finished { counts: Box::default() });
         let ending = self.ending.clone().or(silent);
         // The recorder's own counts say how many messages there were, the last ones before the end how many at least.
         let counts = match &ending {
-            Some(FileEnding::Finished { counts }) => Some(counts),
+            Some(FileEnding::Finished { counts }) => Some(&**counts),
             _ => remarks.counts.as_ref(),
         };
         let recorded = |topic: Topic| match &ending {
             Some(FileEnding::Finished { counts }) if topic == data => Some(counts.recorded),
             _ => counts.and_then(|counts| counts.messages.get(&topic)).copied(),
         };
-        let (mut lost, mut repeated) = (BTreeMap::new(), 0);
-        for topic in Topic::ALL.into_iter().filter(|topic| topic.lost_in_file().is_some()) {
-            if let Some(recorded) = recorded(topic) {
-                lost.insert(topic, recorded.saturating_sub(read(topic)));
+        let mut in_file = Counts::default();
+        for topic in Topic::ALL {
+            if let (Some(cause), Some(recorded)) = (topic.lost_in_file(), recorded(topic)) {
+                in_file[cause] += recorded.saturating_sub(read(topic));
                 // Notes may have been added since.
-                repeated += if topic == data { read(topic).saturating_sub(recorded) } else { 0 };
+                in_file[Cause::RepeatedInFile] += if topic == data { read(topic).saturating_sub(recorded) } else { 0 };
             }
         }
         Condition {
             ending,
             rebuilt: self.rebuilt,
             bad_chunks,
-            lost,
-            repeated,
+            in_file,
             messages: read(data),
             so_far: remarks.counts.clone(),
             converted: self.header().conversion.converted.clone().map(Box::new),
@@ -422,7 +421,7 @@ impl Reader {
         decoded.events.markers.iter_mut().for_each(|m| m.t += header.decoding.origin_us);
         decoded.counts = *sender.counts();
         decoded.version_2 = sender.version_2().counts();
-        decoded.found = DamageCounts::from_sender(&sender, header.decoding.origin_us);
+        decoded.found = Found::of_sender(&sender, header.decoding.origin_us);
         Ok(decoded)
     }
 }

@@ -9,8 +9,9 @@ use serde_json::{Map, Value};
 use taxel_core::dates::seconds_of;
 use taxel_core::problem;
 
-use super::damage::{DamageCounts, IN_NO_LINE, MISSING, STRANGE, UNFINISHED_LINES};
+use super::causes::Cause;
 use super::limits;
+use super::verdict::Found;
 use crate::text_lines::LeftOut;
 use clock::StreamClock;
 
@@ -156,7 +157,7 @@ pub struct Samples {
     /// The values without the clock column, line by line.
     pub values: Vec<f64>,
     /// What could not be read, and what is wrong with the stamps, as a verdict states it.
-    pub found: DamageCounts,
+    pub found: Found,
 }
 
 /// Decodes a stream's messages.
@@ -271,23 +272,21 @@ impl StreamFaults {
 
     /// What was found so far, as a verdict states it.
     #[must_use]
-    pub fn found(&self) -> DamageCounts {
+    pub fn found(&self) -> Found {
         let mut found = self.clock.found();
         let LeftOut { in_no_line, unfinished } = self.left_out;
-        let counts = [
-            (STRANGE, self.strange),
-            (MISSING, self.missing),
-            (IN_NO_LINE, in_no_line),
-            (UNFINISHED_LINES, unfinished),
-        ];
-        found.damage.extend(counts.map(|(cause, n)| (cause.to_owned(), n)));
+        found.counts.extend([
+            (Cause::Strange, self.strange),
+            (Cause::Missing, self.missing),
+            (Cause::InNoLine, in_no_line),
+            (Cause::UnfinishedLines, unfinished),
+        ]);
         found
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::damage::{ANEW, BACK, DRIFTS, JUMPS};
     use super::*;
     use rand::{Rng, SeedableRng, rngs::StdRng};
 
@@ -302,15 +301,19 @@ mod tests {
             sampling.push(at_ns, k as u64, message.as_bytes());
         }
         let samples = sampling.finish();
-        let DamageCounts { mut damage, doubtful_after_us, .. } = samples.found;
-        for none in [STRANGE, IN_NO_LINE, UNFINISHED_LINES] {
-            assert_eq!(damage.remove(none), Some(0));
-        }
-        let mut n = |cause: &str| damage.remove(cause).unwrap();
-        (
-            samples.t,
-            Counted { anew: n(ANEW), back: n(BACK), jumps: n(JUMPS), drifts: n(DRIFTS), after: doubtful_after_us },
-        )
+        let Found { counts, doubtful_after_us, .. } = samples.found;
+        let counted = Counted {
+            anew: counts[Cause::ClockAnew],
+            back: counts[Cause::StampsBack],
+            jumps: counts[Cause::Jumps],
+            drifts: counts[Cause::Drifts],
+            after: doubtful_after_us,
+        };
+        assert_eq!(
+            counts.iter().map(|(_, n)| n).sum::<u64>(),
+            counted.anew + counted.back + counted.jumps + counted.drifts
+        );
+        (samples.t, counted)
     }
 
     /// What a stream's clock was found to have done.
@@ -472,7 +475,7 @@ mod tests {
             live.line(&stream, &[stamp, 1.0], k as i64);
         }
         let samples = sampling.finish();
-        assert_eq!((&samples.t[..], samples.found.damage[STRANGE]), (&[1, 2][..], 4));
+        assert_eq!((&samples.t[..], samples.found.counts[Cause::Strange]), (&[1, 2][..], 4));
         assert_eq!(live.found(), samples.found);
     }
 
@@ -487,7 +490,7 @@ mod tests {
         }
         let samples = sampling.finish();
         assert_eq!(samples.values.iter().filter(|value| value.is_nan()).count(), 3);
-        assert_eq!((samples.found.damage[MISSING], samples.found.damage[STRANGE]), (3, 1));
+        assert_eq!((samples.found.counts[Cause::Missing], samples.found.counts[Cause::Strange]), (3, 1));
         assert_eq!(live.found(), samples.found);
     }
 
@@ -499,7 +502,7 @@ mod tests {
             sampling.push(k as i64, k as u64, data.as_bytes());
         }
         let samples = sampling.finish();
-        assert_eq!((samples.values.len(), samples.found.damage[STRANGE]), (0, 2));
+        assert_eq!((samples.values.len(), samples.found.counts[Cause::Strange]), (0, 2));
     }
 
     #[test]

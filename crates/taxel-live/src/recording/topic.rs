@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::causes::Cause;
+
 /// A channel of a recording. Its number is the same in every file, so that a file is readable even if its first chunk,
 /// which contains the channel records, is damaged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -103,19 +105,16 @@ impl Topic {
         matches!(self, Self::Datagrams | Self::Samples | Self::Frames)
     }
 
-    /// How a verdict names messages of the channel that a file has lost: the cause, and what one of them is; none where
-    /// nothing is lost by them.
-    pub(super) fn lost_in_file(self) -> Option<(&'static str, &'static str)> {
+    /// The cause of messages of the channel that a file has lost; none where nothing is lost by them.
+    pub(super) fn lost_in_file(self) -> Option<Cause> {
         Some(match self {
-            Self::Datagrams => ("lost_in_file", "datagram"),
-            Self::Samples => ("lost_in_file", "line"),
-            Self::Frames => ("lost_in_file", "frame"),
-            Self::Registers => ("registers_lost_in_file", "register setting"),
-            Self::Markers => ("markers_lost_in_file", "marker"),
-            Self::Notes => ("notes_lost_in_file", "note"),
-            Self::Detections => ("detections_lost_in_file", "detection"),
-            Self::Held => ("held_values_lost_in_file", "initial state"),
-            Self::Board => ("changes_lost_in_file", "board change"),
+            Self::Datagrams | Self::Samples | Self::Frames => Cause::DataInFile,
+            Self::Registers => Cause::RegistersInFile,
+            Self::Markers => Cause::MarkersInFile,
+            Self::Notes => Cause::NotesInFile,
+            Self::Detections => Cause::DetectionsInFile,
+            Self::Held => Cause::HeldInFile,
+            Self::Board => Cause::ChangesInFile,
             // Later counts include them, and datagrams the values of low-rate previews.
             Self::Counts | Self::Pressure => return None,
         })

@@ -20,8 +20,7 @@ use taxel_core::rest::{LOADED_TICKS, preload, preload_text};
 use taxel_live::clock::{BoardClock, Pace, leaves};
 use taxel_live::pipeline::TaxelChange;
 use taxel_live::recording::{
-    Basis, Condition, DamageCounts, Header, ReadPosition, Reader, Remarks, Topic, Verdict, begin_with,
-    damage_of_version_1,
+    Basis, Condition, Counts, Found, Header, ReadPosition, Reader, Remarks, Topic, Verdict, begin_with,
 };
 use taxel_live::{Error, Result};
 
@@ -360,7 +359,7 @@ impl RecordingIndex {
                 break;
             }
         }
-        contents.verdict = self.verdict_on(&contents, &decoding).text;
+        contents.verdict = self.verdict_on(&contents, &decoding).text();
         Ok(contents)
     }
 
@@ -372,15 +371,13 @@ impl RecordingIndex {
                 let name = self.path.with_extension("lss").file_name().map(|name| name.to_string_lossy().into_owned());
                 return Verdict::new(Basis::Raw(
                     name.filter(|_| self.unfinished),
-                    damage_of_version_1(decoder.counts()),
+                    Counts::of_version_1(decoder.counts()),
                 ));
             }
             (OpenedFile::Lsa(..), RecordingDecoder::Datagrams(_)) => return Verdict::default(),
         };
         let decoded = match decoding {
-            RecordingDecoder::Datagrams(sender) => {
-                Some(DamageCounts::from_sender(sender, self.header.decoding.origin_us))
-            }
+            RecordingDecoder::Datagrams(sender) => Some(Found::of_sender(sender, self.header.decoding.origin_us)),
             RecordingDecoder::Bytes(_) => None,
         };
         let condition = reader.condition(&contents.remarks, contents.bad_chunks);

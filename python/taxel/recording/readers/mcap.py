@@ -28,6 +28,17 @@ from taxel.wire import Registers
 
 #: The damage after which times are doubtful; from when on is known by the file's own times alone.
 DOUBTS = ("jumps_of_time", "stamps_out_of_order", "drifts_from_arrival")
+#: What a stream of numbers counts, whether it happened or not.
+_OF_STREAMS = (
+    "bytes_in_no_line",
+    "bytes_of_unfinished_lines",
+    "clock_began_anew",
+    "drifts_from_arrival",
+    "jumps_of_time",
+    "lines_that_could_not_be_read",
+    "missing_values",
+    "stamps_out_of_order",
+)
 #: What is counted where times step back, by how much and where.
 STEPS = ("events_out_of_order", "events_overtaken")
 
@@ -254,9 +265,10 @@ class McapReader(Reader):
 
     def _counts_of_stream(self) -> dict[str, Any]:
         read = self._samples
-        found, counts = read.found["damage"], self._counted or self._remarks.counts or {}
+        found, counts = read.found["counts"], self._counted or self._remarks.counts or {}
         # Bytes that are in no line are not in the file.
-        lost = {cause: max(n, counts.get("decoder", {}).get(cause, 0)) for cause, n in found.items()}
+        recorded = counts.get("decoder", {})
+        lost = {cause: max(found.get(cause, 0), recorded.get(cause, 0)) for cause in _OF_STREAMS}
         return {"samples": len(read.t), **lost, "received": self._counted.get("received")}
 
     @property

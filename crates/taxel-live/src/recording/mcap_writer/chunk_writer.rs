@@ -114,7 +114,7 @@ impl ChunkWriter {
             let is_board = self.header.stream.is_none() && self.header.frames.is_none();
             let verdict = if is_board { counts.verdict() } else { Verdict::of_lines(counts) };
             let mut end = BTreeMap::from([
-                ("verdict".to_owned(), verdict.text),
+                ("verdict".to_owned(), verdict.text()),
                 ("counts".to_owned(), json!(counts).to_string()),
                 ("header".to_owned(), json!(self.header).to_string()),
                 ("stopped_ns".to_owned(), now_ns().to_string()),

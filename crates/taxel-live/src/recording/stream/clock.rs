@@ -1,8 +1,7 @@
 //! The clock of a stream of numbers: its stamps as times, and what arrival shows to be wrong with them.
 
-use std::collections::BTreeMap;
-
-use super::super::damage::{ANEW, BACK, DRIFTS, DamageCounts, JUMPS};
+use super::super::causes::{Cause, Counts};
+use super::super::verdict::Found;
 
 /// Range of a counter: whole numbers are assumed to have 32 bits.
 const TURN: f64 = 4_294_967_296.0;
@@ -219,9 +218,13 @@ impl StreamClock {
     }
 
     /// What is wrong with the stamps so far.
-    pub fn found(&self) -> DamageCounts {
-        let damage = [(ANEW, self.resets), (BACK, self.back), (JUMPS, self.jumps), (DRIFTS, self.drifts)];
-        let damage: BTreeMap<String, u64> = damage.into_iter().map(|(cause, n)| (cause.to_owned(), n)).collect();
-        DamageCounts { damage, doubtful_after_us: self.after, ..DamageCounts::default() }
+    pub fn found(&self) -> Found {
+        let counts = Counts::from([
+            (Cause::ClockAnew, self.resets),
+            (Cause::StampsBack, self.back),
+            (Cause::Jumps, self.jumps),
+            (Cause::Drifts, self.drifts),
+        ]);
+        Found { counts, doubtful_after_us: self.after, ..Found::default() }
     }
 }
