@@ -23,6 +23,7 @@ from taxel.detect.examples import array_of, padded_to
 from taxel.encode import Composite, Encoder
 from taxel.frames import Frames
 from taxel.recorded import recorded
+from taxel.report import compared
 from taxel.report.page import render
 from taxel.report.svg import INK, STYLE, picture
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -101,7 +102,9 @@ def write_detections(
     target, labels = Path(folder), readout.labels
     moments = {label: _moments(listened, label) for label in labels}
     with mpl.rc_context(STYLE):
+        compared_with = [compared.nearest(listened, labels), compared.beside_training(readout, listened)]
         drawn = {label: _pictures(_of_label(readout, listened, label, moments[label])) for label in labels}
+        nearest, beside_training = ([*_pictures([figure])] for figure in compared_with)
     text = render(
         "report/listening.html.j2",
         title=title,
@@ -111,6 +114,8 @@ def write_detections(
         warnings=warnings,
         printed=printed,
         tables=_tables(listened, labels, held_out, scored),
+        nearest=nearest,
+        beside_training=beside_training,
         worst=[
             (moment.outcome.name, label, (moment.t - moment.outcome.begin_us) / 1e6, moment.what)
             for label in labels
