@@ -4,7 +4,7 @@ python docs/figures.py            judges all statements and draws all pictures a
 python docs/figures.py REPORT     takes the numbers of a report (taxel study all --report REPORT) first, with the commit
 
 A report is taken if the commit that is checked out computed it, without local changes. Beside each figure its toy
-result is kept, with which `taxel study NAME --confirm` compares that of later code.
+result is kept, with which `make slow` compares that of later code.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from __future__ import annotations
 import json
 import os
 import sys
+import tempfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from taxel_studies import STUDIES, load
 from taxel_studies.commit import code_version
-from taxel_studies.kept import keep_toy
 from taxel_studies.study import drawn
 
 FIGURES = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "figures"
@@ -34,7 +34,15 @@ def keep(report: Path, data: Path | None = None) -> None:
             if section.get("commit") != code_version("taxel", "taxel_rules", "taxel_studies"):
                 sys.exit(f"{name}: not computed by the commit that is checked out, without local changes; run it again")
             (FIGURES / f"{name}.json").write_text(json.dumps(section) + "\n")
-            keep_toy(name, FIGURES, data=data)
+            (FIGURES / "toy").mkdir(exist_ok=True)
+            (FIGURES / "toy" / f"{name}.json").write_text(json.dumps(toy_result(name, data)) + "\n")
+
+
+def toy_result(name: str, data: Path | None = None) -> dict[str, Any]:
+    """Run a study at its smallest size; return parameters and results, with commit, date and machine."""
+    with tempfile.TemporaryDirectory() as report:
+        section = load(name).run(Path(report), size="toy", data=data, quiet=True)
+    return {key: section[key] for key in ("parameters", "unread", "said", "commit", "date", "machine")}
 
 
 def judged(section: dict[str, Any]) -> list[dict[str, Any]]:

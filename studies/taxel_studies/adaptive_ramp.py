@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.simulate.circuit import AdaptiveRamp, Converter, Fabric, VirtualGround
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, logarithmic
 
 WHERE = "thesis 4.3.2"
 PROTOCOL = (

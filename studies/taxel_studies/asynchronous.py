@@ -12,9 +12,8 @@ from taxel.events import Events
 from taxel.simulate import Act, Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains, to_ms
 from taxel_studies import spike_codes
-from taxel_studies.runner import Task
 from taxel_studies.spike_codes import drop_tasks, kinds_of
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, logarithmic
 
 WHERE = "thesis 4.5, 7.2 and Table 7.1"
 PROTOCOL = (

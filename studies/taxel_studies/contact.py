@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from taxel.encode import FA1
 from taxel.frames import Frames
 from taxel_studies import indented
-from taxel_studies.fem import Course, KeptCourses, SamplingGrid, Yeoh, bodies
+from taxel_studies.fem import Course, SamplingGrid, Yeoh, bodies
 from taxel_studies.fem.solids import Solids
-from taxel_studies.runner import SharedFolder
-from taxel_studies.study import Parameters, Row, Statement, Summary
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary
 
 WHERE = "thesis 5.4.1 and 5.4.2, figures 5.1 to 5.4, tables 5.1 and 5.2"
 PROTOCOL = (
@@ -27,7 +26,7 @@ PROTOCOL = (
     "Pressure is the normal traction at the base. What the thesis leaves open stands on the page Readings. Courses are "
     "kept beside the report and shared by figures 5.5 to 5.8."
 )
-COURSES = True
+KEEPS = True
 
 PARAMETERS: dict[str, Any] = {
     **indented.TABLE,
@@ -51,10 +50,10 @@ COLOURS = ("C3", "C1", "C9")
 tasks = indented.tasks
 
 
-def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[str, Any]:
+def realise(params: dict[str, Any], seed: int, kept: Kept) -> dict[str, Any]:
     """Press once, and return how well the forces balance."""
     del seed
-    course = indented.make(params, courses)
+    course = indented.make(params, kept)
     assert course is not None  # every realisation of this study makes a course
     most = max(float(np.abs(course.reaction).max()), 1e-300)
     mirrored = course.pressure_kpa - course.pressure_kpa[:, ::-1]
@@ -68,13 +67,13 @@ def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[st
     }
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     """List the courses, and what the pictures show of one of them."""
     paths = [{**row.params["course"], **row.result} for row in rows]
     wanted = p["drawn"]
     asked = indented.courses_of(p)
     shown = asked[wanted["diameter_mm"], wanted["modulus_kpa"], wanted["angle_deg"]]
-    course = KeptCourses(courses.path, courses.code).made(shown)
+    course = indented.pressed(shown, kept)
     most = max(row.result["most_kpa"] for row in rows)
     return {
         "paths": [{k: v for k, v in one.items() if k != "silicone"} for one in paths],
@@ -91,7 +90,7 @@ def _shape(course: Course, depth: float) -> dict[str, Any]:
     laws = course.indentation.silicone, Yeoh.of_modulus(course.indentation.modulus_kpa)
     solids = Solids([(ground, laws[0]), (disc, laws[1])])
     at = min(course.shapes, key=lambda path: abs(path - depth))
-    x = course.shapes[at]
+    x = course.shapes[at].astype(float)
     f = solids.gradient((x - solids.nodes).ravel()).mean(1)
     split = len(ground.quads)
     pressure = []

@@ -13,8 +13,7 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.capacity import DURATION_MS, patterns, satisfied, weakest
 from taxel_studies.mapping import LEARN, TABLE
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task
 
 WHERE = "ours; the thesis has no delays"
 PROTOCOL = (

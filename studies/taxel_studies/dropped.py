@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple
@@ -16,11 +14,10 @@ from taxel.array import Array
 from taxel.encode import ChangeEvents
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.report import write_whole
 from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US, Registers
-from taxel_studies.runner import SharedFolder, Task
+from taxel_studies.study import Kept, Task
 
 __all__ = [
     "ANSWERED",
@@ -157,27 +154,18 @@ def tasks(p: Mapping[str, Any]) -> list[Task]:
     return [Task({**named(p), "condition": list(one)}, p["seed"]) for one in conditions(p)]
 
 
-def played_summary(
-    params: Mapping[str, Any], seed: int, courses: SharedFolder, rig: Rig = IMPACTS
-) -> dict[str, Any] | None:
+def played_summary(params: Mapping[str, Any], seed: int, kept: Kept, rig: Rig = IMPACTS) -> dict[str, Any] | None:
     """Return the events and contact times of the drops of a realisation of `tasks`; None for another one."""
     if "condition" not in params:
         return None
-    drops = played(params, Condition(*params["condition"]), seed, courses, rig)
+    drops = played(params, Condition(*params["condition"]), seed, kept, rig)
     return {"events": drops.events.tolist(), "lasted_ms": to_ms(drops.lasted_us).round(3).tolist()}
 
 
-def played(p: Mapping[str, Any], condition: Condition, seed: int, courses: SharedFolder, rig: Rig = IMPACTS) -> Drops:
-    """Return a condition's drops from the folder, or drop the ball and keep them there."""
-    made_by = json.dumps([named(p), condition, rig, seed, courses.code], sort_keys=True)
-    digest = hashlib.sha256(made_by.encode()).hexdigest()[:16]
-    b, h, s = condition
-    path = courses.path / f"drops-{b:g}mm-{h:g}mm-{s:g}deg-{digest}.npz"
-    if not path.exists():
-        drops = _drop(p, condition, seed, rig)
-        write_whole(path, lambda file: np.savez_compressed(file, **drops._asdict()), overwrite=True)
-    with np.load(path) as kept:
-        return Drops(**{name: kept[name] for name in Drops._fields})
+def played(p: Mapping[str, Any], condition: Condition, seed: int, kept: Kept, rig: Rig = IMPACTS) -> Drops:
+    """Return a condition's drops computed once for all studies of a report."""
+    drops: Drops = kept.made(_drop, named(p), condition, seed, rig)
+    return drops
 
 
 def _drop(p: Mapping[str, Any], condition: Condition, seed: int, rig: Rig) -> Drops:

@@ -12,8 +12,7 @@ from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 from taxel_studies import dropped
 from taxel_studies.dropped import FRAMES, REGION, Condition
-from taxel_studies.runner import SharedFolder
-from taxel_studies.study import Parameters, Row, Statement, Summary
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary
 
 WHERE = "thesis 5.6.2 and 5.7, figures 5.10 and 5.14"
 PROTOCOL = (
@@ -26,7 +25,7 @@ PROTOCOL = (
     "tilted by 0, 15 or 30 degrees, always the same way: the ball meets it by v cos(slant), keeps the rest of its "
     "speed, and friction (0.6 of the force, a guess) makes it roll. The foam is a layer bonded to the board."
 )
-COURSES = True
+KEEPS = True
 
 PARAMETERS: dict[str, Any] = {**dropped.TABLE, "drawn": [50.0, 100.0, 0.0], "seed": 1}
 SIZES = {"toy": {**dropped.TOY, "drawn": [50.0, 100.0, 0.0]}}
@@ -41,14 +40,14 @@ PICTURES_MS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 tasks = dropped.tasks
 
 
-def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[str, Any] | None:
+def realise(params: dict[str, Any], seed: int, kept: Kept) -> dict[str, Any] | None:
     """Drop a ball so many times, and count."""
-    return dropped.played_summary(params, seed, courses)
+    return dropped.played_summary(params, seed, kept)
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     """Return each drop's data rate, and the events of one."""
-    shown = dropped.played(p, Condition(*p["drawn"]), p["seed"], courses)
+    shown = dropped.played(p, Condition(*p["drawn"]), p["seed"], kept)
     spikes = dropped.sampled(shown.ticks[:1], to_ms(FRAME_US), np.zeros(1))[0]
     sample, sign, taxel = np.nonzero(spikes)
     events = [n for row in rows for n in row.result["events"]]

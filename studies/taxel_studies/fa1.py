@@ -16,9 +16,8 @@ from taxel.encode import FA1
 from taxel.frames import Frames
 from taxel.spikes import SpikeTrains
 from taxel_studies import spike_codes
-from taxel_studies.runner import Task
 from taxel_studies.spike_codes import PERIOD_US, SIDE, drop, drop_tasks, kinds_of, since_contact
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task
 
 WHERE = "thesis 7.2, which asks it"
 PROTOCOL = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 
 from taxel.encode import ThresholdIzhikevich
 from taxel_studies.fabric_array import ARRAY, PERIOD_US, SENSOR, depth_of, pressed, read
-from taxel_studies.study import Parameters, Row, Statement, Summary, one_task_per_seed
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid
 
 WHERE = "thesis 3.4.3, figure 3.3"
 PROTOCOL = (
@@ -33,7 +34,7 @@ SIZES = {"toy": {"realisations": 2, "presses": 2}}
 STEADY_MS = 60.0
 
 
-tasks = one_task_per_seed
+tasks = partial(grid, seed="realisations")
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:

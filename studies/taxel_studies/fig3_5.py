@@ -14,8 +14,7 @@ from taxel.encode import ThresholdIzhikevich
 from taxel.spikes import SpikeTrains
 from taxel_rules import Tempotron
 from taxel_studies.fabric_array import PERIOD_US, SENSOR, depth_of, pressed, read
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task
 
 WHERE = "thesis 3.5 and 3.6.1, figures 3.5 and 3.6"
 PROTOCOL = (

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 from taxel.simulate.circuit import Converter, Fabric, VirtualGround
 from taxel.wire import Registers
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task
 
 WHERE = "thesis 4.4.1, figure 4.6"
 PROTOCOL = (

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from taxel.information import confusion_matrix, nested_predictions, panzeri_treves
 from taxel_studies import dropped
 from taxel_studies.dropped import TENNIS, Condition
-from taxel_studies.runner import SharedFolder, Task
-from taxel_studies.study import Parameters, Row, Statement, Summary, logarithmic
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, logarithmic
 
 WHERE = "thesis 4.4.2, figures 4.8 and 4.10"
 PROTOCOL = (
@@ -26,7 +25,7 @@ PROTOCOL = (
     "discriminants of the frames, 10 folds, the ridge chosen inside them; bits of the answers (4.1), corrected "
     "by Panzeri and Treves."
 )
-COURSES = True
+KEEPS = True
 
 PARAMETERS: dict[str, Any] = {
     **dropped.TENNIS_TABLE,
@@ -61,12 +60,12 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     ]
 
 
-def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[str, Any]:
+def realise(params: dict[str, Any], seed: int, kept: Kept) -> dict[str, Any]:
     """Drop the ball as often as asked; or return the bits of discriminants on all drops at a period."""
-    drops = dropped.played_summary(params, seed, courses, TENNIS)
+    drops = dropped.played_summary(params, seed, kept, TENNIS)
     if drops is not None:
         return drops
-    x, y = sampled_drops(params, seed, courses, params["period_ms"], TENNIS.length_ms, aligned=params["aligned"])
+    x, y = sampled_drops(params, seed, kept, params["period_ms"], TENNIS.length_ms, aligned=params["aligned"])
     x -= x.mean(0)
     named = nested_predictions([x @ x.T], [int(x.any(0).sum())], y, count=10, seed=seed)
     return {
@@ -76,23 +75,23 @@ def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[st
 
 
 def sampled_drops(
-    p: Parameters, seed: int, courses: SharedFolder, period_ms: float, length_ms: float, *, aligned: bool = True
+    p: Parameters, seed: int, kept: Kept, period_ms: float, length_ms: float, *, aligned: bool = True
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return the frames of all drops at a period, one drop a row, and the number of each drop's condition."""
     rng = np.random.default_rng([seed, PHASES])
     parts = []
     for condition in dropped.conditions(p):
-        ticks = dropped.played(p, condition, seed, courses, TENNIS).ticks
+        ticks = dropped.played(p, condition, seed, kept, TENNIS).ticks
         late = np.zeros(len(ticks)) if aligned else rng.uniform(0, period_ms, len(ticks))
         shown = dropped.frames_of(ticks, period_ms, late, TENNIS, length_ms)
         parts.append(shown.reshape(len(ticks), -1))
     return np.concatenate(parts), np.repeat(np.arange(len(parts)), [len(part) for part in parts])
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     """List the bits by period, and one drop's frames."""
     asked = {(row.params["period_ms"], row.params["aligned"]): row for row in rows if "period_ms" in row.params}
-    one = dropped.played(p, Condition(*p["drawn"]), p["seed"], courses, TENNIS).ticks[:1]
+    one = dropped.played(p, Condition(*p["drawn"]), p["seed"], kept, TENNIS).ticks[:1]
     frame_ms = TENNIS.frame_us / 1000
     whole = dropped.frames_of(one, frame_ms, np.zeros(1), TENNIS, TENNIS.length_ms)[0]
     shown = dropped.frames_of(one, FRAME_MS, np.zeros(1), TENNIS, (FRAMES + 1) * FRAME_MS)[0]

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import dropped, fig4_8
 from taxel_studies.dropped import TENNIS
-from taxel_studies.runner import SharedFolder, Task
-from taxel_studies.study import Parameters, Row, Statement, Summary
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task
 
 WHERE = "thesis 4.4.2, figure 4.9"
 PROTOCOL = (
@@ -20,7 +19,7 @@ PROTOCOL = (
     "t-SNE of scikit-learn on all frames of a drop, begun at its principal components; beside each map, how many "
     "of a drop's 10 nearest neighbours in it are of its own class; and the same of drops sampled from any phase on."
 )
-COURSES = True
+KEEPS = True
 NEEDS = ("sklearn",)
 
 PARAMETERS: dict[str, Any] = {
@@ -51,16 +50,16 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     ]
 
 
-def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[str, Any]:
+def realise(params: dict[str, Any], seed: int, kept: Kept) -> dict[str, Any]:
     """Drop the ball as often as asked; or map all drops at a rate onto a plane, and classify each by its neighbours."""
-    drops = dropped.played_summary(params, seed, courses, TENNIS)
+    drops = dropped.played_summary(params, seed, kept, TENNIS)
     if drops is not None:
         return drops
     from sklearn.manifold import TSNE  # noqa: PLC0415  an extra
 
     result: dict[str, Any] = {}
     for how, aligned in (("", True), ("any_phase_", False)):
-        x, y = fig4_8.sampled_drops(params, seed, courses, 1000 / params["rate_hz"], LENGTH_MS, aligned=aligned)
+        x, y = fig4_8.sampled_drops(params, seed, kept, 1000 / params["rate_hz"], LENGTH_MS, aligned=aligned)
         laid = TSNE(perplexity=params["perplexity"], init="pca", random_state=seed).fit_transform(x)
         result[f"{how}own"] = round(own_neighbours(np.asarray(laid, np.float64), y), 4)
         if aligned:
@@ -77,9 +76,9 @@ def own_neighbours(places: NDArray[np.float64], y: NDArray[np.int64]) -> float:
     return float(np.mean(y[near] == y[:, None]))
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     """List the maps by rate."""
-    del courses
+    del kept
     maps = {row.params["rate_hz"]: row.result for row in rows if "rate_hz" in row.params}
     names = [f"{c.height_mm / 10:g} cm, {c.slant_deg:g} degrees" for c in dropped.conditions(p)]
     return {"lines": [{"rate_hz": rate, **maps[rate]} for rate in sorted(maps)], "classes": names}

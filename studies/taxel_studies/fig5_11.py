@@ -15,8 +15,7 @@ from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 from taxel_studies import dropped, kept_bits
 from taxel_studies.dropped import LENGTH_MS, REGION, distances_of
-from taxel_studies.runner import SharedFolder, Task
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Table, Task
 
 WHERE = "thesis 5.6.3 and 5.6.4, figures 5.11 to 5.13"
 PROTOCOL = (
@@ -28,7 +27,7 @@ PROTOCOL = (
     "Panzeri and Treves. Tau and sigma are searched at each period on the same drops, as in the thesis. Beside "
     "it: sampling begun at any phase, and the absolute differences of 5.10 as printed, at the best tau and sigma."
 )
-COURSES = True
+KEEPS = True
 
 PARAMETERS: dict[str, Any] = {
     **dropped.TABLE,
@@ -99,12 +98,12 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     return first + last
 
 
-def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> Any:
+def realise(params: dict[str, Any], seed: int, kept: Kept) -> Any:
     """Drop a ball as often as asked; or compare all drops at a period, and return the bits of neighbours' answers."""
-    drops = dropped.played_summary(params, seed, courses)
+    drops = dropped.played_summary(params, seed, kept)
     if drops is not None:
         return drops
-    spikes, y = _spikes(params, seed, courses, aligned=params["ask"] != "any phase")
+    spikes, y = _spikes(params, seed, kept, aligned=params["ask"] != "any phase")
     period, tau, pitch = params["period_ms"], params["tau_ms"], Array.thesis().column_mm
     if params["ask"] == "search":
         kernels = [dropped.smoothed(REGION, pitch, sigma) for sigma in params["sigmas_mm"]]
@@ -158,13 +157,13 @@ def _samples_before(time_ms: float, period_ms: float, most: int) -> int:
 
 
 def _spikes(
-    params: dict[str, Any], seed: int, courses: SharedFolder, *, aligned: bool
+    params: dict[str, Any], seed: int, kept: Kept, *, aligned: bool
 ) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
     """Return all drops' change events at a period, and the number of each one's condition."""
     parts = []
     rng = np.random.default_rng([seed, 511])
     for condition in dropped.conditions(params):
-        ticks = dropped.played(params, condition, seed, courses).ticks
+        ticks = dropped.played(params, condition, seed, kept).ticks
         late = np.zeros(len(ticks)) if aligned else rng.uniform(0, params["period_ms"], len(ticks))
         parts.append(dropped.sampled(ticks, params["period_ms"], late))
     return np.concatenate(parts), np.repeat(np.arange(len(parts)), [len(part) for part in parts])
@@ -186,9 +185,9 @@ def _bits(
     return bits
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     """List the bits by period."""
-    del courses
+    del kept
     lines = []
     for period in sorted(p["periods_ms"]):
         here = [row for row in rows if row.params.get("period_ms") == period]

@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from taxel.encode import FA1
 from taxel_studies import indented, kept_bits
 from taxel_studies.fem import SamplingGrid
-from taxel_studies.runner import SharedFolder, Task
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Table, Task
 
 WHERE = "thesis 5.5.1 and 5.5.3, figures 5.5, 5.6 and 5.8"
 PROTOCOL = (
@@ -24,7 +23,7 @@ PROTOCOL = (
     "at 2 ms and longer, below that around the best of those. A sample of rest comes before the first. At .2 ms "
     "(the thesis' own step) only the first 20 ms are sampled, at the alpha of the shortest period."
 )
-COURSES = True
+KEEPS = True
 
 PARAMETERS: dict[str, Any] = {
     **indented.TABLE,
@@ -105,9 +104,9 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     return first + second + last + [asked("bits", period, a, p["even_ms"]) for period, a in chosen.items()]
 
 
-def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[str, Any]:
+def realise(params: dict[str, Any], seed: int, kept: Kept) -> dict[str, Any]:
     """Press once; or sample all contacts at a period, and return the bits of the discriminants' answers."""
-    course = indented.make(params, courses)
+    course = indented.make(params, kept)
     if course is not None:
         return indented.course_summary(course)
     conditions = indented.reached(params)
@@ -123,7 +122,7 @@ def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[st
     x = indented.rasters(
         conditions,
         indented.courses_of(params),
-        courses,
+        kept,
         grid=grid,
         encoder=encoder,
         samples=samples,
@@ -156,9 +155,9 @@ def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[st
     }
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     """List the bits by period, alpha and question."""
-    del courses
+    del kept
     lines = []
     for period in sorted(p["periods_ms"]):
         here = [row for row in rows if row.params.get("period_ms") == period and row.params["ask"] != "part"]

@@ -11,15 +11,14 @@ from matplotlib.figure import Figure
 from taxel.encode import FA1
 from taxel_studies import indented
 from taxel_studies.fem import SamplingGrid
-from taxel_studies.runner import SharedFolder, Task
-from taxel_studies.study import Parameters, Row, Statement, Summary, logarithmic
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, logarithmic
 
 WHERE = "thesis 5.5.2, figure 5.7"
 PROTOCOL = (
     "As fig5.5, with Table 5.3's alpha; a spike's value is the change since the last one in units of theta_0 "
     "(5.7), towards zero, saturating at 2^bits - 1. When a spike is fired stays that of 5.4."
 )
-COURSES = True
+KEEPS = True
 
 PARAMETERS: dict[str, Any] = {
     **indented.TABLE,
@@ -49,9 +48,9 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     ]
 
 
-def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[str, Any]:
+def realise(params: dict[str, Any], seed: int, kept: Kept) -> dict[str, Any]:
     """Press once; or sample all contacts, and return the bits of discriminants on spikes with so many bits."""
-    course = indented.make(params, courses)
+    course = indented.make(params, kept)
     if course is not None:
         return indented.course_summary(course)
     conditions, samples = indented.reached(params), params["samples"]
@@ -64,7 +63,7 @@ def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[st
     x = indented.rasters(
         conditions,
         indented.courses_of(params),
-        courses,
+        kept,
         grid=SamplingGrid(),
         encoder=encoder,
         samples=samples,
@@ -73,9 +72,9 @@ def realise(params: dict[str, Any], seed: int, courses: SharedFolder) -> dict[st
     return indented.bits_of(indented.summed(x, len(conditions), samples, seed), samples)
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: SharedFolder) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     """List the bits by period and bits an event."""
-    del courses
+    del kept
     bits = {
         (row.params["period_ms"], row.params["event_bits"]): row.result["bits"]
         for row in rows

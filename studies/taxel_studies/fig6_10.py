@@ -8,8 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from taxel_studies import waves
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Statement, Summary
+from taxel_studies.study import Parameters, Statement, Summary, Task
 from taxel_studies.waves import NOISES, READINGS, TRAINED_AT
 
 WHERE = "thesis 6.4.7, figure 6.10"

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import waves
 from taxel_studies.mapping import LEARN
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task
 from taxel_studies.waves import READINGS
 
 WHERE = "thesis 6.4.7, figure 6.11"

@@ -16,8 +16,7 @@ from taxel_studies.gait.judgement import STANDS_FOR
 from taxel_studies.gait.outcomes import EVENTS
 from taxel_studies.gait.recipes import NOTES, PRINTED
 from taxel_studies.gait.sources import SOURCES, fingerprint
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task
 
 WHERE = "thesis 6.5.4, figure 6.15"
 PROTOCOL = (

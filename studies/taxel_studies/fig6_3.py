@@ -13,8 +13,7 @@ from taxel.learn import ConeR, ConeX
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.mapping import LEARN, TABLE
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task
 
 WHERE = "thesis 6.3.4, figure 6.3"
 PROTOCOL = (

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 from taxel_studies import mapping
 from taxel_studies.mapping import TABLE
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task
 
 WHERE = "thesis 6.4.2, figure 6.5"
 PROTOCOL = (

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import mapping
 from taxel_studies.mapping import TABLE, thresholds
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task
 
 WHERE = "thesis 6.4.3, figure 6.6"
 PROTOCOL = (

@@ -9,8 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from taxel_studies import capacity
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task
 
 WHERE = "thesis 6.4.4, figure 6.7"
 PROTOCOL = (

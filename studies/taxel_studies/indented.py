@@ -12,10 +12,9 @@ from taxel.encode import FA1
 from taxel.frames import Frames
 from taxel.information import folds
 from taxel_studies.discriminants import FoldSums
-from taxel_studies.fem import TABLE_5_1, Condition, Course, Indentation, KeptCourses, SamplingGrid, Table, paths
+from taxel_studies.fem import TABLE_5_1, Condition, Course, Indentation, SamplingGrid, Table, paths, press
 from taxel_studies.kept_bits import information
-from taxel_studies.runner import SharedFolder, Task
-from taxel_studies.study import Row
+from taxel_studies.study import Kept, Row, Task
 
 __all__ = [
     "COARSE",
@@ -26,6 +25,7 @@ __all__ = [
     "courses_of",
     "largest_kpa",
     "make",
+    "pressed",
     "rasters",
     "reached",
     "shared",
@@ -83,23 +83,28 @@ def tasks(p: Mapping[str, Any]) -> list[Task]:
     return course_tasks(list(courses_of(p).values()))
 
 
-def make(params: Mapping[str, Any], courses: SharedFolder) -> Course | None:
+def make(params: Mapping[str, Any], kept: Kept) -> Course | None:
     """Return the course that a realisation is to make, from the folder or anew; None where it makes none."""
     if _COURSE not in params:
         return None
-    return KeptCourses(courses.path, courses.code).made(Indentation.from_dict(params[_COURSE]))
+    return pressed(Indentation.from_dict(params[_COURSE]), kept)
 
 
-def largest_kpa(asked: Sequence[Indentation], courses: SharedFolder, grid: SamplingGrid) -> float:
+def pressed(asked: Indentation, kept: Kept) -> Course:
+    """Return a course, computed once for all studies of a report."""
+    course: Course = kept.made(press, asked)
+    return course
+
+
+def largest_kpa(asked: Sequence[Indentation], kept: Kept, grid: SamplingGrid) -> float:
     """Return the largest pressure on any taxel of a grid on any course: Table 5.3's range."""
-    kept = KeptCourses(courses.path, courses.code)
-    return max(grid.most_kpa(kept.made(one)) for one in asked)
+    return max(grid.most_kpa(pressed(one, kept)) for one in asked)
 
 
 def rasters(
     conditions: Sequence[Condition],
     asked: Mapping[tuple[float, float, float], Indentation],
-    courses: SharedFolder,
+    kept: Kept,
     *,
     grid: SamplingGrid,
     encoder: FA1,
@@ -111,7 +116,6 @@ def rasters(
 
     Of the whole contact, or of its beginning until a time.
     """
-    kept = KeptCourses(courses.path, courses.code)
     steps = grid.steps(encoder.period_ms) if until_ms is None else round(until_ms / encoder.period_ms)
     raster = np.zeros((len(conditions), samples, steps, grid.taxels), np.int8 if encoder.bits < 8 else np.int16)
     t = np.round(np.arange(steps + 1) * encoder.period_ms * 1000).astype(np.int64)
@@ -119,7 +123,7 @@ def rasters(
     for k, c in enumerate(conditions):
         way = (c.diameter_mm, c.modulus_kpa, c.angle_deg)
         if way not in loaded:
-            loaded[way] = kept.made(asked[way])
+            loaded[way] = pressed(asked[way], kept)
         values = grid.draw(loaded[way], c.depth_mm, encoder.period_ms, samples, seed=seed * len(conditions) + k)
         values = values[:, : steps + 1]
         spikes = encoder.encode(Frames(values.transpose(1, 0, 2), t, unit="kPa"))

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from taxel.encode import FA1, FA2, SA1, SA2, Encoder
 from taxel.frames import Frames
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task
 
 WHERE = "thesis 2.1.5, 3.3 and 7.2, which asks for the types beside FA-1"
 PROTOCOL = (

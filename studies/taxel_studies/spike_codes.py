@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import Frames, SpikeTrains, Tare
 from taxel.information import Estimate, estimate, nested_predictions
 from taxel.simulate import Act, Scene, Silence, play, truth
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row
+from taxel_studies.study import Parameters, Row, Task
 
 __all__ = [
     "PERIOD_US",

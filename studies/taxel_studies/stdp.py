@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from taxel.spikes import SpikeTrains
 from taxel_rules import STDP
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, one_task_per_seed
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, grid
 
 WHERE = "thesis 3.6.2, which calls for it; Masquelier, Guyonneau and Thorpe 2008, PLoS ONE 3:e1377"
 PROTOCOL = (
@@ -117,7 +116,7 @@ def pieces(p: Parameters, spikes: Spikes, start: float) -> Iterator[SpikeTrains]
 
 def tasks(p: Parameters) -> list[Task]:
     """List one run a task."""
-    return one_task_per_seed(p, "runs")
+    return grid(p, seed="runs")
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:

@@ -24,10 +24,10 @@ from matplotlib.figure import Figure
 from taxel import FormatError, ProblemError, __version__
 from taxel.report import write_whole
 from taxel_studies.commit import code_version
-from taxel_studies.durations import forecast
-from taxel_studies.runner import Results, SharedFolder, Task, Workers, one_of, run, whole
+from taxel_studies.runner import Kept, Row, Task, Workers, grid, run
 
 __all__ = [
+    "Kept",
     "Parameters",
     "Row",
     "Section",
@@ -35,14 +35,17 @@ __all__ = [
     "Study",
     "Summary",
     "Table",
+    "Task",
     "drawn",
+    "forecast",
+    "grid",
     "logarithmic",
     "machine",
     "one_task",
-    "one_task_per_seed",
     "only_result",
     "read_section",
     "refuse",
+    "results",
     "svg",
 ]
 
@@ -52,6 +55,44 @@ Parameters = Mapping[str, Any]
 Summary = dict[str, Any]
 #: One study's part of the page, as ``summary.json`` holds it.
 Section = dict[str, Any]
+
+
+#: The size of the kept run of each study that took a minute or more, and its seconds of CPU, on one core of an AMD EPYC
+#: or an Intel Xeon; `studies/tests/test_kept_figures.py` compares them with the kept figures.
+CPU_SECONDS = {
+    "contact": ("full", 3421),
+    "asynchronous": ("full", 200),
+    "drops": ("full", 294),
+    "fa1": ("full", 94),
+    "fig5.5": ("full", 5152),
+    "fig5.7": ("full", 1257),
+    "fig5.11": ("full", 728),
+    "fig6.7": ("full", 2340),
+    "fig6.9": ("full", 99),
+    "fig6.10": ("full", 151),
+    "fig6.15": ("full", 339),
+    "gait": ("full", 457),
+    "rivals": ("full", 2437),
+    "stdp": ("full", 2520),
+    "tempotron": ("full", 329),
+    "touch": ("full", 795),
+}
+
+
+def forecast(names: Sequence[str], size: str, jobs: int) -> str:
+    """Return about how long studies take, and how that is known; "" below a minute and where it is not.
+
+    Examples
+    --------
+    >>> forecast(["gait"], "full", 1)
+    'about 8 min with 1 of --jobs: the kept runs took 457 s of CPU'
+    """
+    cpu_s = sum(CPU_SECONDS[name][1] for name in names if CPU_SECONDS.get(name, ("", 0))[0] == size)
+    minutes = cpu_s / jobs / 60
+    if minutes < 1:
+        return ""
+    lasts = f"{minutes:.0f} min" if minutes < 90 else f"{minutes / 60:.1f} h"
+    return f"about {lasts} with {jobs} of --jobs: the kept runs took {cpu_s} s of CPU"
 
 
 @dataclass(frozen=True)
@@ -101,19 +142,9 @@ class Table:
     folded: bool = False
 
 
-@dataclass(frozen=True)
-class Row:
-    """One realisation, its result and the CPU seconds that it took."""
-
-    params: dict[str, Any]
-    seed: int
-    result: Any
-    seconds: float = 0.0
-
-
 #: What a module must define to be a study, and what it may define.
 _REQUIRED = ("WHERE", "PROTOCOL", "PARAMETERS", "SIZES", "tasks", "realise", "summarise", "statements", "draw")
-_OPTIONAL = ("then", "tables", "unread", "DATA", "COURSES", "NEEDS")
+_OPTIONAL = ("then", "tables", "unread", "DATA", "KEEPS", "NEEDS")
 
 
 @dataclass(frozen=True)
@@ -124,7 +155,7 @@ class Study:
     (``WHERE``, ``PROTOCOL`` ...), and from its functions (``tasks``, ``realise`` ...).
 
     Of studies on recordings `tasks`, `then`, `realise` and `summarise` are also given ``data``, the folder of them; of
-    studies on simulated contact `realise` and `summarise` are also given ``courses``, a `SharedFolder` in the report's.
+    studies that share what takes long `realise` and `summarise` are also given ``kept``, a `Kept` of the report.
 
     Attributes
     ----------
@@ -155,8 +186,8 @@ class Study:
         Which files of the recordings cannot be read, and why. It raises `FormatError` where none can.
     data : tuple of str
         Folders of recordings that it needs.
-    courses : bool
-        Whether it is on simulated contact.
+    keeps : bool
+        Whether it shares with other studies what takes long.
     needs : tuple of str
         Modules of the extra ``studies`` that it needs.
     """
@@ -176,7 +207,7 @@ class Study:
     tables: Callable[[Parameters, Summary], Sequence[Table]] | None = None
     unread: Callable[[Parameters, Path], Mapping[str, str]] = lambda _parameters, _data: {}
     data: tuple[str, ...] = ()
-    courses: bool = False
+    keeps: bool = False
     needs: tuple[str, ...] = ()
 
     @classmethod
@@ -200,7 +231,9 @@ class Study:
         ------
         ProblemError : an unknown size or parameter, or a value of another kind
         """
-        one_of(f"{self.name}: size", size, ("full", *self.sizes))
+        if size not in ("full", *self.sizes):
+            allowed = ", ".join(map(repr, ("full", *self.sizes)))
+            raise ProblemError(f"{self.name}: size is {size!r}: must be one of {allowed}")
         values = {**self.parameters, **self.sizes.get(size, {})}
         for name, value in changes.items():
             if name not in values:
@@ -208,8 +241,8 @@ class Study:
             if not _alike(value, values[name]):
                 raise ProblemError(f"{name} is {value!r}: must be {_kind(values[name])}, as {values[name]!r}")
             values[name] = value
-        if "realisations" in values:
-            whole("realisations", values["realisations"], 1)
+        if values.get("realisations", 1) < 1:
+            raise ProblemError(f"realisations is {values['realisations']}: must be a whole number, 1 or more")
         return values
 
     @property
@@ -269,43 +302,26 @@ class Study:
         parameters = self.set(size, **(changes or {}))
         if self.lacks is not None:
             raise ProblemError(f"{self.name}: {self.lacks}")
-        given: dict[str, Any] = {}
-        unread: Mapping[str, str] = {}
+        begun, given, unread = time.time(), dict[str, Any](), dict[str, str]()
         if self.data:
             given["data"] = self._recordings(data)
-            if not quiet:
-                print(f"{self.name}: reading the recordings in {data}; hundreds of them take minutes", file=sys.stderr)
-                # What is there already is known once they are read.
-                self._say_how_long(size, 1.0, workers)
-            unread = self.unread(parameters, given["data"])
+            _say(quiet, f"{self.name}: reading the recordings in {data}; hundreds of them take minutes")
+            unread = dict(self.unread(parameters, given["data"]))
             refuse(unread, strict=strict)
-        folder = report / self.name
-        folder.mkdir(parents=True, exist_ok=True)
-        listing = dict(given)
-        code = code_version("taxel", "taxel_rules", "taxel_studies")
-        if self.courses:
-            given["courses"] = SharedFolder(report / "courses", code)
-            given["courses"].path.mkdir(exist_ok=True)
-        results = Results(folder / "results.jsonl", code)
-        if not (quiet or self.data):
-            kept = {t.key("") for t in self.tasks(self.set(size))}
-            left = [t for t in self.tasks(parameters) if t not in results]
-            self._say_how_long(size, len(left) / max(1, len(kept)), workers)
-        begun = time.time()
-        rows: dict[str, Row] = {}
-
-        def phase(title: str, wanted: Sequence[Task]) -> None:
-            run(partial(self.realise, **given), wanted, results, workers=workers, title=title, quiet=quiet)
-            for t in wanted:
-                rows[t.key("")] = Row(t.params, t.seed, results[t], results.seconds([t]))
-
-        phase(self.name, self.tasks(parameters, **listing))
+        kept = Kept(report / "cache", code_version("taxel", "taxel_rules", "taxel_studies"))
+        tasks = self.tasks(parameters, **given)
+        if text := forecast([self.name], size, workers.jobs):
+            left = sum(not kept.has(self.realise, task) for task in tasks) / max(1, len(tasks))
+            _say(quiet, f"{self.name}: {text}, and {100 * left:.0f} % of it is to be computed")
+        more = given | ({"kept": kept} if self.keeps else {})
+        rows = run(self.realise, tasks, kept, given=more, workers=workers, title=self.name, quiet=quiet)
         while self.then is not None:
-            wanted = [t for t in self.then(parameters, list(rows.values()), **listing) if t.key("") not in rows]
+            done = [(row.params, row.seed) for row in rows]
+            wanted = [t for t in self.then(parameters, rows, **given) if (t.params, t.seed) not in done]
             if not wanted:
                 break
-            phase(f"{self.name}, next", wanted)
-        summary = self.summarise(parameters, list(rows.values()), **given)
+            rows += run(self.realise, wanted, kept, given=more, workers=workers, title=self.name, quiet=quiet)
+        summary = self.summarise(parameters, rows, **more)
         section = {
             "name": self.name,
             "title": self.title,
@@ -314,34 +330,33 @@ class Study:
             "size": size,
             "parameters": parameters,
             "changed": sorted(changes or {}),
-            "unread": dict(unread),
+            "unread": unread,
             "realisations": len(rows),
             "statements": [asdict(s) for s in self.statements(parameters, summary)],
             "tables": [asdict(t) for t in self.tables(parameters, summary)] if self.tables is not None else [],
             "said": summary,
-            "cpu_seconds": round(sum(row.seconds for row in rows.values()), 1),
+            "cpu_seconds": round(sum(row.seconds for row in rows), 1),
             "wall_seconds": round(time.time() - begun, 1),
-            "commit": code,
+            "commit": kept.code,
             **machine(),
         }
-        _write_section(folder, section, drawn(self, parameters, summary))
+        _write_section(report / self.name, section, drawn(self, parameters, summary))
         return section
-
-    def _say_how_long(self, size: str, share: float, workers: Workers) -> None:
-        """Print about how long a share of the study takes, if that is more than a minute and known."""
-        if text := forecast(self.name, size, share, workers.jobs):
-            print(f"{self.name}: {text}", file=sys.stderr)
 
     def _recordings(self, data: Path | None) -> Path:
         if data is not None and not data.is_dir():
             raise FileNotFoundError(2, "No such folder", str(data))
-        missing = [name for name in self.data if data is None or not (data / name).is_dir()]
-        if data is None or len(missing) == len(self.data):
+        if data is None or not any((data / name).is_dir() for name in self.data):
             raise FormatError(
                 f"{data or self.name}: contains no recordings; give a folder with any of {', '.join(self.data)} by "
-                "--data (taxel study gait --help says where you get them)"
+                "--data (taxel's documentation says on the page Files where you get them)"
             )
         return data
+
+
+def _say(quiet: bool, text: str) -> None:
+    if not quiet:
+        print(text, file=sys.stderr)
 
 
 def refuse(unread: Mapping[str, str], *, strict: bool) -> None:
@@ -386,6 +401,11 @@ def machine() -> dict[str, Any]:
     }
 
 
+def results(rows: Sequence[Row], **axes: Any) -> list[Any]:
+    """Return the results of the realisations that were given these parameters."""
+    return [row.result for row in rows if all(row.params[name] == value for name, value in axes.items())]
+
+
 def one_task(p: Parameters) -> list[Task]:
     """List the one realisation of a study, with its parameters' seed."""
     return [Task({k: v for k, v in p.items() if k != "seed"}, p["seed"])]
@@ -395,12 +415,6 @@ def only_result(_p: Parameters, rows: Sequence[Row]) -> Summary:
     """Return the result of the one realisation of a study."""
     summary: Summary = rows[0].result
     return summary
-
-
-def one_task_per_seed(p: Parameters, count: str = "realisations") -> list[Task]:
-    """List as many realisations as the parameter of this name says, each with a seed of its own."""
-    shared = {k: v for k, v in p.items() if k != count}
-    return [Task(shared, seed) for seed in range(p[count])]
 
 
 def svg(figure: Figure) -> bytes:
@@ -431,6 +445,7 @@ def drawn(study: Study, parameters: Parameters, summary: Summary) -> list[bytes]
 
 def _write_section(folder: Path, section: Section, pictures: Sequence[bytes]) -> None:
     """Write a study's summary and its pictures, each whole; the summary names the pictures."""
+    folder.mkdir(parents=True, exist_ok=True)
     names = ["figure.svg"] if len(pictures) == 1 else [f"figure-{k}.svg" for k in range(1, len(pictures) + 1)]
     for name, picture in zip(names, pictures, strict=True):
         write_whole(folder / name, partial(_put, picture), overwrite=True)

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 from taxel.spikes import SpikeTrains
 from taxel_rules import Tempotron
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task
 
 WHERE = "Gütig and Sompolinsky 2006; thesis 3.3"
 PROTOCOL = (

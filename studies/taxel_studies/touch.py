@@ -30,8 +30,7 @@ from taxel.recording.convert import convert
 from taxel.simulate import Act, Contact, Scene, Silence, play, truth
 from taxel.spikes import to_ms, to_us
 from taxel.tare import Tare
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task
 from taxel_studies.touch_rivals import around, best_rule, lda, numbers
 
 WHERE = "after 5.6.2"

@@ -19,8 +19,7 @@ from taxel.metrics import victor_purpura
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.mapping import LEARN
-from taxel_studies.runner import Task
-from taxel_studies.study import Row
+from taxel_studies.study import Row, Task
 
 __all__ = [
     "LEVELS",

@@ -13,7 +13,7 @@ from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 from taxel_studies import dropped, drops, fig4_8, fig4_9, fig5_11, load
 from taxel_studies.dropped import FRAMES, REGION, TENNIS, Condition
-from taxel_studies.runner import SharedFolder
+from taxel_studies.runner import Kept
 from taxel_studies.study import Row
 
 FEW, TENNIS_FEW = {**dropped.TABLE, "drops": 4}, {**dropped.TENNIS_TABLE, "drops": 3}
@@ -22,7 +22,7 @@ SIDE, PERIOD_MS = 4, 0.5
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    return SharedFolder(tmp_path_factory.mktemp("drops"), "0123abc")
+    return Kept(tmp_path_factory.mktemp("drops"), "0123abc")
 
 
 @pytest.fixture(scope="module")
@@ -97,11 +97,15 @@ def test_a_longer_period_and_another_phase_see_less(fallen):
 
 
 def test_drops_are_kept_and_belong_to_what_made_them(folder, fallen):
+    def kept() -> int:
+        return len(list(folder.folder.rglob("output.pkl")))
+
+    before = kept()
     again = dropped.played(FEW, Condition(50.0, 100.0, 0.0), 1, folder)
     np.testing.assert_array_equal(again.ticks, fallen.ticks)
-    assert len(list(folder.path.glob("drops-50mm-100mm-0deg-*.npz"))) == 1
+    assert kept() == before
     other = dropped.played({**FEW, "drops": 2}, Condition(50.0, 100.0, 0.0), 2, folder)
-    assert len(list(folder.path.glob("drops-50mm-100mm-0deg-*.npz"))) == 2
+    assert kept() == before + 1
     assert len(other.ticks) == 2
     assert not np.array_equal(other.ticks, fallen.ticks[:2])
 
@@ -143,7 +147,7 @@ def test_a_drop_that_nothing_answers_is_said(tmp_path):
             {**FEW, "mass_g": 0.01, "mass_by_g": 0.0, "height_sd_mm": 0.0},
             Condition(50.0, 5.0, 0.0),
             1,
-            SharedFolder(tmp_path, "0123abc"),
+            Kept(tmp_path, "0123abc"),
         )
 
 

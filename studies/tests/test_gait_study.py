@@ -3,11 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import h5py
@@ -22,6 +17,7 @@ from taxel_studies.gait import outcomes
 from taxel_studies.gait.protocols import PROTOCOLS
 from taxel_studies.gait.recipes import ENCODERS, SEARCH, SETTINGS
 from taxel_studies.page import write_page
+from taxel_studies.runner import Kept, Task
 from taxel_studies.study import Section
 
 GAIT = load("gait")
@@ -83,6 +79,13 @@ def ran(data, tmp_path_factory) -> tuple[Path, Section]:
     return folder, study(data, folder)
 
 
+def results_of(data: Path, report: Path, **changes) -> list[tuple[Task, dict]]:
+    """Return the realisations of a run with their results."""
+    kept = Kept(report / "cache", "0123abc")
+    listed = GAIT.tasks(GAIT.set("toy", **changes), data=data)
+    return [(task, kept.row(GAIT.realise, {"data": data}, task).result) for task in listed]
+
+
 def rows(section: Section, source: str, event: str) -> dict[str, dict]:
     found = next(s for s in section["said"]["sources"] if s["source"] == source)
     return {row["row"]: row for row in found["protocols"][0]["rows"] if row["event"] == event}
@@ -113,15 +116,13 @@ def test_every_figure_adds_up(ran):
             assert sum(p["false"] for p in row["by_person"].values()) == f["false"]
 
 
-def test_errors_take_off_the_delay_that_known_keeps(ran):
-    folder, _ = ran
-    for line in (folder / "gait" / "results.jsonl").read_text().splitlines():
-        row = json.loads(line)
-        if row["params"]["kind"] == "neuron" and row["params"]["source"] == "gaitpdb":
-            for units in row["result"]["tested"].values():
+def test_errors_take_off_the_delay_that_known_keeps(data, ran):
+    for task, result in results_of(data, ran[0]):
+        if task.params["kind"] == "neuron" and task.params["source"] == "gaitpdb":
+            for units in result["tested"].values():
                 for unit in units.values():
                     late = np.subtract(unit["delays"], unit["errors"])
-                    assert np.allclose(late, row["result"]["point"]["learner"]["delay_ms"], atol=0.2)
+                    assert np.allclose(late, result["point"]["learner"]["delay_ms"], atol=0.2)
 
 
 def test_the_page_shows_every_row_and_the_folds_lie_with_the_numbers(ran):
@@ -144,9 +145,9 @@ def test_every_table_is_as_wide_as_its_head(ran):
 
 def test_a_second_run_reckons_nothing_again(data, ran):
     folder, section = ran
-    before = (folder / "gait" / "results.jsonl").stat().st_size
+    before = set((folder / "cache").rglob("output.pkl"))
     assert study(data, folder)["said"] == section["said"]
-    assert (folder / "gait" / "results.jsonl").stat().st_size == before
+    assert set((folder / "cache").rglob("output.pkl")) == before
 
 
 def test_the_full_search_chooses_inside_each_fold_and_only_on_the_plate(data, ran, tmp_path):
@@ -159,15 +160,18 @@ def test_the_full_search_chooses_inside_each_fold_and_only_on_the_plate(data, ra
     for one in searched:
         assert one["tau"] in (10.0, 40.0)
         assert one["lambda_1"] + one["lambda_2"] == 4
-    results = [json.loads(line) for line in (tmp_path / "gait" / "results.jsonl").read_text().splitlines()]
-    searches = [r for r in results if r["params"]["kind"] == "neuron" and r["params"].get("search") == {"count": 20}]
+    searches = [
+        (task.params, result)
+        for task, result in results_of(data, tmp_path, search="full")
+        if task.params["kind"] == "neuron" and task.params.get("search") == {"count": 20}
+    ]
     assert len(searches) == 2 * 3  # as printed and recipe; folds
-    for one in searches:
-        (judged,) = one["params"]["inner"]
-        assert not set(judged) & set(one["params"]["left_out"])
-        assert len(one["params"]["points"]) == 2 * 2 * 2
-        assert one["result"]["point"] in one["params"]["points"]
-        assert one["result"]["fit"]["status"] == "solved"
+    for params, result in searches:
+        (judged,) = params["inner"]
+        assert not set(judged) & set(params["left_out"])
+        assert len(params["points"]) == 2 * 2 * 2
+        assert result["point"] in params["points"]
+        assert result["fit"]["status"] == "solved"
     assert "The 528 settings of 6.5.2" in write_page(tmp_path).read_text()
     assert ran[1]["said"]["full_search"] == []
 
@@ -198,26 +202,6 @@ def test_other_people_are_judged_by_all_of_these(data, tmp_path):
     assert set(contact["chosen"]["by_person"]) == {"SiPt99"}
     assert contact["chosen"]["figures"]["found_percent"] >= 90
     assert contact["chosen"]["goal"]["found_percent"] == 98.0
-
-
-def test_ctrl_c_stops_the_command_and_the_next_run_goes_on(data, tmp_path):
-    command = [sys.executable, "-m", "taxel", "study", "gait", "--data", str(data), "--size", "toy"]
-    command += ["--report", str(tmp_path), "--only", "gaitpdb"]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    try:
-        lines = tmp_path / "gait" / "results.jsonl"
-        while process.poll() is None and not (lines.exists() and lines.stat().st_size):
-            time.sleep(0.02)
-        if process.poll() is None:
-            os.kill(process.pid, signal.SIGINT)
-            assert process.wait(timeout=60) in (0, 130)
-    finally:
-        process.kill()
-        process.wait()
-    done = len(lines.read_text().splitlines())
-    section = study(data, tmp_path, sources=["gaitpdb"])
-    assert len(lines.read_text().splitlines()) >= done
-    assert rows(section, "gaitpdb", "contact")["notes"]["figures"]["found_percent"] >= 95
 
 
 def test_no_list_of_points_is_longer_than_24():
@@ -258,7 +242,7 @@ def test_a_goal_is_met_only_where_every_part_of_it_is():
 def test_nonsense_is_refused(data, tmp_path, changes, error, message):
     with pytest.raises(error, match=message):
         study(data, tmp_path, **changes)
-    assert not (tmp_path / "gait" / "results.jsonl").exists()
+    assert not (tmp_path / "cache").exists()
 
 
 def test_a_folder_that_is_not_there_is_told(tmp_path):

@@ -4,16 +4,16 @@ import importlib.util
 import json
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 from matplotlib.container import BarContainer
 
-from taxel import FormatError, ProblemError
-from taxel_studies import kept, load
-from taxel_studies.command import app, tell
+from taxel_studies import load
+from taxel_studies.command import tell
+from taxel_studies.study import CPU_SECONDS, forecast
 
 _spec = importlib.util.spec_from_file_location("figures", Path(__file__).parents[2] / "docs" / "figures.py")
 assert _spec is not None
@@ -69,89 +69,53 @@ def test_bars_begin_at_zero(file: Path) -> None:
             assert low <= 0 <= high, f"{axes.get_ylabel()} from {low:g} to {high:g}"
 
 
-@pytest.fixture
-def figure(tmp_path: Path) -> Path:
-    """A folder that keeps one small figure with its toy result."""
-    section = load("fig6.1").run(tmp_path / "report", size="toy", quiet=True)
-    (tmp_path / "kept").mkdir()
-    (tmp_path / "kept" / "fig6.1.json").write_text(json.dumps(section))
-    kept.keep_toy("fig6.1", tmp_path / "kept")
-    return tmp_path / "kept"
+def test_the_times_that_are_forecast_are_those_of_the_kept_figures() -> None:
+    kept = [json.loads(file.read_text(encoding="utf-8")) for file in figures.FIGURES.glob("*.json")]
+    took = {each["name"]: (each["size"], round(each["cpu_seconds"])) for each in kept}
+    assert {name: of for name, of in took.items() if of[1] >= 60} == CPU_SECONDS
+    assert forecast(["gait", "fig6.1"], "full", 4) == "about 2 min with 4 of --jobs: the kept runs took 457 s of CPU"
+    assert forecast(["gait"], "toy", 1) == forecast(["fig6.1"], "full", 1) == ""
 
 
-def spoil(file: Path, change: Callable[[dict[str, Any]], Any]) -> None:
-    value = json.loads(file.read_text())
-    change(value)
-    file.write_text(json.dumps(value))
-
-
-def test_what_is_not_kept_is_refused(figure: Path) -> None:
-    assert kept.kept_figures(figure) == ["fig6.1"]
-    with pytest.raises(FormatError, match="contains no saved figure"):
-        kept.kept_figures(figure / "report")
-    with pytest.raises(ProblemError, match=r"fig6\.2\.json: contains no toy result of fig6\.2"):
-        kept.confirm("fig6.2", figure)
-
-
-@pytest.mark.parametrize("part", ["said", "parameters", "unread"])
-def test_a_toy_result_that_is_another_one_is_found_and_stays(figure: Path, part: str) -> None:
-    file = figure / "toy" / "fig6.1.json"
-    spoil(file, lambda result: result.update({"commit": "4567def", "date": "2020-01-01", "machine": "another"}))
-    before = file.read_text()
-    kept.confirm("fig6.1", figure)
-    assert file.read_text() == before
-    spoil(file, lambda result: result[part].update({"spikes": [1.0]}))
-    before = file.read_text()
-    with pytest.raises(ProblemError, match=r"fig6\.1: the toy result differs from the saved one"):
-        kept.confirm("fig6.1", figure)
-    assert file.read_text() == before
-
-
-def test_a_result_that_is_rounded_otherwise_is_the_same(figure: Path) -> None:
-    def moved(part: float) -> Callable[[dict[str, Any]], Any]:
-        def change(result: dict[str, Any]) -> None:
-            result["said"] = scaled(result["said"], 1.0 + part)
-
-        return change
-
-    spoil(figure / "toy" / "fig6.1.json", moved(1e-13))
-    kept.confirm("fig6.1", figure)
-    spoil(figure / "toy" / "fig6.1.json", moved(1e-7))
-    with pytest.raises(ProblemError, match="the toy result differs from the saved one"):
-        kept.confirm("fig6.1", figure)
-
-
-def scaled(value: Any, by: float) -> Any:
-    """Return a result with each float of it scaled."""
-    if isinstance(value, dict):
-        return {key: scaled(inner, by) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [scaled(inner, by) for inner in value]
-    return value * by if isinstance(value, float) else value
-
-
-def test_all_kept_figures_are_tried_and_those_that_moved_named(
-    figure: Path, capsys: pytest.CaptureFixture[str]
+def test_a_run_says_first_how_long_it_takes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for name in ("fig6.2", "fig6.1"):
-        section = json.loads((figure / "fig6.1.json").read_text()) | {"name": name}
-        (figure / f"{name}.json").write_text(json.dumps(section))
-        kept.keep_toy(name, figure)
-    spoil(figure / "toy" / "fig6.1.json", lambda result: result["said"].update({"spikes": [1.0]}))
-    with pytest.raises(ProblemError, match=r"not confirmed: fig6\.1;"):
-        app(["all", "--confirm", "--figures", str(figure)], result_action="return_value")
-    assert "fig6.2: confirmed" in capsys.readouterr().out
+    monkeypatch.setitem(CPU_SECONDS, "fig6.1", ("full", 600))
+    begun: list[str] = []
+
+    def stop(*_: object, **__: object) -> None:
+        begun.append(capsys.readouterr().err)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("taxel_studies.study.run", stop)
+    with pytest.raises(KeyboardInterrupt):
+        load("fig6.1").run(tmp_path)
+    assert begun[0].startswith("fig6.1: about 10 min with 1 of --jobs: the kept runs took 600 s of CPU, and 100 %")
+
+
+def differences(kept: Any, now: Any, where: str) -> Iterator[str]:
+    """Return where two results differ by more than rounding, which another processor or version of NumPy does so."""
+    if isinstance(kept, dict) and isinstance(now, dict) and kept.keys() == now.keys():
+        for key in kept.keys() - {"cpu_seconds"}:
+            yield from differences(kept[key], now[key], f"{where}.{key}")
+    elif isinstance(kept, list) and isinstance(now, list) and len(kept) == len(now):
+        for k, (a, b) in enumerate(zip(kept, now, strict=True)):
+            yield from differences(a, b, f"{where}[{k}]")
+    elif not (isinstance(kept, float) and kept == pytest.approx(now, rel=1e-9, abs=1e-12)) and kept != now:
+        yield f"{where} was {str(kept)[:40]}, is {str(now)[:40]}"
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize("name", kept.kept_figures(figures.FIGURES))
+@pytest.mark.parametrize("name", [file.stem for file in (figures.FIGURES / "toy").glob("*.json")])
 def test_a_study_gives_its_kept_toy_result(name: str) -> None:
     data = Path(os.environ["TAXEL_DATA"]) if "TAXEL_DATA" in os.environ else None
     why = load(name).cannot_run(data)
     if why is not None:
         pytest.skip(why)
-    kept.confirm(name, figures.FIGURES, data=data)
+    kept = json.loads((figures.FIGURES / "toy" / f"{name}.json").read_text())
+    now = json.loads(json.dumps(figures.toy_result(name, data)))
+    assert not [line for key in ("parameters", "unread", "said") for line in differences(kept[key], now[key], key)]
 
 
 def test_a_printed_table_loses_no_cell_to_the_width(capsys: pytest.CaptureFixture[str]) -> None:

@@ -31,7 +31,7 @@ def test_a_resumed_study_uses_the_results_of_the_same_commit_without_local_chang
 
     def saved() -> int:
         load("fig6.11").run(tmp_path / "report", size="toy", changes={"realisations": 1}, quiet=True)
-        return len((tmp_path / "report" / "fig6.11" / "results.jsonl").read_text().splitlines())
+        return len(list((tmp_path / "report" / "cache").rglob("output.pkl")))
 
     git("init", "-q")
     file.write_text("first = 1\n")
@@ -55,5 +55,5 @@ def test_the_processes_of_a_run_share_what_they_save_also_with_local_changes(
     monkeypatch.setattr("taxel_studies.study.code_version", lambda *packages: f"0123abc, {next(calls)}")
     for runs in (1, 2):
         section = load("drops").run(tmp_path, size="toy", changes={"drops": 2}, workers=Workers(2), quiet=True)
-        assert len(list((tmp_path / "courses").iterdir())) == runs * section["realisations"]
+        assert len(list((tmp_path / "cache").rglob("_made/*/output.pkl"))) == runs * section["realisations"]
         assert section["commit"] == f"0123abc, {runs - 1}"

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -13,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from taxel import DeviceError, ProblemError
-from taxel_studies.runner import Results, Task, Workers, run
+from taxel_studies.runner import Kept, Task, Workers, grid, run
 
 CALLS: list[int] = []
 
@@ -25,8 +22,15 @@ def square(params: dict, seed: int) -> dict:
 
 
 def stops_at_three(params: dict, seed: int) -> dict:
-    if params["x"] == 3:
+    if params["x"] == 3 and os.environ.get("STOP"):
         raise KeyboardInterrupt
+    return square(params, seed)
+
+
+def fails_at_twenty(params: dict, seed: int) -> dict:
+    if params["x"] == 20 and Path(params["fails while"]).exists():
+        time.sleep(0.5)
+        raise ZeroDivisionError
     return square(params, seed)
 
 
@@ -41,16 +45,9 @@ def tasks(count: int) -> list[Task]:
     return [Task({"x": x}, seed=1) for x in range(count)]
 
 
-def fails_at_twenty(params: dict, seed: int) -> dict:
-    if params["x"] == 20:
-        time.sleep(0.5)
-        raise ZeroDivisionError
-    return square(params, seed)
-
-
-def process_number(_params: dict, _seed: int) -> dict:
-    time.sleep(0.1)
-    return {"pid": os.getpid()}
+@pytest.fixture
+def kept(tmp_path: Path) -> Kept:
+    return Kept(tmp_path / "cache", "0123abc")
 
 
 @pytest.fixture(autouse=True)
@@ -60,149 +57,95 @@ def _forget(monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent), prepend=os.pathsep)
 
 
+def test_a_grid_has_every_combination_in_order_and_gives_the_rest_to_all():
+    p = {"kappas": [1.0, 1.2], "norms": ["l1"], "realisations": 2, "inputs": 9}
+    found = [(t.params, t.seed) for t in grid(p, kappa="kappas", norm="norms", seed="realisations")]
+    assert found == [({"inputs": 9, "kappa": k, "norm": "l1"}, seed) for k in (1.0, 1.2) for seed in (0, 1)]
+
+
 @pytest.mark.parametrize(
     "backend",
-    # A cluster takes ten seconds of processor time to start: the results of one are looked at beside its errors, below.
+    # A cluster takes ten seconds of processor time to start.
     ["here", "loky", *(pytest.param(cluster, marks=pytest.mark.slow) for cluster in ("dask", "ray"))],
 )
-def test_each_task_has_its_result(tmp_path, backend):
+def test_each_task_has_its_result(kept, backend):
     """Dask and Ray start two worker processes on loopback."""
-    results = Results(tmp_path / "results.jsonl", "code")
-    run(square, tasks(4), results, workers=workers(backend), quiet=True)
-    again = Results(tmp_path / "results.jsonl", "code")
-    assert [again[t]["y"] for t in tasks(4)] == [1, 2, 5, 10]
-    rows = [json.loads(line) for line in (tmp_path / "results.jsonl").read_text().splitlines()]
-    assert {(row["params"]["x"], row["seed"], row["code"]) for row in rows} == {(x, 1, "code") for x in range(4)}
+    for _ in range(2):
+        rows = run(square, tasks(4), kept, workers=workers(backend), quiet=True)
+        assert [(row.params["x"], row.seed, row.result["y"]) for row in rows] == [(x, 1, x * x + 1) for x in range(4)]
+    assert all(kept.has(square, task) for task in tasks(4))
+    assert not kept.has(square, Task({"x": 1}, seed=2))
 
 
-def test_what_is_there_is_not_run_again(tmp_path):
-    run(square, tasks(3), Results(tmp_path / "r.jsonl", "code"), quiet=True)
+def test_what_is_there_is_not_run_again_and_a_cut_file_is(kept):
+    run(square, tasks(3), kept, quiet=True)
     CALLS.clear()
-    run(square, tasks(5), Results(tmp_path / "r.jsonl", "code"), quiet=True)
+    run(square, tasks(5), kept, quiet=True)
     assert CALLS == [3, 4]
+    for file in kept.folder.rglob("output.pkl"):
+        file.write_bytes(file.read_bytes()[:9])
+    rows = run(square, tasks(5), kept, quiet=True)
+    assert [row.result["y"] for row in rows] == [x * x + 1 for x in range(5)]
 
 
-def test_the_same_task_twice_in_a_list_runs_once(tmp_path):
-    run(square, tasks(2) + tasks(2), Results(tmp_path / "r.jsonl", "code"), quiet=True)
-    assert CALLS == [0, 1]
-
-
-def test_results_of_other_code_count_no_more(tmp_path):
-    run(square, tasks(2), Results(tmp_path / "r.jsonl", "old"), quiet=True)
+def test_results_of_other_code_count_no_more(kept):
+    run(square, tasks(2), kept, quiet=True)
     CALLS.clear()
-    run(square, tasks(2), Results(tmp_path / "r.jsonl", "new"), quiet=True)
+    run(square, tasks(2), Kept(kept.folder, "4567def"), quiet=True)
     assert CALLS == [0, 1]
-    assert len((tmp_path / "r.jsonl").read_text().splitlines()) == 4
 
 
-def test_a_stop_keeps_what_was_done_and_the_next_run_goes_on(tmp_path):
+def test_what_is_shared_is_made_once_by_the_same_code(kept):
+    for code in ("0123abc", "0123abc", "4567def"):
+        assert Kept(kept.folder, code).made(square, {"x": 3}, 1) == {"y": 10}
+    assert CALLS == [3, 3]
+
+
+def test_a_stop_keeps_what_was_done_and_the_next_run_goes_on(kept, monkeypatch):
+    monkeypatch.setenv("STOP", "1")
     with pytest.raises(KeyboardInterrupt):
-        run(stops_at_three, tasks(6), Results(tmp_path / "r.jsonl", "code"), quiet=True)
+        run(stops_at_three, tasks(6), kept, quiet=True)
     CALLS.clear()
-    run(square, tasks(6), Results(tmp_path / "r.jsonl", "code"), quiet=True)
+    monkeypatch.delenv("STOP")
+    run(stops_at_three, tasks(6), kept, quiet=True)
     assert CALLS == [3, 4, 5]
 
 
-def test_a_line_cut_short_by_a_kill_is_dropped(tmp_path):
-    path = tmp_path / "r.jsonl"
-    run(square, tasks(3), Results(path, "code"), quiet=True)
-    whole = path.read_bytes()
-    path.write_bytes(whole[:-9])
-    CALLS.clear()
-    run(square, tasks(3), Results(path, "code"), quiet=True)
-    assert CALLS == [2]
-    assert [json.loads(line)["result"]["y"] for line in path.read_text().splitlines()] == [1, 2, 5]
-
-
-def test_a_file_of_something_else_is_refused(tmp_path):
-    (tmp_path / "r.jsonl").write_text('{"hello": 1}\n')
-    with pytest.raises(ProblemError, match="a line is not a result"):
-        Results(tmp_path / "r.jsonl", "code")
-
-
-@pytest.mark.parametrize("backend", ["here", "loky", "dask", pytest.param("ray", marks=pytest.mark.slow)])
-def test_what_was_done_before_an_error_is_kept(tmp_path, backend):
+@pytest.mark.parametrize("backend", ["here", "loky"])
+def test_what_was_done_before_an_error_is_kept(kept, backend, tmp_path):
     """A realisation that raises ends the run with its own error; the next run begins where it stood."""
+    (tmp_path / "stop").touch()
+    wanted = [Task({"x": x, "fails while": str(tmp_path / "stop")}, seed=1) for x in range(24)]
     with pytest.raises(ZeroDivisionError):
-        run(fails_at_twenty, tasks(24), Results(tmp_path / "r.jsonl", "code"), workers=workers(backend), quiet=True)
-    results = Results(tmp_path / "r.jsonl", "code")
-    assert sum(t in results for t in tasks(24)) >= 16
-    run(square, tasks(24), results, quiet=True)
-    assert [results[t]["y"] for t in tasks(24)] == [x * x + 1 for x in range(24)]
+        run(fails_at_twenty, wanted, kept, workers=workers(backend), quiet=True)
+    assert sum(kept.has(fails_at_twenty, t) for t in wanted) >= 16
+    (tmp_path / "stop").unlink()
+    rows = run(fails_at_twenty, wanted, kept, quiet=True)
+    assert [row.result["y"] for row in rows] == [x * x + 1 for x in range(24)]
 
 
-def test_a_dask_cluster_that_runs_already_is_used(tmp_path):
-    distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
-    ) as cluster:
-        results = Results(tmp_path / "r.jsonl", "code")
-        run(
-            process_number,
-            tasks(6),
-            results,
-            workers=Workers(backend="dask", scheduler=cluster.scheduler_address),
-            quiet=True,
-        )
-        of_the_cluster = {worker.process.pid for worker in cluster.workers.values()}
-    used = {results[t]["pid"] for t in tasks(6)}
-    assert used <= of_the_cluster
-    assert os.getpid() not in used
-
-
-def test_a_dask_scheduler_that_is_not_there_is_told(tmp_path):
-    pytest.importorskip("distributed")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    nobody = Workers(backend="dask", scheduler=f"tcp://127.0.0.1:{port}")
-    with pytest.raises(DeviceError, match="no Dask scheduler answers at this address"):
-        run(square, tasks(1), Results(tmp_path / "r.jsonl", "code"), workers=nobody, quiet=True)
-
-
-@pytest.mark.parametrize("backend", ["dask", "ray"])
-def test_a_backend_that_is_not_installed_names_its_extra(monkeypatch, backend):
-    monkeypatch.setattr("taxel._base.parallel.find_spec", lambda name: None)
-    with pytest.raises(ProblemError, match=r"taxel\[cluster\]"):
-        Workers(backend=backend)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"jobs": 0}, "jobs is 0"),
-        ({"jobs": "two"}, "jobs is 'two'"),
-        ({"backend": "slurm"}, "backend is 'slurm'"),
-        ({"scheduler": 3}, "scheduler is 3"),
-        ({"scheduler": "tcp://127.0.0.1:9"}, "scheduler is for the backends"),
-    ],
-)
-def test_nonsense_about_workers_is_refused(arguments, message):
-    with pytest.raises(ProblemError, match=message):
-        Workers(**arguments)
-
-
-@pytest.mark.parametrize("who", ["Workers()", "Workers(2)", "Workers(2, 'dask')"])
-def test_ctrl_c_ends_promptly(tmp_path, who):
-    if "dask" in who:
-        pytest.importorskip("distributed")
+def test_ctrl_c_ends_promptly(tmp_path):
     code = (
-        "import time\nfrom pathlib import Path\nfrom taxel_studies.runner import Results, Task, Workers, run\n"
+        "import time\nfrom pathlib import Path\nfrom taxel_studies.runner import Kept, Task, run\n"
         "def first_is_quick(p, s):\n    if p['x']:\n        time.sleep(60)\n"
         "if __name__ == '__main__':\n"
-        f"    results = Results(Path({str(tmp_path)!r}) / 'r.jsonl', 'c')\n"
-        f"    run(first_is_quick, [Task({{'x': k}}) for k in range(4)], results, workers={who}, quiet=True)\n"
+        f"    kept = Kept(Path({str(tmp_path)!r}) / 'cache', 'c')\n"
+        f"    run(first_is_quick, [Task({{'x': k}}) for k in range(4)], kept, quiet=True)\n"
     )
     script = tmp_path / "script.py"
     script.write_text(code)
     process = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def done() -> int:
+        return len(list((tmp_path / "cache").rglob("output.pkl")))
+
     try:
         deadline = time.monotonic() + 60
-        while not (tmp_path / "r.jsonl").exists() and time.monotonic() < deadline:
+        while not done() and time.monotonic() < deadline:
             time.sleep(0.05)
         os.kill(process.pid, signal.SIGINT)
         assert process.wait(timeout=20) != 0
     finally:
         process.kill()
         process.wait()
-    assert len((tmp_path / "r.jsonl").read_text().splitlines()) == 1
+    assert done() == 1

@@ -19,7 +19,7 @@ from taxel import FormatError, ProblemError
 from taxel.cli import main
 from taxel_studies import STUDIES, load
 from taxel_studies.page import write_page
-from taxel_studies.runner import SharedFolder
+from taxel_studies.runner import Kept
 
 #: Studies on recordings have tests of their own.
 MADE_HERE = [name for name in STUDIES if not load(name).data]
@@ -42,12 +42,7 @@ def first_run(report) -> Callable[[str], dict[str, Any]]:
 @pytest.fixture
 def small(tmp_path) -> list[str]:
     """Name the command that runs the smallest study."""
-    return ["study", "fig6.11", "--size", "toy", "--realisations", "1", "--report", str(tmp_path)]
-
-
-@pytest.fixture(scope="module")
-def courses(tmp_path_factory) -> SharedFolder:
-    return SharedFolder(tmp_path_factory.mktemp("courses"), "0123abc")
+    return ["study", "fig6.11", "--size", "toy", "--set", "realisations=1", "--report", str(tmp_path)]
 
 
 def ends(arguments: list[str]) -> int:
@@ -87,26 +82,23 @@ def test_what_the_thesis_says_holds_at_toy_size(first_run, name):
 @pytest.mark.parametrize("name", EACH)
 def test_a_second_run_reckons_nothing_again_and_says_the_same(report, first_run, name):
     first = first_run(name)
-    lines = (report / name / "results.jsonl").read_bytes()
+    results = set((report / "cache").rglob("output.pkl"))
     second = load(name).run(report, size="toy", quiet=True)
-    assert (report / name / "results.jsonl").read_bytes() == lines
+    assert set((report / "cache").rglob("output.pkl")) == results
     assert second["said"] == first["said"]
     assert second["statements"] == first["statements"]
 
 
 @pytest.mark.parametrize("name", EACH)
-def test_a_realisation_is_a_pure_function_of_parameters_and_seed(report, first_run, name, courses):
+def test_a_realisation_is_a_pure_function_of_parameters_and_seed(report, first_run, name, tmp_path):
     """Here, alone and after other draws, it gives what the whole study gave among the others."""
     study = load(name)
     first_run(name)
-    rows = [json.loads(line) for line in (report / name / "results.jsonl").read_text().splitlines()]
-    tasks = study.tasks(study.set("toy"))
-    task = tasks[-1]
-    params = json.loads(json.dumps(task.params))
-    (stored,) = (row["result"] for row in rows if row["params"] == params and row["seed"] == task.seed)
+    task = study.tasks(study.set("toy"))[-1]
+    stored = Kept(report / "cache", "0123abc").row(study.realise, {}, task).result
     np.random.default_rng().random()
-    given = {"courses": courses} if study.courses else {}
-    assert json.loads(json.dumps(study.realise(params, task.seed, **given))) == stored
+    given = {"kept": Kept(tmp_path, "0123abc")} if study.keeps else {}
+    assert json.dumps(study.realise(task.params, task.seed, **given)) == json.dumps(stored)
 
 
 class Page(HTMLParser):
@@ -186,7 +178,7 @@ def test_the_command_prints_json(small, capsys):
         (["--set", "kapa=1"], "fig6.11 has no parameter 'kapa': its parameters are"),
         (["--set", "kappa=wide"], "kappa is 'wide': must be a number, as 1.04"),
         (["--set", "kappa"], "--set kappa: must be KEY=VALUE"),
-        (["--realisations", "0"], "realisations is 0"),
+        (["--set", "realisations=0"], "realisations is 0"),
         (["--jobs", "0"], "jobs is 0"),
         (["--backend", "slurm"], "backend is 'slurm'"),
         (["--scheduler", "tcp://127.0.0.1:1"], "scheduler is for the backends"),

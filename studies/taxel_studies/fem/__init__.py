@@ -9,7 +9,6 @@ from __future__ import annotations
 from taxel_studies.fem.conditions import TABLE_5_1, Condition, Table, paths
 from taxel_studies.fem.grid import SamplingGrid
 from taxel_studies.fem.indentation import Course, Indentation, bodies, press
-from taxel_studies.fem.kept import KeptCourses
 from taxel_studies.fem.material import DRAGON_SKIN_10, Yeoh
 from taxel_studies.fem.mesh import Mesh
 
@@ -19,7 +18,6 @@ __all__ = [
     "Condition",
     "Course",
     "Indentation",
-    "KeptCourses",
     "Mesh",
     "SamplingGrid",
     "Table",

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-from taxel import ProblemError
 from taxel_studies.fem.indentation import Indentation
 
 __all__ = ["TABLE_5_1", "Condition", "Table", "paths"]
@@ -36,10 +35,6 @@ class Table:
     ----------
     diameters_mm, moduli_kpa, depths_mm, angles_deg : sequence of float
 
-    Raises
-    ------
-    ProblemError : an empty variable, or a value twice
-
     Examples
     --------
     >>> len(TABLE_5_1.conditions()), len(paths(TABLE_5_1.conditions()))
@@ -50,13 +45,6 @@ class Table:
     moduli_kpa: tuple[float, ...]
     depths_mm: tuple[float, ...]
     angles_deg: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        for name in ("diameters_mm", "moduli_kpa", "depths_mm", "angles_deg"):
-            values = tuple(map(float, getattr(self, name)))
-            if not values or len(set(values)) < len(values):
-                raise ProblemError(f"{name} are {values}: must be one at least, and none twice")
-            object.__setattr__(self, name, values)
 
     def conditions(self) -> list[Condition]:
         """List the conditions: diameter by diameter, then by modulus, depth and angle."""

@@ -10,7 +10,6 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from taxel import ProblemError
 from taxel_studies.fem.indentation import Course
-from taxel_studies.runner import whole
 
 __all__ = ["SamplingGrid"]
 
@@ -32,12 +31,6 @@ class SamplingGrid:
         From the first touch to full depth, at constant speed: the same for every depth.
     shift_mm : float, mm, 0 or more
         The grid is moved by up to half of this to either side, at random (o: a pitch).
-    quantity : {"nominal", "cauchy", "mean"}
-        What is called pressure (o): see `Course.sensed_kpa`.
-
-    Raises
-    ------
-    ProblemError : a parameter that is invalid
 
     Examples
     --------
@@ -49,15 +42,6 @@ class SamplingGrid:
     pitch_mm: float = 0.2
     duration_ms: float = 100.0
     shift_mm: float = 0.2
-    quantity: str = "nominal"
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "taxels", whole("taxels", self.taxels, 1))
-        for name, least in (("pitch_mm", 0.0), ("duration_ms", 0.0), ("shift_mm", -1.0)):
-            value = float(getattr(self, name))
-            if not (value > least and np.isfinite(value)) or value < 0:
-                raise ProblemError(f"{name} is {value:g}: must be {'above 0' if least == 0 else '0 or more'}")
-            object.__setattr__(self, name, value)
 
     def steps(self, period_ms: float) -> int:
         """Return how many samples a period gives.
@@ -78,7 +62,7 @@ class SamplingGrid:
     def most_kpa(self, course: Course) -> float:
         """Return the largest pressure that a taxel can see on a course."""
         reach = self.places_mm()[-1] + self.shift_mm / 2
-        return float(course.sensed_kpa(self.quantity)[:, np.abs(course.x_mm) <= reach].max())
+        return float(course.pressure_kpa[:, np.abs(course.x_mm) <= reach].max())
 
     def draw(
         self, course: Course, depth_mm: float, period_ms: float, samples: int, seed: int = 0
@@ -112,18 +96,17 @@ class SamplingGrid:
         if not 0 < depth_mm <= reached * (1 + 1e-12):
             why = f" ({course.fault})" if course.fault else ""
             raise ProblemError(f"depth_mm is {depth_mm:g}: the course goes from 0 to {reached:g} mm{why}")
-        random = np.random.default_rng(whole("seed", seed, 0))
-        number_of = whole("samples", samples, 1)
-        phase = random.uniform(0, period_ms, number_of)
-        shift = random.uniform(-self.shift_mm / 2, self.shift_mm / 2, number_of)
+        random = np.random.default_rng(seed)
+        phase = random.uniform(0, period_ms, samples)
+        shift = random.uniform(-self.shift_mm / 2, self.shift_mm / 2, samples)
         places = self.places_mm()
         near = np.abs(course.x_mm) <= places[-1] + self.shift_mm / 2 + _BEYOND_MM
         if np.abs(course.x_mm[near]).max() < places[-1] + self.shift_mm / 2:
             raise ProblemError(f"the grid is {2 * places[-1]:g} mm wide: must lie on the block")
-        along = PchipInterpolator(course.path_mm, course.sensed_kpa(self.quantity)[:, near])
+        along = PchipInterpolator(course.path_mm, course.pressure_kpa[:, near])
         across = CubicSpline(course.x_mm[near], np.eye(int(near.sum())))
-        drawn = np.zeros((number_of, count + 1, self.taxels), np.float32)
-        for first in range(0, number_of, _AT_ONCE):
+        drawn = np.zeros((samples, count + 1, self.taxels), np.float32)
+        for first in range(0, samples, _AT_ONCE):
             part = slice(first, first + _AT_ONCE)
             t = phase[part, None] + np.arange(count) * period_ms
             path = np.minimum(t * (depth_mm / self.duration_ms), reached)

@@ -11,7 +11,6 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from taxel_studies.fem.contact import Contact, Touch
-from taxel_studies.fem.interruptible import interruptible
 from taxel_studies.fem.solids import Solids
 
 __all__ = ["State", "Stopped", "march"]
@@ -137,7 +136,7 @@ def _equilibrium(
         pushed, tangent, touch = contact.forces(solids.nodes + u.reshape(-1, 2), state.touch)
         return _Residual(u, inner + pushed, pushed, stiffness + tangent, touch)
 
-    here = interruptible(lambda: at(u))
+    here = at(u)
     for iteration in range(_ITERATIONS):
         if np.abs(here.total[free]).max() < _TOLERANCE:
             solids.check(here.u)
@@ -150,12 +149,9 @@ def _equilibrium(
 
 
 def _solved(matrix: sparse.csc_array, right: NDArray[np.float64]) -> NDArray[np.float64]:
-    def solve() -> NDArray[np.float64]:
+    try:
         factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options={"SymmetricMode": True})
         return np.asarray(factor.solve(right))
-
-    try:
-        return interruptible(solve)
     except RuntimeError:
         raise ArithmeticError("a singular matrix") from None
 
@@ -175,7 +171,7 @@ def _along(
         u = here.u.copy()
         u[free] -= part * step
         try:
-            there = interruptible(lambda u=u: at(u))  # type: ignore[misc]
+            there = at(u)
         except ArithmeticError as error:
             fault = error
             continue

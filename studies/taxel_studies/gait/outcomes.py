@@ -12,12 +12,11 @@ import numpy as np
 
 from taxel_studies.gait import insole, sources
 from taxel_studies.gait.fits import TEST
-from taxel_studies.gait.plans import Plan, chooses, each, plans
+from taxel_studies.gait.plans import Plan, chooses, each, key, plans
 from taxel_studies.gait.protocols import ROWS, Protocol
 from taxel_studies.gait.recipes import FULL, NOTES, SEARCH
 from taxel_studies.gait.sources import SOURCES
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Summary
+from taxel_studies.study import Parameters, Row, Summary, Task
 
 __all__ = ["EVENTS", "GOALS", "Outcome", "Unit", "figures", "summarise"]
 
@@ -46,15 +45,15 @@ class Known:
     """The results of realisations, by their tasks."""
 
     def __init__(self, rows: Sequence[Row]) -> None:
-        self._rows = {Task(row.params, row.seed).key(""): row for row in rows}
+        self._rows = {key(row): row for row in rows}
 
     def __getitem__(self, task: Task) -> Any:
         """Return a task's result."""
-        return self._rows[task.key("")].result
+        return self._rows[key(task)].result
 
     def seconds(self, tasks: Sequence[Task]) -> float:
         """Return the CPU seconds that tasks took."""
-        return sum(self._rows[task.key("")].seconds for task in tasks)
+        return sum(self._rows[key(task)].seconds for task in tasks)
 
 
 @dataclass(frozen=True)

@@ -24,9 +24,8 @@ from taxel_studies.gait.recipes import (
     changed,
 )
 from taxel_studies.gait.rules import RULES
-from taxel_studies.gait.sources import SOURCES, fingerprint
-from taxel_studies.runner import Task, one_of
-from taxel_studies.study import Parameters
+from taxel_studies.gait.sources import SOURCES, fingerprint, one_of
+from taxel_studies.study import Parameters, Task
 
 __all__ = [
     "PARAMETERS",
@@ -183,7 +182,7 @@ def tasks(p: Parameters, *, data: Path) -> list[Task]:
         for scope, event, row in each(plan)
         for left_out in plan.outer(scope)
     ]
-    return sorted({t.key(""): t for t in listed}.values(), key=_by_encoder)
+    return sorted({key(t): t for t in listed}.values(), key=_by_encoder)
 
 
 def _by_encoder(task: Task) -> str:
@@ -240,3 +239,8 @@ def each(plan: Plan) -> Iterator[tuple[Scope, str, str]]:
         for row in _rows(plan, event):
             for scope in plan.scopes:
                 yield scope, event, row
+
+
+def key(task: Task) -> str:
+    """Return what a realisation is told apart by."""
+    return json.dumps([task.params, task.seed], sort_keys=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import FormatError
+from taxel import FormatError, ProblemError
 from taxel.array import Array
 from taxel.encode import Encoder, RunningRange
 from taxel.frames import Frames
@@ -23,7 +23,6 @@ from taxel_studies.datasets import files as files_of
 from taxel_studies.gait import insole
 from taxel_studies.gait.pieces import Piece
 from taxel_studies.gait.recipes import RULE_ENCODERS
-from taxel_studies.runner import one_of
 from taxel_studies.study import refuse
 
 __all__ = ["SOURCES", "Cut", "Source", "cuts", "encoded", "fingerprint", "readable", "readings", "unread"]
@@ -362,3 +361,15 @@ def _boxed(trial: Trial) -> Trial:
 
 def _moved(spikes: Any, by: float, stop: float) -> Any:
     return type(spikes)(np.clip(spikes.times + by, 0.0, stop), spikes.offsets, 0.0, stop)
+
+
+def one_of(name: str, value: object, allowed: Collection[str]) -> str:
+    """Return a word of a closed list.
+
+    Raises
+    ------
+    ProblemError : any other value (names the parameter and the list)
+    """
+    if not isinstance(value, str) or value not in allowed:
+        raise ProblemError(f"{name} is {value!r}: must be one of {', '.join(map(repr, allowed))}")
+    return value

@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 from taxel_studies.capacity import PUBLISHED
 from taxel_studies.rivals import protocols
 from taxel_studies.rivals.rules import CHOSEN_ON, RULES
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task
 
 WHERE = "thesis 6.4.4, beside figure 6.7; Gardner and Grüning 2016"
 PROTOCOL = (
