@@ -480,10 +480,16 @@ def _unknown(path: Path) -> FormatError:
     refuse_container(path)
     with open(path, "rb") as file:
         head = file.read(4)
+    if not head:
+        return _empty(path)
     describes = advice(path, "describe a table or an array of another program")
     known = f"{', '.join(ENDINGS)}, and of event cameras {', '.join(CAMERA)}"
     begins = " ".join(f"{byte:02X}" for byte in head)
     return FormatError(f"{path}, byte 0: starts with {begins}: not a recording; taxel reads {known}; {describes}")
+
+
+def _empty(path: Path) -> FormatError:
+    return FormatError(f"{path}: the file is empty; must be a recording")
 
 
 def _open(path: Path, options: OpenOptions) -> list[Recording]:
@@ -501,11 +507,11 @@ def _named(opened: Sequence[Recording], name: Path) -> list[tuple[Path, Recordin
 
 def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[Recording]:
     """Open a file, a ROS bag, or a folder of a maker by its layout; each trial is a recording."""
-    if path.is_file() and path.suffix.lower() not in (".lsa", ".mcap") and not path.stat().st_size:
-        raise FormatError(f"{path}: the file is empty; must be a recording")
     kind = kind_of(path)
     if kind is None:
         raise _unknown(path)
+    if path.is_file() and kind not in ("lsa", "mcap") and not path.stat().st_size:
+        raise _empty(path)
     options.check(path, kind)
     before = path.stat()
     try:
