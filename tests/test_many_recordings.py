@@ -72,3 +72,27 @@ def test_detections_do_not_depend_on_who_detects(folder: Path, tmp_path: Path, s
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == expected
     assert [len(one["detections"]) for one in expected["recordings"]] == [2, 2, 2]
+
+
+@pytest.mark.parametrize("spread", SPREAD[1:])
+def test_folds_and_bits_do_not_depend_on_who_computes_them(tmp_path: Path, spread: tuple[str, ...]) -> None:
+    rows = ["recording,label,t_us,stop_us"]
+    for k in range(2):
+        values = np.random.default_rng(k).normal(50, 1, (600, 4, 4))
+        for touch in range(8):
+            begin = 60 + 60 * touch
+            values[begin : begin + 25, 1 : 3 - touch % 2, 1:3] += 100
+            label, t = ("ball", "edge")[touch % 2], 10_000 * begin
+            rows.append(f"press{k},{label},{t},{t + 250_000}")
+        frames = taxel.Frames(np.round(values), 10_000 * np.arange(600), unit="counts", array=taxel.Array(4, 4))
+        taxel.convert(frames, tmp_path / f"press{k}.npz")
+    (tmp_path / "labels.csv").write_text("\n".join(rows) + "\n")
+    files = [tmp_path / f"press{k}.npz" for k in range(2)]
+    given = ("--labels", tmp_path / "labels.csv", "--overwrite", "--json")
+    for command in (
+        ("train", *files, "--recipe", "touch", "--out", tmp_path / "r.json"),
+        ("information", *files, "--draws", "2", "--shuffles", "2", "--folds", "2", "--report", tmp_path / "r.html"),
+    ):
+        alone, spread_out = (run(*command, *given, *how) for how in ((), spread))
+        assert spread_out.returncode == 0, spread_out.stderr
+        assert json.loads(spread_out.stdout) == json.loads(alone.stdout)

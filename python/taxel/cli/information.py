@@ -9,6 +9,7 @@ from cyclopts import Parameter
 
 import taxel
 from taxel._base.messages import counted
+from taxel._base.parallel import Workers
 from taxel._core import ProblemError
 from taxel.cli._say import say
 from taxel.cli._task import Output, Reading, progress, say_warnings
@@ -29,6 +30,7 @@ def information(
     labels: Annotated[str | None, Parameter(metavar="FILE")] = None,
     report: Annotated[Path, Parameter(metavar="FILE")] = Path("information.html"),
     options: Flat[InformationOptions] = InformationOptions(),
+    workers: Flat[Workers] = Workers(),
     reading: Flat[Reading] = Reading(),
     output: Flat[Output] = Output(),
 ) -> None:
@@ -58,7 +60,7 @@ def information(
             for path in recordings:
                 update(f"reading {path}", 0, 0)
                 opened += reading.opener.open_sensors([path])
-            result = taxel.tasks.information(opened, labels, options, progress=update, watch=known.add)
+            result = taxel.tasks.information(opened, labels, options, progress=update, watch=known.add, workers=workers)
             update("drawing", 0, 0)
             taxel.report.write_information(report, result.answer, overwrite=output.overwrite)
     except KeyboardInterrupt:

@@ -11,6 +11,7 @@ from cyclopts import Parameter
 
 import taxel
 from taxel._base.messages import collected
+from taxel._base.parallel import Workers
 from taxel.cli._say import say
 from taxel.cli._task import OutArgument, Output, Reading, one_or_several, paths_text, progress, say_warnings
 from taxel.cli.app import App, Flat
@@ -30,6 +31,7 @@ def train(
     out: OutArgument = Path("readout.json"),
     report: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,
     options: Flat[TrainOptions] = TrainOptions(),
+    workers: Flat[Workers] = Workers(),
     reading: Flat[Reading] = Reading(),
     output: Flat[Output] = Output(),
 ) -> None:
@@ -70,7 +72,7 @@ def train(
             opened = reading.opener.open_sensors(recordings)
     say_warnings(unread)  # before the training, which may take long, and again with its result
     with progress(output.json) as update:
-        training = taxel.train(opened, one_or_several(labels), options, progress=update)
+        training = taxel.train(opened, one_or_several(labels), options, progress=update, workers=workers)
     training.readout.save(out, overwrite=output.overwrite)
     say_warnings(training.warned)
     training = replace(training, warned=(*unread, *training.warned))

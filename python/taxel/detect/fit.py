@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -183,6 +184,8 @@ class Fitter:
         self.examples, self.clocks = check_examples(examples), clocks
         self.window_ms = finite("window_ms", window_ms, least=0.0, most=3.6e6)
         self.report = reporting(progress)
+        #: Makes the same fitter in another process, where nobody is told of its progress.
+        self.made_anew = partial(Fitter, examples, recipe, window_ms=window_ms, frame_us=frame_us)
         #: All of the examples.
         self.whole = whole(self.examples)
         self._in_frames = in_frames(instance("recipe", recipe, Recipe), self.examples, clocks)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import partial, reduce
 from operator import add
 from typing import Any
 
 import numpy as np
 
 from taxel._base.messages import collected
+from taxel._base.parallel import HERE, Workers
 from taxel._base.progress import Progress
 from taxel.detect.examples import Example
 from taxel.detect.fit import Fitter, Found, Rules, Trained, better_by_rule
@@ -142,15 +143,23 @@ def judge(
     return judge_by(fitter, k)
 
 
-def judge_by(fitter: Fitter, k: int | Sequence[Fold]) -> Judged:
-    """Return what `judge` does, by a fitter that may have been used before."""
+def judge_by(fitter: Fitter, k: int | Sequence[Fold], workers: Workers = HERE) -> Judged:
+    """Return what `judge` does, by a fitter that may have been used before; `workers` train the folds."""
     folds, how = folds_of(fitter.examples, k)
-    trained = []
-    for n, fold in enumerate(folds):
-        fitter.report(f"fold {n + 1} of {len(folds)}", n, len(folds))
-        with collected():  # a readout that is only scored: the score shows what it misses
-            trained.append(fitter.decided(fold.train))
-    return replace(scored(fitter, folds, trained), how=how)
+    # Another process makes a fitter of its own: what is computed once is no part of it.
+    train = partial(_decided, (lambda: fitter) if workers.are_here else fitter.made_anew)
+    trained: dict[int, Trained] = {}
+    fitter.report(f"fold 1 of {len(folds)}", 0, len(folds))
+    for n, one in workers.run(train, [fold.train for fold in folds]):
+        trained[n] = one
+        if len(trained) < len(folds):
+            fitter.report(f"fold {len(trained) + 1} of {len(folds)}", len(trained), len(folds))
+    return replace(scored(fitter, folds, [trained[n] for n in range(len(folds))]), how=how)
+
+
+def _decided(fitter: Callable[[], Fitter], parts: Sequence[Part]) -> Trained:
+    with collected():  # a readout that is only scored: the score shows what it misses
+        return fitter().decided(parts)
 
 
 def judge_training(fitter: Fitter, trained: Trained) -> Judged:

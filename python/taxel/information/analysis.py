@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import callback, instance, integer, several
+from taxel._base.parallel import HERE, Workers
 from taxel.encode import ChangeEvents, Encoder
 from taxel.information._threads import threads
 from taxel.information.answers import Answer, Control, Point, is_above_chance
@@ -39,6 +42,7 @@ def answer(
     seed: int = 0,
     progress: Callable[[str, int, int], object] | None = None,
     watch: Callable[[float, float, float], object] | None = None,
+    workers: Workers = HERE,
 ) -> Answer:
     """Estimate how many bits the events of labelled trials hold about the labels, by period, time, taxels and cost.
 
@@ -68,6 +72,8 @@ def answer(
         ends the work.
     watch : function of (period_ms, window_ms, bits), optional
         Called after each draw of a setting with all taxels, with the bits by the draws so far.
+    workers : Workers, optional
+        Who computes the draws of each period; default: this process alone.
 
     Returns
     -------
@@ -88,7 +94,7 @@ def answer(
     answering.set_out(periods_ms, windows_ms, taxels)
     # On small matrices several threads are slower than one, and far slower where other processes compute as well.
     with threads(several=len(listed) >= WORTH_THREADS):
-        return answering.answer(int(shuffles), progress, watch)
+        return answering.answer(int(shuffles), progress, watch, instance("workers", workers, Workers))
 
 
 class _Answering(Question):
@@ -99,40 +105,43 @@ class _Answering(Question):
         shuffles: int,
         progress: Callable[[str, int, int], object] | None,
         watch: Callable[[float, float, float], object] | None,
+        workers: Workers,
     ) -> Answer:
         """Return the answer for all settings."""
         self._progress, self._done = progress, 0
         self._steps = self.draws * (len(self.periods) + len(self.random_taxels)) + shuffles + 1
         values = isinstance(self.encoder, ChangeEvents) and self.encoder.bits > 1
-        responses_at: dict[tuple[int, float], list[Any]] = {}
-        about: dict[tuple[int, float], list[tuple[float, float, float]]] = {}
-        reference: tuple[SampledEvents, Matrices] | None = None
+        responses_at: dict[tuple[int, float], dict[int, Any]] = {}
+        about: dict[tuple[int, float], dict[int, tuple[float, float, float]]] = {}
         missing: set[str] = set()
-        for draw in range(self.draws):
-            for period in self.periods:
-                self._begin(f"{to_ms(period):g} ms, draw {draw + 1}")
-                spikes = self.spikes(period, draw)
-                for window, matrices in zip(self.windows, self.matrices(spikes, self.windows), strict=True):
-                    nested = self.nested(matrices, draw)
-                    responses_at.setdefault((period, window), []).append(nested.responses)
-                    about.setdefault((period, window), []).append(_about(spikes, window, values))
-                    missing |= {f"fold {fold + 1} has no training trial of {name}" for fold, name in nested.missing}
-                    if reference is None and window == self.windows[-1]:
-                        reference = spikes, matrices
-                    if watch is not None:
-                        watch(to_ms(period), to_ms(window), bits_of(self.labels, responses_at[period, window]))
-        assert reference is not None  # there are a period, a draw and a window at least
+        settings = [(draw, period) for draw in range(self.draws) for period in self.periods]
+        alone = copy(self)
+        alone._progress = None
+        self._begin(_step(*settings[0]))
+        for done, (k, found) in enumerate(workers.run(partial(_of_setting, alone, values), settings), 1):
+            draw, period = settings[k]
+            for window, (responses, counts, lacking) in zip(self.windows, found, strict=True):
+                responses_at.setdefault((period, window), {})[draw] = responses
+                about.setdefault((period, window), {})[draw] = counts
+                missing |= lacking
+                if watch is not None:
+                    so_far = list(responses_at[period, window].values())
+                    watch(to_ms(period), to_ms(window), bits_of(self.labels, so_far))
+            if done < len(settings):
+                self._begin(_step(*settings[done]))
         self._begin("intervals")
-        estimates = {key: self.estimate(responses) for key, responses in responses_at.items()}
+        keys = [(period, window) for period in self.periods for window in self.windows]
+        estimates = {key: self.estimate(_in_order(responses_at[key])) for key in keys}
         everything, finest, longest = len(self.active), self.periods[0], self.windows[-1]
         points = []
         for (period, window), bits in estimates.items():
             verdict = None
             if window == longest and period != finest:
                 verdict = keeps(bits, estimates[finest, longest], groups=self.groups)
-            points.append(_point(period, window, everything, bits, about[period, window], verdict))
+            points.append(_point(period, window, everything, bits, _in_order(about[period, window]), verdict))
         full = next(p for p in points if (p.period_ms, p.window_ms) == (to_ms(finest), to_ms(longest)))
-        spikes, matrices = reference
+        spikes = self.spikes(finest, 0)
+        [matrices] = self.matrices(spikes, [longest])
         zero = zero_test(
             lambda labels: self._shuffled(matrices, labels),
             self.labels,
@@ -222,6 +231,28 @@ class _Answering(Question):
             self.notes.append(
                 "trials have no stop_us: the length uses the last event in the window instead of the trial's end"
             )
+
+
+def _of_setting(
+    question: Question, values: bool, setting: tuple[int, int]
+) -> list[tuple[Any, tuple[float, float, float], set[str]]]:
+    """Return of each window the responses, what is counted, and what is missing, in one draw of a period."""
+    draw, period = setting
+    spikes, found = question.spikes(period, draw), []
+    for window, matrices in zip(question.windows, question.matrices(spikes, question.windows), strict=True):
+        nested = question.nested(matrices, draw)
+        missing = {f"fold {fold + 1} has no training trial of {name}" for fold, name in nested.missing}
+        found.append((nested.responses, _about(spikes, window, values), missing))
+    return found
+
+
+def _step(draw: int, period: int) -> str:
+    return f"{to_ms(period):g} ms, draw {draw + 1}"
+
+
+def _in_order(of_draws: dict[int, Any]) -> list[Any]:
+    """Return what the draws gave in the order of the draws."""
+    return [of_draws[draw] for draw in sorted(of_draws)]
 
 
 def _about(spikes: SampledEvents, window: float, values: bool) -> tuple[float, float, float]:

@@ -53,6 +53,10 @@ class HeldValues:
         else:
             self._held = _core.HeldValues(source._parts(), self.taxels.astype(np.uint32), None)
 
+    def __reduce__(self) -> tuple[type[HeldValues], tuple[Events | Frames]]:
+        """Pickle what it is made of, for other processes."""
+        return HeldValues, (self.source,)
+
     def at(self, times: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return the held values, shape (times, existing taxels); before the first frame, the first frame.
 

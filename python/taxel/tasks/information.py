@@ -10,6 +10,7 @@ from typing import Any
 from taxel._base.arguments import checked_path, instance, integer
 from taxel._base.errors import helped, refused
 from taxel._base.messages import collected, counted
+from taxel._base.parallel import HERE, Workers
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.information import Answer, LabelledTrial, answer, folds, notes_as_trials, read_trials, recordings_as_trials
@@ -49,6 +50,7 @@ def information(
     *,
     progress: Progress | None = None,
     watch: Callable[[float, float, float], object] | None = None,
+    workers: Workers = HERE,
 ) -> Information:
     """Estimate how many bits labelled touches hold.
 
@@ -65,6 +67,8 @@ def information(
     watch : function of (period, window, bits), optional
         Called with the bits of each setting of all taxels as they are known, draw by draw, so that a task that is
         stopped has reported them.
+    workers : Workers, optional
+        Who computes; default: this process alone.
 
     Raises
     ------
@@ -98,6 +102,7 @@ def information(
             seed=options.seed,
             progress=show,
             watch=watch,
+            workers=workers,
         )
     return Information(found, tuple(warnings))
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from taxel._base.arguments import instance
 from taxel._base.errors import helped, refused
 from taxel._base.messages import collected, counted, warn
+from taxel._base.parallel import HERE, Workers
 from taxel._base.progress import Forecast, Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, Readout, Recipe, recipes, score
@@ -58,6 +59,7 @@ def train(
     options: TrainOptions | None = None,
     *,
     progress: Progress | None = None,
+    workers: Workers = HERE,
 ) -> Training:
     """Train neurons to detect labelled events, and score them on held-out data.
 
@@ -72,6 +74,8 @@ def train(
         that it is named after, or with a column recording; or times (us) by label, one mapping for each recording.
     options : TrainOptions, optional
     progress : function of (step, done, all), optional
+    workers : Workers, optional
+        Who trains the folds; default: this process alone.
 
     Returns
     -------
@@ -103,12 +107,15 @@ def train(
     """
     options = TrainOptions() if options is None else instance("options", options, TrainOptions)
     update = reporting(progress)
+    workers = instance("workers", workers, Workers)
     with collected() as warnings:
-        training = _train(sensors_of(recordings), labels, options, update)
+        training = _train(sensors_of(recordings), labels, options, update, workers)
     return replace(training, warned=tuple(warnings))
 
 
-def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainOptions, update: Progress) -> Training:
+def _train(
+    recordings: Sequence[Recording], labels: GivenLabels, options: TrainOptions, update: Progress, workers: Workers
+) -> Training:
     opened = labelled_trials(labels, recordings)
     labelled = references(labels, opened)
     if not any(labelled):
@@ -155,7 +162,7 @@ def _train(recordings: Sequence[Recording], labels: GivenLabels, options: TrainO
     plan = options._plan(names, measured_floor(examples))
     assert plan is not None
     taken = [one for one in rests if isinstance(one, TakenRest)]
-    return replace(_Work(opened, examples, taken, options, update).training(plan), unlabelled=unlabelled)
+    return replace(_Work(opened, examples, taken, options, update, workers).training(plan), unlabelled=unlabelled)
 
 
 def _like_labels(table: Events | Frames, events: Mapping[str, NDArray[np.int64]]) -> list[str]:
@@ -240,6 +247,7 @@ class _Work:
     rests: Sequence[TakenRest]
     options: TrainOptions
     update: Progress
+    workers: Workers
 
     def training(self, plan: Recipe) -> Training:
         """Return the readout with its scores, held out where that can be, and its outcomes on the training data.
@@ -274,7 +282,7 @@ class _Work:
         scored = None
         if count:
             try:
-                scored = judge_by(fitter, count)
+                scored = judge_by(fitter, count, self.workers)
             except ProblemError as error:
                 # These folds are the default, not a request, and all of the data may still be learnt from.
                 if folds is not None:
