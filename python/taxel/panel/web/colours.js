@@ -40,6 +40,21 @@ const CHANGE = {
   light: [[6, 41, 102], [20, 92, 196], [144, 187, 240], [238, 241, 246], [243, 178, 132], [194, 82, 16], [92, 31, 4]],
 };
 
+/** Names of labels in the order in which they were met: each has one colour on the whole page. @type {string[]} */
+const labels = [];
+const LABEL_COLOURS = ["label-0", "label-1", "label-2", "label-3", "label-4", "label-5"];
+
+/** @param {string} label @returns {string} the name of its colour in the theme */
+export function labelColour(label) {
+  if (!labels.includes(label)) labels.push(label);
+  return LABEL_COLOURS[labels.indexOf(label) % LABEL_COLOURS.length];
+}
+
+/** Gives an element the colour of a label. @param {HTMLElement} element @param {string} label */
+export function paintAs(element, label) {
+  element.style.setProperty("--label", `var(--${labelColour(label)})`);
+}
+
 /** Colours of a taxel without any event so far: a chequered ground of two tones. */
 /** @type {Record<Theme, [Colour, Colour]>} */
 export const UNKNOWN = {

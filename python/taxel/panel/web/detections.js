@@ -1,6 +1,7 @@
 // Detections: the list beside the views, and the marks over the lanes.
 
 import { collapsed } from "./clusters.js";
+import { paintAs } from "./colours.js";
 import { entitle, make, part, write } from "./dom.js";
 import { counted, seconds, short, integer } from "./words.js";
 
@@ -30,7 +31,7 @@ export class Detections {
     this.shown = [];
     /** Those of the live source, newest first. @type {Detection[]} */
     this.live = [];
-    /** The labels of the readout: their order gives shape and colour. @type {string[]} */
+    /** The labels of the readout: their order gives the shape. @type {string[]} */
     this.labels = [];
     this.listed = -1;
   }
@@ -74,6 +75,7 @@ export class Detections {
         make("span", { class: "when" }, seconds(t_us)),
         make("span", { class: "late" }, late),
       );
+      paintAs(button, label);
       button.onclick = () => this.seek(t_us);
       return make("li", {}, button);
     });
@@ -92,14 +94,15 @@ export class Detections {
     });
     const { single, counts } = collapsed(inside.sort((a, b) => a.x - b.x), MARK, 1);
     const all = [
-      ...single.map(({ label, t_us, source, x }) => ({ x, kind: this.shape(label), text: "", title: `${named({ label, source })} at ${seconds(t_us)}` })),
-      ...counts.map(({ from, to, marks: { length } }) => ({ x: (from + to) / 2, kind: "count", text: integer(length), title: counted(length, "detection") })),
+      ...single.map(({ label, t_us, source, x }) => ({ x, kind: this.shape(label), label, text: "", title: `${named({ label, source })} at ${seconds(t_us)}` })),
+      ...counts.map(({ from, to, marks: { length } }) => ({ x: (from + to) / 2, kind: "count", label: "", text: integer(length), title: counted(length, "detection") })),
     ];
     while (marks.children.length > all.length) marks.lastElementChild?.remove();
     while (marks.children.length < all.length) marks.append(make("span"));
-    all.forEach(({ x, kind, text, title }, i) => {
+    all.forEach(({ x, kind, label, text, title }, i) => {
       const mark = /** @type {HTMLElement} */ (marks.children[i]);
       mark.className = kind;
+      if (label) paintAs(mark, label);
       write(mark, text);
       entitle(mark, "title", title);
       mark.style.left = `${((100 * x) / clientWidth).toFixed(3)}%`;

@@ -1,6 +1,7 @@
 // Labels by click: mark, name, move and delete events on the time line.
 
 import { collapsed } from "./clusters.js";
+import { paintAs } from "./colours.js";
 import { entitle, make, part, write } from "./dom.js";
 import { notify, silence } from "./notice.js";
 import { counted, integer, listedTime, readTime, seconds, timeUnit } from "./words.js";
@@ -330,6 +331,7 @@ export class Labels {
     away.onclick = () => this.remove(label_id);
     const row = make("li", {}, name, time, make("span", { class: "unit" }, timeUnit() === "seconds" ? "s" : ""), go, away, ...(source ? [make("span", { class: "source" }, source)] : []));
     row.dataset.id = String(label_id);
+    paintAs(row, label);
     return row;
   }
 
@@ -421,6 +423,7 @@ export class Labels {
       entitle(flag, "aria-label", name);
       entitle(flag, "title", name);
       flag.classList.toggle("chosen", label_id === this.chosen);
+      paintAs(flag, label);
     });
     for (const [id, flag] of this.flags) {
       if (seen.has(id)) continue;

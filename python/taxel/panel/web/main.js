@@ -9,7 +9,7 @@ import { make, part, write } from "./dom.js";
 import { showKeys } from "./keys.js";
 import { Labels } from "./labels.js";
 import { Lanes } from "./lanes.js";
-import { Layout } from "./layout.js";
+import { Divider } from "./layout.js";
 import { Maps } from "./maps.js";
 import { Mistakes } from "./mistakes.js";
 import { Notes } from "./notes.js";
@@ -62,10 +62,9 @@ const labels = new Labels(server, settings, player, () => timeline, failed, () =
 const notes = new Notes(player, labels);
 const mistakes = new Mistakes(player, () => {
   marksDue = true;
-  layout.arrange();
 });
 const training = new Training(server, player, mistakes, () => showDetections(detections.shown, detections.labels));
-const layout = new Layout(arrangement, () => (lanesDue = true));
+new Divider(settings, () => (lanesDue = true));
 const board = new Board(server, failed);
 const sensor = new Sensor(server);
 const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
@@ -169,11 +168,6 @@ function shown() {
   // The sum of the values is a force where they are in N, or where it is known of a pressure.
   const sums = newtons === null ? { unit: values.unit, step: values.step } : { unit: "N", step: newtons };
   return { sensor, taxel, named: maps.named(), values, sums, gap_us: gapOfFrames(), raster: settings.values.raster, spikes };
-}
-
-/** What the page has to place: see `Layout`. */
-function arrangement() {
-  return { aspect: maps.aspect, maps: mapsShown() === "both" ? 2 : 1, lanes: lanes.visible };
 }
 
 /** Lists the recordings, with the labels as the page knows them. */
@@ -549,8 +543,8 @@ function showLanes() {
     part(`${name}-alone`, HTMLButtonElement).setAttribute("aria-pressed", String(values.maps === name));
   }
   part("pressure-alone", HTMLButtonElement).hidden = part("maps-field", HTMLElement).hidden = !hasMaps();
+  part("maps", HTMLElement).style.setProperty("--count", mapsShown() === "both" ? "2" : "1");
   lanes.show();
-  layout.arrange();
   lanesDue = true;
 }
 

@@ -118,6 +118,8 @@ export class Maps {
     /** @type {Uint16Array} */
     this.rest = new Uint16Array(0);
     this.pressureScale = new Scale(20);
+    /** Ticks of the full colour. */
+    this.top = this.pressureScale.top;
     this.changeScale = new Scale(10);
     /** @type {{ pressure: Uint32Array, change: Uint32Array }} */
     this.words = { pressure: new Uint32Array(256), change: new Uint32Array(256) };
@@ -167,6 +169,7 @@ export class Maps {
   name() {
     const title = this.geometry.kind === "channels" ? "Channels" : quantity(this.values.unit);
     write(part("pressure-title", HTMLElement), title);
+    write(part("top-unit", HTMLElement), this.values.unit);
     entitle(part("pressure-frame", HTMLElement), "aria-label", `${title}: arrow keys move the crosshair, Escape hides it`);
     entitle(part("pressure-alone", HTMLElement), "aria-label", `${title} alone, larger`);
   }
@@ -208,7 +211,6 @@ export class Maps {
   draw(now_ms) {
     const { frame, rows, columns, rest, floor } = this;
     const { exists } = this.geometry;
-    const { contrast } = this.settings.values;
     if (!frame?.pressure || frame.rows !== rows || frame.columns !== columns) return;
     const { pressure, change } = frame;
     let most = 0;
@@ -217,7 +219,8 @@ export class Maps {
       if (pressure[i] !== UNKNOWN_VALUE && rest[i] !== UNKNOWN_VALUE) most = Math.max(most, pressure[i] - rest[i]);
       if (change) moved = Math.max(moved, Math.abs(change[i]));
     }
-    const scale = this.pressureScale.held(most, now_ms);
+    const scale = this.settings.values.top / this.values.step || this.pressureScale.held(most, now_ms);
+    this.top = scale;
     const changes = this.changeScale.held(moved, now_ms);
     const ground = UNKNOWN[this.settings.theme].map(word);
     const [onPressure, onChange] = [this.pressure.words, this.change.words];
@@ -236,10 +239,10 @@ export class Maps {
           onPressure[from] = ground[(x + y) & 1];
         } else {
           const above = rest[from] === UNKNOWN_VALUE ? 0 : pressure[from] - rest[from];
-          this.levels[from] = above > floor ? Math.min(1, (contrast * above) / scale) : 0;
+          this.levels[from] = above > floor ? Math.min(1, above / scale) : 0;
           onPressure[from] = pressureWord[Math.round(255 * this.levels[from])];
         }
-        const moves = change ? Math.max(-127, Math.min(127, (127 * contrast * change[from]) / changes)) : 0;
+        const moves = change ? Math.max(-127, Math.min(127, (127 * change[from]) / changes)) : 0;
         onChange[from] = changeWord[128 + Math.round(moves)];
       }
     }
@@ -255,8 +258,7 @@ export class Maps {
 
   /** Writes the numbers beside the colours. */
   write() {
-    const { contrast } = this.settings.values;
-    const [scale, changes] = [this.pressureScale.top / contrast, this.changeScale.top / contrast];
+    const [scale, changes] = [this.top, this.changeScale.top];
     const { unit, step, zero, frames } = this.values;
     write(part("pressure-half", HTMLElement), rounded((scale * step) / 2));
     write(part("pressure-top", HTMLElement), `${rounded(scale * step)} ${unit}`);

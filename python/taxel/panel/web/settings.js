@@ -8,11 +8,12 @@ const OTHERS = {
   theme: "system",
   map: "lipari",
   gamma: 1,
-  contrast: 1,
+  top: 0,
   flipX: false,
   flipY: false,
   raster: "changes",
   maps: "both",
+  share: 42,
   letters: true,
   label: "contact",
 };

@@ -1,12 +1,14 @@
 // The whole recording, or the past of the live source as far as it can be viewed: force and marks; click or drag to move there.
 
+import { labelColour } from "./colours.js";
 import { fitted, ground, part, themed } from "./dom.js";
 import { seconds, writtenTime } from "./words.js";
 
 /** @typedef {import("./messages.js").Overview} Overview */
 /** @typedef {import("./player.js").Player} Player */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
-/** @typedef {{ labels: { t_us: number }[], detections: { t_us: number }[], mistakes: { t_us: number }[], notes: { t_us: number }[], cut: [number | null, number | null] }} Marks */
+/** @typedef {{ t_us: number, label: string }} Labelled */
+/** @typedef {{ labels: Labelled[], detections: Labelled[], mistakes: { t_us: number }[], notes: { t_us: number }[], cut: [number | null, number | null] }} Marks */
 
 /** The strip at the foot of the page. */
 export class Strip {
@@ -104,8 +106,14 @@ export class Strip {
       for (const { t_us: t } of marked) context.fillRect(x(t) - wide / 2, from, wide, to - from);
     };
     ticks(notes, "dim", 0, 5, 1.5);
-    ticks(detections, "less", 0, 5, 2);
-    ticks(labels, "label", 0, height, 2);
+    /** @param {Labelled[]} named @param {number} to */
+    const labelled = (named, to) => {
+      for (const label of new Set(named.map((each) => each.label))) {
+        ticks(named.filter((each) => each.label === label), labelColour(label), 0, to, 2);
+      }
+    };
+    labelled(detections, 5);
+    labelled(labels, height);
     ticks(mistakes, "bad", 5, 12, 3);
     if (this.hover !== undefined) {
       context.fillStyle = themed("dim");

@@ -36,7 +36,14 @@ export class View {
       select.value = settings.values[name];
       select.onchange = () => settings.set(name, select.value);
     }
-    for (const name of /** @type {const} */ (["gamma", "contrast"])) this.slider(name);
+    this.slider();
+    const top = part("top", HTMLInputElement);
+    top.value = settings.values.top ? String(settings.values.top) : "";
+    top.oninput = () => {
+      const value = Number(top.value.replace(",", "."));
+      top.setAttribute("aria-invalid", String(!(value >= 0)));
+      if (value >= 0) settings.set("top", value);
+    };
     /** @param {HTMLInputElement} box @param {"flipX" | "flipY" | "letters" | `show${string}`} name of its setting */
     const bind = (box, name) => {
       box.checked = settings.values[name];
@@ -65,21 +72,20 @@ export class View {
     };
   }
 
-  /** @param {"gamma" | "contrast"} name */
-  slider(name) {
-    const slider = part(name, HTMLInputElement);
+  slider() {
+    const slider = part("gamma", HTMLInputElement);
     // Even steps in ratio: a quarter to four, one in the middle.
-    slider.value = String(Math.log2(this.settings.values[name]));
+    slider.value = String(Math.log2(this.settings.values.gamma));
     const show = () => {
       const value = 2 ** Number(slider.value);
-      write(part(`${name}-value`, HTMLElement), value.toFixed(2));
+      write(part("gamma-value", HTMLElement), value.toFixed(2));
       slider.setAttribute("aria-valuetext", value.toFixed(2));
       return value;
     };
-    slider.oninput = () => this.settings.set(name, show());
+    slider.oninput = () => this.settings.set("gamma", show());
     slider.ondblclick = () => {
       slider.value = "0";
-      this.settings.set(name, show());
+      this.settings.set("gamma", show());
     };
     show();
   }
