@@ -474,3 +474,14 @@ def test_a_damaged_recording_is_said_beside_its_detections(
         result, verdict = json.loads(said.out), taxel.open(file).verdict
         assert (result["verdict"], result["verdict_details"]) == (verdict, verdict.to_dict())
         assert (verdict.status, bool(verdict.damaged)) == (("unfinished", True) if warned else ("unknown", False))
+
+
+def test_where_no_label_is_learnt_nothing_is_written(tmp_path: Path, capsys) -> None:
+    random = np.random.default_rng(7)
+    frames = taxel.Frames(random.normal(0, 1, (2000, 4, 4)), np.arange(2000) * 10_000, unit="counts")
+    taxel.convert(frames, tmp_path / "noise.npz")
+    rows = "".join(f"contact,{t}\n" for t in range(2_000_000, 19_000_000, 1_000_000))
+    (tmp_path / "labels.csv").write_text("label,t_us\n" + rows)
+    out = tmp_path / "readout.json"
+    code, said, _ = call(capsys, "train", tmp_path / "noise.npz", "--labels", tmp_path / "labels.csv", "-o", out)
+    assert (code, out.exists()) == (3, False), said

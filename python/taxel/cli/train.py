@@ -14,7 +14,7 @@ from taxel._base.messages import collected
 from taxel._base.parallel import Workers
 from taxel.cli._say import say
 from taxel.cli._task import OutArgument, Output, Reading, one_or_several, paths_text, progress, say_warnings
-from taxel.cli.app import App, Flat
+from taxel.cli.app import OUTSIDE, App, Flat
 from taxel.options import TrainOptions
 
 app = App(name="train")
@@ -34,13 +34,13 @@ def train(
     workers: Flat[Workers] = Workers(),
     reading: Flat[Reading] = Reading(),
     output: Flat[Output] = Output(),
-) -> None:
+) -> int:
     """Train neurons to detect labelled events, tune plain rules beside them, and save both as a readout.
 
     Training starts from the recipe that fits the recordings and labels; --recipe, --encoder and --set change that. Of
     each label the neuron or the rule runs, whichever is better (taxel detect --use runs the other one). The score is
     cross-validated: each fold is scored by what was made without it. The first line states that, or why the score is
-    that of the training data.
+    that of the training data. Exit code 3: no label is detected better than by nothing, and no readout is written.
 
     Example: taxel train trials/ -o gait.json
     Example: taxel train walk.npz --labels events.csv --set neurons.contact.kappa=1.5 -o gait.json
@@ -73,16 +73,21 @@ def train(
     say_warnings(unread)  # before the training, which may take long, and again with its result
     with progress(output.json) as update:
         training = taxel.train(opened, one_or_several(labels), options, progress=update, workers=workers)
-    training.readout.save(out, overwrite=output.overwrite)
+    end = "nothing is written, because no label is detected better than by nothing"
+    if training.learnt:
+        training.readout.save(out, overwrite=output.overwrite)
+        following = training.command(str(out))
+        end = f"written to {out}" + f"; next: {following}" * bool(following)
     say_warnings(training.warned)
     training = replace(training, warned=(*unread, *training.warned))
     written = {} if report is None else {"report": str(report / "report.html")}
-    following = training.command(str(out))
     output.say(
-        {"readout": str(out), **training.to_dict(), **written},
-        *training.lines(), "", f"written to {out}" + f"; next: {following}" * bool(following),
+        {"readout": str(out) if training.learnt else None, **training.to_dict(), **written},
+        *training.lines(),
+        "",
+        end,
         *(f"warning: {warning}" for warning in (*unread, *training.unreliable())),
-    )  # fmt: skip
+    )
     if report is not None:  # last, so that nothing is lost where it fails
         place = taxel.report.write_detections(
             report,
@@ -97,3 +102,4 @@ def train(
             overwrite=output.overwrite,
         )
         say(*[] if output.json else [f"report: {place}"])
+    return 0 if training.learnt else OUTSIDE

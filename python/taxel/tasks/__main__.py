@@ -73,6 +73,8 @@ _Save: TypeAlias = Callable[[Any], object]
 def _train(recordings: Sequence[Recording], request: Request, progress: Progress, save: _Save) -> Any:
     options = _fields(TrainOptions, request)
     training = train(recordings, request.pop("labels", "notes"), options, progress=progress)
+    if not training.learnt:
+        raise ProblemError("; ".join(["no label is learnt, so nothing is written", *training.unreliable()]))
     save(training.readout)
     return training
 

@@ -75,6 +75,14 @@ class Training:
         return self.scored.together
 
     @property
+    def learnt(self) -> tuple[str, ...]:
+        """The labels that are detected with fewer missed and false than there are labels."""
+        of_label = self.score.by_label
+        return tuple(
+            one for one in self.readout.labels if one in of_label and of_label[one].rank[0] < of_label[one].events
+        )
+
+    @property
     def held_out(self) -> bool:
         """Whether the score is that of data that the neurons were not trained on."""
         return not self.why
