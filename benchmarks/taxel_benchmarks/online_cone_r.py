@@ -20,7 +20,7 @@ from taxel.learn import ConeR, OnlineConeR
 from taxel.neuron import Neuron
 from taxel_benchmarks._goals import at_most
 from taxel_benchmarks._rounds import stamp
-from taxel_studies.gait.recipes import NOTES
+from taxel_studies.gait.recipes import RECIPE
 from taxel_studies.gait.sources import encoded
 
 WINDOW = 200
@@ -33,7 +33,7 @@ def recorded(event):
     folder = Path(os.environ.get("TAXEL_DATA") or Path(__file__).resolve().parents[3] / "shared" / "data") / "plate"
     if not folder.is_dir():
         return None
-    point = NOTES["plate"][event]
+    point = RECIPE["plate"][event]
     data = encoded(folder, "plate", point["encoder"])
     cone, delay_ms = learner_from("point", point["learner"])
     later = data.latency_ms + delay_ms

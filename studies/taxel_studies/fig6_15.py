@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from taxel_studies.gait import fits, protocols, sources
 from taxel_studies.gait.judgement import STANDS_FOR
 from taxel_studies.gait.outcomes import EVENTS
-from taxel_studies.gait.recipes import NOTES, PRINTED
+from taxel_studies.gait.recipes import PRINTED, RECIPE
 from taxel_studies.gait.sources import SOURCES, fingerprint
 from taxel_studies.study import Parameters, Row, Statement, Summary, Task
 
@@ -38,7 +38,7 @@ PARAMETERS: dict[str, Any] = {
 }
 TOY: dict[str, Any] = {"sources": ["gaitndd", "gaitpdb"], "recipes": ["printed"], "scopes": 1, "folds": 1}
 SIZES = {"toy": TOY}
-RECIPES = {"printed": ("Table 6.2 as printed", PRINTED), "notes": ("our recipe", NOTES)}
+RECIPES = {"printed": ("Table 6.2 as printed", PRINTED), "notes": ("our recipe", RECIPE)}
 LEARNERS = {"neuron": "CONE", "skim": "SKIM"}
 #: The lowest of SKIM's thresholds in 6.5.4.
 LOWEST = 0.1
@@ -57,7 +57,6 @@ def tasks(p: Parameters, *, data: Path) -> list[Task]:
             "data": fingerprint(folder, source),
             "folds": hashlib.sha256(json.dumps(protocols.to_json(scopes, names)).encode()).hexdigest()[:16],
             "train": dict(protocol.train),
-            "placed": "own",
         }
         for recipe in p["recipes"]:
             for event, point in RECIPES[recipe][1][source].items():

@@ -71,7 +71,7 @@ CPU_SECONDS = {
     "fig6.9": ("full", 99),
     "fig6.10": ("full", 151),
     "fig6.15": ("full", 339),
-    "gait": ("full", 457),
+    "gait": ("full", 352),
     "rivals": ("full", 2437),
     "stdp": ("full", 2520),
     "tempotron": ("full", 329),
@@ -85,7 +85,7 @@ def forecast(names: Sequence[str], size: str, jobs: int) -> str:
     Examples
     --------
     >>> forecast(["gait"], "full", 1)
-    'about 8 min with 1 of --jobs: the kept runs took 457 s of CPU'
+    'about 6 min with 1 of --jobs: the kept runs took 352 s of CPU'
     """
     cpu_s = sum(CPU_SECONDS[name][1] for name in names if CPU_SECONDS.get(name, ("", 0))[0] == size)
     minutes = cpu_s / jobs / 60

@@ -140,14 +140,6 @@ def test_folds_by_time_cover_the_recording_without_overlap():
     assert all(a.stop == b.start for a, b in pairwise(parts))
 
 
-def test_folds_by_piece_test_recordings_or_else_feet():
-    pieces = [piece(name, [[1.0]], [[]], []) for name in ("a left", "a right", "b left", "b right")]
-    (two,), (one,) = protocols.by_piece(pieces), protocols.by_piece(pieces[:2])
-    assert [[part.example for part in group] for group in two.groups] == [[0, 1], [2, 3]]
-    assert [[part.example for part in group] for group in one.groups] == [[0], [1]]
-    assert protocols.to_json([one], ["a left", "a right"])[0]["groups"] == [["a left"], ["a right"]]
-
-
 # plain rules: two sensors, one level
 
 
@@ -163,32 +155,26 @@ def detected(rule: str, numbers: dict, event: str = "contact", **changed) -> lis
 
 
 def test_a_counter_that_remembers_says_when_enough_sensors_are_on():
-    assert detected("state", {"count": 2, "release": 0}) == [120.0, 610.0]
-    assert detected("state", {"count": 1, "release": 0}) == [100.0, 600.0]
+    assert detected("count", {"count": 2, "release": 0}) == [120.0, 610.0]
+    assert detected("count", {"count": 1, "release": 0}) == [100.0, 600.0]
 
 
 def test_a_counter_says_lift_when_enough_sensors_are_off():
-    assert detected("state", {"count": 2, "release": 0}, "foot_off") == [350.0, 805.0]
-    assert detected("state", {"count": 2, "release": 1}, "foot_off") == [300.0, 800.0]
+    assert detected("count", {"count": 2, "release": 0}, "foot_off") == [350.0, 805.0]
+    assert detected("count", {"count": 2, "release": 1}, "foot_off") == [300.0, 800.0]
 
 
 def test_a_counter_hears_only_its_sensors():
-    assert detected("state", {"count": 1, "release": 0}, channels=np.array([1])) == [120.0, 610.0]
+    assert detected("count", {"count": 1, "release": 0}, channels=np.array([1])) == [120.0, 610.0]
 
 
 def test_a_counter_knows_what_was_on_before_it_listened():
     begun = piece("h/1", [[500.0], []], [[100.0], [700.0]], [])
     options = {"levels": 1, "channels": None, "sum_name": "", "dead_ms": 0.0}
-    assert rules.detection_times("state", {"count": 2, "release": 1}, begun, "foot_off", **options).tolist() == [
+    assert rules.detection_times("count", {"count": 2, "release": 1}, begun, "foot_off", **options).tolist() == [
         100.0,
         700.0,
     ]
-
-
-def test_a_spike_counter_needs_its_spikes_within_the_window():
-    assert detected("spikes", {"window_ms": 30.0, "count": 2}) == [120.0, 610.0]
-    assert detected("spikes", {"window_ms": 15.0, "count": 2}) == [610.0]
-    assert detected("spikes", {"window_ms": 15.0, "count": 1}, dead_ms=0.0) == [100.0, 120.0, 600.0, 610.0]
 
 
 def test_a_sum_has_its_threshold_and_its_release():
@@ -196,11 +182,15 @@ def test_a_sum_has_its_threshold_and_its_release():
     t = np.arange(0.0, 100.0, 10.0)
     row.sums["total"] = (t, np.array([0, 6, 9, 12, 9, 12, 4, 0, 20, 0.0]))
     options = {"levels": 1, "channels": None, "sum_name": "total", "dead_ms": 0.0}
-    assert rules.detection_times("sum", {"threshold": 10, "release": 5}, row, "contact", **options).tolist() == [
+    assert rules.detection_times(
+        "labels' own rule", {"threshold": 10, "release": 5}, row, "contact", **options
+    ).tolist() == [
         30.0,
         80.0,
     ]
-    assert rules.detection_times("sum", {"threshold": 10, "release": 5}, row, "foot_off", **options).tolist() == [
+    assert rules.detection_times(
+        "labels' own rule", {"threshold": 10, "release": 5}, row, "foot_off", **options
+    ).tolist() == [
         60.0,
         90.0,
     ]

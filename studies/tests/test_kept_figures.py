@@ -73,7 +73,7 @@ def test_the_times_that_are_forecast_are_those_of_the_kept_figures() -> None:
     kept = [json.loads(file.read_text(encoding="utf-8")) for file in figures.FIGURES.glob("*.json")]
     took = {each["name"]: (each["size"], round(each["cpu_seconds"])) for each in kept}
     assert {name: of for name, of in took.items() if of[1] >= 60} == CPU_SECONDS
-    assert forecast(["gait", "fig6.1"], "full", 4) == "about 2 min with 4 of --jobs: the kept runs took 457 s of CPU"
+    assert forecast(["gait", "fig6.1"], "full", 4) == "about 1 min with 4 of --jobs: the kept runs took 352 s of CPU"
     assert forecast(["gait"], "toy", 1) == forecast(["fig6.1"], "full", 1) == ""
 
 

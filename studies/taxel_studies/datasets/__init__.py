@@ -82,7 +82,7 @@ class DataSet(Protocol):
 
 
 def data_set(name: str) -> DataSet:
-    """Return a data set by its name: plate, gaitpdb, gaitndd, moticon, pedar, icub, popu."""
+    """Return a data set by its name: plate, gaitpdb, gaitndd, icub, popu."""
     return cast("DataSet", import_module(f"taxel_studies.datasets.{name}"))
 
 

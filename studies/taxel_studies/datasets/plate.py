@@ -105,7 +105,7 @@ def _images(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
         with h5py.File(path) as h5:
             for name in sorted(h5):
                 yield name, h5[name][...]
-    except OSError as error:
+    except (OSError, KeyError, RuntimeError, ValueError) as error:
         raise FormatError(f"{path.name}: the HDF5 file is damaged: {error}") from None
 
 

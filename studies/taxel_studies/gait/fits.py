@@ -23,14 +23,12 @@ from taxel_studies.gait.pieces import Piece, joined
 from taxel_studies.gait.protocols import Scope
 from taxel_studies.gait.sources import SOURCES, Encoded, encoded
 
-__all__ = ["TEST", "realise"]
+__all__ = ["realise"]
 
 #: Detections count up to so far from a reference event, ms (thesis 6.5.2).
 WINDOW_MS = 50.0
 #: A plain rule detects nothing for so long after an event, ms.
 DEAD_MS = 250.0
-#: The group of the people of the other folder, where one is judged.
-TEST = "test"
 
 
 def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
@@ -39,11 +37,10 @@ def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
     Parameters
     ----------
     params : dict
-        ``kind`` ("neuron", "skim" or "rule"), ``source``, ``protocol``, ``scope``, ``left_out`` (numbers of groups;
-        none: the folder ``test`` is judged), ``event``, ``train`` (``seconds`` a piece, or ``count`` footfalls a
-        person), ``placed``; of a neuron its ``points``, and of several the folds to choose in: ``inner`` (the groups
-        that each of them tests) and ``search`` (how much trains there); of SKIM a ``point`` and its own options
-        ``skim``; of a rule ``rule`` and ``encoder``.
+        ``kind`` ("neuron", "skim" or "rule"), ``source``, ``protocol``, ``scope``, ``left_out`` (numbers of groups),
+        ``event``, ``train`` (``seconds`` a piece, or ``count`` footfalls a person); of a neuron its ``points``, and of
+        several the folds to choose in: ``inner`` (the groups that each of them tests) and ``search`` (how much trains
+        there); of SKIM a ``point`` and its own options ``skim``; of a rule ``rule`` and ``encoder``.
     seed : int
         Draws the footfalls and their order in the training row.
     data : Path
@@ -57,28 +54,21 @@ def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
     """
     source = params["source"]
     folder = data / SOURCES[source].folder
-    split = protocols.scopes(folder, source, params["protocol"], 1 if params.get("test") else 2)
-    scope = next(s for s in split if s.name == params["scope"])
+    scope = next(s for s in protocols.scopes(folder, source, params["protocol"]) if s.name == params["scope"])
     if params["kind"] == "neuron":
         return _neuron(params, scope, folder, seed)
     encoder = params["encoder"] if params["kind"] == "rule" else params["point"]["encoder"]
-    encoding = encoded(folder, source, encoder, params["placed"])
+    encoding = encoded(folder, source, encoder)
     training = _training(scope, params["left_out"], params["train"], encoding, seed)
-    rows = _tested(params, scope, encoding, encoder)
+    rows = _tested(params, scope, encoding)
     if params["kind"] == "skim":
         return _skim(params, encoding, training, rows, seed)
     return _rule(params, encoding, training, rows)
 
 
-def _tested(
-    params: Mapping[str, Any], scope: Scope, encoding: Encoded, encoder: Mapping[str, Any]
-) -> dict[str, list[Piece]]:
-    """Return the rows that are tested, by group: those left out, or another folder's."""
-    source = params["source"]
-    if params["left_out"]:
-        return {str(g): _rows(_pieces(scope.groups[g], encoding), source) for g in params["left_out"]}
-    other = encoded(Path(params["test"]) / SOURCES[source].folder, source, encoder, params["placed"])
-    return {TEST: _rows(list(other.pieces.values()), source)}
+def _tested(params: Mapping[str, Any], scope: Scope, encoding: Encoded) -> dict[str, list[Piece]]:
+    """Return the rows that are tested, by group."""
+    return {str(g): _rows(_pieces(scope.groups[g], encoding), params["source"]) for g in params["left_out"]}
 
 
 def _pieces(parts: Sequence[Part], encoding: Encoded) -> list[Piece]:
@@ -134,8 +124,8 @@ def _recipe(
 ) -> tuple[tuple[float, float], dict[str, Any]]:
     """Train and test the best of points with one encoder; return the rank that it has inside, and the result."""
     event = params["event"]
-    encoding = encoded(folder, params["source"], encoder, params["placed"])
-    rows = [(g, row) for g, group in _tested(params, scope, encoding, encoder).items() for row in group]
+    encoding = encoded(folder, params["source"], encoder)
+    rows = [(g, row) for g, group in _tested(params, scope, encoding).items() for row in group]
     pieces = [row for _, row in rows]
 
     def fold(left_out: Sequence[int], size: str, tested: Sequence[Piece]) -> Fold:
@@ -270,7 +260,7 @@ def _rule(
     }
     first = training[0]
     largest = (
-        max((float(p.sums[options["sum_name"]][1].max()) for p in training), default=0.0) if rule == "sum" else 0.0
+        max((float(p.sums[options["sum_name"]][1].max()) for p in training), default=0.0) if rule != "count" else 0.0
     )
     channels = len(first.spikes) // 2 // data.levels if options["channels"] is None else len(options["channels"])
     best: tuple[tuple[float, float], dict[str, Any], float] | None = None

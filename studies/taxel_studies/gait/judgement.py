@@ -105,11 +105,6 @@ _ABOUT = [
         "target",
         "reference + the encoder's latency + a delay of at most 12 ms; t takes both off again, known does not",
     ],
-    [
-        "FA-1",
-        "receives one long row of footfalls; its threshold takes 1.6 s to come down after a spike, so it hardly fires "
-        "to the next one. Each footfall by itself would do better, and would let the cut mark time",
-    ],
 ]
 _FLATTERED = (
     "The lists for foot-off (plate, gaitpdb) were changed once after results on the shared people had been seen, so "
@@ -118,13 +113,13 @@ _FLATTERED = (
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
-    """List the goals, every row by event, people and worst feet where they were asked for, the full search."""
+    """List every row by event, and people where parameters were chosen inside."""
     del p
-    listed = [Table("What was run", ("", ""), _about(summary)), *_goals(summary)]
+    listed = [Table("What was run", ("", ""), _about(summary))]
     for source in summary["sources"]:
         for protocol in source["protocols"]:
             listed += _of_protocol(source, protocol)
-    return [*listed, *_full_search(summary)]
+    return listed
 
 
 def _about(summary: Summary) -> list[list[str]]:
@@ -133,31 +128,11 @@ def _about(summary: Summary) -> list[list[str]]:
         row["row"] for source in summary["sources"] for protocol in source["protocols"] for row in protocol["rows"]
     }
     rows = [
-        ["judged", summary["judged"]],
         *_ABOUT,
         *([name, about] for name, about in ROWS.items() if name in there),
         ["points to choose from, by event", f"{points}. {_FLATTERED}"],
     ]
     return [*rows, *([["not here, so skipped", ", ".join(summary["skipped"])]] if summary["skipped"] else [])]
-
-
-def _goals(summary: Summary) -> Iterator[Table]:
-    rows = []
-    for source in summary["sources"]:
-        for row in (r for protocol in source["protocols"] for r in protocol["rows"] if "goal" in r):
-            figures = row["figures"]
-            goal, reached = [], []
-            for name, value in row["goal"].items():
-                least = name in ("found_percent", "within_10_ms_percent")
-                goal.append(f"{name.replace('_', ' ')} {'≥' if least else '≤'} {value:g}")
-                is_ = figures["error_ms"] and figures["error_ms"]["sd"] if name == "sd_ms" else figures[name]
-                reached.append(_some(is_, 0 if name in ("missed", "false") else 2))
-            met = "met" if row["goal_met"] else "below the goal"
-            rows.append([source["source"], EVENTS[row["event"]], "; ".join(goal), "; ".join(reached), met])
-    if rows:
-        yield Table(
-            "Against the goals", ("recording", "event", "goal", "reached", ""), rows, "Parameters chosen inside."
-        )
 
 
 def _of_protocol(source: Mapping[str, Any], protocol: Mapping[str, Any]) -> Iterator[Table]:
@@ -171,11 +146,7 @@ def _of_protocol(source: Mapping[str, Any], protocol: Mapping[str, Any]) -> Iter
     )
     for event in dict.fromkeys(row["event"] for row in protocol["rows"]):
         listed = [row for row in protocol["rows"] if row["event"] == event]
-        rows = []
-        for row in listed:
-            rows.append([row["row"], *_cells(row["figures"], by_minute)])
-            if row["row"] in ("notes", "chosen") and len(row["by_group"]) > 1:
-                rows += [[f"  {group}", *_cells(f, by_minute)] for group, f in row["by_group"].items()]
+        rows = [[row["row"], *_cells(row["figures"], by_minute)] for row in listed]
         yield Table(f"{place}: {EVENTS[event]}", _head("row", by_minute), rows, note.strip())
         note = ""
         for row in _opened(listed):
@@ -183,43 +154,17 @@ def _of_protocol(source: Mapping[str, Any], protocol: Mapping[str, Any]) -> Iter
 
 
 def _opened(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Return the rows to be shown by person: parameters chosen inside; else the notes' recipe."""
+    """Return the rows to be shown by person: parameters chosen inside; else the study's recipe."""
     names = {row["row"] for row in rows}
-    return [row for row in rows if row["row"] == ("chosen" if "chosen" in names else "notes")]
+    return [row for row in rows if row["row"] == ("chosen" if "chosen" in names else "recipe")]
 
 
 def _by_person(title: str, row: Mapping[str, Any], by_minute: bool) -> Iterator[Table]:
     people = [[person, *_cells(f, by_minute)] for person, f in row["by_person"].items()]
-    feet = row["feet"]
-    over = f", {feet['over_3_false_per_minute']} above 3 false a minute" if by_minute else ""
-    note = f"{feet['below_95_percent_found']} of {feet['all']} feet are below 95 % found{over}."
-    yield Table(f"{title}, by person", _head("person", by_minute), people, note, folded=True)
-    worst = [[f["foot"], *_cells(f, by_minute)] for f in row["worst_feet"]]
-    yield Table(f"{title}, worst feet", _head("foot", by_minute), worst, folded=True)
+    yield Table(f"{title}, by person", _head("person", by_minute), people, folded=True)
     if row["chosen"]:
         points = [[str(one["folds"]), str(one["point"])] for one in row["chosen"]]
         yield Table(f"{title}, what was chosen", ("folds", "point"), points, folded=True)
-
-
-def _full_search(summary: Summary) -> Iterator[Table]:
-    if not summary["full_search"]:
-        return
-    rows = []
-    for one in summary["full_search"]:
-        inside = f"{one['inside']['missed']}, {one['inside']['false']}, {_some(one['inside']['rms_ms'])}"
-        ratio = f"{one['lambda_1']} : {one['lambda_2']}"
-        about = [EVENTS[one["event"]], one["all_else"], one["left_out"], f"{one['tau']:.0f}", str(one["kappa"]), ratio]
-        rows.append([*about, inside, str(one["missed"]), str(one["false"]), _ms(one["error_ms"])])
-    head = ("event", "all else", "person left out", "tau, ms", "kappa", "l1 : l2", "inside: missed, false, error (ms)")
-    yield Table(
-        "The 528 settings of 6.5.2",
-        (*head, "missed", "false", "error of t, ms"),
-        rows,
-        "tau 10 to 220 ms by 30, kappa 1.05 to 1.3 by 0.05, l1 : l2 from 4 : 0 to 0 : 4 by 0.4, on the plate, people "
-        "left out. Inside each fold a third of the training people judge what the others trained (20 footfalls each); "
-        "missed + false choose, then the error; what was chosen is trained on all training people and tested on the "
-        "one left out.",
-    )
 
 
 def _head(first: str, by_minute: bool) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,34 +11,16 @@ from typing import Any
 import numpy as np
 
 from taxel_studies.gait import insole, sources
-from taxel_studies.gait.fits import TEST
-from taxel_studies.gait.plans import Plan, chooses, each, key, plans
-from taxel_studies.gait.protocols import ROWS, Protocol
-from taxel_studies.gait.recipes import FULL, NOTES, SEARCH
+from taxel_studies.gait.plans import Plan, key, plans
+from taxel_studies.gait.protocols import ROWS
+from taxel_studies.gait.recipes import RECIPE, SEARCH
+from taxel_studies.gait.rules import RULES
 from taxel_studies.gait.sources import SOURCES
 from taxel_studies.study import Parameters, Row, Summary, Task
 
-__all__ = ["EVENTS", "GOALS", "Outcome", "Unit", "figures", "summarise"]
+__all__ = ["EVENTS", "Outcome", "Unit", "figures", "summarise"]
 
 EVENTS = {"contact": "contact", "heel_off": "heel-off", "foot_off": "foot-off"}
-
-#: What "parameters chosen inside" has to reach, people left out: missed and false, sd (ms); or % found, false a minute
-#: and foot, % of found within 10 ms.
-GOALS: dict[str, dict[str, dict[str, float]]] = {
-    "plate": {
-        "contact": {"missed": 0, "false": 0, "sd_ms": 6.7},
-        "heel_off": {"missed": 0, "false": 0},
-        "foot_off": {"missed": 0, "false": 0, "sd_ms": 17.0},
-    },
-    "gaitpdb": {
-        "contact": {"found_percent": 98.0, "false_per_minute": 2.5, "within_10_ms_percent": 92.0},
-        "foot_off": {"found_percent": 97.0, "false_per_minute": 2.5, "within_10_ms_percent": 85.0},
-    },
-    "gaitndd": {
-        "contact": {"found_percent": 94.0, "false_per_minute": 2.0, "within_10_ms_percent": 94.0},
-        "foot_off": {"found_percent": 95.0, "false_per_minute": 3.0, "within_10_ms_percent": 75.0},
-    },
-}
 
 
 class Known:
@@ -70,9 +52,9 @@ class Unit:
     delays: tuple[float, ...]
 
 
-@dataclass(frozen=True)
+@dataclass
 class Outcome:
-    """One row of the study: a source, a protocol, an event, a row's name, and every foot.
+    """One row of the study: an event, a row's name, and every foot.
 
     Attributes
     ----------
@@ -82,11 +64,9 @@ class Outcome:
         CPU time of the folds' fits, the choice inside them included.
     """
 
-    source: str
-    protocol: str
     event: str
     row: str
-    units: tuple[Unit, ...]
+    units: list[Unit] = field(default_factory=list)
     points: list[Any] = field(default_factory=list)
     seconds: float = 0.0
 
@@ -147,60 +127,48 @@ def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
     """Put all outcomes into plain values, with the folds, so that other learners can be judged on the same."""
     known, listed = Known(rows), plans(p, data)
     there = {plan.source for plan in listed}
-    present = set(sources.readable(data, p["sources"]))
-    if p["test"]:
-        present &= set(sources.readable(Path(p["test"]), p["sources"]))
+    present = sources.readable(data, p["sources"])
     skipped = [SOURCES[name].folder for name in SOURCES if name in p["sources"] and name not in present]
+    skipped += [f"{SOURCES[n].folder} (too few people or recordings)" for n in present if n not in there]
     skipped += [
-        f"{SOURCES[n].folder} (too few people or recordings)" for n in SOURCES if n in present and n not in there
-    ]
-    skipped += [
-        f"{plan.source}, {plan.protocol.name}: chosen inside (too few people)"
-        for plan in listed
-        if not plan.can_choose and any(chooses(row) for row in plan.protocol.rows)
+        f"{plan.source}, {plan.protocol.name}: chosen inside (too few people)" for plan in listed if not plan.can_choose
     ]
     return {
-        "judged": "on another folder" if p["test"] else "by folds",
         "skipped": skipped,
         "search_points": {s: {e: len(points) for e, points in events.items()} for s, events in SEARCH.items()},
-        "full_search": [one for plan in listed for one in _full_search(plan, known)],
         "sources": [
-            _source(name, [plan for plan in listed if plan.source == name], known) for name in SOURCES if name in there
+            {
+                "source": name,
+                "title": SOURCES[name].title,
+                "truth": SOURCES[name].truth,
+                "shows": SOURCES[name].shows,
+                "by_minute": SOURCES[name].by_minute,
+                "protocols": [_protocol(plan, known) for plan in listed if plan.source == name],
+            }
+            for name in SOURCES
+            if name in there
         ],
         "folds": {f"{plan.source}/{plan.protocol.name}": plan.folds for plan in listed},
         "conversion": _conversion(data) if "plate" in there else None,
     }
 
 
-def _source(name: str, listed: Sequence[Plan], known: Known) -> dict[str, Any]:
-    source = SOURCES[name]
-    judged = []
-    for plan in listed:
-        rows = [_row(outcome, plan.protocol, plan.testing) for outcome in _outcomes(plan, known)]
-        judged.append(
-            {
-                "protocol": plan.protocol.name,
-                "title": "trained on one folder, judged on the other" if plan.testing else plan.protocol.title,
-                "train": dict(plan.protocol.train),
-                "search": dict(plan.protocol.search),
-                "rows": rows,
-                "beside": _beside(rows),
-            }
-        )
+def _protocol(plan: Plan, known: Known) -> dict[str, Any]:
+    rows = [_row(outcome) for outcome in _outcomes(plan, known)]
     return {
-        "source": name,
-        "title": source.title,
-        "truth": source.truth,
-        "shows": source.shows,
-        "by_minute": source.by_minute,
-        "protocols": judged,
+        "protocol": plan.protocol.name,
+        "title": plan.protocol.title,
+        "train": dict(plan.protocol.train),
+        "search": dict(plan.protocol.search),
+        "rows": rows,
+        "beside": _beside(rows),
     }
 
 
 def _conversion(data: Path) -> dict[str, Any]:
     """Return pressure and spikes of one footfall of the plate: what figures 6.12 and 6.13 draw."""
-    folder, encoder = data / SOURCES["plate"].folder, NOTES["plate"]["contact"]["encoder"]
-    cut = sources.cuts(folder, "plate", "own")[0]
+    folder, encoder = data / SOURCES["plate"].folder, RECIPE["plate"]["contact"]["encoder"]
+    cut = sources.cuts(folder, "plate")[0]
     piece = sources.encoded(folder, "plate", encoder).pieces[cut.name]
     begins = float(piece.truth["contact"][0])
     peak = cut.values.max(axis=0)
@@ -220,27 +188,6 @@ def _conversion(data: Path) -> dict[str, Any]:
     }
 
 
-def _full_search(plan: Plan, known: Known) -> Iterator[dict[str, Any]]:
-    """List the setting of the 528 that each fold chose, its errors inside the training groups and in the test."""
-    for scope, event, row in each(plan):
-        for left_out in plan.outer(scope) if row in FULL else ():
-            fitted = known[plan.task(scope, left_out, event, row)]
-            point = fitted["point"]
-            units = [_unit(name, unit) for group in fitted["tested"].values() for name, unit in group.items()]
-            result = figures(units)
-            yield {
-                "event": event,
-                "all_else": row.removeprefix("528: "),
-                "left_out": ", ".join(sorted({u.person for u in units})),
-                "tau": point["learner"]["tau"],
-                "kappa": point["learner"]["kappa"],
-                "lambda_1": point["learner"]["lambdas"][0],
-                "lambda_2": point["learner"]["lambdas"][1],
-                "inside": fitted["inside"],
-                **{name: result[name] for name in ("missed", "false", "error_ms")},
-            }
-
-
 def _unit(name: str, unit: Mapping[str, Any]) -> Unit:
     return Unit(
         name,
@@ -256,55 +203,27 @@ def _unit(name: str, unit: Mapping[str, Any]) -> Unit:
 
 def _outcomes(plan: Plan, known: Known) -> list[Outcome]:
     outcomes: dict[tuple[str, str], Outcome] = {}
-    for scope, event, row in each(plan):
-        units, points, tasks = [], [], []
-        for left_out in plan.outer(scope):
-            task = plan.task(scope, left_out, event, row)
-            if chooses(row) or row.startswith("rule: "):
-                points.append(known[task]["point" if chooses(row) else "fit"])
-            tasks.append(task)
-            for group in [TEST] if plan.testing else [str(g) for g in left_out]:
-                units += [_unit(name, unit) for name, unit in known[task]["tested"][group].items()]
-        before = outcomes.get((event, row))
-        outcomes[event, row] = Outcome(
-            plan.source,
-            plan.protocol.name,
-            event,
-            row,
-            (*(before.units if before else ()), *units),
-            [*(before.points if before else []), *points],
-            (before.seconds if before else 0.0) + known.seconds(tasks),
-        )
+    for event, row, left_out, task in plan.fits():
+        outcome = outcomes.setdefault((event, row), Outcome(event, row))
+        result = known[task]
+        if row == "chosen" or row in RULES:
+            outcome.points.append(result["point" if row == "chosen" else "fit"])
+        outcome.units += [_unit(name, unit) for name, unit in result["tested"][str(left_out)].items()]
+        outcome.seconds += known.seconds([task])
     return list(outcomes.values())
 
 
-def _row(outcome: Outcome, protocol: Protocol, test: bool) -> dict[str, Any]:
-    all_feet = figures(outcome.units)
-    groups = sorted({u.group for u in outcome.units if u.group})
-    feet = [{"foot": name, **figures([u for u in outcome.units if u.name == name])} for name in _names(outcome.units)]
-    worst = sorted(feet, key=lambda f: (-(f["missed"] + f["false"]), -(f["error_ms"] or {"sd": 0.0})["sd"]))
+def _row(outcome: Outcome) -> dict[str, Any]:
     people = sorted({u.person for u in outcome.units})
-    row: dict[str, Any] = {
+    return {
         "event": outcome.event,
         "row": outcome.row,
         "about": ROWS[outcome.row],
-        "figures": all_feet,
-        "by_group": {g: figures([u for u in outcome.units if u.group == g]) for g in groups},
+        "figures": figures(outcome.units),
         "by_person": {p: figures([u for u in outcome.units if u.person == p]) for p in people},
-        "worst_feet": worst[:5],
-        "feet": {
-            "all": len(feet),
-            "below_95_percent_found": sum((f["found_percent"] or 100.0) < 95.0 for f in feet),
-            "over_3_false_per_minute": sum((f["false_per_minute"] or 0.0) > 3.0 for f in feet),
-        },
         "chosen": _counted(outcome.points),
         "cpu_seconds": round(outcome.seconds, 1),
     }
-    goal = GOALS.get(outcome.source, {}).get(outcome.event)
-    if goal and outcome.row == "chosen" and (protocol.split == "people" or test):
-        row["goal"] = goal
-        row["goal_met"] = _reaches(all_feet, goal)
-    return row
 
 
 def _counted(points: Sequence[Any]) -> list[dict[str, Any]]:
@@ -317,33 +236,13 @@ def _counted(points: Sequence[Any]) -> list[dict[str, Any]]:
 
 
 def _beside(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Compare the neuron with the plain rules, event by event: by missed + false, then by % within 10 ms."""
+    """Compare the neuron with the count, event by event: by missed + false."""
     lines = []
     for event in dict.fromkeys(row["event"] for row in rows):
-        here = {row["row"]: row["figures"] for row in rows if row["event"] == event}
-        neuron = here.get("chosen", here.get("notes"))
-        rules = {name.removeprefix("rule: "): f for name, f in here.items() if name.startswith("rule: ")}
-        if neuron is None or not rules:
-            continue
-        wrong = neuron["missed"] + neuron["false"]
-        ahead = [f"{n} ({f['missed'] + f['false']})" for n, f in rules.items() if f["missed"] + f["false"] < wrong]
-        behind = [f"{n} ({f['missed'] + f['false']})" for n, f in rules.items() if f["missed"] + f["false"] >= wrong]
-        lines.append(
-            f"{EVENTS[event]}: the neuron has {wrong} missed and false; "
-            + (f"better than it: {', '.join(ahead)}" if ahead else "no plain rule is better")
-            + (f"; not better: {', '.join(behind)}." if behind else ".")
-        )
+        wrong = {
+            row["row"]: row["figures"]["missed"] + row["figures"]["false"] for row in rows if row["event"] == event
+        }
+        if "count" in wrong:
+            neuron = wrong.get("chosen", wrong["recipe"])
+            lines.append(f"{EVENTS[event]}: the neuron has {neuron} missed and false, the count {wrong['count']}.")
     return lines
-
-
-def _names(units: Sequence[Unit]) -> list[str]:
-    return list(dict.fromkeys(u.name for u in units))
-
-
-def _reaches(result: dict[str, Any], goal: dict[str, float]) -> bool:
-    at_least = {"found_percent", "within_10_ms_percent"}
-    for name, value in goal.items():
-        is_ = result["error_ms"] and result["error_ms"]["sd"] if name == "sd_ms" else result[name]
-        if is_ is None or (is_ < value if name in at_least else is_ > value):
-            return False
-    return True

@@ -1,4 +1,4 @@
-"""What is run on which recordings, and in which folds: by person, by count, by time, by piece."""
+"""What is run on which recordings, and in which folds: by person, by count, by time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from taxel.detect import Part
 from taxel.spikes import to_ms, to_us
 from taxel_studies.gait.pieces import Piece
-from taxel_studies.gait.recipes import ENCODERS, NOTES
+from taxel_studies.gait.recipes import RECIPE
 from taxel_studies.gait.rules import RULES
 from taxel_studies.gait.sources import encoded
 
@@ -24,7 +24,6 @@ __all__ = [
     "Scope",
     "by_count",
     "by_person",
-    "by_piece",
     "by_time",
     "names",
     "of",
@@ -32,17 +31,12 @@ __all__ = [
     "to_json",
 ]
 
-#: The three rows of the study, and those for comparison.
+#: The rows of the study.
 ROWS = {
-    "notes": "the notes' recipe (tuned on the shared people, and flattered by that)",
+    "recipe": "the study's own recipe (tuned on the shared people, and flattered by that)",
     "chosen": "parameters chosen inside the training folds (missed + false first, then error): the honest row",
     "printed": "Table 6.2 as printed",
-    "528: as printed": "528 settings of 6.5.2 searched, all else as printed",
-    "528: recipe": "528 settings of 6.5.2 searched, all else as in the notes' recipe",
-    "tonic": "the notes' recipe with tonic inputs (extension)",
-    "others": "the notes' recipe, insole placed by other people's mean",
-    **{f"rule: {name}": f"plain rule: {text}" for name, text in RULES.items()},
-    **{f"encoder: {name}": f"encoder: {name}" for name in ENCODERS},
+    **RULES,
 }
 
 
@@ -106,15 +100,6 @@ def by_time(pieces: Sequence[Piece], folds: int) -> list[Scope]:
     return scopes
 
 
-def by_piece(pieces: Sequence[Piece]) -> list[Scope]:
-    """Let one recording train and the other test; where there is only one, one foot trains and the other tests."""
-    recordings = [p.name.rsplit(" ", 1)[0] for p in pieces]
-    if len(set(recordings)) == 1:
-        return [Scope("all", tuple((Part(n),) for n in range(len(pieces))))]
-    groups = (tuple(Part(n) for n, of in enumerate(recordings) if of == name) for name in sorted(set(recordings)))
-    return [Scope("all", tuple(groups))]
-
-
 def _of(pieces: Sequence[Piece], person: str) -> list[Part]:
     return [Part(n) for n, piece in enumerate(pieces) if piece.person == person]
 
@@ -137,12 +122,12 @@ class Protocol:
     ----------
     name, title : str
     split : str
-        "people", "footfalls", "time" or "pieces".
+        "people", "footfalls" or "time".
     folds : int
     repeats : int
         Of random splits.
     rows : tuple of str
-        Of `ROWS`; "rules" and "encoders" stand for all of theirs.
+        Of `ROWS`.
     train, search : dict
         How much each piece or person trains, in the folds and inside them: ``seconds`` or ``count``.
     """
@@ -162,9 +147,7 @@ class Protocol:
             return by_person(all_pieces, self.folds, seed=1)
         if self.split == "footfalls":
             return by_count(all_pieces, self.folds, self.repeats, seed=1)
-        if self.split == "time":
-            return by_time(all_pieces, self.folds)
-        return by_piece(all_pieces)
+        return by_time(all_pieces, self.folds)
 
 
 PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
@@ -174,17 +157,8 @@ PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
             "each person is tested by what five others trained",
             "people",
             6,
-            ("notes", "chosen", "printed", "others", "rules"),
+            ("recipe", "chosen", "printed", "count", "labels' own rule"),
             {"count": 40},
-            {"count": 10},
-        ),
-        Protocol(
-            "encoders compared",
-            "two people are tested by what four others trained; each encoder has the same number of points",
-            "people",
-            3,
-            ("encoders",),
-            {"count": 20},
             {"count": 10},
         ),
         Protocol(
@@ -192,7 +166,7 @@ PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
             "40 of a person's 60 footfalls train, 20 test; every footfall is tested once a split",
             "footfalls",
             3,
-            ("notes", "chosen", "printed"),
+            ("recipe", "chosen", "printed"),
             {"count": 60},
             {"count": 60},
         ),
@@ -203,7 +177,7 @@ PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
             "four folds by person, half healthy, half patients",
             "people",
             4,
-            ("notes", "chosen", "printed", "tonic", "rules"),
+            ("recipe", "chosen", "printed", "count", "labels' own rule"),
             {"seconds": 30},
             {"seconds": 15},
         ),
@@ -214,7 +188,7 @@ PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
             "four folds by person, healthy people and patients spread",
             "people",
             4,
-            ("notes", "chosen", "printed", "rules"),
+            ("recipe", "chosen", "printed", "count"),
             {"seconds": 120},
             {"seconds": 60},
         ),
@@ -223,31 +197,9 @@ PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
             "four folds by time within each person (6.5.3)",
             "time",
             4,
-            ("notes", "chosen"),
+            ("recipe", "chosen"),
             {"seconds": 300},
             {"seconds": 300},
-        ),
-    ),
-    "moticon": (
-        Protocol(
-            "one recording trains, the other tests",
-            "two recordings of one person",
-            "pieces",
-            2,
-            ("notes", "rules"),
-            {"seconds": 60},
-            {"seconds": 60},
-        ),
-    ),
-    "pedar": (
-        Protocol(
-            "one foot trains, the other tests",
-            "two feet of one person",
-            "pieces",
-            2,
-            ("notes", "rules"),
-            {"seconds": 60},
-            {"seconds": 60},
         ),
     ),
 }
@@ -259,10 +211,10 @@ def of(source: str, name: str) -> Protocol:
 
 
 @lru_cache(maxsize=32)
-def scopes(folder: Path, source: str, protocol: str, least: int = 2) -> tuple[Scope, ...]:
-    """Split the recordings of a source's folder as one of its protocols says; scopes of fewer groups are left out."""
+def scopes(folder: Path, source: str, protocol: str) -> tuple[Scope, ...]:
+    """Split the recordings of a source's folder as one of its protocols says; scopes of one group are left out."""
     split = of(source, protocol).scopes(list(_pieces(folder, source).values()))
-    return tuple(scope for scope in split if len(scope.groups) >= least)
+    return tuple(scope for scope in split if len(scope.groups) > 1)
 
 
 def names(folder: Path, source: str) -> list[str]:
@@ -272,4 +224,4 @@ def names(folder: Path, source: str) -> list[str]:
 
 def _pieces(folder: Path, source: str) -> Mapping[str, Piece]:
     # Any encoder will do: the names and lengths of the pieces count.
-    return encoded(folder, source, next(iter(NOTES[source].values()))["encoder"]).pieces
+    return encoded(folder, source, next(iter(RECIPE[source].values()))["encoder"]).pieces

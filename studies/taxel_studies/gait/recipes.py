@@ -1,4 +1,4 @@
-"""The study's parameters as data: its own recipes, what may be chosen inside, Table 6.2 as printed, the encoders.
+"""The study's parameters as data: its own recipe, what may be chosen inside, Table 6.2 as printed, rules' encoders.
 
 A point is a recipe for one neuron, in the notation of `taxel.detect.Recipe`: an encoder, and a learner's parameters
 with the delay. Lambdas are those of 6.14 in its order (l1, l2, B, C, D).
@@ -9,14 +9,14 @@ from __future__ import annotations
 from copy import deepcopy
 from typing import Any
 
-__all__ = ["ENCODERS", "FULL", "NOTES", "PRINTED", "RULE_ENCODERS", "SEARCH", "SETTINGS", "TONIC", "Point", "changed"]
+__all__ = ["PRINTED", "RECIPE", "RULE_ENCODERS", "SEARCH", "Point", "changed"]
 
 Point = dict[str, Any]
 
 
-def izhikevich(*levels: float, published: str = "6.5.1") -> dict[str, Any]:
+def izhikevich(*levels: float) -> dict[str, Any]:
     """Threshold and Izhikevich pair."""
-    return {"name": "threshold_izhikevich", "levels": list(levels), "published": published}
+    return {"name": "threshold_izhikevich", "levels": list(levels), "published": "6.5.1"}
 
 
 def crossing(*levels: float, **options: Any) -> dict[str, Any]:
@@ -88,10 +88,9 @@ _STRIKE = crossing(
     running_range={"low": 10.0, "high": 95.0, "first_window": "itself"},
 )
 _LIFT = crossing(0.06, release_share=0.7, running_range={"low": 28, "high": 95, "first_window": "itself"})
-_CELLS, _KILOPASCALS = crossing(1, release_share=0.7), crossing(20)
 
 #: The recipes of the trials, tuned on the shared people; some events with an encoder of their own.
-NOTES: dict[str, dict[str, Point]] = {
+RECIPE: dict[str, dict[str, Point]] = {
     "plate": {
         "contact": {
             "encoder": _ONE,
@@ -127,16 +126,6 @@ NOTES: dict[str, dict[str, Point]] = {
             | {"lambdas": [0.0, 1.9, 384.0, 100.0, 2214.0]},
         },
     },
-    "moticon": _of_sensors(_CELLS, _CELLS),
-    "pedar": _of_sensors(_KILOPASCALS, _KILOPASCALS),
-}
-
-#: One more input a sensor: a spike each 20 ms while above 20 N, a memory that the crossings lack.
-TONIC: dict[str, dict[str, Point]] = {
-    "gaitpdb": {
-        event: changed(point, encoder=_NEWTONS | {"tonic_ms": 20.0, "tonic_level": 20})
-        for event, point in NOTES["gaitpdb"].items()
-    }
 }
 
 
@@ -145,17 +134,16 @@ def _printed(encoder: dict[str, Any], event: str) -> Point:
     tau, kappa = (70.0, 1.2) if event == "contact" else (190.0, 1.25)
     lambdas = [2.8, 1.2, 100.0, 100.0, 80.0]
     about = {"bound": 0.3, "delay_ms": 8.0, "after_spike": "keep", "divide_b_by": "B_max"}
-    return changed(NOTES["plate"]["contact"], encoder=encoder, tau=tau, kappa=kappa, lambdas=lambdas, **about)
+    return changed(RECIPE["plate"]["contact"], encoder=encoder, tau=tau, kappa=kappa, lambdas=lambdas, **about)
 
 
 #: Table 6.2 as printed, each recording with the encoder of its recipe (the plate with one level, as 6.5.1 has it).
 PRINTED: dict[str, dict[str, Point]] = {
     source: {event: _printed(_ONE if source == "plate" else point["encoder"], event) for event, point in points.items()}
-    for source, points in NOTES.items()
-    if source in {"plate", "gaitpdb", "gaitndd"}
+    for source, points in RECIPE.items()
 }
 
-_CONTACT, _HEEL, _LIFTED = NOTES["plate"].values()
+_CONTACT, _HEEL, _LIFTED = RECIPE["plate"].values()
 _RESET = {"after_spike": "reset", "theta_plus": 0.2}
 
 #: What may be chosen inside the training folds, 24 points an event at most.
@@ -195,7 +183,7 @@ SEARCH: dict[str, dict[str, list[Point]]] = {
             changed(point, tau=45.0 if event == "contact" else 25.0),
             changed(point, **_RESET, refractory=250.0 if event == "contact" else 120.0),
         ]
-        for event, point in NOTES["gaitpdb"].items()
+        for event, point in RECIPE["gaitpdb"].items()
     },
     "gaitndd": {
         event: [
@@ -206,41 +194,8 @@ SEARCH: dict[str, dict[str, list[Point]]] = {
             changed(point, delay_ms=6.0),
             changed(point, **_RESET, refractory=250.0),
         ]
-        for event, point in NOTES["gaitndd"].items()
+        for event, point in RECIPE["gaitndd"].items()
     },
-}
-
-#: The 528 settings of 6.5.2: tau (ms), kappa, lambda_1; lambda_2 is what that leaves of 4.
-SETTINGS: dict[str, tuple[float, ...]] = {
-    "tau": tuple(float(tau) for tau in range(10, 221, 30)),
-    "kappa": (1.05, 1.1, 1.15, 1.2, 1.25, 1.3),
-    "lambda_1": tuple(round(4 - 0.4 * k, 1) for k in range(11)),
-}
-
-#: All else, where those settings are searched: as printed, and as in the notes' recipe. 6.5.2 has these two events.
-FULL: dict[str, dict[str, Point]] = {
-    name: {event: points[event] for event in ("contact", "foot_off")}
-    for name, points in {"528: as printed": PRINTED["plate"], "528: recipe": NOTES["plate"]}.items()
-}
-
-_HELD = crossing(1, 60, 200, 500, hold_ms=10.0)
-_TAUS = {"contact": (10.0, 20.0, 40.0), "heel_off": (50.0, 70.0, 100.0), "foot_off": (130.0, 160.0, 190.0)}
-
-#: Encoders compared on the plate, each with the same number of points on the same folds.
-ENCODERS: dict[str, dict[str, list[Point]]] = {
-    name: {
-        event: [changed(NOTES["plate"][event], encoder=encoder, tau=tau) for tau in taus]
-        for event, taus in _TAUS.items()
-    }
-    for name, encoder in {
-        "Izhikevich 6.5.1, 1 level": _ONE,
-        "Izhikevich 6.5.1, 4 levels": _FOUR,
-        "Izhikevich 3.4.3, 1 level": izhikevich(100, published="3.4.3"),
-        "Izhikevich 3.4.3, 4 levels": izhikevich(1, 60, 200, 500, published="3.4.3"),
-        "crossings that hold 10 ms, 4 levels": _HELD,
-        "FA-1": {"name": "fa1", "theta_0": 0.163, "period_ms": 2.0},
-        "change events of 100 counts": {"name": "change_events", "noise_floor": 100.0, "bits": 1},
-    }.items()
 }
 
 _RANGE = {"low": 28, "high": 95, "first_window": "itself"}
@@ -253,6 +208,4 @@ RULE_ENCODERS: dict[str, dict[str, dict[str, Any]]] = {
         "contact": _STRIKE,
         "foot_off": crossing(0.03, 0.045, 0.06, 0.08, 0.11, 0.15, release_share=0.7, running_range=_RANGE),
     },
-    "moticon": dict.fromkeys(("contact", "foot_off"), crossing(1, 2, 5, release_share=0.7)),
-    "pedar": dict.fromkeys(("contact", "foot_off"), crossing(20, 40, 80)),
 }

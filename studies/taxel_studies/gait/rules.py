@@ -1,4 +1,4 @@
-"""The plain rules that each neuron is compared with: thresholds on spike counts, on trains that are on, and on sums.
+"""The plain rules that each neuron is compared with: a count of trains that are on, and a threshold on a sum.
 
 Every rule has few numbers; they and its offset are chosen in the training folds, as the neuron's weights are.
 """
@@ -19,10 +19,8 @@ __all__ = ["RULES", "detection_times", "grid"]
 RISING = {"contact"}
 
 RULES = {
-    "spikes": "spikes counted in a window",
-    "state": "sensors (and levels) that are on now, counted, with memory",
-    "level": "one level alone: sensors above it now",
-    "sum": "threshold on a sum of the sensors",
+    "count": "plain rule: sensors (and levels) that are on now, counted, with memory",
+    "labels' own rule": "a threshold on the sum of the sensors whose threshold the labels are",
 }
 
 
@@ -35,21 +33,11 @@ def grid(rule: str, levels: int, channels: int, largest: float) -> list[dict[str
     levels, channels : int
         Of the encoder whose spikes are its input.
     largest : float
-        The largest value of the sum in training, for thresholds of "sum".
+        The largest value of the sum in training, for thresholds of the labels' own rule.
     """
     counts = [n for n in (1, 2, 3, 4, 6, 8, 12, 16) if n <= channels * levels]
-    if rule == "spikes":
-        return [{"window_ms": w, "count": n} for w, n in product((5.0, 10.0, 20.0, 30.0, 60.0), counts)]
-    if rule == "state":
+    if rule == "count":
         return [{"count": n, "release": r} for n in counts for r in sorted({0, n // 4, n // 2}) if r < n]
-    if rule == "level":
-        few = [n for n in counts if n <= channels]
-        return [
-            {"level": k, "count": n, "release": r}
-            for k, n in product(range(levels), few)
-            for r in sorted({0, n // 2})
-            if r < n
-        ]
     return [
         {"threshold": largest * s, "release": largest * s * r}
         for s, r in product((0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2), (1.0, 0.5))
@@ -78,20 +66,17 @@ def detection_times(
     channels : int array or None
         The sensors that count; all where None.
     sum_name : str
-        The sum that the rule "sum" compares with its threshold.
+        The sum that the labels' own rule compares with its threshold.
     dead_ms : float
         After a detection there is none for so long.
     """
     rising = event in RISING
-    if rule == "sum":
+    if rule != "count":
         t, values = piece.sums[sum_name]
         return _apart(_crossings(t, values, numbers["threshold"], numbers["release"], rising), dead_ms)
-    t, sign = _changes(piece, levels, channels, numbers.get("level"))
-    if rule == "spikes":
-        t = t[sign == (1 if rising else -1)]
-        enough = np.arange(len(t)) - np.searchsorted(t, t - numbers["window_ms"], side="left") + 1 >= numbers["count"]
-        return _apart(t[enough], dead_ms)
-    at_first = _on_at_first(piece, levels, channels, numbers.get("level"))
+    on = np.arange(len(piece.spikes) // 2).reshape(-1, levels)[slice(None) if channels is None else channels].ravel()
+    t, sign = _changes(piece, on)
+    at_first = _on_at_first(piece, on)
     last = np.append(t[1:] > t[:-1], [True] * (len(t) > 0))  # changes of one instant are one change
     t, count = np.append(-np.inf, t[last]), np.append(at_first, at_first + np.cumsum(sign)[last])
     return _apart(_crossings(t, count, numbers["count"], numbers["release"] + 1, rising), dead_ms)
@@ -109,20 +94,10 @@ def _crossings(
     return wanted
 
 
-def _trains(piece: Piece, levels: int, channels: NDArray[np.int64] | None, level: int | None) -> NDArray[np.int64]:
-    """Return the ON trains that count; the index of an OFF train is larger by half of all trains."""
-    every = np.arange(len(piece.spikes) // 2 // levels) if channels is None else channels
-    which = np.arange(levels) if level is None else np.array([level])
-    return (every[:, None] * levels + which).ravel()
-
-
-def _changes(
-    piece: Piece, levels: int, channels: NDArray[np.int64] | None, level: int | None
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return all ON (+1) and OFF (-1) spikes of the trains that count, by time."""
+def _changes(piece: Piece, on: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return all ON (+1) and OFF (-1) spikes of ON trains, and of the OFF trains half of all trains behind them."""
     half = len(piece.spikes) // 2
     which = np.zeros(2 * half, bool)
-    on = _trains(piece, levels, channels, level)
     which[on] = which[half + on] = True
     train = np.repeat(np.arange(2 * half), piece.spikes.counts)
     keep = which[train]
@@ -131,11 +106,10 @@ def _changes(
     return t[order], sign[order]
 
 
-def _on_at_first(piece: Piece, levels: int, channels: NDArray[np.int64] | None, level: int | None) -> int:
+def _on_at_first(piece: Piece, on: NDArray[np.int64]) -> int:
     """Count the trains that were on when the piece began: those whose OFF comes before any ON."""
     half = len(piece.spikes) // 2
     offsets, times = piece.spikes.offsets, np.append(piece.spikes.times, np.inf)
-    on = _trains(piece, levels, channels, level)
     first_on = np.where(offsets[on] < offsets[on + 1], times[offsets[on]], np.inf)
     first_off = np.where(offsets[half + on] < offsets[half + on + 1], times[offsets[half + on]], np.inf)
     return int(np.count_nonzero(first_off < first_on))

@@ -47,7 +47,7 @@ class Source:
     truth, shows : str
         Where the truth comes from; what it can and cannot show.
     sums : mapping from event to name of a sum
-        Whose threshold is a plain rule of its own; none where the sum is the truth.
+        Whose threshold the labels are.
     """
 
     name: str
@@ -85,7 +85,7 @@ SOURCES = {
             "Contact and off in real walking with turns, healthy and sick, to within a sample of 10 ms. Not the true "
             "time at the ground. The truth is a threshold on the sum of the inputs, so a counter or a sum can be near "
             "perfect.",
-            {},
+            {"contact": "total", "foot_off": "total"},
         ),
         Source(
             "gaitndd",
@@ -95,24 +95,6 @@ SOURCES = {
             "Step times of the data's authors, derived from this very channel (300 Hz).",
             "Timing against step times that somebody else derived; not against the ground, and not independent of the "
             "channel. Turns and long pauses are in it.",
-            {},
-        ),
-        Source(
-            "moticon",
-            "insole_moticon",
-            "Moticon insoles, one person, 32 steps",
-            ("contact", "foot_off"),
-            "The maker's step finder: neither the first nor the last loaded frame (100 Hz).",
-            "That the way works; 14 to 18 footfalls cannot train much.",
-            {"contact": "total", "foot_off": "total"},
-        ),
-        Source(
-            "pedar",
-            "pressure_formats",
-            "novel pedar insoles, 2 x 99 sensors, one person, 17 steps",
-            ("contact", "foot_off"),
-            "The insole's own sum, 10 % of its largest: it has no truth of its own (100 Hz).",
-            "That the way works on the nearest thing to the thesis' insole; 8 footfalls cannot train 198 weights.",
             {},
         ),
     )
@@ -232,7 +214,7 @@ class Encoded:
     levels: int
 
 
-def encoded(folder: Path, name: str, encoder: Mapping[str, Any], placed: str = "own") -> Encoded:
+def encoded(folder: Path, name: str, encoder: Mapping[str, Any]) -> Encoded:
     """Return a source's pieces, encoded; they stay in memory, as many fits need the same.
 
     Parameters
@@ -242,21 +224,19 @@ def encoded(folder: Path, name: str, encoder: Mapping[str, Any], placed: str = "
         Of `SOURCES`.
     encoder : mapping
         Its `name` and parameters.
-    placed : {"own", "others"}
-        Whose footfalls give the insole's size and toe-out on the plate: the person's other ones, or other people's.
     """
-    return _encoded(folder, name, json.dumps(encoder, sort_keys=True), placed)
+    return _encoded(folder, name, json.dumps(encoder, sort_keys=True))
 
 
 @lru_cache(maxsize=12)
-def _encoded(folder: Path, name: str, encoder: str, placed: str) -> Encoded:
+def _encoded(folder: Path, name: str, encoder: str) -> Encoded:
     built = Encoder.from_json(encoder)
     make = _footfalls if name == "plate" else _walks
-    pieces = {p.name: p for p in make(folder, name, built, placed)}
+    pieces = {p.name: p for p in make(folder, name, built)}
     return Encoded(pieces, float(built.latency_ms), len(json.loads(encoder).get("levels", [0])))
 
 
-def _walks(folder: Path, name: str, encoder: Encoder, _placed: str) -> list[Piece]:
+def _walks(folder: Path, name: str, encoder: Encoder) -> list[Piece]:
     pieces = []
     for trial in readings(folder, name).trials:
         if not any(len(times) for times in trial.truth.values()):
@@ -279,8 +259,8 @@ def _walks(folder: Path, name: str, encoder: Encoder, _placed: str) -> list[Piec
     return pieces
 
 
-def _footfalls(folder: Path, name: str, encoder: Encoder, placed: str) -> list[Piece]:
-    all_cuts = cuts(folder, name, placed)
+def _footfalls(folder: Path, name: str, encoder: Encoder) -> list[Piece]:
+    all_cuts = cuts(folder, name)
     pieces = []
     for person in dict.fromkeys(c.person for c in all_cuts):
         pieces += _row([c for c in all_cuts if c.person == person], encoder)
@@ -336,15 +316,13 @@ class Cut:
 
 
 @lru_cache(maxsize=4)
-def cuts(folder: Path, name: str, placed: str) -> tuple[Cut, ...]:
+def cuts(folder: Path, name: str) -> tuple[Cut, ...]:
     """Cut every footfall, once all footprints are known."""
     feet = readings(folder, name).trials
     prints = [insole.footprint(t) for t in feet]
     footfalls = []
     for k, trial in enumerate(feet):
-        others = [
-            prints[n] for n, other in enumerate(feet) if n != k and (other.person == trial.person) == (placed == "own")
-        ]
+        others = [prints[n] for n, other in enumerate(feet) if n != k and other.person == trial.person]
         frames = insole.cut(trial, prints[k].origin_mm, insole.placement(others))
         truth = {e: to_ms(times) for e, times in trial.truth.items()}
         footfalls.append(Cut(trial.name, trial.person, frames.values[:, 0, :], truth))
