@@ -25,7 +25,7 @@ def labels(place: Path, kind: str, stem: str) -> Path:
         rows = ["recording,label,t_us", *(f"{stem},contact,{10_000 * k}" for k in BEGINS)]
         file = "all.csv"
     else:
-        file, rows = f"{stem}.csv", ["Zeit [s];Ereignis", *(f"{t};contact".replace(".", ",") for t in times)]
+        file, rows = f"{stem}.csv", ["t_s;label", *(f"{t};contact".replace(".", ",") for t in times)]
     (place / file).write_text("\n".join(rows) + "\n")
     return place / file
 
@@ -38,7 +38,7 @@ def mats(tmp_path: Path) -> list[Path]:
     return places
 
 
-@pytest.mark.parametrize("kinds", [("track", "bids", "german"), ("named", "track", "german")])
+@pytest.mark.parametrize("kinds", [("track", "bids", "semicolons"), ("named", "track", "semicolons")])
 def test_tables_are_of_the_recordings_that_they_are_named_after(
     tmp_path: Path, mats: list[Path], kinds: tuple[str, ...]
 ) -> None:
