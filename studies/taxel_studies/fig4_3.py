@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from taxel.simulate.circuit import Converter
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid
 
 WHERE = "thesis 4.3.2, figure 4.3"
 PROTOCOL = (
@@ -30,9 +31,7 @@ SIZES = {"toy": {"points": 59}}
 TICKS_A_US = 300.0
 
 
-def tasks(p: Parameters) -> list[Task]:
-    """List one task a shape of the ramp."""
-    return [Task({**{k: v for k, v in p.items() if k != "shapes"}, "shape": shape}, 0) for shape in p["shapes"]]
+tasks = partial(grid, shape="shapes")
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 
 from taxel.simulate.circuit import Converter, Fabric, VirtualGround
 from taxel.wire import Registers
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results
 
 WHERE = "thesis 4.4.1, figure 4.6"
 PROTOCOL = (
@@ -36,10 +37,8 @@ SIZES = {"toy": {"realisations": 4, "size": 8, "at": [3, 4], "loads": 24}}
 SEEN_N = 0.02
 
 
-def tasks(p: Parameters) -> list[Task]:
-    """List one task a voltage and a taxel drawn; the first is the law itself."""
-    shared = {k: v for k, v in p.items() if k not in ("v_trans", "realisations")}
-    return [Task({**shared, "v_trans": v}, seed) for v in p["v_trans"] for seed in range(p["realisations"])]
+#: The first taxel that is drawn is the law itself.
+tasks = partial(grid, v_trans="v_trans", seed="realisations")
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
@@ -72,7 +71,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     floor, ramp = Registers().noise_floor, Registers().ramp
     summary: Summary = {"floor": floor, "ramp": ramp, "lines": []}
     for v_trans in p["v_trans"]:
-        here = [r.result for r in rows if r.params["v_trans"] == v_trans]
+        here = results(rows, v_trans=v_trans)
         loads = np.array(here[0]["loads"])
         volts, ticks = (np.array([r[name] for r in here]) for name in ("volts", "ticks"))
         at = int(np.flatnonzero(loads == SEEN_N)[0])

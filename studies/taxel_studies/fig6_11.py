@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import waves
 from taxel_studies.mapping import LEARN
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results
 from taxel_studies.waves import READINGS
 
 WHERE = "thesis 6.4.7, figure 6.11"
@@ -36,27 +37,20 @@ STANDS_OUT = 0.05
 DRAWN_FROM = 2e-4
 
 
-def tasks(p: Parameters) -> list[Task]:
-    """List one task a seed, a training and a reading."""
-    return [
-        Task(
-            {
-                "training": training,
-                "learner": "cone_r",
-                "settings": [{"kappa": p["kappa"], "lambdas": p["lambdas"]}],
-                "divide_b_by": reading,
-                "levels": {training: []} if training != "clean" else {},
-                "repetitions": p["repetitions"],
-            },
-            seed,
-        )
-        for reading in p["readings"]
-        for training in p["trainings"]
-        for seed in range(p["realisations"])
-    ]
+tasks = partial(grid, reading="readings", training="trainings", seed="realisations")
 
 
-realise = waves.realise
+def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Train on one pattern, and test nothing."""
+    given = {
+        "training": params["training"],
+        "learner": "cone_r",
+        "settings": [{"kappa": params["kappa"], "lambdas": params["lambdas"]}],
+        "divide_b_by": params["reading"],
+        "levels": {params["training"]: []} if params["training"] != "clean" else {},
+        "repetitions": params["repetitions"],
+    }
+    return waves.realise(given, seed)
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
@@ -69,11 +63,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     for reading in p["readings"]:
         summary["shares"][reading] = {}
         for training in p["trainings"]:
-            weights = [
-                r.result["found"][0]["weights"]
-                for r in rows
-                if r.params["divide_b_by"] == reading and r.params["training"] == training
-            ]
+            weights = [r["found"][0]["weights"] for r in results(rows, reading=reading, training=training)]
             counts = np.histogram(np.clip(weights, edges[0], edges[-1]), edges)[0]
             summary["shares"][reading][training] = (counts / counts.sum()).round(6).tolist()
     return summary

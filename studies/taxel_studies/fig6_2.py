@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results
 
 WHERE = "thesis 6.3.2, figure 6.2"
 PROTOCOL = (
@@ -36,39 +38,31 @@ SIZES = {"toy": {"realisations": 2}}
 DELTA_T: float = LEARN["delta_t_ms"]
 
 
-def tasks(p: Parameters) -> list[Task]:
-    """List one fit a kappa and a seed."""
+tasks = partial(grid, kappa="kappas", seed="realisations")
+
+
+def _times(p: Parameters) -> NDArray[np.float64]:
     first, last = p["drawn"]
-    times = (first + p["step_ms"] * np.arange(round((last - first) / p["step_ms"]) + 1)).round(6).tolist()
-    learnt = {"lambdas": p["lambdas"], "divide_b_by": p["divide_b_by"], "neuron__after_spike": p["after_spike"]}
-    return [
-        Task(
-            {
-                "pattern": "single",
-                "inputs": p["inputs"],
-                "stop": p["stop"],
-                "targets": [p["target"]],
-                "learn": {"kappa": kappa, **learnt},
-                "times": times,
-            },
-            seed,
-        )
-        for kappa in p["kappas"]
-        for seed in range(p["realisations"])
-    ]
+    times: NDArray[np.float64] = first + p["step_ms"] * np.arange(round((last - first) / p["step_ms"]) + 1)
+    return times.round(6)
 
 
-realise = mapping.realise
+def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Fit one pattern."""
+    times = _times(params).tolist()
+    trains = mapping.single_spikes(seed, params["inputs"], params["stop"], max(times))
+    learn = {name: params[name] for name in ("kappa", "lambdas", "divide_b_by")}
+    return mapping.fitted(trains, [params["target"]], times, **learn, neuron__after_spike=params["after_spike"])
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Sum up a kappa: the slope at the target, and how far the potential stays above threshold within delta t."""
-    times = np.array(rows[0].params["times"])
+    times = _times(p)
     at = int(np.searchsorted(times, p["target"]))
     behind = int(np.searchsorted(times, p["target"] + DELTA_T))
     summary: Summary = {"times": times.tolist(), "kappas": []}
     for kappa in p["kappas"]:
-        here = [r.result for r in rows if r.params["learn"]["kappa"] == kappa]
+        here = results(rows, kappa=kappa)
         potential = np.array([r["potential"] for r in here])
         summary["kappas"].append(
             {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results
 from taxel_studies.waves import READINGS
 
 WHERE = "thesis 6.4.1, figure 6.4"
@@ -43,33 +44,16 @@ def _times(p: Parameters) -> list[float]:
     return sorted({*steps.tolist(), p["target"] + DELTA_T})
 
 
-def tasks(p: Parameters) -> list[Task]:
-    """List one fit a reading, a kappa and a seed."""
-    return [
-        Task(
-            {
-                "pattern": "single",
-                "inputs": p["inputs"],
-                "stop": p["stop"],
-                "targets": [p["target"]],
-                "learn": {
-                    "kappa": kappa,
-                    "lambdas": p["lambdas"],
-                    "divide_b_by": reading,
-                    "neuron__after_spike": p["after_spike"],
-                    "neuron__time": p["time"],
-                },
-                "times": _times(p),
-            },
-            seed,
-        )
-        for reading in p["readings"]
-        for kappa in p["kappas"]
-        for seed in range(p["realisations"])
-    ]
+tasks = partial(grid, reading="readings", kappa="kappas", seed="realisations")
 
 
-realise = mapping.realise
+def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Fit one pattern."""
+    times = _times(params)
+    trains = mapping.single_spikes(seed, params["inputs"], params["stop"], max(times))
+    learn = {"divide_b_by": params["reading"], "kappa": params["kappa"], "lambdas": params["lambdas"]}
+    neuron = {"neuron__after_spike": params["after_spike"], "neuron__time": params["time"]}
+    return mapping.fitted(trains, [params["target"]], times, **learn, **neuron)
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
@@ -80,19 +64,17 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     for reading in p["readings"]:
         summary["readings"][reading] = []
         for kappa in p["kappas"]:
-            here = [
-                r for r in rows if (r.params["learn"]["divide_b_by"], r.params["learn"]["kappa"]) == (reading, kappa)
-            ]
-            solved = [r.result for r in here if r.result["status"] == "solved"]
+            here = results(rows, reading=reading, kappa=kappa)
+            solved = [r for r in here if r["status"] == "solved"]
             weights = [
                 [w for w, t in zip(r["weights"], r["at"], strict=True) if p["target"] - t <= 2 * TABLE["tau"]]
                 for r in solved
             ]
-            first = here[0].result
+            first = here[0]
             summary["readings"][reading].append(
                 {
                     "kappa": kappa,
-                    **mapping.timing([r.result for r in here], [p["target"]]),
+                    **mapping.timing(here, [p["target"]]),
                     "behind": round(float(np.mean([r["potential"][behind] for r in solved])) / TABLE["theta_0"], 4)
                     if solved
                     else None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 
 from taxel_studies import mapping
 from taxel_studies.mapping import TABLE
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results
 
 WHERE = "thesis 6.4.2, figure 6.5"
 PROTOCOL = (
@@ -35,38 +36,28 @@ SIZES = {"toy": TOY}
 ZERO = 1e-6
 
 
-def tasks(p: Parameters) -> list[Task]:
-    """List one fit a ratio and a seed."""
-    return [
-        Task(
-            {
-                "pattern": "single",
-                "inputs": p["inputs"],
-                "stop": p["stop"],
-                "targets": [p["target"]],
-                "learn": {
-                    "kappa": p["kappa"],
-                    "lambdas": [*ratio, 0.0],
-                    "neuron__after_spike": p["after_spike"],
-                    "neuron__time": p["time"],
-                },
-                "times": np.arange(0.0, p["drawn_to"] + 0.5).tolist(),
-            },
-            seed,
-        )
-        for ratio in p["ratios"]
-        for seed in range(p["realisations"])
-    ]
+tasks = partial(grid, ratio="ratios", seed="realisations")
 
 
-realise = mapping.realise
+def _times(p: Parameters) -> list[float]:
+    times: list[float] = np.arange(0.0, p["drawn_to"] + 0.5).tolist()
+    return times
+
+
+def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Fit one pattern."""
+    times = _times(params)
+    trains = mapping.single_spikes(seed, params["inputs"], params["stop"], max(times))
+    learn = {"kappa": params["kappa"], "lambdas": [*params["ratio"], 0.0]}
+    neuron = {"neuron__after_spike": params["after_spike"], "neuron__time": params["time"]}
+    return mapping.fitted(trains, [params["target"]], times, **learn, **neuron)
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Sum up a ratio: spikes, zero weights, where the largest weight sits."""
-    summary: Summary = {"times": rows[0].params["times"], "ratios": []}
+    summary: Summary = {"times": _times(p), "ratios": []}
     for ratio in p["ratios"]:
-        here = [r.result for r in rows if r.params["learn"]["lambdas"][:2] == ratio]
+        here = results(rows, ratio=ratio)
         weights = np.array([r["weights"] for r in here])
         at = np.array([r["at"] for r in here])
         largest = p["target"] - at[np.arange(len(here)), np.argmax(weights, axis=1)]

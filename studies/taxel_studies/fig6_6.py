@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import mapping
 from taxel_studies.mapping import TABLE, thresholds
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task, grid, results
 
 WHERE = "thesis 6.4.3, figure 6.6"
 PROTOCOL = (
@@ -37,28 +37,12 @@ SIZES = {"toy": TOY}
 
 def tasks(p: Parameters) -> list[Task]:
     """List one fit a reading, a norm and a seed."""
-    return [
-        Task(
-            {
-                "pattern": "poisson",
-                "inputs": p["inputs"],
-                "rates_hz": p["rates_hz"],
-                "stop": p["stop"],
-                "targets": p["targets"],
-                "learn": {
-                    "lambdas": lambdas,
-                    "neuron__after_spike": reading,
-                    "neuron__time": p["time"],
-                    "kappa": 1.0,
-                },
-                "times": np.arange(0.0, p["stop"] + 0.5).tolist(),
-            },
-            seed,
-        )
-        for reading in p["readings"]
-        for lambdas in p["norms"].values()
-        for seed in range(p["realisations"])
-    ]
+    listed = {**p, "norms": list(p["norms"].values())}
+    return grid(listed, reading="readings", lambdas="norms", seed="realisations")
+
+
+def _times(p: Parameters) -> NDArray[np.float64]:
+    return np.arange(0.0, p["stop"] + 0.5)
 
 
 def _silent(p: Parameters, times: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -70,22 +54,23 @@ def _silent(p: Parameters, times: NDArray[np.float64]) -> NDArray[np.bool_]:
     return free
 
 
-realise = mapping.realise
+def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Fit one pattern."""
+    trains = mapping.poisson(seed, params["inputs"], params["stop"], *params["rates_hz"])
+    neuron = {"neuron__after_spike": params["reading"], "neuron__time": params["time"]}
+    learn = {"lambdas": params["lambdas"], "kappa": 1.0}
+    return mapping.fitted(trains, params["targets"], _times(params).tolist(), **learn, **neuron)
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Average the potentials, by reading and norm."""
-    times = np.array(rows[0].params["times"])
+    times = _times(p)
     silent = _silent(p, times)
     summary: Summary = {"times": times.tolist(), "readings": {}}
     for reading in p["readings"]:
         summary["readings"][reading] = {}
         for norm, lambdas in p["norms"].items():
-            here = [
-                r.result
-                for r in rows
-                if r.params["learn"]["neuron__after_spike"] == reading and r.params["learn"]["lambdas"] == lambdas
-            ]
+            here = results(rows, reading=reading, lambdas=lambdas)
             solved = [r for r in here if r["status"] == "solved"]
             between = np.array([r["between"] for r in solved]).reshape(len(solved), len(times))
             summary["readings"][reading][norm] = {

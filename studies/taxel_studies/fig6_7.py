@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from taxel_studies import capacity
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task, grid, results
 
 WHERE = "thesis 6.4.4, figure 6.7"
 PROTOCOL = (
@@ -38,22 +38,8 @@ BEND, SATURATED = 150, 500
 
 def tasks(p: Parameters) -> list[Task]:
     """List one search an N, C, time and reading; the longest first."""
-    listed = [
-        {
-            "inputs": inputs,
-            "classes": classes,
-            "time": time,
-            "after_spike": reading,
-            "margin": p["margin"],
-            "slope": p["slope"],
-            "realisations": p["realisations"],
-        }
-        for reading in p["readings"]
-        for time in p["times"]
-        for inputs in sorted(p["inputs"], reverse=True)
-        for classes in p["classes"]
-    ]
-    return [Task(params) for params in listed]
+    ordered = {**p, "inputs": sorted(p["inputs"], reverse=True)}
+    return grid(ordered, after_spike="readings", time="times", inputs="inputs", classes="classes")
 
 
 realise = capacity.realise
@@ -65,12 +51,8 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     for reading in p["readings"]:
         for time in p["times"]:
             for classes in p["classes"]:
-                wanted = (reading, time, classes)
-                here = {
-                    r.params["inputs"]: r.result
-                    for r in rows
-                    if (r.params["after_spike"], r.params["time"], r.params["classes"]) == wanted
-                }
+                wanted = {"after_spike": reading, "time": time, "classes": classes}
+                here = {n: results(rows, **wanted, inputs=n)[0] for n in p["inputs"]}
                 lines.append(
                     {
                         "after_spike": reading,

@@ -12,7 +12,7 @@ from taxel.learn import ConeX
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
-__all__ = ["LEARN", "TABLE", "exactness", "poisson", "realise", "single_spikes", "thresholds", "timing"]
+__all__ = ["LEARN", "TABLE", "exactness", "fitted", "poisson", "single_spikes", "thresholds", "timing"]
 
 #: Table 6.1; parameters that it does not name have taxel's defaults.
 TABLE: dict[str, Any] = {"tau": 15.0, "theta_0": 0.3, "theta_plus": 0.2, "refractory": 3.0}
@@ -69,16 +69,17 @@ def exactness(parts: Sequence[dict[str, Any]]) -> tuple[str, bool]:
     return f"{exact} of {of} fire once a target and never elsewhere, in exact simulation; {worst}", exact == of
 
 
-def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+def fitted(trains: SpikeTrains, targets: Sequence[float], times: Sequence[float], **learn: Any) -> dict[str, Any]:
     """Fit CONE-X to one pattern.
 
     Parameters
     ----------
-    params : dict
-        ``pattern`` ("single" or "poisson"), ``inputs``, ``stop`` (ms), ``targets`` (ms), ``learn`` (parameters
-        of `ConeX`), ``times`` (ms: where the potential is sampled; without spiking, or between output spikes).
-    seed : int
-        Of the pattern.
+    trains : SpikeTrains
+    targets : ms
+    times : ms
+        Where the potential is sampled: without spiking, and between output spikes.
+    **learn
+        Parameters of `ConeX`.
 
     Returns
     -------
@@ -86,13 +87,9 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         ``status``, ``spikes`` (ms, of the exact neuron), ``weights``, ``at`` (ms, first spike an input), ``potential``
         (mV, without spiking), ``between`` (mV, with it).
     """
-    if params["pattern"] == "single":
-        trains = single_spikes(seed, params["inputs"], params["stop"], max(params["times"]))
-    else:
-        trains = poisson(seed, params["inputs"], params["stop"], *params["rates_hz"])
-    cone = ConeX(neuron=Neuron(**TABLE), **LEARN).set_params(**params["learn"])
-    cone.fit([trains], [params["targets"]])
-    neuron, times, targets = cone.neuron_, params["times"], params["targets"]
+    cone = ConeX(neuron=Neuron(**TABLE), **LEARN).set_params(**learn)
+    cone.fit([trains], [targets])
+    neuron = cone.neuron_
     return {
         "status": cone.status_,
         "spikes": neuron.run(cone.weights_, trains).tolist(),

@@ -7,6 +7,7 @@ cycle is least, near 5 Hz (SA-1), 34 Hz (FA-1) and 200 to 250 Hz (FA-2).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from taxel.encode import FA1, FA2, SA1, SA2, Encoder
 from taxel.frames import Frames
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, grid
 
 WHERE = "thesis 2.1.5, 3.3 and 7.2, which asks for the types beside FA-1"
 PROTOCOL = (
@@ -84,10 +85,7 @@ def phases(kind: str, ramp_ms: float, period_ms: float) -> list[int]:
     return [int(np.count_nonzero((times > a) & (times <= b))) for a, b in pairwise(edges)]
 
 
-def tasks(p: Parameters) -> list[Task]:
-    """List one type a task."""
-    shared = {name: p[name] for name in ("frequencies_hz", "amplitudes", "ramps_ms", "period_ms")}
-    return [Task({"kind": kind, **shared}) for kind in p["kinds"]]
+tasks = partial(grid, kind="kinds")
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:

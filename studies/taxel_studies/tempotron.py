@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 
 from taxel.spikes import SpikeTrains
 from taxel_rules import Tempotron
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results
 
 WHERE = "Gütig and Sompolinsky 2006; thesis 3.3"
 PROTOCOL = (
@@ -33,10 +34,7 @@ SIZES = {"toy": TOY}
 NOTED = {1.0: (21, 29), 2.0: (68, 155)}
 
 
-def tasks(p: Parameters) -> list[Task]:
-    """List one task a load and seed."""
-    shared = {"inputs": p["inputs"], "duration_ms": p["duration_ms"], "epochs": p["epochs"]}
-    return [Task({**shared, "load": load}, seed) for load in p["loads"] for seed in range(p["realisations"])]
+tasks = partial(grid, load="loads", seed="realisations")
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
@@ -59,7 +57,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """List by load: share solved, epochs of those that were."""
     lines = []
     for load in p["loads"]:
-        here = [r.result for r in rows if r.params["load"] == load]
+        here = results(rows, load=load)
         epochs = sorted(r["epochs"] for r in here if r["solved"])
         lines.append(
             {
