@@ -113,9 +113,10 @@ class LDA:
             raise ProblemError("x: must be finite")
         self.classes_, row = np.unique(np.asarray(y), return_inverse=True)
         shift = table.mean(0, dtype=np.float64)
-        return self._solve(_moments(table, row, len(self.classes_), shift), shift)
+        return self.fit_moments(_moments(table, row, len(self.classes_), shift), shift)
 
-    def _solve(self, moments: _Moments, shift: NDArray[np.float64] | None) -> Self:
+    def fit_moments(self, moments: _Moments, shift: NDArray[np.float64] | None) -> Self:
+        """Learn from sums over trials from which `shift` was taken off; `classes_` is the caller's to set."""
         there = moments.counts > 0
         counts, sums = moments.counts[there], moments.sums[there]
         trials = int(counts.sum())
@@ -265,7 +266,7 @@ class FoldSums:
             for name, tested in self._sums.items():
                 counts, sums, scatter = self._total.joined(tested, np.subtract)
                 training = _Moments(which @ counts, which @ sums[:, :features], scatter[:features, :features])
-                model._solve(training, shift)
+                model.fit_moments(training, shift)
                 mine = np.flatnonzero(self.folds == name)
                 for first in range(0, len(mine), _ROWS):
                     rows = mine[first : first + _ROWS]
