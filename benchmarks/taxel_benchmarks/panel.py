@@ -1,4 +1,4 @@
-"""The live panel: frames a second beside nine other clients and in a browser, seeking and opening recordings.
+"""The live panel: frames a second beside nine other clients, seeking and opening recordings.
 
 Sender and clients share this machine, over loopback, the sender a process of its own. The fast client reads all
 messages and sends a credit for each frame, as the others do in a process of their own. CPU is of the threads
@@ -7,11 +7,10 @@ with its 5 s of raster.
 
 Recordings of frames are an hour of both insoles, 2 x 99 sensors at 100 Hz, as .mcap, one of them as .h5 and as a text
 table, all in the page cache. A client's times of opening are from its request to the first frame, the overview and
-the whole; the page's, in Chromium without GPU at 1300 x 900, from its address to a map and an overview that are drawn.
-CPU is of this process and its children, medians of rounds. Commands are processes of their own.
+the whole. CPU is of this process and its children, medians of rounds. Commands are processes of their own.
 
 Peer: none but ten clients, as nothing else speaks its protocol. Unit: frames; cores; ms of a seek; s. Goal: 50 frames
-a second beside nine others and in Chromium, nothing lost, .06 core of the server alone and .14 with the others, a GB
+a second beside nine others, nothing lost, .06 core of the server alone and .14 with the others, a GB
 indexed within 2 s (scaled from 218 and 135 MB), any time within 50 ms; an hour of insoles opens in 2 s and is complete
 within 5, a text table shows its first frame in 2 s, then progress; taxel view answers within 1 s.
 """
@@ -22,13 +21,11 @@ import json
 import os
 import pickle
 import resource
-import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -48,9 +45,7 @@ if TYPE_CHECKING:
 
 SIDES, CHANGES_PER_S = (64,), 1e5
 #: The modules that the clients of the panel need.
-PEERS = {"all of it": "websockets", "the page in Chromium": "playwright"}
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"]
+PEERS = {"all of it": "websockets"}
 #: Runs a command, then prints the largest memory of its process: wait4 would give that of the process that began it.
 COMMAND = """
 import sys
@@ -62,29 +57,6 @@ finally:
 """
 #: Goals for the server's cores, by the number of other clients.
 CORES = {0: 0.06, 9: 0.14}
-
-#: Notes in a page when its map showed more than one colour and its overview had bins, and counts the frames drawn.
-WATCH = """
-window.seen = { frames: 0 };
-const proto = CanvasRenderingContext2D.prototype;
-let frame = null, bins = 0;
-for (const name of ["putImageData", "fillRect", "fill", "drawImage"]) {
-  const own = proto[name];
-  proto[name] = function (...given) {
-    own.apply(this, given);
-    const id = this.canvas.id;
-    if (id === "pressure-map") {
-      if (frame !== document.timeline.currentTime) seen.frames++;
-      frame = document.timeline.currentTime;
-      if (seen.map === undefined) {
-        const { data } = this.getImageData(0, 0, this.canvas.width, this.canvas.height);
-        if (new Set(new Uint32Array(data.buffer)).size > 2) seen.map = performance.now();
-      }
-    }
-    if (id === "strip" && name === "fillRect" && ++bins === 100) seen.overview = performance.now();
-  };
-}
-"""
 
 #: Bytes of a datagram: 19 changes and their values, 192 us of them.
 EACH = 190
@@ -291,44 +263,6 @@ def medians(rounds: int, measured: Callable[[], dict[str, Any]]) -> dict[str, fl
     return {name: float(np.median([one[name] for one in every])) for name in every[0]}
 
 
-@contextmanager
-def page(url: str) -> Iterator[Any]:
-    """Show an address in Chromium without GPU, with what it draws noted in `seen`."""
-    from playwright.sync_api import sync_playwright  # noqa: PLC0415  an extra
-
-    with sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        shown = browser.new_page(viewport={"width": 1300, "height": 900})
-        shown.add_init_script(WATCH)
-        shown.goto(url, wait_until="commit")
-        yield shown
-        browser.close()
-
-
-def opening_on_page(path: Path) -> dict[str, float]:
-    """Open a recording in Chromium; measure the time until its map and its overview are drawn."""
-    with Panel(path) as panel, page(panel.url) as shown:
-        end = time.monotonic() + 120
-        while not {"map", "overview"} <= (seen := shown.evaluate("seen")).keys():
-            if time.monotonic() > end:
-                raise ProblemError(f"{path}: not drawn within 120 s; {seen}")
-            time.sleep(0.05)
-    return {"map_s": seen["map"] / 1e3, "overview_s": seen["overview"] / 1e3}
-
-
-def on_page(side: int, seconds: float, scratch: Path) -> dict[str, Any]:
-    """Count the frames that Chromium draws while events arrive."""
-    array = taxel.Array(side, side, name="bench")
-    with Live(0, host="127.0.0.1", array=array) as live, Panel(live) as panel, page(panel.url) as shown:
-        sender = sending(side, live.address[1], seconds + 3, scratch)
-        shown.wait_for_timeout(2000)
-        before, begun = shown.evaluate("seen.frames"), time.perf_counter()
-        shown.wait_for_timeout(1000 * seconds)
-        frames, wall = shown.evaluate("seen.frames") - before, time.perf_counter() - begun
-        sender.wait()
-    return {"side": side, "frames_per_s": frames / wall}
-
-
 def command(*words: str | Path) -> dict[str, float]:
     """Run a command to its end, or `taxel view` until it says its address; measure time, CPU and largest memory."""
     begun = time.perf_counter()
@@ -350,8 +284,8 @@ def command(*words: str | Path) -> dict[str, float]:
     return {"wall_s": wall, "cpu_s": of.ru_utime + of.ru_stime, **memory}
 
 
-def openings(seconds: float, rounds: int, scratch: Path, *, chromium: bool) -> list[dict[str, Any]]:
-    """Open both insoles from a .mcap, one from a .h5 and from a text table: by a client, on the page, by commands."""
+def openings(seconds: float, rounds: int, scratch: Path) -> list[dict[str, Any]]:
+    """Open both insoles from a .mcap, one from a .h5 and from a text table: by a client, by commands."""
     both = insoles(seconds)
     files = {
         scratch / "insoles.mcap": both,
@@ -362,8 +296,6 @@ def openings(seconds: float, rounds: int, scratch: Path, *, chromium: bool) -> l
         taxel.convert(of, file)
         row: dict[str, Any] = {"file": file.name, "file_mb": file.stat().st_size / 1e6}
         row |= medians(rounds, partial(opening, file))
-        if chromium:
-            row["page"] = medians(rounds, partial(opening_on_page, file))
         words: dict[str, tuple[str | Path, ...]] = {
             "view": ("view", file, "--no-open", "--json"),
             "info": ("info", file),
@@ -397,10 +329,6 @@ def goals(result: Mapping[str, Any]) -> list[Goal]:
         Goal("messages of progress on a text table", table["progress"], 1),
         Goal("taxel view answers, s", max(one["view"]["wall_s"] for one in result["opening"]), 1, at_most=True),
     ]
-    # Without Chromium these two were not measured.
-    drawn = max(max(one["page"].values()) for one in hours) if result["page"] else None
-    found.append(Goal("an hour of insoles is drawn in Chromium, s", drawn, 2, at_most=True))
-    found.append(Goal("frames/s in Chromium", result["page"] and result["page"]["frames_per_s"], 50))
     for one in result["seeking"]:
         version = f"version {one['version']}"
         scaled = f"{version}: a GB indexed, scaled from {one['file_mb']:.0f} MB, s"
@@ -415,24 +343,19 @@ def run(*, quick: bool) -> dict[str, Any]:
         if not quick:
             raise ProblemError("panel: its clients need websockets: pip install websockets")
         return stamp() | {"left out": absent, "ratios": {}}
-    if CHROMIUM is None:
-        absent.setdefault("the page in Chromium", "no Chromium: on Debian, apt install chromium")
-    chromium = "the page in Chromium" not in absent
     seconds = 1.0 if quick else 5.0
     load = os.getloadavg()[0]
     with tempfile.TemporaryDirectory() as folder:
         scratch = Path(folder)
         rows = [following(side, others, seconds, scratch) for side in SIDES for others in CORES]
-        shown = on_page(SIDES[0], seconds, scratch) if chromium else None
         sought = [seeking(v, 200_000 if quick else 20_000_000, 5 if quick else 50, scratch) for v in (1, 2)]
-        opened = openings(10.0 if quick else 3600.0, 1 if quick else 3, scratch, chromium=chromium)
+        opened = openings(10.0 if quick else 3600.0, 1 if quick else 3, scratch)
     return {
         "question": (__doc__ or "").splitlines()[0],
         **stamp(),
         "load_before": load,
         "load_after": os.getloadavg()[0],
         "following": rows,
-        "page": shown,
         "seeking": sought,
         "opening": opened,
         "left out": absent,
@@ -445,7 +368,6 @@ def run(*, quick: bool) -> dict[str, Any]:
                     "the server's cores": row["server_cores"],
                 }.items()
             },
-            **({"Chromium: frames/s over 50": shown["frames_per_s"] / 50} if shown else {}),
             **{f"{one['file']}: 2 s over the first frame": 2 / one["frame_s"] for one in opened},
             **{f"{one['file']}: 5 s over all of it": 5 / one["complete_s"] for one in opened[:-1]},
         },
