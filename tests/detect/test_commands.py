@@ -325,12 +325,12 @@ def test_a_report_shows_potential_weights_and_the_worst(folder: Path, trained: P
     code, out, _ = call(capsys, *arguments, tmp_path / "with", "--truth", folder / "truth.csv")
     page = (tmp_path / "with" / "report.html").read_text()
     assert (code, f"report: {tmp_path / 'with' / 'report.html'}" in out) == (0, True)
-    assert page.count('<div class="picture"><svg') == 2 * 3, "potential, errors, weights of each label"
+    assert page.count('<div class="picture"><svg') == 2 * 3 + 2, "potential, errors, weights of each label"
     assert "<h2>contact</h2>" in page
     assert "The worst" in page
     assert call(capsys, *arguments, tmp_path / "without")[0] == 0
     page = (tmp_path / "without" / "report.html").read_text()
-    assert page.count('<div class="picture"><svg') == 2 * 2
+    assert page.count('<div class="picture"><svg') == 2 * 2 + 1
     assert "The worst" not in page
     *lines, _ = call(capsys, *arguments, tmp_path / "again")[1].splitlines()
     assert len(lines) > 12
