@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -296,7 +297,6 @@ def test_a_column_of_labels_is_chosen_by_an_option_and_named_where_it_is_a_chann
         ("a,b\n1,2\n", "[table]\ncolumns = ['a', 'b', 'c']", 1),
         ("a b c\nd e f\n", None, None),
         ('t_s,a\n0.00,"1,201"\n0.01,"1,202"\n', None, None),
-        ('t,a\n"0,00","1,5"\n"0,01","2,5"\n', None, None),
         ("t_s,a\n" + "0.1,1\n0.2,2\n" * 5 + "t_s,a,b\n" + "0.3,1,2\n0.4,1,2\n" * 5, None, 13),
         ("", None, None),
         ("1,2\n3,4\n", "[table]\nskip_lines = 9", None),
@@ -566,3 +566,24 @@ def test_repaired_times_ascend_and_sound_ones_stay(t: list[int]) -> None:
 def test_any_line_has_cells_with_a_name_each_or_is_none(line: str, kind: str, decimal: str) -> None:
     found = read_line(line, kind, ";", decimal)
     assert found is None or len(found.cells) == len(found.names)
+
+
+@given(st.lists(st.tuples(st.integers(-99_999, 99_999), st.integers(0, 99)), min_size=12, max_size=30))
+def test_quoted_decimal_commas_are_read_between_commas(rows: list[tuple[int, int]]) -> None:
+    def cell(hundredths: int) -> str:
+        text = f"{hundredths / 100:.2f}".replace(".", ",")
+        return f'"{text}"'
+
+    lines = [f"{cell(k)},{cell(a)},{cell(b)}" for k, (a, b) in enumerate(rows)]
+    with TemporaryDirectory() as folder:
+        found = opened(Path(folder), "\n".join(["time_s,a,b", *lines]) + "\n")
+    np.testing.assert_array_equal(found.sources[""].t, 10_000 * np.arange(len(rows)))
+    np.testing.assert_array_equal(found.sources[""].values[:, 0], (np.array(rows) / 100).astype(np.float32))
+
+
+@pytest.mark.parametrize("cells", ['"1,{0}","1.234,{1}"', '"1,200","2,10{1}.5"', '"1,200","2,10{1}"'])
+def test_quoted_numbers_that_may_be_thousands_are_refused(tmp_path: Path, cells: str) -> None:
+    lines = [f"{10 * k},{cells.format(k % 7, k % 5)}" for k in range(20)]
+    (tmp_path / "a.csv").write_text("\n".join(["time_ms,a,b", *lines]) + "\n")
+    with refused(FormatError, place=Place("a.csv")):
+        taxel.open(tmp_path / "a.csv")

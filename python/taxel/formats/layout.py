@@ -97,8 +97,7 @@ class Table:
     def __post_init__(self) -> None:
         if len(text("separator", self.separator)) != 1:
             raise refused("separator", f" is {shown(self.separator)}: must be one character")
-        if text("decimal", self.decimal, (".", ",")) == self.separator:
-            raise refused("decimal", f" is {shown(self.decimal)}, and so is separator: must be different characters")
+        text("decimal", self.decimal, (".", ","))
         text("lines", self.lines, KINDS)
         text("time_unit", self.time_unit, (*UNITS_US, ISO))
         integer("skip_lines", self.skip_lines, 0)

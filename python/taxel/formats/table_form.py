@@ -32,6 +32,8 @@ __all__ = ["EVENT_COLUMNS", "Form", "form_of", "unit_of_times"]
 _FORMS = [
     ("json", ",", "."),
     *(("plain", separator, decimal) for decimal in ".," for separator in ",;\t| " if separator != decimal),
+    # Numbers with decimal commas in quotes, which a comma does not split.
+    ("plain", ",", ","),
     ("marked", ",", "."),
     ("marked", ";", ","),
 ]
@@ -55,7 +57,7 @@ _ABOVE_FRAME = re.compile(
 )
 #: What a program quotes because of the comma in it: a number with a decimal comma, or with thousands.
 _QUOTED = re.compile(r'"([^"]*)"')
-_WITH_COMMA = re.compile(r"[-+]?\d+,\d+|[-+]?\d{1,3}(?:,\d{3})+(?:\.\d+)?")
+_DECIMAL, _THOUSANDS = re.compile(r"[-+]?\d+,\d+"), re.compile(r"[-+]?\d{1,3}(?:[,.]\d{3})+(?:[,.]\d+)?")
 _PLACE_IN_LIST = re.compile(r"\[\d+\]")
 _HEX = re.compile(r"(?:0x)?(?:[0-9A-Fa-f]{2})+")
 _HEX_LETTER = re.compile(r"(?<![\w.])(?:0x)?[0-9]*[A-Fa-f][0-9A-Fa-f]*(?![\w.])")
@@ -266,6 +268,7 @@ def _fits(lines: Sequence[str], forms: Sequence[tuple[str, str, str]], missing: 
         marked = separator in (",", ";") if kind != "plain" else separator == " "
         if len(forms) > 1 and (
             (not marked and separator != "," and not any(separator in line for line in few))
+            or (separator == decimal and not _are_quoted_decimals(few))
             or (kind == "marked" and (2 * sum(map(has_marks, few)) < len(few) or _are_quoted_numbers(few)))
             or (kind == "json" and not any(line.lstrip()[:1] in "{[" for line in few))
         ):
@@ -280,10 +283,21 @@ def _fits(lines: Sequence[str], forms: Sequence[tuple[str, str, str]], missing: 
             yield fit
 
 
+def _with_comma(lines: Sequence[str]) -> list[str]:
+    """Return the quoted cells in which a comma is."""
+    return [cell for line in lines for cell in _QUOTED.findall(line) if "," in cell]
+
+
 def _are_quoted_numbers(lines: Sequence[str]) -> bool:
     """Return whether all that is quoted is one number with a comma each, which a comma does not split."""
-    quoted = [cell for line in lines for cell in _QUOTED.findall(line) if "," in cell]
-    return bool(quoted) and all(map(_WITH_COMMA.fullmatch, quoted))
+    quoted = _with_comma(lines)
+    return bool(quoted) and all(_DECIMAL.fullmatch(cell) or _THOUSANDS.fullmatch(cell) for cell in quoted)
+
+
+def _are_quoted_decimals(lines: Sequence[str]) -> bool:
+    """Return whether these have decimal commas: 1,234 alone may be a thousand."""
+    quoted = _with_comma(lines)
+    return all(map(_DECIMAL.fullmatch, quoted)) and not all(map(_THOUSANDS.fullmatch, quoted))
 
 
 def _fit(
