@@ -132,8 +132,7 @@ def test_values_that_fall_as_the_layout_turns_them_name_it(tmp_path: Path, falls
     table(tmp_path, lines(rows), f"{falls}[table]\ntime_column = 1\n")
     shown = run("info", tmp_path / "step.txt").stdout
     of_it = (
-        "after step.layout.toml inverted them: if the values need no inversion, remove the line 'falls = ...' from "
-        "step.layout.toml"
+        "after a layout inverted them: if the values need no inversion, remove the line 'falls = ...' from it"
         if falls
         else "write falls = true in a layout file, "
     )

@@ -275,7 +275,7 @@ def test_where_rebounds_of_values_that_fall_are_detected_what_turns_them_is_said
     taxel.convert(palm(5, 1, 0.4, rebound=0.25), tmp_path / "palm.npz", overwrite=True)
     [hint] = json.loads(call(capsys, *given)[1])["remarks"]
     assert hint.endswith(
-        "after its layout inverted them: if the values need no inversion, remove the line 'falls = ...' from its layout"
+        "after a layout inverted them: if the values need no inversion, remove the line 'falls = ...' from it"
     )
     taxel.convert(palm(5, -1, 0.4, rebound=0.25), tmp_path / "palm.npz", overwrite=True)
     (tmp_path / "palm.layout.toml").write_text("falls = true\n")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
@@ -16,9 +15,8 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._base.messages import counted
 from taxel._base.times import beginning_us
-from taxel._core import FormatError
 from taxel.formats.event_camera import are_counts
-from taxel.formats.layout import Layout, or_given
+from taxel.formats.layout import or_given
 from taxel.frames import Frames
 from taxel.tare import Tare
 
@@ -114,7 +112,7 @@ class Rest:
         return self.text()
 
     def text(self, path: Path | None = None, turned: float | None = None) -> str:
-        """Return the line of ``taxel info``; `path`, `turned`: as of `turning`."""
+        """Return the line of ``taxel info``; `path` is the recording's, `turned` what its values were turned by."""
         words = {
             "tare": "the given tare",
             "calibration": "the calibration's",
@@ -126,34 +124,14 @@ class Rest:
             first, end = ((us - self.begin_us) / 1e6 for us in self.quiet_us)
             text = f"that of a quiet stretch, {first:.3f} to {end:.3f} s; later the rest follows slow changes"
             text += f"; something was on {self.preload_at} during this stretch" * bool(self.preload_at)
-        if self.falls:
-            text += f"; {self.fall(path, turned)}"
+        if self.falls and turned is not None:
+            text += "; values fall from their rest after a layout inverted them: if the values need no inversion, "
+            text += "remove the line 'falls = ...' from it"
+        elif self.falls:
+            where = "" if path is None else f", {or_given(path)}"
+            text += "; values fall from their rest: if smaller values mean more pressure, write falls = true in a "
+            text += f"layout file{where}"
         return text + f"; {counted(self.zeroed, 'taxel')} zeroed" * bool(self.zeroed)
-
-    @staticmethod
-    def fall(path: Path | None = None, turned: float | None = None) -> str:
-        """Return what to do of values that fall; `path`, `turned`: as of `turning`."""
-        layout, turning = Rest.turning(path, turned)
-        if layout:
-            return (
-                f"values fall from their rest after {layout} inverted them: if the values need no inversion, remove "
-                f"the line 'falls = ...' from {layout}"
-            )
-        return f"values fall from their rest: if smaller values mean more pressure, write {turning}"
-
-    @staticmethod
-    def turning(path: Path | None = None, turned: float | None = None) -> tuple[str, str]:
-        """Return the layout file that turns a recording's values ("" if none does), and what turns them again.
-
-        `path`: that of the recording; `turned`: what its values were turned by, if they were.
-        """
-        file = None if path is None else Layout.beside(path)
-        with suppress(FormatError, OSError):
-            if file is not None and Layout.read(file).turned is not None:
-                return file.name, f"{file.name} without falls"
-        if turned is not None:
-            return "its layout", "its layout without falls"
-        return "", "falls = true in a layout file" + ("" if path is None else f", {or_given(path)}")
 
     def described(self) -> dict[str, object]:
         """Return source, quiet stretch, number of zeroed taxels and whether values fall, as JSON values."""
