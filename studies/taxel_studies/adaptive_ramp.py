@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.simulate.circuit import AdaptiveRamp, Converter, Fabric, VirtualGround
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, grid, logarithmic, results
 
 WHERE = "thesis 4.3.2"
 PROTOCOL = (
@@ -64,8 +64,7 @@ def force(p: Parameters, rng: np.random.Generator) -> tuple[NDArray[np.float64],
 
 def tasks(p: Parameters) -> list[Task]:
     """List one task a converter and a drawn touch."""
-    shared = {k: v for k, v in p.items() if k not in ("ramps", "realisations")}
-    return [Task({**shared, "ramp": ramp}, seed) for ramp in [None, *p["ramps"]] for seed in range(p["realisations"])]
+    return grid({**p, "ramps": [None, *p["ramps"]]}, ramp="ramps", seed="realisations")
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
@@ -128,10 +127,9 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Return each converter's error in each phase, its delay until a tap shows, and its scan rate."""
-    del p
     summary: Summary = {"ramps": {}}
-    for name in dict.fromkeys(row.params["ramp"] for row in rows):
-        here = [row.result for row in rows if row.params["ramp"] == name]
+    for name in [None, *p["ramps"]]:
+        here = results(rows, ramp=name)
         late = np.concatenate([one["late_us"] for one in here])
         summary["ramps"]["adaptive" if name is None else str(name)] = {
             "rms_mv": {phase: float(np.median([one["rms_mv"][phase] for one in here])) for phase in PHASES},

@@ -13,7 +13,7 @@ from taxel.learn import ConeR, ConeX
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.mapping import LEARN, TABLE
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task, grid
 
 WHERE = "thesis 6.3.4, figure 6.3"
 PROTOCOL = (
@@ -39,7 +39,7 @@ DELTA_T: float = LEARN["delta_t_ms"]
 
 def tasks(p: Parameters) -> list[Task]:
     """List the two learners."""
-    return [Task({**p, "learner": learner}) for learner in ("cone_x", "cone_r")]
+    return grid({**p, "learners": ["cone_x", "cone_r"]}, learner="learners")
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:

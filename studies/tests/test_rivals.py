@@ -46,7 +46,7 @@ def test_the_published_rate_is_what_inst_takes_by_itself():
 @pytest.mark.parametrize("name", [n for n in RULES if n != "ConeX"])
 def test_each_rule_learns_something_in_each_protocol(name):
     for protocol in ("a", "b"):
-        params = {"rule": name, "protocol": protocol, "inputs": 100, "epochs": 200}
+        params = {"rule": name, "protocol": protocol, "inputs": 100, f"epochs_{protocol}": 200}
         assert share_right(params, 5, 1000) >= 0.6, protocol
 
 
@@ -65,7 +65,9 @@ def test_the_search_ends_at_the_largest_load_that_holds(monkeypatch, most, begin
 
     monkeypatch.setattr(protocols, "share_right", share)
     inputs = round(begin / RULES["FILT"].begin)
-    found = realise({"rule": "FILT", "protocol": protocol, "inputs": inputs, "runs": 3, "epochs": 1}, 0)
+    found = realise(
+        {"rule": "FILT", "protocol": protocol, "inputs": inputs, f"runs_{protocol}": 3, f"epochs_{protocol}": 1}, 0
+    )
     assert found["p"] == most
     assert found["load"] == round(most / inputs, 4)
     failed = [entry for entry in found["tried"] if entry[0] > most]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,7 @@ from matplotlib.figure import Figure
 
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results
 
 WHERE = "after thesis 6.2"
 PROTOCOL = "Trains of one random spike each, all of one small weight; output spikes within 200 ms."
@@ -20,9 +20,8 @@ PARAMETERS: dict[str, Any] = {"inputs": [10, 100, 1000], "weight": 0.01, "realis
 SIZES = {"toy": {"realisations": 2}}
 
 
-def tasks(p: Parameters) -> list[Task]:
-    """List one task for each number of inputs and seed."""
-    return [Task({"inputs": n, "weight": p["weight"]}, k) for n in p["inputs"] for k in range(p["realisations"])]
+#: One realisation for each number of inputs and seed.
+tasks = partial(grid, inputs="inputs", seed="realisations")
 
 
 def realise(params: dict[str, Any], seed: int) -> int:
@@ -34,7 +33,7 @@ def realise(params: dict[str, Any], seed: int) -> int:
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Average over realisations."""
-    return {str(n): float(np.mean([r.result for r in rows if r.params["inputs"] == n])) for n in p["inputs"]}
+    return {str(n): float(np.mean(results(rows, inputs=n))) for n in p["inputs"]}
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from taxel_studies.capacity import PUBLISHED
 from taxel_studies.rivals import protocols
 from taxel_studies.rivals.rules import CHOSEN_ON, RULES
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task, grid, results
 
 WHERE = "thesis 6.4.4, beside figure 6.7; Gardner and Grüning 2016"
 PROTOCOL = (
@@ -55,20 +55,7 @@ LOADS = {"FILT": 0.14, "E-learning": 0.15}
 
 def tasks(p: Parameters) -> list[Task]:
     """List one search a protocol, a number of inputs and a rule; few inputs first."""
-    return [
-        Task(
-            {
-                "rule": rule,
-                "protocol": protocol,
-                "inputs": inputs,
-                "runs": p[f"runs_{protocol}"],
-                "epochs": p[f"epochs_{protocol}"],
-            }
-        )
-        for inputs in sorted(p["inputs"])
-        for protocol in p["protocols"]
-        for rule in p["rules"]
-    ]
+    return grid({**p, "inputs": sorted(p["inputs"])}, inputs="inputs", protocol="protocols", rule="rules")
 
 
 realise = protocols.realise
@@ -79,12 +66,8 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     lines = []
     for protocol in p["protocols"]:
         for rule in p["rules"]:
-            here = {
-                r.params["inputs"]: r.result
-                for r in rows
-                if (r.params["protocol"], r.params["rule"]) == (protocol, rule)
-            }
-            inputs = [n for n in p["inputs"] if n in here]
+            inputs = p["inputs"]
+            here = {n: results(rows, protocol=protocol, rule=rule, inputs=n)[0] for n in inputs}
             lines.append(
                 {
                     "protocol": protocol,

@@ -53,7 +53,7 @@ def share_right(params: dict[str, Any], count: int, seed: int) -> float:
     """
     name, protocol, inputs = params["rule"], params["protocol"], params["inputs"]
     patterns, targets = (gardner_gruning if protocol == "a" else thesis)(seed, inputs, count)
-    training = {"epochs": params["epochs"], "until_right": protocol == "b", "within_ms": 1.0}
+    training = {"epochs": params[f"epochs_{protocol}"], "until_right": protocol == "b", "within_ms": 1.0}
     if name == "ConeX":
         cone = learner(name, protocol, inputs, count, seed).fit(patterns, targets)
         if cone.status_ == "stopped":
@@ -76,7 +76,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
     def holds(count: int) -> bool:
         shares: list[float] = []
-        for run in range(seed, seed + params["runs"]):
+        for run in range(seed, seed + params[f"runs_{params['protocol']}"]):
             shares.append(share_right(params, count, run))
             if params["protocol"] == "b" and shares[-1] < 1.0:
                 break
