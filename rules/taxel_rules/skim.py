@@ -274,8 +274,10 @@ class SKIM(SpikeLearner):
             place, weight = ((row - first) * columns + column)[here], weight[here]
             to_a, to_b, alone = _decays(given, age)
             to_b = alone if given.kernel == "exponential" else to_b
+            # Without spikes bincount returns whole numbers.
             added_a, added_b = (
-                np.bincount(place, weight * to, count * columns).reshape(count, columns) for to in (to_a, to_b)
+                np.bincount(place, weight * to, count * columns).reshape(count, columns).astype(np.float64)
+                for to in (to_a, to_b)
             )
             after, _ = lfilter([1.0], [1.0, -aa], added_a, axis=0, zi=aa * a[None])
             added_b[0] += ba * a

@@ -127,6 +127,18 @@ def test_an_output_spike_is_the_first_row_that_reaches_the_threshold():
     assert np.all(output[rows[rows > 0] - 1] < skim.threshold_)
 
 
+def test_a_recording_may_be_silent_for_longer_than_a_block_of_rows():
+    """A block without a spike still holds what the potentials decay from."""
+    skim = SKIM(tau=10.0).fit([SpikeTrains.from_lists([[5.0], [60.0]], stop=200.0)], [[80.0]])
+    at = skim.thresholds[0]
+    alone, late = (
+        SpikeTrains.from_lists([[before + 5.0], [before + 60.0]], stop=before + 200.0) for before in (0.0, 20_000.0)
+    )
+    spikes = [skim.predict([trains], threshold=at)[0] for trains in (alone, late)]
+    assert len(spikes[0]) > 0
+    np.testing.assert_allclose(spikes[1] - 20_000.0, spikes[0], atol=1e-6)
+
+
 def test_a_long_recording_costs_no_more_memory_than_a_short_one():
     """2 000 000 rows of 20 trains would be 320 MB."""
     resource = pytest.importorskip("resource")
