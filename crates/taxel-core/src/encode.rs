@@ -1,13 +1,16 @@
 //! Encodes events or frames as spikes, live or as a whole recording, with identical spikes.
 
 mod blocks;
-mod bracket;
-mod by_stamp;
+mod channel_levels;
 mod channels;
+mod driver;
 mod encoding;
+mod features;
 mod level_count;
+mod levels;
 mod loaded;
 mod local_sums;
+mod peak_load;
 mod periods;
 mod pieces;
 mod power;
@@ -15,9 +18,8 @@ mod quantity;
 mod recent;
 mod receptor;
 mod running_range;
-mod sampled;
 mod side_by_side;
-mod slow;
+mod slowly_adapting;
 mod stream;
 mod tare;
 
@@ -26,7 +28,6 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-pub use local_load::{LargestOfFrame, LargestSums};
 pub use pieces::Pieces;
 pub use quantity::Quantity;
 pub use running_range::{FirstWindow, RunningRange};

@@ -6,7 +6,6 @@
 
 mod aligned;
 mod eight;
-mod fetch;
 #[cfg(target_arch = "x86_64")]
 mod front;
 mod instructions;
@@ -16,7 +15,6 @@ pub(crate) use aligned::Aligned;
 pub(crate) use eight::{LANES, Vector, lines, lines_mut};
 #[cfg(target_arch = "x86_64")]
 pub(crate) use eight::{Ymm, Zmm};
-pub(crate) use fetch::fetch;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use front::TO_FRONT;
 pub use instructions::Instructions;

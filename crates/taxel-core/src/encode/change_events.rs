@@ -2,9 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, NextFrame};
+use super::blocks::{BLOCK, Block};
+use super::channels::Channels;
+use super::driver::{Clock, Driver, Rule, Sample};
 use super::encoding::Encoding;
-use super::sampled::{Rule, Sampled};
+use super::periods::micros;
 use super::stream::Stream;
 use crate::allowed::Range;
 pub use crate::board::Previous;
@@ -68,7 +70,8 @@ impl Encoding for ChangeEvents {
             rounding: self.rounding,
             last: vec![],
         };
-        Ok(Box::new(Sampled::new(self, changes, array, self.period_ms)?))
+        let clock = Clock::Period(micros("period_ms", self.period_ms)?);
+        Ok(Box::new(Driver::new(changes, Channels::new(array), self.trains_of(array), clock)))
     }
 }
 
@@ -82,17 +85,14 @@ struct ChangeRule {
 }
 
 impl Rule for ChangeRule {
-    fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
-        self.last = held.to_vec();
+    fn begin(&mut self, now: Sample<'_>, _out: &mut Vec<Spike>) {
+        self.last = now.held.to_vec();
     }
 
-    const PREFETCHES: bool = true;
-
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {
-        let floor = self.floor;
-        for (block, (new, last)) in held.iter().zip(&mut self.last).enumerate().filter(|(b, _)| changed[*b]) {
-            next.fetch();
+    fn sample(&mut self, now: Sample<'_>, out: &mut Vec<Spike>) {
+        let (floor, t) = (self.floor, ms(now.t));
+        for (block, (new, last)) in now.held.iter().zip(&mut self.last).enumerate().filter(|(b, _)| now.changed[*b]) {
             let moved = |new: f32, last: f32| match self.rounding {
                 Rounding::Truncate => (new - last).abs() > floor,
                 Rounding::Floor => new - last >= floor || new < last,
@@ -106,7 +106,7 @@ impl Rule for ChangeRule {
                             Rounding::Floor => units.floor(),
                         };
                         let value = rounded.clamp(-self.most, self.most);
-                        out.push(Spike { t: ms(t), train: (block * BLOCK + lane) as u32, value });
+                        out.push(Spike { t, train: (block * BLOCK + lane) as u32, value });
                         *last = new;
                     }
                 }
@@ -119,8 +119,11 @@ impl Rule for ChangeRule {
 
     const SPIKES_OF_REPAIRED: bool = false;
 
-    fn repair(&mut self, channel: usize, from: f32, to: f32) {
-        self.last[channel / BLOCK][channel % BLOCK] += to - from;
+    #[inline(always)]
+    fn read(&mut self, channel: usize, from: f32, to: f32, repaired: bool) {
+        if repaired {
+            self.last[channel / BLOCK][channel % BLOCK] += to - from;
+        }
     }
 
     fn idle(&self) -> bool {

@@ -1,7 +1,7 @@
 //! The existing taxels of an array as an encoder's channels, which of them a frame changes, and which events are
 //! valid.
 
-use super::blocks::{BLOCK, Block, NextFrame};
+use super::blocks::{BLOCK, Block};
 use crate::held::Held;
 use crate::vectors::wide;
 use crate::{Array, Error, EventsView, Result, problem};
@@ -11,11 +11,10 @@ pub(super) const FARTHEST: u64 = 1 << 60;
 
 wide! {
     /// Copies the blocks of a frame that differ from the stored ones.
-    fn take(t: i64, new: &[Block], held: &mut [Block], changed: &mut [bool], next: &mut NextFrame) -> Result<()> {
+    fn take(t: i64, new: &[Block], held: &mut [Block], changed: &mut [bool]) -> Result<()> {
         /// All exponent bits: infinite or not a number.
         const NOT_FINITE: u32 = 0x7f80_0000;
         for ((new, held), changed) in new.iter().zip(held).zip(changed) {
-            next.fetch();
             let (mut difference, mut bad) = (0, 0);
             for (new, held) in new.iter().zip(held.iter()) {
                 difference |= new.to_bits() ^ held.to_bits();
@@ -40,15 +39,20 @@ pub(super) fn not_finite(t: i64, value: f32) -> Error {
     problem!("frame at {t} us contains {value}: values must be finite{filled}")
 }
 
+/// A value that is finite, otherwise 0.
+fn finite(value: f32) -> f32 {
+    if value.is_finite() { value } else { 0.0 }
+}
+
 /// The mapping between taxels and channels.
 #[derive(Clone)]
 pub(super) struct Channels {
     rows: u16,
     columns: u16,
     name: String,
-    /// The taxel of each channel in a frame; `None` if every taxel is a channel.
+    /// The taxel of each channel in a frame; `None` if every place is a channel.
     taxels: Option<Vec<u32>>,
-    /// The channel of each taxel, [`NONE`] if no taxel exists there; `None` if every taxel is a channel.
+    /// The channel of each taxel, [`NONE`] if no taxel exists there; `None` if every taxel exists.
     of_taxel: Option<Vec<u32>>,
 }
 
@@ -68,12 +72,21 @@ impl Channels {
         Self { rows: array.rows, columns: array.columns, name: array.name.clone(), taxels, of_taxel }
     }
 
-    /// Number of existing taxels.
-    pub(super) fn len(&self) -> usize {
-        self.taxels.as_ref().map_or(self.grid(), Vec::len)
+    /// Every place of the grid as a channel, for what does not depend on position; events where no taxel exists are none.
+    pub(super) fn grid(array: &Array) -> Self {
+        let of_taxel = array.exists.as_ref().map(|exists| {
+            let channel = |(taxel, &exists): (u32, &bool)| if exists { taxel } else { NONE };
+            (0..).zip(exists).map(channel).collect()
+        });
+        Self { taxels: None, of_taxel, ..Self::new(array) }
     }
 
-    fn grid(&self) -> usize {
+    /// Number of channels.
+    pub(super) fn len(&self) -> usize {
+        self.taxels.as_ref().map_or(self.places(), Vec::len)
+    }
+
+    fn places(&self) -> usize {
         usize::from(self.rows) * usize::from(self.columns)
     }
 
@@ -91,26 +104,25 @@ impl Channels {
     }
 
     /// Copies a frame into blocks and marks those that changed.
-    pub(super) fn load(
-        &self,
-        t: i64,
-        values: &[f32],
-        held: &mut Held<f32>,
-        changed: &mut [bool],
-        next: &mut NextFrame,
-    ) -> Result<()> {
+    pub(super) fn load(&self, t: i64, values: &[f32], held: &mut Held<f32>, changed: &mut [bool]) -> Result<()> {
         let held = held.values_mut().as_chunks_mut().0;
-        if values.len() != self.grid() {
+        if values.len() != self.places() {
             let (rows, columns) = (self.rows, self.columns);
             return Err(problem!("frame at {t} us: {} values; must be {rows} x {columns}", values.len()));
         }
         let Some(taxels) = &self.taxels else {
+            // What a frame has where no taxel exists is not refused.
+            let existing: Option<Vec<f32>> = self.of_taxel.as_ref().map(|of_taxel| {
+                let read = |(&value, &channel): (&f32, &u32)| if channel == NONE { finite(value) } else { value };
+                values.iter().zip(of_taxel).map(read).collect()
+            });
+            let values = existing.as_deref().unwrap_or(values);
             let (full, rest) = values.as_chunks::<BLOCK>();
-            take(t, full, held, changed, next)?;
+            take(t, full, held, changed)?;
             if !rest.is_empty() {
                 let mut new = [0.0; BLOCK];
                 new[..rest.len()].copy_from_slice(rest);
-                take(t, &[new], &mut held[full.len()..], &mut changed[full.len()..], next)?;
+                take(t, &[new], &mut held[full.len()..], &mut changed[full.len()..])?;
             }
             return Ok(());
         };
@@ -119,7 +131,7 @@ impl Channels {
             for (value, &taxel) in new.iter_mut().zip(taxels) {
                 *value = values[taxel as usize];
             }
-            take(t, &[new], &mut held[block..], &mut changed[block..], next)?;
+            take(t, &[new], &mut held[block..], &mut changed[block..])?;
         }
         Ok(())
     }

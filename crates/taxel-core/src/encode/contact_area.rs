@@ -3,16 +3,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::Block;
-use super::by_stamp::{ByStamp, Measure};
 use super::encoding::Encoding;
-use super::loaded::Loaded;
+use super::features::{self, Emit, Feature};
+use super::levels::Levels;
+use super::loaded::{Loaded, require_tare};
 use super::stream::Stream;
 use super::tare::Tare;
 use crate::allowed::Range;
 use crate::parameters::parameters;
-use crate::spikes::ms;
-use crate::{Array, Result, Spike, SpikeKind, problem};
+use crate::{Array, Result, SpikeKind, problem};
 
 parameters! {
     /// Contact area: rises and falls of the number of loaded taxels through levels.
@@ -48,10 +47,12 @@ impl Encoding for ContactArea {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        let crossings = AreaCrossings { levels: self.levels.clone(), reported: 0 };
         array.check_neighbours("contact area")?;
+        let rest = require_tare("contact area", self.tare.as_ref())?.rest_of(array)?;
         let loaded = Loaded::new("contact area", array, self.tare.as_ref(), self.noise_floor)?;
-        Ok(Box::new(ByStamp::new(crossings, loaded, array)))
+        let levels: Vec<f64> = self.levels.iter().map(|&level| f64::from(level)).collect();
+        let emit = Emit::Crossings(Levels::of_each(1, &levels, 1.0));
+        Ok(features::stream(vec![Feature::Area(loaded)], rest, emit, array, self.trains_of(array)))
     }
 
     fn trains(&self, _array: &Array) -> usize {
@@ -64,38 +65,5 @@ impl Encoding for ContactArea {
 
     fn set_tare(&mut self, tare: &Tare) {
         self.tare = Some(tare.clone());
-    }
-}
-
-/// Crossings of levels by the area.
-#[derive(Clone)]
-struct AreaCrossings {
-    levels: Vec<u32>,
-    /// The area at the end of the last stamp.
-    reported: u32,
-}
-
-impl Measure for AreaCrossings {
-    fn trains(&self) -> usize {
-        2 * self.levels.len()
-    }
-
-    /// Emits a spike for each level that the area has crossed since the previous stamp.
-    fn emit(&mut self, t: i64, loaded: &Loaded, _held: &[Block], out: &mut Vec<Spike>) {
-        let (before, now) = (self.reported, loaded.area());
-        if before == now {
-            return;
-        }
-        for (train, &level) in self.levels.iter().enumerate() {
-            if before < level && level <= now {
-                out.push(Spike { t: ms(t), train: train as u32, value: 1.0 });
-            }
-        }
-        for (train, &level) in self.levels.iter().enumerate() {
-            if now < level && level <= before {
-                out.push(Spike { t: ms(t), train: (self.levels.len() + train) as u32, value: 1.0 });
-            }
-        }
-        self.reported = now;
     }
 }

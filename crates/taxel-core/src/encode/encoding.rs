@@ -1,6 +1,7 @@
 //! The interface of every encoder in the registry.
 
 use super::channels::Channels;
+use super::driver::Trains;
 use super::stream::Stream;
 use super::tare::Tare;
 use crate::{Array, Result, SpikeKind};
@@ -26,6 +27,11 @@ pub(super) trait Encoding {
     /// The latency that the encoder's own algorithm adds between a touch and its spike, ms.
     fn latency_ms(&self) -> f64 {
         0.0
+    }
+
+    /// The trains of its stream.
+    fn trains_of(&self, array: &Array) -> Trains {
+        Trains { number: self.trains(array), kind: self.kind(), latency_ms: self.latency_ms() }
     }
 
     /// Sets the taxels' rest; most encoders use none.

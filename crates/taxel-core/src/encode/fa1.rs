@@ -18,10 +18,12 @@ use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, NextFrame};
+use super::blocks::{BLOCK, Block};
+use super::channels::Channels;
+use super::driver::{Clock, Driver, Rule, Sample};
 use super::encoding::Encoding;
+use super::periods::micros;
 use super::power::power;
-use super::sampled::{Rule, Sampled};
 use super::stream::Stream;
 use crate::allowed::Range;
 use crate::parameters::parameters;
@@ -92,8 +94,8 @@ impl Encoding for Fa1 {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        let afferents = Fa1Afferents::new(self);
-        Ok(Box::new(Sampled::new(self, afferents, array, self.period_ms)?.steady()))
+        let clock = Clock::Period(micros("period_ms", self.period_ms)?);
+        Ok(Box::new(Driver::new(Fa1Afferents::new(self), Channels::new(array), self.trains_of(array), clock).steady()))
     }
 }
 
@@ -114,7 +116,7 @@ struct Fa1Block {
 }
 
 /// An afferent that may fire.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Near {
     channel: u32,
     /// theta of this sample.
@@ -236,16 +238,12 @@ impl Fa1Afferents {
                 (values[k], base[k]) = (held[block][lane], self.blocks[block].base[lane]);
             }
             Self::compress(self.alpha, &mut self.table, &values, &mut rho);
-            // Collects the firing lanes first, without a branch, which the processor could not predict.
-            let (mut firing, mut n) = ([0; BLOCK], 0);
-            for (k, near) in some.iter().enumerate() {
+            for (k, &Near { channel, theta }) in some.iter().enumerate() {
                 let u = rho[k] - base[k];
-                firing[n] = k;
                 // If theta is negative, both comparisons hold for a small U, which fires in neither direction.
-                n += usize::from((u > near.theta) != (u < -near.theta));
-            }
-            for &k in &firing[..n] {
-                let (Near { channel, theta }, u) = (some[k], rho[k] - base[k]);
+                if (u > theta) == (u < -theta) {
+                    continue;
+                }
                 // With a baseline of 0 every change has the largest possible value.
                 let size = if self.most > 1.0 { (u.abs() / self.theta_0).trunc().clamp(1.0, self.most) } else { 1.0 };
                 let signed = if u > theta { size } else { -size };
@@ -288,7 +286,7 @@ impl Fa1Block {
 }
 
 impl Rule for Fa1Afferents {
-    fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
+    fn begin(&mut self, Sample { held, .. }: Sample<'_>, _out: &mut Vec<Spike>) {
         let blank = Fa1Block {
             base: [0.0; BLOCK],
             theta: [0.0; BLOCK],
@@ -297,7 +295,6 @@ impl Rule for Fa1Afferents {
             still: true,
         };
         self.blocks = vec![blank; held.len()];
-        self.near = vec![Near::default(); (held.len() + 1) * BLOCK];
         for (block, values) in held.iter().enumerate() {
             let mut rho = [0.0; BLOCK];
             Self::compress(self.alpha, &mut self.table, values, &mut rho);
@@ -307,39 +304,32 @@ impl Rule for Fa1Afferents {
         }
     }
 
-    const PREFETCHES: bool = true;
-
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {
-        /// Number of entries that are always written, needed or not: a branch on the count would cost more.
-        const AT_ONCE: usize = 4;
-        let (mut near, mut n) = (std::mem::take(&mut self.near), 0);
+    fn sample(&mut self, Sample { t, held, changed, .. }: Sample<'_>, out: &mut Vec<Spike>) {
+        let mut near = std::mem::take(&mut self.near);
+        near.clear();
         for (block, afferent) in self.blocks.iter_mut().enumerate() {
-            next.fetch();
             if afferent.still && !changed[block] {
                 continue;
             }
             let mut left = afferent.near(&held[block]);
-            let end = n + left.count_ones() as usize;
-            while {
-                for near in &mut near[n..n + AT_ONCE] {
-                    let lane = left.trailing_zeros() as usize % BLOCK;
-                    *near = Near { channel: (block * BLOCK + lane) as u32, theta: afferent.theta[lane] };
-                    left &= left.wrapping_sub(1);
-                }
-                n += AT_ONCE;
-                n < end
-            } {}
-            n = end;
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize;
+                left &= left - 1;
+                near.push(Near { channel: (block * BLOCK + lane) as u32, theta: afferent.theta[lane] });
+            }
             afferent.lower_thresholds(self.decay, self.theta_0);
         }
-        self.reckon(t, held, &near[..n], out);
+        self.reckon(t, held, &near, out);
         self.near = near;
     }
 
     const SPIKES_OF_REPAIRED: bool = false;
 
-    fn repair(&mut self, channel: usize, from: f32, to: f32) {
+    fn read(&mut self, channel: usize, from: f32, to: f32, repaired: bool) {
+        if !repaired {
+            return;
+        }
         let (mut values, mut rho) = ([0.0; BLOCK], [0.0; BLOCK]);
         (values[0], values[1]) = (from, to);
         Self::compress(self.alpha, &mut self.table, &values, &mut rho);
@@ -424,10 +414,10 @@ mod tests {
                 .collect();
             let mut afferents = Fa1Afferents::new(&parameters);
             let mut out = vec![];
-            afferents.begin(0, &frames[..1], &mut out);
-            for (t, frame) in (1..).zip(frames[1..].chunks(1)) {
-                let changed = frame != &frames[t as usize - 1..t as usize];
-                afferents.sample(t, frame, &[changed], &mut NextFrame::unknown(), &mut out);
+            afferents.begin(Sample { t: 0, held: &frames[..1], changed: &[true], of_frame: true }, &mut out);
+            for (t, held) in (1..).zip(frames[1..].chunks(1)) {
+                let changed = held != &frames[t as usize - 1..t as usize];
+                afferents.sample(Sample { t, held, changed: &[changed], of_frame: true }, &mut out);
             }
             assert!(out == plainly(&parameters, &frames), "round {round}: {parameters:?}");
         }

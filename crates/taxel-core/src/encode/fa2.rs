@@ -3,10 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::blocks::BLOCK;
-use super::channels::Channels;
 use super::encoding::Encoding;
-use super::receptor::{Filter, Firing, Lanes, LowPass, TaxelAfferents};
-use super::sampled::Sampled;
+use super::receptor::{self, Filter, FilterState, Lanes, LowPass, firing};
 use super::stream::Stream;
 use crate::allowed::Range;
 use crate::parameters::parameters;
@@ -51,16 +49,6 @@ impl Fa2 {
         let low_pass = |tau| LowPass::new(tau, self.period_ms);
         Fast { corner: low_pass(self.corner_ms), membrane: low_pass(self.membrane_ms) }
     }
-
-    pub(super) fn firing(&self) -> Firing {
-        Firing {
-            threshold: self.threshold,
-            jump: self.jump,
-            recovery_ms: self.recovery_ms,
-            refractory_ms: self.refractory_ms,
-            period_ms: self.period_ms,
-        }
-    }
 }
 
 impl Encoding for Fa2 {
@@ -69,8 +57,7 @@ impl Encoding for Fa2 {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        let afferents = TaxelAfferents::new(self.filter(), self.firing(), self.range, Channels::new(array).len());
-        Ok(Box::new(Sampled::new(self, afferents, array, self.period_ms)?.steady()))
+        receptor::stream(self.filter(), firing!(self), None, array, self.trains_of(array))
     }
 
     fn kind(&self) -> SpikeKind {
@@ -85,48 +72,27 @@ pub(super) struct Fast {
     membrane: LowPass,
 }
 
-#[derive(Clone)]
-pub(super) struct FastState {
-    x: Lanes,
-    /// Output of the low-pass filter that the first high-pass filter subtracts, and the difference.
-    first: Lanes,
-    once: Lanes,
-    /// The same for the second high-pass filter.
-    second: Lanes,
-    twice: Lanes,
-}
-
 impl Filter for Fast {
-    type State = FastState;
-
-    fn steady_state(&self, x: &Lanes) -> (FastState, Lanes) {
+    /// The input; the output of the low-pass filter that the first high-pass filter subtracts, and the difference; the
+    /// same for the second high-pass filter.
+    fn steady_state(&self, x: &Lanes) -> (FilterState, Lanes) {
         let none = [0.0; BLOCK];
-        (FastState { x: *x, first: *x, once: none, second: none, twice: none }, none)
+        ([*x, *x, none, none, none], none)
     }
 
     #[inline(always)]
-    fn step<const SEE: bool>(&self, state: &mut FastState, lane: usize, x: f64, u: f64, moved: &mut u64) -> f64 {
-        let (before, slow, slower) = (state.x[lane], state.first[lane], state.second[lane]);
-        let first = self.corner.step(slow, before, x);
-        let once = x - first;
-        let second = self.corner.step(slower, state.once[lane], once);
-        let twice = once - second;
-        let potential = self.membrane.step(u, state.twice[lane], twice);
-        if SEE {
-            *moved |= (before.to_bits() ^ x.to_bits())
-                | (slow.to_bits() ^ first.to_bits())
-                | (slower.to_bits() ^ second.to_bits());
-        }
-        state.x[lane] = x;
-        state.first[lane] = first;
-        state.once[lane] = once;
-        state.second[lane] = second;
-        state.twice[lane] = twice;
+    fn step(&self, [before, first, once, second, twice]: &mut FilterState, lane: usize, x: f64, u: f64) -> f64 {
+        first[lane] = self.corner.step(first[lane], before[lane], x);
+        let now_once = x - first[lane];
+        second[lane] = self.corner.step(second[lane], once[lane], now_once);
+        let now_twice = now_once - second[lane];
+        let potential = self.membrane.step(u, twice[lane], now_twice);
+        (before[lane], once[lane], twice[lane]) = (x, now_once, now_twice);
         potential
     }
 
-    fn shift(&self, state: &mut FastState, lane: usize, by: f64) {
-        state.x[lane] += by;
-        state.first[lane] += by;
+    fn shift(&self, [before, first, ..]: &mut FilterState, lane: usize, by: f64) {
+        before[lane] += by;
+        first[lane] += by;
     }
 }

@@ -1,9 +1,8 @@
 //! How many levels the taxels of a sensor are above: a count with memory.
 
-use super::blocks::{Block, NextFrame, blocks};
+use super::driver::{Rule, Sample};
 use super::level_crossing::{LevelCrossing, LevelCrossings};
 use super::running_range::RunningRange;
-use super::sampled::Rule;
 use crate::Result;
 use crate::rest::Rest;
 
@@ -14,7 +13,6 @@ const RELEASE: f64 = 0.7;
 #[derive(Clone)]
 pub(super) struct LevelCount {
     crossings: LevelCrossings,
-    changed: Vec<bool>,
     begun: bool,
 }
 
@@ -36,23 +34,24 @@ impl LevelCount {
     fn new(levels: &[f64], running_range: Option<RunningRange>, taxels: usize) -> Result<Self> {
         let levels =
             LevelCrossing { release_share: Some(RELEASE), running_range, ..LevelCrossing::at(levels.to_vec()) };
-        let crossings = LevelCrossings::new(&levels, taxels)?;
-        Ok(Self { crossings, changed: vec![true; blocks(taxels)], begun: false })
+        Ok(Self { crossings: LevelCrossings::new(&levels, taxels)?, begun: false })
     }
 
-    /// Reads the values of all taxels at `t` us; returns how many levels they are above.
-    pub(super) fn take(&mut self, t: i64, held: &[Block]) -> usize {
+    /// Reads the values of all taxels; returns how many levels they are above.
+    pub(super) fn take(&mut self, now: Sample<'_>) -> usize {
         let mut crossed = vec![];
         if std::mem::replace(&mut self.begun, true) {
-            self.crossings.sample(t, held, &self.changed, &mut NextFrame::unknown(), &mut crossed);
+            self.crossings.sample(now, &mut crossed);
         } else {
-            self.crossings.begin(t, held, &mut crossed);
+            self.crossings.begin(now, &mut crossed);
         }
         self.crossings.above()
     }
 
-    /// Sets the rest of a taxel from now on.
+    /// Sets the rest of a taxel from now on, where levels are above it.
     pub(super) fn set_rest(&mut self, taxel: usize, rest: f64) {
-        self.crossings.place(taxel, rest, 1.0);
+        if !self.crossings.is_of_range() {
+            self.crossings.place(taxel, rest, 1.0);
+        }
     }
 }

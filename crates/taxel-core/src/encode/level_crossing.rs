@@ -1,20 +1,17 @@
 //! Crossings of levels, with hysteresis, a minimum duration, and tonic spikes.
 
-use std::collections::VecDeque;
-
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, NextFrame, blocks};
-use super::bracket::{Bracket, check_levels};
+use super::blocks::blocks;
+use super::channel_levels::{ChannelLevels, check_levels};
 use super::channels::Channels;
+use super::driver::{Clock, Driver, Rule, Sample};
 use super::encoding::Encoding;
 use super::periods::micros;
 use super::running_range::{RunningRange, SampleWindow};
-use super::sampled::{Rule, Sampled};
-use super::stream::{Stream, sort_from};
+use super::stream::Stream;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
-use crate::spikes::ms;
 use crate::{Array, Result, Spike, problem};
 
 /// Crossings of levels: +1 when a taxel's value reaches a level, -1 when it falls below the level's release.
@@ -119,8 +116,10 @@ impl Encoding for LevelCrossing {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        let crossings = LevelCrossings::new(self, Channels::new(array).len())?;
-        Ok(Box::new(Sampled::new(self, crossings, array, self.period_ms)?))
+        let channels = Channels::new(array);
+        let crossings = LevelCrossings::new(self, channels.len())?;
+        let clock = Clock::Period(micros("period_ms", self.period_ms)?);
+        Ok(Box::new(Driver::new(crossings, channels, self.trains_of(array), clock)))
     }
 
     fn trains(&self, array: &Array) -> usize {
@@ -132,253 +131,75 @@ impl Encoding for LevelCrossing {
     }
 }
 
-/// State of one level on one channel.
-#[derive(Clone, Copy)]
-struct ChannelLevel {
-    /// From this value on, the taxel is above.
-    on_at: f32,
-    /// Below this value, the taxel is no longer above.
-    off_at: f32,
-    /// Whether the value of the latest sample is above.
-    above: bool,
-    /// The state at the latest spike; follows `above` after the minimum duration.
-    reported: bool,
-    /// When `above` last changed, us.
-    since: i64,
-}
-
-/// The levels of all channels.
+/// The levels of all channels, moved by their running ranges if they have one.
 #[derive(Clone)]
 pub(super) struct LevelCrossings {
-    channels: usize,
-    levels: Vec<f64>,
-    releases: Vec<f64>,
-    hold: i64,
-    /// Indexed by `channel * levels + level`.
-    states: Vec<ChannelLevel>,
-    /// The number of these that are above.
-    above: usize,
-    bracket: Bracket,
-    /// Crossings that have not lasted for the minimum duration: the time when they will have, and their index. The
-    /// duration is the same for all, so the queue is ordered by time.
-    trials: VecDeque<(i64, usize)>,
-    tonic: Option<Tonic>,
+    /// Each level with its release, as given.
+    given: Vec<(f64, f64)>,
+    levels: ChannelLevels,
     window: Option<SampleWindow>,
-}
-
-#[derive(Clone)]
-struct Tonic {
-    interval_us: i64,
-    level: usize,
-    /// The time of each channel's next tonic spike, the channel, and its crossing's time; the period is the same for
-    /// all, so the queue is ordered by time.
-    next: VecDeque<(i64, usize, i64)>,
-    /// Time of the spike of the crossing since which a channel is above; `None` while it is below.
-    above_since: Vec<Option<i64>>,
 }
 
 impl LevelCrossings {
     /// Levels that all channels are below.
     pub(super) fn new(parameters: &LevelCrossing, channels: usize) -> Result<Self> {
         parameters.check()?;
-        let levels = parameters.levels.clone();
-        let releases: Vec<f64> = levels.iter().map(|&l| parameters.release(l)).collect();
-        let tonic = match parameters.tonic_ms {
-            None => None,
-            Some(interval_us) => Some(Tonic {
-                interval_us: micros("tonic_ms", interval_us)?,
-                level: parameters.tonic_level.and_then(|l| levels.iter().position(|&m| m == l)).unwrap_or(0),
-                next: VecDeque::new(),
-                above_since: vec![None; channels],
-            }),
-        };
-        let blank = |(&rise, &fall): (&f64, &f64)| ChannelLevel {
-            on_at: rise as f32,
-            off_at: fall as f32,
-            above: false,
-            reported: false,
-            since: i64::MIN,
-        };
-        let states = (0..channels).flat_map(|_| levels.iter().zip(&releases).map(blank)).collect();
+        let given: Vec<(f64, f64)> = parameters.levels.iter().map(|&l| (l, parameters.release(l))).collect();
+        let hold = if parameters.hold_ms == 0.0 { 0 } else { micros("hold_ms", parameters.hold_ms)? };
+        let interval = parameters.tonic_ms.map(|ms| micros("tonic_ms", ms)).transpose()?;
+        let tonic = parameters.tonic_level.and_then(|l| parameters.levels.iter().position(|&m| m == l)).unwrap_or(0);
         Ok(Self {
-            channels,
-            hold: if parameters.hold_ms == 0.0 { 0 } else { micros("hold_ms", parameters.hold_ms)? },
-            states,
-            above: 0,
-            bracket: Bracket::new(blocks(channels)),
-            trials: VecDeque::new(),
-            tonic,
+            levels: ChannelLevels::new(channels, &given, hold, interval.unwrap_or(0), interval.map(|_| tonic)),
+            given,
             window: parameters.running_range.as_ref().map(|r| SampleWindow::new(r, blocks(channels))).transpose()?,
-            levels,
-            releases,
         })
     }
 
     /// The number of levels, of all channels, that are above: between 0 and channels times levels.
     pub(super) fn above(&self) -> usize {
-        self.above
+        self.levels.levels.above()
+    }
+
+    /// Whether levels are parts of running ranges.
+    pub(super) fn is_of_range(&self) -> bool {
+        self.window.is_some()
     }
 
     /// Rescales the levels to the running ranges; a channel whose range is empty stays below all levels.
     fn scale(&mut self, ranges: &[(f64, f64)]) {
-        for (channel, &(low, high)) in ranges.iter().enumerate().take(self.channels) {
+        for (channel, &(low, high)) in ranges.iter().enumerate().take(self.levels.channels()) {
             self.place(channel, low, high - low);
         }
     }
 
     /// Puts the levels of a channel above `low`, in units of `span`; without a span above 0 it stays below all levels.
     pub(super) fn place(&mut self, channel: usize, low: f64, span: f64) {
-        let levels = self.levels.len();
-        let states = &mut self.states[channel * levels..(channel + 1) * levels];
-        for ((state, level), release) in states.iter_mut().zip(&self.levels).zip(&self.releases) {
-            (state.on_at, state.off_at) = if span > 0.0 {
-                ((low + level * span) as f32, (low + release * span) as f32)
-            } else {
-                (f32::INFINITY, f32::INFINITY)
-            };
-        }
-        self.set_bracket(channel);
-    }
-
-    fn set_bracket(&mut self, channel: usize) {
-        let levels = self.levels.len();
-        let (mut low, mut high) = (f32::NEG_INFINITY, f32::INFINITY);
-        for state in &self.states[channel * levels..(channel + 1) * levels] {
-            if state.above {
-                low = low.max(state.off_at);
-            } else {
-                high = high.min(state.on_at);
-            }
-        }
-        self.bracket.set(channel, low, high);
-    }
-
-    /// Processes the first sample: no crossings, but tonic spikes if the value is above the level.
-    fn settle(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
-        let levels = self.levels.len();
-        for channel in 0..self.channels {
-            let value = held[channel / BLOCK][channel % BLOCK];
-            for level in 0..levels {
-                let state = &mut self.states[channel * levels + level];
-                state.above = value >= state.on_at;
-                state.reported = state.above;
-                if state.reported {
-                    self.switch_tonic(t, channel, level, true, out);
-                }
-            }
-            self.set_bracket(channel);
-        }
-        self.above = self.states.iter().filter(|state| state.above).count();
-    }
-
-    #[inline(always)]
-    fn cross(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
-        let from = out.len();
-        self.emit_trials(t, true, out);
-        for (block, values) in held.iter().enumerate() {
-            if changed[block] && self.bracket.has_left(block, values) {
-                for channel in block * BLOCK..self.channels.min((block + 1) * BLOCK) {
-                    let value = values[channel % BLOCK];
-                    if !self.bracket.holds(channel, value) {
-                        self.cross_channel(t, channel, value, out);
-                    }
-                }
-            }
-        }
-        self.emit_tonic(t, true, out);
-        sort_from(out, from);
-    }
-
-    fn cross_channel(&mut self, t: i64, channel: usize, value: f32, out: &mut Vec<Spike>) {
-        let levels = self.levels.len();
-        for train in channel * levels..(channel + 1) * levels {
-            let state = &mut self.states[train];
-            let above = value >= if state.above { state.off_at } else { state.on_at };
-            if above != state.above {
-                state.above = above;
-                state.since = t;
-                self.above = if above { self.above + 1 } else { self.above - 1 };
-                if self.hold == 0 {
-                    self.report_level(t, train, out);
-                } else if above != state.reported {
-                    self.trials.push_back((t + self.hold, train));
-                }
-            }
-        }
-        self.set_bracket(channel);
-    }
-
-    fn report_level(&mut self, t: i64, train: usize, out: &mut Vec<Spike>) {
-        let state = &mut self.states[train];
-        state.reported = state.above;
-        let above = state.reported;
-        out.push(Spike { t: ms(t), train: train as u32, value: if above { 1.0 } else { -1.0 } });
-        self.switch_tonic(t, train / self.levels.len(), train % self.levels.len(), above, out);
-    }
-
-    /// Starts or stops a channel's tonic spikes, if `level` is the tonic level.
-    fn switch_tonic(&mut self, t: i64, channel: usize, level: usize, above: bool, out: &mut Vec<Spike>) {
-        let first = self.states.len();
-        let Some(tonic) = self.tonic.as_mut().filter(|tonic| tonic.level == level) else { return };
-        tonic.above_since[channel] = above.then_some(t);
-        if above {
-            out.push(Spike { t: ms(t), train: (first + channel) as u32, value: 1.0 });
-            tonic.next.push_back((t + tonic.interval_us, channel, t));
-        }
-    }
-
-    /// Emits the crossings whose minimum duration ends before `t` (with `at_too` also at `t`), and the tonic spikes
-    /// before each.
-    fn emit_trials(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
-        while let Some(&(due, train)) = self.trials.front()
-            && (due < t || (at_too && due == t))
-        {
-            self.trials.pop_front();
-            self.emit_tonic(due, false, out);
-            let state = self.states[train];
-            if state.above != state.reported && state.since == due - self.hold {
-                self.report_level(due, train, out);
-            }
-        }
-    }
-
-    /// Emits the tonic spikes before `t` (with `at_too` also at `t`).
-    fn emit_tonic(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
-        let first = self.states.len();
-        let Some(tonic) = &mut self.tonic else { return };
-        while let Some(&(due, channel, since)) = tonic.next.front()
-            && (due < t || (at_too && due == t))
-        {
-            tonic.next.pop_front();
-            if tonic.above_since[channel] == Some(since) {
-                out.push(Spike { t: ms(due), train: (first + channel) as u32, value: 1.0 });
-                tonic.next.push_back((due + tonic.interval_us, channel, since));
-            }
-        }
+        let at = |level: f64| if span > 0.0 { low + level * span } else { f64::INFINITY };
+        self.levels.place(channel, self.given.iter().map(|&(level, release)| (at(level), at(release))));
     }
 }
 
 impl Rule for LevelCrossings {
-    fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
+    fn begin(&mut self, now: Sample<'_>, out: &mut Vec<Spike>) {
         match &mut self.window {
-            None => self.settle(t, held, out),
-            Some(window) => window.take(t, held),
+            None => self.levels.settle(now.t, now.held, out),
+            Some(window) => window.take(now.t, now.held),
         }
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], _next: &mut NextFrame, out: &mut Vec<Spike>) {
-        let Some(mut window) = self.window.take() else { return self.cross(t, held, changed, out) };
-        let everything = vec![true; held.len()];
+    fn sample(&mut self, now: Sample<'_>, out: &mut Vec<Spike>) {
+        let Some(mut window) = self.window.take() else { return self.levels.take(now, false, out) };
+        let Sample { t, held, .. } = now;
         let first = window.first_full(t);
         if let Some(first) = &first {
             self.scale(&first.ranges);
             for (k, (at, held)) in first.samples.iter().enumerate() {
                 if k == 0 {
-                    self.settle(*at, held, out);
+                    self.levels.settle(*at, held, out);
                 } else {
                     self.pass(*at, out);
-                    self.cross(*at, held, &everything, out);
+                    self.levels.take(Sample { t: *at, held, ..now }, true, out);
                 }
             }
             self.pass(t, out);
@@ -388,23 +209,19 @@ impl Rule for LevelCrossings {
             self.scale(ranges);
         }
         match first {
-            Some(first) if first.samples.is_empty() => self.settle(t, held, out),
+            Some(first) if first.samples.is_empty() => self.levels.settle(t, held, out),
             None if !window.is_full() => {}
-            None if ranges.is_none() => self.cross(t, held, changed, out),
-            _ => self.cross(t, held, &everything, out),
+            first => self.levels.take(now, first.is_some() || ranges.is_some(), out),
         }
         window.take(t, held);
         self.window = Some(window);
     }
 
     fn pass(&mut self, t: i64, out: &mut Vec<Spike>) {
-        let from = out.len();
-        self.emit_trials(t, false, out);
-        self.emit_tonic(t, false, out);
-        sort_from(out, from);
+        self.levels.levels.pass(t, false, out);
     }
 
     fn idle(&self) -> bool {
-        self.window.is_none() && self.trials.is_empty() && self.tonic.as_ref().is_none_or(|t| t.next.is_empty())
+        self.window.is_none() && self.levels.levels.idle()
     }
 }

@@ -1,8 +1,9 @@
 //! Determines which taxels are loaded, and their number, for encoders that do not depend on position.
 
 use super::blocks::{BLOCK, Block, blocks};
+use super::driver::Sample;
 use super::tare::Tare;
-use crate::rest::{Rest, Value, touched_from};
+use crate::rest::{Rest, touched_from};
 use crate::vectors::wide;
 use crate::{Array, Hint, Result, problem};
 
@@ -92,12 +93,12 @@ impl Paired {
     }
 
     /// Whether any taxel of a block is loaded.
-    pub(super) fn any(&self, block: usize) -> bool {
+    fn any(&self, block: usize) -> bool {
         self.loaded[block].iter().any(|&l| l != 0)
     }
 
     /// Whether a taxel counts: it and one of its neighbours are loaded, or it is a channel.
-    pub(super) fn counts(&self, taxel: usize) -> bool {
+    fn counts(&self, taxel: usize) -> bool {
         self.is_loaded(taxel) && self.neighbours[taxel] > 0
     }
 
@@ -125,32 +126,28 @@ impl Paired {
     /// Toggles whether a taxel is loaded, and updates its neighbours' counts and the area.
     fn toggle(&mut self, taxel: usize) {
         let loaded = !self.is_loaded(taxel);
+        let step = if loaded { 1 } else { -1 };
         self.loaded[taxel / BLOCK][taxel % BLOCK] = u32::from(loaded);
         if let Some(values) = self.alone.get(taxel) {
             self.from[taxel / BLOCK][taxel % BLOCK] = values[usize::from(loaded)];
-            self.area = if loaded { self.area + 1 } else { self.area - 1 };
-            return;
-        }
-        let (row, column) = (taxel / self.columns, taxel % self.columns);
-        for y in row.saturating_sub(1)..=(row + 1).min(self.rows - 1) {
-            for x in column.saturating_sub(1)..=(column + 1).min(self.columns - 1) {
-                let neighbour = y * self.columns + x;
-                if neighbour == taxel {
-                    continue;
-                }
-                let counted = self.neighbours[neighbour] > 0;
-                if loaded {
-                    self.neighbours[neighbour] += 1;
-                } else {
-                    self.neighbours[neighbour] -= 1;
-                }
-                if self.is_loaded(neighbour) && counted != (self.neighbours[neighbour] > 0) {
-                    self.area = if loaded { self.area + 1 } else { self.area - 1 };
+        } else {
+            let (row, column) = (taxel / self.columns, taxel % self.columns);
+            for y in row.saturating_sub(1)..=(row + 1).min(self.rows - 1) {
+                for x in column.saturating_sub(1)..=(column + 1).min(self.columns - 1) {
+                    let neighbour = y * self.columns + x;
+                    if neighbour == taxel {
+                        continue;
+                    }
+                    let counted = self.neighbours[neighbour] > 0;
+                    self.neighbours[neighbour] = self.neighbours[neighbour].wrapping_add_signed(step as i8);
+                    if self.is_loaded(neighbour) && counted != (self.neighbours[neighbour] > 0) {
+                        self.area = self.area.wrapping_add_signed(step);
+                    }
                 }
             }
         }
         if self.neighbours[taxel] > 0 {
-            self.area = if loaded { self.area + 1 } else { self.area - 1 };
+            self.area = self.area.wrapping_add_signed(step);
         }
     }
 }
@@ -197,19 +194,6 @@ impl Loaded {
         Ok(fresh)
     }
 
-    /// Keeps the rest of each taxel, for what is computed from all values: no taxel is ever loaded, which saves most of
-    /// the time where noise alone would load taxels in each frame.
-    pub(super) fn never(subject: &str, array: &Array, tare: Option<&Tare>) -> Result<Self> {
-        Self::new(subject, array, tare, f64::INFINITY)
-    }
-
-    /// Has no rest of any taxel: none is ever loaded.
-    pub(super) fn without_rest(array: &Array) -> Self {
-        let paired = Paired::new(usize::from(array.rows), usize::from(array.columns));
-        let rest = Rest::measured(vec![f64::NO_REST; array.len()]);
-        Self { paired, noise_floor: f64::INFINITY, noise: vec![], rest }
-    }
-
     /// Changes the rest of a taxel; the caller must pass its value again.
     pub(super) fn set_rest(&mut self, taxel: usize, rest: f64) {
         self.rest.set(taxel, rest);
@@ -231,9 +215,9 @@ impl Loaded {
         Some(self.rest.values()[taxel]).filter(|rest| rest.is_finite())
     }
 
-    /// Difference between a value and a taxel's rest.
-    fn above(&self, taxel: usize, value: f32) -> f64 {
-        self.rest.above(taxel, f64::from(value))
+    /// Number of taxels that count.
+    pub(super) fn area(&self) -> u32 {
+        self.paired.area
     }
 
     /// Sums over the taxels that count, from the values of all taxels; they are added in the order of taxels.
@@ -245,14 +229,14 @@ impl Loaded {
     /// The same, with x and y of each taxel.
     pub(super) fn sums_at(&self, held: &[Block], at: impl Fn(usize) -> [f64; 2]) -> LoadedSums {
         let mut sums = LoadedSums::default();
-        if self.area() == 0 {
+        if self.paired.area == 0 {
             return sums;
         }
         let taxels = self.paired.neighbours.len();
-        for (block, values) in held.iter().enumerate().filter(|&(block, _)| self.any(block)) {
+        for (block, values) in held.iter().enumerate().filter(|&(block, _)| self.paired.any(block)) {
             for (taxel, &value) in (block * BLOCK..taxels).zip(values) {
-                if self.counts(taxel) {
-                    let above = self.above(taxel, value);
+                if self.paired.counts(taxel) {
+                    let above = self.rest.above(taxel, f64::from(value));
                     sums.total += above;
                     sums.peak = sums.peak.max(above);
                     let [x, y] = at(taxel);
@@ -269,17 +253,18 @@ impl Loaded {
         self.paired.take(taxel, value);
     }
 
-    /// Updates the values of a block of taxels.
-    pub(super) fn take_block(&mut self, block: usize, values: &Block) {
-        self.paired.take_block(block, values);
+    /// Updates the values of the blocks that a frame changed; those of events are passed to `take`.
+    pub(super) fn take_frame(&mut self, now: Sample<'_>) {
+        if now.of_frame {
+            self.take_changed(now);
+        }
     }
-}
 
-impl std::ops::Deref for Loaded {
-    type Target = Paired;
-
-    fn deref(&self) -> &Paired {
-        &self.paired
+    /// Updates the values of the blocks that changed.
+    pub(super) fn take_changed(&mut self, now: Sample<'_>) {
+        for (block, values) in now.held.iter().enumerate().filter(|&(block, _)| now.changed[block]) {
+            self.paired.take_block(block, values);
+        }
     }
 }
 

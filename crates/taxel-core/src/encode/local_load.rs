@@ -2,13 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{Block, NextFrame};
-use super::by_stamp::{ByStamp, Measure};
+use super::channels::Channels;
+use super::driver::{Clock, Driver, Rule, Sample};
 use super::encoding::Encoding;
-use super::loaded::{Loaded, require_tare};
-use super::local_sums::{LocalSums, SumPair, Values};
+use super::features::{self, Emit, Feature};
+use super::levels::Levels;
+use super::loaded::require_tare;
+use super::local_sums::{LocalSums, SumPair};
+use super::periods::micros;
 use super::recent::{PastWindow, RecentSamples};
-use super::sampled::{Rule, Sampled};
 use super::stream::{Stream, spikes_of_events, spikes_of_frames};
 use super::tare::Tare;
 use crate::allowed::Range;
@@ -116,7 +118,7 @@ impl LocalLoad {
     /// As [`Encoder::encode_events`](super::Encoder::encode_events).
     pub fn values_of_events(&self, events: EventsView<'_>, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
-        let mut stream = self.sampled(events.array, Emit::Values)?;
+        let mut stream = self.sampled(events.array, true)?;
         Ok(quantities(&spikes_of_events(&mut stream, events, stop)?.0))
     }
 
@@ -127,22 +129,8 @@ impl LocalLoad {
     /// As [`Encoder::encode_frames`](super::Encoder::encode_frames).
     pub fn values_of_frames(&self, frames: FramesView<'_>, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
-        let mut stream = self.sampled(frames.array, Emit::Values)?;
+        let mut stream = self.sampled(frames.array, true)?;
         Ok(quantities(&spikes_of_frames(&mut stream, frames, stop)?.0))
-    }
-
-    /// The largest local sums alone, of an array's frames: quantities of plain rules.
-    ///
-    /// # Errors
-    ///
-    /// As [`Encoder::stream`](super::Encoder::stream).
-    pub fn largest(&self, array: &Array) -> Result<LargestSums> {
-        self.check()?;
-        self.sums(array, &self.running_us()).map(LargestSums)
-    }
-
-    fn running_us(&self) -> Vec<f64> {
-        self.local_ms.iter().map(|&tau| us(tau)).collect()
     }
 
     /// The number of largest sums that have levels: above the rest, and above and below each running mean.
@@ -150,21 +138,23 @@ impl LocalLoad {
         1 + 2 * self.local_ms.len()
     }
 
-    fn sums(&self, array: &Array, running_us: &[f64]) -> Result<LocalSums> {
+    /// The local sums of an array's frames.
+    pub(super) fn sums(&self, array: &Array) -> Result<LocalSums> {
         let tare = require_tare("local load", self.tare.as_ref())?;
-        let least = (self.least_noise, self.noise_floor);
-        LocalSums::new(array, tare, least, self.rest == LocalRest::Tracked, running_us)
+        let running_us: Vec<f64> = self.local_ms.iter().map(|&tau| us(tau)).collect();
+        LocalSums::new(array, tare, (self.least_noise, self.noise_floor), self.rest == LocalRest::Tracked, &running_us)
     }
 
-    fn sampled(&self, array: &Array, emit: Emit) -> Result<Sampled<LocalLoadRule>> {
+    fn sampled(&self, array: &Array, as_values: bool) -> Result<Driver<LocalLoadRule>> {
         let whole_us = |ms: f64| us(ms).round() as i64;
         let windows: Vec<PastWindow> = self
             .windows()
             .map(|([from, to], quantities)| PastWindow { from: whole_us(from), to: whole_us(to), quantities })
             .collect();
         let recent = RecentSamples::new(windows[0].quantities, &windows);
-        let rule = LocalLoadRule { sums: self.sums(array, &self.running_us())?, recent, quantities: vec![], emit };
-        Sampled::new(self, rule, array, self.period_ms)
+        let rule = LocalLoadRule { sums: self.sums(array)?, recent, quantities: vec![], as_values };
+        let clock = Clock::Period(micros("period_ms", self.period_ms)?);
+        Ok(Driver::new(rule, Channels::grid(array), self.trains_of(array), clock))
     }
 }
 
@@ -185,13 +175,12 @@ impl Encoding for LocalLoad {
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         array.check_neighbours("local load")?;
         if self.levels.is_empty() {
-            return Ok(Box::new(self.sampled(array, Emit::Spikes)?));
+            return Ok(Box::new(self.sampled(array, false)?));
         }
-        let loaded = Loaded::never("local load", array, self.tare.as_ref())?;
-        let sums = self.sums(array, &self.running_us())?;
-        let level = |&at: &f64| SumLevel { at, left_below: self.release * at, reached: false };
-        let levels = (0..self.sums_with_levels()).flat_map(|_| self.levels.iter().map(level)).collect();
-        Ok(Box::new(ByStamp::new(SumLevels { sums, largest: vec![], levels }, loaded, array)))
+        let rest = require_tare("local load", self.tare.as_ref())?.rest_of(array)?;
+        let emit = Emit::Crossings(Levels::of_each(self.sums_with_levels(), &self.levels, self.release));
+        let sums = Feature::Local(self.sums(array)?);
+        Ok(features::stream(vec![sums], rest, emit, array, self.trains_of(array)))
     }
 
     fn trains(&self, _array: &Array) -> usize {
@@ -207,116 +196,22 @@ impl Encoding for LocalLoad {
     }
 }
 
-/// The largest local sums of each frame: above the rest, and above and below the last running mean, if there is any.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct LargestOfFrame {
-    /// [`LocalLoad`]'s quantity "largest".
-    pub above_rest: f64,
-    /// The same above and below the running mean: "largest" and "largest below".
-    pub of_mean: [f64; 2],
-}
-
-/// Computes the largest local sums of each frame.
-#[derive(Clone)]
-pub struct LargestSums(LocalSums);
-
-impl LargestSums {
-    /// Reads the next frame, row by row, at `t` us, which must not be earlier than the last; returns its largest sums.
-    pub fn take(&mut self, t: i64, frame: &[f32]) -> LargestOfFrame {
-        let (mut largest, mut of_rest) = (LargestOfFrame::default(), true);
-        self.0.take(t, Values::Frame(frame), |sums| {
-            if std::mem::take(&mut of_rest) {
-                largest.above_rest = sums.largest[0];
-            } else {
-                largest.of_mean = sums.largest;
-            }
-        });
-        largest
-    }
-
-    /// Sets the rest of a taxel, by index, from now on.
-    pub fn set_rest(&mut self, taxel: usize, rest: f64) {
-        self.0.set_rest_at(taxel, rest);
-    }
-}
-
-/// A level of one of the largest sums.
-#[derive(Clone)]
-struct SumLevel {
-    at: f64,
-    left_below: f64,
-    reached: bool,
-}
-
-/// Crossings of levels by the largest sums.
-#[derive(Clone)]
-struct SumLevels {
-    sums: LocalSums,
-    /// The largest sums of the last stamp: above the rest, then above and below each running mean.
-    largest: Vec<f64>,
-    /// All levels of the first sum, then those of the next.
-    levels: Vec<SumLevel>,
-}
-
-impl Measure for SumLevels {
-    fn trains(&self) -> usize {
-        2 * self.levels.len()
-    }
-
-    fn drifts(&self) -> bool {
-        true
-    }
-
-    fn set_rest(&mut self, taxel: usize, rest: f64) {
-        self.sums.set_rest_at(taxel, rest);
-    }
-
-    fn emit(&mut self, t: i64, _loaded: &Loaded, held: &[Block], out: &mut Vec<Spike>) {
-        let Self { sums, largest, levels } = self;
-        largest.clear();
-        sums.take(t, Values::Frame(held.as_flattened()), |SumPair { largest: [up, down], .. }| {
-            let present = if largest.is_empty() { &[up][..] } else { &[up, down][..] };
-            largest.extend_from_slice(present);
-        });
-        let each = levels.len() / largest.len();
-        let falls = levels.len();
-        let mut left = vec![];
-        for (train, level) in levels.iter_mut().enumerate() {
-            // In single precision, as plain rules compare it.
-            let now = f64::from(largest[train / each] as f32);
-            if !level.reached && now >= level.at {
-                level.reached = true;
-                out.push(Spike { t: ms(t), train: train as u32, value: 1.0 });
-            } else if level.reached && now < level.left_below {
-                level.reached = false;
-                left.push(Spike { t: ms(t), train: (falls + train) as u32, value: 1.0 });
-            }
-        }
-        out.append(&mut left);
-    }
-}
-
-/// What a sample gives: spikes of the quantities that are not 0, or the quantities themselves, each as the value of one
-/// spike.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Emit {
-    Spikes,
-    Values,
-}
-
+/// The quantities of each sample, as graded spikes.
 #[derive(Clone)]
 struct LocalLoadRule {
     sums: LocalSums,
     recent: RecentSamples,
     quantities: Vec<f64>,
-    emit: Emit,
+    /// Whether a sample gives the quantities themselves, each as the value of one spike.
+    as_values: bool,
 }
 
-impl LocalLoadRule {
-    fn take(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
+impl Rule for LocalLoadRule {
+    #[inline(always)]
+    fn sample(&mut self, now: Sample<'_>, out: &mut Vec<Spike>) {
         let quantities = &mut self.quantities;
         quantities.clear();
-        self.sums.take(t, Values::Taxels(held.as_flattened()), |sums| {
+        self.sums.take(now.t, now.held.as_flattened(), |sums| {
             let SumPair { largest: [up, down], places, area: [area, area_below], total: [total, total_below] } = sums;
             if quantities.is_empty() {
                 quantities.extend([area, up, places, total]);
@@ -324,28 +219,14 @@ impl LocalLoadRule {
                 quantities.extend([area, up, down, area_below, total, total_below]);
             }
         });
-        self.recent.take(t, quantities);
+        self.recent.take(now.t, quantities);
         quantities.push(1.0);
         for (train, &quantity) in quantities.iter().enumerate() {
-            let value = match self.emit {
-                Emit::Spikes => libm::log1p(quantity) as f32,
-                Emit::Values => quantity as f32,
-            };
-            if value != 0.0 || self.emit == Emit::Values {
-                out.push(Spike { t: ms(t), train: train as u32, value });
+            let value = if self.as_values { quantity } else { libm::log1p(quantity) } as f32;
+            if value != 0.0 || self.as_values {
+                out.push(Spike { t: ms(now.t), train: train as u32, value });
             }
         }
-    }
-}
-
-impl Rule for LocalLoadRule {
-    fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
-        self.take(t, held, out);
-    }
-
-    #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], _changed: &[bool], _next: &mut NextFrame, out: &mut Vec<Spike>) {
-        self.take(t, held, out);
     }
 
     fn set_rest(&mut self, channel: usize, rest: f64) {
@@ -354,9 +235,5 @@ impl Rule for LocalLoadRule {
 
     fn rest(&self, channel: usize) -> Option<f64> {
         self.sums.rest(channel)
-    }
-
-    fn idle(&self) -> bool {
-        false
     }
 }

@@ -33,19 +33,10 @@ struct CellGrid {
 /// Existing taxels next to each other in a row.
 #[derive(Debug, Clone, Copy)]
 struct TaxelRun {
-    /// The first one's number among the existing taxels.
-    channel: usize,
     /// The first one's index in the array.
     taxel: usize,
     cell: usize,
     len: usize,
-}
-
-/// Values by the number of the existing taxel, or by index in the array.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Values<'a> {
-    Taxels(&'a [f32]),
-    Frame(&'a [f32]),
 }
 
 impl CellGrid {
@@ -53,7 +44,6 @@ impl CellGrid {
         let (rows, columns) = (usize::from(array.rows), usize::from(array.columns));
         let stride = columns + 1;
         let mut runs: Vec<TaxelRun> = vec![];
-        let mut channel = 0;
         for taxel in 0..array.len() {
             if array.exists.as_ref().is_some_and(|exists| !exists[taxel]) {
                 continue;
@@ -61,9 +51,8 @@ impl CellGrid {
             let cell = (taxel / columns + 1) * stride + taxel % columns + 1;
             match runs.last_mut() {
                 Some(run) if run.cell + run.len == cell && run.taxel + run.len == taxel => run.len += 1,
-                _ => runs.push(TaxelRun { channel, taxel, cell, len: 1 }),
+                _ => runs.push(TaxelRun { taxel, cell, len: 1 }),
             }
-            channel += 1;
         }
         // The last row's sums are computed in whole lanes, beyond the border below it.
         let cells = ((rows + 2) * stride + 2 + LANES).next_multiple_of(BLOCK);
@@ -75,26 +64,16 @@ impl CellGrid {
         self.runs.iter().flat_map(|run| (0..run.len).map(|k| (run.cell + k, run.taxel + k)))
     }
 
-    /// The cell of the existing taxel with this number.
-    fn cell(&self, channel: usize) -> usize {
-        let run = self.runs[self.runs.partition_point(|run| run.channel <= channel) - 1];
-        run.cell + channel - run.channel
-    }
-
-    /// The number of the existing taxel with this index in the array.
-    fn channel(&self, taxel: usize) -> Option<usize> {
+    /// The cell of the taxel with this index in the array, if it exists.
+    fn cell(&self, taxel: usize) -> Option<usize> {
         let run = self.runs.iter().find(|run| (run.taxel..run.taxel + run.len).contains(&taxel))?;
-        Some(run.channel + taxel - run.taxel)
+        Some(run.cell + taxel - run.taxel)
     }
 
-    /// Copies values into the cells of the existing taxels.
-    fn spread(&self, values: Values<'_>, cells: &mut [f32]) {
+    /// Copies the values of a frame into the cells of the existing taxels.
+    fn spread(&self, frame: &[f32], cells: &mut [f32]) {
         for run in &self.runs {
-            let new = match values {
-                Values::Taxels(values) => &values[run.channel..],
-                Values::Frame(values) => &values[run.taxel..],
-            };
-            cells[run.cell..][..run.len].copy_from_slice(&new[..run.len]);
+            cells[run.cell..][..run.len].copy_from_slice(&frame[run.taxel..][..run.len]);
         }
     }
 }
@@ -116,36 +95,22 @@ struct CellNoise {
 
 impl CellNoise {
     fn new(grid: &CellGrid, sd: Vec<Option<f64>>, least: f64, floor: f64) -> Self {
-        let n = grid.cells;
-        let mut new = Self { floor, sd, least, clip: vec![0.0; n], large: vec![f32::INFINITY; n], per_noise: vec![] };
-        for cell in 0..n {
-            new.changed(cell);
-        }
-        new.per_noise = new.noise_reciprocals(grid.stride);
-        new
-    }
-
-    /// The unit of a cell's values: the taxel's noise and that of the board's floor, within which a value can hide.
-    fn unit(&self, cell: usize) -> f64 {
-        self.sd[cell].map_or(0.0, |sd| (sd * sd + self.floor * self.floor / 4.0).sqrt())
-    }
-
-    fn changed(&mut self, cell: usize) {
-        self.clip[cell] = (CLIP * self.unit(cell)) as f32;
-        self.large[cell] = self.sd[cell].map_or(f32::INFINITY, |sd| (FAR_NOISE * sd) as f32);
-    }
-
-    /// 1 over the noise of the sum around each cell.
-    fn noise_reciprocals(&self, stride: usize) -> Vec<f32> {
-        let around = |cell: usize| {
-            let row = |cell: usize| {
-                let [left, middle, right] = [cell - 1, cell, cell + 1].map(|cell| self.unit(cell).powi(2));
-                (left + right) + middle
-            };
-            (row(cell - stride) + row(cell + stride)) + row(cell)
+        // The unit of a cell's values: the taxel's noise and that of the board's floor, within which a value can hide.
+        let unit = |cell: usize| sd[cell].map_or(0.0, |sd| (sd * sd + floor * floor / 4.0).sqrt());
+        let row = |cell: usize| {
+            let [left, middle, right] = [cell - 1, cell, cell + 1].map(|cell| unit(cell).powi(2));
+            (left + right) + middle
         };
-        let per_noise = |(cell, sd): (usize, &Option<f64>)| sd.map_or(0.0, |_| around(cell).sqrt().recip() as f32);
-        self.sd.iter().enumerate().map(per_noise).collect()
+        let around = |cell: usize| (row(cell - grid.stride) + row(cell + grid.stride)) + row(cell);
+        let cells = || sd.iter().enumerate();
+        Self {
+            clip: cells().map(|(cell, _)| (CLIP * unit(cell)) as f32).collect(),
+            large: cells().map(|(_, sd)| sd.map_or(f32::INFINITY, |sd| (FAR_NOISE * sd) as f32)).collect(),
+            per_noise: cells().map(|(cell, sd)| sd.map_or(0.0, |_| around(cell).sqrt().recip() as f32)).collect(),
+            floor,
+            least,
+            sd,
+        }
     }
 
     /// From where a cell stands out by `times` its noise; infinite in cells left out.
@@ -153,13 +118,11 @@ impl CellNoise {
         self.sd[cell].map_or(f64::INFINITY, |sd| stands_out_from(times, sd, self.floor))
     }
 
-    /// Counts a cell from now on whose rest was not known.
-    fn start_counting(&mut self, cell: usize, stride: usize) {
-        if self.sd[cell].is_none() {
-            self.sd[cell] = Some(self.least);
-            self.changed(cell);
-            self.per_noise = self.noise_reciprocals(stride);
-        }
+    /// The same with a cell that counts from now on, whose rest was not known.
+    fn with(&self, cell: usize, grid: &CellGrid) -> Self {
+        let mut sd = self.sd.clone();
+        sd[cell] = Some(self.least);
+        Self::new(grid, sd, self.least, self.floor)
     }
 }
 
@@ -340,9 +303,9 @@ impl LocalSums {
         Ok(Self { values: vec![0.0; grid.cells], grid, noise, sides, waiting: vec![], begun: false })
     }
 
-    /// Reads the next values, at `t` us; gives `each` the sums above the rest, then those above each running mean.
-    pub(super) fn take(&mut self, t: i64, values: Values<'_>, mut each: impl FnMut(SumPair)) {
-        self.grid.spread(values, &mut self.values);
+    /// Reads the values of all taxels, row by row, at `t` us; gives `each` the sums above the rest, then those above each running mean.
+    pub(super) fn take(&mut self, t: i64, frame: &[f32], mut each: impl FnMut(SumPair)) {
+        self.grid.spread(frame, &mut self.values);
         let (values, rest) = (&mut self.values, self.sides[0].baseline.values());
         if !self.begun {
             self.waiting = self.grid.taxels().map(|(cell, _)| cell).filter(|&cell| values[cell] == 0.0).collect();
@@ -358,16 +321,11 @@ impl LocalSums {
     }
 
     /// Sets the rest of the taxel with this index in the array, if it exists.
-    pub(super) fn set_rest_at(&mut self, taxel: usize, rest: f64) {
-        if let Some(channel) = self.grid.channel(taxel) {
-            self.set_rest(channel, rest);
+    pub(super) fn set_rest(&mut self, taxel: usize, rest: f64) {
+        let Some(cell) = self.grid.cell(taxel) else { return };
+        if self.noise.sd[cell].is_none() {
+            self.noise = self.noise.with(cell, &self.grid);
         }
-    }
-
-    /// Sets the rest of the existing taxel with this number.
-    pub(super) fn set_rest(&mut self, channel: usize, rest: f64) {
-        let cell = self.grid.cell(channel);
-        self.noise.start_counting(cell, self.grid.stride);
         for side in &mut self.sides {
             side.changed(&self.noise, cell);
         }
@@ -376,9 +334,9 @@ impl LocalSums {
         baseline.set_far(cell, self.noise.stands_out_from(cell, FAR_NOISE) as f32);
     }
 
-    /// The rest of the existing taxel with this number; `None` if it is not known.
-    pub(super) fn rest(&self, channel: usize) -> Option<f64> {
-        let cell = self.grid.cell(channel);
+    /// The rest of the taxel with this index in the array; `None` if it is not known.
+    pub(super) fn rest(&self, taxel: usize) -> Option<f64> {
+        let cell = self.grid.cell(taxel)?;
         self.noise.sd[cell].map(|_| self.sides[0].baseline.values()[cell])
     }
 }

@@ -1,19 +1,18 @@
 //! Area, force, displacement and age of a touch. None of them depends on where the touch began, so what is learnt at one
 //! position holds at others; its centre, which does, is an option.
 
-use std::collections::VecDeque;
-
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{Block, NextFrame};
+use super::channels::Channels;
+use super::driver::{Clock, Driver, Rule, Sample};
 use super::encoding::Encoding;
-use super::loaded::{Loaded, LoadedSums};
+use super::levels::{Level, Levels};
+use super::loaded::Loaded;
 use super::periods::micros;
-use super::sampled::{Rule, Sampled};
-use super::stream::{Stream, sort_from};
+use super::stream::Stream;
 use super::tare::Tare;
 use crate::allowed::Range;
-use crate::array::{Pitch, PlaceUnit, Places};
+use crate::array::{PlaceUnit, Places};
 use crate::parameters::parameters;
 use crate::spikes::{ms, us};
 use crate::{Array, Result, Spike, SpikeKind, problem};
@@ -80,20 +79,21 @@ parameters! {
 }
 
 impl Moments {
-    fn ranges(&self) -> [(&'static str, Option<[f64; 2]>); 4] {
-        [("area", self.area), ("total", self.total), ("peak", self.peak), ("displacement_mm", self.displacement_mm)]
+    /// The ranges of the moments' levels: area, total, peak, x, y.
+    fn ranges(&self) -> [(&'static str, Option<[f64; 2]>); 5] {
+        let way = ("displacement_mm", self.displacement_mm);
+        [("area", self.area), ("total", self.total), ("peak", self.peak), way, way]
     }
 
-    /// All levels, each with its moment: area, total, peak, x, y.
-    fn all_levels(&self) -> Vec<MomentLevel> {
+    /// All levels, each with its moment, by the number of its range; a negative level is crossed downwards.
+    fn all_levels(&self) -> Vec<(usize, f64)> {
         let mut all = vec![];
-        let [area, total, peak, way] = self.ranges().map(|(_, range)| range);
-        for (moment, range) in [area, total, peak, way, way].into_iter().enumerate() {
+        for (moment, (_, range)) in self.ranges().into_iter().enumerate() {
             let Some([least, most]) = range else { continue };
             let levels = geometric_levels(least, most, self.levels);
-            all.extend(levels.iter().map(|&at| MomentLevel { moment, at }));
+            all.extend(levels.iter().map(|&at| (moment, at)));
             if moment >= 3 {
-                all.extend(levels.iter().map(|&at| MomentLevel { moment, at: -at }));
+                all.extend(levels.iter().map(|&at| (moment, -at)));
             }
         }
         all
@@ -101,9 +101,8 @@ impl Moments {
 
     /// The moments that are emitted as graded spikes, numbered as in `all_levels`.
     fn all_graded(&self) -> Vec<usize> {
-        let [area, total, peak, way] = self.ranges().map(|(_, range)| range.is_some());
-        let present = [area, total, peak, way, way].into_iter().enumerate();
-        present.filter(|&(_, present)| self.graded && present).map(|(moment, _)| moment).collect()
+        let present = self.ranges().into_iter().enumerate().filter(|(_, (_, range))| self.graded && range.is_some());
+        present.map(|(moment, _)| moment).collect()
     }
 
     /// The ages that have a train each, us.
@@ -159,26 +158,28 @@ impl Encoding for Moments {
             array.check_neighbours("moments")?;
         }
         let loaded = Loaded::new("moments", array, self.tare.as_ref(), self.noise_floor)?;
-        let way = if self.displacement_mm.is_some() { Some(Way::on(array)?) } else { None };
-        let levels = self.all_levels();
-        let passing = LevelPass {
+        let (places, unit) = if self.displacement_mm.is_some() { way(array)? } else { (None, [0.0; 2]) };
+        let (levels, interval) = (self.all_levels(), self.tonic_ms.map(|ms| micros("tonic_ms", ms)).transpose()?);
+        let n = levels.len();
+        let level = |(k, &(_, at)): (usize, &(usize, f64))| {
+            Level::new(at.abs(), at.abs(), [k, n + k], interval.map(|_| 2 * n + k))
+        };
+        let moments = MomentRule {
             loaded,
-            way,
+            places,
+            unit,
             touch: None,
             moments: [0.0; 5],
-            since: vec![None; levels.len()],
-            levels,
+            levels: Levels::new(levels.iter().enumerate().map(level).collect(), 0, interval.unwrap_or(0)),
+            of_level: levels.iter().map(|&(moment, at)| (moment, at.signum())).collect(),
             first_graded: self.level_trains(),
             graded: self.all_graded(),
             centre: self.centre.then(|| [array.columns, array.rows].map(|count| (count.max(2) - 1) as f64 / 2.0)),
             position: [0.0; CENTRE],
             ages: self.all_ages(),
-            interval_us: self.tonic_ms.map(|interval_us| micros("tonic_ms", interval_us)).transpose()?,
-            due: VecDeque::new(),
         };
-        // Channels are all taxels here; `loaded` defines which taxels exist.
-        let grid = Array { exists: None, ..array.clone() };
-        Ok(Box::new(Sampled::new(self, passing, &grid, self.period_ms)?))
+        let clock = Clock::Period(micros("period_ms", self.period_ms)?);
+        Ok(Box::new(Driver::new(moments, Channels::grid(array), self.trains_of(array), clock)))
     }
 
     fn trains(&self, _array: &Array) -> usize {
@@ -207,53 +208,36 @@ fn geometric_levels(least: f64, most: f64, n: usize) -> Vec<f64> {
 /// The centre's column, its square, its row and that one's square.
 const CENTRE: usize = 4;
 
-/// A level of one moment; a negative level is crossed downwards.
-#[derive(Clone, Copy)]
-struct MomentLevel {
-    moment: usize,
-    at: f64,
-}
+/// The place of each taxel, `None` for its column and row; and the unit of these, mm.
+type Way = (Option<Vec<[f64; 2]>>, [f64; 2]);
 
-impl MomentLevel {
-    fn is_reached(self, moments: &[f64; 5]) -> bool {
-        let value = moments[self.moment];
-        if self.at > 0.0 { value >= self.at } else { value <= self.at }
-    }
-}
-
-/// How the centre of a touch is measured in mm.
-#[derive(Clone)]
-enum Way {
-    /// In columns and rows, so far apart.
-    Pitch(Pitch),
-    /// By the place of each taxel, mm.
-    Places(Vec<[f64; 2]>),
-}
-
-impl Way {
-    fn on(array: &Array) -> Result<Self> {
-        match &array.places {
-            Some(Places { x, y, unit: Some(PlaceUnit::Mm), .. }) => {
-                Ok(Self::Places(x.iter().zip(y).map(|(&x, &y)| [x, y]).collect()))
-            }
-            Some(_) => Err(problem!(
-                "displacement_mm"; " needs places in mm; the places of {} are in another unit", array.name
-            )),
-            None => array.pitch("moments: displacement_mm").map(Self::Pitch),
+/// How the centre of a touch is measured in mm: by the place of each taxel, or in columns and rows.
+fn way(array: &Array) -> Result<Way> {
+    match &array.places {
+        Some(Places { x, y, unit: Some(PlaceUnit::Mm), .. }) => {
+            Ok((Some(x.iter().zip(y).map(|(&x, &y)| [x, y]).collect()), [1.0; 2]))
         }
+        Some(_) => Err(problem!(
+            "displacement_mm"; " needs places in mm; the places of {} are in another unit", array.name
+        )),
+        None => array.pitch("moments: displacement_mm").map(|pitch| (None, [pitch.columns, pitch.rows])),
     }
 }
 
 #[derive(Clone)]
-struct LevelPass {
+struct MomentRule {
     loaded: Loaded,
-    /// How the centre is measured; `None` where its displacement is not asked for.
-    way: Option<Way>,
-    /// When the current touch began, us, and its centre then, in the unit of `way`.
+    /// The place of each taxel, in which the centre is measured; `None` where that is in columns and rows.
+    places: Option<Vec<[f64; 2]>>,
+    /// The unit of places, or the distance of columns and of rows, mm; 0 where the displacement is not asked for.
+    unit: [f64; 2],
+    /// When the current touch began, us, and its centre then.
     touch: Option<(i64, [f64; 2])>,
     /// The moments of the last sample: area, total, peak, and the displacement of the centre in x and y, mm.
     moments: [f64; 5],
-    levels: Vec<MomentLevel>,
+    levels: Levels,
+    /// The moment of each level, and -1 for one that is crossed downwards.
+    of_level: Vec<(usize, f64)>,
     /// The number of the first train after those of the levels.
     first_graded: usize,
     /// The moments that are emitted as graded spikes.
@@ -264,36 +248,26 @@ struct LevelPass {
     position: [f64; CENTRE],
     /// The ages that have a train each, us.
     ages: Vec<i64>,
-    /// The time at which each level was reached, us; `None` below it.
-    since: Vec<Option<i64>>,
-    /// Period of the tonic spikes, us.
-    interval_us: Option<i64>,
-    /// The time of a level's next tonic spike, the level, and when it was reached; the period is the same for all, so
-    /// the queue is ordered by time.
-    due: VecDeque<(i64, usize, i64)>,
 }
 
-impl LevelPass {
-    /// Computes the moments at `t` us.
-    fn measure(&mut self, t: i64, held: &[Block]) {
+impl MomentRule {
+    /// Computes the moments.
+    fn measure(&mut self, now: Sample<'_>) {
+        self.loaded.take_changed(now);
         if self.loaded.area() == 0 {
             (self.touch, self.moments) = (None, [0.0; 5]);
             return;
         }
-        let (LoadedSums { total, peak, x, y }, unit) = match &self.way {
-            Some(Way::Places(at)) => (self.loaded.sums_at(held, |taxel| at[taxel]), [1.0; 2]),
-            Some(Way::Pitch(Pitch { rows, columns })) => (self.loaded.sums(held), [*columns, *rows]),
-            None => (self.loaded.sums(held), [0.0; 2]),
-        };
-        let centre = [x / total, y / total];
-        let (_, origin) = *self.touch.get_or_insert((t, centre));
-        let way = |axis: usize| (centre[axis] - origin[axis]) * unit[axis];
-        self.moments = [f64::from(self.loaded.area()), total, peak, way(0), way(1)];
+        let sums = self.loaded.sums(now.held);
         if let Some(half) = self.centre {
-            let LoadedSums { total, x, y, .. } = self.loaded.sums(held);
-            let [column, row] = [x / total / half[0] - 1.0, y / total / half[1] - 1.0];
+            let [column, row] = [sums.x / sums.total / half[0] - 1.0, sums.y / sums.total / half[1] - 1.0];
             self.position = [column, column * column, row, row * row];
         }
+        let sums = self.places.as_ref().map_or(sums, |at| self.loaded.sums_at(now.held, |taxel| at[taxel]));
+        let centre = [sums.x / sums.total, sums.y / sums.total];
+        let (_, origin) = *self.touch.get_or_insert((now.t, centre));
+        let way = |axis: usize| (centre[axis] - origin[axis]) * self.unit[axis];
+        self.moments = [f64::from(self.loaded.area()), sums.total, sums.peak, way(0), way(1)];
     }
 
     /// Whether every sample during a touch causes spikes.
@@ -321,77 +295,31 @@ impl LevelPass {
             emit(self.graded.len() + position.len() + reached, 1.0);
         }
     }
-
-    /// Notes that a level is reached: its tonic spikes begin.
-    fn reach(&mut self, t: i64, level: usize, out: &mut Vec<Spike>) {
-        self.since[level] = Some(t);
-        if let Some(interval_us) = self.interval_us {
-            out.push(Spike { t: ms(t), train: (2 * self.levels.len() + level) as u32, value: 1.0 });
-            self.due.push_back((t + interval_us, level, t));
-        }
-    }
-
-    /// Emits the tonic spikes before `t` (with `at_too` also at `t`).
-    fn emit_tonic(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
-        let Some(interval_us) = self.interval_us else { return };
-        while let Some(&(due, level, since)) = self.due.front()
-            && (due < t || (at_too && due == t))
-        {
-            self.due.pop_front();
-            if self.since[level] == Some(since) {
-                out.push(Spike { t: ms(due), train: (2 * self.levels.len() + level) as u32, value: 1.0 });
-                self.due.push_back((due + interval_us, level, since));
-            }
-        }
-    }
 }
 
-impl Rule for LevelPass {
-    fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
-        for (block, values) in held.iter().enumerate() {
-            self.loaded.take_block(block, values);
-        }
-        self.measure(t, held);
-        for level in 0..self.levels.len() {
-            if self.levels[level].is_reached(&self.moments) {
-                self.reach(t, level, out);
-            }
-        }
-        self.emit_sample(t, out);
+impl Rule for MomentRule {
+    fn begin(&mut self, now: Sample<'_>, out: &mut Vec<Spike>) {
+        self.measure(Sample { changed: &vec![true; now.held.len()], ..now });
+        let Self { levels, of_level, moments, .. } = self;
+        levels.settle(now.t, 0..levels.len(), |level| of_level[level].1 * moments[of_level[level].0], out);
+        self.emit_sample(now.t, out);
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], _next: &mut NextFrame, out: &mut Vec<Spike>) {
-        let changes = changed.contains(&true);
-        if !changes && !self.at_every_sample() {
-            return;
+    fn sample(&mut self, now: Sample<'_>, out: &mut Vec<Spike>) {
+        if now.changed.contains(&true) {
+            self.measure(now);
+            let Self { levels, of_level, moments, .. } = self;
+            levels.take(now.t, 0..levels.len(), |level| of_level[level].1 * moments[of_level[level].0], out);
         }
-        let from = out.len();
-        for (block, values) in held.iter().enumerate().filter(|&(block, _)| changed[block]) {
-            self.loaded.take_block(block, values);
+        self.emit_sample(now.t, out);
+        if now.changed.contains(&true) || self.at_every_sample() {
+            self.levels.pass(now.t, true, out);
         }
-        if changes {
-            self.measure(t, held);
-        }
-        for level in 0..self.levels.len() {
-            let (is, was) = (self.levels[level].is_reached(&self.moments), self.since[level].is_some());
-            if is && !was {
-                out.push(Spike { t: ms(t), train: level as u32, value: 1.0 });
-                self.reach(t, level, out);
-            } else if was && !is {
-                out.push(Spike { t: ms(t), train: (self.levels.len() + level) as u32, value: 1.0 });
-                self.since[level] = None;
-            }
-        }
-        self.emit_sample(t, out);
-        self.emit_tonic(t, true, out);
-        sort_from(out, from);
     }
 
     fn pass(&mut self, t: i64, out: &mut Vec<Spike>) {
-        let from = out.len();
-        self.emit_tonic(t, false, out);
-        sort_from(out, from);
+        self.levels.pass(t, false, out);
     }
 
     fn set_rest(&mut self, channel: usize, rest: f64) {
@@ -403,6 +331,6 @@ impl Rule for LevelPass {
     }
 
     fn idle(&self) -> bool {
-        self.due.is_empty() && (self.touch.is_none() || !self.at_every_sample())
+        self.levels.idle() && (self.touch.is_none() || !self.at_every_sample())
     }
 }

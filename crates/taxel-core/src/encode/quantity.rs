@@ -2,17 +2,17 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::Block;
-use super::by_stamp::{ByStamp, Measure};
+use super::driver::Trains;
+use super::encoding::Encoding;
+use super::features::{self, Emit, Feature};
 use super::level_count::LevelCount;
 use super::loaded::{Loaded, require_tare};
-use super::local_load::{LargestOfFrame, LargestSums, LocalLoad};
-use super::peak::PeakLoad;
+use super::local_load::LocalLoad;
+use super::peak_load::PeakLoad;
 use super::stream::Stream;
 use super::tare::Tare;
-use crate::rest::step_of;
-use crate::spikes::ms;
-use crate::{Array, Result, Spike, problem};
+use crate::rest::{Rest, Value, step_of};
+use crate::{Array, Result, SpikeKind, problem};
 
 /// The time constant of the running mean above or below which a load changes, ms.
 const CHANGE_MS: f64 = 50.0;
@@ -87,96 +87,48 @@ impl Quantity {
                 Self::Area | Self::Total | Self::Peak | Self::Count | Self::RangeCount => {}
             }
         }
-        let by_loaded = several.iter().any(|quantity| matches!(quantity, Self::Area | Self::Total));
-        let loaded = if several == [Self::RangeCount] {
-            Loaded::without_rest(array)
+        let reads = |wanted: &[Self]| several.iter().any(|quantity| wanted.contains(quantity));
+        let rest = if several == [Self::RangeCount] {
+            Rest::measured(vec![f64::NO_REST; array.len()])
         } else {
-            Loaded::new("plain rule", array, tare, if by_loaded { noise_floor } else { f64::INFINITY })?
+            require_tare("plain rule", tare)?.rest_of(array)?
         };
-        let mut local = LocalLoad { noise_floor, tare: tare.cloned(), ..LocalLoad::default() };
-        local.least_noise *= step_of(noise_floor);
-        // The least noise of a taxel belongs to the floor: .3 is of a board's 3 ticks, and of values in whole steps.
-        let least = if noise_floor > 0.0 { noise_floor / 10.0 } else { local.least_noise };
-        if several.iter().any(|quantity| matches!(quantity, Self::LocalRise | Self::LocalFall)) {
-            local.local_ms = vec![CHANGE_MS];
+        // Each feature, with the quantities that its first values are.
+        let mut features: Vec<(Feature, &[Self])> = vec![];
+        if reads(&[Self::Area]) {
+            let loaded = Loaded::new("plain rule", array, tare, noise_floor)?;
+            features.push((Feature::Area(loaded), &[Self::Area]));
         }
-        let local = several.iter().any(|quantity| quantity.is_local()).then(|| local.largest(array)).transpose()?;
-        let peak = several.contains(&Self::Peak).then(|| PeakLoad::new(array, tare, least)).transpose()?;
-        let count = several.contains(&Self::Count).then(|| {
-            let rest = require_tare("plain rule", tare)?.rest_of(array)?;
-            LevelCount::above_rest(levels, &rest)
-        });
-        let range_count = several.contains(&Self::RangeCount).then(|| LevelCount::of_range(levels, array.len()));
-        let loads = QuantityMeasure {
-            quantities: several.to_vec(),
-            values: vec![0.0; several.len()],
-            local,
-            peak,
-            count: count.transpose()?,
-            range_count: range_count.transpose()?,
-        };
-        Ok(Box::new(ByStamp::new(loads, loaded, array)))
-    }
-}
-
-/// Quantities, with their values at the end of the last stamp.
-#[derive(Clone)]
-struct QuantityMeasure {
-    quantities: Vec<Quantity>,
-    values: Vec<f32>,
-    /// Computes local loads, if one is among the quantities.
-    local: Option<LargestSums>,
-    /// Computes the peak, if it is among the quantities.
-    peak: Option<PeakLoad>,
-    /// Counts levels above rest, if that is among the quantities.
-    count: Option<LevelCount>,
-    /// Counts levels of running ranges, likewise.
-    range_count: Option<LevelCount>,
-}
-
-impl Measure for QuantityMeasure {
-    fn trains(&self) -> usize {
-        self.quantities.len()
-    }
-
-    fn drifts(&self) -> bool {
-        self.local.is_some() || self.peak.is_some()
-    }
-
-    fn set_rest(&mut self, taxel: usize, rest: f64) {
-        if let Some(local) = &mut self.local {
-            local.set_rest(taxel, rest);
+        if reads(&[Self::Total]) {
+            let loaded = Loaded::new("plain rule", array, tare, noise_floor)?;
+            features.push((Feature::Total(loaded), &[Self::Total]));
         }
-        if let Some(peak) = &mut self.peak {
-            peak.set_rest(taxel, rest);
+        if several.iter().any(|quantity| quantity.is_local()) {
+            let changes = reads(&[Self::LocalRise, Self::LocalFall]);
+            let mut local = LocalLoad { noise_floor, tare: tare.cloned(), ..LocalLoad::default() };
+            local.least_noise *= step_of(noise_floor);
+            local.local_ms.extend(changes.then_some(CHANGE_MS));
+            let values = &[Self::LocalLoad, Self::LocalRise, Self::LocalFall][..if changes { 3 } else { 1 }];
+            local.check()?;
+            features.push((Feature::Local(local.sums(array)?), values));
         }
-        if let Some(count) = &mut self.count {
-            count.set_rest(taxel, rest);
+        if reads(&[Self::Peak]) {
+            // The least noise of a taxel belongs to the floor: .3 is of a board's 3 ticks, and of values in whole steps.
+            let least = if noise_floor > 0.0 { noise_floor / 10.0 } else { LocalLoad::default().least_noise };
+            let peak = PeakLoad::new(array, require_tare("plain rule", tare)?, least)?;
+            features.push((Feature::Peak(peak), &[Self::Peak]));
         }
-    }
-
-    fn emit(&mut self, t: i64, loaded: &Loaded, held: &[Block], out: &mut Vec<Spike>) {
-        let local = self.local.as_mut().map_or(LargestOfFrame::default(), |sums| sums.take(t, held.as_flattened()));
-        let peak = self.peak.as_mut().map_or(0.0, |peak| peak.take(t, held.as_flattened()));
-        let count = self.count.as_mut().map_or(0, |count| count.take(t, held));
-        let range_count = self.range_count.as_mut().map_or(0, |count| count.take(t, held));
-        for (train, (quantity, last)) in (0..).zip(self.quantities.iter().zip(&mut self.values)) {
-            // In single precision, which holds every number of taxels and of their levels exactly.
-            let value = match quantity {
-                Quantity::Area => loaded.area() as f32,
-                Quantity::Total => loaded.sums(held).total as f32,
-                Quantity::LocalLoad => local.above_rest as f32,
-                Quantity::LocalRise => local.of_mean[0] as f32,
-                Quantity::LocalFall => local.of_mean[1] as f32,
-                Quantity::Peak => peak as f32,
-                Quantity::Count => count as f32,
-                Quantity::RangeCount => range_count as f32,
-                Quantity::Duration => 0.0,
-            };
-            if value != *last {
-                *last = value;
-                out.push(Spike { t: ms(t), train, value });
-            }
+        if reads(&[Self::Count]) {
+            features.push((Feature::Count(LevelCount::above_rest(levels, &rest)?), &[Self::Count]));
         }
+        if reads(&[Self::RangeCount]) {
+            features.push((Feature::Count(LevelCount::of_range(levels, array.len())?), &[Self::RangeCount]));
+        }
+        let values: Vec<Self> = features.iter().flat_map(|(_, quantities)| quantities.iter().copied()).collect();
+        let which = several.iter().filter_map(|quantity| values.iter().position(|value| value == quantity)).collect();
+        let emit = Emit::Changes { which, last: vec![0.0; several.len()] };
+        let features = features.into_iter().map(|(feature, _)| feature).collect();
+        let trains = Trains { number: several.len(), kind: SpikeKind::Unsigned, latency_ms: 0.0 };
+        Ok(features::stream(features, rest, emit, array, trains))
     }
 }

@@ -8,10 +8,15 @@
 //! within a sample is found by linear interpolation of `u` as well, and the threshold's rise decays from that time.
 //! Therefore rates do not depend on the sampling period as long as it is short compared with the filter.
 
-use super::blocks::{BLOCK, Block, NextFrame, blocks};
-use super::sampled::Rule;
-use crate::Spike;
+use super::blocks::{BLOCK, Block, blocks};
+use super::channels::Channels;
+use super::driver::{Clock, Driver, Rule, Sample, Trains};
+use super::periods::micros;
+use super::stream::Stream;
+use super::tare::Tare;
+use crate::rest::{Rest, Value};
 use crate::spikes::ms;
+use crate::{Array, Result, Spike};
 
 /// One number per channel of a block.
 pub(super) type Lanes = [f64; BLOCK];
@@ -38,29 +43,30 @@ impl LowPass {
     }
 }
 
+/// The state of a filter of the channels of one block.
+pub(super) type FilterState = [Lanes; 5];
+
 /// Filter from pressure, as a fraction of the range, to the potential that is compared with the threshold.
 pub(super) trait Filter: Send + Clone + 'static {
-    /// The state of the channels of one block.
-    type State: Send + Clone + 'static;
-
     /// The state after a constant input `x`, and the potential in it.
-    fn steady_state(&self, x: &Lanes) -> (Self::State, Lanes);
+    fn steady_state(&self, x: &Lanes) -> (FilterState, Lanes);
 
-    /// Processes the next sample of a channel whose potential was `u`; returns the potential. With `SEE`, sets the bits
-    /// of `moved` for the lanes whose state changed.
-    fn step<const SEE: bool>(&self, state: &mut Self::State, lane: usize, x: f64, u: f64, moved: &mut u64) -> f64;
+    /// Processes the next sample of a channel whose potential was `u`; returns the potential.
+    fn step(&self, state: &mut FilterState, lane: usize, x: f64, u: f64) -> f64;
 
     /// Whether the afferent encodes values, and not only changes; if so, a value that a state repaired counts as any
     /// other.
     const SIGNALS_VALUES: bool = false;
 
     /// Shifts the state of one channel by a difference that existed before, so that it does not count as a change.
-    fn shift(&self, _state: &mut Self::State, _lane: usize, _by: f64) {}
+    fn shift(&self, _state: &mut FilterState, _lane: usize, _by: f64) {}
 }
 
 /// The firing rule of an afferent; potentials are fractions of the range, times are in ms.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Firing {
+    /// The largest pressure, in the sensor's unit.
+    pub(super) range: f64,
     pub(super) threshold: f64,
     pub(super) jump: f64,
     pub(super) recovery_ms: f64,
@@ -68,14 +74,29 @@ pub(super) struct Firing {
     pub(super) period_ms: f64,
 }
 
+/// The firing rule of the parameters of an afferent.
+macro_rules! firing {
+    ($of:expr) => {
+        receptor::Firing {
+            range: $of.range,
+            threshold: $of.threshold,
+            jump: $of.jump,
+            recovery_ms: $of.recovery_ms,
+            refractory_ms: $of.refractory_ms,
+            period_ms: $of.period_ms,
+        }
+    };
+}
+pub(super) use firing;
+
 /// Below this fraction of the range a raised threshold counts as recovered.
 const RECOVERED: f64 = 1e-12;
 
 /// The afferents of one block, aligned to cache lines so that no vector crosses a boundary.
 #[derive(Clone)]
 #[repr(align(64))]
-struct FilterBlock<S> {
-    state: S,
+struct Afferents {
+    state: FilterState,
     u: Lanes,
     /// The current rise of the threshold.
     raised: Lanes,
@@ -85,153 +106,163 @@ struct FilterBlock<S> {
     still: bool,
 }
 
-/// The afferents of one type, in blocks.
-#[derive(Clone)]
-pub(super) struct FilterAfferents<F: Filter> {
-    filter: F,
-    firing: Firing,
-    /// The factor by which the rise of the threshold decays in one sample.
-    keep: f64,
-    blocks: Vec<FilterBlock<F::State>>,
-}
-
-impl<F: Filter> FilterAfferents<F> {
-    pub(super) fn new(filter: F, firing: Firing) -> Self {
-        Self { filter, firing, keep: libm::exp(-firing.period_ms / firing.recovery_ms), blocks: vec![] }
-    }
-
-    /// Sets the state after constant input of these pressures; afferents above their threshold fire at the next sample.
-    pub(super) fn begin<'a>(&mut self, x: impl Iterator<Item = &'a Lanes>) {
-        let threshold = self.firing.threshold;
-        self.blocks = x
-            .map(|x| {
-                let (state, u) = self.filter.steady_state(x);
-                let raised = std::array::from_fn(|lane| (u[lane] - threshold).max(0.0));
-                FilterBlock { state, u, raised, wait: [0.0; BLOCK], still: false }
-            })
-            .collect();
-    }
-
-    /// Whether a block's state stays unchanged while its pressures do.
+impl Afferents {
+    /// Whether the state is that of others.
     #[inline(always)]
-    pub(super) fn is_still(&self, block: usize) -> bool {
-        self.blocks[block].still
-    }
-
-    /// Shifts the state of a channel by a difference that existed before.
-    fn shift(&mut self, channel: usize, by: f64) {
-        if !F::SIGNALS_VALUES {
-            self.filter.shift(&mut self.blocks[channel / BLOCK].state, channel % BLOCK, by);
-        }
-    }
-
-    pub(super) fn all_still(&self) -> bool {
-        self.blocks.iter().all(|b| b.still)
-    }
-
-    /// Processes a block's next sample, `x` for each lane; calls `fired` with the lanes that fire. With `SEE`,
-    /// determines whether the block is still from here on; otherwise the block counts as moving, which is always
-    /// correct but slower.
-    #[inline(always)]
-    pub(super) fn sample<const SEE: bool>(
-        &mut self,
-        block: usize,
-        x: impl Fn(usize) -> f64,
-        mut fired: impl FnMut(usize),
-    ) {
-        let Firing { threshold, jump, recovery_ms, refractory_ms, period_ms } = self.firing;
-        let afferent = &mut self.blocks[block];
-        let mut moved = u64::from(!SEE);
-        let (mut below, mut waited) = ([0.0; BLOCK], [0.0; BLOCK]);
-        let mut fires = [0_u32; 2];
-        for (half, fires) in fires.iter_mut().enumerate() {
-            for k in 0..BLOCK / 2 {
-                let lane = half * BLOCK / 2 + k;
-                let (last, before, wait) = (afferent.u[lane], afferent.raised[lane], afferent.wait[lane]);
-                let u = self.filter.step::<SEE>(&mut afferent.state, lane, x(lane), last, &mut moved);
-                let kept = before * self.keep;
-                let raised = if kept < RECOVERED { 0.0 } else { kept };
-                afferent.u[lane] = u;
-                afferent.raised[lane] = raised;
-                afferent.wait[lane] = if wait > period_ms { wait - period_ms } else { 0.0 };
-                below[lane] = threshold + before - last;
-                waited[lane] = wait;
-                *fires |= if (u >= threshold + raised) & (wait < period_ms) { 1 << k } else { 0 };
-                if SEE {
-                    moved |= before.to_bits() | wait.to_bits() | (u.to_bits() ^ last.to_bits());
-                }
-            }
-        }
-        let mut left = u64::from(fires[1]) << 32 | u64::from(fires[0]);
-        afferent.still = left | moved == 0;
-        while left != 0 {
-            let lane = left.trailing_zeros() as usize;
-            left &= left - 1;
-            // The time of the spike: where linear interpolation reaches the threshold, or the end of the refractory
-            // time if that is later.
-            let above = afferent.u[lane] - threshold - afferent.raised[lane];
-            let crossed = if below[lane] > 0.0 { period_ms * below[lane] / (below[lane] + above) } else { 0.0 };
-            let since = period_ms - crossed.max(waited[lane]);
-            afferent.raised[lane] += jump * libm::exp(-since / recovery_ms);
-            afferent.wait[lane] = (refractory_ms - since).max(0.0);
-            fired(lane);
-        }
+    fn equals(&self, other: &Self) -> bool {
+        let moved = |now: &[f64], before: &[f64]| {
+            now.iter().zip(before).fold(0, |moved, (now, before)| moved | (now.to_bits() ^ before.to_bits()))
+        };
+        let rest = moved(&self.u, &other.u) | moved(&self.raised, &other.raised) | moved(&self.wait, &other.wait);
+        moved(self.state.as_flattened(), other.state.as_flattened()) | rest == 0
     }
 }
 
 /// Afferents of one type, one per taxel.
 #[derive(Clone)]
-pub(super) struct TaxelAfferents<F: Filter> {
-    afferents: FilterAfferents<F>,
+pub(super) struct Receptor<F> {
+    filter: F,
+    firing: Firing,
+    /// The factor by which the rise of the threshold decays in one sample.
+    keep: f64,
     /// Factor from the sensor's unit to fractions of the range.
     scale: f64,
-    channels: usize,
+    /// The rest of each channel, from which its pressure is measured; 0 if there is none.
+    rest: Option<Rest<f64>>,
+    blocks: Vec<Afferents>,
 }
 
-impl<F: Filter> TaxelAfferents<F> {
-    pub(super) fn new(filter: F, firing: Firing, range: f64, channels: usize) -> Self {
-        Self { afferents: FilterAfferents::new(filter, firing), scale: 1.0 / range, channels }
+/// A stream of afferents; with a tare pressure is measured from the taxels' rest.
+pub(super) fn stream<F: Filter>(
+    filter: F,
+    firing: Firing,
+    tare: Option<&Tare>,
+    array: &Array,
+    trains: Trains,
+) -> Result<Box<dyn Stream>> {
+    let channels = Channels::new(array);
+    let mut receptor = Receptor::new(filter, firing);
+    if let Some(tare) = tare {
+        let rest = tare.rest_of(array)?;
+        let mut of_channel: Vec<f64> =
+            (0..array.len()).filter(|&taxel| array.has(taxel)).map(|taxel| rest.values()[taxel]).collect();
+        of_channel.resize(blocks(channels.len()) * BLOCK, f64::NO_REST);
+        receptor.rest = Some(Rest::measured(of_channel));
+    }
+    let clock = Clock::Period(micros("period_ms", firing.period_ms)?);
+    Ok(Box::new(Driver::new(receptor, channels, trains, clock).steady()))
+}
+
+impl<F: Filter> Receptor<F> {
+    fn new(filter: F, firing: Firing) -> Self {
+        let (keep, scale) = (libm::exp(-firing.period_ms / firing.recovery_ms), 1.0 / firing.range);
+        Self { filter, firing, keep, scale, rest: None, blocks: vec![] }
+    }
+
+    /// Converts a channel's value to a fraction of the range; below its rest, or if that is not known, it is 0.
+    #[inline(always)]
+    fn share(&self, channel: usize, value: f32) -> f64 {
+        let above = self.rest.as_ref().map_or(value, |rest| rest.above(channel, f64::from(value)) as f32);
+        f64::from(above.max(0.0)) * self.scale
+    }
+
+    /// The fractions of a block's values.
+    #[inline(always)]
+    fn shares(&self, block: usize, values: &Block) -> Lanes {
+        if self.rest.is_none() {
+            return values.map(|value| f64::from(value.max(0.0)) * self.scale);
+        }
+        std::array::from_fn(|lane| self.share(block * BLOCK + lane, values[lane]))
+    }
+
+    /// Processes a block's next sample; calls `fired` with the lanes that fire.
+    #[inline(always)]
+    fn step(&mut self, block: usize, x: &Lanes, mut fired: impl FnMut(usize)) {
+        let Firing { threshold, jump, recovery_ms, refractory_ms, period_ms, .. } = self.firing;
+        let afferents = &mut self.blocks[block];
+        let (mut below, mut waited) = ([0.0; BLOCK], [0.0; BLOCK]);
+        let mut fires = [0_u32; 2];
+        for (half, fires) in fires.iter_mut().enumerate() {
+            for k in 0..BLOCK / 2 {
+                let lane = half * BLOCK / 2 + k;
+                let (last, before, wait) = (afferents.u[lane], afferents.raised[lane], afferents.wait[lane]);
+                let u = self.filter.step(&mut afferents.state, lane, x[lane], last);
+                let kept = before * self.keep;
+                let raised = if kept < RECOVERED { 0.0 } else { kept };
+                afferents.u[lane] = u;
+                afferents.raised[lane] = raised;
+                afferents.wait[lane] = if wait > period_ms { wait - period_ms } else { 0.0 };
+                below[lane] = threshold + before - last;
+                waited[lane] = wait;
+                *fires |= if (u >= threshold + raised) & (wait < period_ms) { 1 << k } else { 0 };
+            }
+        }
+        let mut left = u64::from(fires[1]) << 32 | u64::from(fires[0]);
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            // The time of the spike: where linear interpolation reaches the threshold, or the end of the refractory
+            // time if that is later.
+            let above = afferents.u[lane] - threshold - afferents.raised[lane];
+            let crossed = if below[lane] > 0.0 { period_ms * below[lane] / (below[lane] + above) } else { 0.0 };
+            let since = period_ms - crossed.max(waited[lane]);
+            afferents.raised[lane] += jump * libm::exp(-since / recovery_ms);
+            afferents.wait[lane] = (refractory_ms - since).max(0.0);
+            fired(lane);
+        }
     }
 }
 
-/// Converts a pressure to a fraction of the range; negative values count as 0.
-#[inline(always)]
-fn share(scale: f64, pressure: f32) -> f64 {
-    f64::from(pressure.max(0.0)) * scale
-}
-
-impl<F: Filter> Rule for TaxelAfferents<F> {
-    fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
-        debug_assert_eq!(held.len(), blocks(self.channels));
-        let x: Vec<Lanes> = held.iter().map(|values| values.map(|value| share(self.scale, value))).collect();
-        self.afferents.begin(x.iter());
+impl<F: Filter> Rule for Receptor<F> {
+    /// Afferents above their threshold fire at the next sample.
+    fn begin(&mut self, now: Sample<'_>, _out: &mut Vec<Spike>) {
+        let begun = |(block, values): (usize, &Block)| {
+            let (state, u) = self.filter.steady_state(&self.shares(block, values));
+            let raised = u.map(|u| (u - self.firing.threshold).max(0.0));
+            Afferents { state, u, raised, wait: [0.0; BLOCK], still: false }
+        };
+        self.blocks = now.held.iter().enumerate().map(begun).collect();
     }
-
-    const PREFETCHES: bool = true;
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {
-        for (block, values) in held.iter().enumerate() {
-            next.fetch();
-            let x = |lane: usize| share(self.scale, values[lane]);
-            let fired = |lane| out.push(Spike { t: ms(t), train: (block * BLOCK + lane) as u32, value: 1.0 });
-            if changed[block] {
-                self.afferents.sample::<false>(block, x, fired);
-            } else if !self.afferents.is_still(block) {
-                self.afferents.sample::<true>(block, x, fired);
+    fn sample(&mut self, now: Sample<'_>, out: &mut Vec<Spike>) {
+        for (block, values) in now.held.iter().enumerate() {
+            let changed = now.changed[block];
+            if !changed && self.blocks[block].still {
+                continue;
             }
+            let (x, spikes) = (self.shares(block, values), out.len());
+            let before = (!changed).then(|| self.blocks[block].clone());
+            self.step(block, &x, |lane| {
+                out.push(Spike { t: ms(now.t), train: (block * BLOCK + lane) as u32, value: 1.0 });
+            });
+            let afferents = &mut self.blocks[block];
+            afferents.still = out.len() == spikes && before.is_some_and(|before| afferents.equals(&before));
         }
     }
 
     const SPIKES_OF_REPAIRED: bool = F::SIGNALS_VALUES;
 
-    fn repair(&mut self, channel: usize, from: f32, to: f32) {
-        let by = share(self.scale, to) - share(self.scale, from);
-        self.afferents.shift(channel, by);
+    #[inline(always)]
+    fn read(&mut self, channel: usize, from: f32, to: f32, repaired: bool) {
+        if repaired && !F::SIGNALS_VALUES {
+            let by = self.share(channel, to) - self.share(channel, from);
+            self.filter.shift(&mut self.blocks[channel / BLOCK].state, channel % BLOCK, by);
+        }
+    }
+
+    fn set_rest(&mut self, channel: usize, rest: f64) {
+        if let Some(rests) = &mut self.rest {
+            rests.set(channel, rest);
+        }
+    }
+
+    fn rest(&self, channel: usize) -> Option<f64> {
+        self.rest.as_ref().map(|rest| rest.values()[channel]).filter(|rest| rest.is_finite())
     }
 
     fn idle(&self) -> bool {
-        self.afferents.all_still()
+        self.blocks.iter().all(|afferents| afferents.still)
     }
 }
 
@@ -242,11 +273,11 @@ mod tests {
 
     use super::*;
     use crate::encode::fa2::Fa2;
-    use crate::encode::slow::Slow;
+    use crate::encode::slowly_adapting::Slow;
 
     /// Reference for the tests: computes each channel alone, at every sample, whether it changed or not.
     fn plainly<F: Filter>(filter: &F, firing: Firing, frames: &[Vec<f64>]) -> Vec<Spike> {
-        let Firing { threshold, jump, recovery_ms, refractory_ms, period_ms } = firing;
+        let Firing { threshold, jump, recovery_ms, refractory_ms, period_ms, .. } = firing;
         let mut out = vec![];
         for channel in 0..frames[0].len() {
             let (mut state, u) = filter.steady_state(&[frames[0][channel]; BLOCK]);
@@ -254,7 +285,7 @@ mod tests {
             let mut raised = f64::max(u - threshold, 0.0);
             for (t, frame) in (1..).zip(&frames[1..]) {
                 let (below, waited) = (threshold + raised - u, wait);
-                u = filter.step::<true>(&mut state, 0, frame[channel], u, &mut 0);
+                u = filter.step(&mut state, 0, frame[channel], u);
                 raised *= libm::exp(-period_ms / recovery_ms);
                 raised = if raised < RECOVERED { 0.0 } else { raised };
                 wait = f64::max(wait - period_ms, 0.0);
@@ -275,7 +306,7 @@ mod tests {
     /// Compares blocks, of which only those that move are computed, with channels computed one by one; returns the
     /// number of spikes, and the number of blocks that were skipped.
     fn holds<F: Filter>(filter: &F, firing: Firing, rng: &mut StdRng) -> [usize; 2] {
-        let (channels, range) = (rng.random_range(1..150), 150.0);
+        let channels = rng.random_range(1..150);
         let (noise, changing) = (10_f64.powf(rng.random_range(-6.0..2.5)), rng.random_range(0.0..1.0));
         let mut held: Vec<f64> = (0..channels).map(|_| rng.random_range(-10.0..160.0)).collect();
         let (mut left, mut moving) = (0, true);
@@ -295,16 +326,20 @@ mod tests {
                 held.chunks(BLOCK).map(block).collect()
             })
             .collect();
-        let mut rule = TaxelAfferents::new(filter.clone(), firing, range, channels);
+        let mut rule = Receptor::new(filter.clone(), firing);
         let (mut out, mut left_out) = (vec![], 0);
-        rule.begin(0, &frames[0], &mut out);
+        rule.begin(Sample { t: 0, held: &frames[0], changed: &[], of_frame: true }, &mut out);
         for (t, pair) in (1..).zip(frames.windows(2)) {
             let changed: Vec<bool> = pair[0].iter().zip(&pair[1]).map(|(a, b)| a != b).collect();
-            left_out += (0..changed.len()).filter(|&block| !changed[block] && rule.afferents.is_still(block)).count();
-            rule.sample(t, &pair[1], &changed, &mut NextFrame::unknown(), &mut out);
+            left_out += (0..changed.len()).filter(|&block| !changed[block] && rule.blocks[block].still).count();
+            rule.sample(Sample { t, held: &pair[1], changed: &changed, of_frame: true }, &mut out);
         }
         let shares = |frame: &Vec<Block>| -> Vec<f64> {
-            frame.as_flattened()[..channels].iter().map(|&value| share(rule.scale, value)).collect()
+            frame.as_flattened()[..channels]
+                .iter()
+                .enumerate()
+                .map(|(channel, &value)| rule.share(channel, value))
+                .collect()
         };
         let wanted = plainly(filter, firing, &frames.iter().map(shares).collect::<Vec<_>>());
         assert!(out == wanted, "{firing:?}: {} spikes, by themselves {}", out.len(), wanted.len());
@@ -319,6 +354,7 @@ mod tests {
             let mut exponent = |least: f64, most: f64| 10_f64.powf(rng.random_range(least..most));
             let period_ms = exponent(-1.3, 0.0);
             let firing = Firing {
+                range: 150.0,
                 threshold: exponent(-4.0, 0.3),
                 jump: exponent(-4.0, 0.5),
                 recovery_ms: exponent(-1.0, 2.0),

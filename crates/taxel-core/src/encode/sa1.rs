@@ -1,6 +1,6 @@
 //! SA-1: the slowly adapting afferent with small fields, whose rate follows the force while a taxel is pressed.
 
-use super::slow::slowly_adapting;
+use super::slowly_adapting::slowly_adapting;
 
 slowly_adapting! {
     /// The SA-1 afferent (Merkel): fires while pressed, fastest at the onset, with a rate that decreases during a hold.

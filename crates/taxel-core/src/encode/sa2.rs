@@ -1,6 +1,6 @@
 //! SA-2: the slowly adapting afferent with large fields, which fires steadily under a constant load.
 
-use super::slow::slowly_adapting;
+use super::slowly_adapting::slowly_adapting;
 
 slowly_adapting! {
     /// The SA-2 afferent (Ruffini): less sensitive than SA-1, with a steadier rate and a small onset response.

@@ -3,12 +3,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, NextFrame, blocks};
-use super::bracket::{Bracket, check_levels};
+use super::channel_levels::{ChannelLevels, check_levels};
 use super::channels::Channels;
+use super::driver::{Clock, Driver, Rule, Sample};
 use super::encoding::Encoding;
-use super::sampled::{Rule, Sampled};
-use super::stream::{Stream, sort_from};
+use super::periods::micros;
+use super::stream::Stream;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::spikes::ms;
@@ -100,9 +100,10 @@ impl Encoding for ThresholdIzhikevich {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        self.check()?;
-        let pairs = Pairs::new(self, Channels::new(array).len());
-        Ok(Box::new(Sampled::new(self, pairs, array, self.period_ms)?))
+        let channels = Channels::new(array);
+        let pairs = Pairs::new(self, channels.len());
+        let clock = Clock::Period(micros("period_ms", self.period_ms)?);
+        Ok(Box::new(Driver::new(pairs, channels, self.trains_of(array), clock)))
     }
 
     fn trains(&self, array: &Array) -> usize {
@@ -223,11 +224,8 @@ impl IzhikevichNeurons {
 struct Pairs {
     model: Model,
     begin: Begin,
-    channels: usize,
-    levels: Vec<f32>,
-    bracket: Bracket,
-    /// Whether each train's taxel is at or above its level; padded to a multiple of eight.
-    above: Vec<[bool; LANES]>,
+    /// The levels, whose crossings switch the inputs.
+    levels: ChannelLevels,
     rises: Vec<IzhikevichNeurons>,
     falls: Vec<IzhikevichNeurons>,
     /// The start of the next step, us.
@@ -241,13 +239,11 @@ impl Pairs {
         let (v, u) = Model::rest();
         let neurons = IzhikevichNeurons { v: [v; LANES], u: [u; LANES], input: [0.0; LANES], still: false };
         let groups = (channels * parameters.levels.len()).div_ceil(LANES);
+        let levels: Vec<(f64, f64)> = parameters.levels.iter().map(|&level| (level, level)).collect();
         Self {
             model: Model::published(parameters.published),
             begin: parameters.begin,
-            channels,
-            levels: parameters.levels.iter().map(|&l| l as f32).collect(),
-            bracket: Bracket::new(blocks(channels)),
-            above: vec![[false; LANES]; groups],
+            levels: ChannelLevels::new(channels, &levels, 0, 0, None),
             rises: vec![neurons.clone(); groups],
             falls: vec![neurons; groups],
             next: 0,
@@ -255,25 +251,11 @@ impl Pairs {
         }
     }
 
-    fn read(&mut self, channel: usize, value: f32) {
-        let (levels, gain) = (self.levels.len(), self.model.gain);
-        let (mut low, mut high) = (f32::NEG_INFINITY, f32::INFINITY);
-        for (level, &at) in self.levels.iter().enumerate() {
-            let train = channel * levels + level;
-            let (group, lane) = (train / LANES, train % LANES);
-            let above = value >= at;
-            if above {
-                low = at;
-            } else {
-                high = high.min(at);
-            }
-            if self.above[group][lane] != above {
-                self.above[group][lane] = above;
-                self.rises[group].set(lane, if above { gain } else { 0.0 });
-                self.falls[group].set(lane, if above { 0.0 } else { gain });
-            }
-        }
-        self.bracket.set(channel, low, high);
+    /// Switches the inputs of a pair.
+    fn switch(&mut self, train: usize, above: bool) {
+        let (group, lane, gain) = (train / LANES, train % LANES, self.model.gain);
+        self.rises[group].set(lane, if above { gain } else { 0.0 });
+        self.falls[group].set(lane, if above { 0.0 } else { gain });
     }
 
     /// Computes all steps that begin before `t`.
@@ -298,33 +280,18 @@ impl Pairs {
 
     /// Emits the spikes that are due before `t` (with `at_too` also at `t`).
     fn flush(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
-        let (from, end) = (out.len(), ms(t));
-        self.ahead.retain(|&spike| {
-            let due = spike.t < end || (at_too && spike.t == end);
-            if due {
-                out.push(spike);
-            }
-            !due
-        });
-        sort_from(out, from);
+        let end = ms(t);
+        out.extend(self.ahead.extract_if(.., |spike| spike.t < end || (at_too && spike.t == end)));
     }
 }
 
 impl Rule for Pairs {
-    fn begin(&mut self, t: i64, held: &[Block], _out: &mut Vec<Spike>) {
-        self.next = t;
-        for falls in &mut self.falls {
-            falls.input = [self.model.gain; LANES];
-        }
-        for channel in 0..self.channels {
-            self.read(channel, held[channel / BLOCK][channel % BLOCK]);
-        }
+    fn begin(&mut self, now: Sample<'_>, out: &mut Vec<Spike>) {
+        self.next = now.t;
+        self.levels.settle(now.t, now.held, out);
         // Padding lanes after the last train receive no input and stay at rest.
-        let used = self.channels * self.levels.len() % LANES;
-        if used > 0
-            && let Some(last) = self.falls.last_mut()
-        {
-            last.input[used..].fill(0.0);
+        for train in 0..self.levels.levels.len() {
+            self.switch(train, self.levels.levels.is_above(train));
         }
         if self.begin == Begin::Settled {
             let (above, below) = (self.model.steady_state(self.model.gain), self.model.steady_state(0.0));
@@ -336,22 +303,14 @@ impl Rule for Pairs {
         }
     }
 
-    const PREFETCHES: bool = true;
-
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut NextFrame, out: &mut Vec<Spike>) {
-        for (block, values) in held.iter().enumerate() {
-            next.fetch();
-            if changed[block] && self.bracket.has_left(block, values) {
-                for channel in block * BLOCK..self.channels.min((block + 1) * BLOCK) {
-                    let value = values[channel % BLOCK];
-                    if !self.bracket.holds(channel, value) {
-                        self.read(channel, value);
-                    }
-                }
-            }
+    fn sample(&mut self, now: Sample<'_>, out: &mut Vec<Spike>) {
+        let mut crossed = vec![];
+        self.levels.take(now, false, &mut crossed);
+        for Spike { train, value, .. } in crossed {
+            self.switch(train as usize, value > 0.0);
         }
-        self.flush(t, true, out);
+        self.flush(now.t, true, out);
     }
 
     #[inline(always)]

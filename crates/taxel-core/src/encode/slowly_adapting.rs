@@ -1,6 +1,7 @@
 //! The filter of slowly adapting afferents, and the macro that declares SA-1 and SA-2.
 
-use super::receptor::{Filter, Lanes, LowPass};
+use super::blocks::BLOCK;
+use super::receptor::{Filter, FilterState, Lanes, LowPass};
 
 /// `u = lowpass((1 + onset) x - onset y - loss z)`: x is the pressure, y and z are x filtered by low passes with
 /// `onset_ms` and `loss_ms`; the outer low pass has `membrane_ms`.
@@ -25,40 +26,21 @@ impl Slow {
     }
 }
 
-#[derive(Clone)]
-pub(super) struct SlowState {
-    x: Lanes,
-    recent: Lanes,
-    long: Lanes,
-    drive: Lanes,
-}
-
 impl Filter for Slow {
-    type State = SlowState;
-
     const SIGNALS_VALUES: bool = true;
 
-    fn steady_state(&self, x: &Lanes) -> (SlowState, Lanes) {
+    fn steady_state(&self, x: &Lanes) -> (FilterState, Lanes) {
         let drive = x.map(|x| (1.0 - self.loss) * x);
-        (SlowState { x: *x, recent: *x, long: *x, drive }, drive)
+        ([*x, *x, *x, drive, [0.0; BLOCK]], drive)
     }
 
     #[inline(always)]
-    fn step<const SEE: bool>(&self, state: &mut SlowState, lane: usize, x: f64, u: f64, moved: &mut u64) -> f64 {
-        let (before, last, lost) = (state.x[lane], state.recent[lane], state.long[lane]);
-        let recent = self.recent.step(last, before, x);
-        let long = self.long.step(lost, before, x);
-        if SEE {
-            *moved |= (before.to_bits() ^ x.to_bits())
-                | (last.to_bits() ^ recent.to_bits())
-                | (lost.to_bits() ^ long.to_bits());
-        }
-        let drive = (1.0 + self.onset) * x - self.onset * recent - self.loss * long;
-        let potential = self.membrane.step(u, state.drive[lane], drive);
-        state.x[lane] = x;
-        state.recent[lane] = recent;
-        state.long[lane] = long;
-        state.drive[lane] = drive;
+    fn step(&self, [before, recent, long, last_drive, _]: &mut FilterState, lane: usize, x: f64, u: f64) -> f64 {
+        recent[lane] = self.recent.step(recent[lane], before[lane], x);
+        long[lane] = self.long.step(long[lane], before[lane], x);
+        let drive = (1.0 + self.onset) * x - self.onset * recent[lane] - self.loss * long[lane];
+        let potential = self.membrane.step(u, last_drive[lane], drive);
+        (before[lane], last_drive[lane]) = (x, drive);
         potential
     }
 }
@@ -66,11 +48,9 @@ impl Filter for Slow {
 /// Declares a slowly adapting afferent: its documentation, its name, and the defaults of the parameters that differ.
 macro_rules! slowly_adapting {
     ($(#[$about:meta])* $Kind:ident, threshold: $threshold:expr, onset: $onset:expr, loss: $loss:expr) => {
-        use super::channels::Channels;
         use super::encoding::Encoding;
-        use super::receptor::{TaxelAfferents, Firing};
-        use super::sampled::Sampled;
-        use super::slow::Slow;
+        use super::receptor::{self, firing};
+        use super::slowly_adapting::Slow;
         use super::stream::Stream;
         use super::tare::Tare;
         use $crate::allowed::Range;
@@ -112,27 +92,6 @@ macro_rules! slowly_adapting {
             }
         }
 
-        impl $Kind {
-            pub(super) fn filter(&self) -> Slow {
-                Slow::new(
-                    [self.onset, self.onset_ms],
-                    [self.loss, self.loss_ms],
-                    self.membrane_ms,
-                    self.period_ms,
-                )
-            }
-
-            pub(super) fn firing(&self) -> Firing {
-                Firing {
-                    threshold: self.threshold,
-                    jump: self.jump,
-                    recovery_ms: self.recovery_ms,
-                    refractory_ms: self.refractory_ms,
-                    period_ms: self.period_ms,
-                }
-            }
-        }
-
         impl Encoding for $Kind {
             fn check(&self) -> Result<()> {
                 self.check_ranges()?;
@@ -140,10 +99,9 @@ macro_rules! slowly_adapting {
             }
 
             fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-                let channels = Channels::new(array).len();
-                let afferents = TaxelAfferents::new(self.filter(), self.firing(), self.range, channels);
-                let sampled = Sampled::new(self, afferents, array, self.period_ms)?;
-                Ok(Box::new(sampled.steady().above(self.tare.as_ref(), array)?))
+                let (onset, loss) = ([self.onset, self.onset_ms], [self.loss, self.loss_ms]);
+                let filter = Slow::new(onset, loss, self.membrane_ms, self.period_ms);
+                receptor::stream(filter, firing!(self), self.tare.as_ref(), array, self.trains_of(array))
             }
 
             fn kind(&self) -> SpikeKind {

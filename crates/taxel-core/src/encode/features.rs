@@ -1,0 +1,142 @@
+//! What is computed of the values of all taxels at each stamp, or each frame, and the spikes of its levels and changes.
+
+use super::channels::Channels;
+use super::driver::{Clock, Driver, Rule, Sample, Trains};
+use super::level_count::LevelCount;
+use super::levels::Levels;
+use super::loaded::Loaded;
+use super::local_sums::{LocalSums, SumPair};
+use super::peak_load::PeakLoad;
+use super::stream::Stream;
+use crate::rest::Rest;
+use crate::spikes::ms;
+use crate::{Array, Spike};
+
+/// What is computed of the values of all taxels; none of it depends on position.
+#[derive(Clone)]
+pub(super) enum Feature {
+    /// The number of loaded taxels.
+    Area(Loaded),
+    /// The sum of their values above rest.
+    Total(Loaded),
+    /// The largest local sums: above the rest, then above and below each running mean.
+    Local(LocalSums),
+    /// The largest deviation of a taxel in units of its own noise.
+    Peak(PeakLoad),
+    /// The number of levels that the taxels are above.
+    Count(LevelCount),
+}
+
+impl Feature {
+    /// Whether it changes while the values hold.
+    fn drifts(&self) -> bool {
+        matches!(self, Self::Local(_) | Self::Peak(_))
+    }
+
+    /// Appends its values.
+    fn take(&mut self, now: Sample<'_>, values: &mut Vec<f64>) {
+        match self {
+            Self::Area(loaded) => {
+                loaded.take_frame(now);
+                values.push(f64::from(loaded.area()));
+            }
+            Self::Total(loaded) => {
+                loaded.take_frame(now);
+                values.push(loaded.sums(now.held).total);
+            }
+            Self::Local(sums) => {
+                let mut of_rest = true;
+                sums.take(now.t, now.held.as_flattened(), |SumPair { largest, .. }| {
+                    let present = if std::mem::take(&mut of_rest) { &largest[..1] } else { &largest };
+                    values.extend_from_slice(present);
+                });
+            }
+            Self::Peak(peak) => values.push(peak.take(now.t, now.held.as_flattened())),
+            Self::Count(count) => values.push(count.take(now) as f64),
+        }
+    }
+
+    fn set_rest(&mut self, taxel: usize, rest: f64) {
+        match self {
+            Self::Area(loaded) | Self::Total(loaded) => loaded.set_rest(taxel, rest),
+            Self::Local(sums) => sums.set_rest(taxel, rest),
+            Self::Peak(peak) => peak.set_rest(taxel, rest),
+            Self::Count(count) => count.set_rest(taxel, rest),
+        }
+    }
+}
+
+/// The spikes of features' values.
+#[derive(Clone)]
+pub(super) enum Emit {
+    /// Those of levels, equally many of each value.
+    Crossings(Levels),
+    /// One for every change of some values, by their number, with the new value; all are 0 at first.
+    Changes { which: Vec<usize>, last: Vec<f32> },
+}
+
+/// Features, and the spikes of their values.
+#[derive(Clone)]
+struct FeatureRule {
+    features: Vec<Feature>,
+    /// The rest of each taxel as it was measured or set.
+    rest: Rest<f64>,
+    values: Vec<f64>,
+    emit: Emit,
+}
+
+/// A stream of features at each stamp of events, or each frame.
+pub(super) fn stream(
+    features: Vec<Feature>,
+    rest: Rest<f64>,
+    emit: Emit,
+    array: &Array,
+    trains: Trains,
+) -> Box<dyn Stream> {
+    let clock = Clock::Stamps { drifts: features.iter().any(Feature::drifts) };
+    let rule = FeatureRule { features, rest, values: vec![], emit };
+    Box::new(Driver::new(rule, Channels::grid(array), trains, clock))
+}
+
+impl Rule for FeatureRule {
+    #[inline(always)]
+    fn sample(&mut self, now: Sample<'_>, out: &mut Vec<Spike>) {
+        let Self { features, values, emit, .. } = self;
+        values.clear();
+        features.iter_mut().for_each(|feature| feature.take(now, values));
+        // In single precision, which holds every number of taxels and of their levels exactly.
+        match emit {
+            Emit::Crossings(levels) => {
+                let each = levels.len() / values.len();
+                levels.take(now.t, 0..levels.len(), |level| f64::from(values[level / each] as f32), out);
+            }
+            Emit::Changes { which, last } => {
+                for (train, (&value, last)) in (0..).zip(which.iter().zip(last)) {
+                    let value = values[value] as f32;
+                    if value != *last {
+                        *last = value;
+                        out.push(Spike { t: ms(now.t), train, value });
+                    }
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn read(&mut self, channel: usize, _from: f32, to: f32, _repaired: bool) {
+        for feature in &mut self.features {
+            if let Feature::Area(loaded) | Feature::Total(loaded) = feature {
+                loaded.take(channel, to);
+            }
+        }
+    }
+
+    fn set_rest(&mut self, channel: usize, rest: f64) {
+        self.rest.set(channel, rest);
+        self.features.iter_mut().for_each(|feature| feature.set_rest(channel, rest));
+    }
+
+    fn rest(&self, channel: usize) -> Option<f64> {
+        Some(self.rest.values()[channel]).filter(|rest| rest.is_finite())
+    }
+}
