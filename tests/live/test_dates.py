@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from datetime import UTC, datetime, timedelta, timezone
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from loopback import until
 
 import taxel
-from taxel._core import seconds_of
 from taxel.live import Live
 
 #: How a logger prints a time, with the separator of its cells.
@@ -26,42 +22,6 @@ FORMS = {
     "with points and few digits": (lambda at: f"{at.day}.{at.month}.{at.year} {at:%H:%M:%S}", ";"),
     "of a day": (lambda at: f"{at:%H:%M:%S}.{at.microsecond // 1000:03}", ","),
 }
-
-
-@given(
-    st.datetimes(datetime(1700, 1, 1), datetime(2250, 1, 1)),
-    st.integers(-1439, 1439),
-    st.sampled_from(["T", " "]),
-    st.sampled_from(".,"),
-)
-def test_drawn_dates_are_those_of_the_standard_library(at: datetime, minutes: int, between: str, point: str) -> None:
-    zone = timezone(timedelta(minutes=minutes))
-    texts = {
-        at.isoformat(between, "microseconds").replace(".", point): at.replace(tzinfo=UTC),
-        at.isoformat(between, "seconds"): at.replace(microsecond=0, tzinfo=UTC),
-        at.replace(tzinfo=zone).isoformat(between, "microseconds"): at.replace(tzinfo=zone),
-        f"{at.day}.{at.month}.{at.year:04}{between}{at:%H:%M}": at.replace(second=0, microsecond=0, tzinfo=UTC),
-        f"{at:%H%M%S}": at.replace(year=1970, month=1, day=1, microsecond=0, tzinfo=UTC),
-    }
-    for text, expected in texts.items():
-        since = expected - datetime(1970, 1, 1, tzinfo=UTC)
-        assert seconds_of(text) == since.total_seconds(), text
-
-
-@given(st.text("0123456789.:-+,TZ /", max_size=24))
-def test_no_text_is_a_date_that_is_none_by_the_standard_library(text: str) -> None:
-    seconds = seconds_of(text)
-    if math.isnan(seconds) or text.count(".") >= 2:
-        return
-    for whole in (text, f"1970-01-01T{text}"):
-        try:
-            at = datetime.fromisoformat(whole)
-        except ValueError:
-            continue
-        since = (at if at.tzinfo else at.replace(tzinfo=UTC)) - datetime(1970, 1, 1, tzinfo=UTC)
-        assert seconds == pytest.approx(since.total_seconds(), rel=1e-12)
-        return
-    pytest.fail(f"{text!r} is {seconds}")
 
 
 @pytest.mark.parametrize("stated", ["time=1:iso", "time=1", ""])

@@ -207,12 +207,12 @@ def test_the_command_line_shows_and_writes_one_source(
         ({"imu": "nowhere"}, "must be [NAME=]board:HOST:PORT, serial:PLACE, lines:PATH"),
         ({"imu": "given"}, "needs columns=A:B:C"),
         ({"imu": "given,columns=a:a"}, "two columns have this name"),
-        ({"imu": "given,columns=t_us"}, "contains no column of values"),
+        ({"imu": "given,columns=t_us"}, "have no column of values"),
         ({"board": "given,columns=a"}, "two sources have this name"),
         ({"a b": "given,columns=a"}, "a name must have at most 64 letters, digits"),
         ({"imu": 3}, "source imu is 3"),
-        (["imu"], 'source "imu": must be'),
-        ({"imu": "given,columns=a,speed=3"}, 'has no option "speed"'),
+        (["imu"], "source 'imu': must be"),
+        ({"imu": "given,columns=a,speed=3"}, "has no option 'speed'"),
         ({"imu": "given,columns=a,rate=3"}, "rate is only for frames: add array=ROWSxCOLUMNS"),
     ],
 )
@@ -244,7 +244,7 @@ def test_columns_are_learnt_from_the_first_line_of_a_pipe(tmp_path: Path) -> Non
     writer = os.open(pipe, os.O_RDWR)
     os.write(writer, b"t_s,ax\n")
     with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "imu.mcap", sources={"imu": f"lines:{pipe}"}) as live:
-        os.write(writer, b"0.5,1\n0.25,2\n# no numbers\n0.75 3\n")
+        os.write(writer, b"0.5,1\n0.25,2\n# no numbers\n0.75,3\n")
         until(lambda: lines(live, "imu") == 4)
     os.close(writer)
     imu = taxel.open(tmp_path / "imu.mcap").sources["imu"]

@@ -13,7 +13,6 @@
 //! digits of an `f64`. The certificate of each fit is computed on the machine that made the fit and is valid by itself.
 
 pub mod allowed;
-pub mod dates;
 pub mod error;
 pub mod parameters;
 pub mod reading;

@@ -83,8 +83,8 @@ enum Input {
     /// The socket, locked by a caller while it waits for datagrams, or `None` after it was moved into the thread; and
     /// the thread.
     Socket(Box<Mutex<Option<Socket>>>, Mutex<Option<JoinHandle<()>>>),
-    /// The messages of a [`MessageFeed`], which may end by itself once it was asked to.
-    Messages { ends_itself: bool },
+    /// The messages of a [`MessageFeed`].
+    Messages,
 }
 
 impl Receiver {
@@ -141,13 +141,12 @@ impl Receiver {
         Ok(())
     }
 
-    /// Receives the messages that the caller passes to the [`MessageFeed`]. The caller may end by itself once the end was
-    /// requested, so that nothing is left that it has read: then it calls [`MessageFeed::close`].
+    /// Receives the messages that the caller passes to the [`MessageFeed`].
     #[must_use]
-    pub fn of_messages(origin: Origin, options: ReceiverOptions, ends_itself: bool) -> (Self, MessageFeed) {
+    pub fn of_messages(origin: Origin, options: ReceiverOptions) -> (Self, MessageFeed) {
         let queue = Arc::new(BatchQueue::new(options.queue_bytes, CaptureCounts::default()));
         let feed = MessageFeed::new(Arc::clone(&queue));
-        (Self { queue, origin, input: Input::Messages { ends_itself } }, feed)
+        (Self { queue, origin, input: Input::Messages }, feed)
     }
 
     /// Where datagrams come from, with the actual port if 0 was requested.
@@ -170,7 +169,7 @@ impl Receiver {
     pub fn silent_until(&self) -> Option<i64> {
         match &self.input {
             Input::Socket(..) => Some(now_ns()),
-            Input::Messages { .. } => self.queue.silent_until(),
+            Input::Messages => self.queue.silent_until(),
         }
     }
 
@@ -197,7 +196,7 @@ impl Receiver {
                     None => self.queue.pop(batch, timeout),
                 }
             }
-            Input::Messages { .. } => self.queue.pop(batch, timeout),
+            Input::Messages => self.queue.pop(batch, timeout),
         };
         received.map_err(Error::socket(&self.origin))
     }
@@ -234,7 +233,7 @@ impl Receiver {
     /// Requests the end: what has arrived so far is received, then nothing more.
     pub fn stop(&self) {
         self.queue.stop();
-        if let Input::Messages { ends_itself: false } = self.input {
+        if let Input::Messages = self.input {
             self.queue.close(None);
         }
     }

@@ -4,7 +4,6 @@ pub mod address;
 pub mod board_line;
 pub mod clock;
 pub mod error;
-pub mod frame_lines;
 mod kernel_drops;
 mod latency;
 pub mod line_input;

@@ -30,7 +30,7 @@ pub struct LineReader {
     /// When the last bytes arrived, ns since 1970.
     pub came_ns: i64,
     /// Whether the next line may lack its beginning, as of a serial line that was just opened.
-    pub is_cut: bool,
+    is_cut: bool,
     /// Whether the line was interrupted, so that a line that lacks its beginning is a loss.
     was_interrupted: bool,
     piece: Vec<u8>,
@@ -56,28 +56,14 @@ impl LineReader {
         Ok(Self { place: place.clone(), input, lines, came_ns: 0, is_cut, was_interrupted: false, piece })
     }
 
-    /// What is read.
-    #[must_use]
-    pub fn place(&self) -> &LinePlace {
-        &self.place
+    /// The next line, if one waits; the last one may lack its end where no more can arrive (`ended`).
+    pub fn next(&mut self, ended: bool) -> Option<TextLine> {
+        self.lines.next(ended)
     }
 
-    /// The next line and when it arrived, ns since 1970, if one waits; the last one may lack its end where no more can
-    /// arrive (`ended`).
-    pub fn next(&mut self, ended: bool) -> Option<(TextLine, i64)> {
-        self.lines.next(ended).map(|line| (line, self.came_ns))
-    }
-
-    /// The next line, as [`LineReader::next`], without one that lacks its beginning: the first one, if it does not fit and
-    /// ends in a number; of a serial line also if it does not. Where reading began amid a line, nothing was lost.
-    pub fn next_whole(&mut self, ended: bool, fits: impl Fn(&TextLine) -> bool) -> Option<(TextLine, i64)> {
-        let (line, at_ns) = self.next(ended)?;
-        let is_serial = matches!(self.place, LinePlace::Serial(_));
-        if std::mem::take(&mut self.is_cut) && !fits(&line) && (is_serial || ends_in_number(&line.text)) {
-            self.lines.left_out.unfinished += if self.was_interrupted { line.bytes } else { 0 };
-            return self.next(ended);
-        }
-        Some((line, at_ns))
+    /// Whether the next line may lack its beginning, and whether that is a loss, as the line was interrupted; once.
+    pub fn take_cut(&mut self) -> Option<bool> {
+        std::mem::take(&mut self.is_cut).then_some(self.was_interrupted)
     }
 
     /// Waits briefly for more bytes; returns whether no more can arrive.
@@ -137,12 +123,6 @@ impl LineReader {
         self.input = OpenInput::open(&self.place).ok();
         (self.is_cut, self.was_interrupted) = (self.place.begins_anywhere(), true);
     }
-}
-
-/// Whether the last cell of a line is a number.
-fn ends_in_number(text: &str) -> bool {
-    let last = text.rsplit([',', ';', '\t', ' ']).find(|cell| !cell.is_empty());
-    last.is_some_and(|cell| cell.parse::<f64>().is_ok_and(f64::is_finite))
 }
 
 impl OpenInput {

@@ -33,7 +33,7 @@ impl LinePlace {
     /// # Errors
     ///
     /// `Core(Problem)` if a place, an address or a baud rate is not valid.
-    pub(crate) fn parse(text: &str, options: &mut BTreeMap<&str, &str>) -> Result<Option<Self>> {
+    pub fn parse(text: &str, options: &mut BTreeMap<&str, &str>) -> Result<Option<Self>> {
         let Some((kind, place)) = text.split_once(':').filter(|(_, place)| !place.is_empty()) else { return Ok(None) };
         Ok(Some(match kind {
             "serial" => {

@@ -13,6 +13,7 @@ mod falling_values;
 mod frame_block;
 mod frame_input;
 mod frame_stage;
+mod frame_times;
 mod handle;
 mod observers;
 mod options;
@@ -31,7 +32,6 @@ mod sending;
 mod shared;
 mod sink;
 mod source;
-mod source_preview;
 mod sources;
 mod speculative_readout;
 mod stages;
@@ -53,13 +53,12 @@ use taxel_core::wire;
 use taxel_core::{Marker, Stop, problem};
 
 use crate::capture::Origin;
-use crate::frame_lines::FrameLayout;
 use crate::locked::lock;
 use crate::{Error, Result};
 pub use counters::{
     Arrival, ArrivalState, BoardState, Counters, DecodingCounts, LiveSummary, ReadoutCounts, SourceCounts,
 };
-pub use frame_input::LineCounts;
+pub use frame_input::{LineCounts, ReadLines};
 pub use handle::Handle;
 pub use options::{LiveOptions, Record, StatedTare};
 use output::DetectionOutput;
@@ -72,9 +71,8 @@ use sending::Sending;
 pub use sending::{Destination, Sent};
 use shared::{PipelineShared, PublishedState, RecordingSlot, frame_time, header_of};
 pub use sink::{LineSink, OutputDetection, Sink};
-pub use source::{FirstLineWait, NamedSource, SourceKind, SourceText};
-pub use source_preview::SourcePreview;
-use sources::{Others, PipelineInput};
+pub use source::{BoardSource, FrameLayout, FrameSource, NamedSource, SourceKind};
+use sources::{NumberStream, Others, PipelineInput};
 use stages::Stages;
 use threads::Threads;
 pub use viewer_queue::{Piece, TaxelChange, ViewerEvents};
@@ -84,28 +82,6 @@ const CHECK_EVERY: Duration = Duration::from_millis(50);
 
 /// Capacity of the queue of [`Live::next`], detections; more are lost for it, and counted, but still reach the sinks.
 const OUTPUT_WAITING: usize = 1 << 14;
-
-/// The sources beside the one that is read out, as texts.
-struct OtherTexts<'a> {
-    texts: Vec<SourceText>,
-    /// The unit of the readout.
-    unit: Option<String>,
-    stop: Stop<'a>,
-}
-
-impl OtherTexts<'_> {
-    /// Opens them; those of frames that state no unit have the readout's, by which it reads their recording.
-    fn open(&self, wait: FirstLineWait<'_>) -> Result<Vec<NamedSource>> {
-        let open = |text: &SourceText| {
-            let mut kind = text.open(None, wait)?;
-            if let SourceKind::Frames(_, layout, _) = &mut kind {
-                layout.assume_unit(self.unit.as_deref());
-            }
-            Ok(NamedSource { name: text.name(), kind })
-        };
-        self.texts.iter().map(open).collect()
-    }
-}
 
 /// A running pipeline from datagrams to detections, from [`Live::start`] until [`Live::stop`].
 pub struct Live {
@@ -117,56 +93,32 @@ pub struct Live {
 }
 
 impl Live {
-    /// Opens the source that the options state (and the file), and starts: a board where a port, a host or a board is stated,
-    /// or no source is; else the first source, as frames.
+    /// Opens the source that the options state (and the file), and starts: frames of numbers, or a board.
     ///
     /// # Errors
     ///
-    /// As [`Live::start`]; those of [`SourceText::open`] and [`ReadoutSetup::new`]; of a readout that cannot be read, or is of another unit.
-    pub fn open(options: LiveOptions, sinks: Vec<Box<dyn Sink>>, stop: Stop<'_>) -> Result<Self> {
-        let mut texts = options.source_texts()?;
-        let is_stated = options.port.is_some() || options.host.is_some() || texts.is_empty();
-        let mut options = options;
+    /// As [`Live::start`]; those of [`ReadoutSetup::new`]; of a readout that cannot be read, or is of another unit.
+    pub fn open(options: LiveOptions, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
         let readout = options.readout.as_deref().map(Detector::from_json).transpose()?;
-        let unit = readout.as_ref().and_then(Detector::unit);
-        let mut input = None;
-        if !is_stated {
-            let text = texts.remove(texts.iter().position(SourceText::is_board).unwrap_or(0));
-            options.name = text.name();
-            input = Some(match text.open(Some(&Some(options.array.clone())), options.first_line_wait(stop)?)? {
-                SourceKind::Board(address, array, registers) => {
-                    if text.states_array() {
-                        (options.array, options.registers) = (*array, registers);
-                    }
-                    PipelineInput::Board(address)
-                }
-                SourceKind::Frames(place, mut layout, opened) => {
-                    options.array = layout.array.clone();
-                    layout.assume_unit(unit);
-                    PipelineInput::frames(&place, &layout, &opened)?
-                }
-                SourceKind::Numbers(..) => {
-                    return Err(problem!(
-                        "source {:?}: contains no frames, so it cannot be shown or read by a readout",
-                        text.text
-                    )
-                    .into());
-                }
-            });
-        }
-        let input = input.unwrap_or(PipelineInput::Board(options.address()?));
+        let input = match &options.input {
+            Some(frames) => {
+                frames.layout.check()?;
+                PipelineInput::Frames(frames.place.clone(), Box::new(frames.layout.clone()))
+            }
+            None => PipelineInput::Board(options.address()?),
+        };
         if let Some(readout) = &readout {
             match input.layout() {
                 None => readout.check_unit("ticks")?,
                 Some(layout) => readout.check_unit(&layout.unit).map_err(|error| {
-                    problem!("{error}; if the values are in {}, add unit={0} in --source", unit.unwrap_or_default())
+                    let unit = readout.unit().unwrap_or_default();
+                    problem!("{error}; if the values are in {unit}, add unit={unit} in --source")
                 })?,
             }
         }
-        let unit = unit.map(str::to_owned);
         let frames = frame_time(&options, input.layout());
         let readout = ReadoutSetup::new(readout, &options, frames)?;
-        Self::start_from(input, options, OtherTexts { texts, unit, stop }, readout, sinks)
+        Self::start_from(input, options, readout, sinks)
     }
 
     /// Opens the socket (and the file), and starts to receive a board.
@@ -181,29 +133,26 @@ impl Live {
         readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
-        let others = OtherTexts { texts: options.source_texts()?, unit: None, stop: Stop::never() };
-        Self::start_from(PipelineInput::Board(address), options, others, readout, sinks)
+        Self::start_from(PipelineInput::Board(address), options, readout, sinks)
     }
 
-    /// Starts with the further sources of these texts.
     fn start_from(
         input: PipelineInput,
-        options: LiveOptions,
-        others: OtherTexts<'_>,
+        mut options: LiveOptions,
         readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
         if options.record_later && options.record.is_some() {
             return Err(problem!("record and record_later are both given: give only one of them").into());
         }
-        if let (None, false, Some(source)) = (&options.record, options.record_later, others.texts.first()) {
+        if let (None, false, Some(source)) = (&options.record, options.record_later, options.sources.first()) {
+            let name = &source.name;
             return Err(problem!(
-                "source {}: taxel can only record this source; give record, the file of the recording",
-                source.name()
+                "source {name}: taxel can only record this source; give record, the file of the recording"
             )
             .into());
         }
-        let sources = others.open(options.first_line_wait(others.stop)?)?;
+        let sources = std::mem::take(&mut options.sources);
         Self::begin(input, options, sources, readout, sinks, None)
     }
 
@@ -238,7 +187,7 @@ impl Live {
         let record = options.recording()?;
         let sending = options.send.iter().map(|to| Sending::open(&to.parse()?)).collect::<Result<Vec<_>>>()?;
         // The socket is opened before the file, so that a port that is in use leaves no empty file.
-        let (receiver, frames, lines) = input.open(options.capture())?;
+        let (receiver, frames) = input.open(options.capture())?;
         let header = header_of(&options, receiver.origin(), frames.as_ref().map(|frames| &frames.layout))?;
         let recording = match (&record, host) {
             (None, _) => None,
@@ -294,10 +243,6 @@ impl Live {
         for name in names {
             let (threads, shared) = (Arc::clone(&threads), Arc::clone(&shared));
             live.spawn(name, move || threads.run(&shared))?;
-        }
-        if let (Some(frames), Some(lines)) = (&shared.frames, lines) {
-            let frames = Arc::clone(frames);
-            live.spawn("taxel-lines", move || frames.read(lines))?;
         }
         Ok(live)
     }
@@ -390,26 +335,41 @@ impl Live {
         lock(&self.others).pipelines.iter().find(|(known, _)| known == name).map(|(_, live)| live.address())
     }
 
-    /// Records one line of a source whose values a program passes, with a number for each of its columns; it arrived at
-    /// `arrived_ns` (ns since 1970).
+    /// Passes lines of a source of numbers on, as a reader or a program has them.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` if there is no such source, or it has other columns; `File` if the disk is full.
-    pub fn sample(&self, name: &str, arrived_ns: i64, values: &[f64]) -> Result<()> {
-        let others = lock(&self.others);
-        let numbers = others.numbers.iter().find(|(known, _)| known == name).map(|(_, n)| Arc::clone(n));
-        let main = (self.shared.options.name == name).then_some(&self.shared);
-        let all = main
-            .into_iter()
-            .chain(others.pipelines.iter().filter(|(known, _)| known == name).map(|(_, live)| &live.shared));
-        let frames = all.filter_map(|shared| shared.frames.as_ref()).map(Arc::clone).next();
-        drop(others);
-        match (numbers, frames) {
-            (Some(numbers), _) => numbers.sample(arrived_ns, values),
-            (None, Some(frames)) => frames.sample(name, arrived_ns, values),
-            (None, None) => Err(problem!("source {name:?}: no source of numbers has this name").into()),
+    /// `Core(Problem)` if there is no such source, it has other columns, or has ended; `File` if the disk is full.
+    pub fn lines(&self, name: &str, read: &ReadLines) -> Result<()> {
+        if let Some(numbers) = self.numbers_of(name) {
+            return numbers.push(read);
         }
+        match self.frames_of(name).as_ref().map(|shared| (shared, &shared.frames)) {
+            Some((shared, Some(frames))) => {
+                shared.record_unread(&read.unread);
+                frames.push(name, read)
+            }
+            _ => Err(problem!("source {name:?}: no source of numbers has this name").into()),
+        }
+    }
+
+    /// Ends a source of frames, of which no more lines can come.
+    pub fn end_lines(&self, name: &str) {
+        if let Some(frames) = self.frames_of(name).as_ref().and_then(|shared| shared.frames.as_ref()) {
+            frames.end();
+        }
+    }
+
+    fn numbers_of(&self, name: &str) -> Option<Arc<NumberStream>> {
+        lock(&self.others).numbers.iter().find(|(known, _)| known == name).map(|(_, n)| Arc::clone(n))
+    }
+
+    /// The pipeline of the source of this name.
+    fn frames_of(&self, name: &str) -> Option<Arc<PipelineShared>> {
+        if self.shared.options.name == name && self.shared.frames.is_some() {
+            return Some(Arc::clone(&self.shared));
+        }
+        lock(&self.others).pipelines.iter().find(|(known, _)| known == name).map(|(_, live)| Arc::clone(&live.shared))
     }
 
     /// The layout of the frames of numbers that it receives; `None` of a board.

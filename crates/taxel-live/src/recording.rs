@@ -35,7 +35,6 @@ pub use mcap_reader::{Datagrams, DecodedRecording, Message, ReadPosition, Reader
 pub use mcap_writer::{SourceWriter, Writer};
 pub use output::OutputFile;
 pub use stream::{Samples, StreamColumns, StreamFaults};
-pub(crate) use stream::{UNITS_US, cells, clock_unit_us, date, number};
 pub use topic::Topic;
 pub use verdict::{
     Basis, Condition, FileEnding, Found, NOTHING_LOST, Rebuilt, RecordingCounts, RecordingStatus, Verdict,

@@ -55,13 +55,6 @@ impl TextLines {
         self.bytes.extend_from_slice(bytes);
     }
 
-    /// Makes a line the next one again.
-    pub fn put_back(&mut self, line: &TextLine) {
-        let end = if self.returned { '\r' } else { '\n' };
-        self.bytes.splice(0..0, format!("{}{end}", line.text).into_bytes());
-        (self.searched, self.returned) = (0, false);
-    }
-
     /// The next line, which a line feed, a carriage return or both end, as an Arduino's `println` writes; the last one may lack
     /// its end where no more can arrive (`ended`).
     pub fn next(&mut self, ended: bool) -> Option<TextLine> {
@@ -198,26 +191,13 @@ mod tests {
     }
 
     #[test]
-    fn both_characters_end_one_line_also_where_they_arrive_apart_and_a_line_is_put_back_between() {
+    fn both_characters_end_one_line_also_where_they_arrive_apart_and_the_last_one_may_lack_its_end() {
         let mut lines = TextLines::new(8);
         lines.push(b"1,2\r");
         let first = lines.next(false).unwrap();
-        lines.push(b"\n\r\n3,4\r\n");
-        lines.put_back(&first);
-        let texts: Vec<String> = std::iter::from_fn(|| lines.next(false)).map(|line| line.text).collect();
-        assert_eq!(texts, ["1,2", "", "3,4"]);
+        lines.push(b"\n\r\n3,4");
+        let texts: Vec<String> = std::iter::from_fn(|| lines.next(true)).map(|line| line.text).collect();
+        assert_eq!((&*first.text, &texts[..]), ("1,2", &["".to_owned(), "3,4".to_owned()][..]));
         assert_eq!((lines.waiting(), lines.take_left_out()), (0, LeftOut::default()));
-    }
-
-    #[test]
-    fn a_line_that_is_put_back_comes_again_and_the_last_one_may_lack_its_end() {
-        let mut lines = TextLines::new(8);
-        lines.push(b"1,2\n3,4");
-        let first = lines.next(false).unwrap();
-        lines.put_back(&first);
-        assert_eq!(lines.next(false), Some(first));
-        assert_eq!(lines.next(false), None);
-        assert_eq!(lines.next(true).unwrap().text, "3,4");
-        assert_eq!((lines.next(true), lines.take_left_out()), (None, LeftOut::default()));
     }
 }

@@ -177,7 +177,9 @@ impl LiveSource {
         );
         let (udp, lines, source) = match self.handle.origin() {
             Origin::Udp(address) => (Some(address.to_string()), None, None),
-            Origin::Frames(place) => (None, Some(place.clone()), options.sources.first().cloned()),
+            Origin::Frames(place) => {
+                (None, Some(place.clone()), options.input.as_ref().map(|input| input.text.clone()))
+            }
         };
         json!({
             "array": sensor(self.array()),

@@ -15,6 +15,7 @@ mod detect;
 mod device;
 mod encode;
 mod learn;
+mod line_input;
 mod live;
 mod metrics;
 mod neuron;
@@ -65,6 +66,8 @@ mod _core {
     #[pymodule_export]
     use crate::learn::{ConeRFitOut, ConeRProblem, OnlineConeR};
     #[pymodule_export]
+    use crate::line_input::{ArrivedLines, LineInput};
+    #[pymodule_export]
     use crate::live::{Ended, Live, send};
     #[pymodule_export]
     use crate::metrics::{distance, match_spikes, metric_names, pairwise};
@@ -73,14 +76,13 @@ mod _core {
     #[pymodule_export]
     use crate::nouns::{check_events, check_spikes, split_by_sign};
     #[pymodule_export]
-    use crate::panel::{PanelLive, PanelRecording, PanelView, lines_preview, panel_encoders, panel_limits};
+    use crate::panel::{PanelLive, PanelRecording, PanelView, panel_encoders, panel_limits};
     #[pymodule_export]
     use crate::previews::RecordingPreviews;
     #[pymodule_export]
     use crate::recording::{
         DecodedDatagrams, DecodedLsa, RecordingReader, RecordingWriter, Remarks, Samples, clock_doubt, clock_lines,
-        numbered_path, read_lsa, recording_damage, recording_verdict, seconds_of, verdict_text, whole_frames,
-        write_lsa,
+        numbered_path, read_lsa, recording_damage, recording_verdict, verdict_text, whole_frames, write_lsa,
     };
     #[pymodule_export]
     use crate::simulate::{

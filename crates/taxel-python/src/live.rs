@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use numpy::PyArray1;
+use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde_json::{Value, json};
 use taxel_core::detect::Detection;
@@ -14,12 +14,13 @@ use taxel_core::problem;
 use taxel_live::address::of_host;
 use taxel_live::capture::Sender;
 use taxel_live::pipeline::{
-    Handle, LineSink, Live as Pipeline, LiveOptions, LiveSummary, OutputDetection, Record, Sink,
+    Handle, LineSink, Live as Pipeline, LiveOptions, LiveSummary, OutputDetection, ReadLines, Record, Sink,
 };
+use taxel_live::text_lines::LeftOut;
 
 use crate::thread_state;
 use crate::threaded::Threaded;
-use taxel_border::convert::array;
+use taxel_border::convert::{array, slice};
 use taxel_border::enter::enter;
 use taxel_border::errors::{ProblemError, core};
 use taxel_border::parameters::{Plain, parsed};
@@ -120,7 +121,7 @@ impl Live {
                 .map_err(std::io::Error::other)
             }));
         }
-        let pipeline = enter(py, |stop| Pipeline::open(options, sinks, stop))?;
+        let pipeline = enter(py, |_| Pipeline::open(options, sinks))?;
         Ok(Self {
             pipeline: Threaded::new("live: has been stopped; begin a new Live", pipeline),
             summary: Mutex::default(),
@@ -205,10 +206,45 @@ impl Live {
         Ok(address.map(|address| (address.ip().to_string(), address.port())))
     }
 
-    /// Records numbers of a source whose values a program gives; `arrived_ns` is now where it is left out.
-    fn sample(&self, py: Python<'_>, name: &str, values: Vec<f64>, arrived_ns: Option<i64>) -> PyResult<()> {
-        let arrived_ns = arrived_ns.unwrap_or_else(taxel_live::recording::now_ns);
-        self.with(py, |pipeline| pipeline.sample(name, arrived_ns, &values))
+    /// Passes lines of a source of numbers on: the arrival of each frame or line (ns since 1970), the stamps of frames if they
+    /// have any, all values one after the other, the number of lines, of those that could not be read, the lines that were not
+    /// read with their arrival, the bytes in no line and of unfinished lines, why reading fails now, and the time before which
+    /// all that arrived was read.
+    #[allow(clippy::too_many_arguments)]
+    fn lines(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        arrived_ns: PyReadonlyArray1<'_, i64>,
+        stamps: PyReadonlyArray1<'_, f64>,
+        values: PyReadonlyArray1<'_, f64>,
+        lines: u64,
+        strange: u64,
+        unread: Vec<(i64, String)>,
+        left_out: (u64, u64),
+        trouble: Option<String>,
+        until_ns: i64,
+    ) -> PyResult<()> {
+        let read = ReadLines {
+            arrived_ns: slice("arrived_ns", &arrived_ns)?.to_vec(),
+            stamps: slice("stamps", &stamps)?.to_vec(),
+            values: slice("values", &values)?.to_vec(),
+            lines,
+            strange,
+            unread,
+            left_out: LeftOut { in_no_line: left_out.0, unfinished: left_out.1 },
+            trouble,
+            until_ns,
+        };
+        self.with(py, |pipeline| pipeline.lines(name, &read))
+    }
+
+    /// Ends a source of frames, of which no more lines can come.
+    fn end_lines(&self, py: Python<'_>, name: &str) -> PyResult<()> {
+        self.with(py, |pipeline| {
+            pipeline.end_lines(name);
+            Ok(())
+        })
     }
 
     /// Takes the values that taxels (column, row) hold for their rest from now on.

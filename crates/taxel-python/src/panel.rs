@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
-use std::time::Duration;
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -14,7 +13,6 @@ use taxel_core::encode::Encoder;
 use taxel_core::held::UNKNOWN;
 use taxel_core::rest::Value as _;
 use taxel_core::wire::Registers;
-use taxel_live::pipeline::{SourcePreview, SourceText};
 use taxel_live::recording::{self, Remarks};
 use taxel_panel::{
     Activity, FrameArea, FrameFile, FrameIndex, FrameRest, FrameSource, LiveSource, RecordingIndex, RestSource, Shown,
@@ -61,15 +59,6 @@ pub fn panel_limits() -> Plain<Value> {
 #[pyfunction]
 pub fn panel_encoders(encoder: &str) -> PyResult<Vec<String>> {
     Ok(taxel_panel::encoder_names(Encoder::from_json(encoder).map_err(core)?))
-}
-
-/// The last lines that arrive from a source of lines within two seconds, what they seem to be, and the source with that added.
-#[pyfunction]
-pub fn lines_preview(py: Python<'_>, source: &str) -> PyResult<(Vec<String>, String, String)> {
-    let SourcePreview { lines, source, about } = enter(py, |_| {
-        source.parse::<SourceText>().and_then(|source| SourcePreview::read(&source, Duration::from_secs(2)))
-    })?;
-    Ok((lines, about, source))
 }
 
 /// A live source as the panel shows it, received in a thread of its own. Messages are JSON.

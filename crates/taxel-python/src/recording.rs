@@ -9,7 +9,7 @@ use pyo3::types::{PyBytes, PyTuple};
 use serde_json::{Value, json};
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
-use taxel_core::{Marker, dates, wire};
+use taxel_core::{Marker, wire};
 use taxel_live::clock::{self, BoardClock, Offset};
 use taxel_live::recording::{
     Basis, BoardChange, Counts, FrameEncoding, Header, LsaWriter, Reader, RecordingCounts, SourceWriter, Verdict,
@@ -458,12 +458,6 @@ pub fn clock_lines(
 #[pyfunction]
 pub fn clock_doubt(drift_ppm: f64, delay_us: f64, median_us: f64) -> Option<String> {
     clock::doubt(drift_ppm, delay_us, median_us)
-}
-
-/// The seconds since 1970, or of the day, of a date or a time as tables write them; NaN of any other text.
-#[pyfunction]
-pub fn seconds_of(text: &str) -> f64 {
-    dates::seconds_of(text).unwrap_or(f64::NAN)
 }
 
 /// The name of a recording in automatic mode: the index appended to the name.

@@ -296,7 +296,7 @@ def _watch(
     When a `fresh` tare is complete, `at_rest` is closed, and the panel gets the serial line, if `control` names it.
     """
     echo = _echo(pipeline, console)
-    console.print(f"listening on {pipeline.place}; Ctrl-C ends")
+    console.print("\n".join(filter(None, (f"listening on {pipeline.place}; Ctrl-C ends", pipeline.read_as))))
     # Lines that another thread writes would break a display.
     shown = Console(stderr=True, quiet=True) if echo is None else console
     display = Display(console=shown, refresh_per_second=1 / REDRAW_S, transient=True, redirect_stdout=False)

@@ -202,6 +202,8 @@ def _watch(
 ) -> None:
     """Show the counts until the time is over, the board marks a stop (with `markers`), or the recording has failed."""
     console.print(f"listening on {live.place}, recording to {file}; Ctrl-C ends")
+    if live.read_as:
+        console.print(live.read_as)
     if keys:
         console.print(keys)
     with Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True) as display:

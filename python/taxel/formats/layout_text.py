@@ -1,4 +1,4 @@
-"""Writes layout files: that of a live source, and keys into one that a person may have written."""
+"""Writes layout files, and keys into one that a person may have written."""
 
 from __future__ import annotations
 
@@ -10,18 +10,14 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-from taxel._base.arguments import shown
-from taxel._base.errors import refused, unreadable
-from taxel._core import FormatError, ProblemError
-from taxel.array import Places, of_size
+from taxel._base.errors import unreadable
+from taxel._core import ProblemError
+from taxel.array import Places
 from taxel.formats.layout import Layout, advice
 
-__all__ = ["of_layout", "of_source", "refuse_to_choose", "with_keys"]
+__all__ = ["of_layout", "refuse_to_choose", "with_keys"]
 
 _RATE_NOT_SAID = "# rate_hz = 100  # frames per second, which the file does not state"
-
-#: Keys of a source that are whole numbers, and those that are lists.
-_WHOLE, _LISTS = ("baud", "frame_lines"), ("columns", "leave_out")
 
 #: The line that begins a table of TOML.
 _TABLE = re.compile(r"^[ \t]*\[", re.MULTILINE)
@@ -86,57 +82,6 @@ def refuse_to_choose(path: Path, why: str, choices: Mapping[str, Layout]) -> NoR
     raise error
 
 
-def of_source(text: str) -> str:
-    """Return the text of a layout file for a live source.
-
-    Parameters
-    ----------
-    text : str
-        "serial:/dev/ttyACM0,baud=9600,array=16x16" ...
-
-    Raises
-    ------
-    ProblemError : it states no array, or a key that a layout file cannot hold
-
-    Examples
-    --------
-    >>> print(of_source("serial:COM3,baud=9600,array=4x3,falls=true"), end="")
-    rows = 4
-    columns = 3
-    falls = true
-    <BLANKLINE>
-    [source]
-    place = "serial:COM3"
-    baud = 9600
-    """
-    place, *pairs = text.split(",")
-    keys = {name: value for name, _, value in (pair.partition("=") for pair in pairs)}
-    if not keys.get("array"):
-        raise refused(
-            "source", f" is {shown(text)}: must contain array=ROWSxCOLUMNS; to find the size, use Show what arrives"
-        )
-    array = of_size(keys.pop("array"), of_wire=False)
-    lines = [f"rows = {array.rows}", f"columns = {array.columns}"]
-    if array.pitch_mm is not None:
-        lines.append(f"pitch_mm = {_written(array.pitch_mm)}")
-    if "unit" in keys:
-        lines.append(f"unit = {_written(keys.pop('unit'))}")
-    if "falls" in keys:
-        lines.append(f"falls = {keys.pop('falls')}")
-    if "rate" in keys:
-        lines.append(f"rate_hz = {keys.pop('rate')}")
-    lines += ["", "[source]", f"place = {_written(place)}"]
-    for name, value in keys.items():
-        written = value if name in _WHOLE else _written(_columns(value) if name in _LISTS else value)
-        lines.append(f"{name} = {written}")
-    made = "\n".join(lines) + "\n"
-    try:
-        Layout.of_text(Path("layout.toml"), made)
-    except FormatError as error:
-        raise refused("source", f" is {shown(text)}: {error}") from None
-    return made
-
-
 def with_keys(path: Path, text: str, keys: Mapping[str, Any]) -> str:
     """Return the text of a layout file with other values of some keys; all else stays, comments too.
 
@@ -189,11 +134,6 @@ def _set(text: str, table: str, line: str, key: str) -> str:
     inside, count = re.subn(rf"^[ \t]*{re.escape(key)}[ \t]*=.*$", lambda _: line, text[begin:end], flags=re.MULTILINE)
     before = text[:begin] if begin == 0 or text[:begin].endswith("\n") else f"{text[:begin]}\n"
     return before + (inside if count else f"{line}\n{inside}") + text[end:]
-
-
-def _columns(value: str) -> list[str | int]:
-    """Return the columns of a key of a source: those that are numbers as such."""
-    return [int(column) if column.isdecimal() else column for column in value.split(":")]
 
 
 def _written(value: object) -> str:

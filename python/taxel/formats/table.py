@@ -25,11 +25,11 @@ from taxel.formats.checks import around
 from taxel.formats.checks import table as limited
 from taxel.formats.column_names import AXES, axes_of, time_unit
 from taxel.formats.layout import Layout, Table
-from taxel.formats.lines import MISSING, OddLines, is_number, read_line
+from taxel.formats.lines import MISSING, LineShape, OddLines, is_number
 from taxel.formats.opened import Opened, size_of, sources_of
 from taxel.formats.table_form import EVENT_COLUMNS, Form, form_of
 from taxel.formats.table_text import SHEETS, TEXTS, Text
-from taxel.formats.times import FEW_ODD, ISO, ODD, in_order, is_time, us_of
+from taxel.formats.times import FEW_ODD, ISO, ODD, in_order, us_of
 from taxel.frames import Frames
 
 __all__ = ["ENDINGS", "Opened", "read_table"]
@@ -268,9 +268,20 @@ def _parsed(source: Any, columns: _Columns, how: Table, *, whole: bool = False, 
 
 def _good_lines(text: Text, columns: _Columns, how: Table, kept: _Rows) -> Iterator[tuple[int, Sequence[str]]]:
     """Yield the number and the cells of each line that is not odd; count the others, and note where frames begin."""
-    form, missing = columns.form, {*MISSING, how.missing}
-    numeric = [*columns.taxels, *([] if columns.time is None or how.time_unit == ISO else [columns.time])]
+    form, times = columns.form, frozenset((columns.time,) if how.time_unit == ISO and columns.time is not None else ())
     has_own_names = how.lines in ("marked", "json") and form.is_named and not how.columns
+    clock = columns.time if not times else None
+    shape = LineShape(
+        len(form.names),
+        frozenset((*columns.taxels, *(() if clock is None else (clock,)))),
+        times,
+        how.lines,
+        how.separator,
+        how.decimal,
+        clock,
+        frozenset((*MISSING, *(() if how.missing is None else (how.missing,)))),
+        form.names if has_own_names else (),
+    )
     waiting, row, last, number = True, 0, 0, 0
     for number, line in enumerate(text.lines(), 1):
         is_begin = how.frame_begin is not None and line.lstrip().startswith(how.frame_begin)
@@ -282,37 +293,18 @@ def _good_lines(text: Text, columns: _Columns, how: Table, kept: _Rows) -> Itera
                 found = _NUMBER.findall(line)
                 kept.frame_times.append(float(found[-1].replace(",", ".")) if found else np.nan)
             continue
-        parsed = read_line(line, how.lines, how.separator, how.decimal)
-        parsed = parsed.in_order(form.names) if parsed is not None and has_own_names else parsed
-        cells = list(parsed.cells) if parsed is not None else []
-        while len(cells) > len(form.names) and not cells[-1]:
-            cells.pop()
+        cells, odd = shape.cells(line)
         if waiting and how.has_lines:
             kept.begins.append(row)
             waiting = False
-        if kind := _odd(cells, columns, numeric, missing, how):
-            kept.odd.add(kind, number)
+        if odd:
+            kept.odd.add(odd, number)
             last = number
             continue
         row += 1
         yield number, cells
     if last and last == number and not text.ends_in_line:
         kept.odd.rename_last("with too few cells", "cut off at the end", last)
-
-
-def _odd(cells: Sequence[str], columns: _Columns, numeric: Sequence[int], missing: set[Any], how: Table) -> str:
-    """Return what is odd about a line; "" if nothing is."""
-    count = len(columns.form.names)
-    if not any(is_number(cell, how.decimal) or is_time(cell) for cell in cells):
-        return "of text"
-    if len(cells) != count:
-        return "with too few cells" if len(cells) < count else "with too many cells"
-    for k in numeric:
-        if not is_number(cells[k], how.decimal) and (cells[k] not in missing or k == columns.time):
-            return "with a cell that is no number"
-    if how.time_unit == ISO and columns.time is not None and not is_time(cells[columns.time]):
-        return "without a time"
-    return ""
 
 
 def _refuse_odd(path: Path, rows: _Rows) -> None:

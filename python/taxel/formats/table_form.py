@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import islice, pairwise
 from typing import Any, NoReturn, TypeAlias
@@ -18,15 +18,16 @@ from numpy.typing import NDArray
 from taxel._base.errors import unreadable
 from taxel._base.limits import COLUMNS
 from taxel._base.messages import counted
+from taxel._core import ProblemError
 from taxel.formats import column_names
 from taxel.formats.column_names import time_unit
-from taxel.formats.layout import Layout, Table
+from taxel.formats.layout import Layout, PrintedFrames, Table
 from taxel.formats.layout_text import refuse_to_choose
-from taxel.formats.lines import MISSING, Line, has_marks, is_number, read_line
+from taxel.formats.lines import MISSING, Line, LineShape, has_marks, is_number, read_line
 from taxel.formats.table_text import Text
 from taxel.formats.times import FEW_ODD, ISO, ODD, UNITS_US, is_day, is_time
 
-__all__ = ["EVENT_COLUMNS", "Form", "form_of", "unit_of_times"]
+__all__ = ["EVENT_COLUMNS", "Form", "LineForm", "form_of", "form_of_lines", "stated_count", "unit_of_times"]
 
 #: Forms that are tried: kind of line, separator, decimal mark.
 _FORMS = [
@@ -193,7 +194,7 @@ def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -
     is_begin = [bool(begin) and line.lstrip().startswith(begin) for line in lines]
     shown = ["" if above else line for line, above in zip(lines, is_begin, strict=True)]
     size = (layout.rows or 0) * (layout.columns or 0)
-    in_hex, is_sure = _hex(text, shown)
+    in_hex, is_sure = _hex(text.lines, shown)
     found = [in_hex] if is_sure and in_hex is not None else list(_fits(shown, _FORMS))
     fits = [fit for fit in found if fit.purity >= _FITS]
     fits.sort(key=lambda fit: (-fit.score, bool(size) and fit.count != size))
@@ -232,6 +233,204 @@ def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -
     return Form(full, reading.names, any(reading.names), fit.first, (*_said(reading, time), *reading.said))
 
 
+@dataclass(frozen=True)
+class LineForm:
+    """Hold how lines that are read as they arrive make frames, or rows of numbers.
+
+    Parameters
+    ----------
+    shape : LineShape
+    columns : tuple of str
+        The names of all columns; "" for one without a name.
+    clocks : tuple of (int, float)
+        The columns whose sum is the time, each with its unit, us; none: the time of arrival.
+    taxels : tuple of int
+        The columns with values.
+    lines : int
+        Number of lines of a frame, 0 if only an empty line shows it.
+    ends_blank : bool
+        Whether an empty line ends a frame.
+    keys : dict
+        What was understood beyond what is stated, as keys of a source.
+    said : tuple of str
+        The same for people, with what was left out and why, a text each.
+    """
+
+    shape: LineShape
+    columns: tuple[str, ...]
+    clocks: tuple[tuple[int, float], ...]
+    taxels: tuple[int, ...]
+    lines: int
+    ends_blank: bool
+    keys: Mapping[str, str]
+    said: tuple[str, ...]
+
+
+def form_of_lines(
+    lines: Sequence[str],
+    stated: PrintedFrames,
+    size: int | None,
+    unit_of: Callable[[NDArray[np.float64], Sequence[int]], str],
+    *,
+    are_frames: bool = True,
+) -> LineForm | None:
+    """Return how lines of a live source are read: as is stated, and else as the first ones look; None if none is read.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        The first ones.
+    stated : PrintedFrames
+    size : int, optional
+        Number of taxels, if it is stated: then all columns of that number are taxels.
+    unit_of : callable
+        Returns the unit of a column of times (and the lines that these are of) by the arrival of lines; "" if it does
+        not show.
+    are_frames : bool
+        Whether columns are taxels; else they are quantities, each with a name.
+
+    Raises
+    ------
+    ProblemError : columns that are not there, or lines that can be read in two ways
+    """
+    reading = _reading_of_lines(lines, stated, size)
+    if reading is None:
+        return None
+    fit = reading.fit
+    places = {name: k for k, name in reversed([*enumerate(reading.names)]) if name}
+    left = {_place("leave_out", column, places, fit.count) for column in stated.leave_out}
+    clocks = _stated_clocks(reading, stated.time, places, unit_of)
+    keys, per_frame = dict[str, str](), stated.frame_lines or 1
+    ends_blank = stated.frame_end is not None
+    of_line = None if size is None else size // per_frame
+    is_whole = fit.count - len(left | {k for k, _ in clocks}) == of_line and not any(map(time_unit, reading.names))
+    if not ends_blank and stated.frame_lines is None and not is_whole and (group := _between_blanks(fit, lines)) > 1:
+        per_frame, ends_blank, keys["frame_end"] = group, True, "blank"
+        reading.said.append(f"{group} lines per frame, between empty lines")
+    elif ends_blank:
+        per_frame = 0
+    if not clocks and not is_whole:
+        time = _time(reading, is_stated=not are_frames)
+        if time is not None and time not in left:
+            clocks = _found_clock(reading, time, unit_of, keys, is_sure=not are_frames)
+    at = {k for k, _ in clocks}
+    if is_whole or stated.leave_out or stated.columns or not are_frames:
+        reading.asked.clear()
+        reading.left.update((k, "texts") for k, kind in enumerate(fit.types[: len(reading.names)]) if kind == "text")
+        taxels = [k for k in range(len(reading.names)) if k not in {*left, *at, *reading.left}]
+    else:
+        taxels = [k for k in _taxels(reading, next(iter(at), None)) if k not in left]
+    if not taxels:
+        raise ProblemError("lines have no column of values, only times and columns that are left out")
+    if reading.asked:
+        raise ProblemError(f"{reading.asked[0][0]}: state what it is by time=COLUMN:UNIT, leave_out= or frame_lines=")
+    gone = sorted(set(reading.left) - left - at - set(taxels))
+    if gone and are_frames:
+        keys["leave_out"] = ":".join([*map(str, stated.leave_out), *(str(k + 1) for k in gone)])
+    dated = frozenset(k for k in at if fit.types[k] == "time")
+    numeric = frozenset((*taxels, *(at - dated)))
+    own = reading.fit.lines[reading.fit.body[0]][1].names if fit.kind in ("marked", "json") else ()
+    clock = next(iter(at - dated), None)
+    names = own if any(own) else ()
+    shape = LineShape(fit.count, numeric, dated, fit.kind, fit.separator, fit.decimal, clock, frozenset(MISSING), names)
+    said = tuple(_said(reading, next(iter(at), None)))
+    return LineForm(shape, reading.names, clocks, tuple(taxels), per_frame, ends_blank, keys, said)
+
+
+def _reading_of_lines(lines: Sequence[str], stated: PrintedFrames, size: int | None) -> _Reading | None:
+    """Return lines as the form reads them that fits best, with the stated names of columns; None if none fits."""
+    in_hex, is_sure = _hex(lambda: lines, lines)
+    wanted = stated_count(stated, size)
+    found = [in_hex] if is_sure and in_hex is not None else list(_fits(lines, _FORMS, (), wanted))
+    fits = sorted(found, key=lambda fit: (wanted is not None and fit.count != wanted, -fit.score))
+    if not fits or fits[0].purity < _FITS * (not stated.leave_out):
+        return None
+    reading = _reading(fits[0], lines)
+    if stated.columns:
+        if len(stated.columns) != len(reading.names):
+            here = f"lines have {counted(len(reading.names), 'column')}"
+            raise ProblemError(f"columns={':'.join(map(str, stated.columns))}: {here}; must be as many")
+        reading.names = tuple(map(str, stated.columns))
+    reading.asked.clear()
+    return reading
+
+
+def _between_blanks(fit: _Fit, lines: Sequence[str]) -> int:
+    """Return how many lines of numbers are between two empty lines, 0 if that differs or none are."""
+    empty = np.cumsum([not line.strip() for line in lines])
+    of_line = Counter(empty[[fit.lines[k][0] for k in fit.body]].tolist())
+    # What is before the first empty line, and behind the last, may be a part.
+    whole = {count for after, count in of_line.items() if 0 < after < empty[-1]}
+    return whole.pop() if len(whole) == 1 else 0
+
+
+def stated_count(stated: PrintedFrames, size: int | None) -> int | None:
+    """Return how many columns lines have, if what is stated of them says it."""
+    if stated.columns:
+        return len(stated.columns)
+    if size is None or stated.frame_end is not None:
+        return None
+    clocks = 0 if stated.time is None else 2 if "+" in stated.time else 1
+    return size // (stated.frame_lines or 1) + clocks + len(stated.leave_out)
+
+
+def _place(key: str, column: str | int, places: Mapping[str, int], count: int) -> int:
+    """Return the place of a column that is stated by its name, or its number from 1."""
+    if column in places:
+        return places[str(column)]
+    if not str(column).isdecimal():
+        names = f"; the columns are {', '.join(places)}" * bool(places)
+        raise ProblemError(f"{key}={column}: this column is missing{names}")
+    if not 1 <= int(column) <= count:
+        raise ProblemError(f"{key}={column}: lines have {counted(count, 'column')}")
+    return int(column) - 1
+
+
+def _stated_clocks(
+    reading: _Reading,
+    time: str | None,
+    places: Mapping[str, int],
+    unit_of: Callable[[NDArray[np.float64], Sequence[int]], str],
+) -> tuple[tuple[int, float], ...]:
+    """Return the columns of the time that is stated, with their units, us; without a unit it is found."""
+    fit = reading.fit
+    if time is None:
+        return ()
+    if "+" in time:
+        seconds, nanoseconds = (_place("time", column, places, fit.count) for column in time.split("+", 1))
+        return ((seconds, UNITS_US["s"]), (nanoseconds, UNITS_US["ns"]))
+    column, _, unit = time.partition(":")
+    place = _place("time", column, places, fit.count)
+    if unit == ISO or (not unit and fit.types[place] == "time"):
+        return ((place, UNITS_US["s"]),)
+    if not unit:
+        unit = time_unit(reading.names[place]) or unit_of(fit.numbers(place), [fit.lines[k][0] for k in fit.body])
+    if unit not in UNITS_US:
+        known = ", ".join((*UNITS_US, ISO))
+        raise ProblemError(f"time={time}: the unit must be one of {known}, for example time={column}:ms")
+    return ((place, UNITS_US[unit]),)
+
+
+def _found_clock(
+    reading: _Reading,
+    time: int,
+    unit_of: Callable[[NDArray[np.float64], Sequence[int]], str],
+    keys: dict[str, str],
+    *,
+    is_sure: bool,
+) -> tuple[tuple[int, float], ...]:
+    """Return the column of times that was found, with its unit, us: by its name, by arrival, or as it looks."""
+    fit, unit = reading.fit, reading.table.time_unit
+    if unit != ISO and not time_unit(reading.names[time]):
+        by_arrival = unit_of(fit.numbers(time), [fit.lines[k][0] for k in fit.body])
+        if by_arrival or is_sure:
+            unit = by_arrival or unit
+            reading.asked = [each for each in reading.asked if not each[0].startswith("the unit of the time")]
+    reading.set(time_unit=unit)
+    keys["time"] = f"{reading.called(time)}:{unit}"
+    return ((time, UNITS_US["s" if unit == ISO else unit]),)
+
+
 def _refuse_lines_above(text: Text, fit: _Fit) -> None:
     """Refuse a table above which are many lines of numbers in another number of columns."""
     rows = [line.cells for _, line in fit.lines[: fit.body[0]]]
@@ -260,8 +459,10 @@ def _stated(text: Text, layout: Layout, how: Table) -> Form:
     return Form(layout, names, any(names), fit.first)
 
 
-def _fits(lines: Sequence[str], forms: Sequence[tuple[str, str, str]], missing: Sequence[str] = ()) -> Iterator[_Fit]:
-    """Yield each form that makes columns of numbers of the lines."""
+def _fits(
+    lines: Sequence[str], forms: Sequence[tuple[str, str, str]], missing: Sequence[str] = (), wanted: int | None = None
+) -> Iterator[_Fit]:
+    """Yield each form that makes columns of numbers of the lines, as many as are wanted where any line has them."""
     there = [(k, line) for k, line in enumerate(lines) if line.strip(" \t\r,;")]
     few = [line for _, line in there[-40:]]
     for kind, separator, decimal in forms:
@@ -278,7 +479,7 @@ def _fits(lines: Sequence[str], forms: Sequence[tuple[str, str, str]], missing: 
         if kind != "plain" and cells:
             names = Counter(line.names for _, line in cells).most_common(1)[0][0]
             cells = [(k, line.in_order(names)) for k, line in cells]
-        fit = _fit(kind, separator, decimal, cells, len(there), {*MISSING, *missing})
+        fit = _fit(kind, separator, decimal, cells, len(there), {*MISSING, *missing}, wanted)
         if fit is not None:
             yield fit
 
@@ -301,7 +502,13 @@ def _are_quoted_decimals(lines: Sequence[str]) -> bool:
 
 
 def _fit(
-    kind: str, separator: str, decimal: str, lines: Sequence[tuple[int, Line]], total: int, missing: set[str]
+    kind: str,
+    separator: str,
+    decimal: str,
+    lines: Sequence[tuple[int, Line]],
+    total: int,
+    missing: set[str],
+    wanted: int | None = None,
 ) -> _Fit | None:
     """Return lines as one form reads them; None without a column of numbers. `total` lines are not empty."""
 
@@ -319,6 +526,8 @@ def _fit(
         return None
     most = max(counts.values())
     count = max(size for size, times in counts.items() if times == most)
+    if wanted is not None and wanted in counts:
+        count = wanted
     same = [row for row, has in zip(types, has_values, strict=True) if has and len(row) == count]
     columns = [Counter(filter(None, column)) for column in zip(*same, strict=True)]
     named = [
@@ -433,7 +642,7 @@ def _width(cells: Sequence[str]) -> int:
     return max((k for k, cell in enumerate(cells, 1) if cell), default=0)
 
 
-def _hex(text: Text, lines: Sequence[str]) -> tuple[_Fit | None, bool]:
+def _hex(all_lines: Callable[[], Iterable[str]], lines: Sequence[str]) -> tuple[_Fit | None, bool]:
     """Return the lines as hexadecimal numbers, if all have as many digits, and whether any has one from A to F."""
     there = [(k, line) for k, line in enumerate(lines) if line.strip()]
     for separator in " ,;\t":
@@ -445,7 +654,7 @@ def _hex(text: Text, lines: Sequence[str]) -> tuple[_Fit | None, bool]:
         has_letters = any(not cell.isdecimal() for cell in digits)
         if not has_letters and not any(cell.startswith("0") for cell in digits):
             return None, False
-        has_letters = has_letters or any(_HEX_LETTER.search(line) for line in text.lines())
+        has_letters = has_letters or any(_HEX_LETTER.search(line) for line in all_lines())
         return next(_fits(lines, [("hex", separator, ".")]), None), has_letters
     return None, False
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import re
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,19 @@ from taxel._base.errors import unreadable
 from taxel._base.limits import TIME_US
 from taxel._base.messages import counted
 
-__all__ = ["FEW_ODD", "ISO", "ODD", "UNITS_US", "Repaired", "in_order", "is_day", "is_time", "repaired", "us_of"]
+__all__ = [
+    "FEW_ODD",
+    "ISO",
+    "ODD",
+    "UNITS_US",
+    "Repaired",
+    "in_order",
+    "is_day",
+    "is_time",
+    "repaired",
+    "seconds_of",
+    "us_of",
+]
 
 #: So many odd lines, or times, are left out or repaired in any file, and of longer ones this share.
 FEW_ODD, ODD = 2, 0.1
@@ -31,6 +45,10 @@ _DATE = r"(?:\d{4}-\d\d-\d\d|\d{1,2}\.\d{1,2}\.\d{4})"
 _IS_TIME = re.compile(rf"(?:{_DATE}[T ])?{_CLOCK}(?:Z|[+-]\d\d:?\d\d)?")
 _IS_DAY = re.compile(_DATE)
 _DAY_US = 86_400_000_000
+_DAY_WITH_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?:[ T]+(\S+))?", re.ASCII)
+_TIME_OF_DAY = re.compile(r"\d\d:.*|\d{6}(?:[.,+Z-].*)?", re.ASCII)
+#: Characters of a date without separators.
+_SHORTEST_DATE = 8
 #: A counter of times that is full begins at 0 again: its values, in the unit of the file.
 _WRAPS = (1 << 16, 1 << 32)
 #: A step over a wrap, or to a line out of order, is at most so many usual ones.
@@ -53,6 +71,34 @@ def is_time(cell: str) -> bool:
 def is_day(cell: str) -> bool:
     """Return whether a text is a date without a time."""
     return _IS_DAY.fullmatch(cell) is not None
+
+
+def seconds_of(cell: str) -> float:
+    """Return the seconds since 1970, or of the day, of a text of ISO 8601 or a day with points; NaN of any other text.
+
+    Days with points are day, month and year (DIN 5008). Days with slashes are none: their order differs by country.
+    Without a zone a time is of UTC. Six digits of a fraction count.
+
+    Examples
+    --------
+    >>> seconds_of("1970-01-02T00:00:00.5"), seconds_of("1970-01-01 01:00:00+01:00"), seconds_of("00:01:00.25")
+    (86400.5, 0.0, 60.25)
+    >>> seconds_of("02.01.1970 00:00:00,5"), seconds_of("01/02/1970 00:00")
+    (86400.5, nan)
+    """
+    found = _DAY_WITH_POINTS.fullmatch(cell)
+    if found is not None:
+        day, month, year, rest = found.groups()
+        cell = f"{year}-{month:0>2}-{day:0>2}T{rest or '00:00'}"
+    elif _TIME_OF_DAY.fullmatch(cell):
+        cell = f"1970-01-01T{cell}"
+    elif not cell[:4].isdecimal() or len(cell) < _SHORTEST_DATE:
+        return math.nan
+    try:
+        at = datetime.fromisoformat(cell)
+    except ValueError:
+        return math.nan
+    return (at if at.tzinfo is not None else at.replace(tzinfo=UTC)).timestamp()
 
 
 def us_of(column: Any, unit: str) -> NDArray[Any]:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
-from functools import partial
 from types import TracebackType
 from typing import Any
 
@@ -23,15 +21,15 @@ from taxel._base.options import with_fields_of
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detections import Detection
-from taxel.live.lsl import LslInlet, LslOutlet
+from taxel.live.lsl import LslOutlet
 from taxel.live.options import LiveOptions
+from taxel.live.sources import Sources
 from taxel.live.summary import Summary, summary_of
 from taxel.reading import Zeroing
 from taxel.tare import Tare
 
-#: Prefix of the sources and destinations of the lab streaming layer.
+#: Prefix of the destinations of the lab streaming layer.
 _LSL = "lsl:"
-_LSL_SOURCE = re.compile(r"(?:([^=:]+)=)?lsl:(.*)", re.DOTALL)
 
 #: The largest column or row of any taxel.
 _MOST_INDEX = 2**16 - 1
@@ -81,11 +79,13 @@ class Live:
         recording. "board:HOST:PORT" is a board that sends to that address of this machine (array=ROWSxCOLUMNS,
         preset=NAME). Lines of numbers come from "serial:PLACE" (baud=), "lines:PATH" (a pipe, or a file that grows; "-"
         is the standard input), "lines+tcp:HOST:PORT" (connects), "lines+udp:HOST:PORT" (listens) and "given", what a
-        program passes to `sample`. With ``array=`` they are frames: a line each, or ``frame_lines=16``, or up to an
-        empty line (``frame_end=blank``). ``time=COLUMN:ms`` is the column of the time (by name, or by number from 1;
-        ``time=A+B`` adds seconds and nanoseconds; without it the time of arrival), ``columns=A:B:C`` names the columns,
-        ``leave_out=A:B`` are those without values, ``unit=``, ``falls=`` (true, or the number that readings are
-        subtracted from) and ``rate=`` (frames a second; default: measured). Lines without an array, as of an IMU, are
+        program passes to `sample`. They are read as tables are (commas, brackets, ``NAME:``, JSON, hex). Those of the
+        first source, and with ``array=``, are frames: a line each, or ``frame_lines=16``, or up to an empty line
+        (``frame_end=blank``); without ``array=`` the shape is that of the readout, if it fits, or guessed (`read_as`).
+        ``time=COLUMN:ms`` is the column of the time (by name, or by number from 1; ``time=A+B`` adds seconds and
+        nanoseconds; without it the time of arrival), ``columns=A:B:C`` names the columns, ``leave_out=A:B`` are those
+        without values, ``unit=``, ``falls=`` (true, or the number that readings are subtracted from) and ``rate=``
+        (frames a second; default: measured). Lines without an array of further sources, as of an IMU, are
         recorded with the first source. "lsl:NAME" is a stream of the lab streaming layer.
     first_line_s : float, 0 or more
         How long each source of lines may be silent before its first line, s. A source of which the array, the columns
@@ -150,18 +150,14 @@ class Live:
         self._registers_stated = options.registers is not None
         options = options.completed()
         say = options.say
-        destinations, sources = options.destinations(), options.source_texts()
+        destinations = options.destinations()
         outlets = [LslOutlet(to.removeprefix(_LSL)) for to in destinations if to.startswith(_LSL)]
-        inlets = {source: LslInlet(found[2]) for source in sources if (found := _LSL_SOURCE.fullmatch(source))}
-        self._inlets = list(inlets.values())
+        self._sources = sources = Sources(options)
+        options = sources.options
         receivers: list[Callable[[Detection], object]] = [*outlets, *([] if say is None else [say])]
         self._summary: Summary | None = None
-        stated = options.for_rust(
-            send=[to for to in destinations if not to.startswith(_LSL)],
-            sources=[_given(source, inlets[source]) if source in inlets else source for source in sources],
-        )
         self._core = _core.Live(
-            stated,
+            sources.for_rust([to for to in destinations if not to.startswith(_LSL)]),
             None if options.record is None else checked_path("record", options.record),
             None if not receivers else lambda values: [receive(Detection(**values)) for receive in receivers],
         )
@@ -178,11 +174,12 @@ class Live:
         self._states_unit = layout is None or layout[1]
         #: To begin another one on another address.
         self._options = replace(options, array=self.array)
+        #: How the lines that are read out were understood, if what they are was not stated; else "".
+        self.read_as = sources.read_as
         self._place = self._core.place()
         #: Where a board is received; nowhere of a source of frames.
         self._listened_on = self._core.address() if self.frame_us is None else (None, None)
-        for source, inlet in inlets.items():
-            inlet.begin(partial(self._core.sample, _stream_name(source)))
+        sources.begin(self._core)
 
     def _again(self, **changed: Any) -> Live:
         """Return another `Live` that works alike, with other options; by default it receives from the same place."""
@@ -255,7 +252,8 @@ class Live:
         `late` (events out of order), `detections`, `wrong` (those output in a
         silence that an event then interrupted, later than the guard), `outside` (those with an input outside the range
         that it had in training; None if that is not known), `detections_dropped`, `sources` (the counts of
-        each other source; of one of lines: lines, strange, bytes_in_no_line, bytes_of_unfinished_lines, trouble),
+        each other source; of one of lines: lines, strange, bytes_in_no_line, bytes_of_unfinished_lines, trouble, and
+        for frames unread: by kind the lines in no frame, with the first),
         `sent` (of each destination: to,
         sent, lost, waiting, trouble), `decode_latency` and
         `report_latency` (count, p50_us, p99_us, max_us; None where nothing was measured, as where the
@@ -271,7 +269,7 @@ class Live:
         """
         if self._summary is not None:
             return self._summary.counters
-        return self._core.counters()
+        return self._sources.with_unread(self._core.counters())
 
     @property
     def frame(self) -> NDArray[np.uint16] | NDArray[np.float32]:
@@ -362,7 +360,7 @@ class Live:
         row = numbers("values", values, np.float64).reshape(-1)
         for k in np.flatnonzero(np.abs(row) > VALUE)[:1]:
             raise refused("values", f"[{k}] is {shown(row[k].item())}: must fit 32 bits, or be NaN if it is missing")
-        self._core.sample(text("name", name), row.tolist(), arrival)
+        self._sources.sample(text("name", name), row.tolist(), arrival)
 
     def zero(self, x: ArrayLike, y: ArrayLike) -> tuple[Zeroing, ...]:
         """Use the present values of taxels as their rest from this time: for taxels that drift.
@@ -486,11 +484,10 @@ class Live:
         OSError : the disk is full, and what was written before stays readable
         ProblemError : called by `say`, or after an end by an error
         """
-        inlets, self._inlets = self._inlets, []
-        for inlet in inlets:
-            inlet.close()
+        self._sources.close()
         if self._summary is None:
             self._summary = summary_of(self._core.stop())
+            self._sources.with_unread(self._summary.counters)
         return self._summary
 
     def __enter__(self) -> Live:
@@ -510,14 +507,3 @@ class Live:
         if self._summary is not None:
             return escaped(f"Live(ended; {self._summary.verdict})")
         return escaped(f"Live({self.place}, {self.array.rows} x {self.array.columns} taxels)")
-
-
-def _stream_name(source: str) -> str:
-    """Return the name of a stream of the lab streaming layer among the sources."""
-    found = _LSL_SOURCE.fullmatch(source)
-    return "lsl" if found is None or found[1] is None else found[1]
-
-
-def _given(source: str, inlet: LslInlet) -> str:
-    """Return the source whose numbers an inlet passes."""
-    return f"{_stream_name(source)}=given,columns={':'.join(inlet.columns)}"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import Field, dataclass, fields, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taxel import _core
@@ -15,7 +14,6 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import PlainRule, Readout
 from taxel.detect.detector import detector
-from taxel.formats.layout import Layout
 from taxel.live._stated_options import StatedOptions
 from taxel.tare import Tare
 from taxel.wire import Registers
@@ -65,24 +63,16 @@ class LiveOptions(StatedOptions):
             )
         else:
             listed = [self.sources] if isinstance(self.sources, str) else several("sources", self.sources)
-        return [_with_layout(text("source", source)) for source in listed]
+        return [text("source", source) for source in listed]
 
-    def for_rust(self, *, send: list[str], sources: list[str]) -> str:
-        """Return the options as the compiled part reads them; it opens `send` and `sources` itself."""
+    def for_rust(self, *, send: list[str], read: dict[str, Any] | None, sources: list[dict[str, Any]]) -> str:
+        """Return the options as the compiled part reads them, with the frames that it receives instead of a board."""
         plain = {o.name: _plain(o, getattr(self, o.name)) for o in fields(StatedOptions) if o.name not in _APART}
-        return parameters(plain | {"send": send, "sources": sources})
+        return parameters(plain | {"send": send, "input": read, "sources": sources})
 
 
-def _with_layout(source: str) -> str:
-    """Return the text of a source; that of a layout file, if it names one."""
-    if not source.endswith(".toml") or "," in source:
-        return source
-    name, _, path = source.rpartition("=")
-    return f"{name}=" * bool(name) + Layout.read(Path(path)).source_text()
-
-
-#: Options that are passed in another form: the name of a file may be no text.
-_APART = ("record", "send", "sources")
+#: Options that are passed in another form, as the name of a file may be no text, or not at all.
+_APART = ("record", "send", "sources", "first_line_s")
 
 
 def _plain(option: Field[Any], value: object) -> object:

@@ -18,6 +18,7 @@ from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.device import ports
 from taxel.labels import Note
+from taxel.live.lines import preview
 from taxel.panel.declared import Number, Request, Several, Text, Time, Whole, long_request, request, requests_of
 from taxel.panel.folder import Shown
 from taxel.panel.label_file import Edit
@@ -38,6 +39,8 @@ _MOST_REFUSED, _REFUSED_WITHIN_S = 100, 10.0
 
 #: A client that does not read as many bytes that wait for it is disconnected.
 _MOST_WAITING = 1 << 21
+#: How long the lines of a sensor are looked at, s.
+_LOOK_S = 2.0
 
 
 class Row(TypedDict):
@@ -387,7 +390,7 @@ class Session:
 
         `source` is what `connect` takes, with rows, columns and what else the lines show.
         """
-        lines, about, source = await in_thread(_core.lines_preview, f"serial:{port},baud={baud}")
+        lines, about, source = await in_thread(preview, f"serial:{port},baud={baud}", _LOOK_S)
         await self.say({"type": "guess", "lines": lines, "about": about, "source": source})
 
     @request

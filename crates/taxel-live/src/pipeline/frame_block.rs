@@ -31,3 +31,21 @@ impl FrameBlock {
         FramesView { array, t: &self.t, values: &self.values }
     }
 }
+
+/// A frame as a message: its time, us, and its values.
+pub(super) fn write_message(t: i64, values: &[f32], out: &mut Vec<u8>) {
+    out.clear();
+    out.extend_from_slice(&t.to_le_bytes());
+    values.iter().for_each(|value| out.extend_from_slice(&value.to_le_bytes()));
+}
+
+/// The time of a frame's message, us, and its values.
+///
+/// # Panics
+///
+/// If the message was not made by [`write_message`].
+pub(super) fn read_message(message: &[u8]) -> (i64, impl Iterator<Item = f32> + '_) {
+    let (t, values) = message.split_first_chunk().expect("a message begins with its time");
+    let value = |four: &[u8]| f32::from_le_bytes([four[0], four[1], four[2], four[3]]);
+    (i64::from_le_bytes(*t), values.chunks_exact(4).map(value))
+}

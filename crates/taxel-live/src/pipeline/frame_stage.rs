@@ -9,12 +9,12 @@ use taxel_core::{Array, Events, Intensities};
 
 use super::counters::Counters;
 use super::falling_values::FallingValues;
-use super::frame_block::FrameBlock;
+use super::frame_block::{FrameBlock, read_message};
 use super::readout_queue::QuietUntil;
 use super::rest_shift::RestShift;
+use super::source::FrameLayout;
 use crate::capture::Batch;
 use crate::clock::{BoardClock, Pace};
-use crate::frame_lines::{FrameLayout, read_message};
 
 /// Shortest interval at which the readout's time is advanced while no frames arrive.
 const TICK: Duration = Duration::from_micros(500);

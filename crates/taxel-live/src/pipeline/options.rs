@@ -2,14 +2,13 @@
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::time::Duration;
 
 use serde::Deserialize;
+use taxel_core::Array;
 use taxel_core::detect::FrameTime;
 use taxel_core::wire::Registers;
-use taxel_core::{Array, Stop, problem};
 
-use super::source::{FirstLineWait, SourceText};
+use super::source::{FrameSource, NamedSource};
 use crate::address::of_host;
 use crate::capture::ReceiverOptions;
 use crate::recording::Compression;
@@ -42,10 +41,10 @@ pub struct LiveOptions {
     pub record_later: bool,
     /// The board's name among the sources of the recording.
     pub name: String,
-    /// The source to receive, and further ones that are only recorded: [NAME=]KIND:PLACE and, after commas, KEY=VALUE.
-    pub sources: Vec<String>,
-    /// How long each source of lines may be silent before its first line, s.
-    pub first_line_s: f64,
+    /// The frames of numbers that are received instead of a board.
+    pub input: Option<FrameSource>,
+    /// Further sources, which are only recorded.
+    pub sources: Vec<NamedSource>,
     /// Compression of a .mcap: none, lz4 or zstd.
     pub compression: String,
     /// Replace output files that exist already.
@@ -82,8 +81,8 @@ impl Default for LiveOptions {
             record: None,
             record_later: false,
             name: "board".to_owned(),
+            input: None,
             sources: vec![],
-            first_line_s: 3.0,
             compression: "none".to_owned(),
             overwrite: false,
             guard_frames: 5.0,
@@ -128,38 +127,6 @@ impl LiveOptions {
     /// `Core(Problem)` if there is no such host.
     pub fn address(&self) -> crate::Result<SocketAddr> {
         of_host(self.host.as_deref().unwrap_or(HOST), self.port.unwrap_or(PORT))
-    }
-
-    /// The sources that are stated.
-    ///
-    /// # Errors
-    ///
-    /// `Core(Problem)` if a text is none of a source, or two have one name.
-    pub(super) fn source_texts(&self) -> crate::Result<Vec<SourceText>> {
-        let texts = self.sources.iter().map(|text| text.parse()).collect::<crate::Result<Vec<SourceText>>>()?;
-        for (k, text) in texts.iter().enumerate() {
-            let name = text.name();
-            if texts[..k].iter().any(|earlier| earlier.name() == name) {
-                let text = &text.text;
-                return Err(problem!(
-                    "source {text:?}: two sources have the name {name}; begin one of them with another NAME="
-                )
-                .into());
-            }
-        }
-        Ok(texts)
-    }
-
-    /// How long each source of lines may be silent, unless asked to stop.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` if that is no time.
-    pub(super) fn first_line_wait<'a>(&self, stop: Stop<'a>) -> taxel_core::Result<FirstLineWait<'a>> {
-        let seconds = self.first_line_s;
-        let most = Duration::try_from_secs_f64(seconds)
-            .map_err(|_| problem!("first_line_s"; " is {seconds} s: must be 0 or more"))?;
-        Ok(FirstLineWait { most, stop })
     }
 
     /// The socket and the queue behind it.

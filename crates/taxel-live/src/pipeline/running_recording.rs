@@ -10,16 +10,16 @@ use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
 use super::counters::{Counters, DecodingCounts};
+use super::frame_block::read_message;
 use super::options::Record;
 use super::sink::OutputDetection;
 use super::source::NamedSource;
+use crate::Result;
 use crate::capture::Batch;
-use crate::frame_lines::read_message;
 use crate::locked::lock;
 use crate::recording::{
     self, BoardChange, Cause, Counts, FrameEncoding, Header, LsaWriter, OutputFile, SourceWriter, Writer, now_ns,
 };
-use crate::{Error, Result};
 
 /// One recording, from its reservation to its end. A raw `.lsa` contains bytes only: notes, markers and the like are
 /// left out.
@@ -86,9 +86,6 @@ impl RecordingFile {
 pub(super) trait Host: Send + Sync {
     /// Opens the part of another source.
     fn part(&self, name: &str) -> Result<SourceWriter>;
-
-    /// Ends the pipeline because of an error.
-    fn fail(&self, error: Error);
 }
 
 /// A source's part of a recording that another pipeline began.
@@ -379,6 +376,11 @@ impl RunningRecording {
         }
         self.has_notes.store(true, Ordering::Relaxed);
         self.with_track(|track| track.note(now_ns(), board_us.and_then(|t| self.timed(t)), text))
+    }
+
+    /// Writes a line of a source of frames that was not read.
+    pub(super) fn unread_line(&self, arrived_ns: i64, text: &str) -> Result<()> {
+        self.with_track(|track| track.unread_line(arrived_ns, text))
     }
 
     /// Writes a taxel's zeroing by a user.

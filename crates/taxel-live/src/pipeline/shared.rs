@@ -19,10 +19,9 @@ use super::readout_queue::ReadoutQueue;
 use super::running_recording::{Host, RunningRecording};
 use super::sending::SendingLine;
 use super::sink::OutputDetection;
-use super::source::NamedSource;
+use super::source::{FrameLayout, NamedSource};
 use super::viewer_queue::ViewerEvents;
 use crate::capture::{Origin, Receiver};
-use crate::frame_lines::FrameLayout;
 use crate::latency::{Latencies, Quantiles};
 use crate::locked::lock;
 use crate::recording::{Decoding, Header, SourceWriter, now_ns};
@@ -201,6 +200,13 @@ impl PipelineShared {
         }
     }
 
+    /// Records lines that were not read, as they came; an error of the file, which the next frame meets too, is its.
+    pub(super) fn record_unread(&self, lines: &[(i64, String)]) {
+        if let (false, Some(recording)) = (lines.is_empty(), &*lock(&self.recording.running)) {
+            let _ = lines.iter().try_for_each(|(at_ns, text)| recording.unread_line(*at_ns, text));
+        }
+    }
+
     /// Ends the pipeline because of an error, which [`Live::next`](super::Live::next) and
     /// [`Live::stop`](super::Live::stop) then return.
     pub(super) fn fail(&self, error: Error) {
@@ -238,9 +244,5 @@ impl Host for PipelineShared {
             Some(recording) => recording.track_of(name),
             None => Err(taxel_core::problem!("source {name}: nothing is recorded").into()),
         }
-    }
-
-    fn fail(&self, error: Error) {
-        Self::fail(self, error);
     }
 }

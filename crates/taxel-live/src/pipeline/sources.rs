@@ -1,32 +1,26 @@
 //! The running sources of a recording besides the board.
 //!
-//! Each source has its own clock, in addition to the host's arrival times, its own counts and its own thread. Data that
-//! the thread does not read in time are buffered or dropped by the system.
+//! Each source has its own clock, in addition to the host's arrival times, and its own counts.
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, Weak};
-use std::thread::JoinHandle;
 use std::time::Instant;
 
 use taxel_core::{Array, problem};
 
 use super::counters::{Counters, SourceCounts};
-use super::frame_input::{FrameInput, LineCounts};
+use super::frame_input::{FrameInput, LineCounts, ReadLines};
 use super::options::LiveOptions;
 use super::record_stage::COUNTS_EVERY;
 use super::running_recording::{Host, RecordingPart};
 use super::shared::PipelineShared;
-use super::source::{NamedSource, Opened, OpenedLines, SourceKind};
+use super::source::{FrameLayout, NamedSource, SourceKind};
 use crate::capture::{Receiver, ReceiverOptions};
-use crate::frame_lines::FrameLayout;
-use crate::line_input::LineReader;
-use crate::line_place::LinePlace;
 use crate::locked::lock;
-use crate::recording::{self, Found, SourceWriter, StreamColumns, StreamFaults, cells, now_ns};
-use crate::text_lines::{LeftOut, TextLine};
-use crate::{Error, Result};
+use crate::recording::{self, Found, SourceWriter, StreamColumns, StreamFaults, now_ns};
+use crate::text_lines::LeftOut;
+use crate::{Result, address};
 
 /// A running stream of numbers.
 pub(super) struct NumberStream {
@@ -36,7 +30,6 @@ pub(super) struct NumberStream {
     track: Mutex<NumbersTrack>,
     stream: StreamColumns,
     trouble: Mutex<Option<String>>,
-    ends: AtomicBool,
 }
 
 /// The part of a recording into which lines are written, if any.
@@ -56,18 +49,28 @@ impl NumberStream {
     pub(super) fn new(part: RecordingPart, stream: StreamColumns, always: bool) -> Self {
         let faults = StreamFaults::new(&stream);
         let track = NumbersTrack { track: None, lines: 0, before: 0, all: faults.clone(), faults, counted: None };
-        Self { part, always, track: Mutex::new(track), stream, trouble: Mutex::default(), ends: AtomicBool::new(false) }
+        Self { part, always, track: Mutex::new(track), stream, trouble: Mutex::default() }
     }
 
-    /// Records a line of numbers.
-    pub(super) fn sample(&self, arrived_ns: i64, values: &[f64]) -> Result<()> {
-        if !self.stream.fits(values) {
-            let columns = self.stream.columns.join(", ");
-            let (name, n) = (&self.part.name, values.len());
+    /// Records the lines that a reader passes on.
+    pub(super) fn push(&self, read: &ReadLines) -> Result<()> {
+        let (columns, n) = (self.stream.columns.len(), read.values.len());
+        if n != read.arrived_ns.len() * columns {
+            let (name, columns) = (&self.part.name, self.stream.columns.join(", "));
             return Err(problem!("source {name}: {n} values; must be one per column: {columns}").into());
         }
-        let faults = |faults: &mut StreamFaults| faults.line(&self.stream, values, arrived_ns);
-        self.record(faults, |track, number| track.sample(arrived_ns, number, values))
+        if read.trouble.is_some() || !read.arrived_ns.is_empty() {
+            // A line that failed is there again where numbers arrive.
+            lock(&self.trouble).clone_from(&read.trouble);
+        }
+        for (values, &at_ns) in read.values.chunks_exact(columns).zip(&read.arrived_ns) {
+            let faults = |faults: &mut StreamFaults| faults.line(&self.stream, values, at_ns);
+            self.record(faults, |track, number| track.sample(at_ns, number, values))?;
+        }
+        for (at_ns, text) in &read.unread {
+            self.record(StreamFaults::strange, |track, number| track.strange_line(*at_ns, number, text))?;
+        }
+        self.count_left_out(read.left_out)
     }
 
     /// Counts a line with its faults, and records it if a recording runs. Each line belongs to one recording.
@@ -85,21 +88,6 @@ impl NumberStream {
         count(&mut current.faults);
         count(&mut current.all);
         current.track.as_ref().map_or(Ok(()), |track| write(track, number))
-    }
-
-    /// Records a line of text.
-    fn line(&self, arrived_ns: i64, line: &TextLine) -> Result<()> {
-        let text = &*line.text;
-        match self.stream.parse(text) {
-            Some(values) if !line.cut => self.sample(arrived_ns, &values),
-            // A repeated line of column names contains no numbers.
-            None if !line.cut
-                && (cells(text).eq(self.stream.columns.iter().map(String::as_str)) || text.trim().is_empty()) =>
-            {
-                Ok(())
-            }
-            _ => self.record(StreamFaults::strange, |track, number| track.strange_line(arrived_ns, number, text)),
-        }
     }
 
     /// Counts bytes that arrived and are in no line; an unfinished recording states them too.
@@ -149,56 +137,6 @@ impl NumberStream {
     fn counts_of(&self, lines: u64, faults: Found) -> SourceCounts {
         SourceCounts::Numbers(Box::new(LineCounts::new(lines, faults, lock(&self.trouble).clone())))
     }
-
-    /// Records no more lines: ends its part of the recording with its counts.
-    pub(super) fn end(&self) {
-        self.ends.store(true, Ordering::Release);
-        self.record_into(None);
-    }
-
-    /// Reads lines until the end, in a separate thread; a failed line is opened again.
-    pub(super) fn read(self: &Arc<Self>, opened: OpenedLines) -> Result<JoinHandle<()>> {
-        let (numbers, OpenedLines { mut reader, begun, .. }) = (Arc::clone(self), opened);
-        let thread = std::thread::Builder::new().name("taxel-lines".to_owned());
-        let job = move || {
-            let begun = begun.iter().try_for_each(|(line, at_ns)| numbers.line(*at_ns, line));
-            if let Err(error) = begun.and_then(|()| numbers.read_lines(&mut reader))
-                && !numbers.ends.load(Ordering::Acquire)
-                && let Some(host) = numbers.part.host.upgrade()
-            {
-                host.fail(error);
-            }
-        };
-        thread.spawn(job).map_err(Error::socket("thread"))
-    }
-
-    /// Reads lines until the end.
-    fn read_lines(&self, reader: &mut LineReader) -> Result<()> {
-        let mut failed = false;
-        while !self.ends.load(Ordering::Acquire) {
-            let ended = match reader.fill() {
-                Ok(ended) => ended,
-                Err(error) => {
-                    *lock(&self.trouble) = Some(reader.broken(error).to_string());
-                    failed = true;
-                    reader.reopen();
-                    continue;
-                }
-            };
-            while let Some((line, at_ns)) = reader.next_whole(ended, |line| self.stream.parse(&line.text).is_some()) {
-                self.line(at_ns, &line)?;
-                if std::mem::take(&mut failed) {
-                    *lock(&self.trouble) = None;
-                }
-            }
-            if ended {
-                break;
-            }
-            self.count_left_out(reader.lines.take_left_out())?;
-        }
-        reader.lines.discard();
-        self.count_left_out(reader.lines.take_left_out())
-    }
 }
 
 /// The losses of a stream of numbers, as recordings state them.
@@ -211,46 +149,36 @@ pub(super) fn losses_of_lines(lines: u64, faults: &Found) -> recording::Recordin
 pub(super) enum PipelineInput {
     /// A board that sends to this address.
     Board(SocketAddr),
-    /// Frames of numbers, and the lines to read them from.
-    Frames(Option<LinePlace>, Box<FrameLayout>, Option<Box<OpenedLines>>),
+    /// Frames of numbers from this place.
+    Frames(String, Box<FrameLayout>),
 }
 
 impl PipelineInput {
-    /// Frames of a place that may be open already, or of a program.
-    pub(super) fn frames(place: &Option<LinePlace>, layout: &FrameLayout, opened: &Opened) -> Result<Self> {
-        let lines = place.as_ref().map(|place| opened.take_or_open(place)).transpose()?;
-        Ok(Self::Frames(place.clone(), Box::new(layout.clone()), lines.map(Box::new)))
-    }
-
     /// The layout of its frames, if it has any.
     pub(super) fn layout(&self) -> Option<&FrameLayout> {
         match self {
-            Self::Frames(_, layout, _) => Some(layout),
+            Self::Frames(_, layout) => Some(layout),
             Self::Board(_) => None,
         }
     }
 
-    /// Opens the input: the receiver, and frames with the lines to read.
-    pub(super) fn open(self, options: ReceiverOptions) -> Result<OpenInput> {
+    /// Opens the input: the receiver, and the way of its frames.
+    pub(super) fn open(self, options: ReceiverOptions) -> Result<(Receiver, Option<Arc<FrameInput>>)> {
         Ok(match self {
-            Self::Board(address) => (Receiver::bind(address, options)?, None, None),
-            Self::Frames(place, layout, lines) => {
-                let (frames, receiver) = FrameInput::new(place, *layout, options);
-                (receiver, Some(frames), lines.map(|lines| *lines))
+            Self::Board(address) => (Receiver::bind(address, options)?, None),
+            Self::Frames(place, layout) => {
+                let (frames, receiver) = FrameInput::new(&place, *layout, options);
+                (receiver, Some(frames))
             }
         })
     }
 }
-
-/// A receiver, and frames of numbers with the lines to read them from.
-pub(super) type OpenInput = (Receiver, Option<Arc<FrameInput>>, Option<OpenedLines>);
 
 /// The running other sources of a pipeline.
 pub(super) struct Others<Pipeline> {
     /// Other boards and sources of frames, each with its own pipeline.
     pub(super) pipelines: Vec<(String, Pipeline)>,
     pub(super) numbers: Vec<(String, Arc<NumberStream>)>,
-    pub(super) threads: Vec<JoinHandle<()>>,
 }
 
 impl<Pipeline> Others<Pipeline> {
@@ -259,8 +187,8 @@ impl<Pipeline> Others<Pipeline> {
         shared: &Arc<PipelineShared>,
         begin: impl Fn(PipelineInput, LiveOptions, RecordingPart) -> Result<Pipeline>,
     ) -> Result<Self> {
-        let (mut others, options) = (Self { pipelines: vec![], numbers: vec![], threads: vec![] }, &shared.options);
-        for NamedSource { name, kind } in &shared.sources {
+        let (mut others, options) = (Self { pipelines: vec![], numbers: vec![] }, &shared.options);
+        for NamedSource { name, place, kind } in &shared.sources {
             let host: Weak<dyn Host> = Arc::<PipelineShared>::downgrade(shared);
             let part = RecordingPart { host, name: name.clone() };
             let of_pipeline = |array: &Array| LiveOptions {
@@ -272,38 +200,23 @@ impl<Pipeline> Others<Pipeline> {
                 gro: options.gro,
                 ..LiveOptions::new(array.clone())
             };
-            let (input, stream, opened) = match kind {
-                SourceKind::Board(address, array, registers) => {
-                    let of_board = LiveOptions { registers: *registers, ..of_pipeline(array) };
-                    let board = begin(PipelineInput::Board(*address), of_board, part)?;
-                    others.pipelines.push((name.clone(), board));
+            let (input, options) = match kind {
+                SourceKind::Board(board) => {
+                    let of_board = LiveOptions { registers: board.registers, ..of_pipeline(&board.array) };
+                    (PipelineInput::Board(address::of_text(&board.address)?), of_board)
+                }
+                SourceKind::Frames(layout) => {
+                    (PipelineInput::Frames(place.clone(), layout.clone()), of_pipeline(&layout.array))
+                }
+                SourceKind::Numbers(stream) => {
+                    let numbers = NumberStream::new(part, stream.clone(), options.record.is_some());
+                    others.numbers.push((name.clone(), Arc::new(numbers)));
                     continue;
                 }
-                SourceKind::Frames(place, layout, opened) => {
-                    let (input, of_frames) =
-                        (PipelineInput::frames(place, layout, opened)?, of_pipeline(&layout.array));
-                    others.pipelines.push((name.clone(), begin(input, of_frames, part)?));
-                    continue;
-                }
-                SourceKind::Numbers(input, stream, opened) => (input, stream, opened),
             };
-            let numbers = Arc::new(NumberStream::new(part, stream.clone(), options.record.is_some()));
-            if let Some(input) = input {
-                others.threads.push(numbers.read(opened.take_or_open(input)?)?);
-            }
-            others.numbers.push((name.clone(), numbers));
+            others.pipelines.push((name.clone(), begin(input, options, part)?));
         }
         Ok(others)
-    }
-
-    /// Ends the threads that read numbers.
-    fn end_lines(&mut self) {
-        self.numbers.iter().for_each(|(_, numbers)| numbers.ends.store(true, Ordering::Release));
-        for thread in self.threads.drain(..) {
-            if let Err(panic) = thread.join() {
-                std::panic::resume_unwind(panic);
-            }
-        }
     }
 
     /// Ends all sources, and returns their counts.
@@ -311,10 +224,9 @@ impl<Pipeline> Others<Pipeline> {
         &mut self,
         end: impl Fn(Pipeline) -> Result<Counters>,
     ) -> Result<BTreeMap<String, SourceCounts>> {
-        self.end_lines();
         let mut counts = BTreeMap::new();
         for (name, numbers) in &self.numbers {
-            numbers.end();
+            numbers.record_into(None);
             counts.insert(name.clone(), numbers.counts());
         }
         let mut ended = Ok(());
@@ -325,11 +237,5 @@ impl<Pipeline> Others<Pipeline> {
             }
         }
         ended.map(|()| counts)
-    }
-}
-
-impl<Pipeline> Drop for Others<Pipeline> {
-    fn drop(&mut self) {
-        self.end_lines();
     }
 }

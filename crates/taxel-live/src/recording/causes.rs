@@ -66,6 +66,7 @@ causes! {
     DetectionsInFile "detections_lost_in_file" Lost "detections lost in the file",
     HeldInFile "held_values_lost_in_file" Lost "initial states lost in the file",
     ChangesInFile "changes_lost_in_file" Lost "board changes lost in the file",
+    LinesInFile "unread_lines_lost_in_file" Lost "unread lines lost in the file",
     BytesSkipped "bytes_skipped" Damaged "bytes skipped",
     ShortEvents "short_events" Damaged "short events",
     Contradictory "contradictory_kinds" Damaged "contradictory kinds",

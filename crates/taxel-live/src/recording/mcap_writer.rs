@@ -239,6 +239,15 @@ impl SourceWriter {
         self.push(Topic::Samples, arrived_ns, number, json!({ "line": line }).to_string().as_bytes())
     }
 
+    /// Writes a line of a source of frames that was not read, as it arrived.
+    ///
+    /// # Errors
+    ///
+    /// As [`SourceWriter::datagram`].
+    pub fn unread_line(&self, arrived_ns: i64, line: &str) -> Result<()> {
+        self.push_json(Topic::Lines, arrived_ns, &json!({ "line": line }))
+    }
+
     /// States that bytes arrived that are in no line; a recording with nothing else is kept, for their count.
     pub fn note_left_out(&self) {
         self.queue.lock().written[self.source].left_out = true;

@@ -2,11 +2,8 @@
 
 mod clock;
 
-use std::borrow::Cow;
-
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use taxel_core::dates::seconds_of;
 use taxel_core::problem;
 
 use super::causes::Cause;
@@ -29,9 +26,6 @@ pub struct StreamColumns {
     /// Whether the lines waited in a file until they were read, so that their arrival is no clock to compare with.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub waited: bool,
-    /// Whether the clock's column holds dates, or times of a day, as texts; they are recorded as seconds.
-    #[serde(skip)]
-    pub dates: bool,
 }
 
 fn default_unit() -> f64 {
@@ -39,15 +33,6 @@ fn default_unit() -> f64 {
 }
 
 impl StreamColumns {
-    /// Defines the columns by name. A name `t`, `time`, `stamp` or `timestamp` with the ending `_ns`, `_us`, `_ms` or
-    /// `_s` is the clock.
-    #[must_use]
-    pub fn of_columns(columns: Vec<String>) -> Self {
-        let time = columns.iter().find_map(|name| Some((name.clone(), clock_unit_us(name)?)));
-        let (time, unit_us) = time.map_or((None, 1.0), |(name, unit_us)| (Some(name), unit_us));
-        Self { columns, time, unit_us, waited: false, dates: false }
-    }
-
     /// The names of the columns of values, without the clock.
     pub fn values(&self) -> impl Iterator<Item = &String> {
         self.columns.iter().filter(|name| Some(*name) != self.time.as_ref())
@@ -85,16 +70,6 @@ impl StreamColumns {
         values.len() == self.columns.len()
     }
 
-    /// Parses a line of numbers; `None` if a cell is not a number that is held, or if the number of cells differs
-    /// from that of columns.
-    #[must_use]
-    pub fn parse(&self, line: &str) -> Option<Vec<f64>> {
-        let dated = self.columns.iter().position(|name| self.dates && Some(name) == self.time.as_ref());
-        let number = |(k, cell): (usize, Cow<'_, str>)| if Some(k) == dated { date(&cell) } else { number(&cell) };
-        let values = cells(line).enumerate().map(number).collect::<Option<Vec<f64>>>()?;
-        self.fits(&values).then_some(values)
-    }
-
     /// A line in the form in which it is recorded.
     #[must_use]
     pub(super) fn message(&self, values: &[f64]) -> Value {
@@ -104,44 +79,9 @@ impl StreamColumns {
     }
 }
 
-/// The units of a source's clock, us.
-pub(crate) const UNITS_US: [(&str, f64); 4] = [("ns", 1e-3), ("us", 1.0), ("ms", 1e3), ("s", 1e6)];
-
-/// The unit of a clock whose column has this name, us; none if it is not the name of a clock.
-pub(crate) fn clock_unit_us(name: &str) -> Option<f64> {
-    let (stem, unit) = name.rsplit_once('_')?;
-    let (_, unit_us) = UNITS_US.into_iter().find(|(known, _)| *known == unit)?;
-    ["t", "time", "stamp", "timestamp"].contains(&stem).then_some(unit_us)
-}
-
 /// Whether a number is a value that frames hold, which have 32 bits, or NaN, a missing one; infinity is none.
 pub(crate) fn is_held(value: f64) -> bool {
     value.is_nan() || value.abs() <= f64::from(f32::MAX)
-}
-
-/// The cells of a line, which semicolons (then a comma may be a decimal one), commas, tabs or blanks separate; a separator may
-/// end the line.
-pub(crate) fn cells(text: &str) -> impl Iterator<Item = Cow<'_, str>> {
-    let text = text.trim();
-    let separator = [';', ',', '\t'].into_iter().find(|&separator| text.contains(separator));
-    let text = separator.and_then(|separator| text.strip_suffix(separator)).unwrap_or(text);
-    let split =
-        text.split(move |c: char| if let Some(separator) = separator { c == separator } else { c.is_whitespace() });
-    let cells = split.map(str::trim).filter(move |cell| separator.is_some() || !cell.is_empty());
-    cells.map(move |cell| {
-        let is_decimal = separator == Some(';') && cell.contains(',');
-        if is_decimal { Cow::Owned(cell.replace(',', ".")) } else { Cow::Borrowed(cell) }
-    })
-}
-
-/// The number in a cell, if it is one that frames hold.
-pub(crate) fn number(cell: &str) -> Option<f64> {
-    cell.parse().ok().filter(|&value| is_held(value))
-}
-
-/// The seconds of a date, or of a time of a day, in a cell with or without quotes.
-pub(crate) fn date(cell: &str) -> Option<f64> {
-    seconds_of(cell.trim_matches(['"', '\'']))
 }
 
 /// The samples of a stream, as they arrived.
@@ -291,7 +231,14 @@ mod tests {
     use rand::{Rng, SeedableRng, rngs::StdRng};
 
     fn stream(columns: &[&str]) -> StreamColumns {
-        StreamColumns::of_columns(columns.iter().map(ToString::to_string).collect())
+        let units = [("t_us", 1.0), ("t_ms", 1e3), ("t_s", 1e6)];
+        let found = units.into_iter().find(|(name, _)| columns.contains(name));
+        StreamColumns {
+            columns: columns.iter().map(ToString::to_string).collect(),
+            time: found.map(|(name, _)| name.to_owned()),
+            unit_us: found.map_or(1.0, |(_, unit_us)| unit_us),
+            waited: false,
+        }
     }
 
     fn times(stream: &StreamColumns, stamps: &[(f64, i64)]) -> (Vec<i64>, Counted) {
@@ -324,28 +271,6 @@ mod tests {
         jumps: u64,
         drifts: u64,
         after: Option<i64>,
-    }
-
-    #[test]
-    fn the_clock_is_found_by_its_name() {
-        for (name, unit_us) in [("t_us", 1.0), ("time_ms", 1e3), ("stamp_s", 1e6), ("timestamp_ns", 1e-3)] {
-            let stream = stream(&["ax", name, "ay"]);
-            assert_eq!((stream.time.as_deref(), stream.unit_us), (Some(name), unit_us));
-            assert_eq!(stream.values().collect::<Vec<_>>(), ["ax", "ay"]);
-        }
-        assert_eq!(stream(&["ax", "speed_ms"]).time, None);
-    }
-
-    #[test]
-    fn lines_are_read_with_any_separator_and_refused_where_they_are_no_numbers() {
-        let stream = stream(&["t_us", "ax", "ay"]);
-        for line in ["1,2.5,-3e2", "1; 2.5; -3e2", "1\t2.5\t-300", " 1 2.5  -300 "] {
-            assert_eq!(stream.parse(line), Some(vec![1.0, 2.5, -300.0]), "{line:?}");
-        }
-        let nothing_held = ["1,2,inf", "1,-Infinity,3", "1,2,1e400", "inf,2,3", "1,2,1e39", "1_0,2,3", "1,2,\u{663}"];
-        for line in ["", "1,2", "1,2,3,4", "1,2,x", "t_us,ax,ay"].into_iter().chain(nothing_held) {
-            assert_eq!(stream.parse(line), None, "{line:?}");
-        }
     }
 
     #[test]
@@ -483,8 +408,9 @@ mod tests {
     fn a_missing_value_is_counted_live_and_in_the_file_and_is_no_damage() {
         let stream = stream(&["t_us", "a", "b"]);
         let (mut sampling, mut live) = (Sampling::new(&stream), StreamFaults::new(&stream));
-        for (k, line) in ["1,nan,2", "2,3,4", "3,NaN,nan", "nan,nan,1"].into_iter().enumerate() {
-            let values = stream.parse(line).unwrap();
+        let nan = f64::NAN;
+        let lines = [[1.0, nan, 2.0], [2.0, 3.0, 4.0], [3.0, nan, nan], [nan, nan, 1.0]];
+        for (k, values) in lines.into_iter().enumerate() {
             sampling.push(k as i64 * 1000, k as u64, stream.message(&values).to_string().as_bytes());
             live.line(&stream, &values, k as i64 * 1000);
         }

@@ -32,6 +32,8 @@ pub enum Topic {
     Samples = 10,
     /// Frames at full rate.
     Frames = 11,
+    /// Lines of a source of frames that were not read, as they came.
+    Lines = 12,
 }
 
 /// Difference of the channel numbers of one source from those of the source before it in the file.
@@ -39,7 +41,7 @@ const NEXT_SOURCE: u16 = 16;
 
 impl Topic {
     /// All channels, by number.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Datagrams,
         Self::Registers,
         Self::Markers,
@@ -51,6 +53,7 @@ impl Topic {
         Self::Board,
         Self::Samples,
         Self::Frames,
+        Self::Lines,
     ];
 
     /// The channel's name in a file.
@@ -68,6 +71,7 @@ impl Topic {
             Self::Board => "/board",
             Self::Samples => "/samples",
             Self::Frames => "/frames",
+            Self::Lines => "/lines",
         }
     }
 
@@ -96,6 +100,7 @@ impl Topic {
             Self::Held => ("taxel.Held", include_str!("schemas/Held.json")),
             Self::Board => ("taxel.Board", include_str!("schemas/Board.json")),
             Self::Samples => ("taxel.Sample", include_str!("schemas/Sample.json")),
+            Self::Lines => ("taxel.Line", include_str!("schemas/Line.json")),
         };
         Some((name, "jsonschema", text.as_bytes()))
     }
@@ -115,6 +120,7 @@ impl Topic {
             Self::Detections => Cause::DetectionsInFile,
             Self::Held => Cause::HeldInFile,
             Self::Board => Cause::ChangesInFile,
+            Self::Lines => Cause::LinesInFile,
             // Later counts include them, and datagrams the values of low-rate previews.
             Self::Counts | Self::Pressure => return None,
         })

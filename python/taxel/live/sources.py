@@ -1,0 +1,153 @@
+"""The sources of a `Live`: which of them is read out, and those that are only recorded."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from taxel import _core
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.live.lines import Lines
+from taxel.live.lsl import LslInlet
+from taxel.live.options import LiveOptions
+from taxel.live.stated_source import StatedSource
+
+__all__ = ["Sources"]
+
+
+class Sources:
+    """Open the sources that options state.
+
+    A board is received if a port, a host or a board is stated, or no source is; else the first source, as frames.
+
+    Parameters
+    ----------
+    options : LiveOptions
+        Complete.
+
+    Attributes
+    ----------
+    options : LiveOptions
+        With the address, sensor and name of the board, or the sensor and name of the frames.
+    lines : list of Lines
+        Those that are read, or that a program passes.
+
+    Raises
+    ------
+    OSError : a source cannot be opened
+    ProblemError : no such source, or one whose lines are not what is stated
+    """
+
+    def __init__(self, options: LiveOptions) -> None:
+        stated = [StatedSource.of(text) for text in options.source_texts()]
+        for k, source in enumerate(stated):
+            if any(before.called == source.called for before in stated[:k]):
+                raise ProblemError(
+                    f"source {source.text!r}: two sources have the name {source.called}; begin one of them with "
+                    "another NAME="
+                )
+        self.lines: list[Lines] = []
+        self._inlets: dict[str, LslInlet] = {}
+        self._unit = getattr(options.readout, "unit", None)
+        self._readout = options.array
+        self._read: Lines | None = None
+        is_board = options.port is not None or options.host is not None or not stated
+        if not is_board:
+            boards = [k for k, source in enumerate(stated) if source.kind == "board"]
+            options = self._read_out(stated.pop(boards[0] if boards else 0), options)
+        self.options = options
+        self._others = [self._other(source) for source in stated]
+
+    def _read_out(self, source: StatedSource, options: LiveOptions) -> LiveOptions:
+        """Return the options to receive a source."""
+        if source.kind == "board":
+            host, _, port = source.place.rpartition(":")
+            if not host or not port.isdecimal():
+                raise ProblemError(f"source {source.text!r}: {source.place!r} must be HOST:PORT")
+            options = replace(options, host=host.strip("[]"), port=int(port), name=source.called)
+            if source.array is None:
+                return options
+            return replace(options, array=source.array, registers=source.registers(source.array))
+        if source.kind == "lsl":
+            raise ProblemError(
+                f"source {source.text!r}: contains no frames, so it cannot be shown or read by a readout"
+            )
+        self._read = self._opened(source, options, is_read_out=True)
+        return replace(options, array=self._read.array, name=source.called)
+
+    def _other(self, source: StatedSource) -> dict[str, Any]:
+        """Return a further source as the compiled part knows it."""
+        if source.kind == "board":
+            array = source.array or Array.thesis()
+            registers = json.loads(source.registers(array)._json())
+            board = {"address": source.place, "array": array._geometry(), "registers": registers}
+            return {"name": source.called, "place": f"udp {source.place}", "kind": {"board": board}}
+        if source.kind == "lsl":
+            inlet = self._inlets[source.called] = LslInlet(source.place)
+            source = StatedSource.of(f"{source.called}=given,columns={':'.join(inlet.columns)}")
+        return self._opened(source, self.options, is_read_out=False).source(self._unit)
+
+    def _opened(self, source: StatedSource, options: LiveOptions, *, is_read_out: bool) -> Lines:
+        lines = Lines(source, is_read_out=is_read_out, readout=self._readout)
+        lines.find(options.first_line_s)
+        self.lines.append(lines)
+        return lines
+
+    def for_rust(self, send: Sequence[str]) -> str:
+        """Return the options as the compiled part reads them."""
+        read = self._read
+        frames = None
+        if read is not None:
+            frames = {"text": read.stated.text, "place": read.place, "layout": read.layout(self._unit)}
+        return self.options.for_rust(send=list(send), read=frames, sources=self._others)
+
+    @property
+    def read_as(self) -> str:
+        """How the lines that are read out were understood, if what they are was not stated; else ""."""
+        return "" if self._read is None else self._read.read_as
+
+    def begin(self, core: _core.Live) -> None:
+        """Pass what arrives on."""
+        for lines in self.lines:
+            lines.begin(core.lines, core.end_lines)
+        for name, inlet in self._inlets.items():
+            inlet.begin(partial(self.sample, name))
+
+    def sample(self, name: str, values: Sequence[float], at_ns: int | None) -> None:
+        """Pass on the numbers of a line of a source that a program has.
+
+        Raises
+        ------
+        ProblemError : no such source, or another number of columns
+        OSError : the disk is full
+        """
+        lines = next((lines for lines in self.lines if lines.name == name), None)
+        if lines is None:
+            raise ProblemError(f"source {name!r}: no source of numbers has this name")
+        lines.sample(values, time.time_ns() if at_ns is None else at_ns)
+
+    def with_unread(self, counters: dict[str, Any]) -> dict[str, Any]:
+        """Return counters with the lines of each source of frames that are in no frame, by kind."""
+        for lines in self.lines:
+            of = counters if lines is self._read else counters["sources"].get(lines.name, {})
+            if isinstance(of.get("lines"), dict):
+                of["lines"]["unread"] = {kind: dict(found) for kind, found in lines.unread.items()}
+        return counters
+
+    def close(self) -> None:
+        """End reading; what was read is passed on."""
+        inlets, self._inlets = self._inlets, {}
+        for inlet in inlets.values():
+            inlet.close()
+        for lines in self.lines:
+            lines.close()
+
+    @property
+    def failed(self) -> Exception | None:
+        """The error that ended reading early, as that of a full disk."""
+        return next((lines.failed for lines in self.lines if lines.failed is not None), None)

@@ -1,0 +1,152 @@
+"""What a text or a layout file states of a live source: `[NAME=]KIND:PLACE[,KEY=VALUE...]`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from taxel import _core
+from taxel._base.arguments import shown
+from taxel._base.messages import first_line
+from taxel._core import ProblemError
+from taxel.array import Array, of_size
+from taxel.formats.layout import Layout, PrintedFrames
+from taxel.wire import Registers
+
+__all__ = ["StatedSource"]
+
+#: How a source is written, for errors.
+_FORMS = (
+    "[NAME=]board:HOST:PORT, serial:PLACE, lines:PATH (- is the standard input), lines+tcp:HOST:PORT, "
+    "lines+udp:HOST:PORT, lsl:NAME or given, and KEY=VALUE after commas"
+)
+_LINES = ("serial", "lines", "lines+tcp", "lines+udp")
+_OF_BOARD = ("array", "preset")
+_OF_LINES = ("array", "baud", "time", "columns", "leave_out", "frame_lines", "frame_end", "unit", "falls", "rate")
+
+
+@dataclass(frozen=True)
+class StatedSource:
+    """Hold what is stated of a source.
+
+    Parameters
+    ----------
+    text : str
+        The source as it was stated.
+    kind : {"board", "lines", "given", "lsl"}
+    name : str
+        Its name, "" if none is stated.
+    place : str
+        The address of a board, the place of lines, the name of a stream.
+    array : Array, optional
+    printed : PrintedFrames
+        How its lines are read.
+    unit : str, optional
+    turned : float, optional
+        The number from which readings are subtracted, as they fall with pressure.
+    rate_hz : float, Hz, optional
+    preset : str
+        Of the registers of a board.
+    """
+
+    text: str
+    kind: str
+    name: str
+    place: str
+    array: Array | None
+    printed: PrintedFrames
+    unit: str | None = None
+    turned: float | None = None
+    rate_hz: float | None = None
+    preset: str = "5.2 kHz"
+
+    @classmethod
+    def of(cls, text: str) -> StatedSource:
+        """Return what a text states, or the layout file that it names.
+
+        Raises
+        ------
+        ProblemError : no source, or a key or value that it cannot have
+        FormatError : the layout file cannot be read, or names no source
+        """
+        if text.endswith(".toml") and "," not in text:
+            name, _, path = text.rpartition("=")
+            text = f"{name}=" * bool(name) + Layout.read(Path(path)).source_text()
+        head, *pairs = text.split(",")
+        before, is_named, after = head.partition("=")
+        name, head = (before.strip(), after) if is_named and ":" not in before else ("", head)
+        kind, _, place = head.partition(":")
+        keys = dict[str, str]()
+        for pair in pairs:
+            key, there, value = pair.partition("=")
+            if not there:
+                raise ProblemError(f"source {text!r}: {pair!r} must be KEY=VALUE")
+            keys[key.strip()] = value.strip()
+        is_lines = kind in _LINES and bool(place)
+        if not is_lines and head != "given" and not (kind in ("board", "lsl") and place):
+            right = f"a serial port is serial:{head}" if _is_port(head) else f"must be {_FORMS}"
+            raise ProblemError(f"source {text!r}: {right}")
+        known = _OF_BOARD if kind == "board" else () if kind == "lsl" else _OF_LINES
+        unknown = next((key for key in keys if key not in known), None)
+        if unknown is not None:
+            options = ", ".join(known) or "none"
+            raise ProblemError(f"source {text!r}: has no option {unknown!r}; the options are {options}")
+        try:
+            return cls._of_keys(text, "lines" if is_lines else kind, name, head if is_lines else place, keys)
+        except ProblemError as error:
+            raise ProblemError(f"source {text!r}: {first_line(error)}") from None
+
+    @classmethod
+    def _of_keys(cls, text: str, kind: str, name: str, place: str, keys: dict[str, str]) -> StatedSource:
+        array = of_size(keys["array"], of_wire=kind == "board") if "array" in keys else None
+        rate = _number("rate", keys.get("rate"))
+        if rate is not None and not 1 / 3600 <= rate <= 1e6:
+            raise ProblemError(f"rate is {rate:g} Hz: must be from 1 per hour to 1000000")
+        if keys.get("unit") == "":
+            raise ProblemError("unit is empty: must be the unit of the values, for example N or kPa")
+        falls = keys.get("falls", "false")
+        turned = {"true": 0.0, "false": None}[falls] if falls in ("true", "false") else _number("falls", falls)
+        printed = PrintedFrames(
+            place,
+            baud=_whole("baud", keys.get("baud")),
+            time=keys.get("time"),
+            columns=keys["columns"].split(":") if "columns" in keys else (),
+            leave_out=keys["leave_out"].split(":") if "leave_out" in keys else (),
+            frame_lines=_whole("frame_lines", keys.get("frame_lines")),
+            frame_end=keys.get("frame_end"),
+        )
+        unit, preset = keys.get("unit"), keys.get("preset", cls.preset)
+        return cls(text, kind, name, place, array, printed, unit, turned, rate, preset)
+
+    @property
+    def are_frames(self) -> bool:
+        """Whether its lines are stated to be frames of an array."""
+        return self.array is not None or self.printed.frame_lines is not None or self.printed.frame_end is not None
+
+    @property
+    def called(self) -> str:
+        """The name, or that of its kind."""
+        if self.kind in ("board", "lsl"):
+            return self.name or self.kind
+        return self.name or ("frames" if self.are_frames else "numbers")
+
+    def registers(self, array: Array) -> Registers:
+        """Return the registers of a board."""
+        return Registers._of(_core.registers_preset(self.preset, array._parts()), array)
+
+
+def _is_port(text: str) -> bool:
+    return text.startswith("/dev/") or (text[:3].upper() == "COM" and text[3:].isdecimal())
+
+
+def _number(key: str, value: str | None) -> float | None:
+    try:
+        return None if value is None else float(value)
+    except ValueError:
+        raise ProblemError(f"{key} is {shown(value)}: must be a number") from None
+
+
+def _whole(key: str, value: str | None) -> int | None:
+    if value is not None and not value.isdecimal():
+        raise ProblemError(f"{key} is {shown(value)}: must be a whole number")
+    return None if value is None else int(value)
