@@ -297,7 +297,6 @@ VALUES: dict[str, Callable[[], Any]] = {
     "Composite.parts": lambda: {"a": LEVELS},
     "ConeXProblem.cone": lambda: CONE_X,
     "ConeXProblem.silence.t": lambda: 5.0,
-    "Decoder.push_into.columns": lambda: wire.Columns(100),
     "Detections.from_csv.path": lambda: "here.csv",
     "Detections.from_neo.events": FOUND.to_neo,
     "Detections.from_numpy.records": FOUND.to_numpy,

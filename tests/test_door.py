@@ -124,26 +124,6 @@ def test_a_recording_may_be_written_from_several_threads(tmp_path):
     assert len(recording.events) == 1200
 
 
-def test_columns_that_two_threads_share_are_one_clear_error():
-    """Memory that one thread fills is refused to the others: events, or `ProblemError`, and nothing else."""
-    data = bytes.fromhex("c000050304") * 1_000_000
-    columns, errors = taxel.wire.Columns(1_000_010), []
-    views = taxel.wire.Decoder().push_into(columns, data[:50])
-
-    def push(number):
-        for _ in range(10):
-            try:
-                if number % 3:
-                    taxel.wire.Decoder().push_into(columns, data)
-                else:
-                    taxel.wire.encode(views)
-            except taxel.ProblemError as error:
-                errors.append(error)
-
-    together(push)
-    assert len({str(error) for error in errors}) == 1
-
-
 def test_what_progress_raises_ends_a_fit_that_keeps_its_best():
     """A fit stopped at its first round is not solved, which shows that it did not continue."""
     rng = np.random.default_rng(3)

@@ -17,6 +17,7 @@ fuzz_target!(|input: &[u8]| {
     assert!(board.command(serial).lines().all(|line| line.starts_with("ok REG") || line.starts_with("bad REG")));
     let mut decoder = Decoder::new(array.clone());
     let (mut second, mut other) = (v2::Decoder::new(array.clone()), Events::empty(array.clone()));
+    let mut first = Events::empty(array.clone());
     let mut ticks = vec![0; array.len()];
     for (frame, values) in touch.chunks(64).enumerate() {
         for (k, &value) in values.iter().enumerate() {
@@ -36,8 +37,8 @@ fuzz_target!(|input: &[u8]| {
                 }
                 assert!(datagram.len() <= DATAGRAM_WORDS * WORD_BYTES && datagram.len() % WORD_BYTES == 0);
                 if takes {
-                    decoder.push(datagram, None);
-                    decoder.end_of_datagram();
+                    decoder.push(datagram, None, &mut first);
+                    decoder.end_of_datagram(&mut first);
                 }
                 takes
             })

@@ -103,7 +103,7 @@ def test_a_path_that_is_none_is_refused(path: object) -> None:
         taxel.open(path)
 
 
-@pytest.mark.parametrize("arguments", [{"array": 3}, {"pairing": "best"}, {"pairing": None}, {"differences": 1}])
+@pytest.mark.parametrize("arguments", [{"array": 3}, {"differences": 1}])
 def test_nonsense_in_options_is_refused_by_name(tmp_path: Path, arguments: dict) -> None:
     path = tmp_path / "a.lsa"
     path.write_bytes(b"")
@@ -302,15 +302,6 @@ def test_a_recording_draws_itself(rec: taxel.Recording, tmp_path: Path) -> None:
     taxel.open(tmp_path / "f.npz").plot()
     taxel.convert(taxel.Events([], [], [], [], array=THESIS), tmp_path / "empty.mcap")
     taxel.open(tmp_path / "empty.mcap").plot()
-
-
-def test_intensities_may_be_paired_by_taxel_on_request(tmp_path: Path) -> None:
-    words = taxel.wire.encode(taxel.Events([0, 0], [1, 2], [3, 4], [1, 1], array=THESIS, intensity=[7, 8]))
-    (tmp_path / "a.lsa").write_bytes(words[:5] + words[10:15] + words[5:10] + words[15:])
-    assert taxel.open(tmp_path / "a.lsa").events.intensity is None
-    assert taxel.open(tmp_path / "a.lsa").counts["decoder"]["unpaired"] == 2
-    by_taxel = taxel.open(tmp_path / "a.lsa", pairing="taxel").events
-    assert by_taxel.intensity.tolist() == [7, 8]
 
 
 def test_losses_while_recording_are_in_the_verdict(tmp_path: Path) -> None:

@@ -81,10 +81,6 @@ VECTORS = {
         intensity(4, 1, 1), change(3, 2, 2), word("marker", 3), intensity(5, 2, 2), change(4, 2, 2),
         word("contradictory"), intensity(6, 2, 2),
     )),
-    "by_taxel": ("The same taxel's latest unpaired change, wherever it stands.", {"pairing": "taxel"}, whole(
-        change(1, 1, 1), change(2, 2, 2), change(3, 1, 1), intensity(30, 1, 1), intensity(20, 2, 2),
-        intensity(10, 1, 1), intensity(9, 1, 1), change(4, 2, 2),
-    )),
     "differences": ("Intensities as differences, added up by polarity.", {"differences": True}, whole(
         change(1, 1, 1), intensity(50, 1, 1), change(2, 1, 1, p=False), intensity(20, 1, 1, p=False),
         change(3, 2, 2), intensity(7, 2, 2), change(4, 1, 1, p=False), intensity(40, 1, 1, p=False),
@@ -109,7 +105,7 @@ VECTORS = {
 def main():
     DATA.mkdir(parents=True, exist_ok=True)
     for name, (about, special, pieces) in VECTORS.items():
-        options = {"columns": 64, "rows": 64, "pairing": "direct", "differences": False} | special
+        options = {"columns": 64, "rows": 64, "differences": False} | special
         meaning = decode(pieces, **options)
         (DATA / f"{name}.bin").write_bytes(b"".join(piece for piece, _, _ in pieces))
         lines = [f' "about": {json.dumps(about)}']

@@ -38,7 +38,6 @@ def decode(  # noqa: PLR0912, PLR0915  the reference from top to bottom, in one 
     *,
     columns: int = 64,
     rows: int = 64,
-    pairing: str = "direct",
     differences: bool = False,
 ) -> Meaning:
     """Decode pieces (bytes, arrival in us or None, whether a datagram ends there)."""
@@ -60,7 +59,6 @@ def decode(  # noqa: PLR0912, PLR0915  the reference from top to bottom, in one 
     }
     latest = heard = None
     held: dict[tuple[int, int], int] = {}
-    unpaired: dict[tuple[int, int], list[int]] = {}
     before = None  # the change directly before, as (event number, taxel, end)
     for match in words:
         b, end = match.group(), match.end()
@@ -80,10 +78,7 @@ def decode(  # noqa: PLR0912, PLR0915  the reference from top to bottom, in one 
         if intensity:
             if differences:
                 value = held[x, y] = min(max(held.get((x, y), 0) + (value if p else -value), 0), 65_535)
-            if pairing == "taxel":
-                number = unpaired[x, y].pop() if unpaired.get((x, y)) else None
-            else:
-                number = direct[0] if direct and direct[1] == (x, y) else None
+            number = direct[0] if direct and direct[1] == (x, y) else None
             counts["unpaired" if number is None else "intensities"] += 1
             if number is not None:
                 out.events[number][4] = value
@@ -103,7 +98,6 @@ def decode(  # noqa: PLR0912, PLR0915  the reference from top to bottom, in one 
             out.markers.append([time * 100, p])
         else:
             counts["changes"] += 1
-            unpaired.setdefault((x, y), []).append(len(out.events))
             before = len(out.events), (x, y), end
             out.events.append([time * 100, x, y, p, None])
     out.counts = counts

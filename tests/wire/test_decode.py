@@ -28,10 +28,10 @@ def rows(events):
     return [[*row[:4], row[4] if row[5] else None] for row in zip(*(c.tolist() for c in columns), strict=True)]
 
 
-def decode(pieces, *, columns=64, rows=64, pairing="direct", differences=False):
+def decode(pieces, *, columns=64, rows=64, differences=False):
     """Decode pieces as the oracle does, by `Decoder`."""
     array = taxel.Array(rows, columns)
-    decoder, parts = wire.Decoder(array=array, pairing=pairing, differences=differences), []
+    decoder, parts = wire.Decoder(array=array, differences=differences), []
     for data, arrived, end in pieces:
         parts.append(decoder.push(data, arrived))
         if end:
@@ -62,14 +62,14 @@ def test_a_vector_means_what_its_json_says(path):
         pieces.append((data[:length], arrived, end))
         data = data[length:]
     assert not data
-    options = {key: said[key] for key in ("columns", "rows", "pairing", "differences")}
+    options = {key: said[key] for key in ("columns", "rows", "differences")}
     expected = oracle.Meaning(said["events"], said["markers"], said["counts"])
     assert decode(pieces, **options) == expected
     assert oracle.decode(pieces, **options) == expected
 
 
 def test_there_are_vectors():
-    assert len(VECTORS) >= 16
+    assert len(VECTORS) >= 15
 
 
 words = st.builds(
@@ -83,7 +83,7 @@ words = st.builds(
 )
 streams = st.lists(words | st.binary(max_size=7), max_size=60).map(b"".join)
 sensors = st.sampled_from([{}, {"columns": 3, "rows": 2}, {"columns": 40, "rows": 80}])
-ways = st.fixed_dictionaries({"pairing": st.sampled_from(["direct", "taxel"]), "differences": st.booleans()})
+ways = st.fixed_dictionaries({"differences": st.booleans()})
 
 
 @given(data=streams, sensor=sensors, way=ways)
@@ -144,12 +144,11 @@ def test_long_streams_mean_what_the_reference_says(seed):
     assert whole == oracle.decode([(data, None, False)], **sensor)
     assert closes(whole.counts)
     decoder = wire.Decoder(array=taxel.Array(sensor["rows"], 64))
-    columns, parts, at = wire.Columns(2000), [], 0
+    parts, at = [], 0
     while at < len(data):
         step = int(rng.integers(1, 3000))
-        filled = decoder.push_into(columns, data[at : at + step])
-        parts.append(filled[slice(0, len(filled))])
-        parts[-1] = oracle.Meaning(rows(filled), list(filled.markers))
+        pushed = decoder.push(data[at : at + step])
+        parts.append(oracle.Meaning(rows(pushed), list(pushed.markers)))
         at += step
     parts.append(oracle.Meaning(rows(decoder.finish())))
     assert [row for part in parts for row in part.events] == whole.events
@@ -216,28 +215,10 @@ def test_datagrams_one_behind_the_other_are_heard_each_by_itself(data, cuts):
         parts += [decoder.push(piece), decoder.end_of_datagram()]
     parts.append(decoder.finish())
     heard = wire.decode(data, lengths=[len(piece) for piece in pieces])
-    room = wire.Columns(len(data) // 5 + 2)
-    assert wire.decode(data, lengths=[len(piece) for piece in pieces], columns=room) == heard
-    alone = wire.decode(data)
-    assert wire.decode(data, columns=room) == alone
-    assert wire.decode(data, pairing="taxel", columns=room) == wire.decode(data, pairing="taxel")
     assert rows(heard) == [row for part in parts for row in rows(part)]
     assert heard.markers == tuple(marker for part in parts for marker in part.markers)
     with refused(argument="lengths"):
         wire.decode(data, lengths=[len(data) + 1])
-    whole = wire.decode(data, pairing="taxel", lengths=[len(data)])
-    assert whole == wire.decode(data, pairing="taxel")
-
-
-def test_a_whole_recording_paired_by_taxel_keeps_its_markers():
-    data = oracle.word("marker", 1) + oracle.word("change", 2, 1, 1) + oracle.word("change", 2, 2, 2)
-    data += oracle.word("intensity", 9, 1, 1)
-    events = wire.decode(data, pairing="taxel")
-    assert (events.markers, events.intensity.tolist(), events.present.tolist()) == (
-        ((100, True),),
-        [9, 0],
-        [True, False],
-    )
 
 
 @pytest.mark.parametrize(
@@ -246,12 +227,8 @@ def test_a_whole_recording_paired_by_taxel_keeps_its_markers():
         (lambda: wire.decode([1, 2]), "data"),
         (lambda: wire.decode(np.zeros(3)), "data"),
         (lambda: wire.decode(memoryview(b"abcdef")[::2]), "data"),
-        (lambda: wire.decode(b"", pairing="near"), "pairing"),
         (lambda: wire.Decoder().push(b"", arrived=0.5), "arrived"),
         (lambda: wire.Decoder().push(b"", arrived=2**63), "arrived"),
-        (lambda: wire.Decoder().push_into(wire.Columns(2), bytes(15)), None),
-        (lambda: wire.Columns(0), "rows"),
-        (lambda: wire.Columns(2**48), "rows"),
         (
             lambda: wire.encode(taxel.Events([0], [64], [0], [True], array=taxel.Array(1, 65))),
             None,
@@ -261,17 +238,6 @@ def test_a_whole_recording_paired_by_taxel_keeps_its_markers():
 def test_nonsense_is_refused_in_one_line(call, argument):
     with refused(argument=argument):
         call()
-
-
-def test_a_column_made_short_or_scattered_is_refused():
-    columns = wire.Columns(10)
-    columns.x = columns.x[::2]
-    with refused():
-        wire.Decoder().push_into(columns, b"")
-    columns = wire.Columns(10)
-    columns.y = columns.y[:1]
-    with refused():
-        wire.Decoder().push_into(columns, bytes(10))
 
 
 @settings(max_examples=20)

@@ -3,13 +3,11 @@
 //! Contiguous arrays of the right type are read in place, under a borrow that is held for the whole call; the Python
 //! side makes them so (`numpy.ascontiguousarray`) before it calls.
 
-use std::ops::Deref;
-
-use numpy::{BorrowError, Element, IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray1};
+use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::Borrowed;
 use pyo3::prelude::*;
 use taxel_core::array::{Pitch, PlaceUnit, Places};
-use taxel_core::wire::{Columns, Filled, Room};
+use taxel_core::wire::Columns;
 use taxel_core::{Array, Events, EventsView, FramesView, IntensitiesView, Marker, SpikeKind, SpikeTrains, Stop};
 
 use crate::enter::enter;
@@ -18,45 +16,6 @@ use crate::errors::{ProblemError, core};
 /// The entries of a one-dimensional array, in place.
 pub fn slice<'a, T: Element>(name: &str, array: &'a PyReadonlyArray1<'_, T>) -> PyResult<&'a [T]> {
     array.as_slice().map_err(|_| ProblemError::new_err(format!("{name}: must be contiguous")))
-}
-
-/// An array that is read in place, which may be a view of `Columns`: refused while another thread fills them.
-pub struct ReadArray<'py, T: Element>(PyReadonlyArray1<'py, T>);
-
-impl<'a, 'py, T: Element + 'a> FromPyObject<'a, 'py> for ReadArray<'py, T> {
-    type Error = PyErr;
-
-    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
-        object.cast::<PyArray1<T>>()?.try_readonly().map(Self).map_err(in_use)
-    }
-}
-
-impl<'py, T: Element> Deref for ReadArray<'py, T> {
-    type Target = PyReadonlyArray1<'py, T>;
-
-    fn deref(&self) -> &Self::Target {
-        &self.0
-    }
-}
-
-/// A column that is filled in place: refused while another thread fills or reads it.
-pub struct FilledArray<'py, T: Element>(PyReadwriteArray1<'py, T>);
-
-impl<'a, 'py, T: Element + 'a> FromPyObject<'a, 'py> for FilledArray<'py, T> {
-    type Error = PyErr;
-
-    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
-        object.cast::<PyArray1<T>>()?.try_readwrite().map(Self).map_err(in_use)
-    }
-}
-
-fn in_use(error: BorrowError) -> PyErr {
-    match error {
-        BorrowError::AlreadyBorrowed => ProblemError::new_err(
-            "columns: another thread uses these Columns; give each thread separate Columns, or copies of the events",
-        ),
-        other => other.into(),
-    }
 }
 
 /// A new array of the entries, without a copy.
@@ -114,21 +73,21 @@ pub struct FilledOut<'py> {
 
 /// What was filled, as Python gets it.
 #[must_use]
-pub fn from_filled(py: Python<'_>, columns: Columns) -> FilledOut<'_> {
-    let Columns { filled: Filled { rows, paired }, repaired, markers } = columns;
-    let markers = markers.iter().map(|m| (m.t, m.start)).collect();
-    FilledOut { rows, paired, repaired: repaired.map(|column| array(py, column)), markers }
+pub fn from_columns<'py>(py: Python<'py>, columns: &Columns<'_>) -> FilledOut<'py> {
+    let markers = columns.markers.iter().map(|m| (m.t, m.start)).collect();
+    let repaired = columns.repaired().map(|column| array(py, column));
+    FilledOut { rows: columns.rows, paired: columns.paired, repaired, markers }
 }
 
 /// Events whose columns stay where Python has them, as (array, t, x, y, p, intensity with present, repaired, markers).
 pub struct EventsIn<'py> {
     array: Array,
-    t: ReadArray<'py, i64>,
-    x: ReadArray<'py, u16>,
-    y: ReadArray<'py, u16>,
-    p: ReadArray<'py, bool>,
-    intensity: Option<(ReadArray<'py, u16>, ReadArray<'py, bool>)>,
-    repaired: Option<ReadArray<'py, bool>>,
+    t: PyReadonlyArray1<'py, i64>,
+    x: PyReadonlyArray1<'py, u16>,
+    y: PyReadonlyArray1<'py, u16>,
+    p: PyReadonlyArray1<'py, bool>,
+    intensity: Option<(PyReadonlyArray1<'py, u16>, PyReadonlyArray1<'py, bool>)>,
+    repaired: Option<PyReadonlyArray1<'py, bool>>,
     markers: Vec<Marker>,
 }
 
@@ -166,20 +125,20 @@ impl EventsIn<'_> {
 
 /// Columns for a decoder to fill, as Python lays them out: t, x, y, ticks, and p, present as bytes.
 pub type ColumnsIn<'py> = (
-    FilledArray<'py, i64>,
-    FilledArray<'py, u16>,
-    FilledArray<'py, u16>,
-    FilledArray<'py, u16>,
-    FilledArray<'py, u8>,
-    FilledArray<'py, u8>,
+    PyReadwriteArray1<'py, i64>,
+    PyReadwriteArray1<'py, u16>,
+    PyReadwriteArray1<'py, u16>,
+    PyReadwriteArray1<'py, u16>,
+    PyReadwriteArray1<'py, u8>,
+    PyReadwriteArray1<'py, u8>,
 );
 
 /// The columns in place, to be filled without the GIL.
-pub fn to_room<'a>((t, x, y, ticks, p, present): &'a mut ColumnsIn<'_>) -> PyResult<Room<'a>> {
-    fn open<'a, T: Element>(column: &'a mut FilledArray<'_, T>) -> PyResult<&'a mut [T]> {
-        column.0.as_slice_mut().map_err(|_| ProblemError::new_err("columns must be contiguous"))
+pub fn to_columns<'a>((t, x, y, ticks, p, present): &'a mut ColumnsIn<'_>) -> PyResult<Columns<'a>> {
+    fn open<'a, T: Element>(column: &'a mut PyReadwriteArray1<'_, T>) -> PyResult<&'a mut [T]> {
+        column.as_slice_mut().map_err(|_| ProblemError::new_err("columns must be contiguous"))
     }
-    Room::new(open(t)?, [open(x)?, open(y)?, open(ticks)?], [open(p)?, open(present)?]).map_err(core)
+    Columns::new(open(t)?, [open(x)?, open(y)?, open(ticks)?], [open(p)?, open(present)?]).map_err(core)
 }
 
 /// Frames whose values stay where Python has them, as (array, t, values one frame after the other).

@@ -13,10 +13,10 @@ mod status_line;
 pub mod v1;
 pub mod v2;
 
-pub use columns::{Columns, Filled, Room};
+pub use columns::Columns;
 pub use command::{Command, CommandReader};
 pub use cut::{CutDatagrams, cut};
-pub use decoder::{Counts, Decoder, Pairing, decode, most_rows};
+pub use decoder::{Counts, Decoder, decode, most_rows};
 pub use registers::{Registers, WriteRefusal};
 pub use sender_decoder::{DatagramInfo, SenderDecoder, SenderTotals, StepBack};
 pub use status_line::{Greeting, StatusLine};

@@ -7,7 +7,7 @@ use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use taxel_core::board::{Board, Network, NetworkFaults, Version2};
 use taxel_core::wire::v2::{self, DatagramHeader, DatagramOutcome};
-use taxel_core::wire::{self, Decoder, Pairing, Registers, WORD_BYTES, Word};
+use taxel_core::wire::{self, Decoder, Registers, WORD_BYTES, Word};
 use taxel_core::{Array, Events};
 
 type Row = (i64, u16, u16, bool, Option<u16>);
@@ -130,8 +130,8 @@ fn of_version_1_every_whole_word_is_decoded_and_counts_close_to_the_byte() {
         let (mut changes, mut intensities, mut words, mut bytes) = (vec![], 0_u64, 0_u64, 0);
         for datagram in &arrived {
             bytes += datagram.len() as u64;
-            decoder.push_into(datagram, None, &mut events);
-            decoder.end_of_datagram_into(&mut events);
+            decoder.push(datagram, None, &mut events);
+            decoder.end_of_datagram(&mut events);
         }
         // A slow reference decoder: a word is a byte with its top bit set and four without.
         let all = arrived.concat();
@@ -151,7 +151,7 @@ fn of_version_1_every_whole_word_is_decoded_and_counts_close_to_the_byte() {
             }
             at += 5;
         }
-        decoder.finish_into(&mut events);
+        decoder.finish(&mut events);
         let heard: Vec<(u16, u16, bool)> = rows(&events).into_iter().map(|(_, x, y, p, _)| (x, y, p)).collect();
         assert_eq!(heard, changes, "seed {seed}");
         let counts = decoder.counts();
@@ -161,7 +161,7 @@ fn of_version_1_every_whole_word_is_decoded_and_counts_close_to_the_byte() {
         let paired = events.intensity.as_ref().map_or(0, |i| i.present.iter().filter(|&&p| p).count() as u64);
         assert_eq!(paired + counts.unpaired, intensities, "seed {seed}");
         if all.len() == sent.concat().len() && arrived == sent {
-            assert_eq!(rows(&wire::decode(&all, Array::thesis(), Pairing::Direct).0), rows(&events));
+            assert_eq!(rows(&wire::decode(&all, Array::thesis()).0), rows(&events));
         }
     }
 }

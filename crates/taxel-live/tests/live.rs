@@ -69,13 +69,13 @@ fn sent(frames: u64, pressed: u64) -> Events {
     while touch.frame(&mut ticks, Stop::never()).expect("a frame") {
         board
             .frame(&ticks, |datagram| {
-                decoder.push_into(datagram, None, &mut events);
-                decoder.end_of_datagram_into(&mut events);
+                decoder.push(datagram, None, &mut events);
+                decoder.end_of_datagram(&mut events);
                 true
             })
             .expect("a frame of the array's size");
     }
-    decoder.finish_into(&mut events);
+    decoder.finish(&mut events);
     events
 }
 
@@ -150,13 +150,13 @@ fn recorded(path: &Scratch) -> (Events, Vec<Detection>) {
     reader
         .messages(Stop::never(), |message| {
             if message.topic == Topic::Datagrams {
-                decoder.push_into(message.data, Some(message.at_ns / 1000), &mut events);
-                decoder.end_of_datagram_into(&mut events);
+                decoder.push(message.data, Some(message.at_ns / 1000), &mut events);
+                decoder.end_of_datagram(&mut events);
             }
             Ok(())
         })
         .expect("sound chunks");
-    decoder.finish_into(&mut events);
+    decoder.finish(&mut events);
     let detections = reader.remarks(Stop::never()).expect("sound chunks").0.detections;
     (events, detections.into_iter().map(|(_, d)| d).collect())
 }
@@ -195,9 +195,9 @@ fn a_raw_recording_holds_the_bytes_and_is_complete_at_the_end() {
     wait_for(&live, |live| live.counters().decoding.wire.bytes == report.sent.bytes);
     assert!(!path.0.with_extension("lss").exists(), "not complete yet");
     live.stop().expect("no error");
-    let mut decoder = Decoder::new(Array::thesis());
-    let mut events = decoder.push(&std::fs::read(&path.0).expect("the file"), None);
-    decoder.finish_into(&mut events);
+    let (mut decoder, mut events) = (Decoder::new(Array::thesis()), Events::empty(Array::thesis()));
+    decoder.push(&std::fs::read(&path.0).expect("the file"), None, &mut events);
+    decoder.finish(&mut events);
     assert_eq!(events, sent(1000, 1000));
     assert!(path.0.with_extension("lss").exists());
 }

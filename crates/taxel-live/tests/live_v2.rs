@@ -11,7 +11,7 @@ use taxel_core::board::{Board, Version2};
 use taxel_core::detect::{Readout, TrainedNeuron};
 use taxel_core::encode::Encoder;
 use taxel_core::neuron::{Neuron, Time};
-use taxel_core::wire::{Pairing, Registers, v2};
+use taxel_core::wire::{Registers, v2};
 use taxel_core::{Array, Events, Stop};
 use taxel_live::pipeline::{Live, LiveOptions, ReadoutSetup};
 use taxel_live::recording::Reader;
@@ -131,7 +131,7 @@ fn a_large_array_is_recorded_and_every_loss_is_counted() {
         };
         assert!(summary.verdict.text().starts_with(&verdict), "{}", summary.verdict.text());
         let reader = Reader::open(&path.0).expect("a recording");
-        let read = reader.decode(Pairing::Direct, Stop::never()).expect("sound chunks");
+        let read = reader.decode(Stop::never()).expect("sound chunks");
         let expected = decoded(&array, &sent);
         assert_eq!((read.events.t.len(), &read.events), (expected.t.len(), &expected));
         assert_eq!(read.version_2, counters.decoding.wire_v2);

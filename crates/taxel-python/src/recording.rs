@@ -159,9 +159,8 @@ impl RecordingReader {
     }
 
     /// Decodes all datagrams.
-    fn decode(&self, py: Python<'_>, pairing: &str) -> PyResult<DecodedDatagrams> {
-        let pairing: wire::Pairing = parsed("pairing", &json!(pairing).to_string())?;
-        let decoded = enter(py, |stop| self.reader.decode(pairing, stop))?;
+    fn decode(&self, py: Python<'_>) -> PyResult<DecodedDatagrams> {
+        let decoded = enter(py, |stop| self.reader.decode(stop))?;
         Ok(DecodedDatagrams {
             events: from_events(py, decoded.events).into_pyobject(py)?.unbind(),
             counts: Plain(json!(decoded.counts)),
@@ -427,13 +426,11 @@ pub fn read_lsa(
     py: Python<'_>,
     path: PathBuf,
     sensor: ArrayParts,
-    pairing: &str,
     differences: bool,
     memory: u64,
 ) -> PyResult<DecodedLsa> {
     let sensor = to_array(sensor)?;
-    let pairing: wire::Pairing = parsed("pairing", &json!(pairing).to_string())?;
-    let read = enter(py, |stop| decode_lsa(&path, sensor, pairing, differences, memory, stop))?;
+    let read = enter(py, |stop| decode_lsa(&path, sensor, differences, memory, stop))?;
     Ok(DecodedLsa {
         payload: column(py, read.bytes),
         events: from_events(py, read.events).into_pyobject(py)?.unbind(),

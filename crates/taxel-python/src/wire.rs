@@ -10,11 +10,12 @@ use serde_json::{Value, json};
 use taxel_core::board::{Board, BoardCounts, Crossed, IntensityWord, Previous, Version2};
 use taxel_core::circuit::Chain;
 use taxel_core::wire::v2::{self, DatagramOutcome};
-use taxel_core::wire::{self, Command, CutDatagrams, Decoder, Pairing, Registers};
+use taxel_core::wire::{self, Command, CutDatagrams, Decoder, Registers};
 use taxel_core::{Error, Events, problem};
 
 use taxel_border::convert::{
-    ArrayParts, ColumnsIn, EventsIn, EventsOut, FilledOut, array, from_events, from_filled, slice, to_array, to_room,
+    ArrayParts, ColumnsIn, EventsIn, EventsOut, FilledOut, array, from_columns, from_events, slice, to_array,
+    to_columns,
 };
 use taxel_border::enter::{Exclusive, enter};
 use taxel_border::errors::core;
@@ -22,8 +23,8 @@ use taxel_border::parameters::{Plain, parsed};
 
 /// A decoder of either version, and what the last datagram of version 2 was.
 enum VersionedDecoder {
-    One(Decoder),
-    Two(v2::Decoder, Option<DatagramOutcome>),
+    One(Box<Decoder>),
+    Two(Box<v2::Decoder>, Option<DatagramOutcome>),
 }
 
 /// Turns bytes of version 1, or datagrams of version 2, into events as they come.
@@ -32,13 +33,13 @@ pub struct WireDecoder(Exclusive<VersionedDecoder>);
 
 #[pymethods]
 impl WireDecoder {
-    /// `pairing` and `differences` are of version 1 alone: datagrams of version 2 state both themselves.
+    /// `differences` is of version 1 alone: datagrams of version 2 state it themselves.
     #[new]
-    fn new(version: u8, array: ArrayParts, pairing: &str, differences: bool) -> PyResult<Self> {
-        let (array, pairing): (_, Pairing) = (to_array(array)?, parsed("pairing", &format!("{pairing:?}"))?);
+    fn new(version: u8, array: ArrayParts, differences: bool) -> PyResult<Self> {
+        let array = to_array(array)?;
         Ok(Self(Exclusive::new(match version {
-            1 => VersionedDecoder::One(Decoder::new(array).pairing(pairing).differences(differences)),
-            _ => VersionedDecoder::Two(v2::Decoder::new(array), None),
+            1 => VersionedDecoder::One(Box::new(Decoder::new(array).differences(differences))),
+            _ => VersionedDecoder::Two(Box::new(v2::Decoder::new(array)), None),
         })))
     }
 
@@ -53,16 +54,15 @@ impl WireDecoder {
         last: bool,
     ) -> PyResult<FilledOut<'py>> {
         let data = slice("data", &data)?;
-        let room = to_room(&mut columns)?;
-        let columns = self.0.enter(py, |decoder, stop| match decoder {
-            VersionedDecoder::One(decoder) => decoder.fill(data, arrived, room, last, stop),
+        let mut columns = to_columns(&mut columns)?;
+        self.0.enter(py, |decoder, stop| match decoder {
+            VersionedDecoder::One(decoder) => decoder.fill(data, arrived, &mut columns, last, stop),
             VersionedDecoder::Two(decoder, outcome) => {
-                let (columns, of_this) = decoder.fill(data, arrived, room)?;
-                *outcome = Some(of_this);
-                Ok(columns)
+                *outcome = Some(decoder.fill(data, arrived, &mut columns)?);
+                Ok(())
             }
         })?;
-        Ok(from_filled(py, columns))
+        Ok(from_columns(py, &columns))
     }
 
     /// As `fill`, of datagrams of version 1 that lie one behind the other, each decoded by itself, as a host receives them;
@@ -74,34 +74,41 @@ impl WireDecoder {
         lengths: PyReadonlyArray1<'_, i64>,
         mut columns: ColumnsIn<'_>,
     ) -> PyResult<FilledOut<'py>> {
-        let (data, lengths, room) = (slice("data", &data)?, slice("lengths", &lengths)?, to_room(&mut columns)?);
-        let columns = self.0.enter(py, |decoder, stop| match decoder {
-            VersionedDecoder::One(decoder) => decoder.fill_datagrams(data, lengths, room, stop),
+        let (data, lengths) = (slice("data", &data)?, slice("lengths", &lengths)?);
+        let mut columns = to_columns(&mut columns)?;
+        self.0.enter(py, |decoder, stop| match decoder {
+            VersionedDecoder::One(decoder) => decoder.fill_datagrams(data, lengths, &mut columns, stop),
             VersionedDecoder::Two(..) => Err(problem!(
                 "lengths"; ": must be left out for version 2, whose datagrams come with their lengths"
             )),
         })?;
-        Ok(from_filled(py, columns))
+        Ok(from_columns(py, &columns))
     }
 
     /// Releases the change that waits for its intensity.
     fn end_of_datagram<'py>(&self, py: Python<'py>) -> EventsOut<'py> {
         let events = self.0.with(py, |decoder| match decoder {
-            VersionedDecoder::One(decoder) => decoder.end_of_datagram(),
+            VersionedDecoder::One(decoder) => {
+                let mut events = Events::empty(decoder.array().clone());
+                decoder.end_of_datagram(&mut events);
+                events
+            }
             VersionedDecoder::Two(decoder, _) => Events::empty(decoder.array().clone()),
         });
         from_events(py, events)
     }
 
     /// Ends the stream; returns the rest.
-    fn finish<'py>(&self, py: Python<'py>) -> PyResult<EventsOut<'py>> {
-        let events = self.0.enter(py, |decoder, _| {
-            Ok::<_, Error>(match decoder {
-                VersionedDecoder::One(decoder) => decoder.finish(),
-                VersionedDecoder::Two(decoder, _) => Events::empty(decoder.array().clone()),
-            })
-        })?;
-        Ok(from_events(py, events))
+    fn finish<'py>(&self, py: Python<'py>) -> EventsOut<'py> {
+        let events = self.0.with(py, |decoder| match decoder {
+            VersionedDecoder::One(decoder) => {
+                let mut events = Events::empty(decoder.array().clone());
+                decoder.finish(&mut events);
+                events
+            }
+            VersionedDecoder::Two(decoder, _) => Events::empty(decoder.array().clone()),
+        });
+        from_events(py, events)
     }
 
     /// The version's counts.
@@ -146,7 +153,7 @@ impl WireDecoder {
 pub fn wire_rows(version: u8, length: usize) -> usize {
     match version {
         1 => wire::most_rows(length),
-        _ => v2::stream_rows(length),
+        _ => v2::most_rows(length),
     }
 }
 

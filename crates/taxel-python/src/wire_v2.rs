@@ -7,7 +7,7 @@ use taxel_core::Error;
 use taxel_core::wire::v2::{self, StreamReader};
 
 use taxel_border::convert::{
-    ArrayParts, Column, ColumnsIn, EventsIn, FilledOut, column, from_filled, slice, to_array, to_room,
+    ArrayParts, Column, ColumnsIn, EventsIn, FilledOut, column, from_columns, slice, to_array, to_columns,
 };
 use taxel_border::enter::{Exclusive, enter};
 
@@ -19,9 +19,9 @@ pub fn decode_datagrams<'py>(
     sensor: ArrayParts,
     mut columns: ColumnsIn<'_>,
 ) -> PyResult<FilledOut<'py>> {
-    let (bytes, sensor, room) = (slice("data", &data)?, to_array(sensor)?, to_room(&mut columns)?);
-    let decoded = enter(py, |stop| v2::decode(bytes, sensor, room, stop))?;
-    Ok(from_filled(py, decoded.columns))
+    let (bytes, sensor, mut columns) = (slice("data", &data)?, to_array(sensor)?, to_columns(&mut columns)?);
+    enter(py, |stop| v2::decode(bytes, sensor, &mut columns, stop))?;
+    Ok(from_columns(py, &columns))
 }
 
 /// Events as datagrams.

@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 from taxel import _core
 from taxel._base import arguments
-from taxel._base.arguments import checked_path, flag, instance, shown, text
+from taxel._base.arguments import checked_path, flag, instance, shown
 from taxel._base.arrays import fields_of, stored_names
 from taxel._base.errors import refused
 from taxel._base.limits import available
@@ -73,7 +73,6 @@ class OpenOptions(SharedOptions):
     """Hold the keyword arguments of `open_one`, which documents each, and of `open_all`."""
 
     array: Array | Sequence[Array] | None = None
-    pairing: str = "direct"
     differences: bool = False
 
     @property
@@ -93,7 +92,6 @@ class OpenOptions(SharedOptions):
         ------
         ProblemError : topics of a file that is no ROS bag, or what is read of a camera's events for one of a maker
         """
-        text("pairing", self.pairing, ("direct", "taxel"))
         flag("differences", self.differences)
         if self.topics.are_given and kind != "ros":
             raise ProblemError(f"{path}: is not a ROS bag; topic, field and ros are only for ROS bags")
@@ -140,8 +138,6 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
     label_column : str or int, optional
         For a table: the column, by its name or number from 1, whose value becomes a label where it changes; it is no
         taxel.
-    pairing : {"direct", "taxel"}
-        The change that an intensity belongs to: the change directly before it, or the latest change of that taxel.
     differences : bool
         Whether the intensities of a .lsa are differences (the board's option); a .mcap stores this itself.
 
@@ -203,7 +199,7 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
         As in `taxel.open`.
     region, bin, window_ms, polarity, label_column : str, int, float (ms), str and str or int, optional
         As in `taxel.open`.
-    pairing, differences
+    differences
         As in `taxel.open`.
 
     Returns
@@ -290,8 +286,8 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
 
     yield from {
         "ros": Kind(is_bag, read_bag),
-        "lsa": Kind(_ending(".lsa"), lambda path, _: [read_lsa(path, array, how.pairing, differences=how.differences)]),
-        "mcap": Kind(_is_mcap, lambda path, _: read_mcap(path, how.pairing)),
+        "lsa": Kind(_ending(".lsa"), lambda path, _: [read_lsa(path, array, differences=how.differences)]),
+        "mcap": Kind(_is_mcap, lambda path, _: read_mcap(path)),
         "h5": Kind(is_h5_of_taxel, lambda path, _: [read_columns(path, array)]),
         "csv": Kind(_is_csv, lambda path, _: [read_csv(path, array)]),
         "records": Kind(lambda path: set(EVENTS) <= set(fields_of(path)), read_events),

@@ -4,7 +4,6 @@ Version 1 is the thesis' (Appendix 1, sections 3 to 5). Version 2 is ours, and e
 *Wire version 2*).
 """
 
-from taxel.wire.columns import Columns
 from taxel.wire.command import Command
 from taxel.wire.counts import Counts, Received, Status
 from taxel.wire.decoder import Decoder, decode
@@ -15,7 +14,6 @@ from taxel.wire.stream import StreamReader
 __all__ = [
     "FRAME_US",
     "PRESETS",
-    "Columns",
     "Command",
     "Counts",
     "Decoder",

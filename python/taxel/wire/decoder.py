@@ -8,16 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import buffer_bytes, column, flag, instance, integer, text
+from taxel._base.arguments import buffer_bytes, column, flag, integer
 from taxel._base.errors import refused
 from taxel._base.messages import counted
-from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.wire.columns import Columns
+from taxel.wire.columns import filled
 from taxel.wire.counts import Counts, Received, Status
-
-_PAIRINGS = ("direct", "taxel")
 
 
 def decode(
@@ -25,10 +22,8 @@ def decode(
     version: Literal[1, 2] = 1,
     *,
     array: Array | None = None,
-    pairing: Literal["direct", "taxel"] = "direct",
     differences: bool = False,
     lengths: ArrayLike | None = None,
-    columns: Columns | None = None,
 ) -> Events:
     """Decode a whole stream; a `Decoder` also counts what is dropped.
 
@@ -40,17 +35,11 @@ def decode(
     version : {1, 2}
     array : Array, optional
         The sensor; default: the thesis' 64 x 64.
-    pairing : {"direct", "taxel"}
-        Version 1, as in `Decoder`.
     differences : bool
         Version 1, as in `Decoder`.
     lengths : array of int, shape (datagrams,), optional
         Version 1: the length of each datagram in bytes, if `data` is consecutive datagrams. Each is then decoded
         separately, so that an intensity never belongs to a change of the datagram before.
-    columns : Columns, optional
-        Memory to reuse, with room for ``len(data) // 5 + 2`` events, for version 2 ``len(data) // 2 + 8``: the events
-        are views of it, valid until it is filled again. By default, and with pairing "taxel", they have separate
-        memory.
 
     Returns
     -------
@@ -74,24 +63,19 @@ def decode(
     >>> decode(b"".join(len(datagram).to_bytes(2, "little") + datagram for datagram in sent), version=2)
     Events(4096 events, 0 to 0 us, 64 x 64 taxels, 4096 intensities)
     """
-    decoder = Decoder(version, array=array, pairing=pairing, differences=differences)
+    decoder = Decoder(version, array=array, differences=differences)
     stream = buffer_bytes(data)
-    room, fresh = Columns._or_fresh(columns, _core.wire_rows(decoder.version, len(stream)))
-    if decoder.version == 2:
+
+    def fill(columns: Any) -> _core._Filled:
+        if decoder.version == 2:
+            return _core.decode_datagrams(stream, decoder.array._parts(), columns)
         if lengths is not None:
-            raise refused("lengths", ": must be left out, because in version 2 each datagram begins with its length")
-        filled = _core.decode_datagrams(stream, decoder.array._parts(), room._parts())
-    elif lengths is not None:
-        filled = decoder._core.fill_datagrams(stream, column("lengths", lengths, np.int64), room._parts())
-    else:
-        filled = decoder._core.fill(stream, None, room._parts(), pairing == "direct")
-    if fresh:
-        room._trim(filled["rows"])
-    events = room._first(decoder.array, **filled)
-    if pairing == "taxel":
-        markers, events = events.markers, decoder.finish()
-        events.markers = markers
-    return events
+            return decoder._core.fill_datagrams(stream, column("lengths", lengths, np.int64), columns)
+        return decoder._core.fill(stream, None, columns, True)
+
+    if decoder.version == 2 and lengths is not None:
+        raise refused("lengths", ": must be left out, because in version 2 each datagram begins with its length")
+    return filled(decoder.array, _core.wire_rows(decoder.version, len(stream)), fill)
 
 
 class Decoder:
@@ -108,10 +92,6 @@ class Decoder:
     version : {1, 2}
     array : Array, optional
         The sensor; default: the thesis' 64 x 64. Events outside it are counted and dropped.
-    pairing : {"direct", "taxel"}
-        Version 1: the change that an intensity belongs to. "direct": the word before it, if that is a change of the
-        same taxel. "taxel": the latest change of that taxel without an intensity, for boards that order words
-        differently; `finish` then returns all events, so it is meant for whole recordings.
     differences : bool
         Version 1: whether intensities are differences from the last value sent (the panel's "delta intensity"), which
         the bytes do not state. They are then summed from 0, so that `Events` hold values; these are correct from the
@@ -153,16 +133,13 @@ class Decoder:
         version: Literal[1, 2] = 1,
         *,
         array: Array | None = None,
-        pairing: Literal["direct", "taxel"] = "direct",
         differences: bool = False,
     ) -> None:
         self.version = integer("version", version, 1, 2)
         self.array = Array._of(array)
-        text("pairing", pairing, _PAIRINGS)
-        if self.version == 2 and (pairing != "direct" or flag("differences", differences)):
-            raise ProblemError("pairing and differences are only for version 1: datagrams of version 2 state both")
-        parts = self.array._parts()
-        self._core = _core.WireDecoder(self.version, parts, pairing, flag("differences", differences))
+        if flag("differences", differences) and self.version == 2:
+            raise refused("differences", " is only for version 1: a datagram of version 2 states it")
+        self._core = _core.WireDecoder(self.version, self.array._parts(), differences)
 
     def push(self, data: Any, arrived: int | None = None) -> Events:
         """Decode the next bytes of version 1, or a datagram of version 2; return the events that they complete.
@@ -188,45 +165,9 @@ class Decoder:
         Events(1 event, 500 to 500 us, 64 x 64 taxels, 1 intensity)
         """
         stream = buffer_bytes(data)
-        columns = Columns._fresh(_core.wire_rows(self.version, len(stream)))
-        filled = self._fill(columns, stream, arrived)
-        columns._trim(filled["rows"])
-        return columns._first(self.array, **filled)
-
-    def push_into(self, columns: Columns, data: Any, arrived: int | None = None) -> Events:
-        """Decode into memory that is reused; return the events as views of it.
-
-        The next call with the same columns overwrites the events: copy those that are needed longer.
-
-        Parameters
-        ----------
-        columns : Columns
-            With room for ``len(data) // 5 + 2`` events, for version 2 ``len(data) // 2 + 8``.
-        data : bytes, or anything with a contiguous buffer
-        arrived : int, us, optional
-            As in `push`.
-
-        Returns
-        -------
-        Events
-
-        Raises
-        ------
-        ProblemError : too little room, or as `push`
-
-        Examples
-        --------
-        >>> columns = Columns(1000)
-        >>> Decoder().push_into(columns, bytes.fromhex("c000050304 e000280304")).intensity
-        array([40], dtype=uint16)
-        """
-        room = instance("columns", columns, Columns)
-        return room._first(self.array, **self._fill(room, buffer_bytes(data), arrived))
-
-    def _fill(self, columns: Columns, data: NDArray[np.uint8], arrived: int | None) -> _core._Filled:
-        """Fill columns; return the number of rows, whether they have intensities, repaired rows, and markers."""
-        when = None if arrived is None else integer("arrived", arrived)
-        return self._core.fill(data, when, columns._parts(), False)
+        at = None if arrived is None else integer("arrived", arrived, -(2**63), 2**63 - 1)
+        rows = _core.wire_rows(self.version, len(stream))
+        return filled(self.array, rows, lambda columns: self._core.fill(stream, at, columns, False))
 
     def end_of_datagram(self) -> Events:
         """End a datagram of version 1; return the change that was pending for its intensity, if there is one.
@@ -252,8 +193,8 @@ class Decoder:
 
         Examples
         --------
-        >>> decoder = Decoder(pairing="taxel")
-        >>> len(decoder.push(bytes.fromhex("c000050304 e000280304"))), len(decoder.finish())
+        >>> decoder = Decoder()
+        >>> len(decoder.push(bytes.fromhex("c000050304"))), len(decoder.finish())
         (0, 1)
         """
         return Events._from_parts(self._core.finish(), self.array)

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::wire::registers::PRESETS;
-use crate::wire::{Command, Pairing, Registers, WORD_BYTES, Word, decode};
+use crate::wire::{Command, Registers, WORD_BYTES, Word, decode};
 use crate::{Array, Error};
 
 fn board() -> Board {
@@ -30,7 +30,7 @@ fn a_full_frame_goes_line_by_line_step_by_step_channel_by_channel() {
     let datagrams = play(&mut board(), &[100; 4096]);
     assert!(datagrams.iter().all(|d| d.len() <= 1400 && d.len() % 10 == 0));
     assert_eq!(datagrams.len(), (8192_usize).div_ceil(280));
-    let (events, _) = decode(&datagrams.concat(), Array::thesis(), Pairing::Direct);
+    let (events, _) = decode(&datagrams.concat(), Array::thesis());
     let order: Vec<(u16, u16)> = events.x.iter().copied().zip(events.y.iter().copied()).collect();
     let mut expected = vec![];
     for line in 0..64 {
@@ -93,7 +93,7 @@ fn random_lines_visit_each_line_once_a_frame_in_an_order_of_its_own() {
     let mut board = Board::new(registers, &Array::thesis()).unwrap();
     let mut orders = std::collections::HashSet::new();
     for frame in 0..50_u16 {
-        let (events, _) = decode(&play(&mut board, &[frame + 1; 4096]).concat(), Array::thesis(), Pairing::Direct);
+        let (events, _) = decode(&play(&mut board, &[frame + 1; 4096]).concat(), Array::thesis());
         let order: Vec<u16> = events.x.chunks(64).map(|line| line[0]).collect();
         let mut sorted = order.clone();
         sorted.sort_unstable();
@@ -121,7 +121,7 @@ fn the_random_order_is_drawn_line_by_line() {
     let registers = Registers { random_lines: true, line_period: 1024, noise_floor: 0, ..Registers::default() };
     let (mut board, mut word) = (Board::new(registers, &Array::thesis()).unwrap(), 0xace1);
     for frame in 0..20_u16 {
-        let (events, _) = decode(&play(&mut board, &[frame + 1; 4096]).concat(), Array::thesis(), Pairing::Direct);
+        let (events, _) = decode(&play(&mut board, &[frame + 1; 4096]).concat(), Array::thesis());
         let order: Vec<u16> = events.x.chunks(64).map(|line| line[0]).collect();
         assert_eq!(order, drawn(&mut word, 64), "frame {frame}");
     }

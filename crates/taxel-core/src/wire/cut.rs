@@ -70,8 +70,8 @@ mod tests {
     use rand::{Rng, SeedableRng, rngs::StdRng};
 
     use super::*;
-    use crate::Array;
-    use crate::wire::{Decoder, Pairing, decode};
+    use crate::wire::{Decoder, decode};
+    use crate::{Array, Events};
 
     fn bytes(words: &[Word]) -> Vec<u8> {
         words.iter().flat_map(|word| word.to_bytes()).collect()
@@ -102,14 +102,14 @@ mod tests {
             assert_eq!(cut.times.len() + 1, cut.offsets.len());
             assert!(cut.times.is_sorted(), "arrivals never step back");
             let mut decoder = Decoder::new(Array::thesis());
-            let mut events = decoder.push(&[], None);
+            let mut events = Events::empty(Array::thesis());
             for (part, &t) in cut.offsets.windows(2).zip(&cut.times) {
                 assert!((1..=MOST_BYTES).contains(&(part[1] - part[0])));
-                decoder.push_into(&stream[part[0]..part[1]], Some(t), &mut events);
-                decoder.end_of_datagram_into(&mut events);
+                decoder.push(&stream[part[0]..part[1]], Some(t), &mut events);
+                decoder.end_of_datagram(&mut events);
             }
-            decoder.finish_into(&mut events);
-            let (whole, _) = decode(&stream, Array::thesis(), Pairing::Direct);
+            decoder.finish(&mut events);
+            let (whole, _) = decode(&stream, Array::thesis());
             assert_eq!((&events.t, &events.x, &events.intensity), (&whole.t, &whole.x, &whole.intensity));
         }
     }

@@ -4,23 +4,17 @@
 mod blocks;
 pub(in crate::wire) mod clock;
 mod counts;
-mod fill;
-mod filling;
-mod pairing;
 
 pub use clock::FARTHEST_BACK;
 pub use counts::Counts;
-pub use pairing::Pairing;
 
 use blocks::Carried;
 use clock::StampClock;
-use filling::{FilledColumns, PendingChange};
-use pairing::{UnpairedChanges, append};
 
 use crate::vectors::Instructions;
-use crate::wire::columns::{self, Filled, Room};
+use crate::wire::columns::{BLOCK, Block, Columns, PendingChange};
 use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES, Word};
-use crate::{Array, Events, Marker, Result};
+use crate::{Array, Events, Marker, Result, Stop, problem};
 
 /// Decodes bytes to events as they arrive, however the stream is cut.
 ///
@@ -30,10 +24,10 @@ use crate::{Array, Events, Marker, Result};
 /// # Examples
 ///
 /// ```
-/// use taxel_core::{Array, wire::Decoder};
-/// let mut decoder = Decoder::new(Array::thesis());
-/// let mut events = decoder.push(&[0xc0, 0x00, 0x05, 0x03, 0x04], None);
-/// decoder.finish_into(&mut events);
+/// use taxel_core::{Array, Events, wire::Decoder};
+/// let (mut decoder, mut events) = (Decoder::new(Array::thesis()), Events::empty(Array::thesis()));
+/// decoder.push(&[0xc0, 0x00, 0x05, 0x03, 0x04], None, &mut events);
+/// decoder.finish(&mut events);
 /// assert_eq!((events.t[0], events.x[0], events.y[0], events.p[0]), (500, 3, 4, true));
 /// ```
 #[derive(Debug, Clone)]
@@ -44,15 +38,16 @@ pub struct Decoder {
     partial: [u8; WORD_BYTES],
     have: usize,
     clock: StampClock,
-    waiting: Option<PendingChange>,
-    by_taxel: Option<UnpairedChanges>,
+    /// The change whose intensity may be the next word.
+    pending: Option<PendingChange>,
+    block: Block,
     /// Each taxel's last value, if intensities are differences; none if it is unknown.
     held: Option<Vec<Option<u16>>>,
     counts: Counts,
 }
 
 impl Decoder {
-    /// A decoder for the given array. It pairs an intensity with the word before it and reads intensities as values.
+    /// A decoder for the given array. It reads intensities as values.
     #[must_use]
     pub fn new(array: Array) -> Self {
         Self {
@@ -61,18 +56,11 @@ impl Decoder {
             partial: [0; WORD_BYTES],
             have: 0,
             clock: StampClock::default(),
-            waiting: None,
-            by_taxel: None,
+            pending: None,
+            block: Block::new(),
             held: None,
             counts: Counts::default(),
         }
-    }
-
-    /// Chooses which change an intensity belongs to.
-    #[must_use]
-    pub fn pairing(mut self, pairing: Pairing) -> Self {
-        self.by_taxel = (pairing == Pairing::Taxel).then(|| UnpairedChanges::new(&self.array));
-        self
     }
 
     /// Sets whether intensities are differences from the last value sent (the panel's "delta intensity"); the bytes do
@@ -133,25 +121,82 @@ impl Decoder {
         Some((latest * STAMP_US, self.clock.behind.unwrap_or(latest) * STAMP_US))
     }
 
-    /// Decodes the next bytes; returns the events that they complete.
+    /// Decodes the next bytes; appends the events that they complete.
     ///
     /// `arrived` is the host's clock in us when the bytes came; it shows how long a silence of more than 6.45 s was.
-    pub fn push(&mut self, bytes: &[u8], arrived: Option<i64>) -> Events {
-        let mut events = Events::empty(self.array.clone());
-        self.push_into(bytes, arrived, &mut events);
-        events
+    pub fn push(&mut self, bytes: &[u8], arrived: Option<i64>, out: &mut Events) {
+        let mut block = std::mem::take(&mut self.block);
+        // With the change that waits, and a word of which bytes came before.
+        for piece in bytes.chunks((BLOCK - 2) * WORD_BYTES) {
+            let mut columns = block.columns();
+            self.decode(piece, arrived, &mut columns);
+            out.append_columns(&columns);
+        }
+        self.block = block;
     }
 
-    /// As [`Self::push`], but appends to columns that the caller reuses ([`Events::clear`]).
-    pub fn push_into(&mut self, bytes: &[u8], arrived: Option<i64>, out: &mut Events) {
-        let (before, most) = (out.len(), self.most_rows(bytes.len()));
-        // SAFETY: `fill_columns` writes each row that it counts, and with `paired` its ticks and present.
-        unsafe {
-            columns::append(out, most, |room, paired, markers| {
-                self.fill_columns(bytes, arrived, room, paired, markers)
-            });
+    /// As [`Self::push`], but fills columns that the caller allocated; with `last` the stream ends after these bytes.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` if the columns have less room than [`Self::most_rows`] requires, in which case nothing is read;
+    /// `Interrupted` if asked to stop.
+    pub fn fill(
+        &mut self,
+        bytes: &[u8],
+        arrived: Option<i64>,
+        columns: &mut Columns<'_>,
+        last: bool,
+        stop: Stop<'_>,
+    ) -> Result<()> {
+        /// Bytes between two checks of `stop`: some milliseconds of work.
+        const PIECE: usize = 16 << 20;
+        columns.check_room(bytes.len(), self.most_rows(bytes.len()))?;
+        for piece in bytes.chunks(PIECE) {
+            stop.check()?;
+            self.decode(piece, arrived, columns);
         }
-        out.mark_repaired(before, false);
+        if last {
+            self.release(columns);
+            self.as_new();
+        }
+        Ok(())
+    }
+
+    /// As [`Self::fill`] to the end of the stream, but decodes consecutive datagrams with these `lengths` separately: a
+    /// change whose intensity is not in its datagram has none.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` if the lengths together are not those of the bytes, or the columns have too little room, and nothing was
+    /// read; `Interrupted` if asked to stop.
+    pub fn fill_datagrams(
+        &mut self,
+        bytes: &[u8],
+        lengths: &[i64],
+        columns: &mut Columns<'_>,
+        stop: Stop<'_>,
+    ) -> Result<()> {
+        /// Datagrams between two checks of `stop`: some milliseconds of work.
+        const PIECE: usize = 1 << 14;
+        let total = lengths.iter().try_fold(0, |sum: usize, &n| sum.checked_add(usize::try_from(n).ok()?));
+        if total != Some(bytes.len()) {
+            return Err(problem!("lengths"; ": each must be 0 or more, and their sum {} bytes", bytes.len()));
+        }
+        columns.check_room(bytes.len(), self.most_rows(bytes.len()))?;
+        self.release(columns);
+        let mut rest = bytes;
+        for piece in lengths.chunks(PIECE) {
+            stop.check()?;
+            for &length in piece {
+                let (datagram, later) = rest.split_at(length as usize);
+                self.read(datagram, None, columns);
+                columns.open = false;
+                rest = later;
+            }
+        }
+        self.as_new();
+        Ok(())
     }
 
     /// Most rows that the next `bytes` bytes can complete.
@@ -160,37 +205,27 @@ impl Decoder {
         (self.have + bytes) / WORD_BYTES + 1
     }
 
-    /// Marks the end of a datagram: a change whose intensity has not arrived gets none.
-    pub fn end_of_datagram(&mut self) -> Events {
-        let mut events = Events::empty(self.array.clone());
-        self.end_of_datagram_into(&mut events);
-        events
+    /// Marks the end of a datagram: a change whose intensity has not arrived gets none, and is appended.
+    pub fn end_of_datagram(&mut self, out: &mut Events) {
+        let mut block = std::mem::take(&mut self.block);
+        let mut columns = block.columns();
+        self.release(&mut columns);
+        out.append_columns(&columns);
+        self.block = block;
     }
 
-    /// As [`Self::end_of_datagram`], but appends.
-    pub fn end_of_datagram_into(&mut self, out: &mut Events) {
-        if let Some(change) = self.waiting.take() {
-            append(out, change, None);
-            out.mark_repaired(out.len() - 1, false);
-        }
-    }
-
-    /// Ends the stream: returns the remaining events and resets the decoder, except for its counts.
-    pub fn finish(&mut self) -> Events {
-        let mut events = Events::empty(self.array.clone());
-        self.finish_into(&mut events);
-        events
-    }
-
-    /// As [`Self::finish`], but appends.
-    pub fn finish_into(&mut self, out: &mut Events) {
-        self.end_of_datagram_into(out);
-        if let Some(by_taxel) = &mut self.by_taxel {
-            let before = out.len();
-            by_taxel.finish_into(out);
-            out.mark_repaired(before, false);
-        }
+    /// Ends the stream: appends the remaining event and resets the decoder, except for its counts.
+    pub fn finish(&mut self, out: &mut Events) {
+        self.end_of_datagram(out);
         self.as_new();
+    }
+
+    /// Adds the change that waits for its intensity without one.
+    fn release(&mut self, columns: &mut Columns<'_>) {
+        if let Some(change) = self.pending.take() {
+            columns.push(change);
+            columns.open = false;
+        }
     }
 
     /// Discards an incomplete word and the time, but not the counts.
@@ -202,45 +237,37 @@ impl Decoder {
         }
     }
 
-    fn fill_columns(
-        &mut self,
-        bytes: &[u8],
-        arrived: Option<i64>,
-        room: Room<'_>,
-        paired: bool,
-        markers: &mut Vec<Marker>,
-    ) -> Filled {
-        let mut filling = FilledColumns { room, rows: 0, paired, open: false };
-        if let Some(change) = self.waiting.take() {
-            filling.change(change);
+    /// Decodes bytes to rows; a change whose intensity may be the next word waits.
+    fn decode(&mut self, bytes: &[u8], arrived: Option<i64>, columns: &mut Columns<'_>) {
+        if let Some(change) = self.pending.take() {
+            columns.push(change);
         }
+        self.read(bytes, arrived, columns);
+        self.pending = columns.take_pending();
+    }
+
+    fn read(&mut self, bytes: &[u8], arrived: Option<i64>, columns: &mut Columns<'_>) {
         let mut at = 0;
-        while self.have > 0 && at < bytes.len() {
-            self.byte(bytes[at], arrived, &mut filling, markers);
-            at += 1;
-        }
         while at < bytes.len() {
-            at += self.plain(&bytes[at..], arrived, &mut filling);
+            if self.have == 0 {
+                at += self.plain(&bytes[at..], arrived, columns);
+            }
             // The block loop stopped here: decode one word, or skip damaged bytes until the next first byte.
             for &byte in &bytes[at..] {
-                self.byte(byte, arrived, &mut filling, markers);
+                self.byte(byte, arrived, columns);
                 at += 1;
                 if self.have == 0 {
                     break;
                 }
             }
         }
-        if filling.open {
-            self.waiting = Some(filling.take_last());
-        }
-        Filled { rows: filling.rows, paired: filling.paired }
     }
 
     /// Decodes the plain words at the start of `bytes`; returns how many bytes they have.
     ///
     /// None if the stamps alone do not unwrap the words: before the first stamp, and until this arrival time was used.
-    fn plain(&mut self, bytes: &[u8], arrived: Option<i64>, filling: &mut FilledColumns<'_>) -> usize {
-        if self.by_taxel.is_some() || self.held.is_some() || self.clock.arrived != arrived {
+    fn plain(&mut self, bytes: &[u8], arrived: Option<i64>, columns: &mut Columns<'_>) -> usize {
+        if self.held.is_some() || self.clock.arrived != arrived {
             return 0;
         }
         let Some(latest) = self.clock.latest else { return 0 };
@@ -249,9 +276,9 @@ impl Decoder {
             Some(behind) => Carried { latest: behind, until: latest - 1, intensities: 0, unpaired: 0 },
             None => Carried { latest, until: i64::MAX, intensities: 0, unpaired: 0 },
         };
-        let before = filling.rows;
-        let done = blocks::plain(self.instructions, bytes, self.array.columns, self.array.rows, &mut state, filling);
-        let changes = (filling.rows - before) as u64;
+        let before = columns.rows;
+        let done = blocks::plain(self.instructions, bytes, self.array.columns, self.array.rows, &mut state, columns);
+        let changes = (columns.rows - before) as u64;
         match &mut self.clock.behind {
             Some(behind) => {
                 *behind = state.latest;
@@ -267,7 +294,7 @@ impl Decoder {
         done
     }
 
-    fn byte(&mut self, byte: u8, arrived: Option<i64>, filling: &mut FilledColumns<'_>, markers: &mut Vec<Marker>) {
+    fn byte(&mut self, byte: u8, arrived: Option<i64>, columns: &mut Columns<'_>) {
         if byte & FIRST != 0 {
             self.give_up_partial();
         } else if self.have == 0 {
@@ -281,7 +308,7 @@ impl Decoder {
             self.have = 0;
             self.counts.bytes += WORD_BYTES as u64;
             self.counts.words += 1;
-            self.word(Word::from_bytes(self.partial), arrived, filling, markers);
+            self.word(Word::from_bytes(self.partial), arrived, columns);
         }
     }
 
@@ -292,14 +319,14 @@ impl Decoder {
         self.have = 0;
     }
 
-    fn word(&mut self, word: Word, arrived: Option<i64>, filling: &mut FilledColumns<'_>, markers: &mut Vec<Marker>) {
-        let open = std::mem::take(&mut filling.open);
+    fn word(&mut self, word: Word, arrived: Option<i64>, columns: &mut Columns<'_>) {
+        let open = std::mem::take(&mut columns.open);
         match word {
             Word::Contradictory => self.counts.contradictory += 1,
             Word::Marker { stamp, start } => {
                 self.counts.markers += 1;
                 let t = self.time(stamp, arrived);
-                markers.push(Marker { t, start });
+                columns.markers.push(Marker { t, start });
             }
             Word::Change { x, y, .. } | Word::Intensity { x, y, .. }
                 if u16::from(x) >= self.array.columns || u16::from(y) >= self.array.rows =>
@@ -308,11 +335,7 @@ impl Decoder {
             }
             Word::Change { stamp, x, y, p } => {
                 self.counts.changes += 1;
-                let change = PendingChange { t: self.time(stamp, arrived), x: x.into(), y: y.into(), p };
-                match &mut self.by_taxel {
-                    Some(by_taxel) => by_taxel.change(change),
-                    None => filling.change(change),
-                }
+                columns.push(PendingChange { t: self.time(stamp, arrived), x: x.into(), y: y.into(), p });
             }
             Word::Intensity { ticks, x, y, p } => {
                 let (x, y) = (u16::from(x), u16::from(y));
@@ -326,11 +349,7 @@ impl Decoder {
                         held[taxel]
                     }
                 };
-                let paired = match (ticks, &mut self.by_taxel) {
-                    (None, _) => false,
-                    (Some(ticks), Some(by_taxel)) => by_taxel.intensity(taxel, ticks),
-                    (Some(ticks), None) => open && filling.pair(ticks, x, y),
-                };
+                let paired = ticks.is_some_and(|ticks| open && columns.pair(ticks, x, y));
                 *(if paired { &mut self.counts.intensities } else { &mut self.counts.unpaired }) += 1;
             }
         }
@@ -352,10 +371,10 @@ pub fn most_rows(bytes: usize) -> usize {
 
 /// Decodes a whole stream at once.
 #[must_use]
-pub fn decode(bytes: &[u8], array: Array, pairing: Pairing) -> (Events, Counts) {
-    let mut decoder = Decoder::new(array).pairing(pairing);
-    let mut events = decoder.push(bytes, None);
-    decoder.finish_into(&mut events);
+pub fn decode(bytes: &[u8], array: Array) -> (Events, Counts) {
+    let (mut decoder, mut events) = (Decoder::new(array.clone()), Events::empty(array));
+    decoder.push(bytes, None, &mut events);
+    decoder.finish(&mut events);
     (events, *decoder.counts())
 }
 

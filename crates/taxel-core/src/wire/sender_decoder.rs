@@ -158,8 +158,8 @@ impl SenderDecoder {
             let rows = out.len();
             let markers = out.markers.len();
             let before = self.version_1.times();
-            self.version_1.push_into(datagram, arrived, out);
-            self.version_1.end_of_datagram_into(out);
+            self.version_1.push(datagram, arrived, out);
+            self.version_1.end_of_datagram(out);
             self.carry(rows, markers, arrived, out);
             if let (Some((_, last)), Some(arrived)) = (self.version_1.times(), arrived) {
                 let offset = self.offset.unwrap_or(0);
@@ -185,7 +185,7 @@ impl SenderDecoder {
     /// Ends the stream: appends the events that still waited.
     pub fn finish_into(&mut self, out: &mut Events) {
         let (rows, markers) = (out.len(), out.markers.len());
-        self.version_1.finish_into(out);
+        self.version_1.finish(out);
         self.carry(rows, markers, None, out);
         self.order.note(&out.t[rows..], false, &mut self.totals);
     }
@@ -204,7 +204,7 @@ impl SenderDecoder {
     }
 
     fn change(&mut self, version: u8, out: &mut Events) {
-        self.version_1.end_of_datagram_into(out);
+        self.version_1.end_of_datagram(out);
         (self.version, self.whole_since) = (version, None);
         self.totals.changes += 1;
         if version == 1 {

@@ -18,18 +18,18 @@
 //! | n-6, n-5 | span: no datagram of a higher sequence holds anything before base + span us; 0 = unknown |
 //! | n-4 ... | CRC-32C of all bytes before |
 
-mod checksum;
 mod counts;
+mod crc;
 mod decoder;
 mod encode;
 mod packer;
 mod stream;
 
 pub use counts::{BoardTotals, Counts};
-pub use decoder::{DatagramOutcome, Decoder, stream_rows};
+pub use decoder::{DatagramOutcome, Decoder, most_rows};
 pub use encode::{Encoded, encode};
 pub use packer::{Packer, Settings};
-pub use stream::{DecodedStream, StreamReader, decode};
+pub use stream::{StreamReader, decode};
 
 use crate::{Array, problem};
 
@@ -74,19 +74,19 @@ const BASE_BITS: u32 = 48;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BodyKind {
     /// Changes without values: 16-bit words of polarity and 15 bits of skip.
-    Changes,
+    Changes = 0,
     /// Changes with values to 255: polarity, 7 bits of skip, 8 of value.
-    Small,
+    Small = 1,
     /// Changes with values to 65 535: 32-bit words of polarity, 15 bits of skip, 16 of value.
-    Large,
+    Large = 2,
     /// Markers: offset from the base (us, 32 bits), code (16), argument (16).
-    Markers,
+    Markers = 3,
     /// The board's own totals, 64 bits each, in the order of [`BoardTotals`].
-    Status,
+    Status = 4,
     /// As [`BodyKind::Small`], values that the board repeats.
-    SmallStates,
+    SmallStates = 6,
     /// As [`BodyKind::Large`], values that the board repeats.
-    LargeStates,
+    LargeStates = 7,
 }
 
 impl BodyKind {
@@ -108,15 +108,7 @@ impl BodyKind {
     /// The kind's number in the header.
     #[must_use]
     pub fn number(self) -> u8 {
-        match self {
-            Self::Changes => 0,
-            Self::Small => 1,
-            Self::Large => 2,
-            Self::Markers => 3,
-            Self::Status => 4,
-            Self::SmallStates => 6,
-            Self::LargeStates => 7,
-        }
+        self as u8
     }
 
     /// Bytes of a word, bits of its skip, bits of its value; none for a kind without taxels.
@@ -210,6 +202,13 @@ impl DatagramHeader {
     ///
     /// [`Refused`], with the reason.
     pub fn read(datagram: &[u8]) -> Result<(Self, &[u8]), Refused> {
+        Self::check(datagram)?;
+        Ok((Self::of_intact(datagram), body_of(datagram)))
+    }
+
+    /// Checks that bytes are an intact datagram.
+    #[inline]
+    fn check(datagram: &[u8]) -> Result<(), Refused> {
         if datagram.first().is_some_and(|&byte| byte != MAGIC) || datagram.get(1).is_some_and(|byte| byte >> 4 != 2) {
             return Err(Refused::Foreign);
         }
@@ -219,54 +218,44 @@ impl DatagramHeader {
         if datagram.len() > DATAGRAM_BYTES {
             return Err(Refused::Long);
         }
-        let (rest, sum) = checksum::split_checksum(datagram);
-        if checksum::crc32c(rest) != sum {
+        if crc::crc32c(&datagram[..datagram.len() - 4]) != checksum(datagram) {
             return Err(Refused::Checksum);
         }
-        Ok(Self::fields(datagram))
+        Ok(())
     }
 
     /// Whether bytes begin as a datagram does.
-    #[inline(always)]
     fn likely(bytes: &[u8]) -> bool {
         bytes.first() == Some(&MAGIC) && bytes.get(1).is_some_and(|byte| byte >> 4 == 2)
     }
 
-    /// The part of a datagram that is equal for all plain changes of one kind, board, session and stride: its first
-    /// four bytes and the header's last four, without the line and frame sync.
-    #[inline(always)]
-    #[cfg(target_arch = "x86_64")]
+    /// The bits of an intact datagram that its successor has too, if both are of changes: board, session, kind, stride and
+    /// flags.
+    #[inline]
     fn common(datagram: &[u8]) -> u64 {
-        let four = |at: usize| {
-            let mut word = [0; 4];
-            word.copy_from_slice(&datagram[at..at + 4]);
-            u64::from(u32::from_le_bytes(word))
-        };
-        let flags = ((1 << FLAG_BITS) - 1) & !u64::from(FRAME_SYNC);
-        (four(0) | four(HEADER_BYTES - 4) << 32) & (flags << 56 | ((1 << STRIDE_BITS) - 1) << 48 | 0xffff_ffff_ffff)
+        let mut header = [0; HEADER_BYTES];
+        header.copy_from_slice(&datagram[..HEADER_BYTES]);
+        let sender = u32::from_le_bytes([header[0], header[1], header[2], header[3]]);
+        let session = u16::from_le_bytes([header[14], header[15]]);
+        let (stride, flags) = (header[16] & ((1 << STRIDE_BITS) - 1), header[17] & ((1 << FLAG_BITS) - 1));
+        u64::from(sender) | u64::from(session) << 32 | u64::from(stride) << 48 | u64::from(flags) << 56
     }
 
-    /// The value of [`Self::common`] for plain changes with this header.
-    #[inline(always)]
-    #[cfg(target_arch = "x86_64")]
-    fn common_of(kind: BodyKind, board: u16, session: u16, stride: u8) -> u64 {
-        let [board, session, stride] = [u64::from(board), u64::from(session), u64::from(stride)];
-        u64::from(MAGIC) | u64::from(2 << 4 | kind.number()) << 8 | board << 16 | session << 32 | stride << 48
+    /// Whether the body has changes, of which no flag says more than that they are of one time.
+    fn has_plain_changes(&self) -> bool {
+        self.kind <= BodyKind::Large.number() && self.flags & !FRAME_SYNC == 0
     }
 
-    /// The header and the body of a datagram, which must be long enough to have them.
-    #[inline(always)]
-    fn fields(datagram: &[u8]) -> (Self, &[u8]) {
-        let (header, rest) = datagram.split_at(HEADER_BYTES);
-        let (body, trailer) = rest.split_at(rest.len() - TRAILER_BYTES);
-        let eight = |at: usize| {
-            let mut word = [0; 8];
-            word.copy_from_slice(&header[at..at + 8]);
-            u64::from_le_bytes(word)
-        };
+    /// The header of an intact datagram.
+    #[inline]
+    fn of_intact(datagram: &[u8]) -> Self {
+        let (mut header, mut trailer) = ([0; HEADER_BYTES], [0; TRAILER_BYTES]);
+        header.copy_from_slice(&datagram[..HEADER_BYTES]);
+        trailer.copy_from_slice(&datagram[datagram.len() - TRAILER_BYTES..]);
+        let eight = |at: usize| u64::from_le_bytes(std::array::from_fn(|k| header[at + k]));
         let (sender, time, stride, flags) = (eight(0), eight(8), header[16], header[17]);
-        let header = Self {
-            kind: header[1] & 0xf,
+        Self {
+            kind: (sender >> 8) as u8 & 0xf,
             board: (sender >> 16) as u16,
             sequence: (sender >> 32) as u32,
             base: time & ((1 << BASE_BITS) - 1),
@@ -275,8 +264,7 @@ impl DatagramHeader {
             line: stride >> STRIDE_BITS | flags >> FLAG_BITS << LOW_LINE_BITS,
             flags: flags & ((1 << FLAG_BITS) - 1),
             span: u16::from_le_bytes([trailer[0], trailer[1]]),
-        };
-        (header, body)
+        }
     }
 
     /// Appends a datagram with this header and body.
@@ -291,9 +279,21 @@ impl DatagramHeader {
         out.extend([self.line << STRIDE_BITS | stride, self.line >> LOW_LINE_BITS << FLAG_BITS | flags]);
         out.extend(body);
         out.extend(self.span.to_le_bytes());
-        let sum = checksum::crc32c(out);
+        let sum = crc32c::crc32c(out);
         out.extend(sum.to_le_bytes());
     }
+}
+
+/// The body of an intact datagram.
+fn body_of(datagram: &[u8]) -> &[u8] {
+    &datagram[HEADER_BYTES..datagram.len() - TRAILER_BYTES]
+}
+
+/// The checksum of a datagram: its last four bytes.
+#[inline]
+fn checksum(datagram: &[u8]) -> u32 {
+    let sum = &datagram[datagram.len() - 4..];
+    u32::from_le_bytes([sum[0], sum[1], sum[2], sum[3]])
 }
 
 /// The position before the first word of a body whose positions count from this line.

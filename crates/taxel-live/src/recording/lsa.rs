@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
-use taxel_core::wire::{self, Decoder, Pairing};
+use taxel_core::wire::{self, Decoder};
 use taxel_core::{Array, Events, Stop};
 
 use super::{OutputFile, limits};
@@ -146,14 +146,7 @@ pub struct DecodedLsa {
 /// `File` if it cannot be read; `Core` (format) if it contains datagrams of version 2, or makes more than `memory` bytes;
 /// `Core(Interrupted)` if asked to
 /// stop.
-pub fn decode_lsa(
-    path: &Path,
-    array: Array,
-    pairing: Pairing,
-    differences: bool,
-    memory: u64,
-    stop: Stop<'_>,
-) -> Result<DecodedLsa> {
+pub fn decode_lsa(path: &Path, array: Array, differences: bool, memory: u64, stop: Stop<'_>) -> Result<DecodedLsa> {
     /// Bytes between two checks of `stop`.
     const PIECE: usize = 1 << 22;
     let (mut bytes, file) = (vec![], File::open(path).map_err(Error::file(path))?);
@@ -164,14 +157,14 @@ pub fn decode_lsa(
         let reason = "begins with a datagram of wire version 2; a .lsa file contains only version 1";
         return Err(Error::format(path, &format!("{reason}: record version 2 to a .mcap file")));
     }
-    let mut decoder = Decoder::new(array.clone()).pairing(pairing).differences(differences);
+    let mut decoder = Decoder::new(array.clone()).differences(differences);
     let mut events = Events::empty(array);
     for piece in bytes.chunks(PIECE) {
         stop.check()?;
-        decoder.push_into(piece, None, &mut events);
+        decoder.push(piece, None, &mut events);
         limits::in_memory(path, "events", length + events.size() as u64, memory)?;
     }
-    decoder.finish_into(&mut events);
+    decoder.finish(&mut events);
     Ok(DecodedLsa { bytes, events, counts: *decoder.counts(), complete: completion_marker(path).exists() })
 }
 

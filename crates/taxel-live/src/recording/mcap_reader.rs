@@ -15,7 +15,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mcap::records::Record;
-use taxel_core::wire::{self, Decoder, Pairing};
+use taxel_core::wire::{self, Decoder};
 use taxel_core::{Events, Stop, problem};
 
 use super::stream::Sampling;
@@ -383,10 +383,10 @@ impl Reader {
     /// # Errors
     ///
     /// As [`Reader::messages`].
-    pub fn decode(&self, pairing: Pairing, stop: Stop<'_>) -> Result<DecodedRecording> {
+    pub fn decode(&self, stop: Stop<'_>) -> Result<DecodedRecording> {
         let header = self.header();
         let array = header.array.clone();
-        let decoder = Decoder::new(array.clone()).pairing(pairing).differences(header.decoding.difference);
+        let decoder = Decoder::new(array.clone()).differences(header.decoding.difference);
         let mut sender = wire::SenderDecoder::new(decoder, 1);
         let mut decoded = DecodedRecording::empty(Events::empty(array));
         #[allow(clippy::cast_possible_truncation)]

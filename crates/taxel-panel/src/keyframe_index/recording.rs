@@ -219,14 +219,14 @@ impl RecordingIndex {
                 bytes = LSA_PIECE.min(length - offset);
                 let mut piece = vec![0; usize::try_from(bytes).unwrap_or(0)];
                 taxel_live::read_exact_at(file, &mut piece, offset).map_err(Error::file(&self.path))?;
-                decoder.push_into(&piece, None, events);
+                decoder.push(&piece, None, events);
             }
             _ => {}
         }
         if k + 1 == self.blocks() {
             match decoding {
                 RecordingDecoder::Datagrams(decoder) => decoder.finish_into(events),
-                RecordingDecoder::Bytes(decoder) => decoder.finish_into(events),
+                RecordingDecoder::Bytes(decoder) => decoder.finish(events),
             }
         }
         Ok(bytes)

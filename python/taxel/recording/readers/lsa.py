@@ -32,9 +32,7 @@ class LsaReader(InMemory):
         return cut_raw(self.payload, differences=self.differences)
 
 
-def read_lsa(
-    path: Path, array: Array | None = None, pairing: str = "direct", *, differences: bool = False
-) -> LsaReader:
+def read_lsa(path: Path, array: Array | None = None, *, differences: bool = False) -> LsaReader:
     """Return a reader of a .lsa.
 
     Parameters
@@ -42,7 +40,6 @@ def read_lsa(
     path : Path
     array : Array, optional
         The sensor, which the file does not hold; default: the thesis'.
-    pairing : {"direct", "taxel"}
     differences : bool
         Whether intensities are differences.
 
@@ -52,7 +49,7 @@ def read_lsa(
     OSError : the file cannot be read
     """
     array = Array.thesis() if array is None else array
-    read = _core.read_lsa(path, array._parts(), pairing, differences, available())
+    read = _core.read_lsa(path, array._parts(), differences, available())
     facts = Facts(
         path=path,
         array=array,

@@ -43,7 +43,7 @@ _OF_STREAMS = (
 STEPS = ("events_out_of_order", "events_overtaken")
 
 
-def read_mcap(path: Path, pairing: str = "direct") -> list[McapReader]:
+def read_mcap(path: Path) -> list[McapReader]:
     """Return a reader of each source of a .mcap.
 
     Raises
@@ -52,7 +52,7 @@ def read_mcap(path: Path, pairing: str = "direct") -> list[McapReader]:
     OSError : the file cannot be read
     """
     reader = _core.RecordingReader(path)
-    return [McapReader(path, reader.of_source(name), pairing) for name in reader.sources()]
+    return [McapReader(path, reader.of_source(name)) for name in reader.sources()]
 
 
 class McapReader(Reader):
@@ -63,11 +63,10 @@ class McapReader(Reader):
     path : Path
     reader : RecordingReader
         Of this source.
-    pairing : {"direct", "taxel"}
     """
 
-    def __init__(self, path: Path, reader: _core.RecordingReader, pairing: str) -> None:
-        self._reader, self._pairing = reader, pairing
+    def __init__(self, path: Path, reader: _core.RecordingReader) -> None:
+        self._reader = reader
         self._header, ending, self._opened = reader.about()
         self._ending = ending or {}
         self._frames = self._header.get("frames")
@@ -109,7 +108,7 @@ class McapReader(Reader):
 
     @cached_property
     def _decoded(self) -> _core.DecodedDatagrams:
-        return self._now().decode(self._pairing)
+        return self._now().decode()
 
     @cached_property
     def _samples(self) -> _core.Samples:

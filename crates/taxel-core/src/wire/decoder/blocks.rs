@@ -11,29 +11,29 @@ mod scalar;
 
 pub(super) use carried::Carried;
 
-use super::filling::FilledColumns;
 use crate::vectors::Instructions;
+use crate::wire::columns::Columns;
 use crate::wire::v1::WORD_BYTES;
 
 /// Number of words that are decoded one by one before blocks are tried again: an odd number, so that pairs split by the
 /// edges of blocks are whole in the next block.
 const STRETCH: usize = 31;
 
-/// Decodes plain words from the start of `bytes` into `filling`, up to the first word that is not plain; returns the
-/// number of their bytes.
+/// Decodes plain words from the start of `bytes` into `out`, which has room for a row each, up to the first word that is
+/// not plain; returns the number of their bytes.
 pub(super) fn plain(
     set: Instructions,
     bytes: &[u8],
     columns: u16,
     rows: u16,
     state: &mut Carried,
-    filling: &mut FilledColumns<'_>,
+    out: &mut Columns<'_>,
 ) -> usize {
     let mut done = 0;
     loop {
-        done += blocks(set, &bytes[done..], columns, rows, state, filling);
+        done += blocks(set, &bytes[done..], columns, rows, state, out);
         let most = if set < Instructions::Avx2 { usize::MAX } else { STRETCH };
-        let words = scalar::words(&bytes[done..], columns, rows, state, filling, most);
+        let words = scalar::words(&bytes[done..], columns, rows, state, out, most);
         done += words * WORD_BYTES;
         if words < most {
             return done;
@@ -49,22 +49,15 @@ fn blocks(
     columns: u16,
     rows: u16,
     state: &mut Carried,
-    filling: &mut FilledColumns<'_>,
+    out: &mut Columns<'_>,
 ) -> usize {
-    let room = &filling.room;
-    let most = filling.rows + bytes.len() / WORD_BYTES;
-    assert!(
-        [room.x.len(), room.y.len(), room.ticks.len()].iter().all(|&n| n >= most)
-            && [room.p.len(), room.present.len()].iter().all(|&n| n >= most)
-            && room.t.len() >= most,
-        "columns too short"
-    );
+    assert!(out.left() >= bytes.len() / WORD_BYTES, "columns too short");
     match set {
         Instructions::Plain => 0,
         // SAFETY: `Decoder::instructions` and `best` select a set only if the machine has it, and the assertion above
-        // guarantees that each column has room for one row per word of `bytes`.
+        // guarantees that there is room for one row per word of `bytes`.
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx2 | Instructions::Avx512 => unsafe { avx2::blocks(bytes, columns, rows, state, filling) },
+        Instructions::Avx2 | Instructions::Avx512 => unsafe { avx2::blocks(bytes, columns, rows, state, out) },
         #[cfg(not(target_arch = "x86_64"))]
         _ => 0,
     }

@@ -18,7 +18,14 @@ fn bytes(words: &[Word]) -> Vec<u8> {
 }
 
 fn decode(words: &[Word]) -> (Events, Counts) {
-    crate::wire::decode(&bytes(words), Array::thesis(), Pairing::Direct)
+    crate::wire::decode(&bytes(words), Array::thesis())
+}
+
+/// What a decoder returns for these bytes.
+fn push(decoder: &mut Decoder, bytes: &[u8], arrived: Option<i64>) -> Events {
+    let mut events = Events::empty(decoder.array().clone());
+    decoder.push(bytes, arrived, &mut events);
+    events
 }
 
 fn intensities(events: &Events) -> Vec<Option<u16>> {
@@ -66,11 +73,11 @@ fn arrival_times_tell_how_long_a_silence_was() {
             let silence = turns * TURN + rest;
             for late in [-200_000, 0, 200_000] {
                 let mut decoder = Decoder::new(Array::thesis());
-                let mut events = decoder.push(&bytes(&[change(7, 0, 0)]), Some(1_000_000));
+                let mut events = push(&mut decoder, &bytes(&[change(7, 0, 0)]), Some(1_000_000));
                 let arrived = 1_000_000 + silence * STAMP_US + late;
                 let stamp = ((7 + silence) % TURN) as u16;
-                decoder.push_into(&bytes(&[change(stamp, 1, 0)]), Some(arrived), &mut events);
-                decoder.finish_into(&mut events);
+                decoder.push(&bytes(&[change(stamp, 1, 0)]), Some(arrived), &mut events);
+                decoder.finish(&mut events);
                 assert_eq!(events.t[1] - events.t[0], silence * STAMP_US, "silence {silence}, late {late}");
             }
         }
@@ -81,7 +88,7 @@ fn arrival_times_tell_how_long_a_silence_was() {
 fn arrival_times_out_of_all_reason_do_no_harm() {
     let mut decoder = Decoder::new(Array::thesis());
     for arrived in [i64::MIN, i64::MAX, 0, i64::MAX, i64::MIN] {
-        decoder.push(&bytes(&[change(7, 0, 0)]), Some(arrived));
+        push(&mut decoder, &bytes(&[change(7, 0, 0)]), Some(arrived));
     }
     assert_eq!(decoder.counts().words, 5);
 }
@@ -104,29 +111,15 @@ fn an_intensity_belongs_to_the_change_directly_before_it() {
 }
 
 #[test]
-fn a_whole_recording_may_be_paired_by_taxel() {
-    let words = [
-        change(0, 1, 1),
-        change(1, 1, 1),
-        change(1, 2, 2),
-        intensity(51, 1, 1),
-        intensity(52, 2, 2),
-        intensity(50, 1, 1),
-        intensity(49, 1, 1),
-    ];
-    let (events, counts) = crate::wire::decode(&bytes(&words), Array::thesis(), Pairing::Taxel);
-    assert_eq!(intensities(&events), [Some(50), Some(51), Some(52)]);
-    assert_eq!((counts.intensities, counts.unpaired), (3, 1));
-}
-
-#[test]
 fn a_change_waits_no_longer_than_its_datagram() {
     let mut decoder = Decoder::new(Array::thesis());
-    assert_eq!(decoder.push(&bytes(&[change(0, 1, 1)]), None).len(), 0);
-    assert_eq!(decoder.end_of_datagram().len(), 1);
-    assert_eq!(decoder.push(&bytes(&[intensity(5, 1, 1)]), None).len(), 0);
-    assert_eq!(decoder.counts().unpaired, 1);
-    assert_eq!(decoder.finish().len(), 0);
+    let mut events = push(&mut decoder, &bytes(&[change(0, 1, 1)]), None);
+    assert_eq!(events.len(), 0);
+    decoder.end_of_datagram(&mut events);
+    assert_eq!(events.len(), 1);
+    decoder.push(&bytes(&[intensity(5, 1, 1)]), None, &mut events);
+    decoder.finish(&mut events);
+    assert_eq!((events.len(), events.intensity.is_none(), decoder.counts().unpaired), (1, true, 1));
 }
 
 #[test]
@@ -141,9 +134,10 @@ fn any_word_ends_the_wait() {
     ];
     for word in other {
         let mut decoder = Decoder::new(array.clone());
-        let events = decoder.push(&bytes(&[change(0, 1, 1), word]), None);
+        let mut events = push(&mut decoder, &bytes(&[change(0, 1, 1), word]), None);
         assert_eq!(events.len(), 1, "{word:?}");
-        assert!(decoder.push(&bytes(&[intensity(9, 1, 1)]), None).intensity.is_none());
+        decoder.push(&bytes(&[intensity(9, 1, 1)]), None, &mut events);
+        assert!(events.intensity.is_none());
         assert_eq!(decoder.counts().unpaired, 1);
     }
 }
@@ -159,23 +153,21 @@ fn differences_add_up_to_held_values() {
         Word::Intensity { ticks: 40, x: 1, y: 1, p: false },
     ];
     let mut decoder = Decoder::new(Array::thesis()).differences(true);
-    let mut events = decoder.push(&bytes(&words), None);
-    decoder.finish_into(&mut events);
+    let mut events = push(&mut decoder, &bytes(&words), None);
+    decoder.finish(&mut events);
     assert_eq!(intensities(&events), [Some(50), Some(30), Some(0)]);
 }
 
 #[test]
 fn differences_add_up_from_what_was_held_and_to_nothing_from_what_is_unknown() {
     let words = [change(0, 1, 1), intensity(50, 1, 1), change(1, 2, 1), intensity(7, 2, 1)];
-    for pairing in [Pairing::Direct, Pairing::Taxel] {
-        let mut decoder = Decoder::new(Array::thesis()).pairing(pairing).differences(true);
-        let index = Array::thesis().index(1, 1);
-        decoder.begin_with((0..4096).map(|taxel| (taxel == index).then_some(300)));
-        let mut events = decoder.push(&bytes(&words), None);
-        decoder.finish_into(&mut events);
-        assert_eq!((events.len(), intensities(&events)), (2, vec![Some(350), None]));
-        assert_eq!((decoder.counts().intensities, decoder.counts().unpaired), (1, 1));
-    }
+    let mut decoder = Decoder::new(Array::thesis()).differences(true);
+    let index = Array::thesis().index(1, 1);
+    decoder.begin_with((0..4096).map(|taxel| (taxel == index).then_some(300)));
+    let mut events = push(&mut decoder, &bytes(&words), None);
+    decoder.finish(&mut events);
+    assert_eq!((events.len(), intensities(&events)), (2, vec![Some(350), None]));
+    assert_eq!((decoder.counts().intensities, decoder.counts().unpaired), (1, 1));
 }
 
 #[test]
@@ -187,8 +179,8 @@ fn sums_close_over_damage() {
             spoilt[at] = damage;
             spoilt.insert(at / 2, damage);
             let mut decoder = Decoder::new(Array::thesis());
-            decoder.push(&spoilt, None);
-            decoder.finish();
+            let mut events = push(&mut decoder, &spoilt, None);
+            decoder.finish(&mut events);
             let c = decoder.counts();
             assert_eq!(c.bytes, spoilt.len() as u64);
             assert_eq!(c.bytes, 5 * c.words + c.skipped);
@@ -258,11 +250,11 @@ fn pieces(mut decoder: Decoder, bytes: &[u8], longest: usize, heard: bool, seed:
     let (mut rest, mut now) = (bytes, 0);
     while !rest.is_empty() {
         let (piece, after) = rest.split_at(random.random_range(0..=longest.min(rest.len())));
-        decoder.push_into(piece, heard.then_some(now), &mut events);
+        decoder.push(piece, heard.then_some(now), &mut events);
         now += if random.random_bool(0.02) { random.random_range(0..20_000_000) } else { 0 };
         rest = after;
     }
-    decoder.finish_into(&mut events);
+    decoder.finish(&mut events);
     events.view().check().unwrap();
     (events, *decoder.counts())
 }
@@ -319,9 +311,9 @@ fn overtaken_datagrams_decode_as_byte_by_byte() {
             for (k, datagram) in datagrams.iter().enumerate() {
                 let arrived = Some(20_000 * k as i64);
                 for piece in datagram.chunks(if whole { usize::MAX } else { 1 }) {
-                    decoder.push_into(piece, arrived, &mut events);
+                    decoder.push(piece, arrived, &mut events);
                 }
-                decoder.end_of_datagram_into(&mut events);
+                decoder.end_of_datagram(&mut events);
             }
             (events, *decoder.counts())
         };
@@ -339,27 +331,11 @@ fn a_cut_changes_nothing() {
     let mut random = StdRng::seed_from_u64(12);
     for round in rounds(100) {
         let bytes = stream(&mut random, 500);
-        for pairing in [Pairing::Direct, Pairing::Taxel] {
-            for differences in [false, true] {
-                let decoder = Decoder::new(Array::thesis()).pairing(pairing).differences(differences);
-                let whole = pieces(decoder.clone(), &bytes, bytes.len(), false, round);
-                assert!(pieces(decoder, &bytes, 40, false, round) == whole, "round {round}, {pairing:?}");
-            }
+        for differences in [false, true] {
+            let decoder = Decoder::new(Array::thesis()).differences(differences);
+            let whole = pieces(decoder.clone(), &bytes, bytes.len(), false, round);
+            assert!(pieces(decoder, &bytes, 40, false, round) == whole, "round {round}");
         }
-    }
-}
-
-#[test]
-fn columns_filled_again_hold_the_same() {
-    let mut random = StdRng::seed_from_u64(13);
-    let mut columns = Events::empty(Array::thesis());
-    for _ in rounds(20) {
-        let bytes = stream(&mut random, 300);
-        let fresh = Decoder::new(Array::thesis()).push(&bytes, None);
-        columns.clear();
-        Decoder::new(Array::thesis()).push_into(&bytes, None, &mut columns);
-        assert_eq!((&columns.t, &columns.x, &columns.y), (&fresh.t, &fresh.x, &fresh.y));
-        assert_eq!((&columns.p, intensities(&columns)), (&fresh.p, intensities(&fresh)));
     }
 }
 
@@ -385,7 +361,7 @@ fn a_thousand_million_random_bytes_neither_panic_nor_grow() {
         }
         for decoder in &mut decoders {
             columns.clear();
-            decoder.push_into(&bytes, (round % 3 == 0).then_some(round), &mut columns);
+            decoder.push(&bytes, (round % 3 == 0).then_some(round), &mut columns);
         }
         if round == 10 {
             memory = columns.t.capacity();
@@ -393,7 +369,7 @@ fn a_thousand_million_random_bytes_neither_panic_nor_grow() {
     }
     assert_eq!(columns.t.capacity(), memory, "columns grew");
     let counts = decoders.map(|mut d| {
-        d.finish();
+        d.finish(&mut columns);
         *d.counts()
     });
     assert!(counts.iter().all(|c| c == &counts[0]));

@@ -9,8 +9,8 @@ use std::collections::VecDeque;
 
 use crate::Array;
 use crate::Events;
+use crate::wire::decode;
 use crate::wire::silence;
-use crate::wire::{Pairing, decode};
 
 /// Number of datagrams that one is compared with.
 const DATAGRAMS: usize = 8;
@@ -29,7 +29,7 @@ impl RecentDatagrams {
             known == datagram && then.zip(arrived).is_none_or(|(then, now)| silence(then, now) < WITHIN_US)
         });
         if let Some(before) = before {
-            let events = |datagram| decode(datagram, array.clone(), Pairing::Direct).0;
+            let events = |datagram| decode(datagram, array.clone()).0;
             let again = events(datagram);
             let since = self.0.iter().take(before).map(|(known, _)| events(known));
             if has_two_times(&again) || (values && has_values(&again) && has_no_repeated_taxel(&again, since)) {

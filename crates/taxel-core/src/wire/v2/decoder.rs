@@ -3,26 +3,18 @@
 
 mod body;
 mod held;
-#[cfg(target_arch = "x86_64")]
-mod run;
-mod run_totals;
 mod session;
 mod words;
 
-use super::checksum::split_checksum;
 use super::counts::{BoardTotals, Counts};
-use super::{DIFFERENCES, DROPPED, DatagramHeader, FRAME_SYNC, Refused};
+use super::{DIFFERENCES, DROPPED, DatagramHeader, FRAME_SYNC, Refused, checksum};
 use crate::events::FARTHEST_BACK_US;
 use crate::vectors::Instructions;
-use crate::wire::columns::{Columns, Laid, Room, Table};
+use crate::wire::columns::{Block, Columns};
 use crate::wire::silence;
-use crate::{Array, Events, Result, problem};
+use crate::{Array, Events};
 use held::ValuesByLine;
-#[cfg(target_arch = "x86_64")]
-use run::RunDecoder;
-use run_totals::RunTotals;
 use session::{BoardSession, Noted, WINDOW};
-pub use words::stream_rows;
 
 /// Number of repeated datagrams in turn, or of ones with other contents, after which a session has begun again.
 const IN_TURN: u32 = 32;
@@ -62,6 +54,8 @@ pub struct Decoder {
     array: Array,
     instructions: Instructions,
     board: Option<u16>,
+    /// What the last datagram of the latest session has in common with the next one, if it has plain changes.
+    common: Option<u64>,
     sessions: Vec<BoardSession>,
     /// Missing sequence numbers of sessions that are no longer kept.
     missed_before: u64,
@@ -73,6 +67,7 @@ pub struct Decoder {
     /// Whether events were received by other means before the first session.
     goes_on: bool,
     held: ValuesByLine,
+    block: Block,
     status: Option<BoardTotals>,
     /// Sequence number of the datagram with the latest status, in the latest session.
     status_number: i64,
@@ -91,6 +86,8 @@ impl Decoder {
         Self {
             array,
             instructions: Instructions::best(),
+            common: None,
+            block: Block::new(),
             board: None,
             sessions: vec![],
             missed_before: 0,
@@ -112,7 +109,7 @@ impl Decoder {
     /// # Errors
     ///
     /// `Problem` if this machine does not have them.
-    pub fn instructions(mut self, instructions: Instructions) -> Result<Self> {
+    pub fn instructions(mut self, instructions: Instructions) -> crate::Result<Self> {
         self.instructions = instructions.checked()?;
         Ok(self)
     }
@@ -176,45 +173,34 @@ impl Decoder {
     ///
     /// `arrived` is the host's clock in us. After a reset it shows how much time has passed; without it, time continues
     /// from the latest received time.
-    #[inline]
     pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> DatagramOutcome {
-        self.push_table(datagram, arrived, out)
+        let mut block = std::mem::take(&mut self.block);
+        let mut columns = block.columns();
+        let outcome = self.receive(datagram, arrived, &mut columns);
+        out.append_columns(&columns);
+        self.block = block;
+        outcome
     }
 
-    /// As [`Self::push`], but fills columns that the caller allocated, from their first row on.
+    /// As [`Self::push`], but fills columns that the caller allocated.
     ///
     /// # Errors
     ///
-    /// `Problem` if a column has fewer entries than [`stream_rows`] returns; nothing is read then.
+    /// `Problem` if the columns have less room than [`most_rows`] requires; nothing is read then.
     pub fn fill(
         &mut self,
         datagram: &[u8],
         arrived: Option<i64>,
-        room: Room<'_>,
-    ) -> Result<(Columns, DatagramOutcome)> {
-        let mut laid = Laid::new(check_room(room, datagram.len())?);
-        let received = self.push_table(datagram, arrived, &mut laid);
-        Ok((laid.end(), received))
+        columns: &mut Columns<'_>,
+    ) -> crate::Result<DatagramOutcome> {
+        columns.check_room(datagram.len(), most_rows(datagram.len()))?;
+        Ok(self.receive(datagram, arrived, columns))
     }
 
-    #[inline]
-    fn push_table(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut impl Table) -> DatagramOutcome {
-        let latest = self.latest;
-        let taken = self.plain(std::iter::once(datagram), stream_rows(datagram.len()), out);
-        match self.sessions.last() {
-            Some(session) if taken.datagrams > 0 => {
-                let RunTotals { base, span, .. } = taken;
-                self.last_arrival = arrived.map(|now| (now, latest.max(base))).or(self.last_arrival);
-                let until = (span > 0).then(|| base + i64::from(span));
-                DatagramOutcome::Intact { until, missing: session.missing(), reset: false }
-            }
-            _ => self.push_any(datagram, arrived, out),
-        }
-    }
-
-    fn push_any(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut impl Table) -> DatagramOutcome {
-        match DatagramHeader::read(datagram) {
-            Ok((header, body)) => self.push_read(datagram, &header, body, arrived, out),
+    /// Decodes a datagram to rows.
+    fn receive(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Columns<'_>) -> DatagramOutcome {
+        match DatagramHeader::check(datagram) {
+            Ok(()) => self.receive_intact(datagram, arrived, out),
             Err(refused) => {
                 self.counts.datagrams += 1;
                 *match refused {
@@ -228,63 +214,24 @@ impl Decoder {
         }
     }
 
-    /// As [`Self::push`], for a datagram that was already parsed and found intact.
-    pub(in crate::wire) fn push_read(
+    /// As [`Self::receive`], for a datagram that was found intact.
+    #[inline]
+    pub(in crate::wire::v2) fn receive_intact(
         &mut self,
         datagram: &[u8],
-        header: &DatagramHeader,
-        body: &[u8],
         arrived: Option<i64>,
-        out: &mut impl Table,
+        out: &mut Columns<'_>,
     ) -> DatagramOutcome {
+        let header = DatagramHeader::of_intact(datagram);
         self.counts.datagrams += 1;
-        if *self.board.get_or_insert(header.board) != header.board {
-            return self.refuse_other_board();
-        }
-        let sum = split_checksum(datagram).1;
-        let (index, reset) = match self.sessions.last() {
-            // The usual case.
-            Some(last) if last.is_next(header) && last.unlike == 0 => (self.sessions.len() - 1, false),
-            _ => self.session(header, sum, arrived),
+        let (base, missing, reset) = match self.usual(&header, datagram, out) {
+            Some((base, missing)) => (base, missing, false),
+            None => match self.any(header, datagram, arrived, out) {
+                Ok(decoded) => decoded,
+                Err(outcome) => return outcome,
+            },
         };
-        let session = &mut self.sessions[index];
-        let number = session.number_of(header.sequence);
-        let ahead = number > session.highest;
-        match session.note(number, sum) {
-            Noted::Old => {
-                self.counts.old += 1;
-                return DatagramOutcome::Repeated;
-            }
-            noted @ (Noted::Again | Noted::Unlike) => {
-                let in_turn = if number == self.again.0 { self.again.1 + 1 } else { 1 };
-                self.again = (number + 1, in_turn);
-                if noted == Noted::Unlike {
-                    session.unlike += 1;
-                    return self.refuse_other_board();
-                }
-                self.counts.repeated += 1;
-                return DatagramOutcome::Repeated;
-            }
-            Noted::New => self.again.1 = 0,
-        }
-        if ahead {
-            session.unlike = 0;
-        }
-        session.latest = session.latest.max(header.base);
-        let (base, missing) = (session.offset + header.base as i64, session.missing());
         self.counts.intact += 1;
-        self.counts.dropped += u64::from(header.flags & DROPPED != 0);
-        self.counts.unknown_flags += u64::from(header.flags & !(FRAME_SYNC | DIFFERENCES | DROPPED) != 0);
-        self.latest = self.latest.max(base);
-        if index + 1 == self.sessions.len() {
-            self.body(header, body, base, Some(number), out);
-        } else {
-            // An event from before the latest reset must not change the taxels' current values.
-            let blank = self.held.blank();
-            let since = std::mem::replace(&mut self.held, blank);
-            self.body(header, body, base, None, out);
-            self.held = since;
-        }
         if let Some(now) = arrived {
             self.last_arrival = Some((now, self.latest));
         }
@@ -293,47 +240,90 @@ impl Decoder {
         DatagramOutcome::Intact { until, missing, reset }
     }
 
+    /// Decodes changes like those of the datagram before, next in the same session; returns their base time, us, and how
+    /// many numbers are missing. None for any other datagram.
+    #[inline(always)]
+    fn usual(&mut self, header: &DatagramHeader, datagram: &[u8], out: &mut Columns<'_>) -> Option<(i64, u64)> {
+        if self.common != Some(DatagramHeader::common(datagram)) {
+            return None;
+        }
+        let session = self.sessions.last_mut()?;
+        let base = session.take_ahead(header, checksum(datagram))?;
+        let missing = session.missing();
+        self.again.1 = 0;
+        self.latest = self.latest.max(base);
+        self.changes(header, datagram, base, out);
+        Some((base, missing))
+    }
+
+    /// Decodes any intact datagram; returns its base time, us, how many numbers are missing, and whether the board was reset
+    /// before it.
+    ///
+    /// # Errors
+    ///
+    /// The outcome for a datagram of which nothing is decoded.
+    #[inline(never)]
+    fn any(
+        &mut self,
+        header: DatagramHeader,
+        datagram: &[u8],
+        arrived: Option<i64>,
+        out: &mut Columns<'_>,
+    ) -> Result<(i64, u64, bool), DatagramOutcome> {
+        if *self.board.get_or_insert(header.board) != header.board {
+            return Err(self.refuse_other_board());
+        }
+        let sum = checksum(datagram);
+        let (index, reset) = match self.sessions.last() {
+            Some(last) if last.is_ahead(&header) && last.unlike == 0 => (self.sessions.len() - 1, false),
+            _ => self.session(&header, sum, arrived),
+        };
+        let session = &mut self.sessions[index];
+        let number = session.number_of(header.sequence);
+        let ahead = number > session.highest;
+        match session.note(number, sum) {
+            Noted::Old => {
+                self.counts.old += 1;
+                return Err(DatagramOutcome::Repeated);
+            }
+            noted @ (Noted::Again | Noted::Unlike) => {
+                let in_turn = if number == self.again.0 { self.again.1 + 1 } else { 1 };
+                self.again = (number + 1, in_turn);
+                if noted == Noted::Unlike {
+                    session.unlike += 1;
+                    return Err(self.refuse_other_board());
+                }
+                self.counts.repeated += 1;
+                return Err(DatagramOutcome::Repeated);
+            }
+            Noted::New => self.again.1 = 0,
+        }
+        if ahead {
+            session.unlike = 0;
+        }
+        session.latest = session.latest.max(header.base);
+        let (base, missing) = (session.offset + header.base as i64, session.missing());
+        self.counts.dropped += u64::from(header.flags & DROPPED != 0);
+        self.counts.unknown_flags += u64::from(header.flags & !(FRAME_SYNC | DIFFERENCES | DROPPED) != 0);
+        self.latest = self.latest.max(base);
+        if index + 1 == self.sessions.len() {
+            self.common = header.has_plain_changes().then(|| DatagramHeader::common(datagram));
+            self.body(&header, datagram, base, Some(number), out);
+        } else {
+            // An event from before the latest reset must not change the taxels' current values.
+            let blank = self.held.blank();
+            let since = std::mem::replace(&mut self.held, blank);
+            self.body(&header, datagram, base, None, out);
+            self.held = since;
+        }
+        Ok((base, missing, reset))
+    }
+
     /// Leaves out an intact datagram of another board.
     fn refuse_other_board(&mut self) -> DatagramOutcome {
         self.counts.foreign += 1;
         self.counts.other_board += 1;
         DatagramOutcome::Refused(Refused::Foreign)
-    }
-
-    /// Decodes datagrams while they are plain and short, if the machine has the instructions; `out` has room for `most`
-    /// rows. The result equals that of [`Self::push_read`] for each datagram, without arrival times.
-    #[inline]
-    #[cfg_attr(not(target_arch = "x86_64"), allow(unused_variables))]
-    pub(in crate::wire::v2) fn plain<'d>(
-        &mut self,
-        datagrams: impl Iterator<Item = &'d [u8]> + Clone,
-        most: usize,
-        out: &mut impl Table,
-    ) -> RunTotals {
-        #[cfg(target_arch = "x86_64")]
-        if self.instructions >= Instructions::Avx2
-            && let (Some(first), Some(board), Some(session)) =
-                (datagrams.clone().next(), self.board, self.sessions.last_mut())
-            && session.unlike == 0
-            && let Self { held, counts, latest, again, .. } = self
-            && let Some((mut run, value)) = RunDecoder::new(first, board, session, held, latest, counts)
-            && (value == 0 || out.writes_intensity())
-        {
-            // SAFETY: `instructions` and `best` select a set only if the machine has it. A run writes each row that it
-            // counts, and with `paired` its ticks and present.
-            unsafe {
-                out.rows(most, false, false, |room, row, paired| match value {
-                    0 => run.take::<0>(datagrams, room, row, paired),
-                    8 => run.take::<8>(datagrams, room, row, paired),
-                    _ => run.take::<16>(datagrams, room, row, paired),
-                });
-            }
-            if run.taken.datagrams > 0 {
-                again.1 = 0;
-            }
-            return run.taken;
-        }
-        RunTotals::default()
     }
 
     /// The index of the session that a datagram with this checksum belongs to, and whether it is the session's first datagram.
@@ -375,9 +365,11 @@ impl Decoder {
             self.missed_before += session.missing();
             self.filled_before += session.filled;
         }
+        self.common = None;
         self.sessions.push(BoardSession::new(header, offset, !began));
         (self.sessions.len() - 1, !began)
     }
+
     /// Whether a datagram of a session's number begins another session, as two successive resets drew the same number.
     fn begins_again(&self, session: &BoardSession, header: &DatagramHeader, sum: u32, arrived: Option<i64>) -> bool {
         let number = session.number_of(header.sequence);
@@ -402,13 +394,10 @@ impl Decoder {
     }
 }
 
-/// The columns, if they have room for the rows of this many bytes.
-pub(in crate::wire::v2) fn check_room(room: Room<'_>, bytes: usize) -> Result<Room<'_>> {
-    let most = stream_rows(bytes);
-    if room.len() < most {
-        return Err(problem!("columns have room for {} rows: {bytes} bytes may need {most} rows", room.len()));
-    }
-    Ok(room)
+/// Most rows that a stream of this many bytes can need: one a word of two bytes, and those that may be overwritten.
+#[must_use]
+pub fn most_rows(bytes: usize) -> usize {
+    words::room(bytes / 2)
 }
 
 #[cfg(test)]

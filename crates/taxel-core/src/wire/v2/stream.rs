@@ -1,9 +1,9 @@
 //! Datagrams in files and on streams, each preceded by its length; a reader resynchronises after damage.
 
 use super::counts::Counts;
-use super::decoder::{Decoder, check_room, stream_rows};
+use super::decoder::{Decoder, most_rows};
 use super::{DATAGRAM_BYTES, DatagramHeader, HEADER_BYTES, LENGTH_BYTES, TRAILER_BYTES};
-use crate::wire::columns::{Columns, Laid, Room};
+use crate::wire::columns::Columns;
 use crate::{Array, Result, Stop};
 
 /// Cuts a stream into datagrams. Bytes that belong to none are skipped and counted, up to the next place where length,
@@ -36,32 +36,11 @@ impl StreamReader {
     }
 }
 
-/// The destination of a stream's datagrams.
-trait DatagramSink {
-    /// Consumes any number of the datagrams ahead; returns the number of their bytes, with their lengths.
-    fn run(&mut self, ahead: &[u8]) -> usize;
-
-    /// Consumes one intact datagram.
-    fn take(&mut self, datagram: &[u8], header: &DatagramHeader, body: &[u8]);
-}
-
-impl<F: FnMut(&[u8])> DatagramSink for F {
-    fn run(&mut self, _: &[u8]) -> usize {
-        0
-    }
-
-    fn take(&mut self, datagram: &[u8], _: &DatagramHeader, _: &[u8]) {
-        self(datagram);
-    }
-}
-
-/// Passes each whole datagram that begins in `bytes` to a sink; returns the number of bytes consumed: all of them if
+/// Passes each whole datagram that begins in `bytes` to `take`; returns the number of bytes consumed: all of them if
 /// the stream ends there.
-fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, sink: &mut impl DatagramSink) -> usize {
+fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, mut take: impl FnMut(&[u8])) -> usize {
     let mut at = 0;
-    loop {
-        at += sink.run(&bytes[at..]);
-        let Some(rest) = bytes.get(at..).filter(|rest| rest.len() >= LENGTH_BYTES + 2) else { break };
+    while let Some(rest) = bytes.get(at..).filter(|rest| rest.len() >= LENGTH_BYTES + 2) {
         let length = usize::from(u16::from_le_bytes([rest[0], rest[1]]));
         let likely = (HEADER_BYTES + TRAILER_BYTES..=DATAGRAM_BYTES).contains(&length)
             && DatagramHeader::likely(&rest[LENGTH_BYTES..]);
@@ -70,10 +49,8 @@ fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, sink: &mut impl DatagramSink
             if datagram.is_none() && !ends {
                 return at;
             }
-            if let Some((datagram, (header, body))) =
-                datagram.and_then(|bytes| Some((bytes, DatagramHeader::read(bytes).ok()?)))
-            {
-                sink.take(datagram, &header, body);
+            if let Some(datagram) = datagram.filter(|bytes| DatagramHeader::check(bytes).is_ok()) {
+                take(datagram);
                 at += LENGTH_BYTES + length;
                 continue;
             }
@@ -88,58 +65,25 @@ fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, sink: &mut impl DatagramSink
     at
 }
 
-/// The result of decoding a whole stream, apart from the rows themselves.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct DecodedStream {
-    /// Description of the filled columns.
-    pub columns: Columns,
-    /// Counts of what was received and missed.
-    pub counts: Counts,
-    /// Number of bytes that belonged to no datagram.
-    pub skipped: u64,
-}
-
-/// Splits consecutive datagrams, each preceded by its length.
-fn ahead(mut bytes: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
-    std::iter::from_fn(move || {
-        let (length, rest) = bytes.split_first_chunk::<LENGTH_BYTES>()?;
-        let (datagram, rest) = rest.split_at_checked(usize::from(u16::from_le_bytes(*length)))?;
-        bytes = rest;
-        Some(datagram)
-    })
-}
-
-/// A decoder, and the columns that it fills.
-struct StreamDecoder<'a>(Decoder, Laid<'a>);
-
-impl DatagramSink for StreamDecoder<'_> {
-    fn run(&mut self, bytes: &[u8]) -> usize {
-        let taken = self.0.plain(ahead(bytes), stream_rows(bytes.len()), &mut self.1);
-        taken.bytes + LENGTH_BYTES * taken.datagrams
-    }
-
-    fn take(&mut self, datagram: &[u8], header: &DatagramHeader, body: &[u8]) {
-        self.0.push_read(datagram, header, body, None, &mut self.1);
-    }
-}
-
-/// Decodes a whole stream of one board's datagrams into columns that the caller allocated, from their first row on.
+/// Decodes a whole stream of one board's datagrams into columns that the caller allocated. Returns the counts of what was
+/// received and missed, and the number of bytes that belonged to no datagram.
 ///
 /// # Errors
 ///
-/// `Problem` if a column has fewer entries than [`stream_rows`] returns, in which case nothing is read; `Interrupted`
-/// if asked to stop.
-pub fn decode(bytes: &[u8], array: Array, room: Room<'_>, stop: Stop<'_>) -> Result<DecodedStream> {
+/// `Problem` if the columns have less room than [`most_rows`] requires, in which case nothing is read; `Interrupted` if
+/// asked to stop.
+pub fn decode(bytes: &[u8], array: Array, columns: &mut Columns<'_>, stop: Stop<'_>) -> Result<(Counts, u64)> {
     /// Bytes between two checks of `stop`: some milliseconds of work, and more than a datagram.
     const PIECE: usize = 1 << 20;
-    let laid = Laid::new(check_room(room, bytes.len())?);
-    let (mut filling, mut skipped, mut rest) = (StreamDecoder(Decoder::new(array), laid), 0, bytes);
+    columns.check_room(bytes.len(), most_rows(bytes.len()))?;
+    let (mut decoder, mut skipped, mut rest) = (Decoder::new(array), 0, bytes);
     while !rest.is_empty() {
         stop.check()?;
         let piece = &rest[..rest.len().min(PIECE)];
-        let done = cut(piece, piece.len() == rest.len(), &mut skipped, &mut filling);
+        let done = cut(piece, piece.len() == rest.len(), &mut skipped, |datagram| {
+            decoder.receive_intact(datagram, None, columns);
+        });
         rest = &rest[done..];
     }
-    let StreamDecoder(decoder, laid) = filling;
-    Ok(DecodedStream { columns: laid.end(), counts: decoder.counts(), skipped })
+    Ok((decoder.counts(), skipped))
 }

@@ -77,13 +77,13 @@ fn decode_all(index: &Arc<RecordingIndex>) -> Vec<TaxelChange> {
     let mut events = Events::empty(index.header.array.clone());
     match &index.source {
         OpenedFile::Mcap(reader) => {
-            events = reader.decode(wire::Pairing::Direct, taxel_core::Stop::never()).unwrap().events;
+            events = reader.decode(taxel_core::Stop::never()).unwrap().events;
         }
         OpenedFile::Lsa(..) => {
             let bytes = std::fs::read(&index.path).unwrap();
             let mut decoder = Decoder::new(index.header.array.clone());
-            decoder.push_into(&bytes, None, &mut events);
-            decoder.finish_into(&mut events);
+            decoder.push(&bytes, None, &mut events);
+            decoder.finish(&mut events);
         }
     }
     let mut changes = vec![];

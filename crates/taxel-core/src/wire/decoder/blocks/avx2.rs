@@ -4,7 +4,7 @@ use std::arch::x86_64::*;
 
 use super::carried::{Carried, indices, value};
 use crate::vectors::TO_FRONT;
-use crate::wire::decoder::filling::FilledColumns;
+use crate::wire::columns::Columns;
 use crate::wire::v1::{STAMP_US, WORD_BYTES};
 
 const WORDS: usize = 16;
@@ -99,15 +99,14 @@ fn paired_lanes(position: __m256i) -> bool {
 ///
 /// # Safety
 ///
-/// The machine must have AVX2 and POPCNT, and each column of `filling.room` at least `filling.rows + bytes.len() / 5`
-/// entries.
+/// The machine must have AVX2 and POPCNT, and `out` room for a row per word of `bytes`.
 #[target_feature(enable = "avx2,popcnt")]
 pub(super) unsafe fn blocks(
     bytes: &[u8],
     columns: u16,
     rows: u16,
     state: &mut Carried,
-    filling: &mut FilledColumns<'_>,
+    out: &mut Columns<'_>,
 ) -> usize {
     // SAFETY: each table is 16 bytes long.
     let table = |t: &[u8; 16]| unsafe { _mm256_broadcastsi128_si256(_mm_loadu_si128(t.as_ptr().cast())) };
@@ -123,9 +122,9 @@ pub(super) unsafe fn blocks(
 
     // State from the word before a block: its taxel, and whether it is a change whose intensity may be the block's
     // first word. That intensity is written with the next block, or after the last one.
-    let (x, y) = if filling.open { filling.last_taxel() } else { (0, 0) };
+    let (x, y) = if out.open { out.last_taxel() } else { (0, 0) };
     let mut position_before = _mm256_set1_epi16((x | y << 8) as i16);
-    let mut open = u32::from(filling.open);
+    let mut open = u32::from(out.open);
 
     let mut at = 0;
     while at + BYTES <= bytes.len() {
@@ -161,7 +160,7 @@ pub(super) unsafe fn blocks(
             let ahead = _mm256_cvtepu16_epi64(ahead);
             _mm256_add_epi64(start, _mm256_mul_epu32(ahead, _mm256_set1_epi64x(STAMP_US)))
         };
-        let first = filling.rows;
+        let first = out.rows;
 
         let farthest;
         if intensities == 0 {
@@ -176,21 +175,21 @@ pub(super) unsafe fn blocks(
             let (early, late) = (_mm256_castsi256_si128(ahead), _mm256_extracti128_si256::<1>(ahead));
             // SAFETY: at least 16 words are left, so 16 rows fit after `first`; a row precedes it if `open` is set.
             unsafe {
-                let t = filling.room.t.as_mut_ptr().add(first).cast::<i64>();
+                let t = out.t.as_mut_ptr().add(first);
                 _mm256_storeu_si256(t.cast(), time(early));
                 _mm256_storeu_si256(t.add(4).cast(), time(_mm_srli_si128::<8>(early)));
                 _mm256_storeu_si256(t.add(8).cast(), time(late));
                 _mm256_storeu_si256(t.add(12).cast(), time(_mm_srli_si128::<8>(late)));
-                _mm256_storeu_si256(filling.room.x.as_mut_ptr().add(first).cast(), x);
-                _mm256_storeu_si256(filling.room.y.as_mut_ptr().add(first).cast(), y);
-                _mm_storeu_si128(filling.room.p.as_mut_ptr().add(first).cast(), p);
-                if filling.paired {
+                _mm256_storeu_si256(out.x.as_mut_ptr().add(first).cast(), x);
+                _mm256_storeu_si256(out.y.as_mut_ptr().add(first).cast(), y);
+                _mm_storeu_si128(out.p.as_mut_ptr().add(first).cast(), p);
+                if out.paired {
                     let row = first - open as usize;
-                    _mm256_storeu_si256(filling.room.ticks.as_mut_ptr().add(row).cast(), zero);
-                    _mm_storeu_si128(filling.room.present.as_mut_ptr().add(row).cast(), _mm_setzero_si128());
+                    _mm256_storeu_si256(out.ticks.as_mut_ptr().add(row).cast(), zero);
+                    _mm_storeu_si128(out.present.as_mut_ptr().add(row).cast(), _mm_setzero_si128());
                 }
             }
-            filling.rows = first + WORDS;
+            out.rows = first + WORDS;
             open = 1;
         } else if intensities == ALTERNATE && paired_lanes(position) {
             let changes = |lanes: __m256i| {
@@ -204,24 +203,24 @@ pub(super) unsafe fn blocks(
             if !rising || farthest > state.largest_lead() {
                 break;
             }
-            filling.begin_pairs();
+            out.begin_pairs();
             if open == 1 {
-                filling.clear_intensity();
+                out.clear_intensity();
             }
             let p = changes(polarity);
             // SAFETY: at least 16 words are left, so 8 rows fit after `first`.
             unsafe {
-                let t = filling.room.t.as_mut_ptr().add(first).cast::<i64>();
+                let t = out.t.as_mut_ptr().add(first);
                 _mm256_storeu_si256(t.cast(), time(ahead));
                 _mm256_storeu_si256(t.add(4).cast(), time(_mm_srli_si128::<8>(ahead)));
-                _mm_storeu_si128(filling.room.x.as_mut_ptr().add(first).cast(), changes(x));
-                _mm_storeu_si128(filling.room.y.as_mut_ptr().add(first).cast(), changes(y));
-                _mm_storel_epi64(filling.room.p.as_mut_ptr().add(first).cast(), _mm_packus_epi16(p, p));
+                _mm_storeu_si128(out.x.as_mut_ptr().add(first).cast(), changes(x));
+                _mm_storeu_si128(out.y.as_mut_ptr().add(first).cast(), changes(y));
+                _mm_storel_epi64(out.p.as_mut_ptr().add(first).cast(), _mm_packus_epi16(p, p));
                 let ticks = changes(_mm256_srli_epi32::<16>(values));
-                _mm_storeu_si128(filling.room.ticks.as_mut_ptr().add(first).cast(), ticks);
-                _mm_storel_epi64(filling.room.present.as_mut_ptr().add(first).cast(), _mm_set1_epi8(1));
+                _mm_storeu_si128(out.ticks.as_mut_ptr().add(first).cast(), ticks);
+                _mm_storel_epi64(out.present.as_mut_ptr().add(first).cast(), _mm_set1_epi8(1));
             }
-            filling.rows = first + WORDS / 2;
+            out.rows = first + WORDS / 2;
             open = 0;
             state.intensities += (WORDS / 2) as u64;
         } else {
@@ -251,8 +250,8 @@ pub(super) unsafe fn blocks(
                 break;
             }
             let found = pairs.count_ones();
-            if found != 0 && !filling.paired {
-                filling.begin_pairs();
+            if found != 0 && !out.paired {
+                out.begin_pairs();
             }
             let rows = SelectedLanes::new(changes);
             let ([t_early, t_late], [early, late]) = (rows.look_up(ahead), rows.look_up(position));
@@ -260,10 +259,10 @@ pub(super) unsafe fn blocks(
             let (columns, row_bits) = (_mm_set1_epi16(0x3f), |position| _mm_srli_epi16::<8>(position));
             // SAFETY: at least 16 words are left, so 16 rows fit after `first`: up to 8 for each half.
             unsafe {
-                let t = filling.room.t.as_mut_ptr().add(first).cast::<i64>();
-                let x = filling.room.x.as_mut_ptr().add(first);
-                let y = filling.room.y.as_mut_ptr().add(first);
-                let p = filling.room.p.as_mut_ptr().add(first);
+                let t = out.t.as_mut_ptr().add(first);
+                let x = out.x.as_mut_ptr().add(first);
+                let y = out.y.as_mut_ptr().add(first);
+                let p = out.p.as_mut_ptr().add(first);
                 _mm256_storeu_si256(t.cast(), time(t_early));
                 _mm256_storeu_si256(t.add(4).cast(), time(_mm_srli_si128::<8>(t_early)));
                 _mm256_storeu_si256(t.add(rows.early).cast(), time(t_late));
@@ -275,22 +274,22 @@ pub(super) unsafe fn blocks(
                 _mm_storel_epi64(p.cast(), _mm_packus_epi16(p_early, p_early));
                 _mm_storel_epi64(p.add(rows.early).cast(), _mm_packus_epi16(p_late, p_late));
             }
-            if filling.paired {
+            if out.paired {
                 // For each change, from the open one before the block on, the lane after it: its intensity, or none.
                 let behind = SelectedLanes::new(changes << 1 | open);
                 let [ticks_early, ticks_late] = behind.look_up(_mm256_and_si256(values, pair));
                 let [there_early, there_late] = behind.look_up(_mm256_srli_epi16::<15>(pair));
                 // SAFETY: as above; if a change is open, a row precedes `first`.
                 unsafe {
-                    let ticks = filling.room.ticks.as_mut_ptr().add(first - open as usize);
-                    let present = filling.room.present.as_mut_ptr().add(first - open as usize);
+                    let ticks = out.ticks.as_mut_ptr().add(first - open as usize);
+                    let present = out.present.as_mut_ptr().add(first - open as usize);
                     _mm_storeu_si128(ticks.cast(), ticks_early);
                     _mm_storeu_si128(ticks.add(behind.early).cast(), ticks_late);
                     _mm_storel_epi64(present.cast(), _mm_packus_epi16(there_early, there_early));
                     _mm_storel_epi64(present.add(behind.early).cast(), _mm_packus_epi16(there_late, there_late));
                 }
             }
-            filling.rows = first + rows.early + rows.late;
+            out.rows = first + rows.early + rows.late;
             open = changes >> 15;
             state.intensities += u64::from(found);
             state.unpaired += u64::from(WORDS as u32 - changes.count_ones() - found);
@@ -299,9 +298,9 @@ pub(super) unsafe fn blocks(
         state.latest += i64::from(farthest);
         at += BYTES;
     }
-    filling.open = open == 1;
-    if filling.open && filling.paired {
-        filling.clear_intensity();
+    out.open = open == 1;
+    if out.open && out.paired {
+        out.clear_intensity();
     }
     at
 }

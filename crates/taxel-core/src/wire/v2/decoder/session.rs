@@ -71,10 +71,10 @@ impl BoardSession {
         self.highest + i64::from(sequence.wrapping_sub(self.highest as u32) as i32)
     }
 
-    /// Whether a datagram is the next one in the sequence.
+    /// Whether a datagram comes after all that were received.
     #[inline]
-    pub(super) fn is_next(&self, header: &DatagramHeader) -> bool {
-        self.number == header.session && header.sequence == (self.highest as u32).wrapping_add(1)
+    pub(super) fn is_ahead(&self, header: &DatagramHeader) -> bool {
+        self.number == header.session && self.number_of(header.sequence) > self.highest
     }
 
     /// Whether the datagram of a number was received: one within the window, and at most the highest.
@@ -97,6 +97,18 @@ impl BoardSession {
     #[inline]
     pub(super) fn missing(&self) -> u64 {
         (self.highest - self.lowest + 1) as u64 - self.received
+    }
+
+    /// Records a datagram that is ahead of all others, as usual; returns its base time, us. None for any other datagram.
+    #[inline(always)]
+    pub(super) fn take_ahead(&mut self, header: &DatagramHeader, sum: u32) -> Option<i64> {
+        let number = self.number_of(header.sequence);
+        if self.unlike > 0 || !(1..=64).contains(&(number - self.highest)) {
+            return None;
+        }
+        self.note_ahead(number, sum);
+        self.latest = self.latest.max(header.base);
+        Some(self.offset + header.base as i64)
     }
 
     /// Records a number, and the checksum of its datagram.

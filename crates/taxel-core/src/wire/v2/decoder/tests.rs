@@ -18,39 +18,6 @@ fn datagram(kind: BodyKind, session: u16, sequence: u32, base: u64, body: &[u8])
 }
 
 #[test]
-fn changes_as_they_are_go_the_short_way_where_the_machine_has_it() {
-    let short = usize::from(Instructions::best() >= Instructions::Avx2);
-    for (kind, body, flags, taken) in [
-        (BodyKind::Small, vec![], 0, short),
-        (BodyKind::Small, vec![5, 0x80, 7, 0x03], FRAME_SYNC, short),
-        // Advances, and more than eight words.
-        (BodyKind::Small, [1, 0x7f, 5, 0x83].repeat(6), 0, short),
-        (BodyKind::Changes, vec![5, 0x80], 0, short),
-        (BodyKind::Large, vec![5, 1, 0, 0x80], 0, short),
-        // Datagrams that are not plain: a word of time, differences, dropped events, states, part of a word, a position
-        // outside the array, too long.
-        (BodyKind::Small, vec![0, 0xff, 9, 0, 5, 0x83], 0, 0),
-        (BodyKind::Small, vec![5, 0x80], DIFFERENCES, 0),
-        (BodyKind::Small, vec![5, 0x80], DROPPED, 0),
-        (BodyKind::SmallStates, vec![5, 0x80], 0, 0),
-        (BodyKind::Small, vec![5, 0x80, 7], 0, 0),
-        (BodyKind::Small, vec![63, 0x7f, 0, 0], 0, 0),
-        (BodyKind::Small, [5, 0x80].repeat(30), 0, 0),
-    ] {
-        let mut decoder = Decoder::new(Array::thesis());
-        let mut events = Events::empty(Array::thesis());
-        decoder.push(&datagram(BodyKind::Small, 1, 0, 0, &[9, 0]), None, &mut events);
-        let mut bytes = datagram(kind, 1, 1, 192, &body);
-        bytes[17] |= flags;
-        let sum = bytes.len() - 4;
-        let sealed = crc32c::crc32c(&bytes[..sum]).to_le_bytes();
-        bytes[sum..].copy_from_slice(&sealed);
-        let plain = decoder.plain(std::iter::once(&bytes[..]), stream_rows(bytes.len()), &mut events);
-        assert_eq!(plain.datagrams, taken, "{kind:?}, flags {flags}, {body:?}");
-    }
-}
-
-#[test]
 fn a_recording_misses_what_is_lost_since_it_began_whatever_comes_late_from_before() {
     let mut draw = StdRng::seed_from_u64(5);
     for _ in 0..200 {

@@ -1,6 +1,6 @@
 //! A datagram's body while it is decoded: the state of the decoding loops.
 
-use crate::wire::v2::{DatagramHeader, LATEST_OFFSET, Layout, before};
+use crate::wire::v2::{DatagramHeader, HEADER_BYTES, LATEST_OFFSET, TRAILER_BYTES, before};
 
 /// The meaning of a body's words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,14 +18,14 @@ pub(crate) enum Meaning {
 /// A body, and the position of the decoder in it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BodyReader<'a> {
-    pub(crate) layout: Layout,
     pub(crate) meaning: Meaning,
     /// Bits of a position that name its row.
     pub(crate) stride: u8,
     /// Base time, us.
     pub(crate) base: i64,
-    pub(crate) bytes: &'a [u8],
-    /// Number of bytes read; at most the length of `bytes`.
+    /// The header and the body.
+    pub(super) bytes: &'a [u8],
+    /// Index of the next word in `bytes`, or their length.
     pub(super) at: usize,
     /// The time of the next event, us.
     pub(super) t: i64,
@@ -35,22 +35,20 @@ pub(crate) struct BodyReader<'a> {
     pub(super) cut: bool,
     /// The latest time of a row, us; `i64::MIN` before the first.
     pub(crate) latest: i64,
-    /// Index of the next row.
-    pub(crate) rows: usize,
 }
 
 impl<'a> BodyReader<'a> {
-    /// The body of a header, with nothing read yet; times count from `base`, us.
-    pub(crate) fn new(layout: Layout, meaning: Meaning, header: &DatagramHeader, base: i64, bytes: &'a [u8]) -> Self {
-        let (at, rows, stride, position) = (0, 0, header.stride, before(header.line, header.stride));
-        Self { layout, meaning, stride, base, bytes, at, t: base, position, cut: false, latest: i64::MIN, rows }
+    /// The body of a datagram with this header, with nothing read yet; times count from `base`, us.
+    pub(crate) fn new(meaning: Meaning, header: &DatagramHeader, base: i64, datagram: &'a [u8]) -> Self {
+        let (stride, position) = (header.stride, before(header.line, header.stride));
+        let bytes = &datagram[..datagram.len() - TRAILER_BYTES];
+        Self { meaning, stride, base, bytes, at: HEADER_BYTES, t: base, position, cut: false, latest: i64::MIN }
     }
 
     /// Number of whole words left.
     #[inline(always)]
-    pub(crate) fn left(&self) -> usize {
-        // A shift instead of a division: words have 2 or 4 bytes.
-        (self.bytes.len() - self.at) >> self.layout.bytes.trailing_zeros()
+    pub(crate) fn words<const BYTES: usize>(&self) -> usize {
+        (self.bytes.len() - self.at) / BYTES
     }
 
     /// The offset at an index, us; none if the body ends before it, or if it is later than any valid offset.
