@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 
@@ -319,3 +320,15 @@ def test_a_label_outside_the_recording_is_refused(tmp_path):
             mine = labels_of(page)[0]
             assert page.alter(mine, t_us=10**12)["type"] == "refused"
             assert page.alter(mine, label="b")["type"] == "done"
+
+
+def test_a_pipe_in_the_folder_is_left_to_whom_it_is_for(tmp_path):
+    events = taxel.Events(np.array([0, 10**6]), [1, 1], [2, 2], [True, False], array=taxel.Array(8, 8))
+    taxel.convert(events, tmp_path / "walk.mcap")
+    os.mkfifo(tmp_path / "lines")
+    pipe = os.open(tmp_path / "lines", os.O_RDWR | os.O_NONBLOCK)
+    os.write(pipe, b"1,2\n3,4\n")
+    with Panel(tmp_path) as panel, Client(panel) as page:
+        assert [file["name"] for file in page.until("recordings")["files"]] == ["walk.mcap"]
+    assert os.read(pipe, 100) == b"1,2\n3,4\n"
+    os.close(pipe)

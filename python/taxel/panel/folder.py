@@ -108,7 +108,8 @@ class Folder:
         """Return name, size (bytes) and time of the last change (ns since 1970) of each recording, and the readouts."""
         files, readouts = [], []
         for file in self.path.iterdir():
-            if not _NAME.fullmatch(file.name):
+            # A pipe is a source of lines, of which nobody else may read.
+            if not _NAME.fullmatch(file.name) or not (file.is_file() or file.is_dir()):
                 continue
             try:
                 if self._opening.is_recording(file):
