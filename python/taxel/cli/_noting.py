@@ -30,7 +30,7 @@ def noting(write: Callable[[str], None], report: Callable[[str], None]) -> Itera
     try:
         source = sys.stdin.fileno()
         # A terminal that is read from the background stops the whole program.
-        is_readable = not hasattr(os, "tcgetpgrp") or not os.isatty(source) or os.tcgetpgrp(source) == os.getpgrp()
+        is_readable = sys.platform == "win32" or not os.isatty(source) or os.tcgetpgrp(source) == os.getpgrp()
     except (OSError, ValueError, AttributeError):
         is_readable = False
     if not is_readable:

@@ -20,12 +20,13 @@ _LARGE = 1 << 22
 def filled(array: Array, rows: int, fill: Callable[[tuple[Any, ...]], _core._Filled]) -> Events:
     """Return the events that `fill` writes into new columns with room for a number of rows."""
     room = max(rows, _LARGE) if rows >= _LARGE // 4 else rows
-    t, x, y, ticks = (np.empty(room, size) for size in (np.int64, np.uint16, np.uint16, np.uint16))
+    t = np.empty(room, np.int64)
+    x, y, ticks = np.empty(room, np.uint16), np.empty(room, np.uint16), np.empty(room, np.uint16)
     p, present = np.empty(room, np.bool_), np.empty(room, np.bool_)
     written = fill((t, x, y, ticks, p.view(np.uint8), present.view(np.uint8)))
     for column in (t, x, y, ticks, p, present):
         # What was not written is freed.
         column.resize(written["rows"], refcheck=False)
         frozen(column)
-    values = (ticks, present) if written["paired"] else (None, None)
-    return Events._unchecked(t, x, y, p, array, *values, written["repaired"], tuple(written["markers"]))
+    intensity, stated = (ticks, present) if written["paired"] else (None, None)
+    return Events._unchecked(t, x, y, p, array, intensity, stated, written["repaired"], tuple(written["markers"]))
