@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import time
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -254,10 +254,10 @@ def test_a_large_table_is_shown_from_its_beginning_and_then_whole(tmp_path, monk
     file = write_gaitpdb(tmp_path)
     monkeypatch.setattr(shown_files, "_LARGE", 1000)
     monkeypatch.setattr(shown_files, "_BEGINNING", file.stat().st_size // 3)
-    reading = shown_files.ShownFiles.opened
+    reading, looked_at = shown_files.ShownFiles.opened, threading.Event()
 
     def slowly(self, path, trial):
-        time.sleep(6)
+        assert looked_at.wait(60)
         return reading(self, path, trial)
 
     monkeypatch.setattr(shown_files.ShownFiles, "opened", slowly)
@@ -269,6 +269,7 @@ def test_a_large_table_is_shown_from_its_beginning_and_then_whole(tmp_path, monk
         assert first["frames"]["left_s"] > 0
         share = page.until("loading", name=file.name)["share"]
         assert 0 < share < 1
+        looked_at.set()
         then = page.until("opened", name=file.name)
         assert (then["frames"]["count"], then["frames"]["left_s"]) == (frames, None)
         assert page.until("transport")["t_us"] == first["start_us"]
