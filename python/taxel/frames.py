@@ -353,14 +353,13 @@ class Frames(FrozenColumns):
         if finite("above", above) < 0:
             raise refused("above", f" is {shown(above)}: must be 0 or more, because values are weights")
         weights = np.where(self._loaded(above), self.values, 0.0)
-        x, y = self.array.positions()
         across, down = weights.sum(axis=1, dtype=np.float64), weights.sum(axis=2, dtype=np.float64)
         if self.array.places is None:
             pitch = self.array._pitch("centre") if self.array.pitch_mm is not None else (1.0, 1.0)
             moments = np.stack([across @ np.arange(self.array.columns), down @ np.arange(self.array.rows)], axis=1)
             moments = moments * pitch[::-1]
         else:
-            moments = np.einsum("nij,kij->nk", weights, np.stack([x, y]), dtype=np.float64)
+            moments = np.einsum("nij,kij->nk", weights, np.stack(self.array.positions()), dtype=np.float64)
         total = across.sum(axis=1)[:, None]
         centre = np.full(moments.shape, np.nan)
         np.divide(moments, total, out=centre, where=total > 0)

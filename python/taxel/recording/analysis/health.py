@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded
 from taxel.recorded import recorded as held_by
-from taxel.recording.analysis.rest import FORCE_UNITS, NOISE_FLOOR, flickering, ticks_by_unit
+from taxel.recording.analysis.rest import FORCE_UNITS, NOISE_FLOOR, extremes, flickering, ticks_by_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -137,14 +137,15 @@ def health(recorded: Events | Frames | Recorded) -> Health:
         grid.astype(np.int64).reshape(table.array.shape) for grid in _core.changes_of_frames(table._parts())
     )
     # The values of frames count from the least one.
-    least, ticks = np.fmin.reduce(table.values, axis=None, initial=np.inf), table
-    if np.isfinite(least):
-        # Values at both ends of single precision are infinitely far apart.
-        with np.errstate(over="ignore"):
+    (lowest, most), scale = extremes(table), ticks_by_unit(table)
+    least, ticks = np.fmin.reduce(lowest, axis=None, initial=np.inf), table
+    # Values at both ends of single precision are infinitely far apart.
+    with np.errstate(over="ignore"):
+        if np.isfinite(least):
             values = table.values - least
-            ticks = Frames(frozen(np.multiply(values, ticks_by_unit(table), out=values)), table.t, array=table.array)
+            ticks = Frames(frozen(np.multiply(values, scale, out=values)), table.t, array=table.array)
+        above = np.multiply(most - least, scale) > NOISE_FLOOR
     touches = _core.touches_of_frames(ticks._parts(), 0.0 if table.unit in FORCE_UNITS else np.nan)
-    above = np.fmax.reduce(ticks.values, axis=0, initial=-np.inf) > NOISE_FLOOR
     found = judge(table.array, activity, moved, touches, above)
     # What jumps alone for single frames is left out of pressures too, and so is named.
     noisy = found.noisy | flickering(table)
@@ -184,7 +185,9 @@ def judge(
         Whether the taxel is known to have read more than the least value.
     """
     exists = np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists).reshape(array.shape)
-    touched, missed, pressed, changed, by_itself = (_grid(touches, k, array) for k in range(5))
+    counts = np.zeros((array.rows * array.columns, 5), np.uint32)
+    counts[touches[0]] = touches[1].reshape(-1, 5)
+    touched, missed, pressed, changed, by_itself = counts.T.reshape(5, *array.shape)
     enough = exists & (touched >= TOUCHED_FROM) & (_neighbours(exists) >= NEIGHBOURS_FROM)
     still = enough & (missed == touched)
     noisy = exists & (by_itself >= NOISY_FROM) & (by_itself >= NOISY_SHARE * changed) & (moved <= NOISY_ON * activity)
@@ -194,17 +197,12 @@ def judge(
     return Health(array, activity, still & ~above, still & above, noisy, untested)
 
 
-def _grid(touches: TouchCounts, k: int, array: Array) -> NDArray[Any]:
-    """Return one of the five counts of each taxel."""
-    taxels, counts = touches
-    grid = np.zeros(array.shape, np.int64)
-    grid.reshape(-1)[taxels] = counts.reshape(-1, 5)[:, k]
-    return grid
-
-
-def _neighbours(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _neighbours(mask: NDArray[np.bool_]) -> NDArray[np.int8]:
     """Return how many of the up to 8 neighbours of each taxel a mask has."""
-    padded = np.pad(mask.astype(np.int64), 1)
+    padded = np.pad(mask.astype(np.int8), 1)
     rows, columns = mask.shape
-    squares = [padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3)]
-    return np.asarray(np.sum(squares, axis=0) - mask)
+    found = -mask.astype(np.int8)
+    for i in range(3):
+        for j in range(3):
+            found += padded[i : i + rows, j : j + columns]
+    return found

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.columns import frozen_whole
 from taxel._core import ProblemError
 from taxel.calibration._curves import N_PER_KPA_MM2
 from taxel.encode import ContactArea
@@ -119,8 +120,10 @@ def series(recording: Recording, tare: Tare | None = None) -> Series | None:
     frames, above, rest = result
     if not recording.has_events and recording.calibration is None:
         # As on the page, a taxel that jumps alone for single frames is no load.
-        values = np.where(flickering(recording.frames()), np.float32(0), frames.values)
-        frames = Frames(values, frames.t, unit=frames.unit, array=frames.array)
+        flickers = flickering(recording.frames())
+        if flickers.any():
+            values = frozen_whole(np.where(flickers, np.float32(0), frames.values))
+            frames = Frames(values, frames.t, unit=frames.unit, array=frames.array)
     return Series.from_frames(frames, above, rest)
 
 

@@ -191,21 +191,20 @@ def ticks_by_unit(frames: Frames) -> float:
     """
     if frames.unit == "ticks":
         return 1.0
-    least, most = _extremes(frames.values)
-    flickers = flickering(frames)
-    least[flickers] = most[flickers] = np.nan
+    least, most = (np.where(flickering(frames), np.nan, each) for each in extremes(frames))
     span = float(np.fmax.reduce(most, axis=None, initial=np.nan)) - float(
         np.fmin.reduce(least, axis=None, initial=np.nan)
     )
     return RANGE_TICKS / span if span > 0 else 1.0
 
 
+@_once
 def flickering(frames: Frames) -> NDArray[np.bool_]:
     """Return which taxels of frames jump again and again for one frame, alone, shape (rows, columns)."""
     values, found = frames.values, np.zeros(frames.array.shape, bool)
     if min(found.shape) == 1 or found.size < _SMALL:
         return found
-    least, most = _extremes(values)
+    least, most = extremes(frames)
     spans = np.nan_to_num(most.astype(np.float64) - least)
     for _ in range(found.size // _FEW):
         y, x = np.unravel_index(np.argmax(spans), found.shape)
@@ -228,12 +227,10 @@ def flickering(frames: Frames) -> NDArray[np.bool_]:
     return found
 
 
-def _extremes(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return each taxel's least and greatest finite value, NaN for one without any."""
-    least, most = (reduction.reduce(values, axis=0, initial=np.nan) for reduction in (np.fmin, np.fmax))
-    if np.isinf(least).any() or np.isinf(most).any():
-        values = np.where(np.isfinite(values), values, np.nan)
-        least, most = (reduction.reduce(values, axis=0, initial=np.nan) for reduction in (np.fmin, np.fmax))
+@_once
+def extremes(frames: Frames) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return each taxel's least and greatest value, NaN for one without any."""
+    least, most = (reduction.reduce(frames.values, axis=0, initial=np.nan) for reduction in (np.fmin, np.fmax))
     return least, most
 
 

@@ -161,15 +161,17 @@ def _full_scale(frames: Frames) -> dict[str, Any] | None:
     least, top = (float(reduction.reduce(values, axis=None)) for reduction in (np.fmin, np.fmax))
     if not np.isfinite(top - least) or (top - least < _LEVELS and not np.any(values % 1)):
         return None
-    below, tail = top, list[int]()
-    while len(tail) < _BELOW and below > least:
-        below = float(np.max(values, where=values < below, initial=least))
-        tail.append(int(np.count_nonzero(values == below)))
     at_top = np.count_nonzero(values == top, axis=0)
     # A taxel that is always there is stuck.
-    at_top[(at_top < _AT_TOP) | (at_top == np.count_nonzero(~np.isnan(values), axis=0))] = 0
+    often = at_top >= _AT_TOP
+    at_top[~often] = 0
+    at_top[often] *= at_top[often] < np.count_nonzero(~np.isnan(values[:, often]), axis=0)
     taxels, readings = int(np.count_nonzero(at_top)), int(at_top.sum())
-    cut_off = taxels > 1 and readings > _TIMES * np.mean(tail)
+    below, tail = top, list[int]()
+    while taxels > 1 and len(tail) < _BELOW and below > least:
+        below = float(np.max(values, where=values < below, initial=least))
+        tail.append(int(np.count_nonzero(values == below)))
+    cut_off = bool(tail) and readings > _TIMES * np.mean(tail)
     return {"value": top, "readings": readings, "taxels": taxels} if cut_off else None
 
 
