@@ -125,19 +125,6 @@ def test_a_target_out_of_reach_is_refuted_by_one_row_and_said_so(time, after_spi
     assert "the smallest allowed weights give" in cone.certificate_.text
 
 
-def test_the_reading_names_the_patterns_targets_and_silences_that_conflict():
-    trains = SpikeTrains.from_lists([[20.0], [25.0], [30.0], [33.0]], stop=100.0)
-    cone = ConeX(lb=-2, ub=2, margin=1e-3).fit(
-        [trains, trains, SpikeTrains.from_lists([[99.0], [99.5], [], []], stop=100.0)], [[35.0], [], []]
-    )
-    assert cone.status_ == "infeasible"
-    text = str(cone.certificate_)
-    assert "pattern 0 must fire at target 0 (35 ms)" in text
-    assert "; pattern 1 must be silent at 3" in text
-    assert "pattern 2" not in text
-    assert repr(cone.certificate_).startswith("<Certificate of ")
-
-
 def test_a_proof_that_needs_its_margin_says_so_and_a_smaller_margin_may_solve_it():
     trains = SpikeTrains.from_lists([[20.0], [25.0], [30.0]], stop=100.0)
     near = SpikeTrains.from_lists([[20.0], [25.0], [30.2]], stop=100.0)
@@ -155,17 +142,6 @@ def test_a_proof_that_needs_its_margin_says_so_and_a_smaller_margin_may_solve_it
                 assert "Without a margin this is impossible too" not in proof.text
     assert found[0.2] == "infeasible"
     assert found[1e-5] == "solved"
-
-
-def test_a_row_that_the_problem_does_not_have_is_one_clear_error():
-    problem = refuted().problem_
-    for row in (("silence", 99, 5.0), ("target", 0, 7), ("silence", 0, 1e6), ("noise", 0, 1.0), ("target", 0, 0.5)):
-        with refused():
-            problem.row(row)
-    with refused():
-        refuted(time="grid").problem_.slope(0, 0)
-    with refused():
-        refuted(time="grid").problem_.silence(0, 0.25)
 
 
 @pytest.mark.parametrize("options", [{}, {"after_spike": "reset"}, {"first_threshold": "printed"}])
@@ -225,18 +201,6 @@ def test_what_a_sum_of_floats_loses_is_no_proof(silence: float, target: float, m
     rows = [Row("target", 0, 0), Row("silence", 0, 40.0), Row("target", 0, 0)]
     proof = Certificate(rows, np.array([target, silence, -target]), 1.0, True, "")
     assert not check_certificate(cone.problem_, proof, margin=margin)
-
-
-@pytest.mark.parametrize("time", ["grid", "continuous"])
-def test_the_check_states_its_rows_itself(time, monkeypatch):
-    cone = refuted(3, time=time)
-
-    def none(*_, **__):
-        raise AssertionError("a row of the compiled part was asked for")
-
-    monkeypatch.setattr(ConeXProblem, "row", none)
-    cone.problem_._problem = cone.problem_.lb = cone.problem_.ub = None
-    assert check_certificate(cone.problem_, cone.certificate_)
 
 
 #: What checks the arguments of a learner, a neuron and trains; it computes nothing of a proof.
@@ -342,14 +306,6 @@ def test_a_certificate_goes_through_json_and_proves_the_same():
     ):
         with refused(argument=argument):
             Certificate.from_dict(wrong)
-
-
-def test_a_certificate_has_one_multiplier_a_row() -> None:
-    trains = SpikeTrains.from_lists([[50.0], [60.0]], stop=100.0)
-    cone = ConeX().fit([trains], [[40.0]])
-    proof = dataclasses.replace(cone.certificate_, multipliers=np.ones(len(cone.certificate_.rows) + 1))
-    with refused(argument="certificate"):
-        check_certificate(cone.problem_, proof)
 
 
 def test_the_repr_of_a_fit_says_how_it_ended() -> None:

@@ -10,7 +10,6 @@ from making import made
 from refusal import refused
 from stated import examples, grid_rows, row, shares, terms, threshold
 
-import taxel
 from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeX, check_certificate
 
@@ -138,30 +137,6 @@ def test_verdicts_over_the_edge_of_what_can_be_met_are_those_of_highs_and_each_n
     assert len(seeds) / 6 < sum(verdicts) < len(seeds) * 5 / 6
 
 
-def test_the_problem_states_the_rows_of_the_grid_by_pattern_and_time():
-    patterns, targets = examples(3)
-    for options in OPTIONS:
-        cone = made(ConeX, **{"time": "grid", "lb": -3.0, "ub": 3.0, **options}).fit(patterns, targets)
-        problem, rows = cone.problem_, grid_rows(cone, patterns, targets)
-        for k, (p, target) in enumerate([(0, 0), (0, 1), (1, 0), (1, 1)]):
-            at, theta = problem.target(p, target)
-            behind, wanted = problem.behind(p, target)
-            assert at == pytest.approx(rows[0][k], abs=1e-14)
-            assert behind == pytest.approx(rows[1][k], abs=1e-14)
-            assert (theta, wanted) == pytest.approx((rows[2][k], cone.kappa * rows[2][k]), rel=1e-14)
-        end = np.broadcast_to(np.inf if cone.horizon is None else cone.horizon, 2)[1]
-        for t in np.arange(0.0, min(end, 125.0), 7.0):
-            fired = [e for e in targets[1] if e < t]
-            if any(e - 1e-9 <= t <= e + cone.neuron_.refractory + 1e-9 for e in targets[1]):
-                with refused():
-                    problem.silence(1, t)
-                continue
-            coefficients, limit = problem.silence(1, t)
-            assert coefficients == pytest.approx(row(cone, patterns[1], t, fired), abs=1e-14)
-            assert limit == pytest.approx(threshold(cone, t, fired, 0.0) - (cone.margin or 0.0), rel=1e-14)
-            assert problem.silence(1, t, margin=False)[1] == pytest.approx(threshold(cone, t, fired, 0.0), rel=1e-14)
-
-
 @pytest.mark.parametrize(
     ("kernel", "first_threshold", "after_spike"),
     mixed(["alpha", "double_exponential"], ["theta_0", "printed"], ["keep", "ignore", "reset"]),
@@ -237,13 +212,6 @@ def test_a_start_from_an_earlier_fit_changes_the_way_but_not_the_result():
         ConeX().fit(patterns, targets, start=ConeX())
 
 
-def test_the_same_fit_again_gives_the_same_bits():
-    patterns, targets = examples(8, trains=40)
-    for lambdas in ((0, 1, 0), (2, 2, 200)):
-        first, again = (ConeX(lambdas=lambdas, lb=-1, ub=1).fit(patterns, targets).weights_ for _ in range(2))
-        assert first.tobytes() == again.tobytes()
-
-
 def test_a_shift_in_time_and_another_order_of_trains_change_nothing():
     patterns, targets = examples(9, trains=40, whole_ms=True)
     here = ConeX(lb=-1, ub=1).fit(patterns, targets)
@@ -298,18 +266,6 @@ def test_a_problem_in_another_unit_of_potential_has_the_same_answer_in_that_unit
     assert said == {"solved", "infeasible"}
 
 
-def test_a_pattern_without_targets_teaches_silence():
-    (pattern,), targets = examples(11, trains=40, patterns=1, targets=1)
-    # The same pattern played faster: its potential is higher, so an untrained neuron fires.
-    fast = SpikeTrains.from_lists([0.8 * train for train in pattern], stop=pattern.stop)
-    loud = ConeX(lb=-1, ub=1).fit([pattern], targets)
-    taught = ConeX(lb=-1, ub=1).fit([pattern, fast], [targets[0], []])
-    assert taught.status_ == "solved"
-    assert len(loud.neuron_.run(loud.weights_, fast)) > 0
-    assert len(taught.neuron_.run(taught.weights_, fast)) == 0
-    assert list(taught.neuron_.run(taught.weights_, pattern)) == pytest.approx(list(targets[0]), abs=1e-6)
-
-
 def test_the_horizon_frees_what_lies_behind_it_in_each_pattern():
     patterns, targets = examples(12, trains=30, patterns=2, targets=1)
     ends = [float(t[-1]) + 5.0 for t in targets]
@@ -325,19 +281,6 @@ def large():
     return patterns, [[50.0 + 50.0 * (k % 3)] for k in range(430)]
 
 
-@pytest.mark.parametrize("lambdas", [(0, 1, 0), (1, 0, 0)])
-def test_max_seconds_ends_a_fit_with_the_best_so_far(lambdas):
-    patterns, targets = examples(6, trains=120, patterns=20, targets=2, duration=200.0)
-    cone = ConeX(lambdas=lambdas, lb=-1, ub=1, max_seconds=1e-9).fit(patterns, targets)
-    assert cone.status_ == "stopped"
-    assert cone.weights_.shape == (120,)
-    assert np.isfinite(cone.weights_).all()
-    assert np.isfinite([cone.objective_, cone.gap_, cone.violation_]).all()
-    assert cone.certificate_ is None
-    full = ConeX(lambdas=lambdas, lb=-1, ub=1, max_seconds=600).fit(patterns, targets)
-    assert full.status_ == "solved"
-
-
 def test_control_c_stops_a_fit_at_once_keeps_the_best_so_far_and_then_raises():
     patterns, targets = large()
     cone = ConeX(horizon=200.0)
@@ -345,21 +288,3 @@ def test_control_c_stops_a_fit_at_once_keeps_the_best_so_far_and_then_raises():
         for _ in range(1000):
             cone.fit(patterns, targets)
     assert cone.status_ in ("stopped", "feasible", "solved", "infeasible")
-
-
-def test_progress_is_told_round_by_round():
-    patterns, targets = examples(12, trains=40, patterns=4)
-    told = []
-    cone = ConeX(lb=-1, ub=1).fit(patterns, targets, progress=lambda *round: told.append(round))
-    assert [r[0] for r in told] == list(range(1, cone.rounds_ + 1))
-    assert told[-1][2] == 0
-    assert told[-1][3] == cone.objective_
-    with pytest.raises(ZeroDivisionError):
-        ConeX(lb=-1, ub=1).fit(patterns, targets, progress=lambda *_: 1 / 0)
-
-
-def test_a_fitted_cone_can_be_read_out():
-    patterns, targets = examples(5, trains=30)
-    cone = ConeX(lb=-1, ub=1).fit(patterns, targets)
-    assert cone.neuron_ == taxel.Neuron()
-    assert cone.status_ == "solved"

@@ -1,17 +1,16 @@
-"""ConeR, OnlineConeR and ConeX on graded trains: against 6.9 to 6.14 stated plainly, and against unsigned trains."""
+"""ConeR and ConeX on graded trains: against 6.9 to 6.11 stated plainly, and against unsigned trains."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 import stated
-import test_cone_r
 from draws import mixed
 from making import made
 from simulator import misfire
 
 from taxel import Neuron, SpikeTrains
-from taxel.learn import ConeR, ConeX, OnlineConeR, check_certificate
+from taxel.learn import ConeR, ConeX, check_certificate
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
 
@@ -21,44 +20,8 @@ def wide(random, n):
     return random.choice([-1, 1], n) * 10 ** random.uniform(-6, 6, n)
 
 
-def positive(patterns):
-    """The patterns with every value made positive."""
-    return [SpikeTrains(p.times, p.offsets, p.start, p.stop, abs(p.values), kind="graded") for p in patterns]
-
-
 def ones(patterns):
     return [SpikeTrains(p.times, p.offsets, p.start, p.stop, np.ones(len(p.times)), kind="graded") for p in patterns]
-
-
-OPTIONS = [
-    {},
-    {"after_spike": "reset"},
-    {"after_spike": "ignore", "refractory": 6.0, "norm": "square", "divide_b_by": "targets"},
-    {"lambdas": (4, 0, 100, 100, 80), "step_ms": 0.5},
-    {"kernel": "double_exponential", "lb": -1.0, "ub": 0.2},
-    {"kernel": "exponential", "lambdas": (0, 0, 1, 1, 1), "margin": 0.05},
-    {"engine": "cone solver"},
-    {"sides_b": "below", "sides_c": "below", "divide_d_by": "targets", "lambdas": (2, 1, 300, 10, 1)},
-    {"sides_b": "below", "sides_c": "below", "divide_c_by": "targets", "engine": "cone solver"},
-]
-
-
-@pytest.mark.parametrize(("options", "seed"), mixed(OPTIONS, [1, 2]), ids=str)
-def test_the_objective_of_graded_trains_is_that_of_every_row_handed_whole_to_a_solver(options, seed, monkeypatch):
-    patterns, targets = test_cone_r.examples(seed, whole_ms=seed == 2)
-    patterns = stated.graded(patterns, seed)
-    cone = made(ConeR, tau=12.0, **options).fit(patterns, targets)
-    rows = tuple(test_cone_r.statement(cone, patterns, targets))
-    silent = tuple(test_cone_r.statement(cone, positive(patterns), targets))[3]
-    sizes = (*map(np.abs, rows[:3]), silent, rows[4])
-    normalised = test_cone_r.shares
-    monkeypatch.setattr(test_cone_r, "shares", lambda cone, _: normalised(cone, sizes))
-    value = test_cone_r.shares(cone, rows) * test_cone_r.terms(cone, rows, cone.weights_)
-    assert list(cone.parts_.values()) == pytest.approx(list(value), rel=1e-9, abs=1e-12)
-    assert cone.status_ == "solved"
-    assert cone.objective_ == pytest.approx(test_cone_r.least(cone, rows), rel=1e-6)
-    assert (cone.weights_ < 0).any()
-    assert (cone.weights_ > 0).any()
 
 
 def test_a_target_that_only_negative_weights_reach_is_reachable():
@@ -123,19 +86,6 @@ def test_values_of_1_give_the_bits_of_unsigned_trains(kind, options):
         assert plain.objective_ == graded.objective_
         if kind is ConeX and plain.certificate_ is not None:
             assert plain.certificate_.text == graded.certificate_.text
-
-
-@pytest.mark.parametrize("window", [1, 3])
-def test_a_window_of_graded_patterns_is_a_fit_to_it_from_nothing(window):
-    patterns, targets = stated.examples(7, trains=20, patterns=7, targets=1)
-    patterns = stated.graded(patterns, 7)
-    online = made(OnlineConeR, window=window, tau=12.0, tolerance=3e-7)
-    for k, (pattern, wanted) in enumerate(zip(patterns, targets, strict=True)):
-        online.partial_fit(pattern, wanted)
-        own = slice(max(0, k + 1 - window), k + 1)
-        cold = made(ConeR, tau=12.0, tolerance=3e-7).fit(patterns[own], targets[own])
-        assert online.status_ == "solved"
-        assert online.objective_ == pytest.approx(cold.objective_, rel=1e-6, abs=1e-12)
 
 
 def test_scaling_the_values_scales_the_weights_that_are_needed():

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import signal
-import threading
-import warnings
+import pickle
 from unittest.mock import ANY
 
 import numpy as np
 import pytest
-from making import made
+from making import lists, made
 from refusal import refused
+from relaxed import examples
 
 from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeR, OnlineConeR
 
-
-@pytest.fixture(autouse=True)
-def _quiet():
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
+pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
 
 
 def stream(seed, count, trains=20, duration=120.0):
@@ -57,16 +51,6 @@ def test_at_each_step_the_objective_is_that_of_a_fit_to_the_window_from_nothing(
             assert online.objective_ == pytest.approx(cold.objective_, rel=1e-6, abs=1e-12)
             assert online.silent_rows_ == cold.silent_rows_
             assert online.unreachable_ == cold.unreachable_
-
-
-def test_what_left_the_window_leaves_no_trace():
-    patterns = list(stream(3, 9))
-    long, short = OnlineConeR(neuron=Neuron(tau=12.0), window=4), OnlineConeR(neuron=Neuron(tau=12.0), window=4)
-    for pattern, targets in patterns:
-        long.partial_fit(pattern, targets)
-    for pattern, targets in patterns[-4:]:
-        short.partial_fit(pattern, targets)
-    assert long.objective_ == pytest.approx(short.objective_, rel=2e-6)
 
 
 def test_a_fit_at_once_is_the_fit_of_the_last_patterns_and_the_stream_goes_on_from_it():
@@ -112,24 +96,6 @@ def test_an_empty_window_and_a_misspelt_parameter_are_one_clear_error_each():
         OnlineConeR().fit(*zip(*stream(0, 2), strict=True), start=[0.0])
 
 
-def test_control_c_keeps_the_best_so_far_and_the_pattern():
-    online = OnlineConeR(neuron=Neuron(tau=40.0), window=50, tolerance=1e-10, lambdas=(4, 0, 100, 100, 80))
-    timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
-    timer.start()
-
-    def learn_for_ever():
-        for seed in range(1000):
-            for pattern, targets in stream(seed, 50, trains=400, duration=1000.0):
-                online.partial_fit(pattern, targets)
-
-    with pytest.raises(KeyboardInterrupt):
-        learn_for_ever()
-    assert online.status_ in ("solved", "stopped")
-    assert online.patterns_ >= 1
-    assert repr(online).startswith("<OnlineConeR(neuron=Neuron(tau=40.0), ")
-    assert f"window=50): {online.status_}, gap_ " in repr(online)
-
-
 @pytest.mark.parametrize("learner", [ConeR(), OnlineConeR(window=2)])
 def test_more_trains_than_memory_holds_are_refused_in_one_line(learner):
     many = SpikeTrains.from_lists([[1.0]] * 10_001, stop=20.0)
@@ -137,3 +103,32 @@ def test_more_trains_than_memory_holds_are_refused_in_one_line(learner):
         learner.fit([many], [[10.0]])
     few = SpikeTrains.from_lists([[1.0], [4.0]], stop=20.0)
     assert learner.fit([few], [[10.0]]).weights_.shape == (2,)
+
+
+@pytest.mark.parametrize("seed", [61, 62, 63, 64])
+def test_a_window_of_patterns_fits_as_from_nothing_and_is_pickled_with_its_windows_of_silence(seed):
+    random = np.random.default_rng(seed)
+    options = {"tau": 12.0, "tolerance": 3e-7, "divide_c_by": "targets", "divide_d_by": "targets"}
+    options |= {"sides_b": "below", "sides_c": "below" if seed % 2 else "both"}
+    patterns, targets = examples(seed, 20, patterns=7, targets=2)
+    silence = [None if random.random() < 0.3 else [(10.0, 10.0 + random.uniform(1, 100))] for _ in patterns]
+    online = made(OnlineConeR, window=3, **options)
+    for k, (pattern, wanted, asked) in enumerate(zip(patterns, targets, silence, strict=True)):
+        online = pickle.loads(pickle.dumps(online)) if k == 4 else online
+        online.partial_fit(pattern, wanted, silence=asked)
+        first = max(k - 2, 0)
+        here = slice(first, k + 1)
+        cold = made(ConeR, **options).fit(patterns[here], targets[here], silence=silence[here])
+        assert online.objective_ == pytest.approx(cold.objective_, rel=1e-6, abs=1e-12)
+        assert online.silent_rows_ == cold.silent_rows_
+    once = made(OnlineConeR, window=3, **options).fit(patterns, targets, silence=silence)
+    assert once.objective_ == pytest.approx(online.objective_, rel=1e-6)
+
+
+def test_a_window_that_makes_no_sense_leaves_the_patterns_as_they_were():
+    online = OnlineConeR(window=2).partial_fit(lists([1.0]), [5.0])
+    with refused():
+        online.partial_fit(lists([1.0]), [5.0], silence=[(9.0, 3.0)])
+    with refused(argument="silence"):
+        online.partial_fit(lists([1.0]), [5.0], silence=[3.0])
+    assert online.patterns_ == 1
