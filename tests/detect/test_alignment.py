@@ -5,13 +5,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from discs import recipe, tare, touches
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from test_readout import recipe, tare, touches
 
 import taxel
-from taxel.detect import Alignment, Example, Fold, Part, Recipe, fit, judge, recipes, run, score
+from taxel.detect import Example, Fold, Part, Recipe, fit, judge, run, score
 from taxel.detect.alignment import align
 from taxel.detect.fit import Fitter
 
@@ -95,13 +95,6 @@ def test_where_no_input_follows_the_labels_they_stay_as_given(spikes: list[list[
     assert repr(found) == "Alignment(a: 2 labels as given)"
 
 
-def test_examples_of_different_numbers_of_trains_are_refused() -> None:
-    plan = dataclasses.replace(recipe(), align=True)
-    spikes = [taxel.SpikeTrains.from_lists([[10.0]] * n, stop=50.0) for n in (2, 3)]
-    with pytest.raises(taxel.ProblemError, match="example 1 has 3 trains, example 0 has 2"):
-        fit([Example(one, {"contact": [10_000], "lift": [20_000]}) for one in spikes], plan)
-
-
 def examples(*seeds: int, jitter_ms: float = 0.0) -> list[Example]:
     random = np.random.default_rng(seeds)
     made = []
@@ -165,17 +158,3 @@ def test_without_align_labels_are_learnt_as_they_are_given() -> None:
     exact, off = ([Example(spikes[0], {"a": times})] for times in ([20_000, 120_000], [25_000, 118_000]))
     assert fit(exact, plain) == fit(exact, aligned) == fit(off, aligned)
     assert fit(off, plain) != fit(off, aligned)
-
-
-def test_it_is_on_for_touch_and_bursts_and_off_for_all_other_recipes() -> None:
-    assert {name: Recipe.load(name).align for name in recipes.names()} == {
-        name: name in ("touch", "event_counts") for name in recipes.names()
-    }
-    assert Recipe.load("touch", {"align": False}).align is False
-    with pytest.raises(taxel.ProblemError, match="align is 'yes'"):
-        Recipe.load("touch", {"align": "yes"})
-
-
-def test_an_alignment_says_how_far_labels_moved() -> None:
-    found = Alignment("contact", 3, np.zeros(3, int), np.array([0, 10, 20]), np.array([1.0, -40.0, np.nan]))
-    assert repr(found) == "Alignment(contact: median -19.5 ms, largest -40 ms, 1 of 3 without a pair)"

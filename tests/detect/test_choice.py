@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plain_rules import ARRAY, FLOOR, clocks, events, tare
 from refusal import refused
-from test_plain_rule import ARRAY, FLOOR, clocks, events, tare
 
 import taxel
-from taxel import Detections, Frames, Neuron, Readout, SpikeTrains
+from taxel import Detections, Frames, Neuron, Readout
 from taxel.detect import Example, PlainRule, Recipe, judge, run, score
 from taxel.detect.fit import Found, better_by_rule
 from taxel.detect.judge import _chosen
@@ -79,20 +79,6 @@ def test_its_file_holds_both_and_what_runs(tmp_path):
     for wrong in ({"by_rule": ["never"]}, {"rules": {"on": RULES["off"]}}, {"rules": {"never": RULES["off"]}}):
         with pytest.raises(taxel.ProblemError):
             Readout(LevelCrossing([1.0]), {"on": (Neuron(), [1.0, 0.0])}, **wrong)
-
-
-def test_what_runs_says_whether_it_needs_a_rest():
-    frames = Frames(np.zeros((200, 1, 2)), 100_000 * np.arange(200), array=taxel.Array(1, 2))
-    free = PlainRule("range_count", 2, levels=[0.5], labels=("on", None))
-    neurons = {"on": (Neuron(), [1.0, 0.0, 0.0, 0.0])}
-    by_rule_alone = Readout(LevelCrossing([1.0]), neurons, rules={"on": free}, by_rule=["on"])
-    assert not by_rule_alone._needs_tare
-    assert len(run(by_rule_alone, frames)) == 0
-    tared = Readout(LevelCrossing([1.0]), neurons, rules={"on": PlainRule("area", 2, labels=("on", None))})
-    assert not tared._needs_tare
-    assert tared.using("rule")._needs_tare
-    with pytest.raises(taxel.ProblemError):
-        run(tared.using("rule"), SpikeTrains.from_lists([[1.0]] * 4))
 
 
 def scored(wrong: int, known: int):

@@ -15,7 +15,7 @@ from touching import pressed, touched
 import taxel
 from taxel import Detections, Tare
 from taxel.detect import Example, Outcome, PlainRule, score
-from taxel.detect.clock import ClockFit, explain, off_detections, off_loads
+from taxel.detect.clock import ClockFit, explain, off_loads
 from taxel.detect.examples import check_examples
 
 Times = NDArray[np.float64]
@@ -126,15 +126,6 @@ def outcome(late_us: int) -> Outcome:
     return Outcome("a.npz", Example(frames, labels, name="a.npz"), found, score(found, labels))
 
 
-def test_an_offset_is_that_beside_the_training() -> None:
-    """Detections that are 12 ms late in the training are so here."""
-    for error_ms, shift_ms in ((0.0, -200), (12.0, -212)):
-        [line] = off_detections([outcome(200_000)], dict.fromkeys(("contact", "lift"), error_ms))
-        assert f"--shift-ms {shift_ms}" in line
-        assert len(line) <= 160
-    assert off_detections([outcome(10_000)], {}) == []
-
-
 @pytest.mark.parametrize("shift_ms", [300, -150])
 def test_labels_are_compared_with_loads_where_nothing_was_detected_yet(shift_ms: int) -> None:
     frames, truth = pressed(4, 20)
@@ -158,15 +149,3 @@ def test_a_training_and_a_detection_warn_of_it(tmp_path: Path) -> None:
         assert int(line.rpartition("--shift-ms ")[2].rstrip(")")) == pytest.approx(-300, abs=10)
     for warnings in (taxel.train(recording, [truth]).warnings, taxel.tasks.detect(rule, recording, [truth]).warnings):
         assert warnings == ()
-
-
-def test_one_of_several_recordings_is_named(tmp_path: Path) -> None:
-    labels = []
-    for k, late_us in enumerate((0, 0, 90_000, 0)):
-        frames, truth = pressed(30 + k, 20)
-        taxel.convert(frames, tmp_path / f"{k}.npz")
-        labels.append({label: t + late_us for label, t in truth.items()})
-    opened = [taxel.open(tmp_path / f"{k}.npz") for k in range(4)]
-    [line] = taxel.tasks.detect(PlainRule("area", 2, noise_floor=5.0), opened, labels).warnings
-    assert "40 of 160 labels" in line
-    assert "2.npz" in line

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
 from refusal import refused
 
-import taxel
 from taxel import Array, Detections, Events, Frames, Neuron, Readout, Tare
 from taxel.detect import Example, Fold, Part, Recipe, TrainedNeuron, fit, judge, run
 from taxel.encode import FA1, ChangeEvents, Composite, ContactArea, LevelCrossing, Moments, ThresholdIzhikevich
@@ -109,13 +107,6 @@ def test_the_file_holds_encoders_and_inputs_and_one_without_them_stays_as_it_is(
     assert '"inputs"' not in json.dumps(json.loads(readout.to_json())["neurons"]["d"])
 
 
-def test_inputs_are_given_by_label_too() -> None:
-    encoder = Composite({"area": PARTS["area"], "change": PARTS["change"]})
-    pair = (Neuron(), [1.0] * 4)
-    by_label = Readout(encoder, {"a": pair, "b": (Neuron(), [0.5] * 32, 1.0, ("change",))}, inputs={"a": ["area"]})
-    assert [one.inputs for one in by_label.neurons.values()] == [("area",), ("change",)]
-
-
 def test_one_encoder_has_no_inputs() -> None:
     with refused():
         Readout(PARTS["area"], {"a": (Neuron(), [1.0] * 4, 0.0, ("area",))})
@@ -125,30 +116,6 @@ def test_one_encoder_has_no_inputs() -> None:
     ):
         with refused():
             call("z")
-
-
-def test_live_they_detect_what_they_detect_in_the_recording(tmp_path: Path) -> None:
-    from live.boards import LOOPBACK, SMALL, play, wait_for
-
-    from taxel.live import Live
-
-    events = held(7)
-    readout = Readout(Composite(PARTS), neurons(8, tau=0.5, refractory=5.0), array=SMALL, delays_ms=DELAYS)
-    called: list[taxel.Detection] = []
-    options = {"array": SMALL, "readout": readout, "tare": REST, "guard_frames": 1e6, "say": called.append}
-    with Live(0, host=LOOPBACK, record=tmp_path / "several.mcap", **options) as live:
-        thread = threading.Thread(target=play, args=(events, live.address[1]), kwargs={"pace": 0.0005})
-        thread.start()
-        thread.join()
-        wait_for(live, len(np.unique(events.t)))
-    live.stop()
-    recorded = taxel.open(tmp_path / "several.mcap")
-    again = run(readout, recorded, tare=REST)
-    found = taxel.Detections.from_list(called)
-    assert len(found) > 20
-    assert list(found.label) == list(again.label[: len(found)])
-    np.testing.assert_array_equal(found.t, again.t[: len(found)])
-    np.testing.assert_array_equal(found.known, again.known[: len(found)])
 
 
 def test_nir_holds_what_is_not_graded_and_refuses_what_is(tmp_path: Path) -> None:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
+from draws import seeds
 from refusal import refused
 
-import taxel
 from taxel import Array, Frames, Readout, Tare
-from taxel.detect import Example, PlainRule, Recipe, fit, judge, recipes, run, score, tune
-from taxel.detect.floors import floor_alone, measured_floor
-from taxel.recording.analysis.rest import by_unit
+from taxel.detect import Example, PlainRule, Recipe, fit, recipes, run, score, tune
+from taxel.detect.floors import measured_floor
 
 HZ = 60
 
@@ -55,7 +51,9 @@ def on_channels(seed: int, count: int, taps: int, presses: int, hz: int = HZ, un
     return Example(frames, labels, Tare.take(frames, stop_us=1_900_000))
 
 
-@pytest.mark.parametrize(("count", "hz", "unit"), [(1, 60, "kPa"), (2, 250, "counts"), (6, 60, "N")])
+@pytest.mark.parametrize(
+    ("count", "hz", "unit"), [(1, 60, "kPa"), pytest.param(2, 250, "counts", marks=pytest.mark.slow), (6, 60, "N")]
+)
 def test_on_channels_each_counts_alone(count: int, hz: int, unit: str) -> None:
     learnt, unseen = on_channels(1, count, 20, 10, hz, unit), on_channels(2, count, 20, 10, hz, unit)
     recipe = recipes.fitting(learnt.source, ["press", "tap"])
@@ -75,27 +73,16 @@ def test_on_channels_each_counts_alone(count: int, hz: int, unit: str) -> None:
     assert score(run(rule, unseen.source, tare=unseen.tare), unseen.labels, 50.0).rank[0] == 0
 
 
-def test_the_floor_of_channels_without_a_measured_rest_is_by_the_noise_before_labels() -> None:
-    learnt = on_channels(1, 1, 20, 10, unit="N")
-    assert floor_alone([learnt], 0.1, kinds=2) == 0.1
-    for values in (learnt.source.values, np.maximum(learnt.source.values, 0.0)):
-        frames = Frames(values, learnt.source.t, unit="N", array=learnt.source.array)
-        of_unit = Example(frames, learnt.labels, by_unit(frames))
-        assert floor_alone([of_unit], 0.1, kinds=2) == pytest.approx(6.0, rel=0.25)
-        assert floor_alone([of_unit], 30.0, kinds=2) == 30.0
-        assert floor_alone([of_unit._replace(labels={})], 0.1, kinds=2) == 0.1
-
-
 def test_one_kind_of_touch_has_a_floor_of_its_strength_so_that_a_drift_is_no_touch() -> None:
     rng = np.random.default_rng(1)
-    begins = 1000 + np.cumsum(rng.integers(700, 1500, 30))
+    begins = 250 + np.cumsum(rng.integers(175, 375, 15))
 
     def taps(drift: float) -> Example:
-        values = 4.0 + rng.normal(0.0, 0.3, begins[-1] + 1000) + np.linspace(0.0, drift, begins[-1] + 1000)
+        values = 4.0 + rng.normal(0.0, 0.3, begins[-1] + 250) + np.linspace(0.0, drift, begins[-1] + 250)
         for begin in begins:
-            values[begin : begin + 60] += rng.uniform(60.0, 100.0) * np.sin(np.linspace(0.0, np.pi, 60))
-        frames = Frames(values[:, None, None], 1000 * np.arange(len(values)), unit="V")
-        return Example(frames, {"tap": 1000 * begins}, Tare.take(frames, stop_us=1_000_000))
+            values[begin : begin + 15] += rng.uniform(60.0, 100.0) * np.sin(np.linspace(0.0, np.pi, 15))
+        frames = Frames(values[:, None, None], 4000 * np.arange(len(values)), unit="V")
+        return Example(frames, {"tap": 4000 * begins}, Tare.take(frames, stop_us=1_000_000))
 
     train, drifted = taps(0.0), taps(1.6)
     recipe = recipes.fitting(train.source, ["tap"])
@@ -109,9 +96,9 @@ def trained(seed: int = 1) -> Readout:
     return fit([touches(seed, 8, 5)], Recipe.load("touch", labels=["press", "tap"], noise_floor=5.0))
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", seeds(3, quick=1))
 def test_taps_and_presses_are_told_when_they_end(seed: int) -> None:
-    readout, unseen = trained(seed), touches(seed + 10, 12, 8)
+    readout, unseen = trained(seed + 1), touches(seed + 11, 12, 8)
     assert readout.by_rule == ("press", "tap")
     found = run(Readout.from_json(readout.to_json()), unseen.source, tare=unseen.tare)
     scored = score(found, unseen.labels, 50.0)
@@ -121,23 +108,6 @@ def test_taps_and_presses_are_told_when_they_end(seed: int) -> None:
     lasted = found.known - found.t
     assert (lasted[found.label == "press"] > 1_150_000).all()
     assert (lasted[found.label == "tap"] < 300_000).all()
-
-
-def test_training_says_in_seconds_how_late_what_a_touch_is_is_known(tmp_path: Path) -> None:
-    learnt = touches(1, 8, 5)
-    taxel.convert(learnt.source, tmp_path / "a.npz")
-    result = taxel.train(taxel.open(tmp_path / "a.npz"), [learnt.labels], taxel.tasks.TrainOptions(folds=0))
-    tap, press = (next(line for line in result.lines() if line.startswith(f"{k}, plain")) for k in ("tap", "press"))
-    assert re.search(r"0 false, known \+\d+ ms after the label \(median\); runs$", tap)
-    late = re.search(r", known (.*) s after the label \(median; at most (.*) s\), when the touch ends(; runs)?$", press)
-    assert late
-    assert 1.2 < float(late[1]) < float(late[2]) < 2.4
-
-
-def test_held_out_presses_of_one_recording_end_in_the_part_of_their_label() -> None:
-    learnt = on_channels(3, 6, 20, 10)
-    loaded = Recipe.load("touch", labels=["press", "tap"], noise_floor=measured_floor([learnt]))
-    assert judge([learnt], loaded, 5).together.rank[0] == 0
 
 
 def test_what_is_still_held_at_the_end_is_not_decided() -> None:
@@ -156,23 +126,6 @@ def test_a_stream_detects_the_same_wherever_it_is_cut() -> None:
         found += list(stream.push(unseen.source[piece[0] : piece[-1] + 1]))
     found += list(stream.advance(int(unseen.source.t[-1]) + 1_000_000))
     assert [(d.label, d.t) for d in found] == [(d.label, d.t) for d in whole]
-
-
-def test_a_readout_that_tells_kinds_sooner_does_not_wait() -> None:
-    example = touches(1, 10, 0)
-    values = example.source.values.copy()
-    begins = np.searchsorted(example.source.t, example.labels["tap"])
-    for k, begin in enumerate(begins):
-        if k % 2:
-            values[begin : begin + 6, 2:8, 0:8] += 90.0
-    frames = Frames(values, example.source.t, unit="counts", array=Array(8, 8))
-    labels = {"small": example.labels["tap"][::2], "wide": example.labels["tap"][1::2]}
-    readout = fit(
-        [Example(frames, labels, example.tare)], Recipe.load("touch", labels=["small", "wide"], noise_floor=5.0)
-    )
-    found = run(readout, frames, tare=example.tare)
-    assert score(found, labels).rank[0] == 0
-    assert (found.known - found.t).max() < 100_000
 
 
 def test_a_rule_decides_by_the_duration() -> None:

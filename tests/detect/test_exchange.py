@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import mixed
-from test_commands import call
+from shell import call
 
 import taxel
 from taxel.encode import LevelCrossing

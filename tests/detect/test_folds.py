@@ -6,9 +6,9 @@ import warnings
 
 import numpy as np
 import pytest
+from discs import recipe, tare, touches
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_readout import recipe, tare, touches
 
 import taxel
 from taxel import SpikeTrains
@@ -155,16 +155,6 @@ def test_no_label_that_the_neuron_finds_is_called_one_that_cannot_be_learnt(unit
         assert re.match(rf"contact: ({waits}|{later} of 12)$", text)
 
 
-def test_events_that_cannot_be_learnt_are_named_from_the_beginning_of_a_recording_since_1970() -> None:
-    begin_us = 1_795_000_000_000_000
-    frames = taxel.Frames([[[v]] for v in (0.0, 9.0, 9.0, 0.0)], begin_us + 10_000 * np.arange(4), unit="N")
-    plan = taxel.detect.Recipe(taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "ub": 1e-6, "delay_ms": 1.0})
-    with pytest.warns(UserWarning, match=r"cannot be learnt.* \(10 ms\)"):
-        fit([Example(frames, {"contact": [begin_us + 10_000]})], plan)
-    with pytest.raises(taxel.ProblemError, match=r"contact at 5000.000 ms is outside the trains, 0.000 to 30.000 ms"):
-        fit([Example(frames, {"contact": [begin_us + 5_000_000]})], plan)
-
-
 def test_a_point_that_the_labels_do_not_allow_is_not_chosen() -> None:
     """Two labels lie within its refractory time."""
     plan = recipe()
@@ -181,13 +171,6 @@ def test_a_point_that_the_labels_do_not_allow_is_not_chosen() -> None:
         judge(examples(1, 2), dataclasses.replace(plan, neurons=first), 2)
 
 
-def test_more_folds_than_there_are_recordings_or_events_are_refused() -> None:
-    with pytest.raises(taxel.ProblemError, match="folds is 3: must be at most 2, the number of recordings"):
-        judge(examples(1, 2), recipe(), 3)
-    with pytest.raises(taxel.ProblemError, match="because each fold of a recording needs two events"):
-        judge(examples(1), recipe(), 100)
-
-
 def test_folds_that_are_stated_are_those_that_are_judged() -> None:
     data = examples(1, 2, 9)
     stated = [Fold([Part(k) for k in range(3) if k != n], [Part(n)]) for n in range(3)]
@@ -198,22 +181,6 @@ def test_folds_that_are_stated_are_those_that_are_judged() -> None:
         alone = fit([data[part.example] for part in fold.train], recipe())
         assert made.readout == alone
         assert set(made.learners) == {"contact", "lift"}
-
-
-def test_the_place_of_an_example_may_be_a_float() -> None:
-    data = examples(1, 2)
-    stated, floats = ([Fold([Part(one)], [Part(other)])] for one, other in ((0, 1), (-0.0, 1.0)))  # type: ignore[arg-type]
-    one, other = (judge(data, recipe(), folds, window_ms=10.0) for folds in (stated, floats))
-    assert [score.to_dict() for score in one.scores] == [score.to_dict() for score in other.scores]
-
-
-def test_only_what_a_fold_tests_is_scored() -> None:
-    data = examples(1, 2)
-    times = np.sort(np.concatenate(list(data[1].labels.values())))
-    middle = float(times[4] + times[5]) / 2
-    judged = judge(data, recipe(), [Fold([Part(0)], [Part(1, middle)])], window_ms=10.0)
-    assert len(judged.scores) == 1
-    assert judged.together.events == int(np.count_nonzero(times >= middle)) == judged.together.found
 
 
 @pytest.mark.parametrize(
@@ -289,15 +256,3 @@ def test_what_a_fold_of_one_recording_trains_on_is_split_again_by_its_events(see
         within = [[sum(part.start <= t < part.stop for part in parts) for t in events] for parts in fold[:2]]
         assert np.array_equal(np.sum(within, axis=0), np.ones(len(events))), "each is trained on or tested"
         assert sum(within[1]) >= 2
-
-
-def test_what_a_training_reports_is_in_plain_words() -> None:
-    said: list[str] = []
-    plan = {"ub": 1e-6, "choose": [{"ub": 2.0}]}
-    chosen = taxel.detect.Recipe(taxel.encode.LevelCrossing([5.0]), {"tau": 2.0, "delay_ms": 1.0}, {"press": plan})
-    data = [one._replace(labels={"press": one.labels["press"]}) for one in presses(1, 0, 1)]
-    judge(data, chosen, 2, progress=lambda step, *_: said.append(step))
-    rounds = [line for line in said if ", round 1: " in line]
-    assert rounds
-    assert all(re.search(r"weights at most [\d.]+% from the best", line) for line in rounds), rounds
-    assert not any(re.search(r"\bpoint\b|\de[+-]\d", line) for line in said)

@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 
 import numpy as np
+from plain_rules import tare
 from shell import call
-from test_plain_rule import tare
 
 import taxel
 from taxel import Array, Events, Readout, SpikeTrains

@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -94,11 +90,6 @@ def test_the_floor_scales_with_the_unit_and_not_with_a_bad_taxel() -> None:
     assert measured_floor([Example(frames, labels)]) is None
 
 
-@pytest.mark.parametrize(("floor", "above"), [(0.0, 0.5), (0.04, 0.06), (1.0, 1.5), (3.0, 3.5), (30.0, 30.5)])
-def test_half_a_tick_is_half_of_a_floor_below_a_tick(floor: float, above: float) -> None:
-    assert ContactArea(noise_floor=floor).above == pytest.approx(above)
-
-
 def test_a_floor_that_the_recipe_or_the_user_states_stays(tmp_path: Path, capsys) -> None:
     plan = Recipe.load("touch", {"encoders.area.noise_floor": 30.0}, LABELS, 0.5)
     parts = plan.encoder.parts
@@ -116,38 +107,22 @@ def test_a_floor_that_the_recipe_or_the_user_states_stays(tmp_path: Path, capsys
     ("labels", "unit", "shape", "recipe"),
     [
         (("contact", "lift"), "counts", (2, 2), "touch"),
-        (("Press", "release"), "N", (2, 2), "touch"),
         (("contact",), "V", (2, 2), "touch"),
         (("contact", "foot_off"), "counts", (2, 2), "gait_plate"),
-        (("contact", "Foot off"), "N", (2, 2), "gait_insole"),
-        (("slip",), "counts", (2, 2), "touch"),
         (("contact", "lift"), "V", (1, 4), "touch"),
         (("press", "release"), "N", (1, 1), "touch"),
-        (("contact",), "N", (1, 4), "gait_insole"),
         (("contact", "lift", "slip"), "V", (1, 4), "touch"),
-        (("press", "tap"), "N", (1, 6), "touch"),
         (("press", "tap"), "counts", (1, 1), "touch"),
-        (("heel_off", "tap"), "N", (1, 6), "gait_insole"),
         (("left foot", "right foot"), "V", (1, 16), "gait_channel"),
-        (("soft", "hard"), "V", (16, 16), "touch"),
         (("soft", "hard"), "V", (3, 11), "touch"),
-        (("soft", "hard"), "V", (4, 8), "touch"),
-        (("slip",), "V", (4, 8), "touch"),
         (("contact", "lift", "slip"), "counts", (4, 8), "touch"),
-        (("tap",), "N", (16, 16), "touch"),
         (("tap",), "N", (1, 16), "gait_insole"),
-        (("Heel off",), "counts", (16, 16), "gait_plate"),
         (("contact", "lift", "soft", "hard"), "N", (4, 8), "touch"),
         (("heel strike", "toe-off"), "counts", (16, 16), "gait_plate"),
-        (("left foot", "right foot"), "V", (16, 16), "touch"),
         (("footfall",), "counts", (16, 16), "gait_plate"),
         (("soft", "hard"), "V", (1, 64), "touch"),
-        (("soft", "hard"), "counts", (16, 16), "touch"),
         (("contact", "foot_off"), "kPa", (16, 16), "touch"),
-        (("Initial Contact", "Toe Off"), "kPa", (16, 16), "touch"),
         (("links Erstkontakt", "links Zehenablösung"), "kPa", (16, 16), "touch"),
-        (("Foot Strike", "Foot Off"), "N", (4, 8), "gait_insole"),
-        (("Erstkontakt", "Zehenablösung"), "counts", (16, 16), "gait_plate"),
         (("Erstkontakt", "Zehenablösung"), "N", (1, 12), "gait_insole"),
         (("contact", "heel_off", "foot_off"), "kPa", (4, 8), "gait_channel"),
         ((), "counts", (2, 2), "gait_plate"),
@@ -157,28 +132,6 @@ def test_labels_and_neighbours_choose_the_recipe(
     labels: tuple[str, ...], unit: str, shape: tuple[int, int], recipe: str
 ) -> None:
     assert recipes.fitting(Frames(np.zeros((1, *shape)), [0], unit=unit, array=Array(*shape)), labels) == recipe
-
-
-def test_a_row_of_taxels_at_a_known_distance_is_no_channels() -> None:
-    row = Array(1, 4, pitch_mm=5.0)
-    assert recipes.fitting(Frames(np.zeros((1, 1, 4)), [0], unit="V", array=row), LABELS) == "touch"
-
-
-def test_a_recording_that_begins_with_a_touch_has_the_rest_of_its_quiet_stretch(tmp_path: Path, capsys) -> None:
-    frames, labels = touched((8, 8), 4, gain=200.0, noise=1.0, offset=10.0)
-    first = int(labels["contact"][0]) - 50_000
-    arguments = written(tmp_path, frames.between(first, int(frames.t[-1]) + 1), labels)
-    code, out, error = call(capsys, *arguments, "--folds", 0)
-    assert code == 0, error
-    assert "contact, neuron: 12 of 12 found, 0 missed, 0 false" in out
-
-
-def test_a_label_outside_the_recording_is_said_and_left_out(tmp_path: Path, capsys) -> None:
-    arguments = written(tmp_path, *touched((8, 8), 4, gain=200.0, noise=1.0, offset=10.0), more="slip,900000000\n")
-    code, out, error = call(capsys, *arguments, "--folds", 0)
-    assert (code, "contact, neuron: 12 of 12" in out) == (0, True)
-    labels, recording = tmp_path / "labels.csv", tmp_path / "own.npz"
-    assert f"1 of the 25 events of {labels} left out: outside {recording} (0.000 to 12.990 s)" in error
 
 
 def test_a_refused_training_leaves_no_folder_of_its_report(tmp_path: Path, capsys) -> None:
@@ -198,39 +151,6 @@ def test_an_end_of_touches_is_learnt_by_any_name() -> None:
     readout = fit([example], Recipe.load("touch", None, list(times), measured_floor([example])))
     assert "drop" in readout.by_rule
     assert score(run(readout, frames, tare=example.tare), times).rank[0] == 0
-
-
-def test_ctrl_c_while_a_training_reads_or_learns_ends_it_and_leaves_nothing(tmp_path: Path) -> None:
-    values = np.random.default_rng(4).integers(0, 3, (20_000, 24, 40)).astype(np.int16)
-    labels = ["label,t_us"]
-    for k in range(200, 19_000, 100):
-        values[k : k + 40, 5:9, 5:9] += 100
-        labels += [f"contact,{2000 * k}", f"lift,{2000 * (k + 40)}"]
-    np.save(tmp_path / "a.npy", values)
-    (tmp_path / "a.layout.toml").write_text("rate_hz = 500\n")
-    (tmp_path / "labels.csv").write_text("\n".join(labels) + "\n")
-    words = ["train", tmp_path / "a.npy", "--labels", tmp_path / "labels.csv", "-o", tmp_path / "readout.json"]
-    # With few folds a fast computer ends within the 2 s after which the first line comes.
-    begun = [sys.executable, "-m", "taxel", *map(str, words), "--folds", "40"]
-    process = subprocess.Popen(begun, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stderr is not None
-    # The first line comes within a step; what follows is interrupted in the middle.
-    first = process.stderr.readline()
-    process.send_signal(signal.SIGINT)
-    before = time.perf_counter()
-    said, more = process.communicate(timeout=60)
-    assert first.startswith("taxel: "), (first, more)
-    assert (process.returncode, said) == (130, "")
-    assert "Traceback" not in more
-    assert time.perf_counter() - before < 10
-    assert sorted(one.name for one in tmp_path.iterdir()) == ["a.layout.toml", "a.npy", "labels.csv"]
-
-
-def test_info_takes_the_rate_of_numbered_frames(tmp_path: Path, capsys) -> None:
-    np.save(tmp_path / "b.npy", np.zeros((9, 2, 3)))
-    (tmp_path / "b.layout.toml").write_text('unit = "counts"')
-    facts = json.loads(call(capsys, "info", tmp_path / "b.npy", "--rate-hz", "10", "--json")[1])
-    assert (facts["timed"], facts["to_us"]) == (True, 800_000)
 
 
 @pytest.mark.parametrize("labels", [("contact", "lift"), ("contact",)])

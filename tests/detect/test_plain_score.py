@@ -1,13 +1,10 @@
 """The plain rules beside a readout: as tuned and run one by one, and stored with it."""
 
-import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from shell import call
-from test_plain_rule import played
+from plain_rules import played
 from touching import touched
 
 import taxel
@@ -89,53 +86,6 @@ def test_without_a_tare_there_is_no_rule(examples) -> None:
     assert judged.plain.lacks == "example 0 has no tare to measure a load from"
     assert judged.by_rule == ()
     assert judged.neurons.to_dict() == judged.together.to_dict()
-
-
-def test_training_says_which_is_better_and_why_there_is_no_rule(examples, tmp_path: Path, capsys) -> None:
-    one = examples[0]
-    taxel.convert(one.source, tmp_path / "one.npz")
-    one.tare.save(tmp_path / "tare.json")
-    rows = [f"{label},{t}" for label, times in one.labels.items() for t in times]
-    # A label that nothing follows.
-    rows += [f"odd,{t}" for t in np.arange(6) * 61_000 + 45_000]
-    (tmp_path / "labels.csv").write_text("\n".join(["label,t_us", *rows]) + "\n")
-    arguments = ("train", tmp_path / "one.npz", "--labels", tmp_path / "labels.csv", "--tare", tmp_path / "tare.json")
-    arguments += ("--encoder", "contact_area", "--window-ms", "2", "--set", "learner.tau=0.5", "--overwrite")
-    for folds in ((), ("--folds", "0")):
-        report = ("--report", tmp_path / f"r{len(folds)}")
-        code, out, _ = call(capsys, *arguments, *folds, "-o", tmp_path / "r.json", *report)
-        assert code == 0, out
-        assert "no plain rule for odd: none is better than to detect nothing" in out
-        assert "hit, plain rule: 6 of 6 found, 0 missed, 0 false, known" in out
-        page = (tmp_path / f"r{len(folds)}" / "report.html").read_text()
-        assert "Neuron and plain rule, on the same labels" in page
-        assert "no plain rule for odd" in page
-    result = json.loads(call(capsys, *arguments, "-o", tmp_path / "r.json", "--json")[1])
-    assert result["plain_rule"]["rules"]["odd"] is None
-    assert result["plain_rule"]["score"]["by_label"]["hit"]["found"] == 6
-    # What it prints of a rule is its file.
-    rule = taxel.detect.PlainRule.from_json(json.dumps(result["plain_rule"]["rules"]["hit"]))
-    detect = ("detect", tmp_path / "one.npz", "--readout", rule.save(tmp_path / "rule.json"), "--json")
-    detect += ("--tare", tmp_path / "tare.json", "--truth", tmp_path / "labels.csv", "--window-ms", "2")
-    assert json.loads(call(capsys, *detect)[1])["score"]["by_label"]["hit"]["found"] == 6
-    lines = call(capsys, *arguments, "-o", tmp_path / "r.json")[1].splitlines()
-    kept = taxel.Readout.load(tmp_path / "r.json")
-    assert list(kept.by_rule) == result["by_rule"]
-    assert set(kept.rules) == {"hit", "gone"}
-    for label in kept.rules:
-        runs = f"{label}, {'plain rule' if label in kept.by_rule else 'neuron'}: "
-        assert [line.startswith(runs) for line in lines if line.startswith(label) and line.endswith("; runs")] == [True]
-    # Each way detects what its own detector does; the default is what was better.
-    both = ("detect", tmp_path / "one.npz", "--readout", tmp_path / "r.json", *detect[4:])
-    found = {use: json.loads(call(capsys, *both, "--use", use)[1]) for use in ("better", "rule", "neuron")}
-    assert found["rule"]["score"]["by_label"]["hit"]["found"] == 6
-    assert found["rule"]["score"]["by_label"]["odd"]["found"] == 0
-    for label in kept.labels:
-        same = found["rule" if label in kept.by_rule else "neuron"]["detections"]
-        assert [one for one in found["better"]["detections"] if one["label"] == label] == [
-            one for one in same if one["label"] == label
-        ]
-    assert call(capsys, *both, "--use", "best")[0] == 2
 
 
 def test_channels_have_plain_rules_but_none_by_local_load() -> None:

@@ -40,14 +40,6 @@ def test_a_recipe_file_kept_from_0_1_loads_unchanged() -> None:
     assert kept.run_threshold == 0.9
 
 
-@pytest.mark.parametrize("name", recipes.names())
-def test_every_recipe_names_its_source_and_makes_learners(name: str) -> None:
-    recipe = Recipe.load(name)
-    assert min(len(recipe.about), len(recipe.source)) > 20
-    for label in recipe.neurons:
-        recipe.learner_of(label)
-
-
 def test_every_kind_of_recording_has_one_recipe() -> None:
     every = {name: recipes.read(name) for name in recipes.names()}
     kinds = [kind for one in every.values() for kind in one["fits"]]
@@ -117,27 +109,12 @@ def test_what_gait_laboratories_call_the_ends_of_a_step_has_their_neurons(labels
         assert [said(recipe, label) for label in labels] == [said(named, end) for end in ends], name
 
 
-def test_both_sides_are_kinds_of_touch_and_ends_of_steps() -> None:
-    sides = ["left toe off", "right toe off"]
-    assert {Recipe.load("touch", labels=sides).inputs_of(label)[0] for label in sides} == {"moments"}
-    insole = Recipe.load("gait_insole", labels=sides)
-    assert {said(insole, label) for label in sides} == {said(Recipe.load("gait_insole"), "foot_off")}
-
-
 def test_a_recipe_for_certain_labels_refuses_others(tmp_path: Path) -> None:
     (tmp_path / "certain.toml").write_text('fits = ["events"]\n[encoder]\nname = "fa1"\n[neurons.contact]\ntau = 2.0\n')
     with pytest.raises(
         ProblemError, match=r"recipe: is for contact, not for 'ball': .* the recipes are event_counts, gait_channel, "
     ):
         Recipe.load(tmp_path / "certain.toml", labels=["contact", "ball"])
-
-
-def test_any_other_label_has_the_parameters_that_the_recipe_says() -> None:
-    recipe = Recipe.load("gait_plate", labels=["Foot-off", "step"])
-    assert sorted(recipe.neurons) == ["Foot-off", "step"]
-    own = Recipe.load("gait_plate")
-    assert said(recipe, "Foot-off") == said(own, "foot_off")
-    assert said(recipe, "step") == said(own, "contact")
 
 
 def test_what_is_said_for_all_neurons_comes_before_what_one_has_and_what_is_said_for_one_before_all() -> None:

@@ -4,9 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from discs import ARRAY, FRAME_US, plain, tare, touches
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_readout import ARRAY, FRAME_US, plain, tare, touches
 
 import taxel
 from taxel.encode import ChangeEvents, ContactArea

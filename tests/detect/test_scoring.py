@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import taxel
-from taxel.detect import Score, Spread, score
+from taxel.detect import Spread, score
 
 TIMES = st.lists(st.integers(-(10**6), 10**6), max_size=12)
 
@@ -85,17 +85,6 @@ def test_each_event_may_have_a_window_of_its_own() -> None:
     assert score(found, {"e": [0, 100_000]}, {"e": 50.0}).found == 2
 
 
-def test_other_detections_can_be_the_truth() -> None:
-    assert score(some(), some()).found == 3
-    assert score(some(), some()).error == Spread(0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-def test_nothing_against_nothing_is_no_error() -> None:
-    empty = score(taxel.Detections([], [], []), {})
-    assert (empty.events, empty.false) == (0, 0)
-    assert "none" in repr(empty)
-
-
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=30))
 def test_the_spread_is_numpys(values: list[float]) -> None:
     spread = Spread.from_values(values)
@@ -127,11 +116,6 @@ def test_detections_come_back_from_neo() -> None:
         assert taxel.Detections.from_neo(event.rescale("ms")).t.tolist() == one.t.tolist()
 
 
-def test_a_slope_keeps_every_digit_in_a_table(tmp_path) -> None:
-    found = taxel.Detections(['a,"b"\n'], [1], [2], [0.1 + 0.2])
-    assert taxel.Detections.from_csv(found.to_csv(tmp_path / "a.csv")) == found
-
-
 def test_detections_are_chosen_by_label_time_and_place() -> None:
     found = some()
     assert found.labels == ("a", "b")
@@ -153,16 +137,3 @@ def test_detections_are_chosen_by_label_time_and_place() -> None:
     for start, stop in ((5, 1), (None, 1), ("a", "b"), (math.nan, 1)):
         with pytest.raises(taxel.ProblemError, match="start"):
             found.between(start, stop)  # type: ignore[arg-type]
-
-
-def test_detections_can_be_drawn() -> None:
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    assert [tick.get_text() for tick in some().plot().get_yticklabels()] == ["a", "b"]
-    some()[:0].plot()
-
-
-def test_a_score_is_of_one_label_or_of_all() -> None:
-    assert score(some()["a"], [1000]).label == "a"
-    assert isinstance(score(some(), {"a": [1]})["a"], Score)

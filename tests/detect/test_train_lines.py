@@ -6,13 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from discs import ARRAY, tare, touches
 from refusal import refused
 from shell import call
-from test_ages import touched
-from test_readout import ARRAY, tare, touches
 
 import taxel
-from taxel.detect import PlainRule, run, score
 from taxel.tasks.__main__ import run as run_task
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -88,103 +86,6 @@ def test_labels_of_which_none_is_found_leave_no_readout(tmp_path: Path, capsys, 
     assert ran["command"].partition(" --tare")[0] == f"taxel detect RECORDING --readout {out}"
     code, said, _ = call(capsys, *arguments, "--window-ms", 10)
     assert (code, "warning" in said, out.exists()) == (0, False, True), "all are found"
-
-
-def test_one_rule_tells_kinds_at_a_frame_of_a_touch_and_says_which_lies_below(tmp_path: Path, capsys) -> None:
-    frames, truth = touched(1, 80)
-    taxel.convert(frames, tmp_path / "kinds.npz")
-    rows = [f"{kind},{t}" for kind, times in truth.items() for t in times]
-    (tmp_path / "kinds.csv").write_text("\n".join(["label,t_us", *rows]) + "\n")
-    arguments = ("train", tmp_path / "kinds.npz", "--labels", tmp_path / "kinds.csv", "-o", tmp_path / "r.json")
-    code, out, _ = call(capsys, *arguments)
-    assert (code, out.splitlines()[0]) == (0, "held out: 4 blocks of time (window 50 ms)")
-    said = [
-        re.search(rf"^{kind}, plain rule: \d of 8 found.*\n  tuned on all: (.*)$", out, re.MULTILINE)[1]
-        for kind in ("large", "small")
-    ]
-    rule = re.fullmatch(
-        r"one rule for both kinds, the area (\S+) ms after the onset: below (\S+) small, otherwise large", said[0]
-    )
-    assert rule, said[0]
-    assert said[0] == said[1]
-    # A frame lasts 12.5 ms, and the age is in the middle of one, or 0.
-    assert float(rule[1]) in (0.0, *(12.5 * k + 6.25 for k in range(1, 5)))
-    # As it is printed it tells the touches that it was tuned on.
-    detector = PlainRule("area", float(rule[2]), age_ms=float(rule[1]), labels=("small", "large"), noise_floor=0.012)
-    found = run(detector, frames, tare=taxel.Tare.take(frames, stop_us=1_200_000))
-    assert score(found, truth).found >= 14
-
-
-def test_labels_are_learnt_as_given_where_that_is_asked_for(tmp_path: Path, capsys) -> None:
-    recording, labels = recorded(tmp_path, 1)
-    arguments = (
-        "train",
-        recording,
-        "--labels",
-        labels,
-        "--no-align",
-        "--folds",
-        0,
-        "--overwrite",
-        "-o",
-        tmp_path / "r.json",
-    )
-    code, out, _ = call(capsys, *arguments)
-    assert (code, "labels moved" in out) == (0, False)
-    assert "alignment" not in json.loads(call(capsys, *arguments, "--json")[1])
-
-
-def test_labels_within_the_refractory_time_are_named_and_leave_no_readout(tmp_path: Path, capsys) -> None:
-    recording, labels = recorded(tmp_path, 1)
-    labels.write_text(labels.read_text() + "contact,90000\ncontact,95000\n")
-    out = tmp_path / "r.json"
-    code, _, error = call(capsys, "train", recording, "--labels", labels, "--no-align", "--tare", 0.03, "-o", out)
-    assert (code, error.count("\n"), out.exists()) == (2, 1, False)
-    assert re.search(
-        rf"contact: {recording} has a label at 95000 us, 5000 us after the previous label; labels must be more than "
-        rf"[\d.]+",
-        error,
-    )
-
-
-@pytest.mark.parametrize(
-    ("count", "options", "why"),
-    [
-        (1, (), "1 label of contact, but two folds need 4"),
-        (3, (), "3 labels of contact, but two folds need 4"),
-        (6, ("--folds", 0), "folds is 0"),
-    ],
-)
-def test_what_cannot_be_held_out_or_is_not_to_be_says_why(
-    tmp_path: Path, capsys, count: int, options: tuple[object, ...], why: str
-) -> None:
-    recording, labels = recorded(tmp_path, 1, count)
-    arguments = ("train", recording, "--labels", labels, "--overwrite", "-o", tmp_path / "r.json", *options)
-    code, out, error = call(capsys, *arguments)
-    assert (code, error) == (0, "")
-    assert out.splitlines()[0] == f"not held out, but scored on its own training data (window 50 ms): {why}"
-    result = json.loads(call(capsys, *arguments, "--json")[1])
-    assert (result["held_out"], result["judged_on"]) == (False, "its own training data")
-    assert result["score"]["events"] == 2 * count == result["score"]["found"]
-
-
-def test_one_fold_is_refused(tmp_path: Path, capsys) -> None:
-    recording, labels = recorded(tmp_path, 1)
-    code, _, error = call(capsys, "train", recording, "--labels", labels, "--folds", 1, "-o", tmp_path / "r.json")
-    assert (code, error) == (2, "taxel: --folds is 1: must be 2 or more, or 0 for none\n")
-
-
-def test_a_recording_without_a_spike_is_refused_in_one_line(tmp_path: Path, capsys) -> None:
-    frames = taxel.Frames(np.full((500, 4, 4), 60.0), np.arange(500) * 10_000, unit="ticks")
-    taxel.convert(frames, tmp_path / "still.npz")
-    (tmp_path / "labels.csv").write_text(
-        "label,t_us\n" + "".join(f"contact,{t}\n" for t in range(10**6, 4 * 10**6, 10**6))
-    )
-    arguments = ("train", tmp_path / "still.npz", "--labels", tmp_path / "labels.csv", "--recipe", "touch")
-    code, _, error = call(capsys, *arguments, "-o", tmp_path / "r.json")
-    assert code == 2
-    assert error.startswith("taxel: contact: the sensor felt nothing in the recording up to the last of its 3 events; ")
-    assert error.count("\n") == 1
 
 
 def test_a_fold_that_cannot_be_learnt_leaves_the_training_as_it_is(tmp_path: Path, capsys) -> None:

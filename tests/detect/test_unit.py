@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import json
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from refusal import refused
-from shell import call
 
-import taxel
 from taxel import Array, Events, Frames, Readout, Tare
-from taxel.detect import Example, PlainRule, Recipe, fit, judge, load, run, tune
+from taxel.detect import Example, PlainRule, Recipe, fit, judge, run, tune
 from taxel.encode import LevelCrossing
 from taxel.live import Live
-from taxel.panel.shown_files import Opening, ShownFiles
 
 #: As recordings name units; ticks are those of a board's events.
 UNITS = st.sampled_from(["ticks", "counts", "as sent", "N", "mN", "kPa", "Pa", "N/cm2"])
@@ -94,27 +90,3 @@ def test_a_file_without_a_unit_reads_values_in_any(unit: str) -> None:
 def test_recordings_in_different_units_are_not_trained_on_together(does) -> None:
     with refused():
         does([example("kPa"), example("N")])
-
-
-def test_the_commands_and_the_page_name_both_units(tmp_path: Path, capsys) -> None:
-    from taxel.panel.training import Training
-
-    for unit in ("kPa", "counts"):
-        taxel.convert(pressed(unit), tmp_path / f"{unit}.npz")
-    table = tmp_path / "labels.csv"
-    table.write_text("label,t_us\n" + "".join(f"contact,{t}\n" for t in (400_000, 900_000, 1_400_000, 1_900_000)))
-    readout = tmp_path / "readout.json"
-    code, _, error = call(capsys, "train", tmp_path / "kPa.npz", "--labels", table, "-o", readout)
-    assert code == 0, error
-    assert load(readout).unit == "kPa"
-    code, out, error = call(capsys, "detect", tmp_path / "counts.npz", "--readout", readout, "--tare", "0.3")
-    said = "values are in counts, but the readout was trained on kPa: give values in kPa, as a calibration gives"
-    assert (code, out, error.count("\n"), said in error) == (2, "", 1, True), error
-    handler = Training(Opening(), ShownFiles())
-    with refused():
-        handler.detect(tmp_path / "counts.npz", None, readout)
-    labels, _, found = handler.detect(tmp_path / "kPa.npz", None, readout)
-    assert (labels, len(found) > 0) == (["contact"], True)
-    code, _, error = call(capsys, "live", "--readout", readout, "--tare", "0.05", "--seconds", "0.1")
-    last = error.splitlines()[-1]
-    assert (code, "live values are in ticks, but the readout was trained on kPa" in last) == (2, True), error

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from discs import recipe, tare, touches
 from loopback import free_port
-from tests.detect.test_readout import recipe, tare, touches
 from tests.panel.browser import PATIENCE, running
 from tests.panel.pages import (
     FOLLOWS,

@@ -7,9 +7,9 @@ import time
 
 import numpy as np
 import pytest
+from discs import recipe, tare, touches
 from panel.protocol import EXTENT, SOON, Client, head, heard, say, section, word
 from panel.test_frames import spikes_of, spikes_up_to
-from tests.detect.test_readout import recipe, tare, touches
 from tests.tasks.recordings import rested
 
 import taxel

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from tests.detect.test_readout import touches
+from discs import touches
 
 import taxel
 
