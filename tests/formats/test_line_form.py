@@ -11,7 +11,7 @@ from refusal import refused
 
 import taxel
 from taxel.formats.layout import PrintedFrames
-from taxel.formats.table_form import LineForm, form_of_lines
+from taxel.formats.line_form import LineForm, form_of_lines
 
 
 def row(count: int) -> str:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from taxel.formats.layout import PrintedFrames
-from taxel.formats.table_form import form_of_lines
+from taxel.formats.line_form import form_of_lines
 from taxel.live.line_frames import ArrivedLine, LineFrames
 
 

@@ -19,8 +19,7 @@ from taxel.formats.column_names import AXES, time_unit
 from taxel.formats.layout import Data, Layout, advice
 from taxel.formats.layout_text import refuse_to_choose
 from taxel.formats.opened import Opened, size_of, sources_of
-from taxel.formats.table_form import unit_of_times
-from taxel.formats.times import in_order
+from taxel.formats.times import in_order, unit_of_times
 from taxel.frames import Frames
 
 __all__ = ["ARRAYS", "look", "read_array_file"]

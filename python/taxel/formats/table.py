@@ -27,7 +27,8 @@ from taxel.formats.column_names import AXES, axes_of, time_unit
 from taxel.formats.layout import Layout, Table
 from taxel.formats.lines import MISSING, LineShape, OddLines, is_number
 from taxel.formats.opened import Opened, size_of, sources_of
-from taxel.formats.table_form import EVENT_COLUMNS, Form, form_of
+from taxel.formats.table_columns import EVENT_COLUMNS
+from taxel.formats.table_form import Form, form_of
 from taxel.formats.table_text import SHEETS, TEXTS, Text
 from taxel.formats.times import FEW_ODD, ISO, ODD, in_order, us_of
 from taxel.frames import Frames

@@ -25,16 +25,22 @@ __all__ = [
     "ODD",
     "UNITS_US",
     "Repaired",
+    "epoch_of",
     "in_order",
     "is_day",
     "is_time",
     "repaired",
     "seconds_of",
+    "unit_of_times",
     "us_of",
 ]
 
 #: So many odd lines, or times, are left out or repaired in any file, and of longer ones this share.
 FEW_ODD, ODD = 2, 0.1
+#: Rates of usual sensors, and those that may be, Hz.
+_USUAL_HZ, _POSSIBLE_HZ = (5.0, 500.0), (0.5, 20_000.0)
+#: Years 2001 to 2065 since 1970, in s.
+_EPOCH = (1e9, 3e9)
 #: Times in units of these, us.
 UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
 #: The unit of times that are texts: dates with times, or times of a day.
@@ -99,6 +105,30 @@ def seconds_of(cell: str) -> float:
     except ValueError:
         return math.nan
     return (at if at.tzinfo is not None else at.replace(tzinfo=UTC)).timestamp()
+
+
+def epoch_of(numbers: NDArray[np.float64]) -> str:
+    """Return the unit in which numbers are times since 1970; "" if none."""
+    first, last = (1e6 * edge for edge in _EPOCH)
+    return next((u for u, us in UNITS_US.items() if ((numbers * us > first) & (numbers * us < last)).all()), "")
+
+
+def unit_of_times(times: NDArray[np.float64]) -> tuple[str, dict[str, float]]:
+    """Return the unit of times by the years since 1970 or usual rates; if two fit about equally, the rate by each."""
+    if since_1970 := epoch_of(times[np.isfinite(times)]):
+        return since_1970, {}
+    steps = np.diff(times)
+    steps = steps[steps > 0]
+    if not len(steps):
+        return "s", {}
+    rates = {unit: 1e6 / (us * float(np.median(steps))) for unit, us in UNITS_US.items()}
+    usual, possible = (
+        [unit for unit, hz in rates.items() if least <= hz <= most] for least, most in (_USUAL_HZ, _POSSIBLE_HZ)
+    )
+    if len(usual) == 1 or len(possible) == 1:
+        return (usual if len(usual) == 1 else possible)[0], {}
+    possible = possible or sorted(rates, key=lambda unit: abs(np.log(rates[unit] / 100.0)))
+    return possible[0], {unit: rates[unit] for unit in possible[:2]}
 
 
 def us_of(column: Any, unit: str) -> NDArray[Any]:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
+from taxel.formats.line_form import LineForm
 from taxel.formats.lines import is_number
-from taxel.formats.table_form import LineForm
 
 __all__ = ["ArrivedLine", "LineFrames", "PassedLines", "array_of"]
 

@@ -16,8 +16,8 @@ from taxel._base.limits import VALUE
 from taxel._base.messages import counted, first_line
 from taxel._core import Error, ProblemError
 from taxel.array import Array
+from taxel.formats.line_form import LineForm, form_of_lines, stated_count
 from taxel.formats.lines import is_number
-from taxel.formats.table_form import LineForm, form_of_lines, stated_count
 from taxel.formats.times import ISO, UNITS_US
 from taxel.live.line_frames import ArrivedLine, LineFrames, array_of
 from taxel.live.stated_source import StatedSource

@@ -1,0 +1,207 @@
+"""How lines are cells: the kinds of lines, separators and decimal marks that fit them, best first."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.formats.lines import MISSING, Line, has_marks, is_number, read_line
+from taxel.formats.times import epoch_of, is_day, is_time
+
+__all__ = ["Fit", "fits_in", "fits_of"]
+
+#: Forms that are tried: kind of line, separator, decimal mark.
+_FORMS = [
+    ("json", ",", "."),
+    *(("plain", separator, decimal) for decimal in ".," for separator in ",;\t| " if separator != decimal),
+    # Numbers with decimal commas in quotes, which a comma does not split.
+    ("plain", ",", ","),
+    ("marked", ",", "."),
+    ("marked", ";", ","),
+]
+#: A column is of numbers, or of times, if this share of its cells are; a reading must fit this share of all cells.
+_MOST, FITS = 0.6, 0.5
+#: What a program quotes because of the comma in it: a number with a decimal comma, or with thousands.
+_QUOTED = re.compile(r'"([^"]*)"')
+_DECIMAL, _THOUSANDS = re.compile(r"[-+]?\d+,\d+"), re.compile(r"[-+]?\d{1,3}(?:[,.]\d{3})+(?:[,.]\d+)?")
+_HEX = re.compile(r"(?:0x)?(?:[0-9A-Fa-f]{2})+")
+_HEX_LETTER = re.compile(r"(?<![\w.])(?:0x)?[0-9]*[A-Fa-f][0-9A-Fa-f]*(?![\w.])")
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Hold the lines of a text as one form reads them."""
+
+    kind: str
+    separator: str
+    decimal: str
+    #: Of each line that is not empty, its number from 0 and its cells.
+    lines: Sequence[tuple[int, Line]]
+    #: The places in `lines` of those that are frames.
+    body: Sequence[int]
+    #: What each column holds: "number", "time", "day", "text" or "empty".
+    types: Sequence[str]
+    #: The share of cells that fit, from the first frame on, and less where few of all lines are frames.
+    purity: float
+    score: float
+
+    @property
+    def count(self) -> int:
+        """The number of columns."""
+        return len(self.types)
+
+    @property
+    def first(self) -> int:
+        """The number of the first line of numbers, from 0."""
+        return self.lines[self.body[0]][0]
+
+    def cells(self, column: int) -> list[str]:
+        """Return the cells of a column in the lines that are frames."""
+        return [self.lines[k][1].cells[column] for k in self.body]
+
+    def numbers(self, column: int) -> NDArray[np.float64]:
+        """Return the numbers of a column; NaN for other cells."""
+        cells = [cell.replace(",", ".") if self.decimal == "," else cell for cell in self.cells(column)]
+        return np.array([float(cell) if is_number(cell) else np.nan for cell in cells])
+
+    def ascends(self, column: int) -> bool:
+        """Return whether a column ascends as times do, of which some may repeat, wrap or be out of order."""
+        if self.types[column] != "number":
+            return self.types[column] == "time"
+        steps = np.diff(self.numbers(column))
+        steps = steps[np.isfinite(steps)]
+        rises = int((steps > 0).sum())
+        return len(steps) > 0 and bool((steps >= 0).mean() >= 0.8) and (rises >= 0.2 * len(steps) or rises > 1)
+
+    def counts(self, column: int) -> bool:
+        """Return whether a column counts lines."""
+        return bool((np.diff(self.numbers(column)) == 1).all())
+
+    def epoch(self, column: int) -> str:
+        """Return the unit in which a column is of times since 1970, "" if it is not."""
+        return epoch_of(self.numbers(column)) if self.types[column] == "number" else ""
+
+
+def fits_in(
+    lines: Sequence[str], all_lines: Callable[[], Iterable[str]], wanted: int | None = None
+) -> tuple[list[Fit], bool]:
+    """Return the forms that fit lines, and whether they may as well be hexadecimal numbers, as `all_lines` do not say.
+
+    Of a number of columns that is `wanted`, where any line has it.
+    """
+    in_hex, is_sure = _hex(all_lines, lines)
+    if is_sure and in_hex is not None:
+        return [in_hex], False
+    return list(fits_of(lines, _FORMS, (), wanted)), in_hex is not None
+
+
+def fits_of(
+    lines: Sequence[str], forms: Sequence[tuple[str, str, str]], missing: Sequence[str] = (), wanted: int | None = None
+) -> Iterator[Fit]:
+    """Yield each form that makes columns of numbers of the lines, as many as are wanted where any line has them."""
+    there = [(k, line) for k, line in enumerate(lines) if line.strip(" \t\r,;")]
+    few = [line for _, line in there[-40:]]
+    for kind, separator, decimal in forms:
+        marked = separator in (",", ";") if kind != "plain" else separator == " "
+        if len(forms) > 1 and (
+            (not marked and separator != "," and not any(separator in line for line in few))
+            or (separator == decimal and not _are_quoted_decimals(few))
+            or (kind == "marked" and (2 * sum(map(has_marks, few)) < len(few) or _are_quoted_numbers(few)))
+            or (kind == "json" and not any(line.lstrip()[:1] in "{[" for line in few))
+        ):
+            continue
+        parsed = [(k, read_line(line, kind, separator, decimal)) for k, line in there]
+        cells = [(k, line) for k, line in parsed if line is not None and line.cells]
+        if kind != "plain" and cells:
+            names = Counter(line.names for _, line in cells).most_common(1)[0][0]
+            cells = [(k, line.in_order(names)) for k, line in cells]
+        fit = _fit(kind, separator, decimal, cells, len(there), {*MISSING, *missing}, wanted)
+        if fit is not None:
+            yield fit
+
+
+def _with_comma(lines: Sequence[str]) -> list[str]:
+    """Return the quoted cells in which a comma is."""
+    return [cell for line in lines for cell in _QUOTED.findall(line) if "," in cell]
+
+
+def _are_quoted_numbers(lines: Sequence[str]) -> bool:
+    """Return whether all that is quoted is one number with a comma each, which a comma does not split."""
+    quoted = _with_comma(lines)
+    return bool(quoted) and all(_DECIMAL.fullmatch(cell) or _THOUSANDS.fullmatch(cell) for cell in quoted)
+
+
+def _are_quoted_decimals(lines: Sequence[str]) -> bool:
+    """Return whether these have decimal commas: 1,234 alone may be a thousand."""
+    quoted = _with_comma(lines)
+    return all(map(_DECIMAL.fullmatch, quoted)) and not all(map(_THOUSANDS.fullmatch, quoted))
+
+
+def _fit(
+    kind: str,
+    separator: str,
+    decimal: str,
+    lines: Sequence[tuple[int, Line]],
+    total: int,
+    missing: set[str],
+    wanted: int | None = None,
+) -> Fit | None:
+    """Return lines as one form reads them; None without a column of numbers. `total` lines are not empty."""
+
+    def type_of(cell: str) -> str:
+        if cell in missing:
+            return ""
+        if is_number(cell, decimal):
+            return "number"
+        return "time" if is_time(cell) else "day" if is_day(cell) else "text"
+
+    types = [[type_of(cell) for cell in line.cells] for _, line in lines]
+    has_values = [any(each in ("number", "time") for each in row) for row in types]
+    counts = Counter(len(row) for row, has in zip(types, has_values, strict=True) if has)
+    if not counts:
+        return None
+    most = max(counts.values())
+    count = max(size for size, times in counts.items() if times == most)
+    if wanted is not None and wanted in counts:
+        count = wanted
+    same = [row for row, has in zip(types, has_values, strict=True) if has and len(row) == count]
+    columns = [Counter(filter(None, column)) for column in zip(*same, strict=True)]
+    named = [
+        "empty"
+        if not found
+        else next((t for t in ("number", "time", "day") if found[t] >= _MOST * found.total()), "text")
+        for found in columns
+    ]
+    numeric = [k for k, each in enumerate(named) if each in ("number", "time")]
+    body = [
+        k
+        for k, (row, has) in enumerate(zip(types, has_values, strict=True))
+        if has and len(row) == count and all(row[c] in ("", named[c]) for c in numeric)
+    ]
+    if not numeric or not body:
+        return None
+    below = len(lines) - body[0]
+    purity = sum(each in ("number", "time", "empty") for each in named) / count * len(body) / below
+    return Fit(kind, separator, decimal, lines, body, named, purity, purity * len(body) / total)
+
+
+def _hex(all_lines: Callable[[], Iterable[str]], lines: Sequence[str]) -> tuple[Fit | None, bool]:
+    """Return the lines as hexadecimal numbers, if all have as many digits, and whether any has one from A to F."""
+    there = [(k, line) for k, line in enumerate(lines) if line.strip()]
+    for separator in " ,;\t":
+        rows = [found.cells for _, line in there if (found := read_line(line, "plain", separator)) and found.cells]
+        whole = [cells for cells in rows if all(map(_HEX.fullmatch, cells))]
+        digits = [cell.removeprefix("0x") for cells in whole for cell in cells]
+        if not digits or len(whole) < 0.9 * len(rows) or len(set(map(len, digits))) > 1:
+            continue
+        has_letters = any(not cell.isdecimal() for cell in digits)
+        if not has_letters and not any(cell.startswith("0") for cell in digits):
+            return None, False
+        has_letters = has_letters or any(_HEX_LETTER.search(line) for line in all_lines())
+        return next(fits_of(lines, [("hex", separator, ".")]), None), has_letters
+    return None, False

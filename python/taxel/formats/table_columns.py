@@ -1,0 +1,282 @@
+"""What each column of a table is: the time and its unit, taxels, events, labels; and what is left out, and why."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import islice, pairwise
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.formats import column_names
+from taxel.formats.column_names import time_unit
+from taxel.formats.layout import Table
+from taxel.formats.line_fits import Fit
+from taxel.formats.lines import MISSING
+from taxel.formats.times import ISO, unit_of_times
+
+__all__ = [
+    "EVENT_COLUMNS",
+    "Changes",
+    "Draft",
+    "are_events",
+    "ask_for_events",
+    "ask_for_unit_of_events",
+    "said_of",
+    "taxels_of",
+    "time_of",
+]
+
+#: So many lines show that an unnamed column ascends as times do, and that one counts lines.
+_ASCENDS, _COUNTS = 8, 20
+#: So many different texts are names of sensors, not remarks.
+_KEYS = 16
+#: Names of the columns of events.
+EVENT_COLUMNS = {"col": "x", "column": "x", "row": "y", "pol": "p", "polarity": "p", "on": "p"}
+#: What is changed in a layout: keys of it or of its table; `left` and `read` are columns more to leave out, or fewer.
+Changes: TypeAlias = Mapping[str, Any]
+
+
+@dataclass
+class Draft:
+    """Hold what is understood of a table as it is looked at: its layout, what was left out and why, what is open."""
+
+    fit: Fit
+    table: Table
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    left: dict[int, str] = field(default_factory=dict)
+    said: list[str] = field(default_factory=list)
+    #: What two layouts differ in, and how, with a comment for each.
+    asked: list[tuple[str, Mapping[str, Changes]]] = field(default_factory=list)
+
+    def called(self, column: int) -> str | int:
+        """Return how a layout names a column: by its name, or, without a name of its own, by its number from 1."""
+        name = self.names[column]
+        return name if name and self.names.count(name) == 1 else column + 1
+
+    def set(self, **keys: Any) -> None:
+        """Set keys of the table."""
+        self.table = replace(self.table, **keys)
+
+
+def time_of(draft: Draft, *, is_stated: bool) -> int | None:
+    """Return the column of times that fits best, and say its unit; None without one.
+
+    Where a layout states the sensor or the rate, a column is one of times by its name or its cells alone.
+    """
+    fit, names = draft.fit, draft.names
+    scores: dict[int, int] = {}
+    for k in range(len(names)):
+        if fit.types[k] not in ("number", "time"):
+            continue
+        # A letter may be the name of a taxel too: it is the time where it comes first, or ascends.
+        if time_unit(names[k]) is not None and (k == 0 or len(names[k]) > 1 or fit.ascends(k)):
+            scores[k] = 4 + 2 * fit.ascends(k)
+        elif fit.types[k] == "time":
+            scores[k] = 3
+        elif draft.table.frame_time is None and fit.count > 1 and _rises(fit, k) and fit.epoch(k):
+            scores[k] = 2
+    column = max(scores, key=lambda k: (scores[k], -k), default=None)
+    draft.left.update(dict.fromkeys((k for k in scores if k != column and scores[k] >= 4), "another time"))
+    if column is None and draft.table.frame_time is None and not is_stated and fit.kind != "hex":
+        column = _unnamed_time(draft)
+    if column is None:
+        return None
+    unit = ISO if fit.types[column] == "time" else _unit_of_time(draft, column)
+    draft.set(time_column=draft.called(column), time_unit=unit)
+    cells = fit.cells(column)
+    begins = [k for k in range(len(cells)) if k == 0 or cells[k] != cells[k - 1]]
+    sizes = set(np.diff(begins).tolist())
+    if len(begins) > 2 and len(sizes) == 1 and (size := sizes.pop()) > 1 and not draft.table.has_lines:
+        frames: dict[str, Changes] = {"rounded times": {}, "lines of one frame": {"frame_lines": size}}
+        draft.asked.append((f"{size} lines have the same time", frames))
+    return column
+
+
+def _rises(fit: Fit, column: int) -> bool:
+    """Return whether nearly every cell of a column of numbers is above the one before."""
+    steps = np.diff(fit.numbers(column)) if fit.types[column] == "number" else np.empty(0)
+    return len(steps) > 0 and bool((steps > 0).mean() >= 0.9)
+
+
+def _unnamed_time(draft: Draft) -> int | None:
+    """Return a column of times that no name says: the only one that ascends in like steps; in few lines, ask."""
+    fit = draft.fit
+    if len(fit.body) < 3 or fit.count < 2:
+        return None
+    even = [k for k in range(len(draft.names)) if not draft.names[k] and _rises(fit, k) and _is_even(fit.numbers(k))]
+    times = [k for k in even if not fit.counts(k)]
+    few = len(fit.body) < _ASCENDS
+    if len(times) == len(even) == 1 and not few:
+        draft.said.append(f"column {times[0] + 1} ascends")
+        return times[0]
+    if not even or len(even) > 2 or (few and fit.count < 3):
+        return None
+    column = (times or even)[0]
+    no_time = {"time_column": None, "time_unit": "s", "left": [column + 1]}
+    draft.asked.append(
+        (f"column {column + 1} may be the time", {"the time": {}, "not the time, and not a taxel": no_time})
+    )
+    return column
+
+
+def _is_even(numbers: NDArray[np.float64]) -> bool:
+    steps = np.diff(numbers)
+    return bool(np.median(steps) > 0 and steps.max() <= 20 * np.median(steps))
+
+
+def _unit_of_time(draft: Draft, column: int) -> str:
+    """Return the unit of a column of times: as its name or unit says, by the years since 1970, or by usual rates."""
+    own = draft.units[column]
+    if stated := time_unit(draft.names[column]) or (time_unit(f"t {own}") if own else None):
+        return stated
+    unit, possible = unit_of_times(draft.fit.numbers(column))
+    if possible:
+        choices = {f"{each}: {hz:.4g} frames/s": {"time_unit": each} for each, hz in possible.items()}
+        draft.asked.append(("the unit of the time", choices))
+    return unit
+
+
+def taxels_of(draft: Draft, time: int | None) -> list[int]:
+    """Return the columns of readings, and say why the others are none."""
+    fit, names, left, label = draft.fit, draft.names, draft.left, draft.table.label_column
+    known = {time, names.index(label) if label in names else label - 1 if isinstance(label, int) else None}
+    for k in range(len(names)):
+        why = "" if k in known or k in left else next(filter(None, _reasons(draft, k, first=int(time == 0))), "")
+        if why:
+            left[k] = why
+    taxels = [k for k in range(len(names)) if k not in known and k not in left]
+    if not taxels:
+        # A sensor may have one taxel, and its name be that of a state.
+        taxels = [k for k in left if fit.types[k] == "number" and left[k].startswith(("labels", "another quantity"))]
+        for k in taxels:
+            del left[k]
+    return _of_one_unit(draft, taxels)
+
+
+def _reasons(draft: Draft, column: int, first: int) -> Iterator[str]:
+    """Yield why a column is no taxel, by its cells, or by its name; the first that is not "" counts."""
+    fit, name = draft.fit, draft.names[column]
+    kind, cells = fit.types[column], [cell for cell in fit.cells(column) if cell not in MISSING]
+    few, reads = len(set(cells)) <= _KEYS, f"; label_column = {draft.called(column)!r} reads them"
+    is_time = time_unit(name) is not None and len(name) > 1
+    if kind == "day":
+        yield "a date"
+    if kind == "text":
+        in_turn = 3 * sum(a != b for a, b in pairwise(cells)) > len(cells)
+        is_key = 1 < len(set(cells)) <= _KEYS and len(cells) == len(fit.body) and not column_names.is_label(name)
+        yield "times in a form that taxel does not read" * is_time
+        yield _key(draft, column) if is_key and (column_names.is_key(name) or in_turn) else ""
+        yield f"texts{reads * (len(set(cells)) > 1)}"
+    yield "times in a form that taxel does not read" * column_names.is_slow_time(name)
+    if kind == "time" or is_time or (name and fit.ascends(column) and fit.epoch(column)):
+        yield "another time"
+    numbers = fit.numbers(column)
+    whole = bool((numbers[np.isfinite(numbers)] % 1 == 0).all())
+    # An unnamed column that counts lines, among columns with names or in many lines.
+    is_sure = len(fit.body) >= (2 if any(draft.names) else _COUNTS)
+    counts = not name and column == first and is_sure and kind == "number" and fit.counts(column)
+    if counts or (column_names.is_counter(name) and whole):
+        yield "a counter"
+    yield f"labels{reads}" * (column_names.is_label(name) and few)
+    if column_names.is_key(name) and whole:
+        yield _key(draft, column) if few else "a counter"
+    yield "another quantity" * column_names.is_other(name)
+
+
+def _key(draft: Draft, column: int) -> str:
+    """Ask whether a column names the sensor of each line; return why it is no taxel."""
+    fit, called = draft.fit, draft.called(column)
+    keys = sorted(set(fit.cells(column)))
+    before = column - 1
+    if before >= 0 and fit.types[before] == "number" and not draft.names[before]:
+        pairs = set(zip(fit.cells(before), fit.cells(column), strict=True))
+        if len(pairs) == len(keys) == len(set(fit.cells(before))) > 1:
+            draft.left[before] = "the same as the column that names the sensor"
+    if len(keys) == 1:
+        return f"always {keys[0]}"
+    shown = ", ".join(keys[:4]) + ", ..." * (len(keys) > 4)
+    each: dict[str, Changes] = {f"a source for each: by = {called!r}": {"by": called, "read": [called]}}
+    draft.asked.insert(0, (f"column {called} is {shown} in turn", {**each, "all lines are of one sensor": {}}))
+    return "by"
+
+
+def _of_one_unit(draft: Draft, taxels: list[int]) -> list[int]:
+    """Return the columns in the unit of most, of a force or pressure if there is one; leave out those of others."""
+    units = Counter(draft.units[k] for k in taxels if draft.units[k])
+    forces = Counter({unit: count for unit, count in units.items() if column_names.is_force(unit)})
+    (unit, count), *others = (forces or units).most_common() or [("", 0)]
+    if not unit:
+        return taxels
+    if others and others[0][1] == count:
+        other = others[0][0]
+        moved, kept = ([draft.called(k) for k in taxels if draft.units[k] == each] for each in (unit, other))
+        choices: dict[str, Changes] = {unit: {}, other: {"unit": other, "left": moved, "read": kept}}
+        draft.asked.append((f"readings in {unit} or in {other}", choices))
+    draft.left.update({k: f"in {draft.units[k]}" for k in taxels if draft.units[k] not in ("", unit)})
+    return [k for k in taxels if k not in draft.left]
+
+
+def are_events(draft: Draft, taxels: Sequence[int]) -> bool:
+    """Return whether the columns are those of events, a line each."""
+    names = [draft.names[k].lower() for k in taxels]
+    called = [EVENT_COLUMNS.get(name, name) for name in names]
+    is_so = sorted(called) == ["p", "x", "y"] and draft.table.time_column is not None
+    return is_so and _are_places(draft.fit, *(taxels[called.index(name)] for name in "xyp"))
+
+
+def _are_places(fit: Fit, x: int, y: int, p: int) -> bool:
+    """Return whether columns hold places, and polarities."""
+    places = np.concatenate([fit.numbers(x), fit.numbers(y)])
+    return bool((places >= 0).all() and (places % 1 == 0).all()) and set(fit.numbers(p).tolist()) in (
+        *({0.0}, {1.0}, {-1.0}, {0.0, 1.0}, {-1.0, 1.0}),
+    )
+
+
+def ask_for_events(draft: Draft) -> None:
+    """Ask whether four columns without names are events, in one of the orders that programs write."""
+    fit = draft.fit
+    for order in ("txyp", "xypt") if fit.count == 4 and not any(draft.names) else ():
+        t, (x, y, p) = fit.numbers(order.index("t")), (order.index(name) for name in "xyp")
+        if _are_places(fit, x, y, p) and len(set(fit.numbers(p).tolist())) == 2 and bool((np.diff(t) >= 0).all()):
+            events = {"columns": list(order), "time_column": "t", "time_unit": "us", "leave_out": [], "events": True}
+            draft.asked.insert(0, ("frames or events", {"frames of taxels": {}, "events, in us": events}))
+            return
+
+
+def ask_for_unit_of_events(draft: Draft, time: int | None) -> None:
+    """Ask for the unit of times of events that no name says: their rate says nothing, as that of frames does."""
+    draft.asked = [each for each in draft.asked if not each[0].startswith("the unit of the time")]
+    fit = draft.fit
+    if time is None or time_unit(draft.names[time]) or fit.types[time] == "time" or fit.epoch(time):
+        return
+    units = ("us", "ms") if bool((fit.numbers(time) % 1 == 0).all()) else ("s", "ms")
+    draft.asked.append(("the unit of the time of the events", {unit: {"time_unit": unit} for unit in units}))
+
+
+def said_of(draft: Draft, time: int | None) -> Iterator[str]:
+    """Yield how lines and columns were read, and which columns were left out and why."""
+    table = draft.table
+    marks = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "blanks", "|": "bars"}
+    kinds = {"marked": "marks and names between cells", "json": "lines of JSON", "hex": "hexadecimal"}
+    yield kinds.get(table.lines, f"separated by {marks.get(table.separator, table.separator)}")
+    if table.decimal == ",":
+        yield "decimal commas"
+    if time is not None:
+        yield f"time {draft.called(time)!r} in {table.time_unit}"
+    else:
+        yield "no times" if table.frame_time is None else f"time in {table.frame_time} above each frame"
+    if table.label_column is not None:
+        yield f"labels {table.label_column!r}"
+    used = [draft.units[k] for k in range(len(draft.units)) if k not in draft.left and k != time]
+    yield from (f"unit {unit}" for unit in sorted(filter(None, used))[:1])
+    reasons: dict[str, list[str]] = {}
+    for k, why in sorted(draft.left.items()):
+        reasons.setdefault(why, []).append(draft.names[k] or f"column {k + 1}")
+    for why, names in reasons.items():
+        shown = ", ".join(islice(names, 8)) + ", ..." * (len(names) > 8)
+        yield f"{shown} left out: {why}"
