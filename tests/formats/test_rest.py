@@ -176,45 +176,25 @@ def test_encode_train_and_detect_hold_missing_values_and_count_them(tmp_path, ca
     assert taxel.SpikeTrains.load(tmp_path / "spikes.npz") == held.encode(holes.held())
 
 
-def test_info_counts_missing_values_readings_at_full_scale_and_gaps(tmp_path, capsys) -> None:
+def test_info_counts_missing_values_and_gaps(tmp_path, capsys) -> None:
     frames = palm(7, 1, 0.4)
     flawless = facts_of(frames, tmp_path / "flawless.npz", capsys)
     assert flawless["missing"]["values"] == 0
-    assert flawless["full_scale"] is flawless["gaps"] is None
-    values = np.minimum(frames.values, 3300)
+    assert flawless["gaps"] is None
+    values = frames.values.copy()
     values[3:400, 1, 2] = np.nan
-    # Always at the greatest value: stuck, not at full scale.
-    values[:, 5, 5] = 3300
     keep = np.ones(len(frames), bool)
     keep[[200, 300, 301, 302, 500, 501]] = False
     flawed = taxel.Frames(values[keep], frames.t[keep], unit="counts", array=frames.array)
     facts = facts_of(flawed, tmp_path / "flawed.npz", capsys)
     assert facts["missing"] == {"values": np.count_nonzero(np.isnan(values[keep])), "of": flawed.values.size}
-    counts = np.count_nonzero(values[keep] == 3300, axis=0)
-    counts[5, 5] = 0
-    counts[counts < 3] = 0
-    assert facts["full_scale"] == {"value": 3300, "readings": counts.sum(), "taxels": np.count_nonzero(counts)}
-    assert counts.any()
     # One frame left out is two intervals.
     assert facts["gaps"].pop("text").startswith("2 gaps, ")
     assert facts["gaps"] == {"count": 2, "total_us": 70_000, "longest_us": 40_000, "t_us": 2_990_000}
     code, shown, _ = call(capsys, "info", tmp_path / "flawed.npz")
     assert code == 0
-    assert all(f"  {name:<20}" in shown for name in ("missing values", "full scale"))
+    assert f"  {'missing values':<20}" in shown
     assert "; 2 gaps, 70 ms together, the longest 40 ms at 3.0 s" in shown
-
-
-@pytest.mark.parametrize("seed", [3, 19])
-def test_the_tail_of_noise_is_not_at_full_scale(seed, tmp_path, capsys) -> None:
-    """With seed 19 two taxels read the greatest value of all in three frames each."""
-    values = np.rint(np.random.default_rng(seed).normal(500, 6.6, (40_000, 2, 2)))
-    top = values.max()
-    at_top = np.count_nonzero(values == top, axis=0)
-    assert (np.count_nonzero(at_top >= 3) > 1) == (seed == 19)
-    for name, kept, cut_off in (("noise", values, None), ("cut", np.minimum(4 * values, 2020), 2020)):
-        frames = taxel.Frames(kept, np.arange(40_000) * 1000, unit="counts")
-        facts = facts_of(frames, tmp_path / f"{name}.npz", capsys)
-        assert (facts["full_scale"] or {"value": None})["value"] == cut_off, name
 
 
 def facts_of(frames: taxel.Frames, place: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:

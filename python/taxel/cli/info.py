@@ -17,7 +17,7 @@ from cyclopts import Parameter
 
 import taxel
 from taxel._base.files import write_whole
-from taxel._base.messages import are, counted, plain, warn
+from taxel._base.messages import counted, plain, warn
 from taxel._base.parallel import Workers
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
@@ -400,13 +400,9 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _flaws(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield what frames lack: values, times, and loads beyond the sensor's range."""
+    """Yield what frames lack: values and times."""
     if facts["missing"]["values"]:
         yield "missing values", f"{facts['missing']['values']} of {facts['missing']['of']}"
-    if (full := facts["full_scale"]) is not None:
-        readings = f"{counted(full['readings'], 'reading')} of {counted(full['taxels'], 'taxel')}"
-        greatest = f"{are(full['readings'])} at {full['value']:g}, the greatest value"
-        yield "full scale", f"{readings} {greatest}: larger loads may be cut off"
     if (gaps := facts["gaps"]) is not None and "gaps" not in facts["verdict"].noted:
         yield "gaps", gaps["text"]
 
@@ -467,8 +463,6 @@ def _pressure(pressed: dict[str, Any], begin_us: int, *, timed: bool) -> Iterato
 def _rates(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if facts.get("events_per_s_board") is not None:
         peak = f"{facts['peak_events_per_s_board']:.0f} events/s in the busiest 10 ms"
-        if facts.get("events_per_s_rest") is not None:
-            peak = f"{facts['events_per_s_rest']:.0f} events/s in the quietest tenth of the time, {peak}"
         before = ", before the start marker, where a board sends the rest of every taxel" * facts["peak_before_start"]
         name = "rate" if "on_share" in facts else "rate, board"
         yield name, f"{facts['events_per_s_board']:.0f} events/s; {peak}{before}"

@@ -14,36 +14,23 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["around", "sensor", "table"]
+__all__ = ["around", "check_table"]
 
 
-def sensor(location: str, array: Array) -> Array:
-    """Return the sensor that a file describes, if it is within the limits.
-
-    Raises
-    ------
-    FormatError : more taxels than a file's sensor may have
-    """
-    if array.rows * array.columns > TAXELS:
-        raise FormatError(
-            f"{location}: the sensor has {array.rows} x {array.columns} taxels; must have at most {TAXELS}"
-        )
-    return array
-
-
-def table(location: Path | str, data: Events | Frames) -> Events | Frames:
-    """Return events or frames of a file, if their sensor and their times are within the limits.
+def check_table(location: Path | str, data: Events | Frames) -> None:
+    """Refuse events or frames of a file whose sensor or times are beyond the limits.
 
     Raises
     ------
     FormatError : too many taxels, or a time farther from 0 than 142 years
     """
-    sensor(str(location), data.array)
+    rows, columns = data.array.shape
+    if rows * columns > TAXELS:
+        raise FormatError(f"{location}: the sensor has {rows} x {columns} taxels; must have at most {TAXELS}")
     far = np.flatnonzero((data.t < -TIME_US) | (data.t > TIME_US))
     if len(far):
         k = int(far[0])
         raise FormatError(f"{location}, time {k}: {data.t[k]} us; times must be within {TIME_US} us (142 years) of 0")
-    return data
 
 
 def around(x: NDArray[Any], y: NDArray[Any]) -> Array:

@@ -1,4 +1,4 @@
-"""Writes layout files, and keys into one that a person may have written."""
+"""Writes layout files, and that readings fall into one that a person may have written."""
 
 from __future__ import annotations
 
@@ -15,12 +15,9 @@ from taxel._core import ProblemError
 from taxel.array import Places
 from taxel.formats.layout import Layout, advice
 
-__all__ = ["of_layout", "refuse_to_choose", "with_keys"]
+__all__ = ["of_layout", "refuse_to_choose", "with_falls"]
 
 _RATE_NOT_SAID = "# rate_hz = 100  # frames per second, which the file does not state"
-
-#: The line that begins a table of TOML.
-_TABLE = re.compile(r"^[ \t]*\[", re.MULTILINE)
 
 
 def of_layout(layout: Layout) -> str:
@@ -82,58 +79,34 @@ def refuse_to_choose(path: Path, why: str, choices: Mapping[str, Layout]) -> NoR
     raise error
 
 
-def with_keys(path: Path, text: str, keys: Mapping[str, Any]) -> str:
-    """Return the text of a layout file with other values of some keys; all else stays, comments too.
+def with_falls(path: Path, text: str) -> str:
+    """Return the text of a layout file that states that readings fall with pressure; all else stays, comments too.
 
     Parameters
     ----------
     path : Path
         The file, for errors.
     text : str
-    keys : mapping of str to value
-        Values by the names of the keys; a key in a table is, for example, "ros.topic".
 
     Raises
     ------
-    FormatError : the text is not a layout, before or with these keys
+    FormatError : the text is not a layout, before or with this key
     ProblemError : it is written so that only a person can change it
 
     Examples
     --------
-    >>> print(with_keys(Path("a.toml"), "unit = 'N'  # newton", {"falls": True, "ros.topic": "/palm"}), end="")
+    >>> print(with_falls(Path("a.toml"), "unit = 'N'  # newton"), end="")
     falls = true
     unit = 'N'  # newton
-    <BLANKLINE>
-    [ros]
-    topic = "/palm"
     """
     Layout.of_text(path, text)
-    wanted, made = tomllib.loads(text), text
-    for name, value in keys.items():
-        table, _, key = name.rpartition(".")
-        (wanted.setdefault(table, {}) if table else wanted)[key] = value
-        made = _set(made, table, f"{key} = {_written(value)}", key)
+    own, *tables = re.split(r"^(?=[ \t]*\[)", text, maxsplit=1, flags=re.MULTILINE)
+    changed, count = re.subn(r"^[ \t]*falls[ \t]*=.*$", "falls = true", own, flags=re.MULTILINE)
+    made = "".join([changed if count else f"falls = true\n{own}", *tables])
     Layout.of_text(path, made)
-    if tomllib.loads(made) != wanted:
-        raise ProblemError(
-            f"{path}: taxel cannot edit this layout file; write {', '.join(keys)} in it with a text editor"
-        )
+    if tomllib.loads(made) != tomllib.loads(text) | {"falls": True}:
+        raise ProblemError(f"{path}: taxel cannot edit this layout file; write falls in it with a text editor")
     return made
-
-
-def _set(text: str, table: str, line: str, key: str) -> str:
-    """Return a text of TOML with a line in place of that of the same key in a table, or before the table's others."""
-    begin = 0
-    if table:
-        head = re.search(rf"^[ \t]*\[[ \t]*{re.escape(table)}[ \t]*\].*(\n|\Z)", text, re.MULTILINE)
-        if head is None:
-            return f"{text.rstrip()}\n\n[{table}]\n{line}\n".lstrip("\n")
-        begin = head.end()
-    following = _TABLE.search(text, begin)
-    end = len(text) if following is None else following.start()
-    inside, count = re.subn(rf"^[ \t]*{re.escape(key)}[ \t]*=.*$", lambda _: line, text[begin:end], flags=re.MULTILINE)
-    before = text[:begin] if begin == 0 or text[:begin].endswith("\n") else f"{text[:begin]}\n"
-    return before + (inside if count else f"{line}\n{inside}") + text[end:]
 
 
 def _written(value: object) -> str:

@@ -14,7 +14,6 @@ from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats.checks import table as limited
 from taxel.formats.column_names import AXES
 from taxel.formats.layout import Layout
 from taxel.frames import Frames
@@ -117,8 +116,6 @@ def _frames(
         stated = stated or Array(rows, columns, name=path.stem, names=names if rows == 1 else None)
         array = layout.array(taxels, stated)
         whole = frozen_whole(np.ascontiguousarray(values).reshape(-1, *array.shape))
-        frames = Frames(whole, frozen_whole(t), unit=layout.unit or "counts", array=array)
+        return Frames(whole, frozen_whole(t), unit=layout.unit or "counts", array=array)
     except ProblemError as error:
         raise FormatError(f"{layout.path}: {path.name}: {first_line(error)}") from None
-    limited(path, frames)
-    return frames

@@ -22,7 +22,6 @@ from taxel._base.errors import helped, refused, unreadable
 from taxel._base.messages import counted, first_line, installing, warn
 from taxel._core import Error, FormatError, ProblemError
 from taxel.array import Array
-from taxel.formats.checks import table as limited
 from taxel.formats.times import repaired
 from taxel.frames import Frames
 from taxel.labels import source_of
@@ -470,7 +469,6 @@ class _Messages:
             warn(f"{self.path}: topic {self.topic}: {line}", stacklevel=6)
         unit = "counts" if rows.dtype.kind in "ui" else "as sent"
         table = Frames(frozen_whole(frames.reshape(-1, *array.shape)), frozen_whole(found.t), unit=unit, array=array)
-        limited(self.location, table)
         remarks = () if stamps.any() else ("the times are those of the bag, because the messages have no header",)
         source = self.topic + f".{self.field}" * bool(self.field) + f" ({self.type})"
         counts = {"messages": len(messages), "messages_of_another_length": left_out, "times_by_the_bag": by_the_bag}

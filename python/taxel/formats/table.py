@@ -22,7 +22,6 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import around
-from taxel.formats.checks import table as limited
 from taxel.formats.column_names import AXES, axes_of, time_unit
 from taxel.formats.layout import Layout, Table
 from taxel.formats.lines import MISSING, LineShape, OddLines, is_number
@@ -407,8 +406,6 @@ def _events(path: Path, layout: Layout, how: Table, columns: _Columns, rows: _Ro
     x, y = by_name["x"].astype(np.uint16), by_name["y"].astype(np.uint16)
     try:
         sensor = (array or around(x, y)) if layout.rows is None else layout.array(1)
-        events = Events(us.astype(np.int64), x, y, by_name["p"] > 0, array=sensor)
+        return Events(us.astype(np.int64), x, y, by_name["p"] > 0, array=sensor)
     except ProblemError as error:
         raise FormatError(f"{layout.path}: {path.name}: {first_line(error)}") from None
-    limited(path, events)
-    return events

@@ -52,7 +52,7 @@ _IS_TIME = re.compile(rf"(?:{_DATE}[T ])?{_CLOCK}(?:Z|[+-]\d\d:?\d\d)?")
 _IS_DAY = re.compile(_DATE)
 _DAY_US = 86_400_000_000
 _DAY_WITH_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?:[ T]+(\S+))?", re.ASCII)
-_TIME_OF_DAY = re.compile(r"\d\d:.*|\d{6}(?:[.,+Z-].*)?", re.ASCII)
+_TIME_OF_DAY = re.compile(r"\d?\d:.*|\d{6}(?:[.,+Z-].*)?", re.ASCII)
 #: Characters of a date without separators.
 _SHORTEST_DATE = 8
 #: A counter of times that is full begins at 0 again: its values, in the unit of the file.
@@ -97,7 +97,7 @@ def seconds_of(cell: str) -> float:
         day, month, year, rest = found.groups()
         cell = f"{year}-{month:0>2}-{day:0>2}T{rest or '00:00'}"
     elif _TIME_OF_DAY.fullmatch(cell):
-        cell = f"1970-01-01T{cell}"
+        cell = f"1970-01-01T{cell.zfill(len(cell) + (cell[1] == ':'))}"
     elif not cell[:4].isdecimal() or len(cell) < _SHORTEST_DATE:
         return math.nan
     try:
@@ -143,17 +143,9 @@ def us_of(column: Any, unit: str) -> NDArray[Any]:
     import pandas as pd  # noqa: PLC0415  takes long
 
     if unit == ISO:
-        texts = column.astype(str).str.strip().str.replace(",", ".", regex=False)
-        of_day = texts.str.fullmatch(_CLOCK)
-        if bool(of_day.mean() > 0.5):
-            short = texts.where(texts.str.count(":") != 1, texts + ":00")
-            us = pd.to_timedelta(short, errors="coerce").to_numpy("timedelta64[us]")
-        else:
-            german = bool(texts.str.match(r"\d{1,2}\.\d{1,2}\.\d{4}").mean() > 0.5)
-            stamps = pd.to_datetime(texts, format="mixed", dayfirst=german, utc=True, errors="coerce")
-            us = stamps.dt.tz_localize(None).to_numpy("datetime64[us]")
-        numbers: NDArray[np.int64] = us.astype(np.int64)
-        return np.where(np.isnat(us), np.nan, numbers.astype(np.float64)) if np.isnat(us).any() else numbers
+        seconds = column.astype(str).str.strip().map(seconds_of).to_numpy(np.float64)
+        us: NDArray[np.float64] = np.rint(seconds * 1e6)
+        return us if np.isnan(us).any() else us.astype(np.int64)
     values = column.to_numpy()
     if values.dtype.kind in "iu" and unit in ("us", "ns"):
         exact: NDArray[np.int64] = values.astype(np.int64)

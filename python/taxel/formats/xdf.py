@@ -11,7 +11,6 @@ from taxel._base.columns import frozen_whole
 from taxel._base.errors import damaged, unreadable
 from taxel._base.messages import counted, first_line, installing
 from taxel.array import Array
-from taxel.formats.checks import table as limited
 from taxel.formats.layout import Layout
 from taxel.formats.times import repaired
 from taxel.frames import Frames
@@ -82,7 +81,6 @@ def _reader(path: Path, name: str, stream: dict[str, Any], notes: tuple[Note, ..
     array = Array(1, values.shape[1], name=name, names=names if is_named else None)
     unit = units.pop() if len(units) == 1 else ""
     frames = Frames(frozen_whole(values[:, None]), frozen_whole(found.t), unit=unit or "as sent", array=array)
-    limited(path, frames)
     remarks = tuple(f"{counted(len(t), 'time')}: {said}" for said in found.said)
     facts = Facts(path=path, array=array, kind="xdf", label=source_of(name), source=name, remarks=remarks)
     return InMemory(facts, frames, Marks(notes=notes))

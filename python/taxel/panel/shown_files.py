@@ -282,7 +282,7 @@ class ShownFiles:
         # A layout of the whole folder stays as it is; this recording gets a copy with this key.
         there = Layout.beside(path)
         target = file_beside(path, layout_name(named(path)))
-        written = layout_text.with_keys(target, "" if there is None else read_text(there), {"falls": True})
+        written = layout_text.with_falls(target, "" if there is None else read_text(there))
         with whole_file(target, overwrite=True) as part:
             part.write_text(written, "utf-8", newline="\n")
 

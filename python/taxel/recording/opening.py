@@ -24,6 +24,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats import emed, event_camera, moticon, pedar, tekscan, xdf
+from taxel.formats.checks import check_table
 from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction, reduced
 from taxel.formats.foreign import ARRAYS, TABLES, check_foreign, read_foreign, refuse_container
@@ -520,6 +521,8 @@ def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[
         raise FormatError(f"{path}: the file changed while it was read; open it again when it is complete")
     by_name: dict[str, list[Reader]] = {}
     for reader in readers:
+        if isinstance(reader, InMemory):
+            check_table(path, reader.data)
         by_name.setdefault(reader.facts.name, []).append(reader)
     opened = [Recording.of(*each) for each in by_name.values()]
     if layout is not None:

@@ -16,13 +16,6 @@ from taxel.recording.recording import Recording
 
 #: The interval over which the highest rate is measured, us.
 _PEAK_US = 10_000
-#: Reading: an event camera's rate at rest is that which this share of intervals of so many us do not exceed, of at most
-#: so many; those without an event, as in a gap, are left out.
-_REST_SHARE, _REST_US, _MOST_INTERVALS = 0.1, 100_000, 1_000_000
-#: Reading: a taxel was at full scale if it read the greatest value in so many frames, of at least so many levels.
-_AT_TOP, _LEVELS = 3, 50
-#: Reading: readings are cut off if the greatest value is so many times as frequent as each of so many values below it.
-_TIMES, _BELOW = 2, 3
 #: At most so many places of taxels are listed that were not touched enough: a large sensor may have millions.
 _PLACES = 100
 
@@ -60,16 +53,12 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         facts["markers"] = [{"t_us": t, "start": start} for t, start in events.markers]
         facts["events_per_s_board"] = len(events) / seconds if seconds else None
         if events.intensity is None and _may_be_of_camera(recording):
-            facts |= {
-                "on_share": float(events.p.mean()) if len(events) else None,
-                "events_per_s_rest": _at_rest(events),
-            }
+            facts["on_share"] = float(events.p.mean()) if len(events) else None
         facts["peak_events_per_s_board"], facts["peak_before_start"] = _peak(events)
     else:
         facts["frames"], facts["unit"] = len(table), table.unit
         facts["frames_per_s"] = (len(table) - 1) / seconds if seconds else None
         facts["missing"] = {"values": table.missing, "of": table.values.size}
-        facts["full_scale"] = _full_scale(table)
     gaps = recording._gaps
     facts["gaps"] = None if gaps is None else gaps.to_dict()
     clock = recording.clock
@@ -146,44 +135,6 @@ def _pressure(pressed: Series) -> dict[str, Any] | None:
     if limits is not None:
         limits["y"] = [float(v) for v in (centre[:, 1].min(), centre[:, 1].max())]
     return facts | {f"centre_{pressed.centre_unit}": limits}
-
-
-def _full_scale(frames: Frames) -> dict[str, Any] | None:
-    """Return how many readings are at full scale, and of which value; None where the readings show none.
-
-    It is the greatest value if two taxels or more read exactly this value in several frames, and other values too.
-    Readings of few levels reach their greatest value by chance, and in the tail of noise each value is rarer than the
-    one below it.
-    """
-    values = frames.values
-    if not values.size:
-        return None
-    least, top = (float(reduction.reduce(values, axis=None)) for reduction in (np.fmin, np.fmax))
-    if not np.isfinite(top - least) or (top - least < _LEVELS and not np.any(values % 1)):
-        return None
-    at_top = np.count_nonzero(values == top, axis=0)
-    # A taxel that is always there is stuck.
-    often = at_top >= _AT_TOP
-    at_top[~often] = 0
-    at_top[often] *= at_top[often] < np.count_nonzero(~np.isnan(values[:, often]), axis=0)
-    taxels, readings = int(np.count_nonzero(at_top)), int(at_top.sum())
-    below, tail = top, list[int]()
-    while taxels > 1 and len(tail) < _BELOW and below > least:
-        below = float(np.max(values, where=values < below, initial=least))
-        tail.append(int(np.count_nonzero(values == below)))
-    cut_off = bool(tail) and readings > _TIMES * np.mean(tail)
-    return {"value": top, "readings": readings, "taxels": taxels} if cut_off else None
-
-
-def _at_rest(events: Events) -> float | None:
-    """Return the rate of an event camera at rest, events/s: that of its quiet intervals."""
-    if not len(events):
-        return None
-    first, last = int(events.t[0]), int(events.t[-1])
-    interval = max(_REST_US, -(-(last - first) // _MOST_INTERVALS))
-    counts = np.diff(np.searchsorted(events.t, np.arange(first, last + 1, interval)))
-    counts = counts[counts > 0]
-    return float(np.quantile(counts, _REST_SHARE)) / (interval / 1e6) if len(counts) else None
 
 
 def _peak(events: Events) -> tuple[float | None, bool]:

@@ -23,8 +23,6 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import around
-from taxel.formats.checks import sensor as limited_sensor
-from taxel.formats.checks import table as limited
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory
 
@@ -163,7 +161,6 @@ def from_columns(path: Path, kind: str, columns: Mapping[str, NDArray[Any]], arr
             markers = [(int(at), bool(start)) for at, start in columns.get("markers", np.empty((0, 2)))]
             more = {name: columns[name] for name in _MORE if name in columns}
             table = Events(t, x, y, p, array=sensor or around(x, y), markers=markers, **more)
-        limited(path, table)
     except (ProblemError, ValueError, TypeError, OverflowError) as error:
         raise FormatError(f"{path}: {first_line(error)}") from None
     return InMemory(Facts(path=path, array=table.array, kind=kind, timed="t" in columns), table)
@@ -172,6 +169,6 @@ def from_columns(path: Path, kind: str, columns: Mapping[str, NDArray[Any]], arr
 def _sensor(path: Path, document: str) -> Array:
     """Return the sensor that a file describes."""
     try:
-        return limited_sensor(str(path), Array._from_geometry(dict(json.loads(document))))
+        return Array._from_geometry(dict(json.loads(document)))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, ProblemError) as error:
         raise FormatError(f"{path}, {SENSOR}: {first_line(error)}; must be a sensor as taxel writes it") from None

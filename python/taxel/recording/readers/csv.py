@@ -28,7 +28,6 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import around
-from taxel.formats.checks import table as limited
 from taxel.formats.layout import advice
 from taxel.formats.table_text import Text, beginning
 from taxel.frames import Frames
@@ -64,7 +63,7 @@ def read_csv(path: Path, array: Array | None = None) -> InMemory:
     names, separator = _head(path, text)
     read = _events if tuple(names[:4]) == EVENTS else _frames
     try:
-        table = limited(path, read(text, names, separator, array))
+        table = read(text, names, separator, array)
     except ProblemError as error:
         raise FormatError(f"{path}: {error}") from None
     return InMemory(Facts(path=path, array=table.array, kind="csv"), table)
