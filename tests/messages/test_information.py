@@ -36,8 +36,13 @@ CALLS = {
     "arrays": lambda _: answer(
         [LabelledTrial(Frames(np.zeros((5, 1, n)), np.arange(5)), str(n), 0) for n in (2, 3)], window_ms=20
     ),
-    "table": lambda folder: taxel.information.read_trials(folder, []),
+    "table": lambda folder: taxel.information.read_trials(written(folder / "trials.csv"), []),
 }
+
+
+def written(table):
+    table.write_text("label,t_us\n")
+    return table
 
 
 def test_messages(tmp_path, snapshot):

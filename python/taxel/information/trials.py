@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
-
-from taxel._base.arguments import checked_path, instance, integer, number, several, shown, text
-from taxel._base.errors import helped, placed, refused, unreadable
-from taxel._base.header_table import HeaderTable, text_of
+from taxel._base.arguments import instance, integer, number, several, shown, text
+from taxel._base.errors import helped, refused, unreadable
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.labels import Note, ahead_us, by_clock
+from taxel.labels import Labels, ahead_us, by_clock, trial_of
 from taxel.recorded import refuse_numbered
 from taxel.recording import Recording
 from taxel.spikes import to_ms, to_us
 
 __all__ = ["LabelledTrial", "notes_as_trials", "read_trials", "recordings_as_trials"]
-
-_COLUMNS = ("recording", "t_us", "label")
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,14 +83,13 @@ class LabelledTrial:
 def read_trials(
     table: str | os.PathLike[str], recordings: Sequence[Recording], *, window_ms: float | None = None
 ) -> list[LabelledTrial]:
-    """Read a table of trials: ``recording,t_us,label[,stop_us][,group][,host_ns]``; other columns are not read.
+    """Read a table of trials: that of `Labels` with the columns ``stop_us`` (us) and ``group``, which may be absent.
 
     Parameters
     ----------
     table : path
-        A .csv with a header line, its columns in any order. A recording is named by its path, name or stem; with a
-        single recording the column may be absent. The search for the touch begins at ``t_us``; ``host_ns`` decides if
-        the recording began in mid-stream, as for `Labels`.
+        The search for the touch begins at ``t_us``; ``host_ns`` decides if the recording began in mid-stream, as for
+        `Labels`.
     recordings : sequence of Recording
         The table must name all of them, and no others.
     window_ms : float, ms, above 0, optional
@@ -108,69 +101,63 @@ def read_trials(
 
     Raises
     ------
-    FormatError : a column is missing, or a cell that is not a number (names file and line)
+    FormatError : as `Labels`
     ProblemError : recordings and table do not match, a recording is there twice or has no times, a start outside its
         recording, trials without an end, trials that overlap, or the host's time of another run
     """
-    file = Path(checked_path("table", table))
+    labels = Labels(table)
     opened = _once(recordings)
     window_us = 0 if window_ms is None else _window_us(window_ms)
-    by_name = _by_unique_name(opened)
-    rows = _rows(file, opened)
-    names = {row["recording"] for _, row in rows}
-    strange = sorted(names - set(by_name))
-    if strange:
-        line = next(line for line, row in rows if row["recording"] == strange[0])
-        alike = [str(recording.path) for recording in opened if strange[0] in (recording.name, _stem(recording))]
-        if len(alike) > 1:
-            raise ProblemError(
-                f"{file}, line {line}: recording {strange[0]!r} may be {' or '.join(alike[:3])}; write the path"
-            )
-        there = sorted({recording.name for recording in opened})
-        listed = ", ".join(there[:5]) + (" ..." if len(there) > 5 else "")
-        raise ProblemError(
-            f"{file}, line {line}: recording {strange[0]!r} is not one of the given recordings: {listed}"
-        )
-    unnamed = [
-        recording.path for recording in opened if not {str(recording.path), recording.name, _stem(recording)} & names
-    ]
-    if unnamed:
-        raise ProblemError(f"{file}: has no trial of {unnamed[0]}; add one, or leave the recording out")
-    sources = {id(recording): _source(recording) for recording in opened}
-    spans = {key: _span(source) for key, source in sources.items()}
-    clocks = (
-        {id(recording): recording.clock for recording in opened} if any(row.get("host_ns") for _, row in rows) else {}
-    )
+    if not labels.rows:
+        raise unreadable("names no trial", labels.path)
+    owners = _owners(labels, opened)
+    sources = {name: _source(recording) for name, recording in owners.items()}
+    spans = {name: _span(source) for name, source in sources.items()}
+    host_ns = any(row.at_ns for row in labels.rows)
+    clocks = {name: recording.clock if host_ns else None for name, recording in owners.items()}
     trials = []
-    for line, row in rows:
-        recording = by_name[row["recording"]]
-        source = sources[id(recording)]
-        where = f"{file}, line {line}"
-        times = ("stop_us", "host_ns")
-        end, host_ns = (_whole(file, line, name, row[name]) if row.get(name) else None for name in times)
-        start = _whole(file, line, "t_us", row["t_us"])
-        span = spans[id(recording)]
-        begin = by_clock(Note(row["label"], start, host_ns or 0), span[0] if span else 0)
-        later = (begin.t or 0) - start - ahead_us(begin, recording.path, clocks.get(id(recording)), file)
-        start, stop = start + later, None if end is None else end + later
-        if stop is None and window_ms is None:
-            error = placed(ProblemError("stop_us is missing, so the length of the trial is not known"), file, line=line)
-            raise helped(error, "window_ms", "give")
-        if not row["label"]:
-            raise unreadable("label is empty", file, line=line)
-        if row["label"].lower() == "nan":
-            raise unreadable(
-                f"label is {row['label']!r}, which tables use for a missing value; choose another name",
-                file,
-                line=line,
+    for row in labels.rows:
+        name, others = row.recording, dict(row.others)
+        trial, span = f"{labels.path}, {row.text} at {row.t} us", spans[name]
+        begin = by_clock(row, span[0] if span else 0, stated=labels._from_beginning)
+        later = (begin.t or 0) - (row.t or 0) - ahead_us(begin, owners[name].path, clocks[name], labels.path)
+        end = others.get("stop_us", "").strip()
+        if not end and window_ms is None:
+            raise helped(
+                ProblemError(f"{trial}: stop_us is missing, so the length of the trial is not known"),
+                "window_ms",
+                "give",
             )
-        trials.append(LabelledTrial(source, row["label"], start, stop, row.get("group", ""), where))
-        _inside(trials[-1], recording.name, span, window_us)
+        if end and not end.removeprefix("-").isdecimal():
+            raise ProblemError(f"{trial}: stop_us is {shown(end)}; must be whole us")
+        stop = int(end) + later if end else None
+        group = others.get("group", "").strip()
+        trials.append(LabelledTrial(sources[name], row.text, (row.t or 0) + later, stop, group, trial))
+        _inside(trials[-1], owners[name].name, span, window_us)
     if any(trial.group for trial in trials) and not all(trial.group for trial in trials):
         nameless = next(trial for trial in trials if not trial.group)
         raise ProblemError(f"{nameless.name}: group is empty; give a group to every trial, or to none")
     _apart(trials, window_us)
     return trials
+
+
+def _owners(labels: Labels, recordings: Sequence[Recording]) -> dict[str, Recording]:
+    """Return the recordings by the names that a table has for them."""
+    named = [labels.named(each.path, trial_of(each.name, each.label), each.label) for each in recordings]
+    strange = next((row.recording for row in labels.rows if row.recording not in named), None)
+    if strange is not None:
+        there = ", ".join(sorted(recording.name for recording in recordings)[:5])
+        raise ProblemError(f"{labels.path}: recording {strange!r} is not one of the given recordings: {there}")
+    owners: dict[str, Recording] = {}
+    for name, recording in zip(named, recordings, strict=True):
+        if name is None:
+            raise ProblemError(f"{labels.path}: has no trial of {recording.path}; add one, or leave the recording out")
+        if name in owners:
+            several_of = f"recording {name!r} may be {owners[name].path} or {recording.path}"
+            what = several_of if name else "does not state the recording of each trial"
+            raise ProblemError(f"{labels.path}: {what}; write its path in the column recording")
+        owners[name] = recording
+    return owners
 
 
 def notes_as_trials(recordings: Sequence[Recording], *, window_ms: float) -> list[LabelledTrial]:
@@ -300,48 +287,3 @@ def _apart(trials: list[LabelledTrial], window_us: int) -> None:
                 raise ProblemError(
                     f"{after.name}: begins before {before} ends at {trial.stop_us} us; trials must not overlap"
                 )
-
-
-def _by_unique_name(recordings: Sequence[Recording]) -> dict[str, Recording]:
-    """Return recordings by path, and by name and stem where only one has it."""
-    by_name: dict[str, Recording] = {}
-    for names in ([_stem(recording) for recording in recordings], [recording.name for recording in recordings]):
-        count = Counter(names)
-        by_name |= {name: recording for name, recording in zip(names, recordings, strict=True) if count[name] == 1}
-    return by_name | {str(recording.path): recording for recording in recordings}
-
-
-def _stem(recording: Recording) -> str:
-    return Path(recording.name).stem
-
-
-def _rows(file: Path, recordings: Sequence[Recording]) -> list[tuple[int, dict[str, str]]]:
-    if file.is_dir():
-        raise unreadable(f"is a directory; must be a .csv {','.join(_COLUMNS)}", file)
-    table = HeaderTable.read(file, text_of(file))
-    if not table.header:
-        raise unreadable(f"contains nothing; must be {','.join(_COLUMNS)} ...", file)
-    alone = len(recordings) == 1 and "recording" not in table.header
-    only = {"recording": str(recordings[0].path)} if alone else {}
-    table.has([name for name in _COLUMNS if name not in only])
-    rows = []
-    for line, cells in table:
-        rows.append((line, only | {name: cell.strip() for name, cell in cells.items()}))
-    if not rows:
-        raise unreadable("names no trial", file)
-    return rows
-
-
-def _whole(file: Path, line: int, column: str, cell: str) -> int:
-    value: int | None
-    try:
-        value = int(cell)
-    except ValueError:
-        try:
-            real = float(cell)
-        except ValueError:
-            real = np.nan
-        value = int(real) if np.isfinite(real) and real.is_integer() else None
-    if value is None or not abs(value) < 2**62:
-        raise unreadable(f"{column} is {shown(cell)}; must be whole {column[-2:]}", file, line=line)
-    return value
