@@ -7,11 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from discs import ARRAY, tare, touches
-from refusal import refused
 from shell import call
 
 import taxel
-from taxel.tasks.__main__ import run as run_task
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -78,12 +76,6 @@ def test_labels_of_which_none_is_found_leave_no_readout(tmp_path: Path, capsys, 
     assert [line.split(": ")[1] for line in warned] == ["contact", "lift"]
     result = json.loads(call(capsys, *arguments, "--window-ms", 1, "--json")[1])
     assert (result["readout"], [f"warning: {one}" for one in result["warnings"]]) == (None, warned)
-    request = {"recordings": [str(recording)], "labels": str(labels), "out": str(out), "overwrite": True}
-    with refused(taxel.ProblemError):
-        run_task("train", request | {"options": {"folds": folds, "window_ms": 1}}, lambda *_: None)
-    assert not out.exists()
-    ran = run_task("train", request | {"options": {"folds": folds, "window_ms": 10}}, lambda *_: None)
-    assert ran["command"].partition(" --tare")[0] == f"taxel detect RECORDING --readout {out}"
     code, said, _ = call(capsys, *arguments, "--window-ms", 10)
     assert (code, "warning" in said, out.exists()) == (0, False, True), "all are found"
 

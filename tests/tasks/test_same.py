@@ -1,10 +1,8 @@
-"""The same recordings and labels from Python, the shell, a process of tasks and the page give the same results."""
+"""The same recordings and labels from Python, the shell and the page give the same results."""
 
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,17 +18,6 @@ from taxel.tasks import detect
 from .recordings import board, mat, trials
 
 
-def task(name: str, **request: Any) -> dict[str, Any]:
-    """Run a task in a process of its own; return its result."""
-    words = [sys.executable, "-P", "-m", "taxel.tasks", name]
-    done = subprocess.run(words, input=json.dumps(request), capture_output=True, text=True, timeout=250, check=False)
-    assert (done.returncode, done.stderr) == (0, ""), done
-    *steps, last = map(json.loads, done.stdout.splitlines())
-    assert {step["type"] for step in steps} == {"progress"}
-    assert last["type"] == "result"
-    return last["result"]
-
-
 def requests() -> Training:
     """Return what handles the page's requests about readouts."""
     return Training(Opening(), ShownFiles())
@@ -42,7 +29,7 @@ def moments(detections: list[dict[str, Any]]) -> list[tuple[str, int, int]]:
 
 
 @pytest.mark.parametrize("written", [board, mat, trials])
-def test_readouts_and_detections_are_the_same_from_python_the_shell_a_process_and_the_page(
+def test_readouts_and_detections_are_the_same_from_python_the_shell_and_the_page(
     written: Callable[[Path], Path], tmp_path: Path
 ) -> None:
     place = written(tmp_path)
@@ -51,8 +38,7 @@ def test_readouts_and_detections_are_the_same_from_python_the_shell_a_process_an
     training.readout.save(tmp_path / "python.json")
     shell = run("train", place, "-o", tmp_path / "shell.json", "--json")
     assert shell.returncode == 0, shell.stderr
-    process = task("train", recordings=[str(place)], out=str(tmp_path / "process.json"))
-    texts = {(tmp_path / f"{name}.json").read_text() for name in ("python", "shell", "process")}
+    texts = {(tmp_path / f"{name}.json").read_text() for name in ("python", "shell")}
     if place.is_file():
         made = requests().train(place, tmp_path / "page.json")
         texts.add((tmp_path / "page.json").read_text())
@@ -60,12 +46,10 @@ def test_readouts_and_detections_are_the_same_from_python_the_shell_a_process_an
         assert made["next"] == f"taxel detect RECORDING --readout {tmp_path / 'page.json'}"
     assert len(texts) == 1
     assert json.loads(shell.stdout) == {"readout": str(tmp_path / "shell.json"), **training.to_dict()}
-    assert process == json.loads(json.dumps(training.to_dict()))
 
     readout = tmp_path / "python.json"
     found = json.loads(json.dumps(detect(training.readout, taxel.open_all(place)).to_dict()))
     assert sum(len(one["detections"]) for one in found["recordings"]) > 8
-    assert task("detect", recordings=[str(place)], readout=str(readout)) == found
     shown = json.loads(run("detect", place, "--readout", readout, "--json").stdout)
     if place.is_dir():
         assert shown["recordings"] == found["recordings"]

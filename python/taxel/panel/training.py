@@ -76,10 +76,8 @@ class Training:
 
     def train(self, recording: Path, out: Path) -> dict[str, Any]:
         """Train on the labels of a recording, and return what the page shows of it, with times as in the file."""
-        request = {
-            "recordings": [str(recording)],
-            "open": self._opening.options_of(recording).given(),
-        }
+        options = self._opening.options_of(recording).given()
+        request = json.dumps({"recording": str(recording), "open": options, "out": typed(out)})
         with self._lock:
             if self._closed:
                 raise ProblemError(_STOPPED)
@@ -87,8 +85,7 @@ class Training:
                 raise ProblemError("a training runs already: stop it first, or wait for its end")
             self._steps = Steps()
             # A separate process, so that it does not delay receiving.
-            line = json.dumps(request | {"out": typed(out), "overwrite": True})
-            self._training = ChildProcess("taxel.tasks", ["train"], line=line, stdout=PIPE)
+            self._training = ChildProcess("taxel.panel.training_process", line=request, stdout=PIPE)
         try:
             with self._training:
                 answer = self._answer(self._training)

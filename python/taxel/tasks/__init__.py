@@ -2,8 +2,7 @@
 
 Each task takes opened recordings and a frozen dataclass of options, reports its progress by one callback (step, done,
 all), and returns a frozen result with `to_dict()` and `warnings`. No task writes a file; what a result holds is saved
-by its own methods. The command line and the page call these functions; ``python -m taxel.tasks NAME`` runs one in a
-separate process (`taxel.tasks.__main__`).
+by its own methods. The command line and the page call these functions.
 """
 
 from taxel._base.parallel import Workers as Workers
