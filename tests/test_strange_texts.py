@@ -19,7 +19,7 @@ from shell import run
 from strange import CELL, CONTROL, FILE, NAME
 
 import taxel
-from taxel._base.messages import escaped, escaped_lines, warn
+from taxel._base.messages import escaped, escaped_lines
 from taxel.cli.console import Console
 
 #: What rich moves and colours with on a terminal: no name may bring more.
@@ -113,31 +113,6 @@ def test_a_label_of_any_character_is_read_as_it_was_written(tmp_path: Path) -> N
     assert [row.text for row in taxel.Labels(table).rows] == [f"a{one}b" for one in controls]
     found = taxel.Detections([f"a{one}b" for one in controls], range(len(controls)), range(len(controls)))
     assert taxel.Detections.from_csv(found.to_csv(tmp_path / "found.csv")) == found
-
-
-def test_what_python_shows_of_them_is_escaped(places: dict[str, Path]) -> None:
-    opened = taxel.open(places[".mcap"])
-    readout, labels = taxel.Readout.load(places["readout"]), taxel.Labels(places["labels"])
-    found = taxel.detect.run(readout, opened)
-    score = taxel.detect.score(opened.detections, {NAME: [500_000]}, window_ms=50)
-    tare = taxel.Tare.take(strange.frames(), stop_us=300_000, note=NAME)
-    rule = taxel.detect.PlainRule("area", 2, labels=[NAME, None])
-    for noun in (opened, opened.frames(), opened.array, opened.detections, opened.notes, readout, labels, found, score,
-                 tare, rule, opened.verdict):  # fmt: skip
-        assert not strange.wrong(repr(noun)), type(noun)
-    for noun in (opened, opened.frames(), opened.detections):
-        assert not strange.wrong(noun._repr_html_()), type(noun)
-
-
-def test_errors_and_warnings_are_one_line_wherever_they_are_shown() -> None:
-    for kind in (taxel.Error, taxel.FormatError, taxel.ProblemError, taxel.DeviceError, taxel.SceneError):
-        assert str(kind(f"{NAME}: wrong")) == f"{escaped(NAME)}: wrong"
-        assert str(kind(f"{NAME}:", f"{CELL}\n{CELL}")) == f"{escaped(NAME)}:\n{escaped(CELL)}\n{escaped(CELL)}"
-        assert (str(kind()), str(kind(3))) == ("", "3")
-    with pytest.warns(UserWarning, match="strange") as caught:
-        warn(f"{NAME}: strange", stacklevel=1)
-    assert str(caught[0].message) == f"{escaped(NAME)}: strange"
-    assert caught[0].filename == __file__
 
 
 def test_each_control_character_is_escaped_and_nothing_else() -> None:

@@ -22,8 +22,6 @@ import taxel
 from taxel import Frames, Labels
 from taxel._base.files import create, write_whole
 from taxel._base.stopping import asked_to_end
-from taxel.live import Live
-from taxel.panel.label_file import LabelFile
 
 on_windows = pytest.mark.skipif(sys.platform != "win32", reason="a matter of Windows alone")
 
@@ -55,19 +53,6 @@ def test_a_recording_is_written_and_opened_in_any_folder(folder: Path, ending: s
     said = run("info", path, "--json")
     assert said.returncode == 0, said.stderr
     assert json.loads(said.stdout)
-
-
-def test_a_board_is_recorded_and_labelled_in_any_folder(folder: Path) -> None:
-    path = folder / "a walk é.mcap"
-    with Live(0, host="127.0.0.1", record=path) as live, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
-        board.sendto(taxel.wire.encode(some_events(20)), live.address)
-        until(lambda: live.counters["capture"]["datagrams"] == 1)
-        live.stop()
-    assert len(taxel.open(path).events) == 20
-    table = folder / "a walk é.notes.csv"
-    for t in (7, 9):
-        LabelFile(table, frozenset({""})).change([[(None, taxel.Note("heel ł", t))]])
-    assert [(row.text, row.t) for row in taxel.Labels(table).rows] == [("heel ł", 7), ("heel ł", 9)]
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"], ids=["LF", "CRLF"])

@@ -169,7 +169,9 @@ def test_a_request_that_takes_long_does_not_abort_a_server_that_ends(tmp_path: P
             check_end(one, "SIGINT")
 
 
-@pytest.mark.parametrize("ignored", [signal.SIGHUP, signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    "ignored", [signal.SIGHUP, *(pytest.param(one, marks=pytest.mark.slow) for one in (signal.SIGTERM, signal.SIGINT))]
+)
 def test_a_signal_that_was_ignored_at_the_start_stays_ignored(tmp_path: Path, ignored: signal.Signals) -> None:
     """As by nohup, or in the background of a shell."""
     begin = (

@@ -20,7 +20,7 @@ from refusal import refused
 
 import taxel
 from taxel import Array, Events, Frames, _core
-from taxel.encode import FA1, ChangeEvents, ContactArea, Encoder, LevelCrossing
+from taxel.encode import ChangeEvents, ContactArea, Encoder
 
 from .scenes import ARRAY, at_times, ended, frames_of, rest, spikes_of, touch, wander
 
@@ -385,9 +385,3 @@ def test_what_cannot_be_encoded_is_refused(encoder):
     refuses(Frames(np.full((1, 3, 4), np.nan), [0], array=ARRAY))
     refuses(Events([2**62], [0], [0], [1], array=ARRAY, intensity=[5]))
     refuses(Frames(np.zeros((1, 3, 4)), [-(2**62)], array=ARRAY))
-
-
-def test_readable_names():
-    assert repr(LevelCrossing([5.0], hold_ms=10)) == "LevelCrossing(levels=[5.0], hold_ms=10)"
-    assert repr(FA1()) == "FA1()"
-    assert repr(ENCODERS["area"]) == "ContactArea(levels=[1, 2, 4, 8], tare=Tare(12 of 12 taxels, 0 to 1000 us))"

@@ -165,22 +165,6 @@ def test_quantities_are_those_of_numpy(seed, shape, noise, floor, least, rest_is
     assert (found <= most + 1e-4 * (1 + np.abs(most))).all()
 
 
-def test_names_and_their_order():
-    names = LocalLoad(local_ms=(50, 300)).quantities
-    assert len(names) == len(set(names)) == 57
-    assert names[:4] == ("area", "largest", "places", "total")
-    assert names[4:10] == tuple(
-        f"{name}, 50 ms" for name in ("area", "largest", "largest below", "area below", "total", "total below")
-    )
-    assert names[16] == "area, mean of 0 to 3 ms ago"
-    assert names[32] == "area, mean of 2 to 10 ms ago"
-    assert names[48:] == (
-        *(f"{name}, mean of 0 to 10 ms ago" for name in names[:4]),
-        *(f"{name}, mean of 0 to 50 ms ago" for name in names[:4]),
-        "clock",
-    )
-
-
 def test_spikes_are_the_logarithm_of_the_quantities():
     events = touch(np.random.default_rng(3), scenes.ARRAY, repaired=0.1)
     for encoder in GRADED.values():
@@ -265,18 +249,6 @@ def test_each_of_nine_neighbours_that_are_touched_adds_1(touched):
     for k in range(touched):
         readings[1, 3 + k // 3, 4 + k % 3] += 10 + k
     assert largest(readings).tolist() == [0, pytest.approx(touched)]
-
-
-def test_a_drift_of_a_tick_a_minute_is_followed_and_a_touch_is_not():
-    seconds = 600
-    drift = STILL + np.arange(seconds * 10)[:, None, None] / 600  # 10 frames a second, 1 tick a minute
-    assert largest(drift, 100_000)[-1] < 0.2
-    assert largest(drift, 100_000, rest="tare")[-1] > 8
-    touched = drift.copy()
-    touched[-20:, 2:5, 3:6] += 40
-    felt = largest(touched, 100_000)
-    assert felt[-21] < 0.2
-    assert (felt[-20:] > 8).all()
 
 
 def test_a_taxel_without_a_value_yet_does_not_hide_a_touch_beside_it():

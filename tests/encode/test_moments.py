@@ -152,14 +152,6 @@ def test_moments_of_events_are_sampled_every_period_from_the_first_stamp_on():
     assert (unsigned.kind, list(map(len, unsigned))) == ("unsigned", [2, 2])
 
 
-def test_the_options_are_off_by_default_and_leave_json_as_it_was():
-    plain = Moments(tare=rest(ARRAY))
-    assert not {"graded", "ages_ms"} & json.loads(plain.to_json()).keys()
-    assert taxel.encode.Encoder.from_json(plain.to_json()) == plain
-    both = Moments(graded=True, ages_ms=[1.0, 2.0], tare=rest(ARRAY))
-    assert taxel.encode.Encoder.from_json(both.to_json()) == both
-
-
 def bump(x, y, height=60.0, shape=(16, 24)):
     """A round touch above a rest of 50, in whole ticks, so that sums have no rounding."""
     rows, columns = np.mgrid[: shape[0], : shape[1]]
@@ -227,12 +219,6 @@ def test_a_tonic_train_speaks_as_long_as_its_level_is_reached():
     spikes = felt([STILL, *[bump(8, 8)] * 4, STILL, STILL], Moments(levels=1, area=(2, 3), total=None, peak=None,
                   displacement_mm=None, tonic_ms=0.5))  # fmt: skip
     assert [s.tolist() for s in spikes] == [[1.0], [5.0], (np.arange(8) / 2 + 1).tolist()]
-
-
-def test_it_begins_settled():
-    spikes = felt([bump(8, 8), bump(8, 8), STILL], Moments(levels=1, area=(2, 3), total=None, peak=None,
-                  displacement_mm=None, tonic_ms=None))  # fmt: skip
-    assert [s.tolist() for s in spikes] == [[], [2.0]]
 
 
 def test_without_a_tare_nothing_is_encoded():

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import taxel
-from taxel.encode import FA1, ChangeEvents
+from taxel.encode import ChangeEvents
 from taxel.information import LabelledTrial, answer
 from taxel.information.rasters import event_grams, features
-from taxel.information.sampling import HeldValues, SampledEvents, contacts, finest_us, spikes_of
+from taxel.information.sampling import HeldValues, SampledEvents, contacts, spikes_of
 from taxel.information.wire_rate import kilobits_per_second
 
 from .touches import ordered
@@ -49,11 +49,6 @@ def test_held_values_are_those_of_the_frames_that_events_make(rows, data):
             if when <= at:
                 expected[column] = value
         assert np.array_equal(found[k], expected)
-
-
-def test_events_without_values_count_as_steps():
-    events = taxel.Events([0, 5, 5, 9], [0, 0, 1, 0], [0] * 4, [True, True, False, False], array=taxel.Array(1, 2))
-    assert HeldValues(events).at(np.array([0, 5, 9])).tolist() == [[1, 0], [2, -1], [1, -1]]
 
 
 def test_many_events_are_held_across_kept_states():
@@ -221,29 +216,6 @@ def test_progress_counts_every_step_and_settings_are_told_as_they_are_done():
     assert {point[:2]: point[2] for point in told} == {(p.period_ms, p.window_ms): p.found.bits for p in found.points}
 
 
-def test_events_by_fa1_do_as_well():
-    found = answer(
-        trials_of(40),
-        encoder=FA1(range=200.0),
-        window_ms=20,
-        windows_ms=[20],
-        periods_ms=[1],
-        taxels=[],
-        draws=1,
-        shuffles=2,
-    )
-    assert found.full.found.bits > 0.9
-
-
-def test_recordings_show_their_own_period():
-    assert finest_us([taxel.Frames(np.zeros((4, 1, 1)), [0, 2000, 4000, 8000])]) == 2000
-    stamps = [
-        taxel.Events(t, [0] * len(t), [0] * len(t), [True] * len(t), array=taxel.Array(1, 1))
-        for t in ([200, 400, 1000], [800])
-    ]
-    assert finest_us(stamps) == 200
-
-
 def pulsed(touches):
     """Make trials of (label, group, ((ms, taxel), ...)): each taxel is touched there, for 3 ms."""
     changes, rows = [], []
@@ -292,12 +264,3 @@ def test_a_length_that_tells_as_much_is_warned_of():
         for trial in pulsed(touches)
     ]
     assert [text for text in asked(trials, taxels=[]).warnings if text.startswith("the length alone gives")]
-
-
-def test_what_is_told_plainly_bears_no_warning():
-    random = np.random.default_rng(4)
-    touches = [(f"taxel {k % 2}", "", ((0, k % 2), (random.uniform(1, 9), 7))) for k in range(130)]
-    found = asked(pulsed(touches), taxels=[])
-    assert found.full.found.bits == 1.0
-    assert found.warnings == ()
-    assert str(found.zero).endswith("0 of 19 reach the measured bits")

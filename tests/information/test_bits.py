@@ -69,12 +69,6 @@ def test_names_of_labels_and_responses_do_not_matter(rows):
     assert panzeri_treves(mixed) == pytest.approx(float(panzeri_treves(table)), abs=1e-12)
 
 
-def test_a_stack_of_tables_is_each_table():
-    tables = draws(channel(5, 0.7)[0], 20, 3, 6)
-    assert np.allclose(panzeri_treves(tables), [panzeri_treves(one) for one in tables])
-    assert np.array_equal(relevant_responses(tables), [relevant_responses(one) for one in tables])
-
-
 @pytest.mark.parametrize(
     ("classes", "trials", "right", "near", "counted", "corrected", "extrapolated"),
     [  # errors in bits, from other code and seeds: 300 labels x 500 trials once, 18 x 100 the mean of many
@@ -97,13 +91,6 @@ def test_known_channels_before_and_after_the_correction(classes, trials, right, 
     assert found["counted"] - found["extrapolated"] == pytest.approx(counted - extrapolated, abs=0.025)
     assert found["counted"] - true == pytest.approx(counted, abs=0.02 if classes == 300 else 0.06)
     assert abs(found["corrected"] - true) < 0.1
-
-
-@pytest.mark.parametrize(("classes", "trials"), [(3, 25), (4, 28), (6, 45), (10, 70)])
-@pytest.mark.parametrize("right", [0.5, 0.8, 0.95])
-def test_seven_trials_a_label_and_response_keep_the_bias_small(classes, trials, right):
-    p, true = channel(classes, right)
-    assert abs(np.mean(panzeri_treves(draws(p, trials, 5, 400))) - true) < 0.055
 
 
 def test_shuffled_tables_tell_little_after_the_correction_and_much_before_it():

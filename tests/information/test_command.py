@@ -56,16 +56,6 @@ def test_a_recording_and_its_table_give_figures_and_a_page(tmp_path):
     assert page.read_text() == text
 
 
-def test_json_holds_all_figures(tmp_path):
-    recording, labels = folder(tmp_path, 60)
-    done = run(recording, "--labels", labels, *QUICK, "--report", tmp_path / "page.html", "--json")
-    said = json.loads(done.stdout)
-    assert said["full"]["bits"] == 1.0
-    assert {(p["period_ms"], p["window_ms"]) for p in said["points"]} == {(1, 10), (1, 60), (10, 10), (10, 60)}
-    assert said["cheapest"]["kbps"] <= said["full"]["kbps"]
-    assert said["report"].endswith("page.html")
-
-
 def note(recording, labels):
     """Write notes (label, us) beside a recording."""
     beside(recording).write_text(text_with([Note(label, t, 0) for label, t in labels]))
@@ -119,14 +109,6 @@ def test_without_labels_a_recording_is_a_trial_and_its_folder_the_label(tmp_path
     said = json.loads(done.stdout)
     assert set(said["labels"]) == {"left-first", "right-first"}
     assert said["full"]["bits"] > 0.8
-
-
-def test_recordings_of_one_folder_without_labels_are_told_of_the_table(tmp_path):
-    events, _ = ordered(4)
-    taxel.convert(events, tmp_path / "touches.npz")
-    done = run(tmp_path / "touches.npz", "--window-ms", "20", "--report", tmp_path / "page.html")
-    assert done.returncode == 2
-    assert f"there is only '{tmp_path.name}'; give --labels FILE" in done.stderr
 
 
 GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
@@ -208,16 +190,6 @@ def test_what_is_wrong_is_one_clear_error(tmp_path, table, arguments, text):
     assert not page.exists()
 
 
-def test_frames_without_times_are_told_so(tmp_path):
-    for label in ("a", "b"):
-        (tmp_path / label).mkdir()
-        values = np.arange(12.0).reshape(12, 1, 1) * np.ones((1, 2, 2))
-        for k in range(12):
-            taxel.convert(taxel.Frames(values, np.arange(12)), tmp_path / label / f"{k}.npz")
-    done = run(tmp_path / "a", tmp_path / "b", "--report", tmp_path / "page.html")
-    assert "all frames are within 11 us, so they have no times" in done.stderr
-
-
 def test_a_folder_stands_for_its_recordings(tmp_path):
     events, rows = ordered(24)
     (tmp_path / "monday").mkdir()
@@ -245,16 +217,6 @@ def test_groups_are_read_and_other_columns_are_not(tmp_path):
         ("edge", 500_000, None, "tuesday"),
     ]
     assert np.array_equal(trials[0].source.t, events.t)
-
-
-def test_a_recording_that_the_table_does_not_name_is_said(tmp_path):
-    recording, labels = folder(tmp_path, 20)
-    events, _ = ordered(4)
-    taxel.convert(events, tmp_path / "forgotten.npz")
-    done = run(
-        recording, tmp_path / "forgotten.npz", "--labels", labels, "--window-ms", "20", "--report", tmp_path / "p.html"
-    )
-    assert "has no trial of" in done.stderr
 
 
 def test_numbered_frames_are_refused_until_a_rate_is_given(tmp_path):

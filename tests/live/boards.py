@@ -4,10 +4,10 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from loopback import until
 
 from taxel import Array, Events, Neuron, Readout, wire
 from taxel.encode import ChangeEvents
@@ -52,10 +52,7 @@ def play(events: Events, port: int, *, pace: float = 0.0) -> int:
 
 
 def wait_for(live: Live, decoded: int) -> None:
-    until = time.monotonic() + 30
-    while live.counters["decoded"] < decoded:
-        assert time.monotonic() < until, live.counters
-        time.sleep(0.002)
+    until(lambda: live.counters["decoded"] >= decoded)
 
 
 def command(*arguments: object) -> list[str]:
@@ -77,13 +74,6 @@ def recording(file: Path, port: int, *more: object) -> subprocess.Popen[str]:
     return subprocess.Popen(
         arguments, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-
-
-def wait_until(done: Callable[[], bool]) -> None:
-    until = time.monotonic() + 30
-    while not done():
-        assert time.monotonic() < until
-        time.sleep(0.005)
 
 
 def spikes_of(events: Events) -> list[tuple[int, int, float]]:

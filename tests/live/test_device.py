@@ -1,11 +1,9 @@
 """The board on its serial line: commands, read-back, units, faults, and a cable that is pulled."""
 
-import contextlib
 import errno
 import json
 import os
 import pty
-import re
 import socket
 import subprocess
 import sys
@@ -64,14 +62,6 @@ def test_the_floor_is_0_for_a_while_and_the_lines_stay(line: tuple[str, Board]) 
         assert (board.registers.noise_floor, board.registers.lines) == (3, 64)
 
 
-def test_a_line_without_a_board_is_said() -> None:
-    ours, theirs = pty.openpty()
-    with Cable(os.ttyname(theirs), timeout=0.05) as cable, pytest.raises(DeviceError, match="no answer within"):
-        cable.read(5)
-    os.close(ours)
-    os.close(theirs)
-
-
 def test_a_port_that_another_program_has_opened_is_refused() -> None:
     ours, theirs = pty.openpty()
     place = os.ttyname(theirs)
@@ -84,49 +74,6 @@ def test_a_port_that_another_program_has_opened_is_refused() -> None:
     Cable(place).close()
     os.close(ours)
     os.close(theirs)
-
-
-@pytest.mark.parametrize(
-    ("answer", "why"),
-    [
-        (b"\xfe\x80\0\x1c" * 300, "bytes arrived that are not text: is the board's baud rate 9600?"),
-        (b"x" * 3000, "is this the board's serial line?"),
-        (b"ok REG4=0x0000008C", "is this the board's serial line?"),
-        (b"ok REG5=0x0000008C\nok REG4=8C\nbad REG5 rule 1\n", "is this the board's serial line?"),
-    ],
-)
-def test_garbage_and_a_line_without_an_end_are_no_answer(answer: bytes, why: str) -> None:
-    ours, theirs = pty.openpty()
-
-    def garble() -> None:
-        with contextlib.suppress(OSError):
-            while os.read(ours, 5):
-                os.write(ours, answer)
-
-    threading.Thread(target=garble, daemon=True).start()
-    with (
-        Cable(os.ttyname(theirs), baud=9600, timeout=1) as cable,
-        pytest.raises(DeviceError, match=re.escape(why)),
-    ):
-        cable.command(Command(4, 140))
-    os.close(theirs)
-
-
-def test_a_cable_that_is_pulled_while_an_answer_is_awaited_is_an_error() -> None:
-    ours, theirs = pty.openpty()
-
-    def pull() -> None:
-        os.read(ours, 5)
-        os.close(theirs)
-        os.close(ours)
-
-    threading.Thread(target=pull, daemon=True).start()
-    cable = Cable(os.ttyname(theirs), timeout=30)
-    with pytest.raises(OSError, match="the line was disconnected"):
-        cable.read(4)
-    cable.close()
-    with pytest.raises(DeviceError, match="the line is closed"):
-        cable.listen()
 
 
 def test_the_board_says_what_it_is_when_it_is_asked(line: tuple[str, Board]) -> None:

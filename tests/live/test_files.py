@@ -5,13 +5,13 @@ import time
 from pathlib import Path
 
 import pytest
-from loopback import free_port
+from loopback import free_port, until
 from shell import run
 
 import taxel
 from taxel.live import Live
 
-from .boards import LOOPBACK, SMALL, listening, play, presses, recording, wait_for, wait_until
+from .boards import LOOPBACK, SMALL, listening, play, presses, recording, wait_for
 
 
 @pytest.mark.parametrize("name", ["full.mcap", "full.lsa"])
@@ -66,7 +66,7 @@ def test_a_second_recorder_does_not_take_the_file_of_a_running_one(tmp_path: Pat
         listening(first)
         if not later:
             play(presses(2), port)
-            wait_until(lambda: file.stat().st_size > 0)
+            until(lambda: file.stat().st_size > 0)
         done = run("record", file, "--host", LOOPBACK, "--port", free_port(), "--overwrite", "--seconds", 0.1)
         said = "is being recorded by another program; end that first, or name another file"
         assert (done.returncode, done.stderr) == (3, f"taxel: {file}: {said}\n")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loopback import until
 
 import taxel
 from taxel import Array, Detection, Events, Neuron, ProblemError, Readout, Tare, wire
@@ -192,11 +193,7 @@ def test_a_tare_is_taken_and_can_be_kept() -> None:
     with Live(0, host=LOOPBACK, array=SMALL, readout=readout, tare=0.05) as live:
         assert live.tare is None
         wait_for(live, play(rest, live.address[1]))
-        until = time.monotonic() + 30
-        while live.tare is None:
-            assert time.monotonic() < until
-            time.sleep(0.01)
-        tare = live.tare
+        tare = until(lambda: live.tare)
     np.testing.assert_array_equal(tare.rest, np.full((4, 4), 40.0))
     assert (tare.start_us, tare.stop_us) == (0, 50_000)
 
@@ -210,10 +207,7 @@ def test_a_readout_that_needs_a_tare_and_has_none_is_refused() -> None:
 def test_the_frame_shows_what_the_taxels_hold() -> None:
     with Live(0, host=LOOPBACK, array=SMALL) as live:
         play(presses(1), live.address[1])
-        until = time.monotonic() + 30
-        while live.frame[2, 1] == 0:
-            assert time.monotonic() < until
-            time.sleep(0.01)
+        until(lambda: live.frame[2, 1] != 0)
         assert np.count_nonzero(live.frame) == 1
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import socket
-import time
 
 import numpy as np
 from loopback import free_port
@@ -21,13 +20,10 @@ def test_what_does_not_arrive_is_said_and_ctrl_c_ends_it(tmp_path):
     words = ("live", "--readout", "rule.json", "--port", str(port), "--host", "127.0.0.1", "--preset", "5.2 kHz")
     with running(*words, folder=tmp_path) as server:
         server.wait_for(r"(listening on)")
-        begun = time.monotonic()
         assert str(port) in server.wait_for(r"nothing has arrived on (\S+ \S+)")
-        assert time.monotonic() - begun < 30
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
             board.sendto(word(1000, 3, 4, 60), ("127.0.0.1", port))
         server.wait_for(r"(datagrams arrive)")
         assert float(server.wait_for(r"quiet: nothing for ([\d.]+) s")) >= 1
-        begun = time.monotonic()
+        # Ctrl-C ends it; else this raises.
         server.end()
-        assert time.monotonic() - begun < 10

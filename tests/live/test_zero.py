@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loopback import until
 
 import taxel
 from taxel import Array, Events, Neuron, ProblemError, Readout, Tare, Zeroing, wire
@@ -29,14 +30,8 @@ class Board:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
             link.sendto(wire.encode(events), self.live.address)
         self.said += 2
-        self.until(lambda: self.live.counters["read_out"] == self.said)
+        until(lambda: self.live.counters["read_out"] == self.said)
         time.sleep(0.02)
-
-    def until(self, what) -> None:
-        until = time.monotonic() + 30
-        while not what():
-            assert time.monotonic() < until, self.live.counters
-            time.sleep(0.005)
 
 
 def readout() -> Readout:
@@ -45,10 +40,7 @@ def readout() -> Readout:
 
 
 def heard(live: Live) -> None:
-    until = time.monotonic() + 30
-    while live.counters["events"] < 1:
-        assert time.monotonic() < until, live.counters
-        time.sleep(0.005)
+    until(lambda: live.counters["events"] > 0)
 
 
 @pytest.fixture
@@ -64,12 +56,12 @@ def test_what_is_zeroed_is_heard_anew_live_and_from_the_recording(tmp_path: Path
         board = Board(live)
         board.say(REST)
         board.say(REST + 10)
-        board.until(lambda: live.counters["detections"] == 1)
+        until(lambda: live.counters["detections"] == 1)
         done = live.zero([1, 2], [2, 2])
         assert [(z.x, z.y, z.rest, z.before) for z in done] == [(1, 2, 60.0, 50.0), (2, 2, 60.0, 50.0)]
         board.say(REST + 12)
         board.say(REST + 30)
-        board.until(lambda: live.counters["detections"] == 2)
+        until(lambda: live.counters["detections"] == 2)
         again = live.zero(1, 2)
         assert (again[0].rest, again[0].before) == (80.0, 60.0)
         assert live.zeroed == (again[0], done[1])

@@ -10,7 +10,6 @@ import pytest
 from drawing import STOP, times
 from hypothesis import given
 from hypothesis import strategies as st
-from refusal import refused
 
 from taxel.metrics import van_rossum
 
@@ -83,27 +82,3 @@ def test_near_trains_lose_no_digits():
     b[100] += 1e-12
     moved = b[100] - a[100]
     assert van_rossum(a, b, tau=10.0) == pytest.approx(math.sqrt(2 * moved / 10.0), rel=1e-6)
-
-
-def test_one_spike_more_is_what_the_normalisation_says():
-    for normalisation, expected in (("spike", 1.0), ("tau", math.sqrt(0.5)), ("none", math.sqrt(4.0))):
-        assert van_rossum([1.0, 50.0], [50.0], tau=8.0, normalisation=normalisation) == pytest.approx(
-            expected, abs=1e-2
-        )
-        assert van_rossum([3.0], [], tau=8.0, normalisation=normalisation) == pytest.approx(expected, rel=1e-15)
-
-
-def test_parameters_that_make_no_sense_are_one_clear_error_each():
-    for parameters, argument in (
-        ({"tau": 0.0}, "tau"),
-        ({"tau": -1.0}, "tau"),
-        ({"tau": math.nan}, "tau"),
-        (
-            {"tau": 1.0, "normalisation": "max"},
-            "normalisation",
-        ),
-    ):
-        with refused(argument=argument):
-            van_rossum([1.0], [2.0], **parameters)
-    with refused():
-        van_rossum([], [2.0, 1.0], tau=1.0)

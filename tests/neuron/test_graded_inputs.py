@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_neuron import Plain
+from plain_neuron import Plain
 
 from taxel import Neuron, SpikeTrains
 

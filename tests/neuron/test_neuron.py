@@ -7,8 +7,8 @@ import pytest
 from draws import mixed
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plain_neuron import Plain
 from refusal import refused
-from scipy.optimize import brentq
 
 from taxel import Neuron, SpikeTrains
 
@@ -18,84 +18,6 @@ def random_trains(seed, trains=20, duration=150.0, whole_ms=False):
     times = [np.sort(random.uniform(0, duration, random.integers(0, 6))) for _ in range(trains)]
     times = [t.round() if whole_ms else t for t in times]
     return random.uniform(-0.1, 0.4, trains), SpikeTrains.from_lists(times, stop=duration + 30)
-
-
-class Plain:
-    """6.4 to 6.8 as they stand, one kernel at a time."""
-
-    def __init__(self, neuron, weights, trains):
-        self.n = neuron
-        pairs = sorted((s, n) for n, train in enumerate(trains) for s in train)
-        self.s = np.array([s for s, _ in pairs])
-        self.w = np.array([weights[n] for _, n in pairs])
-        self.start = trains.start
-
-    def potential(self, t, spikes):
-        d, alive = t - self.s, self.s < t
-        for spike in spikes:
-            end = spike + self.n.refractory
-            if self.n.after_spike == "reset":
-                alive &= self.s > end
-            if self.n.after_spike == "ignore":
-                alive &= ~((spike < self.s) & (self.s <= end))
-        d = d[alive]
-        return float((self.w[alive] * self.kernel(d)).sum())
-
-    def kernel(self, d):
-        tau = self.n.tau
-        if self.n.kernel == "alpha":
-            return d / tau * np.exp(-d / tau)
-        if self.n.kernel == "exponential":
-            return np.exp(-d / tau)
-        tau_s = tau / 4 if self.n.tau_s is None else self.n.tau_s
-        peak = tau * tau_s / (tau - tau_s) * np.log(tau / tau_s)
-        value = np.exp(-d / tau) - np.exp(-d / tau_s)
-        return value / (np.exp(-peak / tau) - np.exp(-peak / tau_s))
-
-    def threshold(self, t, spikes):
-        spike = spikes[-1] if spikes else (self.start if self.n.first_threshold == "printed" else -np.inf)
-        since = t - spike - self.n.refractory
-        rec = 2 * self.n.tau if self.n.tau_rec is None else self.n.tau_rec
-        return self.n.theta_0 + (self.n.theta_plus * np.exp(-since / rec) if since >= -1e-9 else 0.0)
-
-    def above(self, t, spikes):
-        return self.potential(t, spikes) - self.threshold(t, spikes)
-
-    def run_grid(self, stop, step):
-        spikes = []
-        for k in range(int((stop - self.start) / step + 1e-9) + 1):
-            t = self.start + k * step
-            if spikes and t <= spikes[-1] + self.n.refractory + 1e-9:
-                continue
-            if self.above(t, spikes) >= 0:
-                spikes.append(t)
-        return spikes
-
-    def run_continuous(self, stop):
-        """Steps of 0.05 ms between all instants at which something changes; each crossing by Brent's method."""
-        spikes, t = [], self.start
-        while t < stop:
-            marks = {*self.s[self.s > t], stop}
-            if self.n.first_threshold == "printed" and not spikes:
-                marks.add(self.start + self.n.refractory)
-            marks = np.array(sorted(m for m in marks if m > t))
-            points = np.unique(np.concatenate([marks, np.arange(t, stop, 0.05)[1:]]))
-            before = t
-            for point in points:
-                if self.above(point, spikes) >= 0:
-                    at = before
-                    if self.above(before, spikes) < 0:
-                        at = brentq(lambda x: self.above(x, spikes), before, point, xtol=1e-13)
-                    spikes.append(float(at))
-                    break
-                before = point
-            else:
-                return spikes
-            t = spikes[-1] + self.n.refractory
-            while t < stop and self.above(t, spikes) >= 0:
-                spikes.append(t)
-                t += self.n.refractory
-        return spikes
 
 
 KINDS = [
@@ -158,12 +80,6 @@ def test_the_exponential_kernel_is_refused_in_continuous_time():
         Neuron(kernel="exponential")
 
 
-@pytest.mark.parametrize("tau_s", [7.0, 8.0, 0.0, -1.0])
-def test_a_synaptic_time_constant_out_of_range_is_refused(tau_s):
-    with refused(argument="tau_s"):
-        Neuron(kernel="double_exponential", tau=7.0, tau_s=tau_s)
-
-
 @pytest.mark.parametrize("after_spike", ["keep", "ignore", "reset"])
 def test_the_potential_with_given_spikes_is_6_7(after_spike):
     neuron = Neuron(tau=7.0, after_spike=after_spike)
@@ -176,23 +92,6 @@ def test_the_potential_with_given_spikes_is_6_7(after_spike):
         masked = earlier and t <= earlier[-1] + neuron.refractory
         expected.append(0.0 if masked else plain.potential(t, earlier))
     assert neuron.potential(weights, trains, times, spikes=spikes) == pytest.approx(expected, abs=1e-13)
-
-
-def test_the_potential_without_spikes_is_the_sum_of_kernels():
-    neuron = Neuron(tau=7.0)
-    weights, trains = random_trains(21)
-    times = np.linspace(0, 180, 1000)
-    plain = Plain(neuron, weights, trains)
-    expected = [plain.potential(t, []) for t in times]
-    assert neuron.potential(weights, trains, times) == pytest.approx(expected, abs=1e-13)
-
-
-def test_one_input_peaks_one_tau_later_at_its_weight_over_e():
-    neuron, trains = Neuron(tau=12.0), SpikeTrains.from_lists([[3.0]], stop=60.0)
-    assert neuron.potential([2.0], trains, [15.0])[0] == pytest.approx(2 / np.e, rel=1e-14)
-    weight = 0.3 * np.e
-    assert neuron.run([weight * (1 + 1e-9)], trains)[0] == pytest.approx(15.0, abs=1e-3)
-    assert len(neuron.run([weight * (1 - 1e-9)], trains)) == 0
 
 
 def test_a_finer_grid_comes_to_the_exact_crossings():
@@ -236,24 +135,11 @@ def test_weights_and_thresholds_scaled_alike_fire_alike(seed, factor):
     assert scaled[:3] == pytest.approx(one[:3], abs=1e-6)
 
 
-def test_spikes_keep_the_refractory_time():
-    weights, trains = random_trains(40, trains=60)
-    for time in ("continuous", "grid"):
-        fired = Neuron(tau=7.0, refractory=4.0, time=time).run(weights, trains)
-        assert len(fired) > 5
-        assert np.diff(fired).min() >= 4.0 - 1e-9
-
-
 def test_keep_fires_again_at_once_while_the_potential_stays_above_the_threshold():
     trains = SpikeTrains.from_lists([[0.0]], stop=30.0)
     fired = Neuron(tau=10.0, theta_plus=0.0).run([3.0], trains)
     assert np.diff(fired[:5]) == pytest.approx([3.0] * 4, abs=1e-12)
     assert len(Neuron(tau=10.0, theta_plus=0.0, after_spike="reset").run([3.0], trains)) == 1
-
-
-def test_neurons_compare_and_print_by_their_parameters():
-    assert Neuron(tau=10.0) == Neuron(tau=10.0) != Neuron(tau=11.0)
-    assert repr(Neuron(tau=10.0, after_spike="reset")) == "Neuron(tau=10.0, after_spike='reset')"
 
 
 @pytest.mark.parametrize("time", ["grid", "continuous"])

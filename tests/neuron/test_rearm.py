@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-import warnings
 
 import numpy as np
 import pytest
@@ -17,7 +15,6 @@ from taxel import Neuron, SpikeTrains
 from taxel.detect import Readout, run
 from taxel.encode import LevelCrossing
 from taxel.learn import ConeR, ConeX, OnlineConeR
-from taxel.learn.cone_r import _warn
 
 #: A potential this far below a level counts as at it, in thresholds.
 AT = 1e-11
@@ -111,19 +108,6 @@ def test_a_potential_that_just_reaches_the_share_is_not_below_it() -> None:
         assert neuron.set_params(rearm=rearm).run([1.0], trains).tolist() == fired
 
 
-def test_an_object_that_rests_is_one_spike_and_a_factor_on_the_threshold_moves_the_share() -> None:
-    rest = SpikeTrains.from_lists([np.arange(0.0, 400.0, 2.0)], 0.0, 900.0)
-    neuron = Neuron(time="grid", tau=10.0, rearm=0.5)
-    assert len(Neuron(time="grid", tau=10.0).run([0.1], rest)) > 20
-    assert len(neuron.run([0.1], rest)) == len(neuron.run([0.1], rest, threshold=0.5)) == 1
-    # Two rates: between them the potential rests at about .26 mV, which is below half of .6 but not of .3 mV.
-    two = SpikeTrains.from_lists(
-        [np.concatenate([np.arange(0, 200, 1.0), np.arange(200, 400, 4.0), np.arange(400, 600)])]
-    )
-    assert len(neuron.run([0.1], two, threshold=2.0)) == 2
-    assert len(neuron.run([0.1], two)) == 1
-
-
 def readout() -> Readout:
     weights = np.random.default_rng(2).normal(0.1, 0.4, 32)
     one = Neuron(tau=3.0, refractory=5.0, time="grid", step_ms=0.2, rearm=0.4)
@@ -187,12 +171,6 @@ def test_training_keeps_its_rows_and_the_trained_neuron_runs_with_it() -> None:
     assert free.refires_ > 0
 
 
-@pytest.mark.parametrize("rearm", [0.0, -0.5, 1.0001, float("nan"), float("inf"), "half", [0.5]])
-def test_a_share_outside_its_range_is_refused(rearm: object) -> None:
-    with refused(argument="rearm"):
-        Neuron(time="grid", rearm=rearm)
-
-
 def test_who_cannot_have_it_refuses_it_by_name(tmp_path) -> None:
     with refused(argument="rearm"):
         Neuron(rearm=0.5)
@@ -202,25 +180,3 @@ def test_who_cannot_have_it_refuses_it_by_name(tmp_path) -> None:
     with refused():
         readout().to_nir(tmp_path / "one.nir")
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    ("after_spike", "said"),
-    [
-        ("keep", 'to prevent this, use after_spike "reset", a refractory above 3 ms or a theta_plus above 0.2 mV'),
-        (
-            "reset",
-            "without a target between; to prevent this, use a refractory above 3 ms or a theta_plus above 0.2 mV",
-        ),
-    ],
-)
-def test_the_warning_of_repeated_spikes_names_what_is_not_set(after_spike: str, said: str) -> None:
-    trains = SpikeTrains.from_lists([[20.0 + n] for n in range(20)], stop=150.0)
-    neuron = Neuron(tau=30.0, theta_plus=0.2, refractory=3.0, after_spike=after_spike)
-    cone = ConeR(neuron=neuron, lambdas=(0, 1, 0, 1000, 0))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        cone.fit([trains], [[45.0]])
-    cone.refires_ = 3
-    with pytest.warns(UserWarning, match=re.escape(said)):
-        _warn(cone)

@@ -72,20 +72,6 @@ def test_what_a_host_holds_is_within_the_floor_and_steps_are_no_larger():
     assert (np.abs(decoder.held.ravel() - walk[-1].astype(int)) <= 4).all()
 
 
-def test_a_fault_moves_nothing_and_a_reset_forgets():
-    array = taxel.Array(2, 2)
-    registers = Registers(array=array, wire_version=2)
-    board = Board(registers, array, asynchronous=True, version_2=Version2(states_us=0))
-    still = np.full((2, 4), 50, np.uint16)
-    first = heard(board, np.vstack([still, np.full((2, 4), taxel.simulate.NOT_RETURNED, np.uint16), still, still]))
-    assert len(first) == 4
-    assert board.counts["not_returned"] == 8
-    board.reset()
-    board.command(taxel.wire.Command(0, Registers(array=array, wire_version=2).words[0]).to_bytes())
-    again = heard(board, np.vstack([still, still]))
-    assert again.intensity.tolist() == [50] * 4
-
-
 def test_a_slow_press_is_told_between_the_frames_of_a_scan():
     """Taxels that rise by a tick each 2 ms: whole frames when scanned, their own times when not."""
     slope_us, frames = 2000.0, 1000

@@ -11,10 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import mixed
-from refusal import refused
 
-from taxel import Array, SceneError
-from taxel._base.errors import Place
+from taxel import Array
 from taxel.simulate import Layer, Scene, SceneFile, Silence, play, truth
 
 ROOT = Path(__file__).parents[2]
@@ -169,15 +167,6 @@ def test_wide_bodies_of_every_kind_do_on_finer_cells_what_they_do_on_taxels(moti
     assert np.abs(counts[0] - counts[1]).sum() < 0.2 * counts[0].sum()
 
 
-def test_the_page_and_drawn_scenes_are_wide_enough(tmp_path):
-    page = (ROOT / "docs" / "scenes.md").read_text()
-    (tmp_path / "scene.toml").write_text(re.findall(r"```toml\n(.*?)```", page, re.S)[0])
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        SceneFile.open(tmp_path / "scene.toml")
-        Scene.draw(1).replace(surface="layer").motion()
-
-
 NARROW = """
 cells_per_pitch = 1
 [[bodies]]
@@ -213,29 +202,3 @@ def test_a_scene_whose_cells_are_too_few_says_so_once(tmp_path):
     place.write_text(narrow.replace("cells_per_pitch = 1", "cells_per_pitch = 4"))
     done = subprocess.run([*run, "simulate", str(place)], capture_output=True, text=True, check=True)
     assert done.stderr.strip() == ""
-
-
-@pytest.mark.parametrize(
-    "cells",
-    [
-        "0",
-        "17",
-        "2.5",
-        "-1",
-        '2\nsurface = "columns"',
-        "16\narray = { rows = 256, columns = 256 }",
-    ],
-)
-def test_cells_that_make_no_sense_get_one_line_with_the_place(tmp_path, cells):
-    place = tmp_path / "scene.toml"
-    place.write_text(NARROW.replace("cells_per_pitch = 1", f"cells_per_pitch = {cells}"))
-    with refused(SceneError, place=Place("scene.toml")):
-        SceneFile.open(place)
-
-
-def test_a_layer_refuses_cells_and_frames_that_do_not_fit():
-    for cells in (0, 17, 1.5, "two"):
-        with refused(argument="cells_per_pitch"):
-            Layer(cells_per_pitch=cells)
-    with refused(argument="sunk_mm"):
-        Layer(None, SMALL, cells_per_pitch=3).press(np.zeros((14, 14)))

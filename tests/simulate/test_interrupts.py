@@ -78,7 +78,7 @@ def test_ctrl_c_ends_a_long_call(name: str) -> None:
                 child.wait(0.7)  # still in the call
             child.send_signal(signal.SIGINT)
             # Half a second on a quiet machine; a call that never checks would continue for minutes.
-            assert child.wait(20) == 0
+            assert child.wait(60) == 0
             assert child.stdout.read() == "interrupted\n"
         finally:
             child.kill()

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused
 from scipy.linalg import expm
 
-from taxel import Array, ProblemError, SceneError
+from taxel import Array
 from taxel.simulate import Layer
 
 #: Foam that is linear however far it is pressed here.
@@ -174,20 +173,3 @@ def test_a_footprint_of_many_taxels_is_solved_as_one_of_few():
     # The exponent of a layer lies between Hertz' 1.5 and the columns' 2, and does not jump.
     assert np.all((steps > 1.5) & (steps < 2.05))
     assert np.abs(np.diff(steps)).max() < 0.04
-
-
-@pytest.mark.parametrize(
-    ("wrong", "error", "argument"),
-    [
-        (lambda: Layer({"poisson": 0.5}), SceneError, None),
-        (lambda: Layer({"colour": 1.0}), SceneError, None),
-        (lambda: Layer("soft"), ProblemError, "foam"),
-        (lambda: Layer(tolerance=0), ProblemError, "tolerance"),
-        (lambda: Layer().press(np.zeros((3, 3))), ProblemError, "sunk_mm"),
-        (lambda: Layer().press(np.full((64, 64), np.nan)), ProblemError, "sunk_mm"),
-        (lambda: Layer().compliance([-1.0]), ProblemError, "waves"),
-    ],
-)
-def test_nonsense_gets_one_clear_line(wrong, error, argument):
-    with refused(error, argument):
-        wrong()

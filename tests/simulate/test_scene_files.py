@@ -57,20 +57,6 @@ def test_every_key_of_the_page_is_known_and_every_key_is_on_the_page():
         assert name in page, name
 
 
-def test_two_bodies_far_apart_do_what_each_does_alone():
-    one = Scene.draw(3).replace(surface="layer", lead_ms=0.0).body(x_mm=50.0, y_mm=50.0)
-    other = Scene.draw(4).replace(surface="layer", lead_ms=0.0).body(x_mm=120.0, y_mm=120.0)
-    foam = one.parameters["foam"]
-    both = one.replace(bodies=[*one.parameters["bodies"], *other.replace(foam=foam).parameters["bodies"]])
-    starts = sorted(c.start_us for scene in (one, other.replace(foam=foam)) for c in scene.motion().contacts)
-    assert [c.start_us for c in both.motion().contacts] == starts
-    quiet = {"noise_ticks": 0.0, "gain_spread": 0.0, "offset_mv": 0.0}
-    alone, together = (play([Silence(100.0), s], seed=1, sensor=quiet).events for s in (one, both))
-    left = [e.x.astype(int) + e.y < 50 for e in (alone, together)]
-    assert left[0].sum() > 1000
-    assert abs(left[0].sum() - left[1].sum()) < 0.01 * left[0].sum()
-
-
 def test_bodies_side_by_side_share_the_foam():
     """Two blocks edge to edge press as one twice as wide, under the same depth: the joint has no rim."""
 

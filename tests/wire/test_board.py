@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused
 
 import taxel
 from taxel import wire
 from taxel.simulate import NOT_RETURNED, Board
-from taxel.wire import Command, Registers
+from taxel.wire import Registers
 
 from . import oracle
 
@@ -85,31 +84,3 @@ def test_registers_are_taken_over_at_a_frames_edge():
     assert board.time_us == 0
     board.frame(np.zeros(4096, np.uint16))
     assert board.time_us == pytest.approx(499.84)
-
-
-def test_read_back_and_damage_on_the_serial_line():
-    board = Board()
-    assert board.greeting == "taxel-board v1 64x64 16ch\n"
-    good = Command(6, 3).to_bytes()
-    assert board.command(b"\x01" + good[:2] + good) == "ok REG3=0x0037004B\n"
-    assert (board.faults(), board.faults()) == ("fault command 3\n", "")
-
-
-@pytest.mark.parametrize(
-    ("call", "argument"),
-    [
-        (lambda: Board().frame(np.zeros(7, np.uint16)), None),
-        (lambda: Board().frame(np.full(4096, -1)), "ticks"),
-        (lambda: Board(array=taxel.Array(257, 256)), None),
-        (lambda: Board(previous="mean"), "previous"),
-        (lambda: Board(queue=-1), "queue"),
-    ],
-)
-def test_nonsense_is_refused_in_one_line(call, argument):
-    with refused(argument=argument):
-        call()
-
-
-def test_a_preset_for_more_lines_than_the_array_has_is_refused():
-    with refused(taxel.DeviceError, argument="lines"):
-        Board(Registers.preset("5.2 kHz"), taxel.Array(8, 8))

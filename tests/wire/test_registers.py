@@ -3,11 +3,9 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from refusal import refused
 
 import taxel
 from taxel import wire
-from taxel._base.errors import Place
 from taxel.wire import Command, Registers
 
 #: The reference's table: row_change, row_read, col_change, col_read, ramp_time, nrows, frames/s.
@@ -63,67 +61,3 @@ def test_writes_lead_to_the_target_and_none_is_refused_on_the_way(names, floor):
     for command in start.commands_to(target):
         assert board.command(command.to_bytes()) == f"ok REG{command.register}=0x{command.value:08X}\n"
     assert board.registers == target
-
-
-def test_a_wrong_order_is_refused_half_way():
-    board = taxel.simulate.Board(Registers.preset("5.2 kHz"))
-    slow = Registers.preset("2 kHz")
-    assert board.command(Command(4, slow.words[4]).to_bytes()) == "bad REG4 rule 3\n"
-    assert board.command(Command(3, slow.words[3]).to_bytes()) == "bad REG3 rule 2\n"
-    assert board.command(Command(2, slow.words[2]).to_bytes()) == "bad REG2 rule 1\n"
-    assert board.registers == Registers.preset("5.2 kHz")
-
-
-def test_what_is_hardly_meant_is_warned_of():
-    (settling,) = Registers(step_read=0.6).warnings
-    assert settling.endswith("(rule 5)")
-    shuffled = Registers(random_lines=True, lines=2, step_read=0.23, ramp=60)
-    assert shuffled.warnings == ()
-    (settling,) = shuffled.replace(step_read=0.24).warnings
-    assert settling.endswith("(rule 5)")
-    (floor,) = Registers(noise_floor=150).warnings
-    assert floor.endswith("(rule 6)")
-
-
-def test_the_manuals_names_are_aliases_in_its_own_units():
-    assert Registers(row_change_period=400, nrows=31) == Registers(line_period=4.0, lines=32)
-
-
-@pytest.mark.parametrize(
-    ("call", "argument"),
-    [
-        (lambda: Registers(speed=1), "speed"),
-        (lambda: Registers(line_period=3.001), "line_period"),
-        (lambda: Registers(line_period=float("nan")), "line_period"),
-        (lambda: Registers(ramp=1.5), "ramp"),
-        (lambda: Registers(ramp=-1), "ramp"),
-        (lambda: Registers(nrows=0.5), "nrows"),
-        (lambda: Registers.preset("fast"), "preset"),
-        (
-            lambda: Registers().with_preset("128 x 128, 1 kHz"),
-            "preset",
-        ),
-        (
-            lambda: Registers(array=taxel.Array(128, 128)).with_preset("2 kHz"),
-            "preset",
-        ),
-        (lambda: Command(8, 0), "register"),
-        (lambda: Command(0, -1), "value"),
-        (lambda: Command(0, 2**32), "value"),
-    ],
-)
-def test_nonsense_is_refused_in_one_line(call, argument):
-    with refused(argument=argument):
-        call()
-
-
-def test_bytes_that_are_no_command_are_refused_by_place():
-    with refused(taxel.FormatError):
-        Command.from_bytes(b"abcd")
-    with refused(taxel.FormatError, place=Place(byte=0)):
-        Command.from_bytes(b"abcde")
-
-
-def test_boards_with_other_channels_are_not_led_to():
-    with refused(taxel.DeviceError):
-        Registers().commands_to(Registers.preset("20.8 kHz"))

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from refusal import refused
 
 import taxel
 from taxel import _core, wire
@@ -262,23 +261,6 @@ def test_the_boards_totals_close_the_sums():
     assert status.datagrams < made
     assert counts.intact + lost == made
     assert lost - 50 <= counts.missing <= lost
-
-
-def test_nonsense_is_one_line():
-    with refused(argument="data"):
-        Decoder().push("text")
-    with refused(argument="array"):
-        Decoder(array=3)
-    with refused(argument="arrived"):
-        Decoder().push(b"", arrived=1.5)
-    with refused(argument="data"):
-        StreamReader().push(3)
-    with refused(argument="version"):
-        wire.Decoder(3)
-    with refused(argument="differences"):
-        Decoder(differences=True)
-    with refused(argument="lengths"):
-        decode(b"", 2, lengths=[0])
 
 
 def test_both_versions_have_one_decoder():
