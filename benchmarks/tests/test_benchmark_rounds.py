@@ -12,8 +12,8 @@ import pytest
 from scipy.optimize import minimize
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from taxel import Array, SpikeTrains, wire
-from taxel_benchmarks import _memory, _peer, _rounds, encode, latency, learn_cone_x, wire_decode
+from taxel import SpikeTrains, wire
+from taxel_benchmarks import _memory, _peer, _rounds, encode, latency, wire_decode
 
 
 class Clock:
@@ -139,13 +139,6 @@ def test_latencies_of_rounds_are_summed_where_they_count_and_else_the_median() -
     }
 
 
-def test_a_touch_is_answered_once() -> None:
-    """The neuron of the latency does not fire again for one touch, and does for the next."""
-    neuron, weights, *_ = latency.readout(Array(8, 8))[0].neurons["contact"]
-    spikes = SpikeTrains.from_lists([[10.0, 10.0 + latency.EACH_US * 0.75e-3], []], stop=60.0)
-    assert len(neuron.run(weights, spikes)) == 2
-
-
 def test_decoding_is_compared_from_the_same_place_into_the_same_memory() -> None:
     ends = {(ours.rpartition(", ")[2], peer.rpartition(", ")[2]) for ours, peer in wire_decode.pairs().values()}
     assert ends == {("fresh", "fresh"), ("file", "EVT2")}
@@ -162,31 +155,6 @@ def test_the_c_loop_decodes_what_ours_does(tmp_path: Path) -> None:
         t, _, _, _, *intensities = wire_decode.by_loop(loop, stream, values=name == "pairs")
         assert np.array_equal(t, ours.t)
         assert name != "pairs" or np.array_equal(intensities[0], ours.intensity)
-
-
-def judged(**of_peer: Any) -> dict[str, bool]:
-    """Return the goals of a solved and an infeasible case of the memory task, with one peer in both."""
-    ours = {"verdict": "solved", "objective": 1.0}, {"verdict": "infeasible", "certificate checked": True}
-    name = next(iter(learn_cone_x.PEERS))
-    peer = {"verdict": "solved", "objective, relative difference": 1e-9} | of_peer
-    cases = {"1/1": {"ConeX": ours[0], name: peer}, "2/2": {"ConeX": ours[1], name: {"verdict": "infeasible"}}}
-    return {
-        goal.what: goal.verdict == "reached"
-        for goal in learn_cone_x.goals({"cases": cases})
-        if "times" not in goal.what
-    }
-
-
-def test_conex_must_agree_with_its_peers() -> None:
-    agree, apart = "1/1, share of peers with ConeX's verdict", "1/1, objectives differ by at most"
-    for of_peer, lacks in (
-        ({}, set()),
-        ({"verdict": "infeasible"}, {agree}),
-        ({"objective, relative difference": -1e-4}, {apart}),
-    ):
-        found = {what: reached for what, reached in judged(**of_peer).items() if what.startswith(("1/1, ", "2/2, "))}
-        assert {what for what, reached in found.items() if not reached} == lacks
-        assert found["2/2, certificate of infeasibility checked"]
 
 
 def test_a_peer_with_rows_on_demand_gets_those_that_its_solution_breaks() -> None:

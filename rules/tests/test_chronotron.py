@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from rule_examples import kernel, patterns, right_sides, summed
 
-from taxel import ProblemError
 from taxel_rules import Chronotron, _rules
 
 NEURON = {"tau": 10.0, "tau_s": 5.0, "theta_0": 15.0}
@@ -89,10 +88,3 @@ def test_i_learning_goes_by_currents_with_the_sign_of_the_weight(targets):
     assert len(fired) > 0
     expected = np.sign(weights) * right_sides(pattern, wanted, fired, current)
     assert change == pytest.approx(expected, rel=1e-9, abs=1e-12)
-
-
-def test_another_rule_is_one_clear_error():
-    with pytest.raises(ProblemError, match=r"^rule\b"):
-        Chronotron(rule="X", **GIVEN)
-    with pytest.raises(ProblemError, match="tau_q is -1 ms"):
-        Chronotron(rule="E", tau_q=-1.0, **GIVEN)

