@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from taxel_studies.commit import checkout_of, code_version
+from taxel_studies.commit import code_version
 
 #: A package that no test imports.
 NAME = "taxel_toy_code"
@@ -110,18 +110,6 @@ def test_an_installed_package_is_its_version_also_within_a_strangers_repository(
     assert repository.version() == f"{NAME} 1.2"
 
 
-def test_packages_of_one_checkout_are_one_commit_and_of_several_named_each(
-    repository: Repository, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert code_version(NAME, NAME) == code_version(NAME)
-    first = repository.version()
-    folder = tmp_path_factory.mktemp("alone")
-    monkeypatch.setattr("taxel_studies.commit.metadata.version", lambda name: "3")
-    (folder / f"{NAME}_other.py").write_text("")
-    monkeypatch.syspath_prepend(str(folder))
-    assert code_version(NAME, f"{NAME}_other") == f"{first} + {NAME}_other 3"
-
-
 def test_where_git_or_the_installation_does_not_say_nothing_is_used_again(
     repository: Repository, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -135,41 +123,3 @@ def test_where_git_or_the_installation_does_not_say_nothing_is_used_again(
     (alone / NAME / "__init__.py").write_text("")
     monkeypatch.syspath_prepend(str(alone))
     assert never_again(repository)
-
-
-def test_a_repository_without_a_commit_is_not_clean(tmp_path: Path) -> None:
-    subprocess.run(["git", "-C", tmp_path, "init", "-q"], check=True)
-    (tmp_path / "one.py").write_text("")
-    assert checkout_of(tmp_path / "one.py") is None
-    subprocess.run(["git", "-C", tmp_path, "add", "one.py"], check=True)
-    checkout = checkout_of(tmp_path / "one.py")
-    assert checkout is not None
-    assert (checkout.commit, bool(checkout.changed)) == ("unknown", True)
-
-
-def test_a_repository_runs_no_program_of_its_own(repository: Repository) -> None:
-    program = repository.root / "watch"
-    program.write_text(f"#!/bin/sh\ntouch {repository.root}/was-run\n")
-    program.chmod(0o755)
-    hook = repository.root / ".git" / "hooks" / "post-index-change"
-    hook.parent.mkdir(exist_ok=True)
-    hook.write_text(program.read_text())
-    hook.chmod(0o755)
-    repository.git("config", "core.fsmonitor", str(program))
-    repository.file.touch()
-    repository.version()
-    assert not (repository.root / "was-run").exists()
-
-
-def test_another_repository_that_the_environment_names_does_not_count(
-    repository: Repository, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    first = repository.version()
-    other = Repository(tmp_path_factory.mktemp("other"), monkeypatch)
-    other.write("python", NAME, "__init__.py", text="second\n")
-    assert other.commit() != first
-    monkeypatch.setenv("GIT_DIR", str(other.root / ".git"))
-    monkeypatch.setenv("GIT_WORK_TREE", str(other.root))
-    checkout = checkout_of(repository.file)
-    assert checkout is not None
-    assert checkout.commit == first

@@ -7,11 +7,11 @@ import sys
 import numpy as np
 import pytest
 
-from taxel import Array, ProblemError, SceneError, SpikeTrains
+from taxel import Array, ProblemError, SpikeTrains
 from taxel.metrics import pairwise
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
-from taxel_studies import dropped, drops, fig4_8, fig4_9, fig5_11, load
+from taxel_studies import dropped, drops, fig4_9, fig5_11, load
 from taxel_studies.dropped import FRAMES, REGION, TENNIS, Condition
 from taxel_studies.runner import Kept
 from taxel_studies.study import Row
@@ -49,17 +49,6 @@ def test_inner_products_give_the_distances_of_metrics(tau, sigma):
     gram = dropped.spatial_grams(spikes, PERIOD_MS, tau, [kernel], [spikes.shape[1]])[0][0]
     wanted = pairwise("van_rossum_spatial", trains, array=array, tau=tau, sigma=sigma, normalisation="none")
     np.testing.assert_allclose(dropped.distances_of(gram), wanted, atol=2e-3 * wanted.max())
-
-
-def test_an_end_leaves_out_what_comes_after_it():
-    spikes, _ = patterns()
-    kernels = [dropped.smoothed(SIDE, 2.67, sigma) for sigma in (1.0, 3.0)]
-    both = dropped.spatial_grams(spikes, PERIOD_MS, 0.7, kernels, [5, 12])
-    for kernel, (early, late) in zip(kernels, both, strict=True):
-        np.testing.assert_allclose(
-            early, dropped.spatial_grams(spikes[:, :5], PERIOD_MS, 0.7, [kernel], [5])[0][0], rtol=1e-6
-        )
-        np.testing.assert_allclose(late, dropped.spatial_grams(spikes, PERIOD_MS, 0.7, [kernel], [12])[0][0], rtol=1e-6)
 
 
 def test_absolute_differences_are_5_10_and_5_12_as_printed():
@@ -110,13 +99,6 @@ def test_drops_are_kept_and_belong_to_what_made_them(folder, fallen):
     assert not np.array_equal(other.ticks, fallen.ticks[:2])
 
 
-def test_drops_of_one_condition_differ_and_higher_ones_tell_more(folder, fallen):
-    assert len({one.tobytes() for one in fallen.ticks}) == 4
-    high = dropped.played(FEW, Condition(50.0, 200.0, 0.0), 1, folder)
-    slanted = dropped.played(FEW, Condition(50.0, 200.0, 30.0), 1, folder)
-    assert fallen.events.mean() < slanted.events.mean() < high.events.mean()
-
-
 def test_a_ball_glances_off_along_the_rows_of_a_tilted_array_and_off_a_level_one_straight_up(folder, fallen):
     """By some 13 mm, 5 taxels, in a contact of 18 ms: friction leaves five sevenths of 1 m/s."""
     slanted = dropped.played(FEW, Condition(50.0, 200.0, 30.0), 1, folder)
@@ -130,32 +112,6 @@ def test_a_ball_glances_off_along_the_rows_of_a_tilted_array_and_off_a_level_one
     assert min(moved(slanted, column)) > 1.5
     assert max(np.abs(moved(slanted, row))) < 0.7
     assert max(np.abs(moved(fallen, column))) < 0.7
-
-
-def test_the_region_holds_the_impact_and_not_a_taxel_of_noise(fallen):
-    """The middle of the taxels that respond lies in the middle of the region, in all drops."""
-    risen = fallen.ticks.max(1).astype(int) - fallen.ticks[:, 0]
-    x, y = np.arange(REGION * REGION) % REGION, np.arange(REGION * REGION) // REGION
-    for one in risen:
-        assert np.average(x, weights=one) == pytest.approx(REGION / 2 - 0.5, abs=1.5)
-        assert np.average(y, weights=one) == pytest.approx(REGION / 2 - 0.5, abs=1.5)
-
-
-def test_a_drop_that_nothing_answers_is_said(tmp_path):
-    with pytest.raises(SceneError, match="drop 0: no 3 taxels answered it"):
-        dropped.played(
-            {**FEW, "mass_g": 0.01, "mass_by_g": 0.0, "height_sd_mm": 0.0},
-            Condition(50.0, 5.0, 0.0),
-            1,
-            Kept(tmp_path, "0123abc"),
-        )
-
-
-def test_none_is_its_own_neighbour():
-    distances = np.array([[0.0, 1.0, 9.0], [1.0, 0.0, 9.0], [9.0, 9.0, 0.0]])
-    summary = dropped.named_by_neighbours(distances, np.array([0, 1, 1]), 1)
-    np.testing.assert_array_equal(summary, [1, 0, 0])
-    assert not np.diag(distances).any()
 
 
 def test_search_first_then_details_at_each_periods_best():
@@ -189,14 +145,6 @@ def test_a_tennis_ball_is_filmed_at_2_khz_around_the_first_taxel_that_answered(f
     rise = film.sum(2)
     assert (rise.argmax(1) * TENNIS.frame_us < 12_000).all()
     assert (rise[:, -1] < 0.3 * rise.max(1)).all()  # the ball has left the array again
-
-
-def test_slower_films_hold_the_frames_before_their_times(tennis):
-    every = dropped.frames_of(tennis.ticks, TENNIS.frame_us / 1000, np.zeros(3), TENNIS, 40.0)
-    late = np.array([0.0, 1.2, 4.9])
-    for k, film in enumerate(dropped.frames_of(tennis.ticks, 5.0, late, TENNIS, 20.0)):
-        at = np.floor((late[k] + 5.0 * np.arange(4)) * 1000 / TENNIS.frame_us).astype(int)
-        np.testing.assert_array_equal(film, every[k, at])
 
 
 @pytest.fixture(scope="module")
@@ -236,46 +184,3 @@ def test_without_its_package_a_study_says_what_to_install(tmp_path, monkeypatch)
     monkeypatch.setitem(sys.modules, "sklearn", None)
     with pytest.raises(ProblemError, match=r'fig4.9: it needs sklearn: pip install "taxel\[studies\]"'):
         load("fig4.9").run(tmp_path, size="toy", quiet=True)
-
-
-@pytest.mark.parametrize(
-    ("below", "height", "least", "radius"), [(0.002, 0.895, False, False), (0.05, 0.8, True, True)]
-)
-def test_a_difference_of_a_few_drops_is_none(below, height, least, radius):
-    """Bits and shares that differ by less than .02 do not make the best period, nor the parameter that suffers most."""
-
-    def line(period, bits, ball, tall):
-        by = {"ball_mm": (ball, 1.0), "height_mm": (tall, 1.585), "slant_deg": (0.5, 1.585)}
-        return {
-            "period_ms": period,
-            "bits": bits,
-            "by": {name: {"bits": share * most, "most": most} for name, (share, most) in by.items()},
-            "any_phase_bits": bits,
-            "absolute_bits": None,
-            "tau_ms": 0.4,
-            "sigma_mm": 2.0,
-            "searched": [],
-            "times": [[50.0, bits]],
-        }
-
-    lines = [line(0.5, 3.9 - below, 1.0, 1.0), line(1.0, 3.9, 1.0, 1.0), line(20.0, 0.5, 0.1, 1.0 - height)]
-    found = fig5_11.statements(load("fig5.11").set("toy"), {"lines": lines, "conditions": 18})
-    holds = {
-        one.says.split(":")[0]: one.holds for one in found if one.says.startswith(("Figure 5.11: most", "Figure 5.12"))
-    }
-    assert holds == {"Figure 5.11": least, "Figure 5.12": radius}
-
-
-def test_the_gain_above_100_hz_is_told_from_100_hz_itself_too():
-    lines = [
-        {"period_ms": t, "bits": b, "any_phase_bits": a} for t, b, a in [(1, 1.8, 1.7), (10, 1.6, 0.4), (20, 0.1, 0.2)]
-    ]
-    summary = {
-        "lines": lines,
-        "conditions": 4,
-        "sum": [[0.0, 0.0], [1.0, 9.0], [5.0, 0.0]],
-        "middle": [0.0, 0.0],
-        "full": 510,
-    }
-    *_, gain = fig4_8.statements(load("fig4.8").set("toy"), summary)
-    assert gain.ours.endswith("from 100 Hz itself on +0.20, begun at any phase +1.30")

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.refusal import refused
 
 from taxel import ProblemError
 from taxel_studies.fem import (
@@ -164,37 +163,12 @@ def test_a_course_that_finds_no_equilibrium_ends_there_and_says_so():
     assert len(course.path_mm) == len(course.pressure_kpa) == len(course.reaction)
 
 
-def test_a_stop_is_heard():
-    def stop(path: float, depth: float) -> None:
-        if path > 0.1:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        press(Indentation(**COARSE), progress=stop)
-
-
 def test_75_paths_serve_the_300_conditions():
     asked = paths(TABLE_5_1.conditions())
     assert len(TABLE_5_1.conditions()) == 300
     assert len(asked) == len(set(asked)) == 75
     assert {one.depth_mm for one in asked} == {2.0}
     assert Condition(2.0, 50.0, 0.5, 0.0) == TABLE_5_1.conditions()[0]
-
-
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: Indentation(diameter_mm=2, depth_mm=2.1),
-        lambda: Indentation(friction=-0.1),
-        lambda: Indentation(height_mm=1.5),
-        lambda: Indentation(width_mm=3),
-        lambda: Indentation(mesh_mm=0.6),
-        lambda: Yeoh(0),
-    ],
-)
-def test_nonsense_is_one_clear_error(make):
-    with refused():
-        make()
 
 
 # Against closed forms, finer meshes and another engine

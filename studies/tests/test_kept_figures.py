@@ -3,17 +3,14 @@
 import importlib.util
 import json
 import os
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from matplotlib.container import BarContainer
 
 from taxel_studies import load
-from taxel_studies.command import tell
-from taxel_studies.study import CPU_SECONDS, forecast
+from taxel_studies.study import CPU_SECONDS
 
 _spec = importlib.util.spec_from_file_location("figures", Path(__file__).parents[2] / "docs" / "figures.py")
 assert _spec is not None
@@ -58,25 +55,6 @@ def test_statements_are_judged_from_the_numbers_that_stand_beside_them(file: Pat
     assert section["statements"] == figures.judged(section), "run docs/figures.py"
 
 
-@pytest.mark.parametrize("file", sorted(figures.FIGURES.glob("*.json")), ids=lambda file: file.stem)
-def test_bars_begin_at_zero(file: Path) -> None:
-    """The length of a bar is its value only where bars begin at 0."""
-    section = json.loads(file.read_text())
-    drawn = load(file.stem).draw(section["parameters"], section["said"])
-    for axes in (axes for figure in (drawn if isinstance(drawn, Sequence) else [drawn]) for axes in figure.axes):
-        for bars in (holder for holder in axes.containers if isinstance(holder, BarContainer)):
-            low, high = sorted(axes.get_ylim() if bars.orientation == "vertical" else axes.get_xlim())
-            assert low <= 0 <= high, f"{axes.get_ylabel()} from {low:g} to {high:g}"
-
-
-def test_the_times_that_are_forecast_are_those_of_the_kept_figures() -> None:
-    kept = [json.loads(file.read_text(encoding="utf-8")) for file in figures.FIGURES.glob("*.json")]
-    took = {each["name"]: (each["size"], round(each["cpu_seconds"])) for each in kept}
-    assert {name: of for name, of in took.items() if of[1] >= 60} == CPU_SECONDS
-    assert forecast(["gait", "fig6.1"], "full", 4) == "about 1 min with 4 of --jobs: the kept runs took 352 s of CPU"
-    assert forecast(["gait"], "toy", 1) == forecast(["fig6.1"], "full", 1) == ""
-
-
 def test_a_run_says_first_how_long_it_takes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -116,10 +94,3 @@ def test_a_study_gives_its_kept_toy_result(name: str) -> None:
     kept = json.loads((figures.FIGURES / "toy" / f"{name}.json").read_text())
     now = json.loads(json.dumps(figures.toy_result(name, data)))
     assert not [line for key in ("parameters", "unread", "said") for line in differences(kept[key], now[key], key)]
-
-
-def test_a_printed_table_loses_no_cell_to_the_width(capsys: pytest.CaptureFixture[str]) -> None:
-    head, row = ["way", *map(str, range(12))], ["a long name of one of the ways", *["100.25"] * 12]
-    table = {"title": "Shares", "head": head, "rows": [row], "folded": False}
-    tell({"name": "touch", "size": "toy", "title": "t", "statements": [], "tables": [table], "unread": {}})
-    assert re.split(" {2,}", capsys.readouterr().out.splitlines()[-1].strip()) == row

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from taxel_studies.runner import Kept, Task, Workers, grid, run
+from taxel_studies.runner import Kept, Task, Workers, run
 
 CALLS: list[int] = []
 
@@ -55,12 +55,6 @@ def _forget(monkeypatch):
     CALLS.clear()
     # A cluster's processes import these functions by name, as they would an installed package.
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent), prepend=os.pathsep)
-
-
-def test_a_grid_has_every_combination_in_order_and_gives_the_rest_to_all():
-    p = {"kappas": [1.0, 1.2], "norms": ["l1"], "realisations": 2, "inputs": 9}
-    found = [(t.params, t.seed) for t in grid(p, kappa="kappas", norm="norms", seed="realisations")]
-    assert found == [({"inputs": 9, "kappa": k, "norm": "l1"}, seed) for k in (1.0, 1.2) for seed in (0, 1)]
 
 
 @pytest.mark.parametrize(
@@ -144,7 +138,7 @@ def test_ctrl_c_ends_promptly(tmp_path):
         while not done() and time.monotonic() < deadline:
             time.sleep(0.05)
         os.kill(process.pid, signal.SIGINT)
-        assert process.wait(timeout=20) != 0
+        assert process.wait(timeout=60) != 0
     finally:
         process.kill()
         process.wait()

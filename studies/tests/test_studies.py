@@ -6,7 +6,6 @@ import base64
 import functools
 import json
 import re
-import shutil
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from taxel import FormatError, ProblemError
+from taxel import ProblemError
 from taxel.cli import main
 from taxel_studies import STUDIES, load
 from taxel_studies.page import write_page
@@ -134,36 +133,6 @@ def test_the_page_holds_every_picture_and_names_what_was_not_run(report, first_r
     assert not [r for r in empty.references if r.startswith("data:")]
 
 
-def test_the_page_adds_up_what_its_studies_took(report, first_run, tmp_path):
-    for name, seconds in zip(MADE_HERE, (3600.0, 3000.0), strict=False):
-        first_run(name)
-        folder = shutil.copytree(report / name, tmp_path / name)
-        section = json.loads((folder / "summary.json").read_text())
-        (folder / "summary.json").write_text(json.dumps(section | {"cpu_seconds": seconds}))
-    page = Page()
-    page.feed(write_page(tmp_path).read_text())
-    assert "1.8 h of CPU" in page.text
-
-
-def test_a_page_shows_the_kept_picture_of_numbers_that_the_code_cannot_draw_any_more(report, first_run, tmp_path):
-    name = MADE_HERE[0]
-    first_run(name)
-    folder = shutil.copytree(report / name, tmp_path / name)
-    section = json.loads((folder / "summary.json").read_text())
-    (folder / "summary.json").write_text(json.dumps(section | {"said": {}}))
-    page = Page()
-    page.feed(write_page(tmp_path).read_text())
-    picture = next(r for r in page.references if r.startswith("data:"))
-    assert base64.b64decode(picture.partition(",")[2]).startswith(b"<?xml")
-
-
-def test_the_command_prints_the_statements_and_where_the_page_is(small, tmp_path, capsys):
-    assert ends(small) == 0
-    message = " ".join(capsys.readouterr().out.split())
-    assert "index.html" in message
-    assert (tmp_path / "index.html").exists()
-
-
 def test_the_command_prints_json(small, capsys):
     assert ends([*small, "--json"]) == 0
     section = json.loads(capsys.readouterr().out)
@@ -194,25 +163,6 @@ def test_nonsense_ends_in_one_line(small, capsys, more, message):
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
-
-
-@pytest.mark.parametrize("size", ["huge", "coarse"])  # a few studies have coarse
-def test_all_studies_run_at_a_size_that_each_of_them_has(tmp_path, capsys, size):
-    assert ends(["study", "all", "--size", size, "--report", str(tmp_path / "report")]) == 2
-    assert capsys.readouterr().err.endswith(f": size is '{size}': must be one of 'full', 'toy'\n")
-    assert not (tmp_path / "report").exists()
-
-
-def test_a_name_that_is_no_study_is_refused(capsys):
-    assert ends(["study", "fig9.9"]) == 2
-    assert "fig9.9" in capsys.readouterr().err
-
-
-def test_a_folder_with_a_strange_summary_is_refused(tmp_path):
-    (tmp_path / MADE_HERE[0]).mkdir()
-    (tmp_path / MADE_HERE[0] / "summary.json").write_text("[]")
-    with pytest.raises(FormatError, match="is not a summary of a study"):
-        write_page(tmp_path)
 
 
 def test_a_parameter_of_another_kind_is_refused():

@@ -7,14 +7,11 @@ import json
 import pkgutil
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
 import taxel_studies as studies
-from taxel import ProblemError
 from taxel.cli import main
-from taxel_studies.study import Study
 
 HERE = Path(__file__).parent
 
@@ -59,13 +56,6 @@ def test_a_study_says_what_it_is(name: str) -> None:
     assert min(len(study.where), len(study.protocol)) > 10
 
 
-def test_a_module_that_is_no_study_is_refused_and_what_it_lacks_is_named() -> None:
-    module = ModuleType("taxel_studies.half")
-    vars(module).update(WHERE="ours", PARAMETERS={}, SIZES={}, tasks=list, realise=int, statements=list, draw=list)
-    with pytest.raises(ProblemError, match=r"taxel_studies\.half is not a study: it lacks PROTOCOL, summarise"):
-        Study.of("half", "half a study", module)
-
-
 def test_every_kept_figure_lies_beside_its_numbers() -> None:
     """The page of figures shows them; `python docs/figures.py` draws them."""
     folder = HERE.parents[1] / "benchmarks" / "results" / "figures"
@@ -87,11 +77,6 @@ def test_every_figure_and_table_of_the_thesis_has_its_study_or_its_drawing() -> 
     assert not held & studies.DRAWN.keys()
 
 
-@pytest.mark.parametrize("place", sorted(set(studies.DRAWN.values())))
-def test_where_a_drawing_is_said_to_be_is_a_page(place: str) -> None:
-    assert (HERE.parents[1] / place).exists()
-
-
 def test_a_figure_runs_the_study_that_holds_it_and_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["study", "table6.1", "--size", "toy", "--report", str(tmp_path), "--json"])
@@ -99,10 +84,3 @@ def test_a_figure_runs_the_study_that_holds_it_and_says_so(tmp_path: Path, capsy
     output = capsys.readouterr()
     assert output.err == "table6.1 is a figure of the study fig6.1\n"
     assert json.loads(output.out)["name"] == "fig6.1"
-
-
-def test_a_figure_that_is_a_drawing_says_where_it_is(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["study", "fig4.1"])
-    assert ended.value.code == 2
-    assert "docs/sensor.md" in capsys.readouterr().err
