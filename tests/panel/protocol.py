@@ -94,6 +94,10 @@ class Client:
         return self.ask("change", changes=[{"old": old}])
 
 
+#: A value that no taxel has: it is missing.
+UNKNOWN = 65_535
+
+
 def row(label, t_us, source="", trial="", replaces_us=None):
     """A label as the page has it."""
     return {"label": label, "t_us": t_us, "source": source, "trial": trial, "replaces_us": replaces_us}
@@ -171,3 +175,40 @@ def spikes_of(page, columns):
     first, rows = head(frame)[0]["first"], head(frame)[0]["rows"]
     ups = section(frame, 6, "u1").reshape(-1, rows)
     return {column: list(np.flatnonzero(ups[column - first])) for column in columns}
+
+
+def opened(page, name, **more):
+    """Open a recording; return what the server said of it, and the frame shown at a time."""
+    assert page.ask("open", name=name, **more)["type"] == "done"
+    return page.since_asked("opened", name=name)
+
+
+def values_at(page, about, t_us):
+    """Return the values that the client draws at a time, in the unit of the file; NaN where one is missing."""
+    assert page.ask("seek", t_us=t_us)["type"] == "done"
+    page.send(type="credit", n=2)
+    while True:
+        frame = page.until("frame")
+        found = head(frame)[0]
+        if found["t_us"] == t_us:
+            break
+    ticks = section(frame, 0, "<u2").reshape(found["rows"], found["columns"]).astype(float)
+    ticks[ticks == UNKNOWN] = np.nan
+    of = about["frames"]
+    return (ticks - of["zero"]) * of["step"], frame
+
+
+def spikes_up_to(page, t_us):
+    """The spikes of a view that moves to a time: times (ms), trains, values."""
+    assert page.ask("seek", t_us=t_us)["type"] == "done"
+    page.send(type="credit", n=1)
+    told = page.until("spikes")
+    assert told["left_out"] == 0
+    return list(zip(told["t_ms"], told["train"], told["value"], strict=True))
+
+
+def trains_of(trains):
+    """The spikes of trains, in the same form."""
+    numbers = np.repeat(np.arange(len(trains)), np.diff(trains.offsets))
+    values = np.ones(len(trains.times)) if trains.values is None else trains.values
+    return list(zip(trains.times.tolist(), numbers.tolist(), values.tolist(), strict=True))

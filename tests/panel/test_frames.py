@@ -8,8 +8,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import mixed, seeds
 from formats.making import write_gaitpdb, write_icub, write_pedar
-from panel.protocol import CURVE, EXTENT, Client, head, held_in, section
+from panel.protocol import (
+    CURVE,
+    EXTENT,
+    UNKNOWN,
+    Client,
+    head,
+    held_in,
+    opened,
+    section,
+    spikes_up_to,
+    trains_of,
+    values_at,
+)
 
 import taxel
 from taxel import Array, Frames, Places
@@ -18,29 +31,6 @@ from taxel.reading import Facts, InMemory
 from taxel.recording.analysis.pressure import above_rest, force_n
 from taxel.recording.analysis.rest import ticks_by_unit
 from taxel.recording.text_options import TextOptions
-
-UNKNOWN = 65_535
-
-
-def opened(page, name, **more):
-    """Open a recording; return what the server said of it, and the frame shown at a time."""
-    assert page.ask("open", name=name, **more)["type"] == "done"
-    return page.since_asked("opened", name=name)
-
-
-def values_at(page, about, t_us):
-    """Return the values that the client draws at a time, in the unit of the file; NaN where one is missing."""
-    assert page.ask("seek", t_us=t_us)["type"] == "done"
-    page.send(type="credit", n=2)
-    while True:
-        frame = page.until("frame")
-        found = head(frame)[0]
-        if found["t_us"] == t_us:
-            break
-    ticks = section(frame, 0, "<u2").reshape(found["rows"], found["columns"]).astype(float)
-    ticks[ticks == UNKNOWN] = np.nan
-    of = about["frames"]
-    return (ticks - of["zero"]) * of["step"], frame
 
 
 def frames_of(fractions=True):
@@ -105,22 +95,6 @@ def test_both_feet_stand_side_by_side(tmp_path):
     assert part.sources["right"].frames() == right.between(0, 100_000)
 
 
-def spikes_up_to(page, t_us):
-    """The spikes of a view that moves to a time: times (ms), trains, values."""
-    assert page.ask("seek", t_us=t_us)["type"] == "done"
-    page.send(type="credit", n=1)
-    told = page.until("spikes")
-    assert told["left_out"] == 0
-    return list(zip(told["t_ms"], told["train"], told["value"], strict=True))
-
-
-def spikes_of(trains):
-    """The spikes of trains, in the same form."""
-    numbers = np.repeat(np.arange(len(trains)), np.diff(trains.offsets))
-    values = np.ones(len(trains.times)) if trains.values is None else trains.values
-    return list(zip(trains.times.tolist(), numbers.tolist(), values.tolist(), strict=True))
-
-
 @pytest.mark.parametrize(
     "encoder",
     [
@@ -133,7 +107,7 @@ def spikes_of(trains):
 def test_spikes_of_frames_are_those_of_the_encoder(tmp_path, encoder):
     frames = frames_of(fractions=False)
     taxel.convert(frames, tmp_path / "mat.mcap")
-    expected = spikes_of(encoder.encode(frames))
+    expected = trains_of(encoder.encode(frames))
     assert len(expected) > 30
     with Panel(tmp_path / "mat.mcap") as panel, Client(panel) as page:
         opened(page, "mat.mcap")
@@ -168,7 +142,7 @@ def test_spikes_of_both_feet_are_those_of_each(tmp_path):
         frames = both.sources[foot].frames()
         assert (frames.values == np.floor(frames.values)).all()
         own = frames.array.rows * frames.array.columns
-        expected += [(t, n * own + train, value) for t, train, value in spikes_of(encoder.encode(frames))]
+        expected += [(t, n * own + train, value) for t, train, value in trains_of(encoder.encode(frames))]
     assert {train // own for _, train, _ in expected} == {0, 1}
     with Panel(file) as panel, Client(panel) as page:
         about = opened(page, file.name)
@@ -339,9 +313,7 @@ def max_and_column(page, about):
     return max(force) * about["frames"]["step"], int(np.argmax(force))
 
 
-@pytest.mark.parametrize("unit", ["N", "kPa", "counts"])
-@pytest.mark.parametrize("sigma", [0.0, 0.1, 1.0])
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(("unit", "sigma", "seed"), mixed(["N", "kPa", "counts"], [0.0, 0.1, 1.0], [1, 2]))
 def test_noise_is_no_area_and_moves_no_centre_and_counts_in_the_sum_of_forces(tmp_path, unit, sigma, seed):
     random = np.random.default_rng(seed)
     values = np.maximum(random.normal(0, sigma, (400, 14, 11)), 0)
@@ -426,7 +398,7 @@ def test_the_centre_is_at_the_places_and_channels_have_none(tmp_path):
             assert (x, y) == pytest.approx(expected, abs=0.02, nan_ok=True)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4, quick=1))
 def test_a_force_from_pressures_uses_each_taxel_s_area(tmp_path, seed):
     draw = np.random.default_rng(seed)
     rows, columns = int(draw.integers(1, 5)), int(draw.integers(2, 9))

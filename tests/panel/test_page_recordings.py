@@ -1,4 +1,4 @@
-"""The page of a recording: its time axis, spikes, labels and cuts, in a real browser."""
+"""The page of a recording: its time axis and numbers, spikes, cuts and labels, in a real browser."""
 
 from __future__ import annotations
 
@@ -25,59 +25,66 @@ from tests.panel.pages import (
 )
 
 import taxel
-import taxel.device
 
 __all__ = ["recording", "replay"]
 
 pytestmark = pytest.mark.timeout(600)
 
-
-def test_a_recording_opens_on_all_of_its_time_and_its_first_touch(replay: Any) -> None:
-    until(lambda: 0.2 < clock(replay) < 0.212, "the first touch, where its force is greatest")
-    start, stop = span(replay)
-    assert (start, stop) == (pytest.approx(0.1, abs=0.15), pytest.approx(9.3, abs=0.15))
-    shows(replay, "clock-more", r"^of 9\.\d{3} s$")
-    drawn = "document.getElementById('pressure-map').getContext('2d').getImageData(0, 0, 24, 16).data.buffer"
-    assert replay.evaluate(f"new Set(new Uint32Array({drawn})).size") > 2, "the touch is in the map"
-    # No crosshair is placed, and the lane of a watched taxel takes no room.
-    assert replay.locator("#pressure-cross").is_hidden()
-    assert replay.locator("#taxel-block").is_hidden()
-    force = replay.locator("#force-lane").bounding_box()
-    title = replay.locator("#force-block h2").bounding_box()
-    assert title["y"] + title["height"] <= force["y"] + 1, "titles cover no curve"
-    assert replay.locator("#tab-labels").get_attribute("aria-selected") == "true"
+#: 2026-11-18 11:06:40 UTC, us since 1970.
+BEGIN_US = 1_794_999_999_000_000 + 1_000_000
 
 
-def test_the_numbers_are_those_of_the_cursor_s_time_and_a_second_cursor_measures(chromium: Any, tmp_path: Path) -> None:
+def test_a_long_recording_opens_on_its_first_touch_and_cursors_say_its_numbers(chromium: Any, tmp_path: Path) -> None:
     draw = np.random.default_rng(4)
     values = draw.integers(0, 90, (1200, 3, 4)) * (draw.random((1200, 1, 1)) < 0.1)
-    frames = taxel.Frames(values, np.arange(1200) * 50_000, unit="N", array=taxel.Array(3, 4))
+    values[:60], values[60:64] = 0, 80
+    frames = taxel.Frames(values, BEGIN_US + np.arange(1200) * 50_000, unit="N", array=taxel.Array(3, 4))
     taxel.convert(frames, tmp_path / "peaks.npz")
     with shown(chromium, tmp_path / "peaks.npz") as page:
-        press(page, "a")
-        until(lambda: span(page)[1] - span(page)[0] > 59, "all of it")
-        lane, tried = page.locator("#force-lane").bounding_box(), 0
-        for t_s in draw.uniform(1, 58, 40):
-            page.mouse.move(pixel(page, t_s), lane["y"] + 9)
-            t_us = 1e6 * float(page.locator("#cursor-time").inner_text()[:-2])
-            # The time is written in ms.
-            if 2000 < t_us % 50_000 < 48_000:
-                tried += 1
-                expected = int(values[int(t_us // 50_000)].sum())
-                shows(page, "force-sum", f"^{expected} N$")
-        assert tried > 20
-        page.mouse.move(pixel(page, 10.0), lane["y"] + 9)
-        first = float(page.locator("#cursor-time").inner_text()[:-2])
-        press(page, "s")
-        page.mouse.move(pixel(page, 42.0), lane["y"] + 9)
-        second = float(page.locator("#cursor-time").inner_text()[:-2])
-        shows(page, "second-time", r"^\+\d+\.\d{3} s$")
-        assert float(page.locator("#second-time").inner_text()[1:-2]) == pytest.approx(second - first, abs=0.002)
-        press(page, "s")
-        until(lambda: page.locator("#second-line").is_hidden(), "it is taken away")
+        opens_on_its_first_touch(page)
+        cursors_say_numbers(page, values)
 
 
-def test_the_lanes_zoom_and_scroll_as_a_time_axis(replay: Any) -> None:
+def opens_on_its_first_touch(page: Any) -> None:
+    """Of a long recording ten seconds are shown, with all of it below; times count from its beginning."""
+    start, stop = span(page)
+    assert stop - start == pytest.approx(10, abs=0.1)
+    assert start < 3.0 <= clock(page) < 3.2 < stop
+    assert float(page.locator("#strip").get_attribute("aria-valuemax")) == pytest.approx(59.95, abs=0.02)
+    shows(page, "clock-more", r"^of 59\.\d{3} s$")
+    shows(page, "begun", r"^0 s: \d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.000 UTC$")
+    assert page.locator("#pressure-cross").is_hidden(), "no crosshair was placed"
+    assert page.locator("#tab-labels").get_attribute("aria-selected") == "true"
+
+
+def cursor_s(page: Any, t_s: float) -> float:
+    """Point at a time in the lanes; return the time that the cursor says."""
+    page.mouse.move(pixel(page, t_s), page.locator("#force-lane").bounding_box()["y"] + 9)
+    return float(page.locator("#cursor-time").inner_text()[:-2])
+
+
+def cursors_say_numbers(page: Any, values: np.ndarray) -> None:
+    """The sum beside the cursor is that of its frame; a second cursor measures from the first."""
+    press(page, "a")
+    until(lambda: span(page)[1] - span(page)[0] > 59, "all of it")
+    tried = 0
+    for t_s in np.random.default_rng(5).uniform(1, 58, 20):
+        t_us = 1e6 * cursor_s(page, t_s)
+        # The time is written in ms.
+        if 2000 < t_us % 50_000 < 48_000:
+            tried += 1
+            shows(page, "force-sum", f"^{int(values[int(t_us // 50_000)].sum())} N$")
+    assert tried > 10
+    first = cursor_s(page, 10.0)
+    press(page, "s")
+    second = cursor_s(page, 42.0)
+    shows(page, "second-time", r"^\+\d+\.\d{3} s$")
+    assert float(page.locator("#second-time").inner_text()[1:-2]) == pytest.approx(second - first, abs=0.002)
+    press(page, "s")
+    until(lambda: page.locator("#second-line").is_hidden(), "it is taken away")
+
+
+def test_the_lanes_zoom_and_scroll_and_show_the_spikes_of_an_encoder(replay: Any) -> None:
     still(replay)
     box = replay.locator("#raster").bounding_box()
     replay.mouse.move(pixel(replay, 5.2), box["y"] + 5)
@@ -107,9 +114,6 @@ def test_the_lanes_zoom_and_scroll_as_a_time_axis(replay: Any) -> None:
     shows(replay, "span", r"^4\.\d s$")
     press(replay, "x", "x", "x")
     until(lambda: span(replay)[1] - span(replay)[0] < 10, "no longer than the recording")
-
-
-def test_spikes_of_an_encoder_are_shown_in_a_recording(replay: Any) -> None:
     press(replay, "End", "4")
     until(lambda: clock(replay) > 9, "the end")
     still(replay)
@@ -119,38 +123,6 @@ def test_spikes_of_an_encoder_are_shown_in_a_recording(replay: Any) -> None:
     until(lambda: replay.evaluate(PIXELS, "raster") != changes, "the raster is of spikes")
     replay.locator("#encoder").select_option("")
     until(lambda: replay.evaluate(PIXELS, "raster") == changes, "and of changes again")
-
-
-def test_ten_footfalls_are_labelled_moved_named_and_deleted(replay: Any, recording: Path) -> None:
-    table = recording.with_suffix("").with_suffix(".notes.csv")
-    press(replay, "3")
-    replay.locator("#label-name").fill("contact")
-    for fall in range(10):
-        t_us = 1_000_000 * fall + 200_000
-        replay.evaluate("document.activeElement.blur()")
-        replay.locator("#strip").focus()
-        replay.keyboard.press("Home")
-        for _ in range(fall):
-            replay.keyboard.press("Shift+ArrowRight")
-        until(lambda t_us=t_us: abs(clock(replay) * 1e6 - t_us) < 20_000, f"fall {fall}")
-        press(replay, "m")
-        shows(replay, "label-count", f"^{fall + 1} label")
-    first = replay.locator("#label-list li").first
-    first.locator("input").first.fill("heel")
-    first.locator("input").first.press("Enter")
-    until(lambda: "heel" in table.read_text(), "the name is kept")
-    press(replay, "End", "p")
-    flag = replay.locator(".flag.chosen")
-    flag.focus()
-    before = [int(row["t_us"]) for row in csv.DictReader(table.open())]
-    flag.press("Shift+ArrowLeft")
-    until(lambda: sum(int(row["t_us"]) for row in csv.DictReader(table.open())) == sum(before) - 100_000, "moved")
-    replay.locator(".flag.chosen").focus()
-    replay.keyboard.press("Delete")
-    shows(replay, "label-count", "^9 label")
-    rows = list(csv.DictReader(table.open()))
-    assert sorted(row["label"] for row in rows) == ["contact"] * 8 + ["heel"]
-    assert sorted(note.text for note in taxel.open(recording).notes) == ["contact"] * 8 + ["heel"]
 
 
 def test_a_click_anywhere_in_the_row_makes_a_label_and_a_handle_moves_it(replay: Any, recording: Path) -> None:

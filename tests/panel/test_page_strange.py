@@ -29,7 +29,7 @@ TEXTS = """() => {
 
 
 def test_names_of_taxels_labels_notes_and_units_are_escaped(chromium: Any, tmp_path: Path) -> None:
-    taxel.convert(strange.recording(), tmp_path / "press.npz")
+    taxel.convert(strange.recording(), tmp_path / "press.mcap")
     table = tmp_path / "press.notes.csv"
     with table.open("w", newline="") as file:
         csv.writer(file).writerows([("label", "t_us"), (CELL, 700_000), (f"b{CELL}", 900_000)])
@@ -37,12 +37,12 @@ def test_names_of_taxels_labels_notes_and_units_are_escaped(chromium: Any, tmp_p
     levels = taxel.encode.LevelCrossing(levels=[50.0])
     readout = taxel.Readout(levels, {NAME: neuron}, array=strange.frames().array, unit=CELL)
     readout.save(tmp_path / f"{CELL}.json")
-    with shown(chromium, tmp_path / "press.npz") as page:
-        shows(page, "source", "^press.npz")
+    with shown(chromium, tmp_path / "press.mcap") as page:
+        shows(page, "source", "^press.mcap")
         still(page)
         for key in "12345":
             press(page, key)
-            page.wait_for_timeout(200)
+            page.locator("[role=tab][aria-selected=true]").wait_for()
         texts = page.evaluate(TEXTS)
         # What a request is refused with.
         page.evaluate("text => import('/notice.js').then(({ failed }) => failed(new Error(text)))", f"{CELL}: refused")

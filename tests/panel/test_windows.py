@@ -8,8 +8,8 @@ import time
 import numpy as np
 import pytest
 from discs import recipe, tare, touches
-from panel.protocol import EXTENT, SOON, Client, head, heard, say, section, word
-from panel.test_frames import spikes_of, spikes_up_to
+from loopback import until
+from panel.protocol import EXTENT, SOON, Client, head, heard, say, section, spikes_up_to, trains_of, word
 from tests.tasks.recordings import rested
 
 import taxel
@@ -97,9 +97,9 @@ def test_a_view_that_plays_beyond_its_window_takes_it_along(steps):
         page.ask("zoom", column_us=1000, end_us=1_950_000)
         page.ask("seek", t_us=1_900_000)
         page.ask("play", speed=2.0)
-        until = time.monotonic() + SOON
+        end = time.monotonic() + SOON
         while head(page.until("frame"))[0]["t_us"] < 2_300_000:
-            assert time.monotonic() < until
+            assert time.monotonic() < end
         page.ask("pause")
         sums = columns_of(page.frames)
         assert [sums[column] for column in (1998, 2001, 2200)] == [0, 30, 30]
@@ -146,7 +146,7 @@ def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
         assert page.ask("encode", encoder={"name": "contact_area"})["type"] == "done"
         [detected] = taxel.tasks.detect(readout, taxel.open(tmp_path / "played.mcap")).each
         read = readout.encoder.with_tare(detected.rest.tare)
-        assert sorted(spikes_up_to(page, int(events.t[-1]))) == sorted(spikes_of(read.encode(events)))
+        assert sorted(spikes_up_to(page, int(events.t[-1]))) == sorted(trains_of(read.encode(events)))
         assert page.said[-1]["of_readout"]
         assert page.ask("train")["reason"].count("names no event")
         page.ask("live")
@@ -155,8 +155,8 @@ def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
         assert "no values of taxels have arrived" in page.ask("read_out", readout="touch.json")["reason"]
         say(live, *(word(4000, x, y, 50) for x in range(8) for y in range(8)))
         heard(live, 64)
-        time.sleep(0.2)
-        assert page.ask("read_out", readout="touch.json")["type"] == "done"
+        # Its rest is held a little later than the events are counted.
+        until(lambda: page.ask("read_out", readout="touch.json")["type"] == "done")
         hello = page.since_asked("hello")
         assert (hello["readout"], hello["readout_encoders"]) == (["contact", "lift"], ["contact_area"])
         assert page.ask("encode", encoder={"name": "contact_area"})["type"] == "done"
