@@ -12,7 +12,7 @@ from refusal import refused
 
 import taxel
 import taxel_studies
-from taxel.recording import opening
+from taxel.recording import kinds
 
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT / "tests" / "contributing"
@@ -39,7 +39,7 @@ def test_what_contributing_says_of_a_format_is_enough(tmp_path: Path, monkeypatc
     (about / "entry_points.txt").write_text(f"[{group}]\n{name} = {module}\n")
     monkeypatch.syspath_prepend(tmp_path)
     invalidate_caches()
-    opening._from_elsewhere.cache_clear()
+    kinds._from_elsewhere.cache_clear()
     try:
         path = tmp_path / "walk.channel"
         path.write_text("t_us force_n\n" + "".join(f"{2000 * k} {k % 7}\n" for k in range(100)))
@@ -49,7 +49,7 @@ def test_what_contributing_says_of_a_format_is_enough(tmp_path: Path, monkeypatc
         with refused(taxel.FormatError):
             taxel.open(path)
     finally:
-        opening._from_elsewhere.cache_clear()
+        kinds._from_elsewhere.cache_clear()
 
 
 def test_what_contributing_says_of_a_study_is_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

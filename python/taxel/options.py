@@ -9,12 +9,24 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 from cyclopts import Parameter
 
-from taxel._base.arguments import checked_path, finite, flag, integer, mapping, number, parameters, short, text
+from taxel._base.arguments import (
+    checked_path,
+    finite,
+    flag,
+    integer,
+    mapping,
+    number,
+    parameters,
+    several,
+    short,
+    text,
+)
 from taxel._base.documents import of_toml
 from taxel._base.errors import refused
 from taxel._core import FormatError, ProblemError, encoder_names
@@ -23,13 +35,16 @@ from taxel.tare import Tare
 if TYPE_CHECKING:
     from taxel.detect import Recipe
     from taxel.encode import Encoder
+    from taxel.recording import Recording
 
 __all__ = [
     "CalibrateOptions",
     "DetectOptions",
     "EncodeOptions",
+    "FullReading",
     "GivenTare",
     "InformationOptions",
+    "Reading",
     "Settings",
     "TrainOptions",
 ]
@@ -69,6 +84,8 @@ def _between_commas(number_of: Callable[[str], Any], must: str) -> Callable[[Any
     return read
 
 
+#: How an option is typed that has another name on the command line.
+_TYPED = {"window_ms": "count_ms"}
 #: How the parameters of an encoder or a recipe are typed: ``--set KEY=VALUE``, as often as is needed.
 Settings = Annotated[
     Mapping[str, Any],
@@ -113,6 +130,121 @@ def encoder_of(name: str | None, values: Mapping[str, Any]) -> Encoder:
     from taxel.encode import Encoder  # noqa: PLC0415  loads slowly
 
     return Encoder.from_json(parameters({**mapping("parameters", values), **({"name": name} if name else {})}))
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Hold how recordings are opened.
+
+    Parameters
+    ----------
+    layout : path, optional
+        Layout file with the facts that a recording lacks: sensor, unit, rate, columns of a table. Default:
+        NAME.layout.toml or layout.toml beside the recording.
+    label_column : str, optional
+        Column of a table whose value becomes a label where it changes; it is no taxel.
+
+    Examples
+    --------
+    >>> Reading(label_column="state").words()
+    ['--label-column', 'state']
+    """
+
+    layout: Annotated[Path | None, Parameter(metavar="FILE")] = None
+    label_column: Annotated[str | None, Parameter(metavar="NAME")] = None
+
+    def open_trials(self, path: str | os.PathLike[str]) -> list[Recording]:
+        """Open a file or a folder; of a folder, or of another maker's file, all trials in it.
+
+        Raises
+        ------
+        ProblemError : an `array` that differs from the sensor that a file holds; a `rate_hz` of one with times
+        """
+        from taxel.recording.reading_options import open_trials  # noqa: PLC0415  loads slowly
+
+        return open_trials(path, **vars(self))
+
+    def open_sensors(self, paths: Sequence[str | os.PathLike[str]]) -> list[Recording]:
+        """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
+
+        Each sensor of a file with several is a separate recording (`Recording.title`).
+        """
+        from taxel.recording.opening import sensors  # noqa: PLC0415  loads slowly
+
+        trials = (trial for path in several("paths", paths) for trial in self.open_trials(path))
+        return [sensor for trial in trials for sensor in sensors(trial)]
+
+    def open_one(self, path: str | os.PathLike[str]) -> Recording:
+        """Open a file that holds one recording.
+
+        Raises
+        ------
+        ProblemError : it holds several
+        """
+        recordings = self.open_trials(path)
+        if len(recordings) != 1:
+            some = ", ".join(recording.name for recording in recordings[:3]) + ", ..." * (len(recordings) > 3)
+            raise ProblemError(f"{path}: contains {len(recordings)} recordings ({some}); must contain one")
+        return recordings[0]
+
+    def given(self) -> dict[str, Any]:
+        """Return the options that differ from their defaults, as JSON holds them."""
+        given = {name: value for name, value in vars(self).items() if value not in (None, [], ())}
+        return {name: str(value) if isinstance(value, Path) else value for name, value in given.items()}
+
+    def words(self) -> list[str]:
+        """Return the options as words of a command line."""
+        words: list[str] = []
+        for name, value in self.given().items():
+            for entry in value if isinstance(value, list | tuple) else [value]:
+                words += [f"--{_TYPED.get(name, name).replace('_', '-')}", str(entry)]
+        return words
+
+
+@dataclass(frozen=True)
+class FullReading(Reading):
+    """Hold all that can be said of files that do not hold it themselves.
+
+    Parameters
+    ----------
+    array : list of str, optional
+        Rows, columns and pitch (mm) of the sensor, for example 24x20x5, for files that do not state them (.csv, .lsa,
+        ROS bags), and for frames of one row that list these taxels row by row. Default: 64x64x2.67, or a larger array
+        if events are outside it; for a bag, the size of its messages. If no pitch is given, it is 2.67 mm for events of
+        the board, otherwise unknown.
+    topic : list of str, optional
+        Open this topic of a ROS bag as frames; taxel info lists the topics. May be repeated: each topic is a source;
+        give --field and --array once for all topics, or once for each.
+    field : list of str, optional
+        The topic's field, for example left.taxels. Default: the only field with numbers.
+    ros : str, optional
+        The ROS release, for example humble, whose message definitions are used if the bag lacks them.
+    region : str, optional
+        Read columns A to B - 1 and rows C to D - 1 of an event camera's file, for example 100:420,60:300.
+    bin : int, optional
+        Side, in pixels of an event camera, of the square that becomes one taxel.
+    window_ms : float, ms, optional
+        Read an event camera's file as frames of counts, each over this many ms.
+    polarity : str, optional
+        Which events of an event camera are read: both (default), on or off.
+    rate_hz : float, Hz, optional
+        Frames per second, for recordings whose frames have no times.
+
+    Examples
+    --------
+    >>> FullReading(window_ms=2.5, topic=["/palm"]).words()
+    ['--topic', '/palm', '--count-ms', '2.5']
+    """
+
+    array: Annotated[list[str] | None, Parameter(metavar="ROWSxCOLUMNS[xMM]")] = None
+    topic: Annotated[list[str] | None, Parameter(metavar="NAME")] = None
+    field: Annotated[list[str] | None, Parameter(metavar="NAME")] = None
+    ros: Annotated[str | None, Parameter(metavar="NAME")] = None
+    region: Annotated[str | None, Parameter(metavar="A:B,C:D")] = None
+    bin: Annotated[int | None, Parameter(metavar="PIXELS")] = None
+    window_ms: Annotated[float | None, Parameter(name="--count-ms", metavar="MS")] = None
+    polarity: Annotated[str | None, Parameter(metavar="NAME")] = None
+    rate_hz: Annotated[float | None, Parameter(metavar="HZ")] = None
 
 
 @dataclass(frozen=True)

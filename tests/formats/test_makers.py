@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import taxel
 from taxel import FormatError, Frames, Recording
-from taxel.recording.opening import kind_of
+from taxel.recording.kinds import kind_of
 
 from .making import shared, write_emed, write_moticon, write_pedar, write_tekscan
 

@@ -21,7 +21,7 @@ from shell import call
 import taxel
 from taxel import FormatError, ProblemError
 from taxel.formats import ros
-from taxel.recording.text_options import TextOptions
+from taxel.options import FullReading
 from taxel.tasks.labels import references
 
 from . import bags
@@ -410,7 +410,7 @@ def test_labels_of_two_topics_are_each_of_their_source(names: dict[str, str], tm
     bag = bags.write(tmp_path / "pick.mcap", several)
     table = tmp_path / "labels.csv"
     table.write_text("recording,source,label,t_us\n" + "".join(f"{names[s]}touch,{us + t}\n" for s, t in rows))
-    options = TextOptions(topic=["/grip/left", "/grip/right"], field=["patches.taxels"])
+    options = FullReading(topic=["/grip/left", "/grip/right"], field=["patches.taxels"])
     opened = options.open_sensors([bag])
     left, right = references(str(table), opened)
     assert [(left["touch"] - us).tolist(), (right["touch"] - us).tolist()] == [[20_000, 70_000], [30_000]]

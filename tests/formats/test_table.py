@@ -325,7 +325,7 @@ def test_a_file_that_changes_while_it_is_read_is_refused(tmp_path: Path, monkeyp
         path.write_text(path.read_text() + "20,3\n")
         return found
 
-    monkeypatch.setattr("taxel.recording.opening.read_foreign", grows)
+    monkeypatch.setattr("taxel.recording.kinds.read_foreign", grows)
     with pytest.raises(FormatError, match=r"a\.csv: the file changed while it was read"):
         taxel.open(path)
     monkeypatch.undo()

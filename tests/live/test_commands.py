@@ -15,7 +15,7 @@ from shell import run
 import taxel
 from taxel import Array, Events, wire
 from taxel.live import Live, send
-from taxel.recording.text_options import TextOptions
+from taxel.options import FullReading
 from taxel.simulate import Board, Scene, emulate
 from taxel.wire import Registers
 
@@ -58,7 +58,7 @@ def test_taxel_record_keeps_the_registers_of_a_sensor_of_ones_own(tmp_path: Path
     assert registers.frame_us == pytest.approx(2000, rel=1e-3)
     # No pitch is stated.
     assert taxel.open(file).array.pitch_mm is None
-    assert TextOptions(array=["4x4"]).open_one(file).array.pitch_mm is None
+    assert FullReading(array=["4x4"]).open_one(file).array.pitch_mm is None
 
 
 def test_taxel_record_says_how_much_a_board_of_version_2_sent(tmp_path: Path) -> None:

@@ -26,11 +26,11 @@ from panel.protocol import (
 
 import taxel
 from taxel import Array, Frames, Places
+from taxel.options import FullReading
 from taxel.panel import Panel, shown_files
 from taxel.reading import Facts, InMemory
 from taxel.recording.analysis.pressure import above_rest, force_n
 from taxel.recording.analysis.rest import ticks_by_unit
-from taxel.recording.text_options import TextOptions
 
 
 def frames_of(fractions=True):
@@ -72,7 +72,7 @@ def test_a_frame_of_any_kind_of_file_is_shown_in_its_unit(tmp_path, ending):
 
 def test_both_feet_stand_side_by_side(tmp_path):
     file = write_pedar(tmp_path)
-    [both] = TextOptions().open_trials(file)
+    [both] = FullReading().open_trials(file)
     left, right = (both.sources[foot].frames() for foot in ("left", "right"))
     columns = left.array.columns
     with Panel(file) as panel, Client(panel) as page:
@@ -135,7 +135,7 @@ def test_spikes_of_frames_are_those_of_the_encoder(tmp_path, encoder):
 
 def test_spikes_of_both_feet_are_those_of_each(tmp_path):
     file = write_pedar(tmp_path)
-    [both] = TextOptions().open_trials(file)
+    [both] = FullReading().open_trials(file)
     encoder = taxel.encode.ChangeEvents(noise_floor=1.0)
     expected = []
     for n, foot in enumerate(("left", "right")):
@@ -235,7 +235,7 @@ def test_a_large_table_is_shown_from_its_beginning_and_then_whole(tmp_path, monk
         return reading(self, path, trial)
 
     monkeypatch.setattr(shown_files.ShownFiles, "opened", slowly)
-    [whole] = TextOptions().open_trials(file)
+    [whole] = FullReading().open_trials(file)
     frames = sum(len(one.frames()) for one in whole.sources.values())
     with Panel(file) as panel, Client(panel) as page:
         first = opened(page, file.name)
@@ -357,7 +357,7 @@ def test_each_foot_has_a_sum_and_a_centre(tmp_path, column_us):
         return ["\t".join(f"{cell:.6g}" for cell in row) for row in table]
 
     file = write_gaitpdb(tmp_path, change=walked)
-    [both] = TextOptions().open_trials(file)
+    [both] = FullReading().open_trials(file)
     feet = [both.sources[foot].frames() for foot in ("left", "right")]
     with Panel(file) as panel, Client(panel) as page:
         about = opened(page, file.name)

@@ -18,9 +18,9 @@ from shell import call
 
 import taxel
 from taxel import Array, Calibration, Frames
+from taxel.options import FullReading
 from taxel.panel import Panel
-from taxel.recording.opening import recordings_in
-from taxel.recording.text_options import TextOptions
+from taxel.recording.kinds import recordings_in
 
 KINDS = ("grasp.bag", "grasp.db3", "grasp.mcap", "grasp")
 
@@ -171,7 +171,7 @@ def test_tables_and_arrays_of_other_programs_are_shown_by_their_layout(beside, c
     (folder / "layout.toml" if beside else layout).write_text(text)
     given = {} if beside else {"layout": layout}
     for name in TABLES:
-        with Panel(folder / name, options=TextOptions(**given)) as panel, Client(panel) as page:
+        with Panel(folder / name, options=FullReading(**given)) as panel, Client(panel) as page:
             shown_alike(page, [name], values)
     assert [one.name for one in taxel.open_all(folder, **given)] == list(TABLES)
     (folder / "labels.csv").write_text("recording,label,t_us\npalm,contact,100000\n")

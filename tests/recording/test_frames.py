@@ -23,8 +23,8 @@ from taxel import Array, Frames, Note, ProblemError, SpikeTrains
 from taxel.detect import Example, Part, Recipe, judge
 from taxel.detect.folds import split
 from taxel.encode import LevelCrossing
+from taxel.options import FullReading
 from taxel.reading import Facts, InMemory, Marks
-from taxel.recording.text_options import TextOptions
 from taxel.tasks.labels import references
 
 WHOLE = st.integers(0, 65_535).map(float)
@@ -357,7 +357,7 @@ def test_a_folder_of_many_trials_becomes_a_folder_of_recordings(
     write_pedar(source)
     assert call(capsys, "convert", source, out)[0] == 0
     names = sorted(file.name for file in out.iterdir())
-    assert len(names) == len(TextOptions().open_trials(source)) == 2
+    assert len(names) == len(FullReading().open_trials(source)) == 2
     assert "again.mcap" in names
     assert list(taxel.open(out / "again.mcap").sources) == ["left", "right"]
 

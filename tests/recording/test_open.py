@@ -14,8 +14,8 @@ from refusal import refused
 import taxel
 from taxel import Frames
 from taxel._core import FormatError, ProblemError
+from taxel.options import FullReading
 from taxel.panel import Panel
-from taxel.recording.text_options import TextOptions
 
 from .making import HEADER, record, some_events
 
@@ -359,12 +359,12 @@ def test_one_recording_is_opened_and_of_a_folder_all(tmp_path: Path) -> None:
 def test_a_row_of_channels_is_laid_out_by_the_array_that_is_given(tmp_path: Path, ending: str) -> None:
     values = np.arange(36, dtype=np.float32).reshape(3, 1, 12)
     taxel.convert(taxel.Frames(values, [0, 10, 20], unit="N"), tmp_path / f"a{ending}")
-    [recording] = TextOptions(array=["3x4"]).open_trials(tmp_path / f"a{ending}")
+    [recording] = FullReading(array=["3x4"]).open_trials(tmp_path / f"a{ending}")
     assert recording.frames().values.tolist() == values.reshape(3, 3, 4).tolist()
     if ending != ".mcap":
         assert taxel.open(tmp_path / f"a{ending}", array=taxel.Array(3, 4)).array.shape == (3, 4)
     with pytest.raises(taxel.Error, match=r"5 x 4 taxels|5x4"):
-        TextOptions(array=["5x4"]).open_trials(tmp_path / f"a{ending}")
+        FullReading(array=["5x4"]).open_trials(tmp_path / f"a{ending}")
 
 
 @pytest.mark.parametrize("form", ["to_tonic", "to_numpy", "to_faery"])
@@ -380,5 +380,5 @@ def test_a_saved_array_of_events_opens(tmp_path: Path, form: str) -> None:
 
 def test_the_page_opens_an_array_whose_rate_is_given(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", np.ones((4, 256)))
-    with Panel(tmp_path / "a.npy", options=TextOptions(rate_hz=30.0)) as panel:
+    with Panel(tmp_path / "a.npy", options=FullReading(rate_hz=30.0)) as panel:
         assert panel.url

@@ -13,7 +13,7 @@ import taxel
 from taxel import FormatError, ProblemError
 from taxel.formats.layout import Layout
 from taxel.reading import Facts, InMemory, Reader
-from taxel.recording.opening import check_recording, is_recording, kind_of, recordings_in
+from taxel.recording.kinds import check_recording, is_recording, kind_of, recordings_in
 
 from .making import some_events, some_frames
 
@@ -190,7 +190,7 @@ class Distribution:
 def test_a_format_of_another_distribution_is_opened_as_any_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("taxel.recording.opening._from_elsewhere", lambda: {"grasp": Distribution()})
+    monkeypatch.setattr("taxel.recording.kinds._from_elsewhere", lambda: {"grasp": Distribution()})
     path = content("one.grasp", b"\x01\x02\x03\x04")(tmp_path)
     (tmp_path / "one.layout.toml").write_text("rows = 2\ncolumns = 1\n")
     assert recordings_in(tmp_path) == [path]

@@ -19,12 +19,11 @@ from taxel._base.messages import collected, escaped
 from taxel._base.progress import Forecast, Steps
 from taxel._core import Error, ProblemError
 from taxel.cli._say import say
-from taxel.cli.app import WRONG_INPUT, Limits
+from taxel.cli.app import WRONG_INPUT
 
 if TYPE_CHECKING:
     from taxel._base.parallel import Workers
     from taxel.recording import Recording
-    from taxel.recording.text_options import TextOptions
 
 #: Without a terminal a line says the step after so long, then after so long again; the last repeats, s.
 _REPORT_S = (0.5, 9.5, 20.0, 30.0)
@@ -35,73 +34,6 @@ SourceOption = Annotated[
 #: A file that is written: the last argument, or what -o names.
 OutArgument = Annotated[Path, Parameter(name=("--out", "-o"))]
 OutOption = Annotated[Path | None, Parameter(name=("--out", "-o"), metavar="FILE")]
-
-
-@dataclass(frozen=True)
-class Reading:
-    """Hold how recordings are opened.
-
-    Parameters
-    ----------
-    layout
-        Layout file with the facts that a recording lacks: sensor, unit, rate, columns of a table. Default:
-        NAME.layout.toml or layout.toml beside the recording.
-    label_column
-        Column of a table whose value becomes a label where it changes; it is no taxel.
-    """
-
-    layout: Annotated[Path | None, Parameter(metavar="FILE")] = None
-    label_column: Annotated[str | None, Parameter(metavar="NAME")] = None
-
-    @property
-    def opener(self) -> TextOptions:
-        """Opener of files with these options."""
-        from taxel.recording.text_options import TextOptions  # noqa: PLC0415  the command line starts quickly
-
-        return TextOptions(**vars(self))
-
-
-@dataclass(frozen=True)
-class FullReading(Reading):
-    """Hold all that can be said of files that do not hold it themselves.
-
-    Parameters
-    ----------
-    array
-        Rows, columns and pitch (mm) of the sensor, for example 24x20x5, for files that do not state them (.csv, .lsa,
-        ROS bags), and for frames of one row that list these taxels row by row. Default: 64x64x2.67, or a larger array
-        if events are outside it; for a bag, the size of its messages. If no pitch is given, it is 2.67 mm for events of
-        the board, otherwise unknown.
-    topic
-        Open this topic of a ROS bag as frames; taxel info lists the topics. May be repeated: each topic is a source;
-        give --field and --array once for all topics, or once for each.
-    field
-        The topic's field, for example left.taxels. Default: the only field with numbers.
-    ros
-        The ROS release, for example humble, whose message definitions are used if the bag lacks them.
-    region
-        Read columns A to B - 1 and rows C to D - 1 of an event camera's file, for example 100:420,60:300.
-    bin
-        Side, in pixels of an event camera, of the square that becomes one taxel.
-    window_ms
-        Read an event camera's file as frames of counts, each over this many ms.
-    polarity
-        Which events of an event camera are read: both (default), on or off.
-    rate_hz
-        Frames per second, for recordings whose frames have no times.
-    """
-
-    array: Annotated[list[str] | None, Parameter(metavar="ROWSxCOLUMNS[xMM]")] = None
-    topic: Annotated[list[str] | None, Parameter(metavar="NAME")] = None
-    field: Annotated[list[str] | None, Parameter(metavar="NAME")] = None
-    ros: Annotated[str | None, Parameter(metavar="NAME")] = None
-    region: Annotated[str | None, Parameter(metavar="A:B,C:D")] = None
-    bin: Annotated[int | None, Parameter(metavar="PIXELS", validator=Limits(1, 65_535))] = None
-    window_ms: Annotated[float | None, Parameter(name="--count-ms", metavar="MS", validator=Limits(0.001, 3.6e6))] = (
-        None
-    )
-    polarity: Annotated[str | None, Parameter(metavar="NAME")] = None
-    rate_hz: Annotated[float | None, Parameter(metavar="HZ")] = None
 
 
 @dataclass(frozen=True)

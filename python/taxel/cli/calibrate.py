@@ -10,9 +10,9 @@ from cyclopts import Parameter
 import taxel
 from taxel._base.files import beside, named
 from taxel._core import ProblemError
-from taxel.cli._task import OutOption, Output, Reading, progress, say_warnings
+from taxel.cli._task import OutOption, Output, progress, say_warnings
 from taxel.cli.app import App, Flat
-from taxel.options import CalibrateOptions
+from taxel.options import CalibrateOptions, Reading
 
 app = App(name="calibrate")
 
@@ -60,7 +60,7 @@ def calibrate(
         raise ProblemError("--from and --to give the time of --load: give --load too")
     if start is not None and stop is not None and start > stop:
         raise ProblemError(f"--from {start} and --to {stop} s: --from must not be after --to")
-    opened = reading.opener.open_one(recording)
+    opened = reading.open_one(recording)
     file = beside(recording, f"{named(recording).stem}.calibration.json") if out is None else out
     output.check(file)
     with progress(output.json):

@@ -16,7 +16,6 @@ from taxel._base.files import check_writable
 from taxel._base.parallel import Workers
 from taxel._core import ProblemError
 from taxel.cli._task import (
-    FullReading,
     OutArgument,
     Output,
     SourceOption,
@@ -26,10 +25,10 @@ from taxel.cli._task import (
     say_failures,
 )
 from taxel.cli.app import App, Flat
+from taxel.options import FullReading
 
 if TYPE_CHECKING:
     from taxel.recording import Recording
-    from taxel.recording.text_options import TextOptions
 
 app = App(name="convert")
 
@@ -67,10 +66,10 @@ def convert(
     compression
         Compression of a .mcap: none, lz4 or zstd.
     """
-    from taxel.recording.opening import is_folder, recordings_in  # noqa: PLC0415  the command line starts quickly
+    from taxel.recording.kinds import is_folder, recordings_in  # noqa: PLC0415  the command line starts quickly
 
     how: dict[str, Any] = {"frames_hz": frames, "compression": compression, "overwrite": output.overwrite}
-    work = partial(_converted, reading.opener, part, how, target)
+    work = partial(_converted, reading, part, how, target)
     files = recordings_in(source, reading.layout) if source.exists() and is_folder(source) else []
     if not target.suffix and len(files) > 1:
         _refuse_twice([file.stem for file in files], target)
@@ -90,10 +89,10 @@ def convert(
 
 
 def _converted(
-    opener: TextOptions, part: str | None, how: Mapping[str, Any], target: Path, source: Path
+    reading: FullReading, part: str | None, how: Mapping[str, Any], target: Path, source: Path
 ) -> list[dict[str, Any]]:
     """Convert the recordings of a file, to a file or into a folder; return places and what the format lacks."""
-    opened = [of_source(recording, part) for recording in opener.open_trials(source)]
+    opened = [of_source(recording, part) for recording in reading.open_trials(source)]
     if target.suffix and len(opened) > 1:
         raise ProblemError(
             f"{source}: contains {len(opened)} recordings; {target} must be a folder, so its name must have no "

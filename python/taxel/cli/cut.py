@@ -14,8 +14,9 @@ from taxel import _core
 from taxel._base.messages import plain
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
-from taxel.cli._task import OutArgument, Output, Reading, SourceOption, of_source
+from taxel.cli._task import OutArgument, Output, SourceOption, of_source
 from taxel.cli.app import App, Flat, Limits
+from taxel.options import Reading
 
 if TYPE_CHECKING:
     from taxel.recording import Recording
@@ -70,7 +71,7 @@ def cut(
     """
     if start is not None and stop is not None and start > stop:
         raise ProblemError(f"--from {plain(start)} --to {plain(stop)}: the part must not end before it begins")
-    source_recording = of_source(reading.opener.open_one(recording), source)
+    source_recording = of_source(reading.open_one(recording), source)
     start_us, stop_us = _stretch_us(source_recording, start, stop)
     parts = taxel.cut(
         source_recording,

@@ -18,10 +18,10 @@ from taxel._base.messages import collected
 from taxel._base.parallel import Workers
 from taxel._base.times import begun
 from taxel.cli._say import say
-from taxel.cli._task import OutOption, Output, Reading, one_or_several, paths_text, progress, say_warnings
+from taxel.cli._task import OutOption, Output, one_or_several, paths_text, progress, say_warnings
 from taxel.cli.app import App, Flat
 from taxel.detections import Detections
-from taxel.options import DetectOptions
+from taxel.options import DetectOptions, Reading
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def detect(
     with progress(output.json) as update:
         update(f"reading {paths_text(recordings)}", 0, 0)
         with collected() as unread:
-            opened = reading.opener.open_sensors(recordings)
+            opened = reading.open_sensors(recordings)
         found = taxel.tasks.detect(loaded, opened, given, options, progress=update, workers=workers)
         found = replace(found, warnings=(*unread, *found.warnings))
     used = loaded.using(options.use) if isinstance(loaded, taxel.Readout) else loaded

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import taxel
 from taxel._core import ProblemError
-from taxel.cli._task import OutArgument, Output, Reading, progress, say_warnings
+from taxel.cli._task import OutArgument, Output, progress, say_warnings
 from taxel.cli.app import App, Flat
-from taxel.options import EncodeOptions
+from taxel.options import EncodeOptions, Reading
 
 app = App(name="encode")
 
@@ -39,7 +39,7 @@ def encode(
     output.check(out)
     with progress(output.json) as update:
         update(f"reading {recording}", 0, 0)
-        encoded = taxel.tasks.encode(reading.opener.open_one(recording), options, progress=update)
+        encoded = taxel.tasks.encode(reading.open_one(recording), options, progress=update)
     encoded.trains.save(out, overwrite=output.overwrite)
     say_warnings(encoded.warnings)
     result = {"recording": str(recording), **encoded.to_dict(), "written": str(out)}

@@ -23,16 +23,16 @@ from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._say import say
-from taxel.cli._task import FullReading, Output, over_files, progress, say_failures, say_warnings
+from taxel.cli._task import Output, over_files, progress, say_failures, say_warnings
 from taxel.cli._topics import list_topics
 from taxel.cli.app import OUTSIDE, App, Flat
 from taxel.clock import doubt
+from taxel.options import FullReading
 from taxel.spikes import SpikeTrains, to_ms
 
 if TYPE_CHECKING:
     from taxel.recording import Recording
     from taxel.recording.analysis.pressure import Series
-    from taxel.recording.text_options import TextOptions
 
 app = App(name="info")
 
@@ -83,7 +83,8 @@ def info(
         Print all facts about each recording of a folder.
     """
     from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
-    from taxel.recording.opening import are_spike_trains, is_folder, recordings_in  # noqa: PLC0415
+    from taxel.recording.kinds import are_spike_trains, is_folder, recordings_in  # noqa: PLC0415
+    from taxel.recording.reading_options import names_topic  # noqa: PLC0415
     from taxel.tasks.labels import are_trials, trial_name  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
@@ -97,13 +98,13 @@ def info(
         return 0
     files = recordings_in(file, reading.layout) if file.exists() and is_folder(file) else []
     if len(files) > 1 and picture is None and table is None:
-        return _of_files(file, files, partial(_infos, reading.opener, tare), workers, each=each, as_json=as_json)
+        return _of_files(file, files, partial(_infos, reading, tare), workers, each=each, as_json=as_json)
     with progress(as_json) as show:
         show(f"reading {file}", 0, 0)
-        if file.exists() and is_bag(file) and not reading.opener._names_topic(file):
+        if file.exists() and is_bag(file) and not names_topic(file, reading.topic, reading.layout):
             say(*list_topics(file, topics(file, reading.ros), as_json))
             return 0
-        recordings = reading.opener.open_trials(file)
+        recordings = reading.open_trials(file)
         recording = recordings[0]
         if len(recordings) > 1 or len(recording.sources) > 1:
             if table is not None:
@@ -139,9 +140,9 @@ def _code(of_each: Iterable[dict[str, Any]]) -> int:
     return OUTSIDE if any(source["truncated"] for source in sources) else 0
 
 
-def _infos(opener: TextOptions, tare: str | None, file: Path) -> list[dict[str, Any]]:
+def _infos(reading: FullReading, tare: str | None, file: Path) -> list[dict[str, Any]]:
     """Return the facts of the recordings of a file; their warnings are warned of again."""
-    found = [taxel.tasks.info(each, tare) for each in opener.open_trials(file)]
+    found = [taxel.tasks.info(each, tare) for each in reading.open_trials(file)]
     for text in (text for one in found for text in one.warnings):
         warn(text)
     return [one.facts for one in found]

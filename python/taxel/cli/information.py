@@ -12,9 +12,9 @@ from taxel._base.messages import counted
 from taxel._base.parallel import Workers
 from taxel._core import ProblemError
 from taxel.cli._say import say
-from taxel.cli._task import Output, Reading, progress, say_warnings
+from taxel.cli._task import Output, progress, say_warnings
 from taxel.cli.app import App, Flat
-from taxel.options import InformationOptions
+from taxel.options import InformationOptions, Reading
 
 if TYPE_CHECKING:
     from taxel.information import Answer, Estimate, Point
@@ -59,7 +59,7 @@ def information(
             opened = []
             for path in recordings:
                 update(f"reading {path}", 0, 0)
-                opened += reading.opener.open_sensors([path])
+                opened += reading.open_sensors([path])
             result = taxel.tasks.information(opened, labels, options, progress=update, watch=known.add, workers=workers)
             update("drawing", 0, 0)
             taxel.report.write_information(report, result.answer, overwrite=output.overwrite)

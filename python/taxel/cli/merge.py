@@ -8,8 +8,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 import taxel
-from taxel.cli._task import Output, Reading
+from taxel.cli._task import Output
 from taxel.cli.app import App, Flat, Limits
+from taxel.options import Reading
 
 app = App(name="merge")
 
@@ -42,7 +43,7 @@ def merge(
     label
         Merge only the half second before and after each note with this text.
     """
-    opened = [reading.opener.open_one(path) for path in recordings]
+    opened = [reading.open_one(path) for path in recordings]
     parts = opened if label is None else [part for each in opened for part in taxel.cut(each, label=label)]
     merged = taxel.merge(parts, gap_us=None if gap is None else gap * 1e6)
     lost = taxel.convert(merged, out, overwrite=output.overwrite)

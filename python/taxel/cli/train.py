@@ -13,9 +13,9 @@ import taxel
 from taxel._base.messages import collected
 from taxel._base.parallel import Workers
 from taxel.cli._say import say
-from taxel.cli._task import OutArgument, Output, Reading, one_or_several, paths_text, progress, say_warnings
+from taxel.cli._task import OutArgument, Output, one_or_several, paths_text, progress, say_warnings
 from taxel.cli.app import OUTSIDE, App, Flat
-from taxel.options import TrainOptions
+from taxel.options import Reading, TrainOptions
 
 app = App(name="train")
 
@@ -69,7 +69,7 @@ def train(
     with progress(output.json) as update:
         update(f"reading {paths_text(recordings)}", 0, 0)
         with collected() as unread:
-            opened = reading.opener.open_sensors(recordings)
+            opened = reading.open_sensors(recordings)
     say_warnings(unread)  # before the training, which may take long, and again with its result
     with progress(output.json) as update:
         training = taxel.train(opened, one_or_several(labels), options, progress=update, workers=workers)

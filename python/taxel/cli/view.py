@@ -14,14 +14,15 @@ from cyclopts import Parameter
 from taxel._core import ProblemError
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._say import say
-from taxel.cli._task import FullReading
 from taxel.cli._topics import list_topics
 from taxel.cli.app import App, Flat, JsonOption, SecondsOption
 from taxel.cli.console import Console
 from taxel.formats.ros import is_bag, topics
+from taxel.options import FullReading
 from taxel.panel import Panel
 from taxel.recording import Recording
-from taxel.recording.opening import is_folder, recordings_in
+from taxel.recording.kinds import is_folder, recordings_in
+from taxel.recording.reading_options import names_topic
 
 app = App(name="view")
 
@@ -57,7 +58,7 @@ def view(
     """
     console = Console(stderr=True, quiet=as_json)
     opening = _opening(reading, calibration, recording)
-    shown = Panel(recording, host=panel_host, port=panel_port, opens=opening, options=reading.opener)
+    shown = Panel(recording, host=panel_host, port=panel_port, opens=opening, options=reading)
     # Ctrl-C is the end that is awaited from the moment on at which the address is known.
     with shown as panel, contextlib.suppress(KeyboardInterrupt):
         if as_json:
@@ -76,13 +77,13 @@ def _opening(
         return None
     first = recordings[0]
     bag = is_bag(first)
-    if bag and not reading.opener._names_topic(first):
+    if bag and not names_topic(first, reading.topic, reading.layout):
         raise ProblemError(*list_topics(first, topics(first, reading.ros), as_json=False))
-    if not reading.opener.words() and calibration is None and not bag:
+    if not reading.words() and calibration is None and not bag:
         return None
 
     def opens(file: Path) -> list[Recording]:
-        opened = reading.opener.open_trials(file)
+        opened = reading.open_trials(file)
         if calibration is None:
             return opened
         return [sensor._calibrated_by(calibration) for sensor in opened]

@@ -211,11 +211,6 @@ class PrintedFrames:
     Raises
     ------
     ProblemError : a value of another kind
-
-    Examples
-    --------
-    >>> PrintedFrames("serial:COM3", baud=9600, leave_out=["name", 2]).options()
-    {'baud': '9600', 'leave_out': 'name:2'}
     """
 
     place: str
@@ -234,12 +229,6 @@ class PrintedFrames:
             integer("baud", self.baud, 1)
         _check_end(self)
         _check_columns(self, "columns", "leave_out")
-
-    def options(self) -> dict[str, str]:
-        """Return the keys of the source that are stated, except its place."""
-        stated = {name: getattr(self, name) for name in ("baud", "time", "frame_lines", "frame_end")}
-        listed = {name: ":".join(map(str, getattr(self, name))) for name in ("columns", "leave_out")}
-        return {name: str(value) for name, value in (stated | listed).items() if value not in (None, "")}
 
 
 @dataclass(frozen=True)
@@ -381,26 +370,6 @@ class Layout:
     def turned(self) -> float | None:
         """The number that readings are subtracted from, as they fall with pressure; None if they do not."""
         return 0.0 if self.falls is True else None if self.falls is False or self.falls is None else self.falls
-
-    def source_text(self) -> str:
-        """Return the text of its live source: KIND:PLACE and KEY=VALUE after commas.
-
-        Raises
-        ------
-        FormatError : it names no source, or no rows and columns
-        """
-        if self.source is None or self.rows is None or self.columns is None:
-            lacks = "[source] place is missing" if self.source is None else "rows and columns are missing"
-            raise FormatError(f"{self.path}: {lacks}; must be in the layout file of a live source")
-        pitch = "" if self.pitch_mm is None or isinstance(self.pitch_mm, tuple) else f"x{self.pitch_mm:g}"
-        keys = {"array": f"{self.rows}x{self.columns}{pitch}", **self.source.options()}
-        if self.unit is not None:
-            keys["unit"] = self.unit
-        if self.turned is not None:
-            keys["falls"] = "true" if self.falls is True else f"{self.turned:g}"
-        if self.rate_hz is not None:
-            keys["rate"] = f"{self.rate_hz:.17g}"
-        return ",".join([self.source.place, *(f"{key}={value}" for key, value in keys.items())])
 
     def grid(self) -> Array | None:
         """Return a sensor of its rows and columns; None if it does not state them."""

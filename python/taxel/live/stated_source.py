@@ -8,7 +8,7 @@ from pathlib import Path
 from taxel import _core
 from taxel._base.arguments import shown
 from taxel._base.messages import first_line
-from taxel._core import ProblemError
+from taxel._core import FormatError, ProblemError
 from taxel.array import Array, of_size
 from taxel.formats.layout import Layout, PrintedFrames
 from taxel.wire import Registers
@@ -60,6 +60,10 @@ class StatedSource:
     rate_hz: float | None = None
     preset: str = "5.2 kHz"
 
+    def __post_init__(self) -> None:
+        if self.rate_hz is not None and not 1 / 3600 <= self.rate_hz <= 1e6:
+            raise ProblemError(f"rate is {self.rate_hz:g} Hz: must be from 1 per hour to 1000000")
+
     @classmethod
     def of(cls, text: str) -> StatedSource:
         """Return what a text states, or the layout file that it names.
@@ -71,7 +75,7 @@ class StatedSource:
         """
         if text.endswith(".toml") and "," not in text:
             name, _, path = text.rpartition("=")
-            text = f"{name}=" * bool(name) + Layout.read(Path(path)).source_text()
+            return cls._of_layout(text, name, Layout.read(Path(path)))
         head, *pairs = text.split(",")
         before, is_named, after = head.partition("=")
         name, head = (before.strip(), after) if is_named and ":" not in before else ("", head)
@@ -97,11 +101,24 @@ class StatedSource:
             raise ProblemError(f"source {text!r}: {first_line(error)}") from None
 
     @classmethod
+    def _of_layout(cls, text: str, name: str, layout: Layout) -> StatedSource:
+        """Return what a layout file states."""
+        if layout.source is None or layout.rows is None or layout.columns is None:
+            lacks = "[source] place is missing" if layout.source is None else "rows and columns are missing"
+            raise FormatError(f"{layout.path}: {lacks}; must be in the layout file of a live source")
+        kind, _, place = layout.source.place.partition(":")
+        if kind not in _LINES or not place:
+            raise FormatError(f"{layout.path}: [source] place is {shown(layout.source.place)}: must be {_FORMS}")
+        source, array = layout.source, layout.array(layout.rows * layout.columns)
+        try:
+            return cls(text, "lines", name, source.place, array, source, layout.unit, layout.turned, layout.rate_hz)
+        except ProblemError as error:
+            raise FormatError(f"{layout.path}: {first_line(error)}") from None
+
+    @classmethod
     def _of_keys(cls, text: str, kind: str, name: str, place: str, keys: dict[str, str]) -> StatedSource:
         array = of_size(keys["array"], of_wire=kind == "board") if "array" in keys else None
         rate = _number("rate", keys.get("rate"))
-        if rate is not None and not 1 / 3600 <= rate <= 1e6:
-            raise ProblemError(f"rate is {rate:g} Hz: must be from 1 per hour to 1000000")
         if keys.get("unit") == "":
             raise ProblemError("unit is empty: must be the unit of the values, for example N or kPa")
         falls = keys.get("falls", "false")

@@ -13,13 +13,14 @@ from taxel._base.files import named
 from taxel._core import ProblemError
 from taxel.device import Cable
 from taxel.live import Live
+from taxel.options import FullReading
 from taxel.panel.hub import Hub
 from taxel.panel.server import Server
 from taxel.panel.shown_files import Opening
 from taxel.recording import Recording
 from taxel.recording.frames import period_us
-from taxel.recording.opening import check_recording, is_folder, recordings_in
-from taxel.recording.text_options import TextOptions
+from taxel.recording.kinds import check_recording, is_folder, recordings_in
+from taxel.recording.reading_options import layout_for
 
 
 class Panel:
@@ -44,8 +45,8 @@ class Panel:
         panel's address can see the board and set registers, over a connection that is not encrypted.
     opens : function of a path, optional
         Opens the recording that is shown first, or each file of a folder, and returns its trials; it must use
-        `options`. Default: `TextOptions.open_trials`.
-    options : taxel.recording.text_options.TextOptions, optional
+        `options`. Default: `FullReading.open_trials`.
+    options : taxel.options.FullReading, optional
         Facts that the files do not hold; the page uses them for training too. If `rate_hz` gives the times of frames,
         labels are saved as numbers of frames.
 
@@ -70,11 +71,11 @@ class Panel:
         port: int = 0,
         host: str = "127.0.0.1",
         opens: Callable[[Path], Sequence[Recording]] | None = None,
-        options: TextOptions | None = None,
+        options: FullReading | None = None,
     ) -> None:
         live = shows if isinstance(shows, Live) else None
         opened, shown = None, None
-        how = TextOptions() if options is None else instance("options", options, TextOptions)
+        how = FullReading() if options is None else instance("options", options, FullReading)
         if live is None:
             shown_path = Path(checked_path("shows", shows))
             if control is not None:
@@ -150,7 +151,7 @@ class Panel:
         return f"Panel({'ended' if self._stopped else self._url.partition('#')[0]})"
 
 
-def _folder_and_name(path: Path, options: TextOptions) -> tuple[Path, str]:
+def _folder_and_name(path: Path, options: FullReading) -> tuple[Path, str]:
     """Return the folder of a recording and its name there; of a folder its first recording.
 
     The server indexes it when a client opens it; a file that is not a recording is refused now.
@@ -162,7 +163,7 @@ def _folder_and_name(path: Path, options: TextOptions) -> tuple[Path, str]:
         path = files[0]
     if not path.exists():
         raise FileNotFoundError(2, "no such recording", str(path))
-    check_recording(path, options.layout_of(path))
+    check_recording(path, layout_for(path, options.layout, options.rate_hz))
     # A link is a recording of the folder in which it is, as elsewhere: its labels are beside it.
     path = named(path)
     path = path.parent.resolve() / path.name

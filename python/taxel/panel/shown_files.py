@@ -25,13 +25,14 @@ from taxel.formats import layout_text
 from taxel.formats.layout import Layout, layout_name
 from taxel.frames import Frames
 from taxel.labels import Labels, Note, beside, by_clock
+from taxel.options import FullReading
 from taxel.recording import Recording
 from taxel.recording.analysis.health import health, judge
 from taxel.recording.analysis.rest import flickering, loaded_from, of_frames, ticks_by_unit
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
-from taxel.recording.opening import is_recording
-from taxel.recording.text_options import TextOptions
+from taxel.recording.kinds import is_recording
+from taxel.recording.reading_options import layout_for
 
 #: A text table of more bytes than the first number is shown by its beginning first, of as many bytes as the second.
 _LARGE, _BEGINNING = 8 << 20, 1 << 19
@@ -128,26 +129,27 @@ class Opening:
         Opens a file, with the feet of each trial joined.
     file : path, optional
         The file that is opened so; default: each file.
-    options : TextOptions
+    options : FullReading
         Those by which it is opened so. Labels of numbered frames that have times by its `rate_hz` are in numbers of
         frames.
     """
 
-    opens: Callable[[Path], Sequence[Recording]] = TextOptions().open_trials
+    opens: Callable[[Path], Sequence[Recording]] = FullReading().open_trials
     file: Path | None = None
-    options: TextOptions = field(default_factory=TextOptions)
+    options: FullReading = field(default_factory=FullReading)
 
     def open(self, file: Path) -> Sequence[Recording]:
         """Open a file."""
-        return self.opens(file) if self.file in (None, file) else TextOptions().open_trials(file)
+        return self.opens(file) if self.file in (None, file) else FullReading().open_trials(file)
 
     def is_recording(self, file: Path) -> bool:
         """Return whether a file is a recording by its name, its first bytes and its layout."""
-        return is_recording(file, self.options_of(file).layout_of(file))
+        options = self.options_of(file)
+        return is_recording(file, layout_for(file, options.layout, options.rate_hz))
 
-    def options_of(self, file: Path) -> TextOptions:
+    def options_of(self, file: Path) -> FullReading:
         """Return the options by which a file is opened."""
-        return self.options if self.file in (None, file) else TextOptions()
+        return self.options if self.file in (None, file) else FullReading()
 
     def unit_us(self, table: Path) -> float:
         """Return how many us a unit of time in a table of labels is."""

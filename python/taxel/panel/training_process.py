@@ -1,6 +1,6 @@
 """Trains a readout in a process of its own, so that nothing that is received waits: the page starts it.
 
-It reads one JSON object from standard input, to its end: `recording` (a path), `open` (fields of `TextOptions` by which
+It reads one JSON object from standard input, to its end: `recording` (a path), `open` (fields of `FullReading` by which
 it is opened) and `out` (where the readout is written, also over an older one). It writes one JSON object a line to
 standard output::
 
@@ -25,7 +25,7 @@ from taxel._base.messages import collected, escaped
 from taxel._base.progress import Progress
 from taxel._base.stopping import leave, stop_on_signals
 from taxel._core import Error, ProblemError
-from taxel.recording.text_options import TextOptions
+from taxel.options import FullReading
 from taxel.tasks.train import train
 
 __all__ = ["run"]
@@ -47,7 +47,7 @@ def run(request: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
     recording = Path(request["recording"])
     with collected() as warnings:
         progress(f"reading {recording}", 0, 0)
-        training = train(TextOptions(**request["open"]).open_sensors([recording]), progress=progress)
+        training = train(FullReading(**request["open"]).open_sensors([recording]), progress=progress)
     if not training.learnt:
         raise ProblemError("; ".join(["no label is learnt, so nothing is written", *training.unreliable()]))
     training.readout.save(request["out"], overwrite=True)

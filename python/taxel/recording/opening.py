@@ -1,110 +1,46 @@
-"""Opens recordings: taxel's own files, and those of other programs by the first format that knows them."""
+"""Opens recordings: taxel's own files, and those of other programs by the first kind that knows them."""
 
 from __future__ import annotations
 
 import os
-import re
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import cache
-from importlib.metadata import entry_points
+from collections.abc import Sequence
 from pathlib import Path
 from shlex import quote
-from typing import TypeAlias
 
-from taxel import _core
 from taxel._base import arguments
-from taxel._base.arguments import checked_path, flag, instance, shown
-from taxel._base.arrays import fields_of, stored_names
+from taxel._base.arguments import instance, shown
 from taxel._base.errors import refused
 from taxel._base.limits import available
 from taxel._base.messages import first_line, warn
 from taxel._base.options import with_fields_of
 from taxel._core import FormatError, ProblemError
-from taxel.array import Array
 from taxel.events import Events
-from taxel.formats import emed, event_camera, moticon, pedar, tekscan, xdf
 from taxel.formats.checks import check_table
-from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction, reduced
-from taxel.formats.foreign import ARRAYS, TABLES, check_foreign, read_foreign, refuse_container
-from taxel.formats.layout import Layout, advice
-from taxel.formats.ros import Topics, is_bag, read_ros
+from taxel.formats.layout import Layout
+from taxel.formats.ros import is_bag
 from taxel.labels import Labels, trial_of
-from taxel.reading import ENDINGS, Facts, InMemory, Reader
-from taxel.recording.beside import LABELS, is_label_table, labels_for
-from taxel.recording.layout import apply_layout, check_size
-from taxel.recording.readers.columns import EVENTS, SENSOR, is_h5_of_taxel, is_table, read_columns, read_records
-from taxel.recording.readers.csv import check_head, is_of_taxel, read_csv
-from taxel.recording.readers.lsa import read_lsa
-from taxel.recording.readers.mcap import read_mcap
+from taxel.reading import ENDINGS, InMemory, Reader
+from taxel.recording.beside import LABELS, labels_for
+from taxel.recording.kinds import (
+    FOREIGN,
+    MAKERS,
+    OpenOptions,
+    are_spike_trains,
+    check_recording,
+    empty,
+    files_in,
+    is_folder,
+    kind_of,
+    kinds,
+    layout_of,
+    natural_order,
+    recordings_in,
+    unknown,
+)
+from taxel.recording.layout import apply_layout
 from taxel.recording.recording import Recording
 from taxel.recording.source import SourceView
-
-#: A layout, the path of one, or None for the layout file beside a recording, if there is one.
-GivenLayout: TypeAlias = str | os.PathLike[str] | Layout | None
-#: Files of makers and of recorders, and what reads them.
-MAKERS = {"moticon": moticon, "pedar": pedar, "emed": emed, "tekscan": tekscan, "xdf": xdf}
-#: Kinds of files of other programs, which a layout may describe.
-_FOREIGN = ("table", "arrays")
-#: The endings of those that may be tables of labels.
-_LABELS = (".csv", ".txt", ".tsv")
-#: The endings of those that are something else in most folders.
-_RARE = (".json", ".log")
-
-
-@dataclass(frozen=True, kw_only=True)
-class SharedOptions:
-    """Hold how files are opened, as `open_one` documents it; only subclasses state the type of `array`."""
-
-    array: object = None
-    layout: str | os.PathLike[str] | None = None
-    topic: str | Sequence[str] | None = None
-    field: str | Sequence[str] | None = None
-    ros: str | None = None
-    region: str | None = None
-    bin: int | None = None
-    window_ms: float | None = None
-    polarity: str | None = None
-    label_column: str | int | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class OpenOptions(SharedOptions):
-    """Hold the keyword arguments of `open_one`, which documents each, and of `open_all`."""
-
-    array: Array | Sequence[Array] | None = None
-    differences: bool = False
-
-    @property
-    def topics(self) -> Topics:
-        """Topics of a ROS bag that are opened."""
-        return Topics(self.topic, self.field, self.ros)
-
-    @property
-    def reduction(self) -> Reduction:
-        """Selection of the events of a camera."""
-        return Reduction(self.region, self.bin, self.window_ms, self.polarity)
-
-    def check(self, path: Path, kind: str) -> None:
-        """Refuse what is only for files of another kind.
-
-        Raises
-        ------
-        ProblemError : topics of a file that is no ROS bag, or what is read of a camera's events for one of a maker
-        """
-        flag("differences", self.differences)
-        if self.topics.are_given and kind != "ros":
-            raise ProblemError(f"{path}: is not a ROS bag; topic, field and ros are only for ROS bags")
-        if self.label_column is not None and kind != "table":
-            raise refused("label_column", f" is {shown(self.label_column)}: is only for tables; {path} is none")
-
-
-def _no_camera(path: Path) -> ProblemError:
-    return ProblemError(
-        f"{path}: region, bin, window_ms and polarity are only for events without intensities, for example of an event "
-        "camera; this file has no such events"
-    )
 
 
 @with_fields_of(OpenOptions)
@@ -236,259 +172,6 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
     return _open(Path(arguments.checked_path("path", path)), options)
 
 
-@dataclass(frozen=True)
-class Kind:
-    """Say how files of a kind are known, and how they are read.
-
-    Other distributions add theirs by entry points of the group ``taxel.formats``: an object with these attributes.
-
-    Parameters
-    ----------
-    knows : function of a path
-        Returns whether a file, or a folder, is of this kind.
-    read : function of a path and its layout, or None
-        Returns a reader of each source; readers of one name are the sources of one recording.
-    """
-
-    knows: Callable[[Path], bool]
-    read: Callable[[Path, Layout | None], Sequence[Reader]]
-
-
-def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
-    """Yield the kinds of files with their names, in the order in which they are tried.
-
-    Files that taxel writes come first, then formats of other distributions, which are looked for only if it is none.
-    """
-    how = OpenOptions() if options is None else options
-    of_topics = isinstance(how.array, list | tuple) and all(isinstance(each, Array) for each in how.array)
-    array = None if how.array is None or of_topics else Array._given(how.array)
-
-    def read_arrays(path: Path, layout: Layout | None) -> Sequence[Reader]:
-        return [_on_given(each, array) for each in read_foreign(path, layout, array, how.label_column)]
-
-    def read_camera(path: Path, layout: Layout | None) -> Sequence[Reader]:
-        reduction = how.reduction.but(None if layout is None else layout.event_camera)
-        size = layout.grid() if array is None and layout is not None else array
-        table = event_camera.read_events(path, reduction, size)
-        return [InMemory(Facts(path=path, array=table.array, kind="event_camera"), table)]
-
-    def read_bag(path: Path, layout: Layout | None) -> Sequence[Reader]:
-        grid = layout.grid() if how.array is None and layout is not None else how.array
-        return read_ros(path, how.topics.but({} if layout is None else layout.ros), grid)
-
-    def read_events(path: Path, layout: Layout | None) -> Sequence[Reader]:
-        return [read_records(path, layout.grid() if array is None and layout is not None else array)]
-
-    def read_npz(path: Path, layout: Layout | None) -> Sequence[Reader]:
-        names = stored_names(path)
-        # Other programs name their times t too.
-        is_foreign = SENSOR not in names and layout is not None and layout.data is not None
-        return read_arrays(path, layout) if is_foreign else [read_columns(path, array)]
-
-    yield from {
-        "ros": Kind(is_bag, read_bag),
-        "lsa": Kind(_ending(".lsa"), lambda path, _: [read_lsa(path, array, differences=how.differences)]),
-        "mcap": Kind(_is_mcap, lambda path, _: read_mcap(path)),
-        "h5": Kind(is_h5_of_taxel, lambda path, _: [read_columns(path, array)]),
-        "csv": Kind(_is_csv, lambda path, _: [read_csv(path, array)]),
-        "records": Kind(lambda path: set(EVENTS) <= set(fields_of(path)), read_events),
-    }.items()
-    yield from _from_elsewhere().items()
-    yield from {
-        **{name: Kind(maker.knows, maker.read) for name, maker in MAKERS.items()},
-        "event_camera": Kind(event_camera.knows, read_camera),
-        "npz": Kind(_is_npz, read_npz),
-        "arrays": Kind(lambda path: _ending(*ARRAYS)(path) and not are_spike_trains(path), read_arrays),
-        "table": Kind(_is_table, read_arrays),
-    }.items()
-
-
-@cache
-def _from_elsewhere() -> dict[str, Kind]:
-    """Return the formats of other distributions."""
-    return {point.name: point.load() for point in entry_points(group="taxel.formats")}
-
-
-def _ending(*endings: str) -> Callable[[Path], bool]:
-    """Return a function of whether a file, perhaps compressed by gzip, has one of some endings."""
-    return lambda path: path.is_file() and Path(path.name.removesuffix(".gz")).suffix.lower() in endings
-
-
-def _is_mcap(path: Path) -> bool:
-    """Return whether a file is a .mcap by its ending or its first bytes."""
-    if not path.is_file():
-        return False
-    with open(path, "rb") as file:
-        return path.suffix.lower() == ".mcap" or file.read(8) == b"\x89MCAP0\r\n"
-
-
-def _is_csv(path: Path) -> bool:
-    """Return whether the first line of a .csv begins as taxel's own recordings do; a table of labels is none."""
-    if not _ending(".csv")(path) or path.suffix.lower() != ".csv" or is_label_table(path):
-        return False
-    return is_of_taxel(path)
-
-
-def _is_npz(path: Path) -> bool:
-    """Return whether a .npz holds the columns of a table; true of a damaged one, which opening it reports."""
-    names = stored_names(path) if _ending(".npz")(path) else ("none",)
-    return not names or is_table(names)
-
-
-def _is_table(path: Path) -> bool:
-    return _ending(*TABLES)(path) and not (path.suffix.lower() in _LABELS and is_label_table(path))
-
-
-def _on_given(reader: InMemory, array: Array | None) -> Reader:
-    """Return frames of another program on the given sensor: as many rows and columns, or a row of as many channels.
-
-    Raises
-    ------
-    ProblemError : another number of taxels, rows or columns
-    """
-    stated, table = reader.facts.array, reader.data
-    if array is None or isinstance(table, Events):
-        return reader
-    if stated.shape != (1, array.rows * array.columns):
-        check_size(reader.facts.path, stated.shape, array)
-    says_more = array.shape != stated.shape or (array._is_measured and not stated._is_measured)
-    return replace(reader, data=table._on(replace(array, names=array.names or stated.names))) if says_more else reader
-
-
-def kind_of(path: Path) -> str | None:
-    """Return the name of the format of a file or a folder; None if no format knows it.
-
-    Raises
-    ------
-    OSError : the path is not there, or cannot be read
-    """
-    path.stat()
-    return next((name for name, kind in kinds() if kind.knows(path)), None)
-
-
-def is_recording(path: Path, layout: GivenLayout = None) -> bool:
-    """Return whether a path is a recording; what is damaged inside shows only when it is opened."""
-    try:
-        kind = kind_of(path)
-        return kind is not None and (kind not in _FOREIGN or _is_usual(path) or _describes(layout, path))
-    except (FormatError, OSError):
-        return False
-
-
-def _describes(given: GivenLayout, path: Path) -> bool:
-    """Return whether a layout is given or beside a file; one of arrays alone describes no text."""
-    layout = layout_of(path, given)
-    of_arrays = layout is not None and layout.data is not None and layout.table is None
-    return layout is not None and (not of_arrays or path.suffix.lower() in ARRAYS)
-
-
-def check_recording(path: Path, layout: GivenLayout = None) -> None:
-    """Refuse a path that is not a recording by its name, its first bytes, and its layout file.
-
-    Raises
-    ------
-    FormatError : no recording; an invalid layout file; a table or arrays that can be read in two ways
-    """
-    found = layout_of(path, layout)
-    match kind_of(path):
-        case None:
-            raise _unknown(path)
-        case "mcap":
-            _core.RecordingReader(path)
-        case "csv":
-            check_head(path)
-        case "table" | "arrays":
-            check_foreign(path, found)
-
-
-def is_folder(path: Path) -> bool:
-    """Return whether a path is a folder, and no ROS bag."""
-    return path.is_dir() and not is_bag(path)
-
-
-def layout_of(path: Path, layout: GivenLayout) -> Layout | None:
-    """Return what the given layout file says, or the one beside a recording; None if there is none."""
-    if isinstance(layout, Layout):
-        return layout
-    file = Layout.beside(path) if layout is None else Path(checked_path("layout", layout))
-    return None if file is None else Layout.read(file)
-
-
-def files_in(folder: Path) -> list[Path]:
-    """Return the files and folders in a folder but its table of labels, in the order of their names: 2 before 10."""
-    found = (file for file in folder.iterdir() if file.name != LABELS and (file.is_file() or file.is_dir()))
-    return sorted(found, key=natural_order)
-
-
-def recordings_in(folder: Path, layout: GivenLayout = None) -> list[Path]:
-    """Return what of a folder is a recording, ROS bags last, in the order of the names: 2 before 10.
-
-    Tables and arrays of other programs count in a folder that holds nothing else.
-    """
-    named = {file: kind for file in files_in(folder) if (kind := _kind_in_folder(file)) is not None}
-    own = [file for file, kind in named.items() if kind in (*ENDINGS.values(), "records")]
-    # An empty file beside others of its ending has lost its content: opening it says so.
-    endings = {file.suffix for file in own}
-    empty = [
-        file for file, kind in named.items() if kind in _FOREIGN and file.suffix in endings and not file.stat().st_size
-    ]
-    own = sorted([*own, *empty], key=natural_order)
-    bags = [file for file, kind in named.items() if kind == "ros"]
-    makers = [file for file, kind in named.items() if kind not in (*_FOREIGN, "ros")]
-    foreign = [] if bags else [file for file in named if named[file] in _FOREIGN]
-    tables = [file for file in foreign if _is_usual(file) or _describes(layout, file)]
-    return [*(own or makers or tables), *bags]
-
-
-def _kind_in_folder(file: Path) -> str | None:
-    """Return the format of something in a folder; None of what cannot be read, and of folders that are no ROS bags."""
-    try:
-        return kind_of(file) if file.is_file() or is_bag(file) else None
-    except OSError:
-        # Opening it raises the error.
-        return ENDINGS.get(file.suffix.lower())
-
-
-def _is_usual(file: Path) -> bool:
-    """Return whether a table or an array is a recording of its folder, also without a layout file."""
-    return Path(file.name.removesuffix(".gz")).suffix.lower() not in _RARE and not file.name.endswith(".notes.csv")
-
-
-def natural_order(path: Path) -> list[tuple[bool, int, str]]:
-    """Return the sort key of a name in natural order: 2 before 10."""
-    return [(part.isdecimal(), int(part) if part.isdecimal() else 0, part) for part in re.split(r"([0-9]+)", str(path))]
-
-
-def are_spike_trains(path: Path) -> bool:
-    """Return whether a file holds the arrays that `SpikeTrains.save` writes."""
-    is_npz = path.suffix.lower() == ".npz" and path.is_file()
-    return is_npz and {"times", "offsets", "start", "stop"} <= set(stored_names(path))
-
-
-def _unknown(path: Path) -> FormatError:
-    """Return the error of a path that no format knows."""
-    if path.suffix.lower() in _LABELS and is_label_table(path):
-        return FormatError(f"{path}, line 1: a table of labels (docs/howto.md), not a recording")
-    if are_spike_trains(path):
-        return FormatError(
-            f"{path}: contains spike trains, not a recording; to describe them, run taxel info; to read them in "
-            "Python, call taxel.SpikeTrains.load"
-        )
-    refuse_container(path)
-    with open(path, "rb") as file:
-        head = file.read(4)
-    if not head:
-        return _empty(path)
-    describes = advice(path, "describe a table or an array of another program")
-    known = f"{', '.join(ENDINGS)}, and of event cameras {', '.join(CAMERA)}"
-    begins = " ".join(f"{byte:02X}" for byte in head)
-    return FormatError(f"{path}, byte 0: starts with {begins}: not a recording; taxel reads {known}; {describes}")
-
-
-def _empty(path: Path) -> FormatError:
-    return FormatError(f"{path}: the file is empty; must be a recording")
-
-
 def _open(path: Path, options: OpenOptions) -> list[Recording]:
     """Open all recordings of a folder, or all trials of a file, with the labels of the tables beside them."""
     if is_folder(path):
@@ -506,9 +189,9 @@ def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[
     """Open a file, a ROS bag, or a folder of a maker by its layout; each trial is a recording."""
     kind = kind_of(path)
     if kind is None:
-        raise _unknown(path)
+        raise unknown(path)
     if path.is_file() and kind not in ("lsa", "mcap") and not path.stat().st_size:
-        raise _empty(path)
+        raise empty(path)
     options.check(path, kind)
     before = path.stat()
     try:
@@ -529,6 +212,13 @@ def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[
         given = options.layout is not None
         opened = [each._each(lambda source: apply_layout(source, layout, given=given)) for each in opened]
     return opened if kind == "event_camera" else [_of_camera(each, path, options.reduction, layout) for each in opened]
+
+
+def _no_camera(path: Path) -> ProblemError:
+    return ProblemError(
+        f"{path}: region, bin, window_ms and polarity are only for events without intensities, for example of an event "
+        "camera; this file has no such events"
+    )
 
 
 def _of_camera(recording: Recording, path: Path, given: Reduction, layout: Layout | None) -> Recording:
@@ -561,7 +251,7 @@ def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
     found = recordings_in(folder, options.layout)
     if not options.topics.topic and not all(map(is_bag, found)):
         found = [file for file in found if not is_bag(file)]
-    whole = {str(kind_of(file)) for file in found} - {*ENDINGS.values(), "records", "ros", *_FOREIGN}
+    whole = {str(kind_of(file)) for file in found} - {*ENDINGS.values(), "records", "ros", *FOREIGN}
     if len(whole) > 1:
         raise FormatError(f"{folder}: contains several formats ({', '.join(sorted(whole))}): name one file")
     if not found:
