@@ -37,7 +37,7 @@ def palms(folder, name, count=40):
 @contextmanager
 def shown(path, **options):
     """A client of a panel with options, in this process."""
-    with Panel(path, options=TextOptions(**options)) as panel, Client(panel) as page:
+    with Panel(path, options=FullReading(**options)) as panel, Client(panel) as page:
         yield page
 
 
