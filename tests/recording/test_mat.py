@@ -33,19 +33,20 @@ def save(place: Path, arrays: dict[str, NDArray[np.generic]], how: str) -> None:
     ("how", "dtype"),
     [*(("-v7", dtype) for dtype in ("f8", "f4", "u1", "i2", ">f8", "u8")), ("-v6", "f8"), ("-v7.3", "f8")],
 )
-@pytest.mark.parametrize("frames", ["first", "last"])
+@pytest.mark.parametrize("is_last", [False, True])
 @pytest.mark.parametrize("shape", [(4, 6), (24,), (1,), (1, 1)])
 def test_frames_are_those_that_were_saved(
-    how: str, frames: str, dtype: str, shape: tuple[int, ...], tmp_path: Path
+    how: str, is_last: bool, dtype: str, shape: tuple[int, ...], tmp_path: Path
 ) -> None:
     random = np.random.default_rng(1)
     values = random.integers(0, 200, (50, *shape)).astype(dtype)
     t = np.arange(50.0) / 25
     place = tmp_path / "walk.mat"
-    stored = np.moveaxis(values, 0, -1) if frames == "last" else values
+    stored = np.moveaxis(values, 0, -1) if is_last else values
     save(place, {"pressure": stored, "time_s": t[:, None], "left": np.array(3.0)}, how)
     # Without a layout, the times say which axis counts frames.
-    for text in ("", TIMED + f'frames = "{frames}"\n'):
+    inner = "row column" if len(shape) > 1 else "taxel"
+    for text in ("", TIMED + (f'axes = "{inner} time"\n' if is_last else "")):
         if text:
             (tmp_path / "walk.layout.toml").write_text(text)
         read = recorded(taxel.open(place))

@@ -147,8 +147,8 @@ def _axes(
     def with_time_at(axis: int) -> Data:
         return replace(how, axes=" ".join([*inner[:axis], "time", *inner[axis:]]))
 
-    if is_said or how.frames == "last":
-        return with_time_at(len(shape) - 1 if how.frames == "last" else 0), []
+    if is_said:
+        return with_time_at(0), []
     # Times are an array of their name, of as many as one axis counts.
     counts = {name: math.prod(size) for name, size in stored.items() if time_unit(name) is not None}
     named = next((name for name, count in counts.items() if shape.count(count) == 1), None)

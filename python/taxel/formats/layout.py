@@ -158,11 +158,9 @@ class Data:
     time : str, optional
         An array with a time for each frame; default: none.
     time_unit : {"s", "ms", "us", "ns"}
-    frames : {"first", "last"}
-        Which axis of the array counts frames; MATLAB's are often (rows, columns, frames) or (taxels, frames).
     axes : str, optional
-        What each axis counts, in their order, instead of `frames`: "time", and of "trial", "row", "column", "taxel"
-        and "axis" (x, y, z) those that there are, as "row time column".
+        What each axis counts, in their order: "time", and of "trial", "row", "column", "taxel" and "axis" (x, y, z)
+        those that there are, as "row time column"; default: the first counts frames.
 
     Raises
     ------
@@ -172,7 +170,6 @@ class Data:
     array: str | None = None
     time: str | None = None
     time_unit: str = "s"
-    frames: str = "first"
     axes: str | None = None
 
     def __post_init__(self) -> None:
@@ -180,7 +177,6 @@ class Data:
             if getattr(self, name) is not None:
                 text(name, getattr(self, name))
         text("time_unit", self.time_unit, UNITS_US)
-        text("frames", self.frames, ("first", "last"))
         if self.axes is not None:
             named = text("axes", self.axes).split()
             if len(set(named)) < len(named) or "time" not in named or not set(named) <= set(_AXES_OF_ARRAYS):
