@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import mixed
 from loopback import until
 
 import taxel
@@ -24,8 +25,7 @@ FORMS = {
 }
 
 
-@pytest.mark.parametrize("stated", ["time=1:iso", "time=1", ""])
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(("form", "stated"), mixed([*FORMS], ["time=1:iso", "time=1", ""]))
 def test_times_live_are_those_of_the_file(tmp_path: Path, form: str, stated: str) -> None:
     rng = np.random.default_rng(len(form))
     write, separator = FORMS[form]

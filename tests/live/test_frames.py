@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import mixed
 from loopback import until
 from mcap.reader import make_reader
 from numpy.typing import NDArray
@@ -85,13 +86,16 @@ def readout_of(rows: int, columns: int, unit: str) -> Readout:
 
 
 @pytest.mark.parametrize(
-    ("rows", "columns", "unit"),
-    [(1, 1, "counts"), (1, 6, "kPa"), (3, 5, "kPa"), (16, 16, "N"), (64, 64, "counts")],
+    ("shape", "kind"),
+    mixed(
+        [(1, 1, "counts"), (1, 6, "kPa"), (3, 5, "kPa"), (16, 16, "N"), (64, 64, "counts")],
+        ["readout", "rule"],
+    ),
 )
-@pytest.mark.parametrize("kind", ["readout", "rule"])
 def test_a_readout_detects_the_same_live_and_in_the_recording_beside_it(
-    tmp_path: Path, rows: int, columns: int, unit: str, kind: str
+    tmp_path: Path, shape: tuple[int, int, str], kind: str
 ) -> None:
+    rows, columns, unit = shape
     rng = np.random.default_rng(rows * columns)
     values = touches(rng, rows, columns, 300, unit)
     t = np.cumsum(rng.integers(PERIOD_US - 900, PERIOD_US + 900, len(values))) + 5_000_000_000
@@ -115,8 +119,9 @@ def test_a_readout_detects_the_same_live_and_in_the_recording_beside_it(
     assert (frames.unit, recording.frame_us) == (unit, live.frame_us)
     assert summary.verdict.status == recording.verdict.status == "complete after arrival"
     assert summary.verdict == recording.verdict
-    assert (
-        recording.verdict == "nothing lost after arrival (lines are not numbered, so losses before arrival are unknown)"
+    # A busy machine may have been silent for a second meanwhile, which the verdict says too.
+    assert recording.verdict.startswith(
+        "nothing lost after arrival (lines are not numbered, so losses before arrival are unknown)"
     )
     expected = run(detector, recording)
     assert len(expected) >= 5

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from taxel import Array
-from taxel._core import ProblemError
 
 
 @given(st.integers(1, 50), st.integers(1, 50))
@@ -39,16 +38,6 @@ def test_the_mask_is_a_copy_that_cannot_be_changed() -> None:
     assert array.taxels == 4
     with pytest.raises(ValueError, match="read-only"):
         array.exists[0, 0] = False
-
-
-def test_the_thesis_array_is_64_by_64() -> None:
-    assert Array.thesis() == Array(64, 64, 2.67, name="thesis 64x64")
-
-
-@pytest.mark.parametrize(("x", "y"), [(8, 0), (-1, 0), (0, 8), ("a", 0), ([0, 1], [0, 1, 2]), (0.5, 0), (None, 0)])
-def test_a_taxel_that_is_not_there_has_no_index(x: object, y: object) -> None:
-    with pytest.raises(ProblemError):
-        Array(8, 8).index(x, y)
 
 
 @given(

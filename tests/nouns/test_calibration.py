@@ -85,16 +85,6 @@ def test_a_fit_to_several_loads_finds_gain_and_exponent(exponent, gain, seed):
     assert [made for *_, made in found.loads] == pytest.approx([load.load for load in loads], rel=1e-3)
 
 
-def test_the_residual_is_how_far_the_loads_are_missed():
-    read = np.ones((1, *ARRAY.shape))
-    loads = [Load(frames(read), 12.0 * 1.1), Load(frames(read * 2), 24.0 * 0.9), Load(frames(read * 4), 48.0)]
-    found = Calibration.fit(loads, exponent=1.0, date=DAY)
-    share = np.array([1 / 1.1, 1 / 0.9, 1.0])
-    gain = share.sum() / (share**2).sum()
-    assert found.gain == pytest.approx(np.full(ARRAY.shape, gain))
-    assert found.residual == pytest.approx(np.sqrt(np.mean((gain * share - 1) ** 2)))
-
-
 def test_two_loads_that_two_exponents_fit_are_said_to_be_too_few():
     """One strong taxel and six weak ones against four in between."""
     strong, between = np.zeros((2, 1, *ARRAY.shape))
@@ -147,14 +137,6 @@ def test_a_recording_finds_the_calibration_beside_it(tmp_path, name):
     assert np.array_equal(recording.calibrated().values, calibration.apply(recording.frames()).values)
     # Values are converted to N only on request: encoders and readouts receive them as they were read.
     assert recording.frames().unit == "counts"
-
-
-def test_without_one_nothing_is_called_newton(tmp_path):
-    taxel.convert(frames(5.0), tmp_path / "press.npz")
-    recording = taxel.open(tmp_path / "press.npz")
-    assert recording.calibration is None
-    with refused():
-        recording.calibrated()
 
 
 def test_a_calibration_of_another_array_is_one_clear_error(tmp_path):

@@ -76,14 +76,6 @@ def test_tares_readouts_and_recordings_of_events_keep_all_of_a_sensor(
 
 
 @pytest.mark.parametrize(
-    "value", [0.0, -1.0, np.nan, np.inf, (1.0,), (1.0, 2.0, 3.0), (1.0, 0.0), "wide", [[1.0, 2.0]]]
-)
-def test_a_pitch_that_makes_no_sense_is_refused(value: Any) -> None:
-    with refused(argument="pitch_mm"):
-        Array(2, 2, pitch_mm=value)
-
-
-@pytest.mark.parametrize(
     ("make", "argument"),
     [
         (lambda: Array(2, 2, 1.0, places=Places(np.zeros(4), np.zeros(4))), None),
@@ -99,18 +91,6 @@ def test_places_that_make_no_sense_are_refused(make: Callable[[], object], argum
         make()
 
 
-def test_places_of_taxels_that_do_not_exist_do_not_matter() -> None:
-    there = np.array([[True, False]])
-    one = Array(1, 2, exists=there, places=Places([1.0, np.nan], [2.0, np.inf], [3.0, -1.0]))
-    assert one == Array(1, 2, exists=there, places=Places([1.0, 7.0], [2.0, 8.0], [3.0, 9.0]))
-
-
-def test_the_unit_of_a_centre_says_what_is_known() -> None:
-    units = [Array(2, 2, 3.0), PLATE, FOOT, VAGUE, Array(2, 3), Array(1, 3), Array(3, 1), Array(1, 1), Array(1, 3, 2.0)]
-    assert [a.centre_unit for a in units] == ["mm", "mm", "mm", "places", "taxels", None, None, None, "mm"]
-    assert [a.is_channels for a in units] == [False] * 5 + [True] * 3 + [False]
-
-
 def test_area_and_centre_use_both_pitches_and_each_place() -> None:
     values = np.zeros((1, 4, 3))
     values[0, 2, 1], values[0, 0, 0] = 3.0, 1.0
@@ -122,16 +102,6 @@ def test_area_and_centre_use_both_pitches_and_each_place() -> None:
         np.testing.assert_allclose(Frames(weights, [0], array=array).centre(), [[40 / 8, 44 / 8]])
     np.testing.assert_allclose(Frames(weights, [0], array=FOOT).area(above=1.5), [10.0])
     assert Frames(weights, [0], array=VAGUE).loaded(above=1.5).tolist() == [2]
-
-
-def test_without_a_pitch_a_grid_counts_in_columns_and_rows_and_channels_refuse() -> None:
-    grid = Frames([[[0.0, 2.0], [0.0, 2.0]]], [0])
-    assert grid.centre().tolist() == [[1.0, 0.5]]
-    assert grid.loaded().tolist() == [2]
-    channels = Frames([[[0.0, 2.0]]], [0])
-    for method in (grid.area, channels.area, channels.centre):
-        with refused():
-            method()
 
 
 @pytest.mark.parametrize(

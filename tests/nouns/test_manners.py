@@ -115,13 +115,6 @@ def _values(of: SpikeTrains, k: int) -> np.ndarray:
     return np.ones(len(of[k])) if of.values is None else of.values[of.offsets[k] : of.offsets[k + 1]]
 
 
-@pytest.mark.parametrize("noun", [drawn(1, 3), trains(1, signed=True), found(1, 3)])
-def test_a_noun_and_something_else_are_python_s_own_error(noun: Any) -> None:
-    for other in (5, None, [1], "x"):
-        with pytest.raises(TypeError, match="unsupported operand"):
-            noun + other
-
-
 def test_tables_of_pandas_hold_the_columns() -> None:
     pandas = pytest.importorskip("pandas")
     events = drawn(3, 20)
@@ -166,18 +159,6 @@ def test_a_notebook_shows_the_line_and_a_small_picture(tmp_path: Any) -> None:
             assert picture.startswith(b"\x89PNG")
             assert len(picture) < 60_000
     assert plt.get_fignums() == before, "no figure stays open"
-
-
-def test_rises_and_falls_are_both_seen_where_they_are_equally_many() -> None:
-    """Their difference would be nothing; a taxel that never spoke is white."""
-    t = np.arange(8)
-    events = Events(t, [0, 0, 0, 0, 1, 1, 2, 2], [0] * 8, [1, 0, 1, 0, 1, 1, 0, 0], array=Array(1, 4))
-    picture = events.plot().images[0].get_array()
-    both, rises, falls, silent = picture[0]
-    assert silent.tolist() == [1, 1, 1]
-    assert rises[0] > rises[2]
-    assert falls[2] > falls[0]
-    assert both.sum() < min(rises.sum(), falls.sum())
 
 
 def test_encoders_tares_health_and_detections_take_a_recording(tmp_path: Any) -> None:

@@ -129,22 +129,6 @@ def test_splitting_by_sign_keeps_every_spike_once(trains: SpikeTrains) -> None:
         assert np.array_equal(split[n + len(trains)], trains[n][values <= 0])
 
 
-@given(some())
-def test_changed_trains_are_not_equal(trains: SpikeTrains) -> None:
-    lists = list(trains)
-    assert trains != SpikeTrains.from_lists(lists, trains.start, trains.stop + 1)
-    assert trains != SpikeTrains.from_lists([*lists, []], trains.start, trains.stop)
-    assert trains != lists
-
-
-@given(some())
-def test_repr_is_one_line(trains: SpikeTrains) -> None:
-    inputs = "1 train" if len(trains) == 1 else f"{len(trains)} trains"
-    spikes = "1 spike" if len(trains.times) == 1 else f"{len(trains.times)} spikes"
-    assert repr(trains).startswith(f"SpikeTrains({inputs}, {spikes},")
-    assert "\n" not in repr(trains)
-
-
 def test_trains_are_converted_together_and_not_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = []
     for module in ("spikes.trains", "_base.columns"):
@@ -155,9 +139,3 @@ def test_trains_are_converted_together_and_not_one_by_one(monkeypatch: pytest.Mo
     assert set(seen) == {"times", "values", "offsets"}
     with refused(argument="times"):
         SpikeTrains.from_lists([[0.5]] * 700 + [["soon"]] + [[0.5]] * 300)
-
-
-def test_a_train_that_is_not_there_is_an_index_error() -> None:
-    # Python's own error, so that a for loop over trains ends.
-    with pytest.raises(IndexError, match="train 2: there are only 2"):
-        SpikeTrains.from_lists([[], []])[2]
