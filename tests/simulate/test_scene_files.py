@@ -13,6 +13,7 @@ from shell import run
 import taxel
 from taxel import SceneError
 from taxel._base.errors import Place
+from taxel.demo.script import script
 from taxel.simulate import Scene, SceneFile, Silence, play, truth
 
 ROOT = Path(__file__).parents[2]
@@ -162,3 +163,18 @@ def test_a_file_that_begins_with_a_byte_order_mark_is_read(tmp_path):
     for name, encoding in (("plain.toml", "utf-8"), ("marked.toml", "utf-8-sig")):
         (tmp_path / name).write_text(text, encoding=encoding)
     assert repr(SceneFile.open(tmp_path / "marked.toml")) == repr(SceneFile.open(tmp_path / "plain.toml"))
+
+
+def test_random_scenes_are_those_of_their_seed_with_their_truth(tmp_path):
+    out, table = tmp_path / "two.mcap", tmp_path / "two.csv"
+    done = run("simulate", "--scenes", 2, "--seed", 7, "-o", out, "--truth", table, "--json")
+    assert done.returncode == 0, done.stderr
+    acts = script(7, 2)
+    contacts, _ = truth(acts)
+    assert taxel.open(out).events == play(acts, seed=7).events
+    assert json.loads(done.stdout)["contacts"] == [contact._asdict() for contact in contacts]
+    ends = sorted([(c.start_us, "contact") for c in contacts] + [(c.stop_us, "lift") for c in contacts])
+    assert table.read_text().splitlines()[1:] == [f"{label},{round(t)}" for t, label in ends]
+    for wrong in ((), (write(tmp_path, BALL), "--scenes", 2)):
+        refused_call = run("simulate", *wrong)
+        assert (refused_call.returncode, refused_call.stderr) == (2, "taxel: SCENE or --scenes: give one of them\n")
