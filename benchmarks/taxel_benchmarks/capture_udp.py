@@ -3,7 +3,8 @@
 Sender and receiver share this machine, over loopback, the sender a process of its own. *The worst case*: the sender
 sends as the board does, each 192 us the events of a frame, in datagrams of at most 280 words, which the kernel cuts
 out of one train (UDP_SEGMENT). *The portable calls*, which every system has (`TAXEL_CAPTURE=portable`), receive the
-same, one call a datagram; `highest` is the highest rate of `LADDER` that each way received without a loss. *Beside
+same, one call a datagram. *The largest array*: 128 x 128 taxels by version 2 of the wire, all of them in each frame,
+while they are recorded. `highest` is the highest rate of `LADDER` that each way received without a loss. *Beside
 faery*: both receive from the same sender, paced alike, one send call a datagram of 111 events, ours in words of 5
 bytes, faery's in its own format of 13 ("t64_x16_y16_on8"); in turn. `DOES` says what each latency is; the cores are
 the CPU time of the receiving process. faery looks for packets every 20 ms; *a socket loop* is the plain Python
@@ -32,13 +33,14 @@ import numpy as np
 
 from taxel import Array, Events
 from taxel.live import Live
-from taxel.wire import encode
+from taxel.simulate import Board, Version2
+from taxel.wire import Registers, encode
 from taxel_benchmarks._goals import Goal, at_least, at_most
 from taxel_benchmarks._peer import missing
 from taxel_benchmarks._rounds import stamp, thread_seconds
 
-#: The sensor's worst case, changes a second: 4096 taxels in each frame of 192 us.
-WORST = 21.3e6
+#: The sensor's worst case, changes a second: 4096 taxels in each frame of 192 us; and that of 128 x 128 taxels.
+WORST, LARGEST = 21.3e6, 85.3e6
 FRAME_US, DATAGRAM_WORDS = 192.0, 280
 RATES = (1e4, 1e6, 1e7)
 #: The worst case as the board sends it, with a send call a datagram, and while another thread records.
@@ -47,6 +49,7 @@ WAYS: dict[str, dict[str, bool]] = {
     "worst_case_without_segments": {"segment": False},
     "worst_case_recorded": {"record": True},
     "worst_case_portable": {"portable": True},
+    "largest_recorded": {"record": True, "version_2": True},
 }
 #: Rates that are tried for the highest without a loss, changes a second.
 LADDER = (5e6, 1e7, 1.5e7, 2.13e7, 3e7, 4.26e7, 6e7, 8e7)
@@ -145,6 +148,17 @@ def datagrams(rate: float, frames: int) -> tuple[list[bytes], int]:
     return cut, each
 
 
+def of_version_2(frames: int) -> tuple[list[bytes], int]:
+    """Return the datagrams of `frames` frames of 128 x 128 taxels that all change, and their number a frame."""
+    array = Array(128, 128)
+    registers = Registers(array=array, wire_version=2, noise_floor=0)
+    board = Board(registers, array, version_2=Version2(states_us=0))
+    values = [np.full((128, 128), ticks, np.uint16) for ticks in (100, 160)]
+    board.frame(values[1])
+    each = [board.frame(values[k % 2]) for k in range(frames)]
+    return [datagram for frame in each for datagram in frame], len(each[0])
+
+
 @contextmanager
 def calls(*, portable: bool) -> Iterator[None]:
     """Select the system's calls by which a `Live` receives that is made meanwhile."""
@@ -157,19 +171,27 @@ def calls(*, portable: bool) -> Iterator[None]:
 
 
 def ours(
-    rate: float, seconds: float, scratch: Path, *, segment: bool = True, record: bool = False, portable: bool = False
+    rate: float,
+    seconds: float,
+    scratch: Path,
+    *,
+    segment: bool = True,
+    record: bool = False,
+    portable: bool = False,
+    version_2: bool = False,
 ) -> dict[str, Any]:
     """Receive and decode the datagrams of a sender of `rate` changes a second.
 
-    One thread receives and decodes; while it records, another one receives.
+    One thread receives and decodes; while it records, another one receives. Datagrams of version 2 are numbered, so
+    that each is sent once.
     """
-    cut, each = datagrams(rate, 4 if rate > 1e6 else 64)
+    cut, each = of_version_2(int(seconds / FRAME_US * 1e6)) if version_2 else datagrams(rate, 4 if rate > 1e6 else 64)
     payload = scratch / f"{rate:.0f}.pickle"
     payload.write_bytes(pickle.dumps(cut))
     before = thread_seconds()
     file = scratch / "record.mcap" if record else None
     with calls(portable=portable):
-        made = Live(0, host="127.0.0.1", record=file, overwrite=True)
+        made = Live(0, host="127.0.0.1", record=file, overwrite=True, array=Array(128, 128) if version_2 else None)
     with made as live:
         port = live.address[1]
         arguments = [str(port), str(payload), str(each), str(seconds), "1" if segment else "0"]
@@ -190,7 +212,7 @@ def ours(
 
     return {
         "asked_events_per_s": rate,
-        "sent_events_per_s": sent["bytes"] / 5 / seconds,
+        "sent_events_per_s": rate * sent["datagrams"] / len(cut) if version_2 else sent["bytes"] / 5 / seconds,
         "sent_mb_per_s": sent["bytes"] / 1e6 / seconds,
         "segmenting": sent["segmenting"],
         "gro": capture["gro"],
@@ -300,7 +322,8 @@ def run(*, quick: bool) -> dict[str, Any]:
         ladder = {name: highest(seconds, scratch, portable=name == "portable") for name in ("usual", "portable")}
         for turn in range(rounds):
             for name, how in WAYS.items():
-                worst[name].append(ours(WORST, seconds, scratch, **how))
+                rate = LARGEST if "version_2" in how else WORST
+                worst[name].append(ours(rate, seconds, scratch, **how))
             for k, rate in enumerate(RATES):
                 rows[rate]["taxel"].append(beside_faery(rate, seconds, scratch))
                 for n, (name, stream) in enumerate(streams.items()):
