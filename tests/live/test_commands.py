@@ -102,7 +102,7 @@ def test_taxel_record_ends_with_the_boards_stop_marker(tmp_path: Path) -> None:
 def test_taxel_record_goes_on_by_itself_in_automatic_mode(tmp_path: Path) -> None:
     port = free_port()
     automatic = ["--length", 0.3, "--countdown", 0, "--start-index", 7, "--trials", 2]
-    arguments = ("record", tmp_path / "step.lsa", "--host", LOOPBACK, "--port", port, *automatic)
+    arguments = ("record", tmp_path / "step.mcap", "--host", LOOPBACK, "--port", port, *automatic)
     with (
         subprocess.Popen(command(*arguments), stdout=subprocess.PIPE, text=True) as process,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
@@ -112,12 +112,12 @@ def test_taxel_record_goes_on_by_itself_in_automatic_mode(tmp_path: Path) -> Non
             time.sleep(0.01)
         said, _ = process.communicate(timeout=60)
     assert process.returncode == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["step7.lsa", "step7.lss", "step8.lsa", "step8.lss"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["step7.mcap", "step8.mcap"]
     assert said.count("nothing lost after arrival") == 2
     again = run(*arguments)
     assert (again.returncode, again.stderr.strip()) == (
         2,
-        f"taxel: {tmp_path / 'step7.lsa'}: exists already; give --overwrite, or another name",
+        f"taxel: {tmp_path / 'step7.mcap'}: exists already; give --overwrite, or another name",
     )
 
 

@@ -106,13 +106,3 @@ def test_without_a_readout_it_is_kept_and_what_it_rested_at_before_is_unknown(tm
                 live.zero(*wrong)
     assert (done.x, done.y, done.rest, done.before) == (1, 2, 70.0, None)
     assert taxel.open(tmp_path / "a.mcap").zeroings == (done,), "all or none"
-
-
-def test_what_raw_bytes_could_not_keep_is_refused(tmp_path: Path) -> None:
-    with Live(0, host=LOOPBACK, array=FOUR, record=tmp_path / "a.lsa") as live:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
-            link.sendto(wire.encode(Events([0], [1], [2], [True], array=FOUR, intensity=[70])), live.address)
-        heard(live)
-        with pytest.raises(ProblemError, match=r"a \.lsa file cannot contain the new rest of a taxel"):
-            live.zero(1, 2)
-        assert live.zeroed == ()

@@ -18,7 +18,6 @@ mod handle;
 mod observers;
 mod options;
 mod output;
-mod preview_buffer;
 mod readout_queue;
 mod readout_stage;
 mod receive_stage;
@@ -54,6 +53,7 @@ use taxel_core::{Marker, Stop, problem};
 
 use crate::capture::Origin;
 use crate::locked::lock;
+use crate::recording::SourceWriter;
 use crate::{Error, Result};
 pub use counters::{
     Arrival, ArrivalState, BoardState, Counters, DecodingCounts, LiveSummary, ReadoutCounts, SourceCounts,
@@ -66,7 +66,7 @@ use readout_queue::ReadoutQueue;
 use recording_switch::RecordingSwitch;
 pub use running_readout::ReadoutSetup;
 use running_readout::RunningReadout;
-use running_recording::{RecordingPart, RunningRecording};
+use running_recording::RunningRecording;
 use sending::Sending;
 pub use sending::{Destination, Sent};
 use shared::{PipelineShared, PublishedState, RecordingSlot, frame_time, header_of};
@@ -156,14 +156,14 @@ impl Live {
         Self::begin(input, options, sources, readout, sinks, None)
     }
 
-    /// Starts the pipeline; `host` is the pipeline whose recording contains this one's as a part.
+    /// Starts the pipeline; `part` writes it into the recording of another one.
     fn begin(
         input: PipelineInput,
         options: LiveOptions,
         sources: Vec<NamedSource>,
         readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
-        host: Option<RecordingPart>,
+        part: Option<SourceWriter>,
     ) -> Result<Self> {
         for (name, frames) in [("guard_frames", options.guard_frames), ("gap_frames", options.gap_frames)] {
             if !(frames.is_finite() && frames >= 0.0) {
@@ -189,10 +189,10 @@ impl Live {
         // The socket is opened before the file, so that a port that is in use leaves no empty file.
         let (receiver, frames) = input.open(options.capture())?;
         let header = header_of(&options, receiver.origin(), frames.as_ref().map(|frames| &frames.layout))?;
-        let recording = match (&record, host) {
-            (None, _) => None,
-            (Some(record), None) => Some(RunningRecording::create(record, header, &sources)?),
-            (Some(record), Some(host)) => Some(RunningRecording::join(host, record, header)),
+        let recording = match (part, &record) {
+            (Some(part), _) => Some(RunningRecording::part(part, &header, false)),
+            (None, Some(record)) => Some(RunningRecording::create(record, header, &sources, false)?),
+            (None, None) => None,
         };
         let published = PublishedState { frame: vec![0; options.array.len()], ..PublishedState::default() };
         let shared = Arc::new(PipelineShared {
@@ -214,12 +214,11 @@ impl Live {
         });
         let (queue, detections) = channel::bounded(OUTPUT_WAITING);
         let reads_out = !matches!(readout, ReadoutSetup::None);
-        let begin = |input: PipelineInput, options: LiveOptions, part: RecordingPart| {
-            let options = LiveOptions { name: part.name.clone(), ..options };
-            Self::begin(input, options, vec![], ReadoutSetup::None, vec![], Some(part))
+        let begin = |input: PipelineInput, options: LiveOptions, part: Option<SourceWriter>| {
+            Self::begin(input, options, vec![], ReadoutSetup::None, vec![], part)
         };
         let others = Others::start(&shared, begin).inspect_err(|_| {
-            // Nothing arrived: a new file is removed.
+            // Nothing arrived: the file is removed.
             let recording = lock(&shared.recording.running).take();
             drop(recording.map(|recording| recording.finish(&Counters::default())));
         })?;

@@ -30,7 +30,7 @@ use taxel_core::{Array, problem};
 pub use causes::{Cause, CauseKind, Counts};
 pub use event_previews::EventPreviews;
 pub use frames::{FrameEncoding, FrameProperties, Frames};
-pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
+pub use lsa::{DecodedLsa, decode_lsa, write_lsa};
 pub use mcap_reader::{Datagrams, DecodedRecording, Message, ReadPosition, Reader, Remarks, begin_with};
 pub use mcap_writer::{SourceWriter, Writer};
 pub use output::OutputFile;
@@ -120,9 +120,13 @@ pub struct Decoding {
     #[serde(default)]
     pub difference: bool,
     /// Added to decoded times, us: in a converted file whole turns of the board's 6.5536 s counter before the first
-    /// stamp; 0 for a recording from a board.
+    /// stamp. In a recording that began while its board was received, a message states it
+    /// ([`BoardChangeKind::Clock`]), and the file's header is read with it.
     #[serde(default)]
     pub origin_us: i64,
+    /// Whether the recording began while its board was received.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub begun_later: bool,
 }
 
 /// Where a sensor lies.
@@ -333,6 +337,12 @@ pub struct BoardChange {
 pub enum BoardChangeKind {
     /// The board was reset: its taxels' values are unknown until their next event.
     Reset,
+    /// No change, but where the recording begins on the board's clock: added to the times that a decoder finds which
+    /// begins with its first datagram.
+    Clock {
+        /// What is added, us.
+        origin_us: i64,
+    },
     /// The board changed its version of the wire.
     Wire {
         /// The version from here on.

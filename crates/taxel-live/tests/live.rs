@@ -188,21 +188,6 @@ fn a_recording_holds_the_events_that_the_board_sent() {
 }
 
 #[test]
-fn a_raw_recording_holds_the_bytes_and_is_complete_at_the_end() {
-    let path = Scratch::new("bytes.lsa");
-    let live = Live::start(ANY, options(Some(&path)), ReadoutSetup::None, vec![]).expect("a port and a file");
-    let report = emulate(live.address(), false, presses(1000, 1000));
-    wait_for(&live, |live| live.counters().decoding.wire.bytes == report.sent.bytes);
-    assert!(!path.0.with_extension("lss").exists(), "not complete yet");
-    live.stop().expect("no error");
-    let (mut decoder, mut events) = (Decoder::new(Array::thesis()), Events::empty(Array::thesis()));
-    decoder.push(&std::fs::read(&path.0).expect("the file"), None, &mut events);
-    decoder.finish(&mut events);
-    assert_eq!(events, sent(1000, 1000));
-    assert!(path.0.with_extension("lss").exists());
-}
-
-#[test]
 fn detections_live_are_those_of_the_recording() {
     let path = Scratch::new("detections.mcap");
     let delivered = Arc::new(Mutex::new(Vec::<OutputDetection>::new()));
@@ -254,19 +239,16 @@ fn preview_times(path: &Scratch) -> Vec<i64> {
 }
 
 #[test]
-fn a_recording_has_previews_around_detections_beside_ten_a_second() {
+fn a_recording_has_ten_previews_a_second() {
     let path = Scratch::new("preview_times.mcap");
     let begun = Instant::now();
     let live = Live::start(ANY, options(Some(&path)), reading(&readout(2.0)), vec![]).expect("a port and a file");
-    // A press begins each 40 ms; ten previews a second would miss more than half of them.
     emulate(live.address(), true, presses(6000, 6000));
     while live.next(Duration::from_millis(200)).expect("no error").is_some() {}
     live.stop().expect("no error");
-    let tenths = begun.elapsed().as_millis() / 100;
-    let (times, detections) = (preview_times(&path), recorded(&path).1);
-    assert!(detections.len() > 20, "{}", detections.len());
-    assert!(times.len() as u128 > 2 * tenths, "{} previews in {tenths} tenths of a second", times.len());
-    assert!(times.len() as u128 <= 10 * tenths + 12, "{} previews in {tenths} tenths of a second", times.len());
+    let (tenths, times) = (begun.elapsed().as_millis() / 100, preview_times(&path));
+    assert!(times.len() > 2, "{} previews in {tenths} tenths of a second", times.len());
+    assert!(times.len() as u128 <= tenths + 2, "{} previews in {tenths} tenths of a second", times.len());
 }
 
 #[test]

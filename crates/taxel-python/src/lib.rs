@@ -82,7 +82,7 @@ mod _core {
     #[pymodule_export]
     use crate::recording::{
         DecodedDatagrams, DecodedLsa, RecordingReader, RecordingWriter, Remarks, Samples, clock_doubt, clock_lines,
-        numbered_path, read_lsa, recording_damage, recording_verdict, verdict_text, whole_frames, write_lsa,
+        read_lsa, recording_damage, recording_verdict, verdict_text, whole_frames, write_lsa,
     };
     #[pymodule_export]
     use crate::simulate::{

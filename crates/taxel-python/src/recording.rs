@@ -12,8 +12,8 @@ use taxel_core::encode::Zeroing;
 use taxel_core::{Marker, wire};
 use taxel_live::clock::{self, BoardClock, Offset};
 use taxel_live::recording::{
-    Basis, BoardChange, Counts, FrameEncoding, Header, LsaWriter, Reader, RecordingCounts, SourceWriter, Verdict,
-    Writer, WriterOptions, decode_lsa, numbered,
+    Basis, BoardChange, Counts, FrameEncoding, Header, Reader, RecordingCounts, SourceWriter, Verdict, Writer,
+    WriterOptions, decode_lsa,
 };
 
 use crate::threaded::Threaded;
@@ -234,9 +234,9 @@ impl RecordingWriter {
 
     /// Ends a source that is not the first, with the counts of what was received and lost, given as JSON.
     fn end(&self, py: Python<'_>, counts: &str) -> PyResult<()> {
-        let (name, counts): (_, RecordingCounts) = (self.source.clone().unwrap_or_default(), parsed("counts", counts)?);
+        let counts: RecordingCounts = parsed("counts", counts)?;
         self.with(py, |track| {
-            track.end(&name, counts);
+            track.end(counts);
             Ok(())
         })
     }
@@ -400,11 +400,7 @@ pub fn recording_damage(counts: &str) -> PyResult<Plain<Counts>> {
 #[pyfunction]
 pub fn write_lsa(py: Python<'_>, path: PathBuf, payload: &Bound<'_, PyBytes>) -> PyResult<()> {
     let bytes = payload.as_bytes();
-    enter(py, |_| {
-        let mut writer = LsaWriter::create(&path, false)?;
-        writer.bytes(bytes)?;
-        writer.finish()
-    })
+    enter(py, |_| write_lsa(&path, bytes))
 }
 
 /// A `.lsa`, decoded.
@@ -455,12 +451,6 @@ pub fn clock_lines(
 #[pyfunction]
 pub fn clock_doubt(drift_ppm: f64, delay_us: f64, median_us: f64) -> Option<String> {
     clock::doubt(drift_ppm, delay_us, median_us)
-}
-
-/// The name of a recording in automatic mode: the index appended to the name.
-#[pyfunction]
-pub fn numbered_path(path: PathBuf, index: u32) -> PathBuf {
-    numbered(&path, index)
 }
 
 /// Whether all values are whole and from 0 to 65 535, so that 16 bits hold them.

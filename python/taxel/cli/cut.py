@@ -10,7 +10,6 @@ import numpy as np
 from cyclopts import Parameter
 
 import taxel
-from taxel import _core
 from taxel._base.messages import plain
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
@@ -87,7 +86,7 @@ def cut(
         raise ProblemError(f"{recording}: has no note {label!r} with a time; taxel info --json lists the notes")
     written, lines = [], []
     for k, part in enumerate(parts, start=1):
-        file = out if label is None else Path(_core.numbered_path(out, k))
+        file = out if label is None else out.with_stem(f"{out.stem}{k}")
         lost = taxel.convert(part, file, overwrite=output.overwrite)
         written.append({"file": str(file), "lost": lost})
         lines += [f"written to {file}: {part!r}", *(f"  lost: {loss}" for loss in lost)]

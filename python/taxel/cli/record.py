@@ -13,7 +13,6 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 from rich.live import Live as Display
 
-from taxel import _core
 from taxel._base.messages import counted
 from taxel._core import FIREWALL, ProblemError
 from taxel.cli._noting import noting
@@ -88,7 +87,7 @@ def record(
     The board is received during countdowns too, so each trial begins with the values of all taxels; with
     --countdown 0 nothing is lost between two trials. An empty trial is not saved, and its number is used again;
     with --trials, three empty trials in a row end the command with exit code 3. While it records, a line on
-    standard input writes a note with that label and the board's time into the .mcap (add < /dev/null if the input
+    standard input writes a note with that label and the board's time (add < /dev/null if the input
     is not for taxel). --source names what is received, each source with its own clock: frames of numbers, boards,
     lines of numbers. Exit code 3: nothing was received, or data were lost after they had arrived, such as bytes
     outside the lines of a source; 2: the board has more taxels than --array.
@@ -100,7 +99,7 @@ def record(
     Parameters
     ----------
     file
-        A new file: .mcap (with times, registers, notes) or .lsa (raw bytes).
+        A new .mcap file.
     """
     if typed.length is None and typed.trials is not None:
         raise ProblemError("--trials needs --length, the length of each trial: give both")
@@ -124,7 +123,7 @@ def _automatic(file: Path, live: dict[str, Any], typed: _RecordArguments, consol
     empty = 0
 
     def following(saved: int) -> Path:
-        name = Path(_core.numbered_path(file, typed.start_index + saved))
+        name = file.with_stem(f"{file.stem}{typed.start_index + saved}")
         if name.exists() and not how["overwrite"]:
             raise FileExistsError(errno.EEXIST, "exists already", str(name))
         return name
@@ -142,7 +141,7 @@ def _automatic(file: Path, live: dict[str, Any], typed: _RecordArguments, consol
 
     name = following(0)
     with Live(record_later=True, **live) as receiver:
-        notes = noting(receiver.note, console.print) if _takes_notes(file, live["sources"]) else nullcontext("")
+        notes = noting(receiver.note, console.print) if _takes_notes(live["sources"]) else nullcontext("")
         with notes as keys:
             try:
                 while trials is None or (len(codes) < trials and empty < _EMPTY):
@@ -184,17 +183,16 @@ def _count_down(name: Path, seconds: int, console: Console) -> None:
 def _one(file: Path, options: dict[str, Any], typed: _RecordArguments, console: Console) -> tuple[Summary, int]:
     """Record one file until its time is over, the board marks a stop, or Ctrl-C; return summary and exit code."""
     with Live(record=file, **options) as live:
-        notes = noting(live.note, console.print) if _takes_notes(file, options["sources"]) else nullcontext("")
+        notes = noting(live.note, console.print) if _takes_notes(options["sources"]) else nullcontext("")
         with suppress(KeyboardInterrupt), notes as keys:
             _watch(live, file, typed.seconds, typed.markers, console, keys, trial=False)
         summary = live.stop()
         return summary, exit_code(summary, live.array)
 
 
-def _takes_notes(file: Path, sources: list[str] | None) -> bool:
-    """Return whether typed lines are notes: a .lsa holds no notes, and a source may read the input itself."""
-    reads_input = (source.split(",")[0].endswith("lines:-") for source in sources or ())
-    return file.suffix == ".mcap" and not any(reads_input)
+def _takes_notes(sources: list[str] | None) -> bool:
+    """Return whether typed lines are notes: a source may read the input itself."""
+    return not any(source.split(",")[0].endswith("lines:-") for source in sources or ())
 
 
 def _watch(

@@ -57,7 +57,7 @@ class StatedOptions:
         metavar="FILE|SECONDS",
         typed="A recording of the sensor at rest (taxel cut) can be used instead of a saved tare.",
     )
-    record: str | os.PathLike[str] | None = option(None, "Record in a new file (.mcap or .lsa).")
+    record: str | os.PathLike[str] | None = option(None, "Record in a new .mcap file.")
     record_later: bool = option(
         False, "Let `record` and `end_recording` begin and end recordings while the `Live` runs.", commands=""
     )

@@ -67,7 +67,7 @@ class Live:
         on, s, which ends early where the board marks a start. The board must be at rest then, with its noise floor at
         0.
     record : path, optional
-        Record in a new file (.mcap or .lsa). `.mcap` holds all data, `.lsa` the raw bytes of the manual.
+        Record in a new .mcap file.
     record_later : bool
         Let `record` and `end_recording` begin and end recordings while the `Live` runs. Then none begins when the
         `Live` begins; `sources` are recorded while a recording runs.
@@ -377,8 +377,8 @@ class Live:
 
         Raises
         ------
-        ProblemError : a taxel that does not exist or has had no event so far (names it; then none is zeroed), a tare
-            that is being taken, or a `.lsa` that is recorded, which cannot hold it
+        ProblemError : a taxel that does not exist or has had no event so far (names it; then none is zeroed), or a tare
+            that is being taken
         OSError : the disk is full
         """
         columns, rows = (numbers(name, value, np.int64).reshape(-1) for name, value in (("x", x), ("y", y)))
@@ -413,7 +413,7 @@ class Live:
 
         Raises
         ------
-        ProblemError : nothing is recorded, or to a `.lsa`, which holds bytes only
+        ProblemError : nothing is recorded
 
         Examples
         --------

@@ -6,6 +6,7 @@ pub(in crate::wire) mod clock;
 mod counts;
 
 pub use clock::FARTHEST_BACK;
+pub(in crate::wire) use clock::TURN;
 pub use counts::Counts;
 
 use blocks::Carried;

@@ -5,9 +5,9 @@ mod order;
 mod recent;
 mod totals;
 
-use crate::wire::decoder::{Counts, Decoder};
+use crate::wire::decoder::{Counts, Decoder, TURN};
 use crate::wire::silence;
-use crate::wire::v1::{FIRST, WORD_BYTES};
+use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES};
 use crate::wire::v2::{self, DatagramHeader, DatagramOutcome};
 use crate::{Array, Events};
 use clock_jumps::ClockJumps;
@@ -19,6 +19,9 @@ pub use totals::SenderTotals;
 /// For how long only whole words of version 1 must arrive before a sender of version 2 counts as changed to version 1,
 /// us.
 const CHANGED_AFTER_US: i64 = 1_000_000;
+
+/// Duration of a turn of the counter of version 1, us.
+const TURN_US: i64 = TURN * STAMP_US;
 
 /// What a datagram reports besides its events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -120,6 +123,16 @@ impl SenderDecoder {
     /// Notes that a recording begins, as [`v2::Decoder::begin_recording`] does.
     pub fn begin_recording(&mut self) {
         self.version_2.begin_recording();
+    }
+
+    /// What a decoder that begins with the latest datagram lacks to this one's times, us; `None` if the datagram does not
+    /// show it. `first` is the first time in the datagram, us.
+    #[must_use]
+    pub fn origin(&self, first: Option<i64>) -> Option<i64> {
+        if self.version == 2 {
+            return self.version_2.offset();
+        }
+        first.map(|first| first - (first - self.offset.unwrap_or(0)).rem_euclid(TURN_US))
     }
 
     /// Notes that the host has set the board to this version of the wire.

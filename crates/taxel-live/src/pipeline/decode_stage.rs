@@ -101,15 +101,10 @@ impl Heartbeats {
     }
 }
 
-/// A decoder of either version of the wire in its initial state.
-pub(super) fn fresh_decoder(options: &LiveOptions) -> SenderDecoder {
-    SenderDecoder::new(Decoder::new(options.array.clone()).differences(options.differences), 1)
-}
-
 impl DecodeStage {
     pub(super) fn new(options: &LiveOptions) -> Self {
         Self {
-            decoder: fresh_decoder(options),
+            decoder: SenderDecoder::new(Decoder::new(options.array.clone()).differences(options.differences), 1),
             promise: Promise::default(),
             arrivals: Heartbeats::default(),
             clock: BoardClock::default(),
@@ -172,10 +167,11 @@ impl DecodeStage {
         }
     }
 
-    /// The stamps of a datagram's first event and of its first marker, us.
-    pub(super) fn first_stamps(&self, decoded: &DecodedDatagram) -> (Option<i64>, Option<i64>) {
+    /// Where a recording that begins with this datagram begins on the board's clock, us, if the datagram shows it.
+    pub(super) fn origin(&self, decoded: &DecodedDatagram) -> Option<i64> {
         let (row, marker) = decoded.first;
-        (self.events.t.get(row).copied(), self.events.markers.get(marker).map(|marker| marker.t))
+        let marked = self.events.markers.get(marker).map(|marker| marker.t);
+        self.decoder.origin(self.events.t.get(row).copied().into_iter().chain(marked).min())
     }
 
     /// Holds the values of the events that are about to be handed on.

@@ -160,8 +160,8 @@ impl Handle {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where a taxel does not exist or has had no event so far, a tare is being measured, or a `.lsa` is recorded, which
-    /// cannot hold it: then none is zeroed. `File` where the disk is full.
+    /// `Core(Problem)` where a taxel does not exist or has had no event so far, or a tare is being measured: then
+    /// none is zeroed. `File` where the disk is full.
     pub fn zero(&self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
         let (answer, zeroed) = channel::bounded(1);
         self.shared.request(PipelineRequest::Zero(taxels.to_vec(), answer));

@@ -35,7 +35,7 @@ pub struct LiveOptions {
     pub readout: Option<String>,
     /// Rest of the taxels.
     pub tare: Option<StatedTare>,
-    /// Record in a new file (.mcap or .lsa).
+    /// Record in a new .mcap file.
     pub record: Option<PathBuf>,
     /// Recordings begin and end while the pipeline runs, and none when it begins.
     pub record_later: bool,
@@ -45,7 +45,7 @@ pub struct LiveOptions {
     pub input: Option<FrameSource>,
     /// Further sources, which are only recorded.
     pub sources: Vec<NamedSource>,
-    /// Compression of a .mcap: none, lz4 or zstd.
+    /// Compression of the recording: none, lz4 or zstd.
     pub compression: String,
     /// Replace output files that exist already.
     pub overwrite: bool,
@@ -147,12 +147,12 @@ impl LiveOptions {
     }
 }
 
-/// The file of a recording: `.lsa` for the manual's raw bytes, `.mcap` for everything.
+/// The file of a recording.
 #[derive(Debug, Clone)]
 pub struct Record {
     /// The file.
     pub path: PathBuf,
-    /// Compression of the chunks of `.mcap`.
+    /// Compression of the chunks.
     pub compression: Compression,
     /// Whether an existing file may be replaced.
     pub overwrite: bool,

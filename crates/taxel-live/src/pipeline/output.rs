@@ -90,7 +90,6 @@ impl DetectionSinks {
                 .detection(&output)
                 .or_else(|error| if recording.since().is_some() { Ok(()) } else { Err(error) })?;
         }
-        shared.preview_around([output.detection.t, output.detection.known]);
         lock(&shared.subscribers).retain(|subscriber| {
             !matches!(subscriber.try_send(output.clone()), Err(crossbeam_channel::TrySendError::Disconnected(_)))
         });

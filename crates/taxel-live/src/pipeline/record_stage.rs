@@ -5,31 +5,28 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+use taxel_core::Marker;
 use taxel_core::encode::Zeroing;
 use taxel_core::held::Held;
-use taxel_core::wire::{DatagramInfo, Registers, SenderDecoder};
-use taxel_core::{Events, Marker};
+use taxel_core::wire::{DatagramInfo, Registers};
 
 use super::counters::Counters;
-use super::decode_stage::fresh_decoder;
-use super::preview_buffer::PreviewBuffer;
 use super::running_recording::RunningRecording;
 use super::shared::{EndedRecording, PipelineShared};
 use crate::Result;
 use crate::capture::Batch;
 use crate::locked::lock;
-use crate::recording::{BoardChange, BoardChangeKind, now_ns};
+use crate::recording::{BoardChange, BoardChangeKind, LOW_RATE_EVERY, now_ns};
 
 /// Interval at which the counts are written to an unfinished recording.
 pub(super) const COUNTS_EVERY: Duration = Duration::from_secs(1);
 
 pub(super) struct RecordStage {
     shared: Arc<PipelineShared>,
-    /// Decodes from a recording's first datagram on, as a reader of the file will, until the offset between the
-    /// recording's clock and the pipeline's is known.
-    origin: Option<Box<SenderDecoder>>,
-    preview_buffer: PreviewBuffer,
-    /// Number of decoded datagrams when the last preview was considered.
+    /// Whether it is not known yet where the recording begins on the board's clock.
+    awaits_origin: bool,
+    /// When the last preview was recorded, and the number of decoded datagrams then.
+    previewed: Instant,
     considered: u64,
     /// Whether the recording has the fresh tare.
     tared: bool,
@@ -41,8 +38,8 @@ impl RecordStage {
     pub(super) fn new(shared: Arc<PipelineShared>) -> Self {
         Self {
             shared,
-            origin: None,
-            preview_buffer: PreviewBuffer::new(),
+            awaits_origin: false,
+            previewed: Instant::now(),
             considered: 0,
             tared: false,
             counted: Instant::now(),
@@ -80,7 +77,6 @@ impl RecordStage {
         }
         let wire = info.changed.then_some(BoardChangeKind::Wire { version: info.version, asked: false });
         self.with(|recording| {
-            recording.check_version(info.version)?;
             for change in wire.into_iter().chain(info.reset.then_some(BoardChangeKind::Reset)) {
                 recording.board_change(&BoardChange { at_ns, t_us: info.now, change })?;
             }
@@ -102,28 +98,18 @@ impl RecordStage {
         if markers.is_empty() {
             return Ok(());
         }
-        self.with(|recording| markers.iter().try_for_each(|marker| recording.marker(*marker)))?;
-        self.shared.preview_around(markers.iter().map(|marker| marker.t));
-        Ok(())
+        self.with(|recording| markers.iter().try_for_each(|marker| recording.marker(*marker)))
     }
 
-    /// Decodes a datagram by the recording's own clock, which begins with its first stamp. Once an event or a marker
-    /// has arrived, the offset to the pipeline's clock is known. `stamps` are the first of each as the pipeline decoded
-    /// them.
-    pub(super) fn find_origin(&mut self, bytes: &[u8], at_ns: i64, stamps: (Option<i64>, Option<i64>)) -> Result<()> {
-        let Some(origin) = &mut self.origin else { return Ok(()) };
-        let mut events = Events::empty(self.shared.options.array.clone());
-        origin.push(bytes, Some(at_ns / 1000), &mut events);
-        let by_event = stamps.0.zip(events.t.first()).map(|(stamp, decoded)| stamp - decoded);
-        let by_marker = stamps.1.zip(events.markers.first()).map(|(stamp, marker)| stamp - marker.t);
-        let Some(origin_us) = by_event.or(by_marker) else { return Ok(()) };
-        self.origin = None;
-        let mut timed = true;
-        self.with(|recording| {
-            timed = recording.is_timed();
-            recording.set_origin(origin_us)
-        })?;
-        if timed { Ok(()) } else { self.earlier_zeroings() }
+    /// Whether it is not known yet where the recording begins on the board's clock.
+    pub(super) fn awaits_origin(&self) -> bool {
+        self.awaits_origin
+    }
+
+    /// Records where the recording begins on the board's clock, us.
+    pub(super) fn set_origin(&mut self, origin_us: i64) -> Result<()> {
+        self.awaits_origin = false;
+        self.with(|recording| recording.set_origin(origin_us))
     }
 
     /// Ends the running recording, and starts the next one, if there is one, with the taxels' values. What was decoded
@@ -131,30 +117,21 @@ impl RecordStage {
     pub(super) fn switch(&mut self, next: Option<Box<RunningRecording>>, held: &Held) -> Result<EndedRecording> {
         let now = self.shared.counters();
         let ended = lock(&self.shared.recording.running).take();
-        self.origin = None;
         let begins = next.is_some();
         if let Some(mut next) = next {
             if let Err(error) = next.begin(&now, held.values()) {
                 *lock(&self.shared.recording.running) = ended;
                 return Err(error);
             }
-            let is_board = self.shared.frames.is_none();
-            self.origin = is_board.then(|| Box::new(fresh_decoder(&self.shared.options)));
             self.tared = false;
-            let timed = next.is_timed();
             *lock(&self.shared.recording.running) = Some(*next);
-            if timed {
-                self.earlier_zeroings()?;
-            }
+            // Earlier zeroings remain valid.
+            let zeroed: Vec<Zeroing> = self.shared.published().zeroed.values().copied().collect();
+            self.with(|recording| zeroed.iter().try_for_each(|zeroing| recording.zeroing(zeroing)))?;
         }
+        self.awaits_origin = begins && self.shared.frames.is_none();
         self.shared.recording.runs.store(begins, Ordering::Release);
         Ok((ended, now))
-    }
-
-    /// Records earlier zeroings, which remain valid in a new recording.
-    fn earlier_zeroings(&self) -> Result<()> {
-        let zeroed: Vec<Zeroing> = self.shared.published().zeroed.values().copied().collect();
-        self.with(|recording| zeroed.iter().try_for_each(|zeroing| recording.zeroing(zeroing)))
     }
 
     /// Records zeroings; on an error the caller zeroes nothing.
@@ -165,33 +142,16 @@ impl RecordStage {
         }
     }
 
-    /// Buffers a preview if one is due, and records the selected ones; with `last` also the final one.
+    /// Records a preview if one is due; with `last` also the final one. Frames are shown by any viewer.
     pub(super) fn previews(&mut self, decoded: u64, held: &Held, last: bool) -> Result<()> {
-        let now = Instant::now();
-        // Frames are shown by any viewer.
-        if self.shared.frames.is_some() || !(last || self.preview_buffer.is_due(now)) {
+        let is_due = last || self.previewed.elapsed() >= LOW_RATE_EVERY;
+        if self.shared.frames.is_some() || !is_due || decoded == self.considered || !self.runs() {
             return Ok(());
         }
-        let times = std::mem::take(&mut *lock(&self.shared.recording.preview_times));
-        if !self.runs() {
-            self.preview_buffer.clear();
-            return Ok(());
-        }
-        let new = decoded != self.considered;
-        self.considered = decoded;
-        if let (true, Some(t_us)) = (new, self.shared.published().counters.board.board_us) {
-            self.preview_buffer.push(now, now_ns(), t_us, held.frame());
-        }
-        times.into_iter().for_each(|t| self.preview_buffer.around(t));
-        let columns = self.shared.options.array.columns;
-        let mut preview_buffer = std::mem::replace(&mut self.preview_buffer, PreviewBuffer::new());
-        let outcome = self.with(|recording| {
-            preview_buffer
-                .take_wanted()
-                .try_for_each(|preview| recording.preview(preview.at_ns, preview.t_us, columns, &preview.held))
-        });
-        self.preview_buffer = preview_buffer;
-        outcome
+        (self.previewed, self.considered) = (Instant::now(), decoded);
+        let Some(t_us) = self.shared.published().counters.board.board_us else { return Ok(()) };
+        let (columns, values) = (self.shared.options.array.columns, held.frame().collect::<Vec<_>>());
+        self.with(|recording| recording.preview(t_us, columns, &values))
     }
 
     /// Runs ten times a second: writes the tare once it is complete and, once a second, the counts.
@@ -213,9 +173,8 @@ impl RecordStage {
         let lines = self.shared.frames.as_ref().map(|frames| frames.counts());
         self.with(|recording| {
             if let Some(tare) = tare {
-                recording.tare(&tare)?;
+                recording.tare(&tare);
             }
-            recording.flush()?;
             if due { recording.counts(&Counters { capture, lines, ..counters }) } else { Ok(()) }
         })
     }

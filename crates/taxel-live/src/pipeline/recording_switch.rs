@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, Mutex, Weak};
+use std::sync::{Arc, Mutex};
 
 use crossbeam_channel as channel;
 use taxel_core::problem;
@@ -10,7 +10,7 @@ use taxel_core::problem;
 use super::counters::{Counters, LiveSummary, SourceCounts};
 use super::frame_input::LineCounts;
 use super::options::Record;
-use super::running_recording::{Host, RecordingPart, RunningRecording, losses};
+use super::running_recording::{RunningRecording, losses};
 use super::shared::{EndedRecording, PipelineRequest, PipelineShared};
 use super::sources::{NumberStream, losses_of_lines};
 use crate::capture::{FIREWALL, Origin};
@@ -43,7 +43,7 @@ impl RecordingSwitch {
             // Returns an error that ended an earlier recording and that no call has returned yet.
             self.take_error()?;
         }
-        let next = RunningRecording::reserve(record, self.shared.header()?, &self.shared.sources)?;
+        let next = RunningRecording::create(record, self.shared.header()?, &self.shared.sources, true)?;
         self.replace(Some(next))
     }
 
@@ -71,10 +71,9 @@ impl RecordingSwitch {
         let mut sources = BTreeMap::new();
         let mut ended = vec![];
         for (name, board) in &self.pipelines {
-            let host: Weak<dyn Host> = Arc::<PipelineShared>::downgrade(&self.shared);
-            let part = RecordingPart { host, name: name.clone() };
             let header = board.header()?;
-            let part = next.as_ref().map(|next| next.part_of(part, header)).transpose()?;
+            let track = next.as_ref().map(|next| next.track_of(name)).transpose()?;
+            let part = track.map(|track| RunningRecording::part(track, &header, true));
             let (recording, counts) = replace_of(board, part)?;
             let counters = recording
                 .as_ref()

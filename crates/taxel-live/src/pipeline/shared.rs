@@ -16,7 +16,7 @@ use super::counters::Counters;
 use super::frame_input::FrameInput;
 use super::options::LiveOptions;
 use super::readout_queue::ReadoutQueue;
-use super::running_recording::{Host, RunningRecording};
+use super::running_recording::RunningRecording;
 use super::sending::SendingLine;
 use super::sink::OutputDetection;
 use super::source::{FrameLayout, NamedSource};
@@ -24,7 +24,7 @@ use super::viewer_queue::ViewerEvents;
 use crate::capture::{Origin, Receiver};
 use crate::latency::{Latencies, Quantiles};
 use crate::locked::lock;
-use crate::recording::{Decoding, Header, SourceWriter, now_ns};
+use crate::recording::{Decoding, Header, now_ns};
 use crate::{Error, Result};
 
 /// Interval at which a wait for a reply checks whether the decoding thread has ended.
@@ -73,8 +73,6 @@ pub(super) struct RecordingSlot {
     pub(super) runs: AtomicBool,
     /// The error that ended one early which was begun while the pipeline ran.
     pub(super) broken: Mutex<Option<Error>>,
-    /// Times of detections, markers and notes, us, around which it gets previews, since it last did.
-    pub(super) preview_times: Mutex<Vec<i64>>,
 }
 
 /// State shared by all threads.
@@ -127,11 +125,6 @@ impl PipelineShared {
     pub(super) fn request(&self, request: PipelineRequest) {
         lock(&self.requests).push(request);
         self.requested.store(true, Ordering::Release);
-    }
-
-    /// Selects the previews around these times, us, for the recording.
-    pub(super) fn preview_around(&self, times: impl IntoIterator<Item = i64>) {
-        lock(&self.recording.preview_times).extend(times);
     }
 
     /// Notes that everything that arrived was processed.
@@ -192,10 +185,7 @@ impl PipelineShared {
     pub(super) fn note(&self, text: &str, timed: bool) -> Result<()> {
         let board_us = self.published().counters.board.board_us.filter(|_| timed);
         match &*lock(&self.recording.running) {
-            Some(recording) => {
-                self.preview_around(board_us);
-                recording.note(board_us, text)
-            }
+            Some(recording) => recording.note(board_us, text),
             None => Err(taxel_core::problem!("a note is saved only in a recording: record to a .mcap file").into()),
         }
     }
@@ -236,13 +226,4 @@ pub(super) fn header_of(options: &LiveOptions, origin: &Origin, frames: Option<&
     }
     let decoding = Decoding { difference: options.differences, ..Decoding::default() };
     Ok(Header { decoding, name, ..Header::of_board(array, Some(options.registers), source, now_ns()) })
-}
-
-impl Host for PipelineShared {
-    fn part(&self, name: &str) -> Result<SourceWriter> {
-        match &*lock(&self.recording.running) {
-            Some(recording) => recording.track_of(name),
-            None => Err(taxel_core::problem!("source {name}: nothing is recorded").into()),
-        }
-    }
 }

@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
-use std::sync::{Arc, Mutex, Weak};
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use taxel_core::{Array, problem};
@@ -13,7 +13,6 @@ use super::counters::{Counters, SourceCounts};
 use super::frame_input::{FrameInput, LineCounts, ReadLines};
 use super::options::LiveOptions;
 use super::record_stage::COUNTS_EVERY;
-use super::running_recording::{Host, RecordingPart};
 use super::shared::PipelineShared;
 use super::source::{FrameLayout, NamedSource, SourceKind};
 use crate::capture::{Receiver, ReceiverOptions};
@@ -24,9 +23,7 @@ use crate::{Result, address};
 
 /// A running stream of numbers.
 pub(super) struct NumberStream {
-    part: RecordingPart,
-    /// Whether lines are recorded from the first one on; otherwise only while a recording runs.
-    always: bool,
+    name: String,
     track: Mutex<NumbersTrack>,
     stream: StreamColumns,
     trouble: Mutex<Option<String>>,
@@ -46,17 +43,17 @@ struct NumbersTrack {
 }
 
 impl NumberStream {
-    pub(super) fn new(part: RecordingPart, stream: StreamColumns, always: bool) -> Self {
+    pub(super) fn new(name: &str, stream: StreamColumns, track: Option<SourceWriter>) -> Self {
         let faults = StreamFaults::new(&stream);
-        let track = NumbersTrack { track: None, lines: 0, before: 0, all: faults.clone(), faults, counted: None };
-        Self { part, always, track: Mutex::new(track), stream, trouble: Mutex::default() }
+        let track = NumbersTrack { track, lines: 0, before: 0, all: faults.clone(), faults, counted: None };
+        Self { name: name.to_owned(), track: Mutex::new(track), stream, trouble: Mutex::default() }
     }
 
     /// Records the lines that a reader passes on.
     pub(super) fn push(&self, read: &ReadLines) -> Result<()> {
         let (columns, n) = (self.stream.columns.len(), read.values.len());
         if n != read.arrived_ns.len() * columns {
-            let (name, columns) = (&self.part.name, self.stream.columns.join(", "));
+            let (name, columns) = (&self.name, self.stream.columns.join(", "));
             return Err(problem!("source {name}: {n} values; must be one per column: {columns}").into());
         }
         if read.trouble.is_some() || !read.arrived_ns.is_empty() {
@@ -80,9 +77,6 @@ impl NumberStream {
         write: impl FnOnce(&SourceWriter, u64) -> Result<()>,
     ) -> Result<()> {
         let mut current = lock(&self.track);
-        if self.always && current.track.is_none() {
-            current.track = Some(self.part.open()?);
-        }
         let number = current.lines;
         current.lines += 1;
         count(&mut current.faults);
@@ -96,9 +90,6 @@ impl NumberStream {
             return Ok(());
         }
         let mut current = lock(&self.track);
-        if self.always && current.track.is_none() {
-            current.track = Some(self.part.open()?);
-        }
         current.faults.count_left_out(bytes);
         current.all.count_left_out(bytes);
         if let Some(track) = &current.track {
@@ -122,7 +113,7 @@ impl NumberStream {
         current.before = current.lines;
         drop(current);
         if let Some(track) = ended {
-            track.end(&self.part.name, losses_of_lines(lines, &faults));
+            track.end(losses_of_lines(lines, &faults));
         }
         self.counts_of(lines, faults)
     }
@@ -185,16 +176,14 @@ impl<Pipeline> Others<Pipeline> {
     /// Starts the other sources of a pipeline; `begin` starts the pipeline of one.
     pub(super) fn start(
         shared: &Arc<PipelineShared>,
-        begin: impl Fn(PipelineInput, LiveOptions, RecordingPart) -> Result<Pipeline>,
+        begin: impl Fn(PipelineInput, LiveOptions, Option<SourceWriter>) -> Result<Pipeline>,
     ) -> Result<Self> {
         let (mut others, options) = (Self { pipelines: vec![], numbers: vec![] }, &shared.options);
         for NamedSource { name, place, kind } in &shared.sources {
-            let host: Weak<dyn Host> = Arc::<PipelineShared>::downgrade(shared);
-            let part = RecordingPart { host, name: name.clone() };
+            let part =
+                lock(&shared.recording.running).as_ref().map(|recording| recording.track_of(name)).transpose()?;
             let of_pipeline = |array: &Array| LiveOptions {
-                record: options.record.clone(),
-                compression: options.compression.clone(),
-                overwrite: options.overwrite,
+                name: name.clone(),
                 kernel_buffer_bytes: options.kernel_buffer_bytes,
                 queue_bytes: options.queue_bytes,
                 gro: options.gro,
@@ -209,7 +198,7 @@ impl<Pipeline> Others<Pipeline> {
                     (PipelineInput::Frames(place.clone(), layout.clone()), of_pipeline(&layout.array))
                 }
                 SourceKind::Numbers(stream) => {
-                    let numbers = NumberStream::new(part, stream.clone(), options.record.is_some());
+                    let numbers = NumberStream::new(name, stream.clone(), part);
                     others.numbers.push((name.clone(), Arc::new(numbers)));
                     continue;
                 }

@@ -318,7 +318,6 @@ impl Stages {
             published.counters.rest_shift = stage.rest_shift(&published.rest_with_zeroed());
         }
         drop(published);
-        self.shared.preview_around([t]);
         self.readout.zero(&self.shared, &zeroings);
         Ok(zeroings)
     }
@@ -349,7 +348,11 @@ impl EventFlow<'_> {
             let now = now_ns();
             self.decode.note(&decoded, self.readout.announced_until());
             self.record.record_board_change(&decoded.info, decoded.arrived_ns)?;
-            self.record.find_origin(bytes, decoded.arrived_ns, self.decode.first_stamps(&decoded))?;
+            if self.record.awaits_origin()
+                && let Some(origin_us) = self.decode.origin(&decoded)
+            {
+                self.record.set_origin(origin_us)?;
+            }
             self.shared.published().decode_latency.note(now - decoded.arrived_ns);
             if self.decode.events().len() >= FLUSH_AFTER {
                 // A batch has this many events only if reading out is slower than they arrive.

@@ -141,9 +141,39 @@ impl Reader {
                 "is not a taxel recording: the header (metadata record \"taxel\") of this MCAP file is missing",
             ));
         };
-        header.check().map_err(|error| Error::format(path, &format!("header: {error}")))?;
         let (blocks, header, ends) = (Arc::new(blocks), Arc::new(header), Arc::new(ends));
-        Ok(Self { blocks, header, source: 0, ending, ends, rebuilt, memory: u64::MAX })
+        let mut reader = Self { blocks, header, source: 0, ending, ends, rebuilt, memory: u64::MAX };
+        for source in (0..=reader.header.sources.len()).rev() {
+            reader.source = source;
+            if let Some(origin_us) = reader.stated_origin()? {
+                let header = Arc::make_mut(&mut reader.header);
+                let header = if source == 0 { header } else { &mut header.sources[source - 1] };
+                header.decoding.origin_us = origin_us;
+            }
+        }
+        reader.header.check().map_err(|error| Error::format(path, &format!("header: {error}")))?;
+        Ok(reader)
+    }
+
+    /// Where the source begins on its board's clock, us, if it was begun while the board was received and says it.
+    fn stated_origin(&self) -> Result<Option<i64>> {
+        let (mut position, mut origin) = (ReadPosition::default(), None);
+        let blocks = if self.header().decoding.begun_later { self.blocks() } else { 0 };
+        for block in 0..blocks {
+            self.block(block, &mut position, |message| {
+                if message.topic == Topic::Board
+                    && let Ok(BoardChange { change: BoardChangeKind::Clock { origin_us }, .. }) =
+                        serde_json::from_slice(message.data)
+                {
+                    origin.get_or_insert(origin_us);
+                }
+                Ok(())
+            })?;
+            if origin.is_some() {
+                break;
+            }
+        }
+        Ok(origin)
     }
 
     /// The names of the sources; the reader starts with the first.

@@ -22,10 +22,10 @@ use taxel_core::{Marker, problem};
 
 use super::frames::{FrameEncoding, write_message};
 use super::grey_preview::GreyScale;
-use super::{BoardChange, Compression, Header, OutputFile, RecordingCounts, StreamColumns, Topic, WriterOptions};
+use super::{BoardChange, Header, OutputFile, RecordingCounts, StreamColumns, Topic, WriterOptions};
 use crate::Result;
 use crate::locked::lock;
-use write_queue::{ReservedFile, WriteQueue};
+use write_queue::WriteQueue;
 
 /// Capacity of the queue while the disk stalls, bytes; callers wait while it is full (0.6 s of the sensor's worst
 /// case).
@@ -41,7 +41,7 @@ const DATAGRAM_BYTES: usize = 65_507;
 /// A recording that is being written; several threads may share it.
 ///
 /// Dropped without [`Writer::finish`], it writes everything that it accepted, and the file states that it was not
-/// finished. If the file was not begun yet, an existing file is left unchanged.
+/// finished.
 pub struct Writer {
     /// The first source.
     track: SourceWriter,
@@ -77,40 +77,17 @@ impl Writer {
     ///
     /// As [`OutputFile::open`]; `File` if the file cannot be written; `Core(Problem)` if a source is not valid.
     pub fn create(path: &Path, header: &Header, options: WriterOptions) -> Result<Self> {
-        header.check()?;
-        let writer = Self::plan(OutputFile::open(path, options.overwrite)?, header, options.compression, false);
-        writer.begin(header.decoding.origin_us)?;
+        let writer = Self::without_thread(path, header, options)?;
+        writer.track.queue.start()?;
         Ok(writer)
     }
 
-    /// As [`Writer::create`], for a header that was checked and a file that is reserved. The file is first changed by
-    /// the first datagram or sample or, with `for_clock`, by [`Writer::begin`]; data accepted before wait in memory.
-    pub(crate) fn plan(file: OutputFile, header: &Header, compression: Compression, for_clock: bool) -> Self {
-        let queue = Arc::new(WriteQueue::new(ReservedFile { file, header: header.clone(), compression }, for_clock));
-        Self { track: SourceWriter::new(queue, 0, header), header: header.clone() }
-    }
-
-    /// Begins the file of `Writer::plan` with the offset of decoded times, us ([`Decoding::origin_us`](super::Decoding::origin_us)); returns whether
-    /// the offset was used, that is, whether the file was not begun with the header's before.
-    ///
-    /// # Errors
-    ///
-    /// As [`Writer::create`].
-    pub fn begin(&self, origin_us: i64) -> Result<bool> {
-        self.track.queue.begin(Some(origin_us))
-    }
-
-    /// Whether the file is begun.
-    #[must_use]
-    pub fn has_begun(&self) -> bool {
-        self.track.queue.lock().begun
-    }
-
-    /// Sets the time when the recording began, ns since 1970, unless the file was already begun.
-    pub fn set_started(&self, at_ns: i64) {
-        if let Some(plan) = &mut *lock(&self.track.queue.plan) {
-            plan.header.started_ns = at_ns;
-        }
+    /// As [`Writer::create`], but what is accepted waits in memory.
+    fn without_thread(path: &Path, header: &Header, options: WriterOptions) -> Result<Self> {
+        header.check()?;
+        let file = OutputFile::open(path, options.overwrite)?;
+        let queue = Arc::new(WriteQueue::open(file, header, options.compression)?);
+        Ok(Self { track: SourceWriter::new(queue, 0, header), header: header.clone() })
     }
 
     /// The writer of a source.
@@ -141,12 +118,11 @@ impl Writer {
     ///
     /// `File` if the disk is full or not available, in which case the file keeps everything that was written before.
     pub fn finish(self, counts: RecordingCounts) -> Result<RecordingCounts> {
-        self.begin(self.header.decoding.origin_us)?;
         self.track.queue.finish(Some(counts.clone()))?;
         Ok(self.track.queue.lock().written[0].at_end(counts))
     }
 
-    /// Ends an empty recording: removes a new file, leaves an earlier one unchanged.
+    /// Ends an empty recording: removes the file.
     ///
     /// # Errors
     ///
@@ -254,10 +230,10 @@ impl SourceWriter {
     }
 
     /// Ends this source with the counts of what was received and lost; it must not be used afterwards.
-    pub fn end(&self, name: &str, counts: RecordingCounts) {
+    pub fn end(&self, counts: RecordingCounts) {
         let mut state = self.queue.lock();
         let counts = state.written[self.source].at_end(counts);
-        state.ends.insert(name.to_owned(), counts);
+        state.ends.insert(self.name.clone(), counts);
     }
 
     /// Writes a datagram, with its arrival time by the host's clock (ns since 1970), arrival number and bytes.
@@ -481,10 +457,7 @@ mod tests {
     /// A writer whose thread was not started.
     fn alone(path: &Path) -> Writer {
         let header: Header = serde_json::from_value(json!({ "array": taxel_core::Array::thesis() })).unwrap();
-        let writer = Writer::plan(OutputFile::open(path, true).unwrap(), &header, Compression::None, false);
-        let plan = lock(&writer.track.queue.plan).take().unwrap();
-        writer.track.queue.open(plan).unwrap();
-        writer
+        Writer::without_thread(path, &header, WriterOptions { overwrite: true, ..WriterOptions::default() }).unwrap()
     }
 
     #[test]

@@ -23,12 +23,11 @@ use windows as reserved;
 pub struct OutputFile {
     path: PathBuf,
     file: File,
-    new: bool,
 }
 
 impl OutputFile {
-    /// Opens and locks a new file; or with `overwrite` an existing one, whose contents remain until
-    /// [`OutputFile::begin`]. A write-protected file is never replaced.
+    /// Opens and locks a new file; or with `overwrite` an existing one, which loses its contents once it is locked. A
+    /// write-protected file is never replaced.
     ///
     /// # Errors
     ///
@@ -43,7 +42,11 @@ impl OutputFile {
             let text = "is being recorded by another program; end that first, or name another file";
             return Err(Error::file(path)(IoError::new(ErrorKind::ResourceBusy, text)));
         }
-        Ok(Self { path: path.to_owned(), file, new })
+        // A device has no length.
+        if !new && file.metadata().map_err(Error::file(path))?.is_file() {
+            file.set_len(0).map_err(Error::file(path))?;
+        }
+        Ok(Self { path: path.to_owned(), file })
     }
 
     /// Path of the file.
@@ -52,39 +55,20 @@ impl OutputFile {
         &self.path
     }
 
-    /// Whether the file did not exist before.
-    #[must_use]
-    pub fn is_new(&self) -> bool {
-        self.new
-    }
-
-    /// Truncates the file: its previous content is replaced from now on.
-    ///
-    /// # Errors
-    ///
-    /// `File` if the system refuses.
-    pub fn begin(&self) -> Result<()> {
-        // A device has no length.
-        let is_file = self.file.metadata().map_err(Error::file(&self.path))?.is_file();
-        if is_file { self.file.set_len(0).map_err(Error::file(&self.path)) } else { Ok(()) }
-    }
-
     /// The open file.
     #[must_use]
     pub fn file(&self) -> &File {
         &self.file
     }
 
-    /// Removes the file where it is new: nothing is to stay in it. An earlier one stays.
+    /// Removes the file, which holds nothing; a device stays.
     ///
     /// # Errors
     ///
     /// `File` where the system refuses.
     pub fn discard(self) -> Result<()> {
-        if self.new {
-            reserved::remove(self.file, &self.path).map_err(Error::file(&self.path))?;
-        }
-        Ok(())
+        let is_file = self.file.metadata().map_err(Error::file(&self.path))?.is_file();
+        if is_file { reserved::remove(self.file, &self.path).map_err(Error::file(&self.path)) } else { Ok(()) }
     }
 }
 

@@ -9,7 +9,7 @@ use crate::wire::v1::STAMP_US;
 pub const FARTHEST_BACK: i64 = FARTHEST_BACK_US / STAMP_US;
 
 /// Number of stamps in a turn of the 16-bit counter: 6.5536 s.
-pub(super) const TURN: i64 = 65_536;
+pub(in crate::wire) const TURN: i64 = 65_536;
 
 /// Unwraps stamps into 64 bits.
 #[derive(Debug, Clone, Copy, Default)]

@@ -152,6 +152,11 @@ impl Decoder {
         self.goes_on = true;
     }
 
+    /// What is added to the times of the latest session, us.
+    pub(crate) fn offset(&self) -> Option<i64> {
+        self.sessions.last().map(|session| session.offset)
+    }
+
     /// The latest time that was received or promised, us.
     pub(crate) fn latest(&self) -> i64 {
         self.latest

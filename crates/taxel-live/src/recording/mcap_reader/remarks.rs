@@ -12,7 +12,7 @@ use taxel_core::held::UNKNOWN;
 use taxel_core::wire::{self, Registers};
 
 use super::message::Message;
-use crate::recording::{BoardChange, Note, RecordingCounts, Topic};
+use crate::recording::{BoardChange, BoardChangeKind, Note, RecordingCounts, Topic};
 
 /// All small messages of a recording.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -99,7 +99,9 @@ impl Remarks {
                 self.held = held(message.data).or(self.held.take());
             }
             Topic::Board => {
-                if let Ok(value) = serde_json::from_slice::<BoardChange>(message.data) {
+                if let Ok(value) = serde_json::from_slice::<BoardChange>(message.data)
+                    && !matches!(value.change, BoardChangeKind::Clock { .. })
+                {
                     self.board.push(BoardChange { at_ns: message.at_ns, ..value });
                 }
             }

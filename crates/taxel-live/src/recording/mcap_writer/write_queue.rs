@@ -23,17 +23,10 @@ use crate::locked::lock;
 use crate::recording::{Compression, FLUSH_EVERY, Header, OutputFile, RecordingCounts, Topic};
 use crate::{Error, Result};
 
-/// Capacity of the queue while a recording whose file is not begun yet waits for the board's clock, bytes: enough for
-/// hours of heartbeats of a board of version 2 at rest.
-const WAITING_BYTES: usize = 1 << 22;
-
-/// The queue of a recording, and the state of its file: planned, being written, or closed.
+/// The queue of a recording, and the state of its file: being written, or closed.
 pub(super) struct WriteQueue {
     path: PathBuf,
-    /// The parameters with which the file will be begun; `None` once it was.
-    pub(super) plan: Mutex<Option<ReservedFile>>,
-    /// Locked by the thread that writes; if both locks are needed, before `state`. `None` before the file is begun and
-    /// after its end.
+    /// Locked by the thread that writes; if both locks are needed, before `state`. `None` after the file's end.
     pub(super) writer: Mutex<Option<ChunkWriter>>,
     pub(super) thread: Mutex<Option<JoinHandle<Result<()>>>>,
     /// Whether the thread that writes waits for the operating system.
@@ -45,20 +38,9 @@ pub(super) struct WriteQueue {
     room: Condvar,
 }
 
-/// A file that is reserved but not begun yet.
-pub(super) struct ReservedFile {
-    pub(super) file: OutputFile,
-    pub(super) header: Header,
-    pub(super) compression: Compression,
-}
-
 #[derive(Default)]
 pub(super) struct Pending {
     pub(super) queue: MessageQueue,
-    /// Whether the file is begun; until then all messages wait.
-    pub(super) begun: bool,
-    /// Whether the file waits for the board's clock ([`Writer::begin`](super::Writer::begin)), not only for the first data.
-    for_clock: bool,
     /// What was written of each source.
     pub(super) written: Vec<Written>,
     /// The final counts of each source except the first.
@@ -108,18 +90,29 @@ struct WriteFailure {
 }
 
 impl WriteQueue {
-    pub(super) fn new(plan: ReservedFile, for_clock: bool) -> Self {
-        let written = vec![Written::default(); plan.header.sources.len() + 1];
-        Self {
-            path: plan.file.path().to_owned(),
-            plan: Mutex::new(Some(plan)),
-            writer: Mutex::default(),
+    /// Begins the file, without the thread that writes it.
+    pub(super) fn open(file: OutputFile, header: &Header, compression: Compression) -> Result<Self> {
+        let (path, at_disk) = (file.path().to_owned(), Arc::new(AtomicBool::new(false)));
+        let writer = ChunkWriter::begin(file, header, compression, &at_disk)
+            .map_err(|error| WriteFailure::new(error).of_file(&path))?;
+        let written = vec![Written::default(); header.sources.len() + 1];
+        Ok(Self {
+            path,
+            writer: Mutex::new(Some(writer)),
             thread: Mutex::default(),
-            at_disk: Arc::new(AtomicBool::new(false)),
-            state: Mutex::new(Pending { written, for_clock, ..Pending::default() }),
+            at_disk,
+            state: Mutex::new(Pending { written, ..Pending::default() }),
             work: Condvar::new(),
             room: Condvar::new(),
-        }
+        })
+    }
+
+    /// Starts the thread that writes.
+    pub(super) fn start(self: &Arc<Self>) -> Result<()> {
+        let queue = Arc::clone(self);
+        let thread = std::thread::Builder::new().name("taxel-record".to_owned()).spawn(move || queue.run());
+        *lock(&self.thread) = Some(thread.map_err(Error::file(&self.path))?);
+        Ok(())
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Pending> {
@@ -128,7 +121,7 @@ impl WriteQueue {
 
     /// Adds a message of a source; waits while the queue contains `most` bytes or more.
     pub(super) fn push(
-        self: &Arc<Self>,
+        &self,
         source: usize,
         topic: Topic,
         (at_ns, number): (i64, u64),
@@ -136,7 +129,7 @@ impl WriteQueue {
         most: usize,
     ) -> Result<()> {
         let mut state = self.lock();
-        while state.begun && state.queue.bytes.len() >= most && state.failure.is_none() {
+        while state.queue.bytes.len() >= most && state.failure.is_none() {
             self.work.notify_all();
             state = self.room.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
@@ -148,7 +141,7 @@ impl WriteQueue {
         }
         let before = state.queue.bytes.len();
         state.queue.bytes.extend_from_slice(bytes);
-        if state.begun && before < CHUNK_BYTES && state.queue.bytes.len() >= CHUNK_BYTES {
+        if before < CHUNK_BYTES && state.queue.bytes.len() >= CHUNK_BYTES {
             self.work.notify_all();
         }
         state.written[source].add(topic);
@@ -158,56 +151,11 @@ impl WriteQueue {
         let at_ns = u64::try_from(at_ns).unwrap_or(0);
         state.queue.messages.push(QueuedMessage { channel: topic.channel(source), number, at_ns, bytes: bytes.len() });
         state.queue.since.get_or_insert_with(Instant::now);
-        if !state.begun {
-            if topic.is_data() && (!state.for_clock || state.queue.bytes.len() > WAITING_BYTES) {
-                drop(state);
-                self.begin(None)?;
-            }
-            return Ok(());
-        }
         if !state.queue.is_late() || self.at_disk.load(Ordering::Relaxed) {
             return Ok(());
         }
         drop(state);
         self.drain()
-    }
-
-    /// Begins the file, once; returns whether this call did.
-    pub(super) fn begin(self: &Arc<Self>, origin_us: Option<i64>) -> Result<bool> {
-        // The lock is held until the file is begun, so that a second caller finds it begun.
-        let mut planned = lock(&self.plan);
-        let Some(mut plan) = planned.take() else {
-            return self.lock().failure.clone().map_or(Ok(false), |failure| Err(failure.of_file(&self.path)));
-        };
-        plan.header.decoding.origin_us = origin_us.unwrap_or(plan.header.decoding.origin_us);
-        let begun = self.start(plan);
-        if let Err(error) = &begun {
-            self.lock().failure = Some(WriteFailure::copy(error));
-            self.room.notify_all();
-        }
-        begun.map(|()| true)
-    }
-
-    fn start(self: &Arc<Self>, plan: ReservedFile) -> Result<()> {
-        self.open(plan)?;
-        let queue = Arc::clone(self);
-        let thread = std::thread::Builder::new().name("taxel-record".to_owned()).spawn(move || queue.run());
-        *lock(&self.thread) = Some(thread.map_err(Error::file(&self.path))?);
-        Ok(())
-    }
-
-    /// Begins the file without the thread that writes it.
-    pub(super) fn open(&self, ReservedFile { file, header, compression }: ReservedFile) -> Result<()> {
-        file.begin()?;
-        let writer = ChunkWriter::begin(file, &header, compression, &self.at_disk);
-        *lock(&self.writer) = Some(writer.map_err(|error| WriteFailure::new(error).of_file(&self.path))?);
-        let mut state = self.lock();
-        state.begun = true;
-        // The age of messages that waited for the file counts from now on.
-        if state.queue.since.is_some() {
-            state.queue.since = Some(Instant::now());
-        }
-        Ok(())
     }
 
     /// Ends the recording, with the counts of its first source if it is finished, and waits for the thread; the file is
@@ -229,8 +177,7 @@ impl WriteQueue {
 
     /// Ends without an end record, and returns the file.
     pub(super) fn abandon(&self) -> Option<OutputFile> {
-        let planned = lock(&self.plan).take().map(|plan| plan.file);
-        let file = planned.or_else(|| lock(&self.writer).take().map(|writer| writer.into_file().file));
+        let file = lock(&self.writer).take().map(|writer| writer.into_file().file);
         // Without a chunk writer the thread ends at once.
         let _ = self.finish(None);
         file
@@ -299,14 +246,6 @@ impl WriteQueue {
 }
 
 impl WriteFailure {
-    /// A copy of an error that was returned.
-    fn copy(error: &Error) -> Self {
-        match error {
-            Error::File { source, .. } => Self { code: source.raw_os_error(), text: source.to_string() },
-            other => Self { code: None, text: other.to_string() },
-        }
-    }
-
     fn new(error: McapError) -> Self {
         match error {
             McapError::Io(error) => {
