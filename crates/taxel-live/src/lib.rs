@@ -25,4 +25,3 @@ pub mod recording;
 pub use error::{Error, Result};
 pub use kernel_drops::KernelDrops;
 pub use latency::Quantiles;
-pub use read_at::read_exact_at;

@@ -563,7 +563,7 @@ mod tests {
 
     #[test]
     fn an_encoder_by_its_name_alone_is_the_readout_s() {
-        let path = recorded("readout-encoder", "mcap", 3);
+        let path = recorded("readout-encoder", 3);
         let index = RecordingIndex::open(&path).unwrap();
         let last = index.range().unwrap().1;
         let mut view = View::new(None);

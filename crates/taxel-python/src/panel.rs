@@ -151,7 +151,7 @@ pub struct PanelRecording(Shown);
 
 #[pymethods]
 impl PanelRecording {
-    /// Reads a file of a board's events (.mcap, .lsa); None of any other file, a .mcap of other programs among them.
+    /// Reads a `.mcap` of a board's events; None of any other file, those of other programs among them.
     #[staticmethod]
     fn of_events(py: Python<'_>, path: PathBuf) -> PyResult<Option<Self>> {
         let index = enter(py, |_| RecordingIndex::of_a_board(&path))?;

@@ -3,7 +3,6 @@
 //! A keyframe contains a copy of the decoder, so that decoding continues with its clock, sequence numbers and pending
 //! events as they were.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -17,12 +16,12 @@ use crate::array_state::{ArrayState, Keyframe};
 use crate::time_columns::{COLUMN_US, TimeColumns, column_of};
 use taxel_core::held::UNKNOWN;
 use taxel_core::rest::{LOADED_TICKS, preload, preload_text};
+use taxel_live::Result;
 use taxel_live::clock::{BoardClock, Pace, leaves};
 use taxel_live::pipeline::TaxelChange;
 use taxel_live::recording::{
-    Basis, Condition, Counts, Found, Header, ReadPosition, Reader, Remarks, Topic, Verdict, begin_with,
+    Basis, Condition, Found, Header, ReadPosition, Reader, Remarks, Topic, Verdict, begin_with,
 };
-use taxel_live::{Error, Result};
 
 /// Memory that the keyframes of a recording may take, bytes.
 const KEYFRAME_BYTES: usize = 128 << 20;
@@ -35,28 +34,12 @@ const SPACING: u64 = 1 << 16;
 /// Decoded blocks that may wait for the indexing thread.
 const AHEAD: usize = 4;
 
-/// Bytes of a `.lsa` in a block.
-const LSA_PIECE: u64 = 1 << 16;
-
-#[derive(Debug)]
-enum OpenedFile {
-    Mcap(Box<Reader>),
-    Lsa(File, u64),
-}
-
-/// The decoder of a recording.
-#[derive(Debug, Clone)]
-enum RecordingDecoder {
-    Datagrams(Box<wire::SenderDecoder>),
-    Bytes(Box<Decoder>),
-}
-
 /// A keyframe, and the decoder as it is before the next block.
 #[derive(Debug)]
 struct Key {
     block: usize,
     position: ReadPosition,
-    decoding: RecordingDecoder,
+    decoder: wire::SenderDecoder,
     keyframe: Keyframe,
 }
 
@@ -64,7 +47,7 @@ struct Key {
 #[derive(Debug)]
 pub struct RecordingIndex {
     path: PathBuf,
-    source: OpenedFile,
+    reader: Reader,
     header: Header,
     keys: Vec<Key>,
     time_columns: Option<TimeColumns>,
@@ -77,7 +60,7 @@ pub struct RecordingIndex {
     pub activity: Activity,
     /// Notes, markers, detections, registers.
     pub remarks: Remarks,
-    /// The drift and the delays that its datagrams' arrivals show; `None` of raw bytes.
+    /// The drift and the delays that its datagrams' arrivals show.
     pub pace: Option<Pace>,
     /// Where something lay in the quiet stretch that the rest is first taken from, for people; empty where nothing did.
     pub preload_at: String,
@@ -88,36 +71,21 @@ pub struct RecordingIndex {
 }
 
 impl RecordingIndex {
-    /// Reads a recording (`.mcap`, `.lsa`) once and indexes it.
+    /// Reads a recording once and indexes it.
     ///
     /// # Errors
     ///
     /// `File` where it cannot be read, `Core` where it is not a recording.
     pub fn open(path: &Path) -> Result<Arc<Self>> {
-        let bytes = std::fs::metadata(path).map_err(Error::file(path))?.len();
-        let (source, header, unfinished) = match path.extension().and_then(|e| e.to_str()) {
-            Some("mcap") => {
-                let reader = Reader::open(path)?;
-                let (header, unfinished) = (reader.header().clone(), reader.rebuilt().unfinished);
-                (OpenedFile::Mcap(Box::new(reader)), header, unfinished)
-            }
-            Some("lsa") => {
-                let file = File::open(path).map_err(Error::file(path))?;
-                let header = Header::of_board(Array::thesis(), None, path.display().to_string(), 0);
-                (OpenedFile::Lsa(file, bytes), header, !path.with_extension("lss").exists())
-            }
-            _ => {
-                let name = path.display();
-                return Err(problem!(
-                    "{name}: the panel shows only .mcap and .lsa files; taxel convert makes a .mcap file"
-                )
-                .into());
-            }
-        };
+        Self::of_reader(path, Reader::open(path)?)
+    }
+
+    fn of_reader(path: &Path, reader: Reader) -> Result<Arc<Self>> {
+        let (header, unfinished) = (reader.header().clone(), reader.rebuilt().unfinished);
         let header_array = header.array.clone();
         let mut index = Self {
             path: path.to_owned(),
-            source,
+            reader,
             header,
             keys: vec![],
             time_columns: None,
@@ -135,18 +103,16 @@ impl RecordingIndex {
         Ok(Arc::new(index))
     }
 
-    /// The index of a file of a board's events; `None` for any other file, an MCAP file of other programs among them.
+    /// The index of a `.mcap` of a board's events; `None` for any other file, those of other programs among them.
     ///
     /// # Errors
     ///
     /// As [`RecordingIndex::open`].
     pub fn of_a_board(path: &Path) -> Result<Option<Arc<Self>>> {
-        let events = match path.extension().and_then(|ending| ending.to_str()) {
-            Some("mcap") => Reader::open(path).is_ok_and(|recording| recording.header().frames.is_none()),
-            Some("lsa") => true,
-            _ => false,
-        };
-        if events { Self::open(path).map(Some) } else { Ok(None) }
+        let is_mcap = path.extension().is_some_and(|ending| ending == "mcap");
+        let reader = if is_mcap { Reader::open(path).ok() } else { None };
+        let board = reader.filter(|reader| reader.header().frames.is_none());
+        board.map(|reader| Self::of_reader(path, reader)).transpose()
     }
 
     /// The header of the file.
@@ -159,19 +125,9 @@ impl RecordingIndex {
         self.header.registers.map_or(0, |registers| registers.noise_floor.into())
     }
 
-    fn blocks(&self) -> usize {
-        match &self.source {
-            OpenedFile::Mcap(reader) => reader.blocks(),
-            OpenedFile::Lsa(_, length) => usize::try_from(length.div_ceil(LSA_PIECE)).unwrap_or(usize::MAX),
-        }
-    }
-
-    fn decoding(&self) -> RecordingDecoder {
+    fn decoder(&self) -> wire::SenderDecoder {
         let decoder = Decoder::new(self.header.array.clone()).differences(self.header.decoding.difference);
-        match &self.source {
-            OpenedFile::Mcap(_) => RecordingDecoder::Datagrams(Box::new(wire::SenderDecoder::new(decoder, 1))),
-            OpenedFile::Lsa(..) => RecordingDecoder::Bytes(Box::new(decoder)),
-        }
+        wire::SenderDecoder::new(decoder, 1)
     }
 
     /// Decodes a block, with the pending events after the last one, and notes what else it holds. Returns the number of
@@ -180,7 +136,7 @@ impl RecordingIndex {
         &self,
         k: usize,
         position: &mut ReadPosition,
-        decoding: &mut RecordingDecoder,
+        decoder: &mut wire::SenderDecoder,
         events: &mut Events,
         mut beside: Option<&mut Contents>,
     ) -> Result<u64> {
@@ -188,46 +144,31 @@ impl RecordingIndex {
         // A frame is shorter than a second.
         #[allow(clippy::cast_possible_truncation)]
         let frame_us = self.header.registers.map_or(0, |registers| registers.frame_us() as i64);
-        match (&self.source, &mut *decoding) {
-            (OpenedFile::Mcap(reader), RecordingDecoder::Datagrams(decoder)) => {
-                let is_valid = reader.block(k, position, |message| {
-                    if message.topic == Topic::Datagrams {
-                        let before = events.len();
-                        let info = decoder.push(message.data, Some(message.at_ns / 1000), events);
-                        let last = events.t[before..].last().copied();
-                        let left = leaves(&info, last, message.data.len(), frame_us);
-                        if let (Some(contents), Some(left)) = (&mut beside, left) {
-                            contents.clock.note(left, message.at_ns);
-                        }
-                        bytes += message.data.len() as u64;
-                    } else if message.topic == Topic::Held {
-                        begin_with(decoder, message.data);
-                    } else if message.topic == Topic::Pressure {
-                        return Ok(());
-                    }
-                    if let Some(contents) = &mut beside {
-                        contents.remarks.add(&message);
-                    }
-                    Ok(())
-                })?;
-                if let Some(contents) = beside {
-                    contents.bad_chunks += u64::from(!is_valid);
+        let is_valid = self.reader.block(k, position, |message| {
+            if message.topic == Topic::Datagrams {
+                let before = events.len();
+                let info = decoder.push(message.data, Some(message.at_ns / 1000), events);
+                let last = events.t[before..].last().copied();
+                let left = leaves(&info, last, message.data.len(), frame_us);
+                if let (Some(contents), Some(left)) = (&mut beside, left) {
+                    contents.clock.note(left, message.at_ns);
                 }
+                bytes += message.data.len() as u64;
+            } else if message.topic == Topic::Held {
+                begin_with(decoder, message.data);
+            } else if message.topic == Topic::Pressure {
+                return Ok(());
             }
-            (OpenedFile::Lsa(file, length), RecordingDecoder::Bytes(decoder)) => {
-                let offset = k as u64 * LSA_PIECE;
-                bytes = LSA_PIECE.min(length - offset);
-                let mut piece = vec![0; usize::try_from(bytes).unwrap_or(0)];
-                taxel_live::read_exact_at(file, &mut piece, offset).map_err(Error::file(&self.path))?;
-                decoder.push(&piece, None, events);
+            if let Some(contents) = &mut beside {
+                contents.remarks.add(&message);
             }
-            _ => {}
+            Ok(())
+        })?;
+        if let Some(contents) = beside {
+            contents.bad_chunks += u64::from(!is_valid);
         }
-        if k + 1 == self.blocks() {
-            match decoding {
-                RecordingDecoder::Datagrams(decoder) => decoder.finish_into(events),
-                RecordingDecoder::Bytes(decoder) => decoder.finish(events),
-            }
+        if k + 1 == self.reader.blocks() {
+            decoder.finish_into(events);
         }
         Ok(bytes)
     }
@@ -268,10 +209,10 @@ impl RecordingIndex {
         let contents = std::thread::scope(|scope| {
             let decoding = scope.spawn(move || index.decode_all(&decoded));
             for DecodedBlock { key, thin, held, changes } in blocks {
-                keys.extend(key.map(|(block, position, decoding)| Key {
+                keys.extend(key.map(|(block, position, decoder)| Key {
                     block,
                     position,
-                    decoding,
+                    decoder,
                     keyframe: state.keyframe(),
                 }));
                 if thin {
@@ -313,7 +254,7 @@ impl RecordingIndex {
     /// Decodes the whole file, block by block.
     fn decode_all(&self, to: &channel::Sender<DecodedBlock>) -> Result<Contents> {
         let taxels = self.header.array.len();
-        let (mut decoding, mut position) = (self.decoding(), ReadPosition::default());
+        let (mut decoder, mut position) = (self.decoder(), ReadPosition::default());
         // Beside the held values and how the rest is tracked, a decoder of version 2 stores the last 65 536 sequence
         // numbers.
         let each = 64 * taxels + (80 << 10);
@@ -328,18 +269,18 @@ impl RecordingIndex {
             bad_chunks: 0,
             verdict: String::new(),
         };
-        for k in 0..self.blocks() {
+        for k in 0..self.reader.blocks() {
             let mut piece = DecodedBlock { key: None, thin: false, held: None, changes: vec![] };
             if since >= spacing {
                 (since, keys) = (0, keys + 1);
-                piece.key = Some((k, position.clone_counts(), decoding.clone()));
+                piece.key = Some((k, position.clone_counts(), decoder.clone()));
                 if keys * each > KEYFRAME_BYTES {
                     (piece.thin, keys, spacing) = (true, keys.div_ceil(2), 2 * spacing);
                 }
             }
             events.clear();
             let held_before = contents.remarks.held.is_some();
-            let bytes = self.block(k, &mut position, &mut decoding, &mut events, Some(&mut contents))?;
+            let bytes = self.block(k, &mut position, &mut decoder, &mut events, Some(&mut contents))?;
             since = since.saturating_add(bytes);
             if !held_before {
                 piece.held = contents.remarks.held.clone().filter(|held| held.len() == taxels);
@@ -359,28 +300,14 @@ impl RecordingIndex {
                 break;
             }
         }
-        contents.verdict = self.verdict_on(&contents, &decoding).text();
+        contents.verdict = self.verdict_on(&contents, &decoder).text();
         Ok(contents)
     }
 
     /// What was lost, as `Recording.verdict` states it in Python.
-    fn verdict_on(&self, contents: &Contents, decoding: &RecordingDecoder) -> Verdict {
-        let reader = match (&self.source, decoding) {
-            (OpenedFile::Mcap(reader), _) => reader,
-            (OpenedFile::Lsa(..), RecordingDecoder::Bytes(decoder)) => {
-                let name = self.path.with_extension("lss").file_name().map(|name| name.to_string_lossy().into_owned());
-                return Verdict::new(Basis::Raw(
-                    name.filter(|_| self.unfinished),
-                    Counts::of_version_1(decoder.counts()),
-                ));
-            }
-            (OpenedFile::Lsa(..), RecordingDecoder::Datagrams(_)) => return Verdict::default(),
-        };
-        let decoded = match decoding {
-            RecordingDecoder::Datagrams(sender) => Some(Found::of_sender(sender, self.header.decoding.origin_us)),
-            RecordingDecoder::Bytes(_) => None,
-        };
-        let condition = reader.condition(&contents.remarks, contents.bad_chunks);
+    fn verdict_on(&self, contents: &Contents, decoder: &wire::SenderDecoder) -> Verdict {
+        let decoded = Some(Found::of_sender(decoder, self.header.decoding.origin_us));
+        let condition = self.reader.condition(&contents.remarks, contents.bad_chunks);
         Verdict::new(Basis::File(Box::new(Condition { decoded, ..condition })))
     }
 }
@@ -388,7 +315,7 @@ impl RecordingIndex {
 /// A decoded block.
 struct DecodedBlock {
     /// Where decoding can begin again: the block, and the reader and decoder before it.
-    key: Option<(usize, ReadPosition, RecordingDecoder)>,
+    key: Option<(usize, ReadPosition, wire::SenderDecoder)>,
     /// The keyframes take too much memory: every second one is to be dropped.
     thin: bool,
     /// Held values at the start of the recording.
@@ -411,17 +338,17 @@ struct RecordingChanges {
     index: Arc<RecordingIndex>,
     block: usize,
     position: ReadPosition,
-    decoding: RecordingDecoder,
+    decoder: wire::SenderDecoder,
     events: Events,
 }
 
 impl ChangeReader for RecordingChanges {
     fn read(&mut self, out: &mut Vec<TaxelChange>) -> Result<ReadOutcome> {
-        if self.block >= self.index.blocks() {
+        if self.block >= self.index.reader.blocks() {
             return Ok(ReadOutcome::End);
         }
         self.events.clear();
-        self.index.block(self.block, &mut self.position, &mut self.decoding, &mut self.events, None)?;
+        self.index.block(self.block, &mut self.position, &mut self.decoder, &mut self.events, None)?;
         self.block += 1;
         self.index.changes(&self.events, out);
         Ok(ReadOutcome::Changes)
@@ -443,14 +370,14 @@ impl KeyframeIndex for Arc<RecordingIndex> {
 
     fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn ChangeReader>)> {
         let index = self.keys.partition_point(|key| key.keyframe.latest.is_none_or(|latest| latest <= t)).max(1) - 1;
-        let Some(Key { block, position, decoding, keyframe }) = self.keys.get(index) else {
+        let Some(Key { block, position, decoder, keyframe }) = self.keys.get(index) else {
             return Err(problem!("{}: contains no events", self.path.display()).into());
         };
         let reader = RecordingChanges {
             index: Arc::clone(self),
             block: *block,
             position: position.clone(),
-            decoding: decoding.clone(),
+            decoder: decoder.clone(),
             events: Events::empty(self.header.array.clone()),
         };
         Ok((keyframe.clone(), Box::new(reader)))

@@ -17,17 +17,17 @@ use taxel_live::recording::{Writer, WriterOptions};
 const WATCHED: u32 = 2080;
 
 /// Recording of a simulated board, with pauses longer than a turn of its clock and changes of the wire version.
-pub(crate) fn recorded(name: &str, ending: &str, seed: u64) -> PathBuf {
-    let path = std::env::temp_dir().join(format!("taxel-{name}-{}.{ending}", std::process::id()));
+pub(crate) fn recorded(name: &str, seed: u64) -> PathBuf {
+    let path = std::env::temp_dir().join(format!("taxel-{name}-{}.mcap", std::process::id()));
     let array = Array::thesis();
     let mut random = StdRng::seed_from_u64(seed);
     let mut board = Board::new(Registers::default(), &array).unwrap();
     let header = Header::of_board(array.clone(), Some(Registers::default()), String::new(), 0);
     let how = WriterOptions { overwrite: true, ..WriterOptions::default() };
-    let writer = (ending == "mcap").then(|| Writer::create(&path, &header, how).unwrap());
-    let (mut ticks, mut bytes, mut number) = (vec![48_u16; array.len()], vec![], 0);
+    let writer = Writer::create(&path, &header, how).unwrap();
+    let (mut ticks, mut number) = (vec![48_u16; array.len()], 0);
     for part in 0..6 {
-        if part % 2 == 1 && ending == "mcap" {
+        if part % 2 == 1 {
             let version = if part % 4 == 1 { 2 } else { 1 };
             let registers = Registers { wire_version: version, ..*board.registers() };
             board.command(&Command { register: 0, value: registers.word(0) }.to_bytes());
@@ -43,21 +43,14 @@ pub(crate) fn recorded(name: &str, ending: &str, seed: u64) -> PathBuf {
             let now_ns = (board.time_us() * 1000.0) as i64 + 1_000_000_000;
             board
                 .frame(&ticks, |datagram| {
-                    if let Some(writer) = &writer {
-                        writer.datagram(now_ns, number, datagram).unwrap();
-                        number += 1;
-                    } else {
-                        bytes.extend_from_slice(datagram);
-                    }
+                    writer.datagram(now_ns, number, datagram).unwrap();
+                    number += 1;
                     true
                 })
                 .unwrap();
         }
     }
-    match writer {
-        Some(writer) => drop(writer.finish(taxel_live::recording::RecordingCounts::default()).unwrap()),
-        None => std::fs::write(&path, bytes).unwrap(),
-    }
+    writer.finish(taxel_live::recording::RecordingCounts::default()).unwrap();
     path
 }
 
@@ -74,18 +67,7 @@ pub(in crate::keyframe_index) fn held_at(changes: &[TaxelChange], t: i64, taxels
 }
 
 fn decode_all(index: &Arc<RecordingIndex>) -> Vec<TaxelChange> {
-    let mut events = Events::empty(index.header.array.clone());
-    match &index.source {
-        OpenedFile::Mcap(reader) => {
-            events = reader.decode(taxel_core::Stop::never()).unwrap().events;
-        }
-        OpenedFile::Lsa(..) => {
-            let bytes = std::fs::read(&index.path).unwrap();
-            let mut decoder = Decoder::new(index.header.array.clone());
-            decoder.push(&bytes, None, &mut events);
-            decoder.finish(&mut events);
-        }
-    }
+    let events = index.reader.decode(taxel_core::Stop::never()).unwrap().events;
     let mut changes = vec![];
     index.changes(&events, &mut changes);
     changes
@@ -117,12 +99,12 @@ fn counted(changes: &[TaxelChange], columns: std::ops::Range<i64>, us: i64, t: i
 
 #[test]
 fn any_time_of_a_recording_looks_as_after_a_full_decode() {
-    for (ending, seed) in [("mcap", 1), ("lsa", 2)] {
-        let path = recorded("any-time", ending, seed);
+    for seed in [1, 2] {
+        let path = recorded("any-time", seed);
         let index = RecordingIndex::open(&path).unwrap();
         let changes = decode_all(&index);
         assert_eq!(index.events, changes.len() as u64);
-        assert!(index.keys.len() >= 5, "{ending}: {} keyframes", index.keys.len());
+        assert!(index.keys.len() >= 5, "{seed}: {} keyframes", index.keys.len());
         let (first, last) = index.range.unwrap();
         let (mut random, mut some) = (StdRng::seed_from_u64(7), 0);
         for turn in 0..25 {
@@ -135,14 +117,14 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
                 ViewOptions { watched: Some(WATCHED), encoder: Some(spiking.clone()), ..ViewOptions::plain(us) };
             let mut player = Player::open(Arc::new(Arc::clone(&index)), t, options).unwrap();
             let (held, events) = held_at(&changes, t, index.header.array.len());
-            assert_eq!((player.state().held(), player.state().events()), (&held[..], events), "{ending} at {t} us");
+            assert_eq!((player.state().held(), player.state().events()), (&held[..], events), "{seed} at {t} us");
             let (columns, raster, curves) = shown(&mut player, us);
             assert_eq!(columns.end, column_of(t, us) + 1);
             let begin = (columns.end - SPAN).max(column_of(first, us));
-            assert_eq!(columns.start, begin, "{ending} at {t} us: all of the window");
+            assert_eq!(columns.start, begin, "{seed} at {t} us: all of the window");
             assert!(
                 raster == counted(&changes, columns.clone(), us, t, &index.header.array),
-                "{ending}: raster at {t} us by {us} us"
+                "{seed}: raster at {t} us by {us} us"
             );
             // Curves and changes by a state of the same column width, from the beginning, without a keyframe.
             let blank = Keyframe::blank(index.header.array.len());
@@ -150,7 +132,7 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
             changes.iter().filter(|change| change.t <= t).for_each(|change| slow.apply_one(change));
             slow.advance(t);
             slow.update_curve();
-            assert_eq!(player.state().change(), slow.change(), "{ending} at {t} us");
+            assert_eq!(player.state().change(), slow.change(), "{seed} at {t} us");
             // A column wider than those that are stored has the least and the greatest of its parts.
             let part_us = us.min(COLUMN_US);
             let mut parts = ArrayState::new(&index.header.array, index.noise_floor(), &blank, part_us, 1 << 28);
@@ -164,7 +146,7 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
                 (column * us / part_us..=last).for_each(|part| whole.join(&parts.time_columns().curve(part)));
                 whole.write(&mut same);
             }
-            assert!(curves == same, "{ending}: curves at {t} us by {us} us");
+            assert!(curves == same, "{seed}: curves at {t} us by {us} us");
             // An encoder that is given all changes from the beginning has the same spikes. Where stamps are not multiples of
             // its period it may sample one period earlier or later, so that a spike may cross an edge of the window.
             let mut full = EncodedSpikes::new(&spiking, &index.header.array, us, &[], None).unwrap();
@@ -185,19 +167,18 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
                     |change: &&TaxelChange| change.taxel as usize / usize::from(index.header.array.columns) == row;
                 let may = changes.iter().filter(|change| at_edge(change.t)).filter(is_of_row).count() as i64;
                 let differ = (of_row(&spikes, row) - of_row(&all, row)).abs();
-                assert!(differ <= may, "{ending}: spikes of row {row} at {t} us by {us} us: {differ}, not {may}");
+                assert!(differ <= may, "{seed}: spikes of row {row} at {t} us by {us} us: {differ}, not {may}");
             }
-            assert!(ending != "lsa" || spikes == all, "{ending}: spikes at {t} us by {us} us");
             some += all.iter().filter(|&&n| n > 0).count();
         }
-        assert!(some > 1000, "{ending}: {some} spikes");
+        assert!(some > 1000, "{seed}: {some} spikes");
         std::fs::remove_file(&path).unwrap();
     }
 }
 
 #[test]
 fn steps_go_from_stamp_to_stamp_both_ways_and_through_silence() {
-    let path = recorded("steps", "mcap", 3);
+    let path = recorded("steps", 3);
     let index = RecordingIndex::open(&path).unwrap();
     let mut stamps: Vec<i64> = decode_all(&index).iter().map(|change| change.t).collect();
     stamps.dedup();
