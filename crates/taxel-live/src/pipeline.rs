@@ -9,7 +9,6 @@
 
 mod counters;
 mod decode_stage;
-mod falling_values;
 mod frame_block;
 mod frame_input;
 mod frame_stage;
@@ -24,7 +23,6 @@ mod receive_stage;
 mod recent_frames;
 mod record_stage;
 mod recording_switch;
-mod rest_shift;
 mod running_readout;
 mod running_recording;
 mod sending;

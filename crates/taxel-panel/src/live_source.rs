@@ -327,8 +327,6 @@ impl LiveSource {
             "frames_per_s": frames_per_s,
             "arrival": now.arrival(now_ns()),
             "pace": now.board.pace,
-            "rest_shift": now.rest_shift,
-            "falls": now.falls,
             "lost": {
                 "kernel": now.capture.dropped_by_kernel.0,
                 "queue": now.capture.dropped_by_queue,

@@ -236,12 +236,6 @@ _UNREAD = {
 def unread(counters: dict[str, Any], told: set[tuple[str, str]]) -> Iterator[str]:
     """Yield what is wrong with lines of each source, each kind once: `told` holds those that were."""
     for source, counts in {"": counters, **counters["sources"]}.items():
-        if counts.get("falls") and (source, "falls") not in told:
-            told.add((source, "falls"))
-            yield (
-                f"{source + ': ' * bool(source)}values fall under touch: if smaller values mean more pressure, "
-                "add ,falls=true to the source"
-            )
         lines = counts.get("lines")
         kinds = (lines if isinstance(lines, dict) else {}).get("unread") or {}
         for kind, words in _UNREAD.items():

@@ -344,9 +344,6 @@ def _watch(
 def _warnings(pipeline: Live, now: dict[str, Any], told: set[tuple[str, str]]) -> Iterator[str]:
     """Yield what is wrong with what arrives, each once: `told` holds what was."""
     yield from unread(now, told)
-    if (shifted := now["rest_shift"]) and ("rest_shift", shifted) not in told:
-        told.add(("rest_shift", shifted))
-        yield shifted
     if ("", "outside") not in told and (wrong := outside(now, pipeline.array)):
         told.add(("", "outside"))
         yield wrong

@@ -259,9 +259,7 @@ class Live:
         `report_latency` (count, p50_us, p99_us, max_us; None where nothing was measured, as where the
         kernel does not stamp arrivals), `offset` (board_us, host_ns,
         drift_ppm, or None), `pace` (drift_ppm, delay: as a latency, beyond the shortest; doubt: why they cannot be, or
-        None; None at first), `board_us`, `markers`, `marked_start`, `seconds`, `taring`,
-        `rest_shift` (of frames: a line if a quarter of the taxels rest elsewhere after a gap than by the tare, else
-        None), `falls` (of frames: whether values fall under touch).
+        None; None at first), `board_us`, `markers`, `marked_start`, `seconds`, `taring`.
 
         Sums: messages at the socket = messages + dropped_by_kernel (a message is a datagram, or a train of them with
         `gro`); datagrams = decoded + dropped_by_queue + waiting; bytes = 5 words + skipped; events = read_out +

@@ -410,18 +410,14 @@ class Session:
 
     @request
     async def invert(self) -> None:
-        """Take smaller values as more pressure: of the recording shown, by the layout file beside it, or live.
+        """Take smaller values of the recording shown as more pressure, by the layout file beside it.
 
-        The recording is read again by the next `open`; a live source begins again.
+        The recording is read again by the next `open`.
         """
-        if self.shown is not None:
-            await in_thread(self._hub.folder.files.invert, self.shown.path)
-            self._hub.folder.forget(self.shown.path)
-        else:
-            source = self._hub.needed_source().about()["source"]
-            if source is None:
-                raise ProblemError("the live source is a board: its values are known to rise with pressure")
-            await self._hub.read_source(f"{source},falls=true")
+        if self.shown is None:
+            raise ProblemError("no recording is open: state falls=true where a live source is stated")
+        await in_thread(self._hub.folder.files.invert, self.shown.path)
+        self._hub.folder.forget(self.shown.path)
 
     # ------------------------------------------------------------------------------------------ requests: recordings
 

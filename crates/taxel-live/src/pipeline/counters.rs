@@ -45,10 +45,6 @@ pub struct Counters {
     pub board: BoardState,
     /// Time since the socket was opened, s.
     pub seconds: f64,
-    /// Of frames: what is wrong, where the taxels rest elsewhere after a gap than by the tare.
-    pub rest_shift: Option<String>,
-    /// Of frames: whether values fall under touch, so that no pressure is shown.
-    pub falls: bool,
 }
 
 /// Counts of the decoder, and what it refused.

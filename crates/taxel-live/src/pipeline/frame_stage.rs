@@ -4,23 +4,19 @@
 use std::time::Duration;
 
 use taxel_core::held::{Held, UNKNOWN};
-use taxel_core::rest::{FORCE_UNITS, ValueSteps};
+use taxel_core::rest::ValueSteps;
 use taxel_core::{Array, Events, Intensities};
 
 use super::counters::Counters;
-use super::falling_values::FallingValues;
 use super::frame_block::{FrameBlock, read_message};
 use super::readout_queue::QuietUntil;
-use super::rest_shift::RestShift;
+use super::recent_frames::RecentFrames;
 use super::source::FrameLayout;
 use crate::capture::Batch;
 use crate::clock::{BoardClock, Pace};
 
 /// Shortest interval at which the readout's time is advanced while no frames arrive.
 const TICK: Duration = Duration::from_micros(500);
-
-/// Whether values fall is looked at once in so many frames.
-const LOOK_FRAMES: u64 = 32;
 
 /// Number of differences between frames from which the noise is measured.
 const NOISE_FRAMES: usize = 32;
@@ -38,15 +34,7 @@ pub(super) struct FrameStage {
     before: Vec<f32>,
     steps: Option<ValueSteps>,
     noise: FirstNoise,
-    /// The noise of the first frames, once it is measured.
-    measured_noise: Option<f64>,
-    shift: RestShift,
-    /// Whether the taxels hold still after a gap since [`FrameStage::holds_still`].
-    is_still: bool,
-    /// None of values that cannot fall, or are turned.
-    falling: Option<FallingValues>,
-    falls: bool,
-    unit: String,
+    recent: RecentFrames,
     held: Held,
     /// The changes of `held` with these frames.
     changes: Events,
@@ -60,10 +48,8 @@ pub(super) struct FrameStage {
 }
 
 impl FrameStage {
-    /// `noise_floor` is that of the readout.
-    pub(super) fn new(layout: &FrameLayout, guard_frames: f64, noise_floor: f64) -> Self {
+    pub(super) fn new(layout: &FrameLayout, guard_frames: f64) -> Self {
         let array = &layout.array;
-        let may_fall = layout.turned.is_none() && !FORCE_UNITS.contains(&&*layout.unit);
         Self {
             frame_us: layout.frame_us,
             waited: layout.waited,
@@ -75,12 +61,7 @@ impl FrameStage {
             before: vec![],
             steps: None,
             noise: FirstNoise::new(array.len()),
-            measured_noise: None,
-            shift: RestShift::new(noise_floor, layout.frame_us),
-            is_still: false,
-            falling: may_fall.then(|| FallingValues::new(array.columns.into())),
-            falls: false,
-            unit: layout.unit.clone(),
+            recent: RecentFrames::default(),
             held: Held::unknown(array.len()),
             changes: no_changes(array),
             clock: BoardClock::default(),
@@ -109,13 +90,7 @@ impl FrameStage {
             }
             is_new |= self.fit_steps();
             self.change(t);
-            self.is_still |= self.shift.take(message.arrived_ns, &self.last, self.measured_noise);
-            if let Some(falling) = &mut self.falling {
-                falling.take(t, &self.last, self.measured_noise);
-                if self.count.is_multiple_of(LOOK_FRAMES) {
-                    self.falls = falling.are_found();
-                }
-            }
+            self.recent.take(message.arrived_ns, &self.last);
         }
         is_new
     }
@@ -129,7 +104,6 @@ impl FrameStage {
             }
         }
         if let Some(noise) = self.noise.take(&self.before, &self.last) {
-            self.measured_noise = Some(noise);
             steps = steps.above_noise(noise);
         }
         let is_new = self.steps.is_some_and(|before| before != steps);
@@ -187,19 +161,9 @@ impl FrameStage {
         &self.last
     }
 
-    /// The rest of a taxel that nothing touches now; none before the first frame.
+    /// The rest of a taxel that nothing touches now: the median of its last second; none without a value.
     pub(super) fn rest_now(&self, taxel: usize) -> Option<f64> {
-        self.shift.rest_now(taxel)
-    }
-
-    /// Whether the taxels hold still after a gap, once.
-    pub(super) fn holds_still(&mut self) -> bool {
-        std::mem::take(&mut self.is_still)
-    }
-
-    /// What is wrong, where the taxels rest elsewhere than this after a gap.
-    pub(super) fn rest_shift(&self, rest: &[Option<f64>]) -> Option<String> {
-        self.shift.found(rest, &self.unit)
+        self.recent.middle(taxel)
     }
 
     /// Number of frames.
@@ -211,7 +175,6 @@ impl FrameStage {
     pub(super) fn publish(&self, counters: &mut Counters) {
         counters.decoding.decoded = self.count;
         counters.decoding.frames = self.count;
-        counters.falls = self.falls;
         counters.board.arrived_ns = self.latest.map(|(_, arrived_ns)| arrived_ns);
         counters.board.offset = self.clock.offset();
         counters.board.pace.clone_from(&self.pace);

@@ -14,31 +14,16 @@ const MIDDLE_NS: i64 = 1_000_000_000;
 pub(super) struct RecentFrames(VecDeque<(i64, Vec<f32>)>);
 
 impl RecentFrames {
-    /// Takes a frame that arrived at `at_ns`; returns whether it is kept.
-    pub(super) fn take(&mut self, at_ns: i64, values: &[f32]) -> bool {
+    /// Takes a frame that arrived at `at_ns`, which is kept if it is far enough behind the last one.
+    pub(super) fn take(&mut self, at_ns: i64, values: &[f32]) {
         if self.0.back().is_some_and(|(last_ns, _)| at_ns - last_ns < EVERY_NS) {
-            return false;
+            return;
         }
         // The oldest one's memory is used again.
         let mut kept =
             if self.0.len() == COUNT { self.0.pop_front().map_or_else(Vec::new, |(_, kept)| kept) } else { vec![] };
         values.clone_into(&mut kept);
         self.0.push_back((at_ns, kept));
-        true
-    }
-
-    pub(super) fn clear(&mut self) {
-        self.0.clear();
-    }
-
-    pub(super) fn is_full(&self) -> bool {
-        self.0.len() == COUNT
-    }
-
-    /// Difference between a taxel's greatest and least value; NaN is no value.
-    pub(super) fn range(&self, taxel: usize) -> f64 {
-        let values = || self.0.iter().map(|(_, frame)| f64::from(frame[taxel]));
-        values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
     }
 
     /// The median of a taxel's values over the last second, or its last value; none without a value.
@@ -68,18 +53,15 @@ mod tests {
         }
         assert!((500.0..=506.0).contains(&recent.middle(0).unwrap()));
         assert_eq!(recent.middle(1), None);
-        assert!(recent.is_full());
-        assert!(recent.range(0) > 390.0);
+        assert_eq!(recent.0.len(), COUNT);
     }
 
     #[test]
     fn a_slow_source_has_the_last_frame_alone() {
         let mut recent = RecentFrames::default();
         for (k, value) in [7.0, 8.0, 3.0].into_iter().enumerate() {
-            assert!(recent.take(k as i64 * 1_000_000_000, &[value]));
+            recent.take(k as i64 * 1_000_000_000, &[value]);
         }
         assert_eq!(recent.middle(0), Some(3.0));
-        recent.clear();
-        assert_eq!(recent.middle(0), None);
     }
 }

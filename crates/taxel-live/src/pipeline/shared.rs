@@ -52,19 +52,6 @@ pub(super) struct PublishedState {
     pub(super) failed: Option<Error>,
 }
 
-impl PublishedState {
-    /// The readout's rest of each taxel, with that of the zeroed ones.
-    pub(super) fn rest_with_zeroed(&self) -> Vec<Option<f64>> {
-        let mut rest = self.rest.clone();
-        for (&taxel, zeroing) in &self.zeroed {
-            if let Some(rest) = rest.get_mut(taxel) {
-                *rest = Some(zeroing.rest);
-            }
-        }
-        rest
-    }
-}
-
 /// The recording that runs, where one does.
 #[derive(Default)]
 pub(super) struct RecordingSlot {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use taxel_core::detect::{Detection, Detector};
+use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
 use taxel_core::held::{Held, UNKNOWN};
 use taxel_core::problem;
@@ -101,12 +101,7 @@ impl Stages {
         let options = &shared.options;
         let source = match &shared.frames {
             None => SourceStage::Board(Box::new(DecodeStage::new(options))),
-            Some(input) => {
-                let readout = options.readout.as_deref().and_then(|text| Detector::from_json(text).ok());
-                let noise_floor = readout.map_or(0.0, |readout| readout.noise_floor());
-                let stage = FrameStage::new(&input.layout, options.guard_frames, noise_floor);
-                SourceStage::Frames(Box::new(stage))
-            }
+            Some(input) => SourceStage::Frames(Box::new(FrameStage::new(&input.layout, options.guard_frames))),
         };
         Self {
             shared: Arc::clone(shared),
@@ -208,9 +203,6 @@ impl Stages {
                     batch.iter().for_each(|(message, _)| published.decode_latency.note(now - message.arrived_ns));
                     stage.publish(&mut published.counters);
                     published.steps = stage.steps();
-                    if stage.holds_still() {
-                        published.counters.rest_shift = stage.rest_shift(&published.rest_with_zeroed());
-                    }
                 }
                 let (frames, changes, held) = stage.parts();
                 observers.events(changes, held);
@@ -314,9 +306,6 @@ impl Stages {
         let mut published = self.shared.published();
         published.zeroed.extend(zeroings.iter().map(|zeroing| (array.index(zeroing.x, zeroing.y), *zeroing)));
         published.zeroings += 1;
-        if let SourceStage::Frames(stage) = &self.source {
-            published.counters.rest_shift = stage.rest_shift(&published.rest_with_zeroed());
-        }
         drop(published);
         self.readout.zero(&self.shared, &zeroings);
         Ok(zeroings)

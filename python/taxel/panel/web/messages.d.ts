@@ -291,10 +291,6 @@ export interface Counters {
   arrival: Arrival;
   /** Null in the first quarter of a second. */
   pace: Pace | null;
-  /** What is wrong if, after a gap, the rest of the taxels of frames differs from the tare. */
-  rest_shift: string | null;
-  /** Whether the values of frames fall under touch, so that no pressure is shown. */
-  falls: boolean;
   lost: Lost;
   /** Datagrams that wait. */
   queue: number;

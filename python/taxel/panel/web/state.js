@@ -49,12 +49,6 @@ function fall(opened) {
   return `The values${names} fall from their rest, so no pressure is shown. If smaller values mean more pressure, invert the values. This writes “falls = true” into ${file} beside the recording, which every command reads.`;
 }
 
-/** The same of the live source. @param {Hello | null} hello @param {Counters | null} counters @returns {string} */
-function liveFall(hello, counters) {
-  if (!counters?.falls || !hello?.lines) return "";
-  return "The values fall from their rest, so no pressure is shown. If smaller values mean more pressure, invert the values. The source is then read again with “falls=true”.";
-}
-
 /** What lay on a sensor while its rest was taken may hide there. @param {Opened | null} opened @returns {string} */
 function preload(opened) {
   const sources = opened?.frames?.sources ?? [{ name: "", preload_at: opened?.preload_at ?? "" }];
@@ -103,10 +97,8 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
   const doubt = (connected && (opened ? opened.pace : counters?.pace)?.doubt) || "";
   const nothing = connected && source === null && !hello?.live;
   const banner = part("silence", HTMLElement);
-  const isLive = connected && source === null && opened === null;
-  const falling = isLive ? liveFall(hello, counters) : connected && fall(opened);
-  const shift = (isLive && counters?.rest_shift) || "";
-  const text = [silent?.text, sentence(doubt), nothing && refused, connected && preload(opened), falling, sentence(shift)].filter(Boolean).join(" ");
+  const falling = connected && fall(opened);
+  const text = [silent?.text, sentence(doubt), nothing && refused, connected && preload(opened), falling].filter(Boolean).join(" ");
   write(part("silence-text", HTMLElement), text);
   part("turn-values", HTMLButtonElement).hidden = !falling;
   banner.hidden = !text;
