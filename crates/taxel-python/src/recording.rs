@@ -400,7 +400,7 @@ pub fn recording_damage(counts: &str) -> PyResult<Plain<Counts>> {
 #[pyfunction]
 pub fn write_lsa(py: Python<'_>, path: PathBuf, payload: &Bound<'_, PyBytes>) -> PyResult<()> {
     let bytes = payload.as_bytes();
-    enter(py, |_| write_lsa(&path, bytes))
+    enter(py, |_| taxel_live::recording::write_lsa(&path, bytes))
 }
 
 /// A `.lsa`, decoded.

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use serde::Serialize;
 
 use super::offset::Offset;
-use super::stretch::{ArrivalPoint, LONG_US, STRETCHES};
+use super::{ArrivalPoint, LONG_US, STRETCHES};
 use crate::latency::{Latencies, Quantiles};
 
 /// Reading: no two clocks differ by more (crystals by 0.01 %, the worst oscillators by 1 %), ppm.
@@ -106,13 +106,13 @@ impl ArrivalDelays {
     }
 
     /// Notes the fastest arrival of a stretch.
-    pub(super) fn end_stretch(&mut self, fastest: Option<ArrivalPoint>) {
+    pub(super) fn end_stretch(&mut self, fastest: ArrivalPoint) {
         self.catches_up &= self.fastest.is_empty();
-        self.begun = self.begun.or(fastest.map(|(board_us, _)| board_us));
+        self.begun.get_or_insert(fastest.0);
         if self.fastest.len() == STRETCHES {
             self.fastest.pop_front();
         }
-        self.fastest.extend(fastest);
+        self.fastest.push_back(fastest);
     }
 
     /// The drift over all of these arrivals, ppm; `None` within their first seconds. A line follows no drift that
