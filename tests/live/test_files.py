@@ -83,9 +83,10 @@ def test_two_recordings_of_one_program_do_not_share_a_file(tmp_path: Path) -> No
             two.record(file, overwrite=True)
         wait_for(one, play(presses(1), one.address[1]))
         assert one.end_recording().path == file
+        assert len(taxel.open(file).events) == len(presses(1))
         two.record(file, overwrite=True)
         assert two.end_recording().path is None
-    assert len(taxel.open(file).events) == len(presses(1))
+    assert not file.exists(), "nothing came to the recording that replaced it"
 
 
 def test_what_was_noted_is_kept_though_nothing_came(tmp_path: Path) -> None:
