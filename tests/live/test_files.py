@@ -30,7 +30,7 @@ def test_a_recording_to_which_nothing_came_is_not_kept(tmp_path: Path) -> None:
     port, file = free_port(), tmp_path / "walk.mcap"
     done = run("record", file, "--host", LOOPBACK, "--port", port, "--seconds", 0.2)
     assert done.returncode == 3
-    assert done.stdout.startswith(f"nothing arrived at UDP {LOOPBACK}:{port} in 0.")
+    assert done.stdout.startswith(f"nothing arrived at UDP {LOOPBACK}:{port} in ")
     assert "nothing lost" not in done.stdout
     assert list(tmp_path.iterdir()) == []
 

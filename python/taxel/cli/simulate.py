@@ -54,7 +54,7 @@ def simulate(
         scene_file = SceneFile(Scene({})) if scene is None else SceneFile.open(scene)
     seed = scene_file.seed if seed is None else seed
     acts = scene_file.acts() if scenes is None else script(seed, scenes, tare_ms=scene_file.tare_ms)
-    named = counted(scenes, "scene") if scene is None else str(scene)
+    named = str(scene) if scenes is None else counted(scenes, "scene")
     targets = [path for path in (out, labels) if path is not None]
     if len({path.resolve() for path in targets}) < len(targets):
         raise ProblemError("--out and --truth: must be different files")
