@@ -53,13 +53,13 @@ def test_floors_are_raised_for_counts_alone_and_never_lowered() -> None:
     frames, _ = counts(2.0, seed=4)
     tare = Tare.take(frames, stop_us=500_000)
     rule = PlainRule("area", 2, noise_floor=1.0, unit=UNIT)
-    assert rule._at_noise_of(tare).noise_floor == pytest.approx(6 * np.quantile(tare.noise, 0.9))
-    assert rule._at_noise_of(None) is rule
+    assert rule._for(None, tare).noise_floor == pytest.approx(6 * np.quantile(tare.noise, 0.9))
+    assert rule._for(None, None) is rule
     high = PlainRule("area", 2, noise_floor=100.0, unit=UNIT)
-    assert high._at_noise_of(tare) is high
+    assert high._for(None, tare) is high
     for unit in ("counts", None):
         other = PlainRule("area", 2, noise_floor=1.0, unit=unit)
-        assert other._at_noise_of(tare) is other
+        assert other._for(None, tare) is other
 
 
 def test_what_is_no_count_of_the_training_is_refused_before_its_rest(tmp_path: Path) -> None:

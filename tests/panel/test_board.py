@@ -7,6 +7,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
+from loopback import free_port
 from panel.browser import running
 from panel.protocol import (
     Client,
@@ -18,6 +19,9 @@ from panel.protocol import (
 
 import taxel
 import taxel.device
+from taxel.detect.board import summary
+from taxel.live import Live
+from taxel.panel import Panel
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers
 
@@ -88,3 +92,25 @@ def test_a_board_that_was_reset_is_shown_anew(live, panel):
         while np.sum(section(page.until("frame"), 0, "<u2") != 65_535) != 5:
             pass
         assert any(head(frame)[0]["flags"] & 4 for frame in page.frames[here:])
+
+
+def test_a_raised_noise_floor_reaches_the_readout_and_is_told_once(tmp_path):
+    rule = taxel.detect.PlainRule("area", 2, noise_floor=3.0)
+    training = {"noise_floor": 3.0, "error_ms": {}, "loads": {}, "board": summary(Registers())}
+    rule._with(training=training).save(tmp_path / "rule.json")
+    port = free_port()
+    with running("emulate", "--port", str(port), "--control", "0", folder=tmp_path) as emulated:
+        control = emulated.wait_for(r"commands are accepted at (\S+)")
+        with (
+            Live(port, host="127.0.0.1") as live,
+            Panel(live, control=control, folder=tmp_path) as panel,
+            Client(panel) as page,
+        ):
+            page.until("registers", known=True)
+            while page.ask("read_out", readout="rule.json")["type"] != "done":
+                pass  # no value of a taxel has arrived yet
+            for noise_floor in (7, 7, 2):
+                assert page.ask("set", values={"noise_floor": noise_floor})["type"] == "done"
+                assert panel.live._options.readout.noise_floor == 7
+            told = [message["text"] for message in page.said if message["type"] == "warning"]
+            assert [("7 ticks" in text, "2 ticks" in text) for text in told] == [(True, False), (False, True)]

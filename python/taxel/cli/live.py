@@ -18,7 +18,7 @@ from rich.text import Text
 from taxel._base.files import check_writable
 from taxel._base.messages import counted, plain
 from taxel._base.stopping import asked_to_end
-from taxel._core import FIREWALL, ProblemError
+from taxel._core import FIREWALL, DeviceError, ProblemError
 from taxel.array import Array
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._say import say
@@ -40,9 +40,11 @@ from taxel.cli.board import (
 )
 from taxel.cli.console import Console
 from taxel.detect import PlainRule, Readout
+from taxel.detect.board import differences
 from taxel.device import Cable
 from taxel.live import Live, Summary, delays
 from taxel.panel import Panel
+from taxel.panel.board import Board
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 from taxel.wire import Registers
@@ -112,19 +114,16 @@ def live(*, options: dict[str, Any], typed: Flat[_LiveArguments] = _LiveArgument
             raise ProblemError("--report needs a recording: give --record FILE.mcap")
         Output(overwrite=options["overwrite"]).check_report(typed.report)
     console = Console(stderr=True)
+    if typed.control is not None and options["registers"] is None:
+        sensor = trained.array if options["array"] is None and trained is not None else options["array"]
+        options["registers"] = _registers_of(typed.control, Array._of(sensor), console)
     with contextlib.ExitStack() as at_rest:
         if typed.control is not None and isinstance(rest, float):
             at_rest.enter_context(at_rest.enter_context(Cable(typed.control)).floor(0))
-        is_board = options["port"] is not None or options["host"] is not None or not options["sources"]
-        if trained is not None and options["registers"] is None and is_board:
-            sensor = trained.array if options["array"] is None else options["array"]
-            frame_us = Registers(array=Array._of(sensor)).frame_us
-            console.print(
-                f"the readout assumes frames of {plain(frame_us)} us, the default of a board; if the board has "
-                f"other frames, give --preset, or --rate-hz and --bits"
-            )
         say_waiting(options, console)
         with Live(**options) as pipeline:
+            if trained is not None and pipeline.frame_us is None:
+                _say_of_board(trained, pipeline, console)
             if trained is not None and trained.unit is not None and not pipeline._states_unit:
                 console.print(
                     f"values are assumed to be in {pipeline.unit}, the unit of the readout: --source states no unit"
@@ -156,6 +155,37 @@ def live(*, options: dict[str, Any], typed: Flat[_LiveArguments] = _LiveArgument
             f"--tare {given_tare}: the tare was not complete after {seconds:.1f} s; {typed.save_tare} was not written"
         )
     return exit_code(summary, pipeline.array)
+
+
+def _registers_of(control: str, array: Array, console: Console) -> Registers | None:
+    """Return the registers that a board holds; None, with one line, if they cannot be read."""
+    board = Board(Cable(control))
+    try:
+        board.read()
+        return Registers._of(board.registers, array)
+    except (DeviceError, OSError) as error:
+        console.print(f"the registers of the board are not known: {error}")
+        return None
+    finally:
+        board.close()
+
+
+def _say_of_board(trained: Readout | PlainRule, pipeline: Live, console: Console) -> None:
+    """Say in what the board differs from that of the training, or which frames are assumed."""
+    training, registers = trained._parts.get("training") or {}, pipeline._options.registers
+    assert isinstance(registers, Registers)
+    board = training.get("board") or {}
+    if pipeline._registers_stated:
+        differing = differences(training, registers)
+    elif board.get("frame_us", registers.frame_us) != registers.frame_us:
+        differing = (
+            f"the readout was trained on frames of {plain(board['frame_us'])} us, and frames of "
+            f"{plain(registers.frame_us)} us are assumed: give --preset, or --rate-hz and --bits"
+        )
+    else:
+        differing = ""
+    if differing:
+        console.print(differing)
 
 
 def _show(

@@ -15,6 +15,7 @@ from taxel._base.errors import refused
 from taxel._base.saved import Saved
 from taxel._core import ProblemError
 from taxel.array import Array
+from taxel.detect.board import noise_floor
 from taxel.detect.floors import floor_at_rest
 from taxel.detections import Detections
 from taxel.events import Events
@@ -71,16 +72,21 @@ class _Detector(Saved):
         """Return it with other parts of its file."""
         return self._from_text(parameters(self._parts | parts))
 
-    def _at_noise_of(self, tare: Tare | None) -> Self:
-        """Return it with the noise floors of the tare of a file of counts of events, where those of training are lower.
+    def _for(self, source: object, tare: Tare | None) -> Self:
+        """Return it with the noise floors of a source and its tare, where those of training are lower.
 
-        The noise of counts grows with their number, which light and the sensor's thresholds change from file to file.
+        Up to a board's noise floor, a taxel may stay above its rest. The noise of counts of events grows with their
+        number, which light and the sensor's thresholds change from file to file.
         """
-        if tare is None or self.unit is None or not are_counts(self.unit):
-            return self
-        known = tare.noise[np.isfinite(tare.noise)]
-        least = floor_at_rest(known) if len(known) else 0.0
-        parts = _raised(self._parts, least)
+        least = noise_floor(source)
+        if tare is not None and self.unit is not None and are_counts(self.unit):
+            known = tare.noise[np.isfinite(tare.noise)]
+            least = floor_at_rest(known) if len(known) else 0.0
+        return self._with_floor(least)
+
+    def _with_floor(self, least: float) -> Self:
+        """Return it with noise floors of so much at least."""
+        parts = raised(self._parts, least)
         return self if parts == self._parts else self._from_text(parameters(parts))
 
     @classmethod
@@ -197,7 +203,7 @@ class ReadoutStream:
         if self._core is None:
             parts = instance("array", array, Array)._parts()
             self._core = _core.ReadoutStream(
-                self._detector._at_noise_of(self._rest).to_json(), parts, self._frame_us, self._version, self._tare
+                self._detector._for(None, self._rest).to_json(), parts, self._frame_us, self._version, self._tare
             )
         return self._core
 
@@ -264,11 +270,14 @@ class ReadoutStream:
         return {} if self._core is None else dict(self._core.potentials)
 
 
-def _raised(part: Any, least: float) -> Any:
-    """Return a part of a detector's file with noise floors of so much at least."""
+def raised(part: Any, least: float) -> Any:
+    """Return a part of a detector's file, or an encoder's, with noise floors of so much at least."""
     if not isinstance(part, dict):
         return part
-    return {name: max(value, least) if name == "noise_floor" else _raised(value, least) for name, value in part.items()}
+    return {
+        name: max(value, least) if name == "noise_floor" else value if name == "training" else raised(value, least)
+        for name, value in part.items()
+    }
 
 
 def detector(name: str, value: object) -> _Detector:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import re
 from collections.abc import Mapping, Sequence
 from copy import copy
@@ -13,13 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import finite, instance, several, shown
+from taxel._base.arguments import finite, instance, parameters, several, shown
 from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect.ages import in_frames
 from taxel.detect.alignment import WINDOW_MS, Alignment
+from taxel.detect.board import noise_floor
+from taxel.detect.detector import raised
 from taxel.detect.examples import Example, array_of, check_examples, name_of, sizes_of, unit_of
 from taxel.detect.fitted_point import FittedPoint, Inputs
 from taxel.detect.floors import floor_alone, floor_of
@@ -176,7 +179,9 @@ class Fitter:
         self.made_anew = partial(Fitter, examples, recipe, window_ms=window_ms, frame_us=frame_us)
         #: All of the examples.
         self.whole = whole(self.examples)
-        self._in_frames = in_frames(instance("recipe", recipe, Recipe), self.examples, clocks)
+        of_board = max(noise_floor(example[0]) for example in examples)
+        recipe = _above(instance("recipe", recipe, Recipe), of_board)
+        self._in_frames = in_frames(recipe, self.examples, clocks)
         self._recipe = _possible(self._in_frames, self.examples)
         self.array, self._unit = array_of(self.examples), unit_of(self.examples)
         self._pads = len(sizes_of(examples)) > 0
@@ -185,7 +190,7 @@ class Fitter:
         self.lacks = lacks(self.examples)
         self._tuning: Tuning | None = None
         if not self.lacks:
-            loads = Loads(self.examples, clocks, floor_of(self.examples), self.report)
+            loads = Loads(self.examples, clocks, max(floor_of(self.examples), of_board), self.report)
             self._tuning = Tuning(loads, self.labels, self.window_ms)
         # The quantity whose thresholds the labels are.
         self._own = min((example.labels_of for example in self.examples if example.labels_of), default=None)
@@ -410,6 +415,13 @@ def better_by_rule(labels: Sequence[str], pairs: Sequence[tuple[Score, Score]]) 
         return sum(one.rank[0] for one in each), float(np.median(delays)) if len(delays) else np.inf
 
     return tuple(label for label in labels if worth(label, 1) < worth(label, 0))
+
+
+def _above(recipe: Recipe, noise_floor: float) -> Recipe:
+    """Return a recipe whose encoder has noise floors of so much at least."""
+    parts = json.loads(recipe.encoder.to_json())
+    above = raised(parts, noise_floor)
+    return recipe if above == parts else replace(recipe, encoder=Encoder.from_json(parameters(above)))
 
 
 def _possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:

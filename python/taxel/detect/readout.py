@@ -444,7 +444,7 @@ def run_counting(
     None where that is not known: of plain rules, of a readout whose file does not hold the range, of spike trains.
     Nothing is detected before `begin_us`, the end of a fresh tare, as live; spike trains have none.
     """
-    text = detector("readout", readout)._at_noise_of(tare).to_json()
+    text = detector("readout", readout)._for(source, tare).to_json()
     period = None if frame_us is None else number("frame_us", frame_us)
     version = None if wire_version is None else integer("wire_version", wire_version, 1, 2)
     rest, zeroings = tare_text(tare), []

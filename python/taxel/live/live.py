@@ -184,7 +184,8 @@ class Live:
     def _again(self, **changed: Any) -> Live:
         """Return another `Live` that works alike, with other options; by default it receives from the same place."""
         host, port = self._listened_on
-        options = replace(self._options, **{"host": host, "port": port, **changed})
+        kept = {"host": host, "port": port} | ({} if self._registers_stated else {"registers": None})
+        options = replace(self._options, **{**kept, **changed})
         return Live(**{field.name: getattr(options, field.name) for field in fields(options)})
 
     @property

@@ -42,11 +42,14 @@ class LiveOptions(StatedOptions):
         if readout is None and self.tare is not None:
             raise ProblemError("tare needs a readout: only a readout uses a tare")
         array = Array._of(array)
+        stated = registers is not None
         if registers is None:
             registers = Registers(array=array)
         elif not isinstance(registers, Registers):
             registers = Registers._of(_core.registers_preset(text("registers", registers), array._parts()), array)
-        return replace(self, array=array, registers=registers)
+        if readout is not None and stated:
+            readout = readout._with_floor(float(registers.noise_floor))
+        return replace(self, array=array, registers=registers, readout=readout)
 
     def destinations(self) -> list[str]:
         """Return where detections are sent."""

@@ -14,7 +14,8 @@ import numpy as np
 
 from taxel import _core
 from taxel._core import ProblemError
-from taxel.detect import load
+from taxel.detect import PlainRule, Readout, load
+from taxel.detect.board import differences
 from taxel.device import Cable
 from taxel.frames import Frames
 from taxel.live import Live
@@ -27,6 +28,7 @@ from taxel.panel.shown_files import Opening
 from taxel.panel.threads import in_thread
 from taxel.panel.training import Training
 from taxel.tare import Tare
+from taxel.wire.registers import Registers, fields_of_registers, fitting_presets, preset_of
 
 _T = TypeVar("_T")
 
@@ -102,6 +104,8 @@ class Hub:
         self.training = Training(opening, self.folder.files)
         self.board = Board(cable)
         self.source: _core.PanelLive | None = None
+        #: In what the board was said to differ from that of the readout's training.
+        self._differing = ""
         # Locked while one `Live` replaces another.
         self._restarting = threading.Lock()
         self._live = self._first = live
@@ -239,21 +243,42 @@ class Hub:
         A readout that needs a tare uses that of the board, if there is one; else the present values of the taxels are
         their rest, so the sensor must be unloaded.
         """
+        await self._begin_readout(lambda: load(readout))
+        await self._agree()
 
+    async def _begin_readout(self, loaded: Callable[[], Readout | PlainRule]) -> None:
         def change(before: Live) -> Live:
-            loaded = load(readout)
+            readout = loaded()
             tare = before.tare or (before._options.tare if before._options.readout is not None else None)
             if tare is None:
                 tare = _rest_of_held(before)
+            held = {"registers": Registers._of(self.board.registers, before.array)} if self.board.known else {}
             before.stop()
             try:
-                return before._again(readout=loaded, tare=tare)
+                return before._again(readout=readout, tare=tare, **held)
             except Exception:
                 # The sensor stays in sight, whatever the readout lacks.
                 self._show_live(before._again())
                 raise
 
         await self.restart(change)
+
+    async def _agree(self) -> None:
+        """Say once in what the board differs from the training's; read out above a raised noise floor."""
+        readout = None if self._live is None else self._live._options.readout
+        if self._live is None or readout is None or not self.board.known:
+            return
+        registers = Registers._of(self.board.registers, self._live.array)
+        differing = differences(readout._parts.get("training") or {}, registers)
+        if differing and differing != self._differing:
+            await self.warn(differing)
+        self._differing = differing
+        if readout._with_floor(float(registers.noise_floor)) is readout:
+            return
+        if self.recorder.is_busy:
+            await self.warn("the readout knows the raised noise floor after the recording, when it is chosen again")
+        else:
+            await self._begin_readout(lambda: readout)
 
     # ---------------------------------------------------------------------------------------------- the board
 
@@ -284,6 +309,7 @@ class Hub:
                 if before[0]["channels"] != self.board.registers["channels"]:
                     # Other presets fit it.
                     await self.say(self.presets())
+                await self._agree()
 
     async def forget_registers(self) -> None:
         """After a reset the board holds other registers than were read."""
@@ -385,15 +411,16 @@ class Hub:
             "known": self.board.known,
             "stated": self.registers_stated,
             "values": held,
-            "preset": next((name for name in fitting_presets(held, array) if is_preset(held, name, array)), None),
+            "preset": preset_of(held, array),
             "frame_us": _core.registers_words(values)[1],
             "warnings": _core.registers_warnings(values),
         }
 
     def presets(self) -> dict[str, Any]:
-        """Return the names of the presets that the board can hold."""
+        """Return the names of the presets that the board can hold, and the fields of its registers."""
         array = None if self._live is None else self._live.array
-        return {"type": "presets", "built_in": list(fitting_presets(self.board.registers, array))}
+        fitting = list(fitting_presets(self.board.registers, array))
+        return {"type": "presets", "built_in": fitting, "fields": fields_of_registers()}
 
     def zeroed(self) -> dict[str, Any]:
         """Return the taxels of the live source that were zeroed, each as it was last; sent when that has changed."""
@@ -416,26 +443,6 @@ class Hub:
             ],
             "readouts": readouts,
         }
-
-
-def fitting_presets(held: dict[str, Any], array: Any) -> Iterator[str]:
-    """Yield the names of the presets that a board of an array can hold, all of them without a board."""
-    for name in _core.registers_presets():
-        if array is not None:
-            try:
-                wanted = _core.registers_with_preset(json.dumps(held), name, array._parts())
-                _core.registers_with(json.dumps(wanted), [], array._parts())
-            except _core.Error:
-                continue
-        yield name
-
-
-def is_preset(held: dict[str, Any], name: str, array: Any) -> bool:
-    """Return whether registers equal a preset, whatever the version of the wire."""
-    held = held | {"record": False}
-    if array is None:
-        return held == _core.registers_preset(name)
-    return held == _core.registers_with_preset(json.dumps(held), name, array._parts())
 
 
 def _rest_of_held(live: Live) -> Tare:

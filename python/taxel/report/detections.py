@@ -249,7 +249,7 @@ def _trains(readout: Readout, outcome: Outcome) -> SpikeTrains:
     # A readout of grids of several sizes has weights for the largest.
     if isinstance(source, Frames) and array is not None and array.shape != source.array.shape:
         source, tare = padded_to(source, tare, array.shape)
-    encoder = readout._at_noise_of(tare).encoder
+    encoder = readout._for(outcome.example.source, tare).encoder
     return (encoder if tare is None else encoder.with_tare(tare)).encode(source)
 
 

@@ -18,6 +18,7 @@ from taxel._base.parallel import Workers
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, PlainRule, Readout, Score, drift, recipes, score
+from taxel.detect.board import differences
 from taxel.detect.clock import off_detections
 from taxel.detect.detector import detector
 from taxel.detect.examples import check_examples, unreliable
@@ -247,6 +248,9 @@ def detect(
             warnings.append(
                 f"truth has {shown(label)}, the readout {shown(alike[0])}: must be spelt alike to be scored"
             )
+    training = readout._parts.get("training") or {}
+    boards = (recording.registers for recording in opened if recording.has_events)
+    warnings += dict.fromkeys(filter(None, (differences(training, held) for held in boards if held is not None)))
     names = (*(recording.title for recording in left_out), *unknown_rests)
     with_labels = [outcome for outcome in scored if outcome.score is not None and outcome.score.events]
     bad = (

@@ -16,6 +16,7 @@ from taxel._base.parallel import HERE, Workers
 from taxel._base.progress import Forecast, Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, Readout, Recipe, recipes, score
+from taxel.detect.board import of_training
 from taxel.detect.clock import off_loads
 from taxel.detect.drift import training_data
 from taxel.detect.examples import check_examples, sizes_of
@@ -293,7 +294,8 @@ class _Work:
             scored = judge_training(fitter, trained._replace(readout=by_halves))
         rules = {label: rule for label, rule in scored.plain.rules.items() if rule is not None}
         readout = trained.readout._with_rules(rules, scored.by_rule)
-        trained = trained._replace(readout=readout._with(training=training_data(fitter.examples, scored.together)))
+        data = training_data(fitter.examples, scored.together, of_training(self.examples))
+        trained = trained._replace(readout=readout._with(training=data))
         return Training(self.options, self.opened, trained, scored, why, self._outcomes(trained.readout), self.rests)
 
     def _say_how_long(self, once_s: float, folds: int) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -298,6 +298,42 @@ class Registers:
     def __repr__(self) -> str:
         fields = (f"{name}={getattr(self, name)}" for name in self._held)
         return f"Registers({', '.join(fields)})"
+
+
+def fitting_presets(held: Mapping[str, Any], array: Array | None) -> Iterator[str]:
+    """Yield the names of the presets that a board of an array can hold, all of them without a board."""
+    for name in PRESETS:
+        if array is not None:
+            try:
+                wanted = _core.registers_with_preset(json.dumps(held), name, array._parts())
+                _core.registers_with(json.dumps(wanted), [], array._parts())
+            except _core.Error:
+                continue
+        yield name
+
+
+def preset_of(held: Mapping[str, Any], array: Array | None) -> str | None:
+    """Return the name of the preset that registers are, whatever the version of the wire; None of other values."""
+    held = {**held, "record": False}
+    for name in fitting_presets(held, array):
+        if array is None:
+            preset = _core.registers_preset(name)
+        else:
+            preset = _core.registers_with_preset(json.dumps(held), name, array._parts())
+        if held == preset:
+            return name
+    return None
+
+
+def fields_of_registers() -> list[dict[str, Any]]:
+    """Return the fields of the registers, each with what a slider reaches: four times what any preset needs."""
+    presets = [_core.registers_preset(name) for name in PRESETS]
+    keys = ("name", "manual", "text", "unit", "least", "greatest")
+    return [
+        {key: field[key] for key in keys}
+        | {"top": min(field["greatest"], max(255, 4 * max(int(preset[name]) for preset in presets)))}
+        for name, field in _FIELDS.items()
+    ]
 
 
 def described(registers: Registers) -> list[tuple[str, float, str, str, str]]:

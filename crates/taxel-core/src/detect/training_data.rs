@@ -16,6 +16,21 @@ pub struct TrainingData {
     pub error_ms: BTreeMap<String, f64>,
     /// What was measured of loads, by feature.
     pub loads: BTreeMap<String, Quantiles>,
+    /// The board that sent the data, where its registers are known and were the same in all of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub board: Option<TrainedBoard>,
+}
+
+/// What a board's registers held in a training.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrainedBoard {
+    /// The noise floor, ticks.
+    pub noise_floor: u8,
+    /// How long a frame lasts, us.
+    pub frame_us: f64,
+    /// The preset that they are, if any.
+    pub preset: Option<String>,
 }
 
 /// The distribution of a feature of loads.
@@ -41,6 +56,9 @@ impl TrainingData {
         if let Some((label, ms)) = self.error_ms.iter().find(|(_, ms)| !ms.is_finite()) {
             return Err(problem!("training: error_ms of {label} is {ms}: must be finite"));
         }
+        if let Some(board) = self.board.as_ref().filter(|board| !(board.frame_us > 0.0 && board.frame_us.is_finite())) {
+            return Err(problem!("training: frame_us is {}: must be above 0, and finite", board.frame_us));
+        }
         for (feature, Quantiles { count, values }) in &self.loads {
             let finite = values.iter().all(|value| value.is_finite());
             if *count == 0 || values.len() < 2 || !finite || !values.is_sorted() {
@@ -57,12 +75,17 @@ impl TrainingData {
 mod tests {
     use super::*;
 
+    fn board(frame_us: f64) -> TrainedBoard {
+        TrainedBoard { noise_floor: 3, frame_us, preset: Some("5.2 kHz".to_owned()) }
+    }
+
     fn data() -> TrainingData {
         let peak = Quantiles { count: 9, values: vec![1.0, 2.0, 2.0] };
         TrainingData {
             noise_floor: 0.5,
             error_ms: BTreeMap::from([("contact".to_owned(), -3.0)]),
             loads: BTreeMap::from([("peak".to_owned(), peak)]),
+            board: Some(board(192.0)),
         }
     }
 
@@ -79,6 +102,7 @@ mod tests {
             TrainingData { loads: of(3, vec![1.0]), ..data() },
             TrainingData { loads: of(3, vec![2.0, 1.0]), ..data() },
             TrainingData { loads: of(3, vec![1.0, f64::NAN]), ..data() },
+            TrainingData { board: Some(board(0.0)), ..data() },
         ] {
             assert!(wrong.check().is_err());
         }
