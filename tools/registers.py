@@ -1,4 +1,4 @@
-"""Make the tables of Rust, JavaScript and the docs from registers.toml (`make registers`).
+"""Make the tables of Rust and the docs from registers.toml (`make registers`).
 
 Usage: python tools/registers.py [ROOT]. Python reads Rust's table. A test compares the files with what this script makes.
 """
@@ -27,7 +27,7 @@ def rust_type(field: Table) -> str:
 
 
 def value(node: ast.expr) -> str:
-    """Write arithmetic as Rust and JavaScript both read it."""
+    """Write arithmetic as Rust reads it."""
     match node:
         case ast.Name(id=name):
             return name
@@ -41,16 +41,15 @@ def value(node: ast.expr) -> str:
     raise ValueError(f"registers.toml: {ast.unparse(node)} is no arithmetic")
 
 
-def broken(node: ast.expr, *, inner: bool = False, equal: str = "==") -> str:
+def broken(node: ast.expr, *, inner: bool = False) -> str:
     """Write the condition under which a rule is broken: its negation, without needless brackets."""
     match node:
         case ast.BoolOp(op=op, values=values):
             word = " || " if isinstance(op, ast.And) else " && "
-            condition = word.join(broken(part, inner=True, equal=equal) for part in values)
+            condition = word.join(broken(part, inner=True) for part in values)
             return f"({condition})" if inner else condition
         case ast.Compare(left=left, ops=[op], comparators=[right]):
             sign = OPPOSITE[type(op)]
-            sign = {"==": equal, "!=": equal.replace("==", "!=")}.get(sign, sign) if equal != "==" else sign
             return f"{value(left)} {sign} {value(right)}"
     raise ValueError(f"registers.toml: {ast.unparse(node)} is no comparison")
 
@@ -231,114 +230,6 @@ pub static POWER_LAW: LazyLock<[u32; {law["entries"]}]> = LazyLock::new(|| {{
 """)
 
 
-def javascript(source: Table) -> str:
-    """Write the module that the panel loads."""
-    units = {field["name"]: field["unit"] for field in source["field"]} | OF_THE_ARRAY
-    fields = []
-    for f in source["field"]:
-        at = f", register: {f['register']}, low: {f['low']}" if "register" in f else ""
-        default = str(bool(f["default"])).lower() if f["unit"] == "flag" else f["default"]
-        fields.append(
-            f'  {{ name: "{f["name"]}", manual: "{f["manual"]}"{at}, bits: {f["bits"]}, offset: {f["offset"]}, '
-            f'unit: "{f["unit"]}", default: {default}, least: {f["least"]}, greatest: {f["greatest"]}, '
-            f'text: "{f["text"]}" }},'
-        )
-    presets = []
-    for p in source["preset"]:
-        entries = ", ".join(f"{name}: {value}" for name, value in p["values"].items())
-        presets.append(
-            f'  {{ name: "{p["name"]}", sense_lines: {p["sense_lines"]}, values: {{ {entries} }} }},'.replace(
-                "{  }", "{}"
-            )
-        )
-
-    def rules(*, warns: bool) -> str:
-        lines = []
-        for rule in source["rule"]:
-            if rule["warns"] != warns:
-                continue
-            message = ""
-            for before, expression, unit in template(rule["text"], units):
-                message += before
-                if expression:
-                    written, words = formatted(expression, unit)
-                    message += f"${{{written}}}{words}"
-            condition = broken(parsed(rule["holds"]), equal="===")
-            lines.append(
-                f"  if ({condition}) broken.push({{ rule: {rule['number']}, text: `{message} (rule {rule['number']})` }});"
-            )
-        bound = ", ".join(used(source, warns=warns))
-        return f"  const {{ {bound} }} = v;\n" + "\n".join(lines)
-
-    newline = "\n"
-    return f"""// {HEAD}
-
-/**
- * @typedef {{object}} Field
- * @property {{string}} name
- * @property {{string}} manual the manual's name
- * @property {{number}} [register] none: the board's build
- * @property {{number}} [low] lowest bit
- * @property {{number}} bits
- * @property {{number}} offset what is added to the bits
- * @property {{string}} unit
- * @property {{number | boolean}} default at reset
- * @property {{number}} least
- * @property {{number}} greatest
- * @property {{string}} text
- *
- * @typedef {{Record<string, number>}} Values every field by name, in its unit, with steps, driven_lines and sense_lines
- * @typedef {{{{ rule: number, text: string }}}} BrokenRule
- */
-
-/** @type {{readonly Field[]}} */
-export const FIELDS = [
-{newline.join(fields)}
-];
-
-/** @type {{readonly {{ name: string, sense_lines: number, values: Record<string, number> }}[]}} */
-export const PRESETS = [
-{newline.join(presets)}
-];
-
-/**
- * 10 ns units as us, with two decimals.
- * @param {{number}} units
- * @returns {{string}}
- */
-const us = (units) => (units / 100).toFixed(2);
-
-/**
- * All rules that these registers break, in the order in which the board checks them; the board reports the first.
- * @param {{Values}} v
- * @returns {{BrokenRule[]}}
- */
-export function refused(v) {{
-  /** @type {{BrokenRule[]}} */
-  const broken = [];
-  for (const {{ name, least, greatest, unit }} of FIELDS) {{
-    if (unit !== "flag" && (v[name] < least || v[name] > greatest)) {{
-      broken.push({{ rule: 4, text: `${{name}} is ${{v[name]}}: must be from ${{least}} to ${{greatest}} (rule 4)` }});
-    }}
-  }}
-{rules(warns=False)}
-  return broken;
-}}
-
-/**
- * Rules that only warn: settings that are allowed but hardly intended.
- * @param {{Values}} v
- * @returns {{BrokenRule[]}}
- */
-export function warned(v) {{
-  /** @type {{BrokenRule[]}} */
-  const broken = [];
-{rules(warns=True)}
-  return broken;
-}}
-"""
-
-
 def docs(source: Table) -> str:
     """Write the page of the docs."""
     rows, less = [], []
@@ -463,7 +354,6 @@ MADE = {
     "crates/taxel-core/src/wire/registers/presets.rs": rust_presets,
     "crates/taxel-core/src/wire/registers/rules.rs": rust_checks,
     "crates/taxel-core/src/wire/registers/power_law.rs": rust_power_law,
-    "python/taxel/panel/web/registers.js": javascript,
     "crates/taxel-live/src/recording/schemas/Registers.json": schema,
     "docs/registers.md": docs,
 }

@@ -27,7 +27,7 @@ SERVED = sorted(
 
 def test_each_file_is_served_as_it_lies_in_the_folder_and_nothing_else(panel: Panel) -> None:
     line = http.client.HTTPConnection(*panel.address, timeout=SOON)
-    for name in (*SERVED, "uPlot.js", "vendor", "REGISTERS.JS", "vendor/../registers.js"):
+    for name in (*SERVED, "uPlot.js", "vendor", "BOARD.JS", "vendor/../board.js"):
         line.request("GET", f"/{name}")
         answer = line.getresponse()
         found = answer.read()

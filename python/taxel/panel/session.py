@@ -93,8 +93,8 @@ class Session:
         await hub.prepare()
         for message in (
             hub.hello(),
-            hub.registers(),
             hub.presets(),
+            hub.registers(),
             hub.recorder.message(),
             await hub.recordings(),
             hub.zeroed(),

@@ -1,11 +1,10 @@
 // The board: its registers as sliders, presets.
 
 import { make, part, write } from "./dom.js";
-import { FIELDS, PRESETS, refused, warned } from "./registers.js";
 import { RefusedError } from "./server.js";
 import { integer } from "./words.js";
 
-/** @typedef {import("./registers.js").Field} Field */
+/** @typedef {import("./messages.js").Field} Field */
 /** @typedef {import("./messages.js").Registers} RegistersMessage */
 /** @typedef {import("./messages.js").Presets} PresetsMessage */
 /** @typedef {import("./messages.js").Hello} Hello */
@@ -37,6 +36,8 @@ const SPOKEN = {
 /** Set by recordings, or the board's build. */
 const NOT_HERE = ["record", "channels"];
 const SLIDER = 1000;
+/** Sliders that reach less far have even steps; all others even ratios. */
+const LINEAR = 300;
 
 /** A register with its number, and its slider where it has one. */
 class Control {
@@ -46,7 +47,7 @@ class Control {
    */
   constructor(field, typed) {
     this.field = field;
-    this.held = Number(field.default);
+    this.held = field.least;
     /** @type {number | null} typed and not held by the board */
     this.wanted = null;
     this.unit = field.unit === "10 ns" ? { name: "µs", spoken: "microseconds", per: 100, decimals: 2 } : { name: field.unit, spoken: field.unit, per: 1, decimals: 0 };
@@ -75,9 +76,6 @@ class Control {
       this.input.addEventListener("keydown", (event) => this.key(event));
     }
     this.notify = () => typed(this);
-    const presets = PRESETS.map(({ values }) => values[field.name]).filter((value) => value !== undefined);
-    /** What the slider reaches: four times what any preset needs; the number takes whatever the register holds. */
-    this.top = field.bits <= 8 ? field.greatest : Math.min(field.greatest, 4 * Math.max(Number(field.default), ...presets));
     this.show();
   }
 
@@ -113,15 +111,16 @@ class Control {
   valueAt(position) {
     const { least } = this.field;
     const low = Math.max(1, least);
-    if (this.field.bits <= 8) return Math.round(least + (position / SLIDER) * (this.top - least));
-    return Math.round(low * (this.top / low) ** (position / SLIDER));
+    const { top } = this.field;
+    if (top < LINEAR) return Math.round(least + (position / SLIDER) * (top - least));
+    return Math.round(low * (top / low) ** (position / SLIDER));
   }
 
   /** @param {number} value @returns {number} the slider's position */
   positionOf(value) {
-    const { least } = this.field;
+    const { least, top } = this.field;
     const low = Math.max(1, least);
-    const share = this.field.bits <= 8 ? (value - least) / (this.top - least) : Math.log(Math.max(low, value) / low) / Math.log(this.top / low);
+    const share = top < LINEAR ? (value - least) / (top - least) : Math.log(Math.max(low, value) / low) / Math.log(top / low);
     return Math.round(SLIDER * Math.max(0, Math.min(1, share)));
   }
 
@@ -198,22 +197,13 @@ export class Board {
   constructor(server, failed) {
     this.server = server;
     this.failed = failed;
-    this.array = { rows: 64, columns: 64 };
     this.writable = false;
     /** Whether the live source is a board. */
     this.hasRegisters = true;
-    /** @type {Record<string, number>} */
-    this.values = {};
     /** @type {PresetsMessage | null} */
     this.presets = null;
     /** @type {Map<string, Control>} */
     this.controls = new Map();
-    for (const field of FIELDS) {
-      if (NOT_HERE.includes(field.name)) continue;
-      const control = new Control(field, (changed) => this.send(changed));
-      this.controls.set(field.name, control);
-      part(TIMING.includes(field.name) ? "timing" : "more-registers", HTMLElement).append(control.row);
-    }
     this.select = part("preset", HTMLSelectElement);
     this.select.onchange = () => {
       this.restoreAll();
@@ -234,7 +224,6 @@ export class Board {
 
   /** @param {Hello} hello */
   greet(hello) {
-    this.array = hello.array ?? this.array;
     this.hasRegisters = hello.lines === null;
     this.writable = hello.live && hello.control !== null;
     part("losses", HTMLElement).hidden = !hello.live;
@@ -253,17 +242,18 @@ export class Board {
    * @param {string | null} preset
    * @param {boolean} known read from the board, or from the recording
    * @param {boolean} stated given by whoever started the panel
+   * @param {string[]} warnings of values that are allowed but probably a mistake
    */
-  show(values, frame_us, preset, known, stated) {
-    this.values = Object.fromEntries(Object.entries(values).map(([name, value]) => [name, Number(value)]));
-    for (const [name, control] of this.controls) if (this.values[name] !== undefined) control.take(this.values[name]);
+  show(values, frame_us, preset, known, stated, warnings) {
+    for (const [name, control] of this.controls) if (values[name] !== undefined) control.take(Number(values[name]));
     this.preset = preset;
     this.showPresets();
     const rate = frame_us ? `${integer(1e6 / frame_us)} frames/s, a frame takes ${frame_us.toFixed(1)} µs` : "";
     const unread = "the registers have not been read";
     write(part("frame-rate", HTMLElement), known ? rate : stated ? `${rate} (as stated at the start; ${unread})` : `Frame rate not known: ${unread}.`);
-    this.warn();
-    this.check();
+    const warning = part("registers-warning", HTMLElement);
+    warning.hidden = !warnings.length;
+    write(warning, warnings.join(". "));
   }
 
   /**
@@ -274,7 +264,7 @@ export class Board {
   showRecorded(values, frame_us) {
     write(part("registers-why", HTMLElement), values ? "The values of the registers during the recording." : "This recording contains no registers of a board.");
     part("registers-held", HTMLElement).hidden = !values;
-    if (values) this.show(values, frame_us, null, true, false);
+    if (values) this.show(values, frame_us, null, true, false, []);
   }
 
   /** @param {RegistersMessage} message */
@@ -283,12 +273,19 @@ export class Board {
     if (!this.hasRegisters) return write(part("registers-why", HTMLElement), "A sensor that prints numbers has no registers.");
     const assumed = message.known || message.stated ? "" : "; the values below are those of a board at reset";
     write(part("registers-why", HTMLElement), this.writable ? "" : `No control line, so registers cannot be read or set${assumed}. Start taxel live with --control.`);
-    this.show(message.values, message.frame_us, message.preset, message.known, message.stated);
+    this.show(message.values, message.frame_us, message.preset, message.known, message.stated, message.warnings);
   }
 
   /** @param {PresetsMessage} presets */
   takePresets(presets) {
     this.presets = presets;
+    for (const field of presets.fields) {
+      if (NOT_HERE.includes(field.name) || this.controls.has(field.name)) continue;
+      const control = new Control(field, (changed) => this.send(changed));
+      this.controls.set(field.name, control);
+      part(TIMING.includes(field.name) ? "timing" : "more-registers", HTMLElement).append(control.row);
+    }
+    this.enable();
     this.showPresets();
   }
 
@@ -299,49 +296,16 @@ export class Board {
     this.select.value = this.preset ?? "";
   }
 
-  /** @returns {Record<string, number>} what the board would hold with everything that is typed */
-  wanted() {
-    const { rows, columns } = this.array;
-    const values = { ...this.values };
-    for (const [name, { wanted }] of this.controls) if (wanted !== null) values[name] = wanted;
-    const channels = values.channels || 16;
-    return { ...values, channels, steps: Math.ceil(rows / channels), driven_lines: columns, sense_lines: rows };
-  }
-
-  warn() {
-    const warnings = Object.keys(this.values).length ? warned(this.wanted()).map(({ text }) => text) : [];
-    const warning = part("registers-warning", HTMLElement);
-    warning.hidden = !warnings.length;
-    write(warning, warnings.join(". "));
-  }
-
-  /** Looks again at what is typed and was refused: a change elsewhere may have made it good. */
-  check() {
-    const waiting = [...this.controls.values()].filter(({ wanted }) => wanted !== null);
-    if (!waiting.length) return true;
-    const spoilt = waiting.filter(({ wanted }) => Number.isNaN(wanted));
-    for (const control of spoilt) control.refuse(`${control.input.value.trim() || "nothing"} is not a number`);
-    if (spoilt.length) return false;
-    const broken = refused(this.wanted());
-    for (const control of waiting) {
-      const { name } = control.field;
-      const fault = broken.find(({ text }) => new RegExp(`\\b${name}\\b`).test(text)) ?? (waiting.length === 1 ? broken[0] : undefined);
-      control.refuse(fault?.text ?? null);
-    }
-    return !broken.length;
-  }
-
   /**
-   * Something was typed: what the rules allow goes to the board at once, with all that waited for it; what they refuse
-   * stays as it was typed, with the reason.
+   * Something was typed: it goes to the board at once, with all that waited for it; what the board's rules refuse stays as
+   * it was typed, with the reason.
    * @param {Control} control
    */
   send(control) {
     if (control.wanted === null) control.show();
-    this.warn();
-    if (!this.check() || !this.writable) return;
     const waiting = [...this.controls.values()].filter(({ wanted }) => wanted !== null);
-    if (!waiting.length) return;
+    for (const one of waiting) one.refuse(Number.isNaN(one.wanted) ? `${one.input.value.trim() || "nothing"} is not a number` : null);
+    if (!waiting.length || !this.writable || waiting.some(({ wanted }) => Number.isNaN(wanted))) return;
     const values = Object.fromEntries(waiting.map(({ field, wanted }) => [field.name, field.unit === "flag" ? Boolean(wanted) : Number(wanted)]));
     this.server.request({ type: "set", values }).catch((error) => {
       const field = error instanceof RefusedError ? error.field : null;

@@ -408,7 +408,6 @@ function open(message) {
     if (message.touch_us !== null) player.seek(message.touch_us);
   }
   training.choose(message.name, message.train, message.frames?.trial ?? null);
-  board.array = message.array;
   const noisy = message.frames?.flickering ?? [];
   maps.flickering = noisy.length;
   maps.health = noisy.length ? { dead: [], stuck: [], noisy } : null;

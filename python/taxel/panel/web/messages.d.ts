@@ -259,7 +259,7 @@ export interface Registers {
   known: boolean;
   /** Whether they were stated at the start (`--preset`, or `--rate-hz` with `--bits`). */
   stated: boolean;
-  /** Every field of `registers.js` in its unit; those of one bit are true or false. */
+  /** Every field of `presets` in its unit; those of one bit are true or false. */
   values: Record<string, boolean | number>;
   /** The preset that holds the same, the user's or built-in, whatever the version of the wire. */
   preset: string | null;
@@ -268,10 +268,25 @@ export interface Registers {
   warnings: string[];
 }
 
-/** The presets that the board can hold. */
+/** The presets that the board can hold, and the fields of its registers. */
 export interface Presets {
   type: "presets";
   built_in: string[];
+  fields: Field[];
+}
+
+/** A field of the registers. */
+export interface Field {
+  name: string;
+  /** The manual's name. */
+  manual: string;
+  text: string;
+  /** Of one bit: `flag`. */
+  unit: string;
+  least: number;
+  greatest: number;
+  /** What a slider reaches: four times what any preset needs; the number takes whatever the register holds. */
+  top: number;
 }
 
 /** Counts of the live source, 4 times a second; what is not known is null. */
