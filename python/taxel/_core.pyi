@@ -125,7 +125,7 @@ def readout_run_events(
     tare: str | None,
     zeroings: list[tuple[int, int, int, float]],
     begin: int | None,
-) -> tuple[_Detections, int | None]: ...
+) -> _Detections: ...
 def readout_run_frames(
     readout: str,
     frames: _Frames,
@@ -133,7 +133,7 @@ def readout_run_frames(
     tare: str | None,
     zeroings: list[tuple[int, int, int, float]],
     begin: int | None,
-) -> tuple[_Detections, int | None]: ...
+) -> _Detections: ...
 
 # t and known (us), quantity
 _Decisions: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
@@ -175,13 +175,10 @@ class ReadoutStream:
     @property
     def late(self) -> int: ...
     @property
-    def outside(self) -> int | None: ...
-    @property
     def potentials(self) -> list[tuple[str, float]]: ...
 
 # neuron: parameters as JSON, trains as parts
 
-def neuron_memory_ms(parameters: str) -> float: ...
 def neuron_run(
     parameters: str, weights: NDArray[np.float64], trains: _Spikes, threshold: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...

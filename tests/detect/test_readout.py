@@ -1,6 +1,7 @@
 """Readouts: what they hold, their files, and what they say, live and from recordings."""
 
 import itertools
+import json
 
 import numpy as np
 import pytest
@@ -66,6 +67,12 @@ def test_a_file_gives_the_same_readout_back(readout: Readout, tmp_path) -> None:
         readout.save(path)
     readout.save(path, overwrite=True)
     assert [p.name for p in tmp_path.iterdir()] == ["readout.json"]
+
+
+def test_a_file_with_the_ranges_of_inputs_which_older_ones_have_is_read(readout: Readout) -> None:
+    ranges = {label: {"most": [1.0] * len(neuron.weights)} for label, neuron in readout.neurons.items()}
+    older = json.dumps(json.loads(readout.to_json()) | {"seen": ranges})
+    assert Readout.from_json(older) == readout
 
 
 def pieces_of(events: taxel.Events, cuts: list[int]) -> list[taxel.Events]:

@@ -11,7 +11,6 @@ from shell import call
 import taxel
 from taxel import Array, Events, Frames, Tare
 from taxel.detect import PlainRule, run
-from taxel.detect.readout import run_counting
 
 
 def pressed(begins: list[int]) -> np.ndarray:
@@ -40,7 +39,7 @@ def test_what_is_left_out_counts_no_input_as_outside() -> None:
     rule = PlainRule("area", 2, noise_floor=40.0)
     frames = Frames(pressed([20, 100]), 10_000 * np.arange(200), unit="counts", array=Array(4, 4))
     tare = Tare.take(frames, stop_us=500_000)
-    assert run_counting(rule, frames, tare=tare, begin_us=500_000)[0].t.tolist() == [1_000_000, 1_100_000]
+    assert run(rule, frames, tare=tare, begin_us=500_000).t.tolist() == [1_000_000, 1_100_000]
     events = Events(
         [0, 0, 600, 600],
         [0, 1, 0, 1],
@@ -49,5 +48,5 @@ def test_what_is_left_out_counts_no_input_as_outside() -> None:
         intensity=[50, 50, 99, 99],
         array=Array(1, 2, pitch_mm=1),
     )
-    assert len(run_counting(rule, events, tare=Tare.take(events, stop_us=500), begin_us=500)[0]) == 1
-    assert len(run_counting(rule, events, tare=Tare.take(events, stop_us=500), begin_us=700)[0]) == 0
+    assert len(run(rule, events, tare=Tare.take(events, stop_us=500), begin_us=500)) == 1
+    assert len(run(rule, events, tare=Tare.take(events, stop_us=500), begin_us=700)) == 0

@@ -22,7 +22,6 @@ import taxel
 from live.boards import LOOPBACK
 from taxel import Array, Frames, Tare
 from taxel.detect import PlainRule, Readout, run
-from taxel.detect.readout import run_counting
 from taxel.detections import Detection
 from taxel.encode import LevelCrossing
 from taxel.live import Live
@@ -206,7 +205,7 @@ def test_a_tare_is_measured_and_the_recording_tells_the_same(tmp_path: Path) -> 
     assert summary.tare is not None
     tare = Tare.take(recording.frames(), start_us=0, stop_us=500_000)
     assert np.array_equal(summary.tare.rest, tare.rest)
-    expected = run_counting(rule, recording, tare=summary.tare, begin_us=500_000)[0]
+    expected = run(rule, recording, tare=summary.tare, begin_us=500_000)
     assert found
     assert [(d.label, d.t, d.known) for d in found] == [(d.label, d.t, d.known) for d in expected]
 

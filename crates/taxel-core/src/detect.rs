@@ -20,7 +20,7 @@ pub use readout::Readout;
 pub use running_rule::{Decision, EdgeNumbers};
 pub use score::{Spread, Tally, WIDEST_WINDOW_US, score};
 pub use stream::ReadoutStream;
-pub use trained::{Seen, TrainedNeuron};
+pub use trained::TrainedNeuron;
 pub use training_data::{Quantiles, TrainingData};
 
 use serde::{Deserialize, Serialize};

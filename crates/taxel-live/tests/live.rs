@@ -107,7 +107,7 @@ fn readout_of(encoder: &str, cell: TrainedNeuron) -> Readout {
         neurons: [("touch".to_owned(), cell)].into(),
         rules: BTreeMap::new(),
         by_rule: BTreeSet::new(),
-        seen: BTreeMap::new(),
+        seen: Default::default(),
         training: None,
     }
 }
@@ -211,7 +211,7 @@ fn detections_live_are_those_of_the_recording() {
     let output: Vec<Detection> = delivered.iter().map(|s| s.detection.clone()).collect();
     let (events, detections) = recorded(&path);
     assert_eq!(detections, output, "the recording has the detections that were output");
-    let (mut again, _) = Detector::from(readout(2.0))
+    let mut again = Detector::from(readout(2.0))
         .run_events(events.view(), 192.0, None, &[], None, Stop::never())
         .expect("a sound readout");
     // Nothing moved the time on after the last event, and what it would have led to was not output.
@@ -354,7 +354,7 @@ fn a_slow_sink_delays_neither_what_comes_nor_what_is_read_out() {
     drop(free);
     let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
-    let (mut again, _) = Detector::from(readout(2.0))
+    let mut again = Detector::from(readout(2.0))
         .run_events(expected.view(), 192.0, None, &[], None, Stop::never())
         .expect("a sound readout");
     again.retain(|d| Some(&d.t) < expected.t.last());
@@ -436,7 +436,7 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_reads_w
     assert_eq!((tare.start_us, tare.stop_us), (0, start));
     assert!(tare.rest.iter().all(|&rest| rest == Some(20.0)));
     assert_eq!(detections.len(), 5, "a press each 208 frames of 1000");
-    let (again, _) = Detector::from(readout)
+    let again = Detector::from(readout)
         .run_events(recorded(&path).0.view(), 192.0, Some(&tare), &[], None, Stop::never())
         .expect("a sound readout");
     assert_eq!(again, detections);

@@ -157,7 +157,7 @@ fn in_silence_time_moves_on_by_the_boards_promises() {
         neurons: [("touch".to_owned(), cell)].into(),
         rules: BTreeMap::new(),
         by_rule: BTreeSet::new(),
-        seen: BTreeMap::new(),
+        seen: Default::default(),
         training: None,
     };
     let readout = ReadoutSetup::Reading(Box::new(readout.stream(&array, 192.0, None).expect("a sound readout")));

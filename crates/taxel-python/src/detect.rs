@@ -175,7 +175,7 @@ fn to_zeroings(zeroings: ZeroingsIn) -> Vec<Zeroing> {
 }
 
 /// The detections of a readout or a plain rule in a whole recording of events, with its zeroings: t in us, column, row,
-/// rest; and how many of them have an input outside its range in training.
+/// rest.
 #[pyfunction]
 pub fn readout_run_events<'py>(
     py: Python<'py>,
@@ -186,17 +186,16 @@ pub fn readout_run_events<'py>(
     tare: Option<&str>,
     zeroings: ZeroingsIn,
     begin: Option<i64>,
-) -> PyResult<(DetectionsOut<'py>, Option<u64>)> {
+) -> PyResult<DetectionsOut<'py>> {
     let (readout, tare) = parse(readout, tare)?;
     let zeroings = to_zeroings(zeroings);
     let events = events.view()?;
     let frames = FrameTime::on_wire(frame_us, wire_version);
-    let (found, outside) = enter(py, |stop| readout.run_events(events, frames, tare.as_ref(), &zeroings, begin, stop))?;
-    Ok((from_detections(py, found), outside))
+    let found = enter(py, |stop| readout.run_events(events, frames, tare.as_ref(), &zeroings, begin, stop))?;
+    Ok(from_detections(py, found))
 }
 
-/// The detections of a readout or a plain rule in a whole recording of frames, with its zeroings, and how many of them have
-/// an input outside its range in training.
+/// The detections of a readout or a plain rule in a whole recording of frames, with its zeroings.
 #[pyfunction]
 pub fn readout_run_frames<'py>(
     py: Python<'py>,
@@ -206,12 +205,11 @@ pub fn readout_run_frames<'py>(
     tare: Option<&str>,
     zeroings: ZeroingsIn,
     begin: Option<i64>,
-) -> PyResult<(DetectionsOut<'py>, Option<u64>)> {
+) -> PyResult<DetectionsOut<'py>> {
     let (readout, tare) = parse(readout, tare)?;
     let (frames, zeroings) = (frames.view()?, to_zeroings(zeroings));
     let run = |stop: Stop<'_>| readout.run_frames(frames, frame_us, tare.as_ref(), &zeroings, begin, stop);
-    let (found, outside) = enter(py, run)?;
-    Ok((from_detections(py, found), outside))
+    Ok(from_detections(py, enter(py, run)?))
 }
 
 /// A readout or a plain rule at work.
@@ -249,12 +247,6 @@ impl ReadoutStream {
     #[getter]
     fn late(&self, py: Python<'_>) -> u64 {
         self.0.with(py, |readout| readout.late())
-    }
-
-    /// How many detections have an input outside its range in training; None if that is not known.
-    #[getter]
-    fn outside(&self, py: Python<'_>) -> Option<u64> {
-        self.0.with(py, |readout| readout.outside())
     }
 
     /// Each neuron's potential now, mV.

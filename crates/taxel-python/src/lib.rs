@@ -72,7 +72,7 @@ mod _core {
     #[pymodule_export]
     use crate::metrics::{distance, match_spikes, metric_names, pairwise};
     #[pymodule_export]
-    use crate::neuron::{neuron_memory_ms, neuron_potential, neuron_run};
+    use crate::neuron::{neuron_potential, neuron_run};
     #[pymodule_export]
     use crate::nouns::{check_events, check_spikes, split_by_sign};
     #[pymodule_export]

@@ -34,12 +34,6 @@ pub fn neuron_run<'py>(
     Ok((array(py, times), array(py, slopes)))
 }
 
-/// The time after which an input's effect is less than 1 % of its largest, ms.
-#[pyfunction]
-pub fn neuron_memory_ms(parameters: &str) -> PyResult<f64> {
-    Ok(to_neuron(parameters)?.memory_ms())
-}
-
 /// The potential at these times.
 #[pyfunction]
 pub fn neuron_potential<'py>(

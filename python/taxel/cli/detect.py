@@ -123,9 +123,6 @@ def _lines(
         yield from found.unreliable
         yield from _score_lines(found, readout.labels, truth, several=several)
     remarks = _remarks(found)
-    if isinstance(readout, taxel.Readout) and len(readout.by_rule) < len(readout.labels):
-        outside = [(outcome.name, text) for outcome in found.outcomes if (text := outcome.outside_text)]
-        remarks += _of_names(outside, len(found.each))
     for each in found.each:
         if found.score is None or lists or not several:
             rows = None if lists else _ROWS * (found.score is None)

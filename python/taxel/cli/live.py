@@ -234,10 +234,8 @@ def _report(
     assert summary.path is not None
     recording = taxel.open(summary.path)
     rest = tare if isinstance(tare, Tare) else None
-    example, outside = Example(recording, {}, rest), summary.counters["outside"]
-    outcome = Outcome(str(summary.path), example, recording.detections, outside=outside)
+    outcome = Outcome(str(summary.path), Example(recording, {}, rest), recording.detections)
     title = f"Live detections, recorded to {summary.path}"
-    printed += [text for text in [outcome.outside_text] if text]
     write_detections(folder, readout, [outcome], title=title, printed=printed, overwrite=overwrite)
 
 

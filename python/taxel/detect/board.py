@@ -51,14 +51,14 @@ def differences(training: Mapping[str, Any], registers: Registers) -> str:
     then, now = training.get("board"), summary(registers)
     if then is None:
         return ""
-    words = {
-        "preset": ("preset", lambda value: value or "none"),
-        "noise_floor": ("noise floor", lambda value: f"{value} ticks"),
-        "frame_us": ("frames of", lambda value: f"{plain(value, 6)} us"),
-    }
-    differing = [
-        f"{name} {written(now[key])}, in training {written(then[key])}"
-        for key, (name, written) in words.items()
-        if now[key] != then[key]
-    ]
+
+    def words(board: Mapping[str, Any]) -> dict[str, str]:
+        return {
+            "preset": board["preset"] or "none",
+            "noise floor": f"{board['noise_floor']} ticks",
+            "frames of": f"{plain(board['frame_us'], 6)} us",
+        }
+
+    pairs = zip(words(now).items(), words(then).values(), strict=True)
+    differing = [f"{name} {here}, in training {there}" for (name, here), there in pairs if here != there]
     return f"the board differs from that of the training: {'; '.join(differing)}" if differing else ""

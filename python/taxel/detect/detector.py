@@ -260,11 +260,6 @@ class ReadoutStream:
         return 0 if self._core is None else self._core.late
 
     @property
-    def outside(self) -> int | None:
-        """How many detections have an input outside the range that it had in training; None if that is not known."""
-        return None if self._core is None else self._core.outside
-
-    @property
     def potentials(self) -> dict[str, float]:
         """Each neuron's potential now, mV; of a plain rule none."""
         return {} if self._core is None else dict(self._core.potentials)

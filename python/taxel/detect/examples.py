@@ -85,15 +85,12 @@ class Outcome(NamedTuple):
     found : Detections
     score : Score, optional
         None of an example without labels.
-    outside : int, 0 or more, optional
-        How many detections have an input outside the range that it had in training; None if that is not known.
     """
 
     name: str
     example: Example
     found: Detections
     score: Score | None = None
-    outside: int | None = None
 
     @property
     def compared(self) -> Detections:
@@ -105,16 +102,6 @@ class Outcome(NamedTuple):
         """The time that text counts its times from, us: its first if they count from 1970, else 0."""
         source = recorded(self.example.source, hold=False)
         return beginning_us(np.array([int(to_us(source.start))]) if isinstance(source, SpikeTrains) else source.t)
-
-    @property
-    def outside_text(self) -> str:
-        """How many detections have an input outside the range that it had in training, in words; "" of none."""
-        if self.outside == 0:
-            return ""
-        noun = "with an input outside what was seen in training"
-        if self.outside is None:
-            return f"detections {noun}: unknown, because the readout's file does not state the range"
-        return f"detections {noun}: {self.outside} of {len(self.found)} ({self.outside / len(self.found):.0%})"
 
 
 def check_examples(examples: Sequence[Example]) -> list[Example]:

@@ -202,7 +202,7 @@ class Fitter:
         plan = fit_levels(self._recipe, self.examples, parts)
         rules = self.rules(parts)
         learners: dict[str, ConeR | TrainedNeuron] = {}
-        delays, alignments, ranges, chosen = {}, {}, {}, {}
+        delays, alignments, chosen = {}, {}, {}
         points: dict[str, Mapping[str, Any]] = {}
         for label in self.labels:
             try:
@@ -213,10 +213,8 @@ class Fitter:
                 warn(f"{label}: its neuron feels nothing and never fires; its plain rule detects it", stacklevel=4)
                 silent, points[label] = self._silent(plan, label), plan.points_of(label)[0]
                 learners[label], delays[label] = silent, silent.delay_ms
-                ranges[label] = {"most": np.zeros(len(silent.weights)).tolist()}
                 continue
             learners[label], points[label], delays[label] = best.learner, best.point, best.delay_ms
-            ranges[label] = best.seen()
             if differs := _differing(best.point, plan.points_of(label)[0]):
                 by, by_first = differs
                 chosen[label] = (
@@ -228,7 +226,7 @@ class Fitter:
         plan = replace(plan, neurons=points)
         readout = _readout_of(learners, delays, plan, self.array)
         known = {label: rule for label, rule in rules.items() if rule is not None}
-        readout = readout._with(seen=ranges, unit=self._unit, pads=self._pads)._with_rules(known)
+        readout = readout._with(unit=self._unit, pads=self._pads)._with_rules(known)
         fitted_levels = plan.encoder != self._recipe.encoder
         return Trained(plan, learners, readout, alignments, fitted_levels, chosen)
 

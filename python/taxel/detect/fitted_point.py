@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import _core
 from taxel._base.errors import helped
 from taxel._base.messages import are, collected, counted
 from taxel._base.progress import Progress
@@ -23,7 +22,6 @@ from taxel.detect.folds import Part
 from taxel.detect.readout import SILENCE_MS
 from taxel.detect.recipe import Recipe, learner_from
 from taxel.detect.scoring import Score, score_together
-from taxel.detect.seen import seen
 from taxel.detections import Detections
 from taxel.encode import Encoder
 from taxel.learn import ConeR
@@ -53,18 +51,11 @@ class FittedPoint(NamedTuple):
     #: Whether most labels, which are not aligned, are so early that no neuron can fire by their targets.
     precedes_input: bool
     caught: list[str]
-    trains: Sequence[SpikeTrains]
-    is_graded: bool
 
     @property
     def wrong(self) -> int:
         """How many events it misses or detects falsely in the training data."""
         return self.rank[0]
-
-    def seen(self) -> dict[str, Any]:
-        """Return the range of the neuron's inputs."""
-        memory_ms = _core.neuron_memory_ms(self.learner.neuron_._json())
-        return seen(self.trains, memory_ms, graded=self.is_graded)
 
 
 @dataclass(frozen=True)
@@ -153,8 +144,6 @@ class Inputs:
             scored.rank,
             alignment is None and 2 * len(cone.unreachable_) > self.count,
             [f"{self.label}: {remark}" for remark in remarks],
-            self.trains,
-            graded,
         )
 
     def _later(

@@ -387,6 +387,7 @@ def run(
     frame_us: float | None = None,
     tare: Tare | None = None,
     wire_version: int | None = None,
+    begin_us: int | None = None,
 ) -> Detections:
     """Return what a readout or a plain rule detects in a whole recording: the same as it would have detected live.
 
@@ -407,6 +408,8 @@ def run(
     wire_version : int, from 1 to 2, optional
         Version of the wire that stamped the events: 1 counts 100 us (a stamp may be before its frame), 2 counts us.
         Left out: what the recording's registers hold, else 1.
+    begin_us : int, us, optional
+        Nothing is detected before it: the end of a fresh tare, as live. Spike trains have none.
 
     Returns
     -------
@@ -427,23 +430,6 @@ def run(
     >>> found.t, found.known
     (array([10479]), array([20000]))
     """
-    return run_counting(readout, source, frame_us=frame_us, tare=tare, wire_version=wire_version)[0]
-
-
-def run_counting(
-    readout: _Detector,
-    source: Recording | Events | Frames | SpikeTrains,
-    *,
-    frame_us: float | None = None,
-    tare: Tare | None = None,
-    wire_version: int | None = None,
-    begin_us: int | None = None,
-) -> tuple[Detections, int | None]:
-    """Return what `run` returns, and how many of it have an input outside the range that it had in training.
-
-    None where that is not known: of plain rules, of a readout whose file does not hold the range, of spike trains.
-    Nothing is detected before `begin_us`, the end of a fresh tare, as live; spike trains have none.
-    """
     text = detector("readout", readout)._for(source, tare).to_json()
     period = None if frame_us is None else number("frame_us", frame_us)
     version = None if wire_version is None else integer("wire_version", wire_version, 1, 2)
@@ -460,7 +446,7 @@ def run_counting(
                 "source",
                 f" is {shown(source)}: must be a taxel.Recording, taxel.Events or taxel.Frames, for a plain rule",
             )
-        return _run_spikes(readout, source), None
+        return _run_spikes(readout, source)
     if isinstance(source, Events | Frames):
         readout._check_unit(unit_of(source))
         for array in (readout.array, None if tare is None else tare.array):
@@ -468,14 +454,13 @@ def run_counting(
                 array._warn_apart(source.array, "the recording")
     if isinstance(source, Events):
         period, version = FRAME_US if period is None else period, version or 1
-        columns, outside = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings, begin_us)
-        return Detections._from_parts(columns), outside
+        columns = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings, begin_us)
+        return Detections._from_parts(columns)
     if not isinstance(source, Frames):
         raise refused(
             "source", f" is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or taxel.SpikeTrains"
         )
-    columns, outside = _core.readout_run_frames(text, source._parts(), period, rest, zeroings, begin_us)
-    return Detections._from_parts(columns), outside
+    return Detections._from_parts(_core.readout_run_frames(text, source._parts(), period, rest, zeroings, begin_us))
 
 
 def _receives(encoder: Encoder, trained: TrainedNeuron, array: Array | None, delays: int) -> NDArray[np.bool_] | None:

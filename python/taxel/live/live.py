@@ -251,8 +251,7 @@ class Live:
         "nothing", "arriving", "quiet" or "lost"; since_ns, silent_s, heartbeat_us; not of one that has ended),
         `events`, `read_out`, `events_dropped`,
         `late` (events out of order), `detections`, `wrong` (those output in a
-        silence that an event then interrupted, later than the guard), `outside` (those with an input outside the range
-        that it had in training; None if that is not known), `detections_dropped`, `sources` (the counts of
+        silence that an event then interrupted, later than the guard), `detections_dropped`, `sources` (the counts of
         each other source; of one of lines: lines, strange, bytes_in_no_line, bytes_of_unfinished_lines, trouble, and
         for frames unread: by kind the lines in no frame, with the first),
         `sent` (of each destination: to,

@@ -22,7 +22,7 @@ from taxel.detect.board import differences
 from taxel.detect.clock import off_detections
 from taxel.detect.detector import detector
 from taxel.detect.examples import check_examples, unreliable
-from taxel.detect.readout import run_counting
+from taxel.detect.readout import run
 from taxel.detect.scoring import many_wrong, score_together
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
@@ -61,7 +61,7 @@ class Detected:
     ----------
     recording : Recording
     outcome : taxel.detect.Outcome
-        Detections, score and what was outside the range of the training.
+        Detections and score.
     rest : TakenRest, optional
         Which rest was taken; None where the readout needs none.
     remarks : tuple of str
@@ -81,7 +81,6 @@ class Detected:
             "recording": self.outcome.name,
             "verdict": verdict,
             "verdict_details": verdict.to_dict(),
-            "outside": self.outcome.outside,
             "rest": None if self.rest is None else self.rest.to_dict(),
             "remarks": list(self.remarks),
             "detections": [
@@ -389,12 +388,12 @@ def _detected(
         _check_unit(readout, recording)
         taken = _rest(readout, recording, options.tare)
         tare, begin_us = (None, None) if taken is None else (taken.tare, taken.detect_from_us)
-        found, outside = run_counting(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=begin_us)
+        found = run(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=begin_us)
     # Labels that the readout does not have do not count as missed.
     true = {} if labels is None else {label: labels.get(label, _NONE) for label in known}
     title = recording.title
     example = Example(recording, true, tare, title.removesuffix(recording.label), title)
-    outcome = Outcome(title, example, found, None, outside)
+    outcome = Outcome(title, example, found)
     scored = score(outcome.compared, true, options.window_ms) if true else None
     outcome = outcome._replace(score=scored)
     remarks = [] if scored is not None and scored.events and not many_wrong(scored) else list(_remarks(recording))

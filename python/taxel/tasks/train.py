@@ -24,7 +24,7 @@ from taxel.detect.fit import Fitter
 from taxel.detect.floors import TOUCH, held_by_tare, measured_floor
 from taxel.detect.folds import count_of_folds
 from taxel.detect.judge import judge_by, judge_training
-from taxel.detect.readout import run_counting
+from taxel.detect.readout import run
 from taxel.detect.scoring import many_wrong
 from taxel.events import Events
 from taxel.frames import Frames
@@ -316,8 +316,8 @@ class _Work:
         for recording, example in zip(self.opened, self.examples, strict=True):
             self.update(f"scoring on {recording.title}", 0, 0)
             truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
-            detections, outside = run_counting(readout, recording, tare=example.tare)
+            detections = run(readout, recording, tare=example.tare)
             scored = score(detections, truth, self.options.window_ms)
             of_recording = Example(recording, truth, example.tare)
-            outcomes.append(Outcome(recording.title, of_recording, detections, scored, outside))
+            outcomes.append(Outcome(recording.title, of_recording, detections, scored))
         return outcomes

@@ -128,8 +128,7 @@ impl Detector {
     }
 
     /// The detections of a whole recording of events with taxels that a person zeroed, continued by a second of
-    /// silence, and how many of them have an input outside its range in training ([`ReadoutStream::outside`]). Nothing is
-    /// detected before `begin` us ([`ReadoutStream::begin_at`]).
+    /// silence. Nothing is detected before `begin` us ([`ReadoutStream::begin_at`]).
     ///
     /// # Errors
     ///
@@ -143,7 +142,7 @@ impl Detector {
         zeroings: &[Zeroing],
         begin: Option<i64>,
         stop: Stop<'_>,
-    ) -> Result<(Vec<Detection>, Option<u64>)> {
+    ) -> Result<Vec<Detection>> {
         let last = events.t.iter().copied().chain(events.markers.iter().map(|m| m.t)).max().unwrap_or(0);
         let mut stream = self.stream(events.array, frames, tare)?;
         begin.into_iter().for_each(|t| stream.begin_at(t));
@@ -151,11 +150,11 @@ impl Detector {
         events.check_order()?;
         let mut found = stream.push_recording(events, stop)?;
         stream.finish(last, &mut found)?;
-        Ok((found, stream.outside()))
+        Ok(found)
     }
 
     /// The detections of a whole recording of frames with taxels that a person zeroed, continued for a second with the
-    /// last frame, and how many of them have an input outside its range in training. Frames last `frame_us`, or by default
+    /// last frame. Frames last `frame_us`, or by default
     /// the median distance between frames. Nothing is detected before `begin` us: of the frames before it, at rest, only
     /// the last one is read.
     ///
@@ -171,7 +170,7 @@ impl Detector {
         zeroings: &[Zeroing],
         begin: Option<i64>,
         stop: Stop<'_>,
-    ) -> Result<(Vec<Detection>, Option<u64>)> {
+    ) -> Result<Vec<Detection>> {
         let frame_us = match frame_us {
             Some(frame_us) => frame_us,
             None => usual_distance(frames.t)?,
@@ -185,7 +184,7 @@ impl Detector {
         let rest = FramesView { t: &frames.t[first..], values: &frames.values[first * frames.array.len()..], ..frames };
         let mut found = stream.push_frames(rest, stop)?;
         stream.finish(last, &mut found)?;
-        Ok((found, stream.outside()))
+        Ok(found)
     }
 }
 

@@ -3,11 +3,12 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 use crate::allowed::{above_0, is_weight, weight_error};
-use crate::detect::stream::{DelayedNeurons, NamedNeuron, Ranges, ReceivedTrains, Way};
-use crate::detect::{self, FrameClock, FrameTime, PlainRule, ReadoutStream, Seen, TrainedNeuron, TrainingData};
+use crate::detect::stream::{DelayedNeurons, NamedNeuron, ReceivedTrains, Way};
+use crate::detect::{self, FrameClock, FrameTime, PlainRule, ReadoutStream, TrainedNeuron, TrainingData};
 use crate::encode::{Composite, Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
 use crate::spikes::us;
@@ -55,9 +56,9 @@ pub struct Readout {
     /// The labels that are detected by their rule, and not by their neuron; without a rule such a label is never detected.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     pub by_rule: BTreeSet<String>,
-    /// The range of each neuron's inputs in its training data, by label; empty if it is not known.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub seen: BTreeMap<String, Seen>,
+    /// The ranges of inputs in training that older files hold; not read.
+    #[serde(default, skip_serializing)]
+    pub seen: IgnoredAny,
     /// What the data of the training were like; `None` if it is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub training: Option<TrainingData>,
@@ -117,16 +118,6 @@ impl Readout {
             if let Some(array) = &self.array {
                 self.check_weights(label, cell, array)?;
             }
-            match self.seen.get(label) {
-                Some(seen) => seen.check(cell.weights.len()).map_err(|error| error.in_part(label))?,
-                None if self.seen.is_empty() => {}
-                None => {
-                    return Err(problem!(
-                        "{label}: the ranges of the neuron's inputs are missing in seen, which has those of other \
-                         neurons"
-                    ));
-                }
-            }
         }
         for (label, rule) in &self.rules {
             rule.check().map_err(|error| error.in_part(label))?;
@@ -134,11 +125,8 @@ impl Readout {
                 return Err(problem!("{label}: its rule detects no {label}"));
             }
         }
-        if let Some(label) = self.rules.keys().chain(&self.by_rule).find(|&label| !self.neurons.contains_key(label)) {
-            return Err(problem!("rules: the readout has no neuron {label}"));
-        }
-        match self.seen.keys().find(|&label| !self.neurons.contains_key(label)) {
-            Some(label) => Err(problem!("seen: the readout has no neuron {label}")),
+        match self.rules.keys().chain(&self.by_rule).find(|&label| !self.neurons.contains_key(label)) {
+            Some(label) => Err(problem!("rules: the readout has no neuron {label}")),
             None => Ok(()),
         }
     }
@@ -232,8 +220,7 @@ impl Readout {
                 _ => None,
             };
             let (encoder, inputs) = (self.encoder_of(cell)?, ReceivedTrains::new(received, self.delays_ms.len()));
-            let named = NamedNeuron::new(label, cell, self.run_threshold, encoder.latency_ms(), inputs);
-            Ok(named.with_ranges(Ranges::new(self.seen.get(label).cloned(), encoder.kind())))
+            Ok(NamedNeuron::new(label, cell, self.run_threshold, encoder.latency_ms(), inputs))
         });
         let mut ways = vec![];
         if self.runs_neurons() {

@@ -11,7 +11,6 @@ use crate::{Array, EventsView, FramesView, Result, Spike, Stop, problem};
 mod labelled_rule;
 mod named_neuron;
 mod neurons;
-mod ranges;
 mod repairs;
 #[cfg(test)]
 mod tests;
@@ -19,7 +18,6 @@ mod tests;
 use labelled_rule::LabelledRule;
 pub(super) use named_neuron::{NamedNeuron, ReceivedTrains};
 pub(super) use neurons::DelayedNeurons;
-pub(super) use ranges::Ranges;
 use repairs::Repairs;
 
 /// The number of events between two checks of [`Stop`].
@@ -249,13 +247,6 @@ impl ReadoutStream {
     #[must_use]
     pub fn late(&self) -> u64 {
         self.late
-    }
-
-    /// The number of detections of neurons with an input outside the range that it had in training; `None` without
-    /// neurons, or if that range is not known.
-    #[must_use]
-    pub fn outside(&self) -> Option<u64> {
-        self.ways.iter().find_map(Way::neurons).and_then(DelayedNeurons::outside)
     }
 
     /// The time up to which all detections are final, us; `None` before any input.

@@ -87,8 +87,6 @@ pub struct ReadoutCounts {
     /// Detections among these that were output during a silence which an event then interrupted, because it arrived
     /// later than the guard time; the detections of the recording were output after them.
     pub wrong: u64,
-    /// Detections with an input outside the range that it had in training; `None` if that range is not known.
-    pub outside: Option<u64>,
     /// Detections that [`Live::next`](super::Live::next) did not read in time; the sinks received them.
     pub detections_dropped: u64,
     /// Whether a tare is being measured.
@@ -224,7 +222,6 @@ impl ReadoutCounts {
         counts_since! {
             self, earlier;
             read_out, events_dropped, late, detections, wrong, detections_dropped;
-            outside: self.outside.map(|now| now - earlier.outside.unwrap_or(0)),
             taring: self.taring,
         }
     }

@@ -172,7 +172,6 @@ impl RunningReadout {
             counters.readout.read_out += (self.events.len() + self.block.t.len()) as u64;
             if let Mode::Reading(readout) = &self.mode {
                 (counters.readout.late, counters.readout.wrong) = (readout.late(), readout.wrong());
-                counters.readout.outside = readout.outside();
             }
         }
         Ok(())

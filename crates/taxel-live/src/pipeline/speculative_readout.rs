@@ -120,11 +120,6 @@ impl SpeculativeReadout {
         self.wrong
     }
 
-    /// As [`ReadoutStream::outside`], of the detections that are certain.
-    pub(super) fn outside(&self) -> Option<u64> {
-        self.certain.outside()
-    }
-
     /// Ends the silence at `t` us: a copy that has not passed that time is what the certain readout would be there.
     fn end_silence(&mut self, t: i64) {
         let copies = [self.ahead.take(), self.behind.take()];
@@ -182,7 +177,7 @@ mod tests {
             neurons: [("touch".to_owned(), cell)].into(),
             rules: BTreeMap::new(),
             by_rule: BTreeSet::new(),
-            seen: BTreeMap::new(),
+            seen: Default::default(),
             training: None,
         };
         SpeculativeReadout::new(Box::new(readout.stream(&array(), 192.0, None).unwrap()))

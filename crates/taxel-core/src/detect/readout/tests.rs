@@ -30,7 +30,7 @@ fn readout() -> Readout {
         neurons: [("contact".to_owned(), cell(0.2, 3.0)), ("lift".to_owned(), cell(0.5, -0.1))].into(),
         rules: BTreeMap::new(),
         by_rule: BTreeSet::new(),
-        seen: BTreeMap::new(),
+        seen: Default::default(),
         training: None,
     }
 }
@@ -186,7 +186,6 @@ fn a_zeroed_taxel_reads_as_one_whose_values_fell_by_what_its_rest_rose() {
             Detector::from(readout.clone())
                 .run_events(events.view(), 192.0, Some(&tare), zeroings, None, Stop::never())
                 .unwrap()
-                .0
         };
         let detections = run(&events, &zeroings);
         assert_eq!(detections, run(&low, &[]), "seed {seed}, {name}");

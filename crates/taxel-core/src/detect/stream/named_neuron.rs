@@ -1,6 +1,5 @@
 //! A neuron of a readout in a stream: its label, its state, and its crossings so far.
 
-use super::ranges::Ranges;
 use crate::detect::TrainedNeuron;
 use crate::neuron::{Neuron, NeuronStream, OutputSpike, Time};
 use crate::spikes::us;
@@ -49,11 +48,8 @@ pub(in crate::detect) struct NamedNeuron {
     /// Started at the first spike, so that a grid has the same points wherever the input begins.
     pub stream: Option<NeuronStream>,
     crossings: Vec<OutputSpike>,
-    pub ranges: Ranges,
     /// The time of the latest input that may rest on a repaired taxel, ms.
     repaired: Option<f64>,
-    /// The time of the latest input outside its range in training, ms.
-    outside: Option<f64>,
 }
 
 /// A crossing of a neuron, and what it rests on.
@@ -63,8 +59,6 @@ pub(in crate::detect) struct NeuronCrossing {
     pub neuron: usize,
     /// Whether it may rest on repaired taxels.
     pub repaired: bool,
-    /// Whether it may rest on an input outside its range in training.
-    pub outside: bool,
 }
 
 impl NamedNeuron {
@@ -79,20 +73,13 @@ impl NamedNeuron {
             threshold,
             stream: None,
             crossings: vec![],
-            ranges: Ranges::default(),
             repaired: None,
-            outside: None,
         }
     }
 
     /// The time of the event of a crossing, us: without the delay.
     pub fn event_us(&self, crossing: &OutputSpike) -> i64 {
         us(crossing.t - self.offset_ms).round() as i64
-    }
-
-    /// The neuron with the ranges that its inputs had in training.
-    pub fn with_ranges(self, ranges: Ranges) -> Self {
-        Self { ranges, ..self }
     }
 
     /// Passes a spike of an encoder's train to the neuron, the number of which is `k`, if it is one of its inputs; adds
@@ -115,12 +102,10 @@ impl NamedNeuron {
             }
         };
         stream.push(spike, &mut self.crossings)?;
-        let outside = self.ranges.is_outside(spike, self.neuron.memory_ms());
-        if repaired || outside {
+        if repaired {
             // Crossings up to here cannot rest on this spike.
             self.drain_crossings(k, out);
-            self.repaired = if repaired { Some(spike.t) } else { self.repaired };
-            self.outside = if outside { Some(spike.t) } else { self.outside };
+            self.repaired = Some(spike.t);
         }
         Ok(())
     }
@@ -138,7 +123,6 @@ impl NamedNeuron {
         let rests = |since: Option<f64>, t: f64| since.is_some_and(|at| at <= t && t - at <= self.neuron.memory_ms());
         out.extend(self.crossings.drain(..).map(|spike| NeuronCrossing {
             repaired: rests(self.repaired, spike.t),
-            outside: rests(self.outside, spike.t),
             spike,
             neuron: k,
         }));

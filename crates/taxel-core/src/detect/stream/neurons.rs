@@ -13,13 +13,11 @@ pub(in crate::detect) struct DelayedNeurons {
     delays_ms: Vec<f64>,
     /// Spikes assigned to inputs that wait for possibly earlier spikes, and whether each may rest on a repaired event.
     waiting: Vec<(Spike, bool)>,
-    /// The number of detections with an input outside its range in training.
-    outside: u64,
 }
 
 impl DelayedNeurons {
     pub fn new(neurons: Vec<NamedNeuron>, delays_ms: Vec<f64>) -> Self {
-        Self { neurons, delays_ms, waiting: vec![], outside: 0 }
+        Self { neurons, delays_ms, waiting: vec![] }
     }
 
     /// The label and present potential of each neuron, mV.
@@ -27,11 +25,6 @@ impl DelayedNeurons {
         self.neurons
             .iter()
             .map(|neuron| (neuron.label.as_str(), neuron.stream.as_ref().map_or(0.0, NeuronStream::potential)))
-    }
-
-    /// The number of detections with an input outside its range in training; `None` if a range is not known.
-    pub fn outside(&self) -> Option<u64> {
-        self.neurons.iter().all(|neuron| neuron.ranges.are_known()).then_some(self.outside)
     }
 
     /// Assigns the encoder's spikes to the neurons' inputs, each with whether it may rest on a repaired event.
@@ -67,7 +60,6 @@ impl DelayedNeurons {
         let t_of = |crossing: &NeuronCrossing| self.neurons[crossing.neuron].event_us(&crossing.spike);
         crossings.retain(|crossing| t_of(crossing) >= begin);
         crossings.sort_by(|a, b| a.spike.t.total_cmp(&b.spike.t));
-        self.outside += crossings.iter().filter(|crossing| crossing.outside).count() as u64;
         out.extend(crossings.iter().map(|crossing| Detection {
             label: self.neurons[crossing.neuron].label.clone(),
             t: t_of(crossing),
