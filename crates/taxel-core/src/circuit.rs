@@ -14,15 +14,13 @@ pub mod converter;
 mod dense;
 pub mod fabric;
 pub mod grid;
-pub mod limit;
 pub mod ramp;
 pub mod readout;
 
 pub use adaptive::{Adaptive, Converted};
 pub use converter::{Converter, ConverterScan, Moment};
 pub use fabric::Fabric;
-pub use grid::{Crossbar, Idle};
-pub use limit::Limit;
+pub use grid::Crossbar;
 pub use ramp::{Ramp, RampShape};
 pub use readout::{Divider, VirtualGround};
 

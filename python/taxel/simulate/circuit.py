@@ -179,8 +179,7 @@ class VirtualGround(_Lines):
     wire_ohm : float, ohm, from 0 to 1e9
         Resistance of a line from one taxel to the next, and from its end to the first; 0, or 0.001 or more.
     rail_v : float, V, above 0
-        Voltage at which amplifiers saturate; they also saturate at 0 V. The line of a saturated amplifier is no longer
-        held: the feedback resistor ties it to the rail.
+        Voltage at which amplifiers saturate; they also saturate at 0 V. The line of one that does counts as held.
     seed : int, 0 or more
         Seed of the offsets.
 
@@ -221,7 +220,7 @@ class VirtualGround(_Lines):
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class Divider(_Lines):
-    """Pull rows to ground by resistors and put the supply on one driven line after the other: no amplifier.
+    """Pull rows to ground by resistors; put the supply on one driven line, and ground on the others: no amplifier.
 
     Currents also flow through other taxels, so a taxel reads less, or more, than it would by itself.
 
@@ -235,8 +234,6 @@ class Divider(_Lines):
         Resistance of a driven line's switch.
     wire_ohm : float, ohm, from 0 to 1e9
         Resistance of a line from one taxel to the next, and from its end to the first; 0, or 0.001 or more.
-    idle : {"held", "floating"}
-        Whether lines that are not driven are held at ground, as in thesis 3.4.2, or float.
 
     Raises
     ------
@@ -257,7 +254,6 @@ class Divider(_Lines):
     resistor_kohm: float = _DIVIDER.resistor_kohm
     switch_ohm: float = _DIVIDER.switch_ohm
     wire_ohm: float = _DIVIDER.wire_ohm
-    idle: Literal["held", "floating"] = _DIVIDER.idle
 
     _kind = "divider"
 

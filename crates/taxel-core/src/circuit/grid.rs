@@ -9,32 +9,18 @@
 //! `(1 + s K) I = K u - v / (1 + r b_j) G_j`, `s` the sense resistance, `u` the sources, `v` on the driven line j.
 //!
 //! That is symmetric, positive definite and as large as there are rows; ideal lines (0 ohm) are no special case, and
-//! small currents are no differences of large ones. Lines that float are `r` without bound: `K` is then another for each
-//! line read, by `(1 / b_j - w_j) G_j G_j'`, so that one factor serves all of them (Sherman and Morrison). With wire
-//! resistance each crossing has two voltages of its own, and the sparse system of all of them is factored.
+//! small currents are no differences of large ones. With wire resistance each crossing has two voltages of its own, and
+//! the sparse system of all of them is factored.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, factorize_symbolic_cholesky};
 use faer::sparse::{SparseColMat, Triplet};
 use faer::{Conj, Mat, MatMut, Par, Side};
-use serde::{Deserialize, Serialize};
 
 use super::dense::{Matrix, too_far_apart};
-use super::limit::Limit;
 use crate::{Result, Stop, problem};
 
-/// The state of the driven lines that are not read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Idle {
-    /// Their switches hold them.
-    #[default]
-    Held,
-    /// They float.
-    Floating,
-}
-
-/// A network's lines.
+/// A network's lines; driven lines that are not read are held at one voltage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossbar {
     /// Sense lines.
@@ -47,10 +33,6 @@ pub struct Crossbar {
     pub drive_ohm: f64,
     /// Resistance of a line from one crossing to the next, and from its end to the first, ohm; 0, or 0.001 or more.
     pub wire_ohm: f64,
-    /// The state of the lines that are not read.
-    pub idle: Idle,
-    /// Limits of a sense line's source; `None`: it has none.
-    pub limit: Option<Limit>,
 }
 
 /// The least wire resistance above 0: with less the system is too badly conditioned.
@@ -106,72 +88,30 @@ impl Crossbar {
             turned.set_column(i, row.iter().copied());
             solved.set_row(i, row);
         }
-        let held = |k: usize| r / (1.0 + r * by_column[k]);
-        let floats = |k: usize| if by_column[k] > 0.0 { by_column[k].recip() } else { 0.0 };
-        let weights: Vec<f64> = (0..m)
-            .map(|k| match self.idle {
-                Idle::Held => held(k),
-                Idle::Floating => floats(k),
-            })
-            .collect();
         // G W, in the place of G.
         for (i, row) in g.chunks_exact_mut(m.max(1)).enumerate() {
             let mut back = 0.0;
             for (k, g) in row.iter_mut().enumerate() {
-                *g *= weights[k];
+                *g *= r / (1.0 + r * by_column[k]);
                 back += *g * of_sources[k];
             }
             *solved.at_mut(i, m) = by_row[i] * sense_v[i] - back;
         }
-        // K as if no line were read.
-        let k_matrix = || {
+        if self.sense_ohm > 0.0 {
             let mut matrix = Matrix::zeros(n, n);
             matrix.subtract(&g, &turned);
             (0..n).for_each(|i| *matrix.at_mut(i, i) += by_row[i]);
-            matrix
-        };
-        let factor = if self.sense_ohm > 0.0 {
-            let mut matrix = k_matrix().scaled(self.sense_ohm);
+            let mut matrix = matrix.scaled(self.sense_ohm);
             (0..n).for_each(|i| *matrix.at_mut(i, i) += 1.0);
-            let factor = matrix.factor()?;
-            factor.solve(&mut solved);
-            Some(factor)
-        } else {
-            None
-        };
-        // The share of the line that is read: its weight is one that is held, and its voltage drives.
-        let mut share = vec![0.0; m];
-        for (k, share) in share.iter_mut().enumerate() {
-            let more = weights[k] - held(k);
-            let drives = more * of_sources[k] - drive_v / (1.0 + r * by_column[k]);
-            let (mut of_line, mut of_rest) = (0.0, 0.0);
-            if more != 0.0 {
-                for i in 0..n {
-                    of_line += turned.at(k, i) * solved.at(i, k);
-                    of_rest += turned.at(k, i) * solved.at(i, m);
-                }
-            }
-            let again = self.sense_ohm * more;
-            *share = (drives - again * of_rest) / (1.0 + again * of_line);
+            matrix.factor()?.solve(&mut solved);
         }
         let mut currents = vec![0.0; n * m];
         for (i, row) in currents.chunks_exact_mut(m.max(1)).enumerate() {
             solved.copy_row(i, row);
             let rest = solved.at(i, m);
-            for (current, share) in row.iter_mut().zip(&share) {
-                *current = *current * share + rest;
+            for (current, column) in row.iter_mut().zip(&by_column) {
+                *current = rest - *current * drive_v / (1.0 + r * column);
             }
-        }
-        if let Some(limit) = self.limit {
-            limit.apply(self.sense_ohm, sense_v, &mut currents, || {
-                let mut matrix = k_matrix();
-                if let Some(factor) = &factor {
-                    factor.solve(&mut matrix);
-                }
-                let mut response = vec![0.0; n * n];
-                response.chunks_exact_mut(n).enumerate().for_each(|(i, row)| matrix.copy_row(i, row));
-                Ok(response)
-            })?;
         }
         Ok(currents)
     }
@@ -205,43 +145,18 @@ impl Crossbar {
         let into = |volts: &Mat<f64>, i: usize, c: usize| -> f64 {
             (0..m).map(|k| g[sense(i, k)] * (volts[(sense(i, k), c)] - volts[(driven(i, k), c)])).sum()
         };
-        let untouched = |k: usize| (0..n).all(|i| g[sense(i, k)] == 0.0);
-        let mut currents = vec![0.0; n * m];
-        // Lines that are held have one matrix for all that are read, lines that float one for each.
-        let at_once = if self.idle == Idle::Held { m } else { 1 };
-        let fixed = entries.len();
-        for first in (0..m).step_by(at_once) {
-            stop.check()?;
-            entries.truncate(fixed);
-            // A floating line without a conducting taxel has no current, so a connection of any resistance may hold it.
-            let ends = |k: &usize| (first..first + at_once).contains(k) || untouched(*k);
-            entries.extend((0..m).filter(ends).map(|k| Triplet::new(driven(0, k), driven(0, k), driven_end)));
-            let mut volts = Mat::zeros(2 * n * m, at_once);
-            for c in 0..at_once {
-                for i in 0..n {
-                    volts[(sense(i, 0), c)] = sense_end * sense_v[i];
-                }
-                volts[(driven(0, first + c), c)] = driven_end * drive_v;
-            }
-            let factor = Sparse::factor(2 * n * m, &entries, stop)?;
-            factor.solve(volts.as_mut())?;
+        entries.extend((0..m).map(|k| Triplet::new(driven(0, k), driven(0, k), driven_end)));
+        let mut volts = Mat::zeros(2 * n * m, m);
+        for k in 0..m {
             for i in 0..n {
-                (0..at_once).for_each(|c| currents[i * m + first + c] = into(&volts, i, c));
+                volts[(sense(i, 0), k)] = sense_end * sense_v[i];
             }
-            if let Some(limit) = self.limit {
-                let mut read: Vec<f64> =
-                    (0..n).flat_map(|i| currents[i * m + first..i * m + first + at_once].to_vec()).collect();
-                limit.apply(self.sense_ohm, sense_v, &mut read, || {
-                    stop.check()?;
-                    let mut volts = Mat::zeros(2 * n * m, n);
-                    (0..n).for_each(|i| volts[(sense(i, 0), i)] = sense_end);
-                    factor.solve(volts.as_mut())?;
-                    Ok((0..n * n).map(|at| into(&volts, at / n, at % n)).collect())
-                })?;
-                for (i, read) in read.chunks_exact(at_once).enumerate() {
-                    currents[i * m + first..i * m + first + at_once].copy_from_slice(read);
-                }
-            }
+            volts[(driven(0, k), k)] = driven_end * drive_v;
+        }
+        Sparse::factor(2 * n * m, &entries, stop)?.solve(volts.as_mut())?;
+        let mut currents = vec![0.0; n * m];
+        for i in 0..n {
+            (0..m).for_each(|k| currents[i * m + k] = into(&volts, i, k));
         }
         Ok(currents)
     }
@@ -297,8 +212,8 @@ impl Sparse {
 mod tests {
     use super::*;
 
-    fn grid(sense_ohm: f64, drive_ohm: f64, wire_ohm: f64, idle: Idle) -> Crossbar {
-        Crossbar { rows: 2, columns: 2, sense_ohm, drive_ohm, wire_ohm, idle, limit: None }
+    fn grid(sense_ohm: f64, drive_ohm: f64, wire_ohm: f64) -> Crossbar {
+        Crossbar { rows: 2, columns: 2, sense_ohm, drive_ohm, wire_ohm }
     }
 
     fn currents(grid: &Crossbar, g: &[f64], sense_v: &[f64]) -> Vec<f64> {
@@ -308,57 +223,38 @@ mod tests {
     #[test]
     fn ideal_lines_give_each_taxel_its_own_current() {
         let g = [1.0, 20.0, 300.0, 0.0];
-        let ideal = currents(&grid(0.0, 0.0, 0.0, Idle::Held), &g, &[0.0, 0.0]);
+        let ideal = currents(&grid(0.0, 0.0, 0.0), &g, &[0.0, 0.0]);
         assert_eq!(ideal, [1.0, 20.0, 300.0, 0.0]);
     }
 
     #[test]
     fn a_taxel_by_itself_is_in_series_with_its_lines() {
         for (wire, segments) in [(0.0, 0.0), (10.0, 3.0)] {
-            for idle in [Idle::Held, Idle::Floating] {
-                // The one at x 1, y 0: a segment more of its row than the one at x 0.
-                let got = currents(&grid(70.0, 30.0, wire, idle), &[0.0, 500.0, 0.0, 0.0], &[0.0, 0.0]);
-                let wanted = 1e6 / (70.0 + 30.0 + 2000.0 + segments * wire);
-                assert!((got[1] - wanted).abs() < 1e-9 * wanted, "{got:?} {wanted}");
-                assert!([0, 2, 3].iter().all(|&k| got[k].abs() < 1e-9));
-            }
+            // The one at x 1, y 0: a segment more of its row than the one at x 0.
+            let got = currents(&grid(70.0, 30.0, wire), &[0.0, 500.0, 0.0, 0.0], &[0.0, 0.0]);
+            let wanted = 1e6 / (70.0 + 30.0 + 2000.0 + segments * wire);
+            assert!((got[1] - wanted).abs() < 1e-9 * wanted, "{got:?} {wanted}");
+            assert!([0, 2, 3].iter().all(|&k| got[k].abs() < 1e-9));
         }
-    }
-
-    #[test]
-    fn two_by_two_by_hand() {
-        // Floating: of (0, 0) is read the taxel itself, and beside it the three others in series by the other column.
-        // Row 1 is held at 0 V behind 100 ohm, row 0 likewise: column 0 at -1 V, column 1 floats.
-        let [a, b, c, d] = [100e-6, 200e-6, 300e-6, 400e-6_f64];
-        let (s, through) = (1.0 / 100.0, (1.0 / b + 1.0 / d).recip());
-        // Two rows: (s + a + through) r0 - through r1 = -a, and the same of row 1 with c.
-        let (p, q) = (s + a + through, s + c + through);
-        let determinant = p * q - through * through;
-        let (r0, r1) = ((-a * q - c * through) / determinant, (-c * p - a * through) / determinant);
-        let got = currents(&grid(100.0, 0.0, 0.0, Idle::Floating), &[100.0, 200.0, 300.0, 400.0], &[0.0, 0.0]);
-        assert!((got[0] + 1e6 * s * r0).abs() < 1e-9 && (got[2] + 1e6 * s * r1).abs() < 1e-9, "{got:?}");
     }
 
     #[test]
     fn a_wire_of_almost_nothing_is_none() {
         let g: Vec<f64> = (0..35).map(|k| 0.1 + f64::from(k * k % 17) * 30.0).collect();
-        for idle in [Idle::Held, Idle::Floating] {
-            let with = |wire_ohm| {
-                let (rows, columns, sense_ohm, drive_ohm) = (5, 7, 47.0, 5.0);
-                let grid = Crossbar { rows, columns, sense_ohm, drive_ohm, wire_ohm, idle, limit: None };
-                grid.currents_ua(&g, -1.3, &[0.0, 1e-3, 0.0, -2e-3, 0.0], Stop::never()).unwrap()
-            };
-            for (without, nearly) in with(0.0).iter().zip(with(LEAST_WIRE_OHM)) {
-                assert!((without - nearly).abs() < 1e-4 * without.abs().max(1.0), "{without} {nearly}");
-            }
+        let with = |wire_ohm| {
+            let (rows, columns, sense_ohm, drive_ohm) = (5, 7, 47.0, 5.0);
+            let grid = Crossbar { rows, columns, sense_ohm, drive_ohm, wire_ohm };
+            grid.currents_ua(&g, -1.3, &[0.0, 1e-3, 0.0, -2e-3, 0.0], Stop::never()).unwrap()
+        };
+        for (without, nearly) in with(0.0).iter().zip(with(LEAST_WIRE_OHM)) {
+            assert!((without - nearly).abs() < 1e-4 * without.abs().max(1.0), "{without} {nearly}");
         }
     }
 
     #[test]
     fn a_crossing_that_conducts_nonsense_is_named() {
         for wrong in [-1.0, f64::NAN, f64::INFINITY] {
-            let error =
-                grid(0.0, 0.0, 0.0, Idle::Held).currents_ua(&[0.0, 0.0, 0.0, wrong], 1.0, &[0.0; 2], Stop::never());
+            let error = grid(0.0, 0.0, 0.0).currents_ua(&[0.0, 0.0, 0.0, wrong], 1.0, &[0.0; 2], Stop::never());
             assert!(error.unwrap_err().to_string().contains("row 1, column 1"), "{wrong}");
         }
     }

@@ -5,8 +5,7 @@ use rand::rngs::StdRng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use super::grid::{Crossbar, Idle, LEAST_WIRE_OHM};
-use super::limit::Limit;
+use super::grid::{Crossbar, LEAST_WIRE_OHM};
 use crate::allowed::Range;
 use crate::parameters::parameters;
 use crate::{Result, Stop, problem};
@@ -39,7 +38,7 @@ parameters! {
         pub switch_ohm: f64 = 2.5, "ohm", LINE;
         /// A line from one taxel to the next, ohm; 0, or 0.001 or more.
         pub wire_ohm: f64 = 0.0, "ohm", LINE;
-        /// Where the amplifiers saturate, V.
+        /// Where the amplifiers saturate, V; the lines of those that do count as held.
         pub rail_v: f64 = 5.0, "V", Range::ABOVE_0;
         /// The seed of the offsets.
         pub seed: u64 = 0;
@@ -84,9 +83,6 @@ impl VirtualGround {
             sense_ohm: feedback_ohm * share,
             drive_ohm: self.switch_ohm,
             wire_ohm: self.wire_ohm,
-            idle: Idle::Held,
-            // An amplifier that saturates no longer holds its line: the feedback resistor connects that to the rail.
-            limit: Some(Limit { least_v: -self.v_trans, most_v: self.rail_v - self.v_trans, ohm: feedback_ohm }),
         };
         let mut draw = StdRng::seed_from_u64(self.seed);
         let mut normal = || -> f64 { StandardNormal.sample(&mut draw) };
@@ -104,7 +100,7 @@ impl VirtualGround {
 }
 
 parameters! {
-    /// Rows that resistors pull to ground, one driven line at the supply: no amplifier, and crosstalk between taxels
+    /// Rows that resistors pull to ground, one driven line at the supply, the others at ground: no amplifier, and crosstalk between taxels
     /// (thesis 3.4.2; Appendix 1, figure 1.1).
     #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
@@ -117,8 +113,6 @@ parameters! {
         pub switch_ohm: f64 = 0.0, "ohm", LINE;
         /// A line from one taxel to the next, ohm; 0, or 0.001 or more.
         pub wire_ohm: f64 = 0.0, "ohm", LINE;
-        /// Whether lines that are not driven are held at ground (thesis 3.4.2) or float.
-        pub idle: Idle = Idle::Held;
     }
 }
 
@@ -147,8 +141,7 @@ impl Divider {
     /// As [`Crossbar::currents_ua`].
     pub fn volts(&self, rows: usize, columns: usize, conductance_us: &[f64], stop: Stop<'_>) -> Result<Vec<f64>> {
         let sense_ohm = 1e3 * self.resistor_kohm;
-        let (drive_ohm, wire_ohm, idle) = (self.switch_ohm, self.wire_ohm, self.idle);
-        let grid = Crossbar { rows, columns, sense_ohm, drive_ohm, wire_ohm, idle, limit: None };
+        let grid = Crossbar { rows, columns, sense_ohm, drive_ohm: self.switch_ohm, wire_ohm: self.wire_ohm };
         let currents = grid.currents_ua(conductance_us, self.supply_v, &vec![0.0; rows], stop)?;
         Ok(currents.iter().map(|current| -1e-6 * sense_ohm * current).collect())
     }
