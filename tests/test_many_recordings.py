@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +47,11 @@ def test_info_of_a_folder_lists_what_failed(folder: Path, spread: tuple[str, ...
     [line] = done.stderr.splitlines()
     assert line.startswith("taxel: ")
     assert "press2.npz" in line
+
+
+def test_a_command_with_processes_of_its_own_ends(folder: Path) -> None:
+    asked = [sys.executable, "-P", "-m", "taxel", "info", str(folder), "--jobs", "2"]
+    assert subprocess.run(asked, capture_output=True, timeout=100, check=False).returncode == 2
 
 
 @pytest.mark.parametrize("spread", SPREAD)

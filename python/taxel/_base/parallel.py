@@ -5,6 +5,7 @@ Results are given as each is known, with the number of its call; they do not dep
 
 from __future__ import annotations
 
+import atexit
 import logging
 import os
 import signal
@@ -132,10 +133,13 @@ class Workers:
             else:
                 # Workers of Dask and Ray end with their parent by themselves; helpers of a killed Ray may stay.
                 watch: dict[str, Any] = {"initializer": _end_with_parent, "initargs": (os.getpid(),)}
+                # Before the program waits for its children, of which idle workers are some.
+                atexit.unregister(_end_workers)
+                atexit.register(_end_workers)
                 try:
                     yield joblib.Parallel(n_jobs=self.jobs, return_as="generator_unordered", batch_size=1, **watch)
                 except KeyboardInterrupt:
-                    joblib.externals.loky.get_reusable_executor().shutdown(wait=False, kill_workers=True)
+                    _end_workers()
                     raise
 
 
@@ -170,6 +174,13 @@ def _end_with_parent(parent: int) -> None:
         psutil.Process().kill()
 
     threading.Thread(target=watch, name="taxel-parent", daemon=True).start()
+
+
+def _end_workers() -> None:
+    """End the workers of loky, which stay for the next call."""
+    from joblib.externals.loky import get_reusable_executor  # noqa: PLC0415  what runs in one process does not need it
+
+    get_reusable_executor(reuse=True).shutdown(wait=False, kill_workers=True)
 
 
 @contextmanager
