@@ -304,8 +304,10 @@ export class Board {
   send(control) {
     if (control.wanted === null) control.show();
     const waiting = [...this.controls.values()].filter(({ wanted }) => wanted !== null);
-    for (const one of waiting) one.refuse(Number.isNaN(one.wanted) ? `${one.input.value.trim() || "nothing"} is not a number` : null);
-    if (!waiting.length || !this.writable || waiting.some(({ wanted }) => Number.isNaN(wanted))) return;
+    const spoilt = waiting.filter(({ wanted }) => Number.isNaN(wanted));
+    for (const one of spoilt) one.refuse(`${one.input.value.trim() || "nothing"} is not a number`);
+    if (!waiting.length || !this.writable || spoilt.length) return;
+    for (const one of waiting) one.refuse(null);
     const values = Object.fromEntries(waiting.map(({ field, wanted }) => [field.name, field.unit === "flag" ? Boolean(wanted) : Number(wanted)]));
     this.server.request({ type: "set", values }).catch((error) => {
       const field = error instanceof RefusedError ? error.field : null;
