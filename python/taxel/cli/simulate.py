@@ -14,7 +14,9 @@ from taxel._core import ProblemError
 from taxel.cli._task import OutOption, Output, progress
 from taxel.cli.app import App, Flat, Limits
 from taxel.demo.script import TRAINING_SEED, script
+from taxel.reading import Facts, InMemory, Marks
 from taxel.simulate import Scene, SceneFile
+from taxel.simulate.board import fitting
 
 app = App(name="simulate")
 
@@ -72,7 +74,9 @@ def simulate(
                 **scene_file.options,
             )
         about["events"] = len(played.events)
-        lost = taxel.convert(played.events, out, overwrite=output.overwrite)
+        registers = fitting(scene_file.preset, played.events.array)
+        made = InMemory(Facts(array=played.events.array), played.events, Marks(registers=registers))
+        lost = taxel.convert(taxel.Recording.of(made), out, overwrite=output.overwrite)
         lines.append(f"{counted(len(played.events), 'event')} written to {out}")
         lines += [f"  lost: {loss}" for loss in lost]
     if labels is not None:
