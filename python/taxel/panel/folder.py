@@ -136,13 +136,22 @@ class Folder:
         OSError : it cannot be read
         """
         path = self.file(name)
+        # What is known is shown at once, also while the rest of a large table is read.
+        if (known := self._known(path, trial, entire)) is not None:
+            return known
         async with self._locks.setdefault(path, asyncio.Lock()):
-            known = self._open.get((path, trial))
-            if known is not None and not (entire and known.left_s is not None) and known.size == _size(path):
+            if (known := self._known(path, trial, entire)) is not None:
                 return known
             shown = await in_thread(self._index, name, path, trial, entire)
             self._open = dict([*self._open.items()][-3:]) | {(path, trial): shown}
             return shown
+
+    def _known(self, path: Path, trial: str | None, entire: bool) -> Shown | None:
+        """Return a recording that was opened and is as it was; None of one of which more is asked for."""
+        known = self._open.get((path, trial))
+        if known is None or (entire and known.left_s is not None) or known.size != _size(path):
+            return None
+        return known
 
     def _index(self, name: str, path: Path, trial: str | None, entire: bool) -> Shown:
         begun, size = time.monotonic(), _size(path)
