@@ -104,7 +104,6 @@ def readout(path: Path) -> dict[str, Any]:
         "array": None if held.array is None else held.array._geometry(),
         "neurons": [[n.neuron.get_params(), n.weights, n.delay_ms, n.inputs] for n in held.neurons.values()],
         "of": [held.time, held.after_spike, held.run_threshold, held.delays_ms, held.unit],
-        "seen": json.loads(held.to_json()).get("seen"),
     }
 
 

@@ -46,7 +46,7 @@ def recorded(path: Path, drift_ppm: float, delay_s: float) -> Path:
         (10_100.0, 0.0, "a drift of "),
         (-10_100.0, 0.0, "a drift of "),
         # No fit takes such drifts, so the delays say it.
-        (-318_601.0, 0.0, "a delay of 6.3 s "),
+        (-318_601.0, 0.0, "a delay of 5.9 s "),
         (30_000.0, 0.0, "a median delay of -0.2 s "),
         (500_000.0, 0.0, "a median delay of -4.1 s "),
         (0.0, 0.9, None),

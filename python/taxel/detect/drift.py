@@ -62,7 +62,7 @@ def of_loads(examples: Sequence[Example], noise_floor: float) -> dict[str, _Valu
     return {name: np.concatenate(values) for name, values in features.items()}
 
 
-def training_data(examples: Sequence[Example], scored: Score, board: Mapping[str, Any] | None) -> dict[str, Any]:
+def training_data(examples: Sequence[Example], scored: Score, board: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Return what a readout's file keeps of its training: quantiles of loads, and how late detections were.
 
     Parameters
@@ -70,7 +70,7 @@ def training_data(examples: Sequence[Example], scored: Score, board: Mapping[str
     examples : sequence of Example, checked
     scored : Score
         Of the detector in its training data, or of folds of them.
-    board : mapping or None
+    board : mapping, optional
         The registers of the board that sent them, as `taxel.detect.board.summary` returns them.
     """
     noise_floor = floor_of(examples)

@@ -434,6 +434,8 @@ def run(
     period = None if frame_us is None else number("frame_us", frame_us)
     version = None if wire_version is None else integer("wire_version", wire_version, 1, 2)
     rest, zeroings = tare_text(tare), []
+    if begin_us is not None:
+        begin_us = integer("begin_us", begin_us, -(2**52), 2**52)
     if isinstance(source, Recording):
         if source.registers is not None:
             version = source.registers.wire_version if version is None else version
