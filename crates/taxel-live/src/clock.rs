@@ -5,6 +5,7 @@
 //! second the earliest point is kept. The line is the edge of the lower convex hull of the last 64 s above their mean
 //! time: of all lines below the points the closest to them.
 
+mod arrival_point;
 mod offset;
 mod pace;
 
@@ -12,19 +13,13 @@ use std::collections::VecDeque;
 
 use taxel_core::wire::{DatagramInfo, WORD_BYTES};
 
+use arrival_point::{ArrivalPoint, LONG_US, STRETCHES};
 pub use offset::Offset;
 use pace::ArrivalDelays;
 pub use pace::{Pace, doubt};
 
-/// Board time in us, and arrival minus board time in ns.
-type ArrivalPoint = (i64, i64);
-
 /// Duration of a stretch, of which the earliest point is kept, us of the board's clock.
 const STRETCH_US: i64 = 250_000;
-/// Number of stretches from which the line is fitted: 64 s, within which the rate of a quartz is constant.
-const STRETCHES: usize = 256;
-/// Duration beyond which a slope larger than that of a quartz is accepted, us.
-const LONG_US: i64 = 10_000_000;
 
 /// Distance from the line, ns, beyond which points belong to another clock: the board was reset, or the host's clock
 /// was set. After a pause the limit is larger, by the uncertainty of the drift.

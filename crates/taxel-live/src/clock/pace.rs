@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use serde::Serialize;
 
+use super::arrival_point::{ArrivalPoint, LONG_US, STRETCHES};
 use super::offset::Offset;
-use super::{ArrivalPoint, LONG_US, STRETCHES};
 use crate::latency::{Latencies, Quantiles};
 
 /// Reading: no two clocks differ by more (crystals by 0.01 %, the worst oscillators by 1 %), ppm.
