@@ -15,6 +15,7 @@ from taxel import SceneError
 from taxel._base.errors import Place
 from taxel.demo.script import script
 from taxel.simulate import Scene, SceneFile, Silence, play, truth
+from taxel.wire import Registers
 
 ROOT = Path(__file__).parents[2]
 BALL = """
@@ -169,6 +170,7 @@ def test_random_scenes_are_those_of_their_seed_with_their_truth(tmp_path):
     out, table = tmp_path / "two.mcap", tmp_path / "two.csv"
     done = run("simulate", "--scenes", 2, "--seed", 7, "-o", out, "--truth", table, "--json")
     assert done.returncode == 0, done.stderr
+    assert taxel.open(out).registers == Registers.preset("5.2 kHz")
     acts = script(7, 2)
     contacts, _ = truth(acts)
     assert taxel.open(out).events == play(acts, seed=7).events
