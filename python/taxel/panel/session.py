@@ -8,7 +8,7 @@ import json
 import math
 import time
 from collections import deque
-from collections.abc import Coroutine, Iterator
+from collections.abc import Coroutine
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NotRequired, TypedDict
 
 from websockets.exceptions import ConnectionClosed
@@ -23,6 +23,7 @@ from taxel.panel.declared import Number, Request, Several, Text, Time, Whole, lo
 from taxel.panel.folder import Shown
 from taxel.panel.label_file import Edit
 from taxel.panel.messages import dumps, text_of
+from taxel.panel.refusals import at_field, field_of, reason
 from taxel.panel.shown_files import judged
 from taxel.panel.threads import in_thread
 
@@ -223,7 +224,7 @@ class Session:
         A name without parameters is that of the encoder of the readout that reads what is shown, with its parameters
         and its tare, where the readout has one of this name; else the parameters are the defaults.
         """
-        with _field("encoder", whole=True):
+        with at_field("encoder", whole=True):
             await in_thread(self.view.encode, None if encoder is None else json.dumps(encoder))
 
     @request
@@ -275,7 +276,7 @@ class Session:
         follow. Of a large text table the beginning is shown first, `loading` follows each second, and then `opened`
         again, at the same time of the view.
         """
-        with _field("name"):
+        with at_field("name"):
             shown = await self._hub.open(name, trial)
             await self._show(shown, None)
 
@@ -398,7 +399,7 @@ class Session:
         """Receive the lines of numbers of a sensor instead, for all clients; refused while recording."""
         if not source.startswith("serial:"):
             raise refused("source", ": must begin with serial:; taxel live --source takes the others")
-        with _field("source"):
+        with at_field("source"):
             await self._hub.read_source(source)
 
     @request
@@ -537,7 +538,7 @@ class Session:
         A recording: `detections` follows. The live source: from now on, for all clients; it begins again. A readout
         that needs a tare uses that of the command, else what the taxels hold now.
         """
-        with _field("readout"):
+        with at_field("readout"):
             path = self._hub.folder.file(readout)
         shown = self.shown
         if shown is None:
@@ -588,31 +589,3 @@ def _note(row: Row | None, trial: str | None) -> Note | None:
         return None
     of_trial = row["trial"] or trial or ""
     return Note(row["label"].strip(), row["t_us"], 0, of_trial, row["source"], row.get("replaces_us"))
-
-
-def reason(error: Exception) -> str:
-    """Return why a request is refused, for a person."""
-    if isinstance(error, _core.Error):
-        return str(error)
-    if isinstance(error, OSError):
-        words = {FileExistsError: "exists already", FileNotFoundError: "no such file or device"}
-        where = "" if error.filename is None else f"{error.filename}: "
-        what = "permission denied" if isinstance(error, PermissionError) else words.get(type(error))
-        return f"{where}{what or error.strerror or error}"
-    return f"failed within taxel; please report it: {type(error).__name__}: {error}"
-
-
-def field_of(error: Exception) -> str | None:
-    """Return the key or register at fault."""
-    return getattr(error, "field", None) or getattr(error, "argument", None)
-
-
-@contextlib.contextmanager
-def _field(name: str, *, whole: bool = False) -> Iterator[None]:
-    """Note the key at fault where an error names none of the request; or, of a `whole` object, in any case."""
-    try:
-        yield
-    except (OSError, _core.Error) as error:
-        if whole or getattr(error, "argument", None) is None:
-            error.field = name  # type: ignore[union-attr]
-        raise

@@ -1,4 +1,4 @@
-// The line between the maps, on the left, and the lanes, on the right: dragged, or moved by the arrow keys.
+// Where the parts of the page are: the line between the maps, on the left, and the lanes, on the right; what a narrow page has where.
 
 import { part } from "./dom.js";
 
@@ -45,4 +45,23 @@ export class Divider {
     this.views.style.setProperty("--share", `${share}%`);
     this.line.setAttribute("aria-valuenow", share);
   }
+}
+
+/** A narrow page has only what must stay in sight in its header and footer, so that these stay low. */
+export function arrangeForWidth() {
+  const narrow = matchMedia("(max-width: 860px)");
+  const arrange = () => {
+    if (narrow.matches) {
+      part("opening", HTMLElement).append(part("files", HTMLElement), part("speed", HTMLElement));
+      part("strip-place", HTMLElement).append(part("strip", HTMLElement));
+      part("aside", HTMLElement).prepend(part("counters", HTMLElement));
+    } else {
+      part("clock-place", HTMLElement).before(part("strip", HTMLElement));
+      part("corner", HTMLElement).before(part("counters", HTMLElement));
+      part("record", HTMLElement).after(part("files", HTMLElement));
+      part("step-on", HTMLElement).after(part("speed", HTMLElement));
+    }
+  };
+  narrow.addEventListener("change", arrange);
+  arrange();
 }

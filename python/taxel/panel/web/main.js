@@ -9,7 +9,7 @@ import { make, part, write } from "./dom.js";
 import { showKeys } from "./keys.js";
 import { Labels } from "./labels.js";
 import { Lanes } from "./lanes.js";
-import { Divider } from "./layout.js";
+import { arrangeForWidth, Divider } from "./layout.js";
 import { Maps } from "./maps.js";
 import { Mistakes } from "./mistakes.js";
 import { Notes } from "./notes.js";
@@ -569,23 +569,7 @@ part("trials", HTMLSelectElement).onchange = ({ target }) => {
   if (opened) ask(opened.name, value);
 };
 
-// A narrow page has only what must stay in sight in its header and footer, so that these stay low.
-const narrow = matchMedia("(max-width: 860px)");
-const arrange = () => {
-  if (narrow.matches) {
-    part("opening", HTMLElement).append(part("files", HTMLElement), part("speed", HTMLElement));
-    part("strip-place", HTMLElement).append(part("strip", HTMLElement));
-    part("aside", HTMLElement).prepend(part("counters", HTMLElement));
-  } else {
-    part("clock-place", HTMLElement).before(part("strip", HTMLElement));
-    part("corner", HTMLElement).before(part("counters", HTMLElement));
-    part("record", HTMLElement).after(part("files", HTMLElement));
-    part("step-on", HTMLElement).after(part("speed", HTMLElement));
-  }
-};
-narrow.addEventListener("change", arrange);
-arrange();
-
+arrangeForWidth();
 showKeys();
 showTab("board");
 labels.show();
