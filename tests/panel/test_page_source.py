@@ -87,6 +87,8 @@ def test_a_plug_that_is_pulled_while_recording_is_said_and_is_in_the_verdict(chr
             shows(page, "state-word", "^Live$")
             page.locator("#record").click()
             shows(page, "state-word", r"^Recording trial1\.mcap$")
+            begun = (tmp_path / "trial1.mcap").stat().st_size
+            until(lambda: (tmp_path / "trial1.mcap").stat().st_size > begun + 500, "lines are in the recording")
         shows(
             page,
             "silence-text",
