@@ -73,7 +73,7 @@ def training_data(examples: Sequence[Example], scored: Score, board: Mapping[str
     board : mapping, optional
         The registers of the board that sent them, as `taxel.detect.board.summary` returns them.
     """
-    noise_floor = floor_of(examples)
+    noise_floor = max(floor_of(examples), 0.0 if board is None else float(board["noise_floor"]))
     return {
         "noise_floor": noise_floor,
         "error_ms": error_ms(scored),

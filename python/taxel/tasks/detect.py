@@ -18,7 +18,7 @@ from taxel._base.parallel import Workers
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, PlainRule, Readout, Score, drift, recipes, score
-from taxel.detect.board import differences
+from taxel.detect.board import differences, noise_floor
 from taxel.detect.clock import off_detections
 from taxel.detect.detector import detector
 from taxel.detect.examples import check_examples, unreliable
@@ -238,7 +238,8 @@ def detect(
         if together is not None and together.events and many_wrong(together):
             data = readout._parts.get("training") or {}
             sound = check_examples([outcome.example for outcome in scored])
-            drifted = drift.lines(data, drift.of_loads(sound, data.get("noise_floor", 0.0)))
+            floors = [data.get("noise_floor", 0.0), *(noise_floor(outcome.example.source) for outcome in scored)]
+            drifted = drift.lines(data, drift.of_loads(sound, max(floors)))
             for line in (off_detections(scored, data.get("error_ms", {})) + drifted)[:_LINES]:
                 warn(line, stacklevel=2)
     unknown = sorted({label for labels_of in events for label in labels_of} - set(readout.labels))
