@@ -718,6 +718,7 @@ class ConeRFit:
     rows: Final[int]
     unreachable: Final[list[tuple[int, int]]]
     refires: Final[int]
+    fired: Final[tuple[int, int]]
     multipliers: Final[tuple[NDArray[np.int64], NDArray[np.float64]]]
     proof: Final[_Proof]
     raised: Final[BaseException | None]

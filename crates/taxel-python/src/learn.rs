@@ -45,6 +45,7 @@ pub struct ConeRFitOut {
     rows: usize,
     unreachable: Vec<(usize, usize)>,
     refires: usize,
+    fired: (usize, usize),
     /// For a start: rows, and a share each.
     multipliers: (Column<i64>, Column<f64>),
     /// The multipliers that prove the gap.
@@ -176,7 +177,7 @@ fn to_start<'a>((weights, multipliers): &'a StartIn<'_>) -> PyResult<(&'a [f64],
 }
 
 fn fit_out(py: Python<'_>, found: ConeRFit, raised: Option<Py<PyAny>>) -> ConeRFitOut {
-    let ConeRFit { fit, rows, multipliers, proof, unreachable, refires } = found;
+    let ConeRFit { fit, rows, multipliers, proof, unreachable, refires, fired } = found;
     let Fit { status, weights, objective, parts, gap, rounds, engine } = fit;
     let numbers = multipliers.rows.iter().map(|&row| row as i64).collect();
     ConeRFitOut {
@@ -190,6 +191,7 @@ fn fit_out(py: Python<'_>, found: ConeRFit, raised: Option<Py<PyAny>>) -> ConeRF
         rows,
         unreachable,
         refires,
+        fired,
         multipliers: (column(py, numbers), column(py, multipliers.values)),
         proof: proof_out(py, proof),
         raised,

@@ -18,7 +18,7 @@ from taxel.spikes import SpikeTrains
 #: How a fit ended, of all learners; the page on errors has the table.
 Status = Literal["solved", "feasible", "infeasible", "stopped", "assigned"]
 #: What a fit says of its weights. It does not hold of others; a certificate and multipliers are of the problem.
-_OF_WEIGHTS = ("objective_", "parts_", "gap_", "violation_", "margin_", "reason_")
+_OF_WEIGHTS = ("objective_", "parts_", "gap_", "violation_", "margin_", "reason_", "fired_")
 
 
 _DEFAULT = defaults("matching")
@@ -37,18 +37,16 @@ class Learner(Parameters):
                 fit.pop(of_weights, None)
 
     def __repr__(self) -> str:
-        """Return the parameters, and of a fit with a proven gap how it ended."""
+        """Return the parameters, of a fit with a proven gap how it ended, and how many targets fire."""
         parameters, fit = super().__repr__(), vars(self)
         if "gap_" not in fit:
             return parameters
         # The gap says nothing about weights that miss rows.
         if fit["status_"] == "stopped" and "violation_" in fit:
             return f"<{parameters}: stopped, violation_ {fit['violation_']:.1e} mV>"
-        return (
-            f"<{parameters}: {fit['status_']}"
-            + f", gap_ {fit['gap_']:.1e}" * bool(fit["status_"] != "infeasible")
-            + ">"
-        )
+        gap = f", gap_ {fit['gap_']:.1e}" * (fit["status_"] != "infeasible")
+        fired = "{} of {} targets fire".format(*fit["fired_"]) if "fired_" in fit else ""
+        return f"<{parameters}: {fit['status_']}{gap}{fired and f', {fired}'}>"
 
     def _fitted(self) -> NDArray[float64]:
         """Return the weights; raise NotFittedError before `fit`."""

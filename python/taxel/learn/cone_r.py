@@ -101,6 +101,8 @@ class ConeR(SpikeLearner):
         Targets at which no weights within the bounds reach the threshold; the other targets are fitted.
     refires_ : int
         Output spikes on the training patterns within `tau` of another output spike, with no target between.
+    fired_ : (int, int)
+        How many targets of the training patterns an output spike is paired with, as in `score`, and how many there are.
     neuron_ : Neuron
         The trained neuron: a copy with ``time="grid"``.
 
@@ -160,6 +162,7 @@ class ConeR(SpikeLearner):
     silent_rows_: int = field(init=False)
     unreachable_: list[tuple[int, int]] = field(init=False)
     refires_: int = field(init=False)
+    fired_: tuple[int, int] = field(init=False)
     neuron_: Neuron = field(init=False)
     #: What a start's multipliers belong to (the number of rows, `sides_c`), and these, as shares of their range.
     _multipliers: tuple[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.float64]]] = field(init=False)
@@ -415,7 +418,7 @@ def _keep(
 ) -> None:
     """Set the results of a fit on the learner, those of trains `for_all`; raise what ended the fit."""
     cone.weights_ = for_all(fit.weights)
-    for name in ("objective", "gap", "status", "engine", "rounds", "rows", "unreachable", "refires"):
+    for name in ("objective", "gap", "status", "engine", "rounds", "rows", "unreachable", "refires", "fired"):
         setattr(cone, f"{name}_", getattr(fit, name))
     cone.parts_ = dict(zip(("l1", "l2", "B", "C", "D"), fit.parts, strict=True))
     of_rows, of_behind, pull = fit.proof

@@ -56,7 +56,7 @@ class OnlineConeR(ConeR):
     weights_, objective_, parts_, gap_, multipliers_, status_, engine_, rounds_, rows_, silent_rows_, unreachable_,
     neuron_
         Results of the last fit, as in `ConeR`; patterns are counted from the oldest in the window.
-    refires_ : int
+    refires_, fired_ : int, (int, int)
         As in `ConeR`, for the newest pattern only.
 
     Raises

@@ -10,10 +10,13 @@ const MOST_PAIRS: usize = 200_000_000;
 /// The largest distance between a spike and its target, at most an hour.
 const WINDOW: Parameter = Parameter { name: "window_ms", unit: "ms", range: Range::within(0.0, 3_600_000.0) };
 
-/// The parameters of the matching of spikes to targets; 50 ms as in 6.5.2.
+/// The largest distance between a spike and its target where none is given, ms, as in 6.5.2.
+pub const WINDOW_MS: f64 = 50.0;
+
+/// The parameters of the matching of spikes to targets.
 #[must_use]
 pub fn described() -> Described {
-    Described::by(&serde_json::json!({}), &[], &[]).with(WINDOW, 50.0)
+    Described::by(&serde_json::json!({}), &[], &[]).with(WINDOW, WINDOW_MS)
 }
 
 /// Pairs the spikes of a pattern with its targets (ms), at a resolution of 1 ns: `(spike, target)`, ascending.

@@ -9,6 +9,7 @@ use crate::learn::statement::{
     Bound, Choice, Divisor, DivisorC, DivisorD, Margin, Norm, Objective, Relaxed, RelaxedProof, Row, Sides, Statement,
     bounds_of, check_bounds, check_examples, check_silence, check_trains, end_of,
 };
+use crate::metrics::matching::{WINDOW_MS, match_spikes};
 use crate::neuron::{Neuron, Time};
 use crate::parameters::parameters;
 use crate::{Result, SpikeTrains, Stop, problem};
@@ -138,6 +139,8 @@ pub struct ConeRFit {
     pub unreachable: Vec<(usize, usize)>,
     /// Output spikes on the training patterns that follow a previous one within `tau` without a target in between.
     pub refires: usize,
+    /// Targets that an output spike is paired with, as in a score, and all targets, of the training patterns.
+    pub fired: (usize, usize),
 }
 
 /// What is asked of a pattern.
@@ -332,12 +335,14 @@ impl ConeRProblem {
             progress(Round { round, rows: found.rows, objective: found.objective, left });
         }
         let weights: Vec<f64> = found.weights.iter().map(|w| w * unit).collect();
+        let (refires, fired) = self.firing(&weights, pattern)?;
         let kept = || found.shares.iter().enumerate().filter(|s| *s.1 != 0.0);
         Ok(ConeRFit {
             rows: found.rows,
             multipliers: Shares { rows: kept().map(|s| s.0).collect(), values: kept().map(|s| *s.1).collect() },
             unreachable: self.unreachable(&objective),
-            refires: self.refires(&weights, pattern)?,
+            refires,
+            fired,
             proof: self.name_rows(found.proof),
             fit: Fit {
                 status: if found.gap <= parameters.tolerance { Status::Solved } else { Status::Stopped },
@@ -414,15 +419,20 @@ impl ConeRProblem {
         names.filter(|(_, row)| objective.bounds.range(row.at).1 < row.threshold).map(|(name, _)| *name).collect()
     }
 
-    fn refires(&self, weights: &[f64], only: Option<usize>) -> Result<usize> {
-        let mut refires = 0;
+    /// How often the trained neuron fires again without a target, and at how many of how many targets it fires; of one
+    /// pattern alone if it is named.
+    fn firing(&self, weights: &[f64], only: Option<usize>) -> Result<(usize, (usize, usize))> {
+        let (mut refires, mut fired, mut wanted) = (0, 0, 0);
         let neuron = self.base.neuron.in_units(1.0 / self.statement.unit);
         for (p, pattern) in self.patterns.iter().enumerate().filter(|(p, _)| only.is_none_or(|pattern| pattern == *p)) {
             let spikes = neuron.run(weights, pattern, 1.0, Stop::never())?;
             let targets = &self.statement.examples[p].targets;
             let again = |a: f64, b: f64| b - a <= neuron.tau && !targets.iter().any(|&t| a < t && t <= b);
             refires += spikes.windows(2).filter(|w| again(w[0].t, w[1].t)).count();
+            let times: Vec<f64> = spikes.iter().map(|spike| spike.t).collect();
+            fired += match_spikes(("spikes", &times), ("targets", targets), WINDOW_MS, Stop::never())?.len();
+            wanted += targets.len();
         }
-        Ok(refires)
+        Ok((refires, (fired, wanted)))
     }
 }
