@@ -183,8 +183,12 @@ def test_a_csv_from_other_programs_is_read_as_it_comes(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_bytes(b"\xef\xbb\xbft_us, x, y, p\r\n0, 1, 2, 1\r\n100, 3, 4, 0\r\n\r\n")
     assert taxel.open(path).events.t.tolist() == [0, 100]
-    path.write_bytes(b"t_us,left,right\n0,1,2\n10,3,4\n")
-    assert taxel.open(path).frames().values.tolist() == [[[1, 2]], [[3, 4]]]
+    # A table of others may call its time so too: what its columns are is asked of their names.
+    path.write_bytes(b"t_us,left,slipped,right\n0,1,0,2\n10,3,1,4\n")
+    recording = taxel.open(path)
+    assert (recording.kind, recording.array.names) == ("table", ("left", "right"))
+    assert recording.frames().values.tolist() == [[[1, 2]], [[3, 4]]]
+    assert recording.frames().t.tolist() == [0, 10]
     assert taxel.open(path, array=taxel.Array(2, 1)).frames().values.tolist() == [[[1], [2]], [[3], [4]]]
     path.write_bytes(b"t_us,x,y,p\n")
     assert len(taxel.open(path).events) == 0

@@ -153,7 +153,8 @@ def page(app: cyclopts.App, path: str) -> list[str]:
     width = min(WIDTH, shutil.get_terminal_size().columns)
     each = rows(app)
     arguments, options = ([row for row in each if row.is_argument is kind] for kind in (True, False))
-    usage = [*["[OPTIONS]"] * bool(options), *(row.names[0] for row in arguments)]
+    named = (row.names[0] if row.is_required else f"[{row.names[0]}]" for row in arguments)
+    usage = [*["[OPTIONS]"] * bool(options), *named]
     lines = [" ".join(["Usage:", path, *usage, *["COMMAND"] * bool(own_commands(app))])]
     for part in about(app):
         example = part.startswith("Example: ")

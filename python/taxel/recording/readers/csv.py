@@ -1,8 +1,8 @@
 """Reads tables of text: a .csv of events or of frames.
 
 A .csv has either the columns ``t_us,x,y,p[,intensity][,repaired]`` (an empty intensity is an absent one), or ``t_us``
-and a column a taxel, named ``x3y5``, or, of channels, as they are called. A spreadsheet may have saved it: with
-semicolons or tabs, then with decimal commas too, and in UTF-16.
+and a column a taxel, named ``x3y5``. A spreadsheet may have saved it: with semicolons or tabs, then with decimal commas
+too, and in UTF-16. A table with other columns behind ``t_us`` is one of another program.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -28,7 +27,6 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import around
-from taxel.formats.layout import advice
 from taxel.formats.table_text import Text, beginning
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory
@@ -37,6 +35,7 @@ from taxel.reading import Facts, InMemory
 EVENTS = ("t_us", "x", "y", "p")
 MORE = ("intensity", "repaired")
 _TAXEL = re.compile(r"x([0-9]{1,5})y([0-9]{1,5})")
+_OURS = re.compile(r" *t_us *[,;\t] *(?:x *[,;\t] *y *[,;\t] *p *(?:[,;\t\r\n]|$)|x\d{1,5}y\d{1,5} *(?:[,;\t\r\n]|$))")
 #: Columns of events: the least and the largest number in the file, and the type in memory.
 _LIMITS: dict[str, tuple[int, int, type[Any]]] = {
     "t_us": (-(1 << 62), 1 << 62, np.int64),
@@ -87,11 +86,11 @@ def names_in(line: str) -> tuple[list[str], str]:
 
 
 def is_of_taxel(path: Path) -> bool:
-    """Return whether the first line of a .csv begins as taxel's own recordings do."""
+    """Return whether the first line of a .csv begins as taxel's own recordings do: t_us,x,y,p or t_us,x0y0."""
     head = beginning(path, 64)
     is_utf_16 = head.startswith((b"\xff\xfe", b"\xfe\xff"))
     text = head[: len(head) // 2 * 2].decode("utf-16", "ignore") if is_utf_16 else head.decode("utf-8-sig", "ignore")
-    return re.match(r" *t_us *[,;\t]", text) is not None
+    return _OURS.match(text) is not None
 
 
 def _head(path: Path, text: Text) -> tuple[list[str], str]:
@@ -100,9 +99,6 @@ def _head(path: Path, text: Text) -> tuple[list[str], str]:
     names, separator = names_in(line)
     if len(names) > COLUMNS:
         raise unreadable(f"{len(names)} columns; must have at most {COLUMNS}", path, line=1)
-    if names[0] != "t_us" or len(names) < 2:
-        right = "must be t_us,x,y,p[,intensity][,repaired], or t_us and a column for each taxel"
-        raise unreadable(f"{line[:40]!r}: {right}; {advice(path, 'describe a table of another program')}", path, line=1)
     if tuple(names[:4]) == EVENTS and names[4:] != [name for name in MORE if name in names[4:]]:
         more = shown(",".join(names[4:]))
         raise unreadable(f"{more} after p: only intensity and repaired may follow", path, line=1)
@@ -176,34 +172,28 @@ def _events(text: Text, names: Sequence[str], separator: str, array: Array | Non
     return Events(t, x, y, p, array=array or around(x, y), **columns)
 
 
-def sensor_of(x: NDArray[np.int64], y: NDArray[np.int64], names: Sequence[str] | None = None) -> Array:
+def sensor_of(x: NDArray[np.int64], y: NDArray[np.int64]) -> Array:
     """Return the sensor whose taxels are these columns and rows."""
     exists = np.zeros((int(y.max()) + 1, int(x.max()) + 1), bool)
     exists[y, x] = True
-    return Array(*exists.shape, exists=None if exists.all() else exists, names=names)
+    return Array(*exists.shape, exists=None if exists.all() else exists)
 
 
-def _places(path: Path, names: Sequence[str], array: Array | None) -> tuple[list[tuple[int, int]], list[str] | None]:
-    """Return column and row of each taxel, and their names where those do not say them."""
+def _places(path: Path, names: Sequence[str], array: Array | None) -> list[tuple[int, int]]:
+    """Return column and row of each taxel."""
     matches = [_TAXEL.fullmatch(name) for name in names]
-    if all(matches):
-        places = [(int(m[1]), int(m[2])) for m in matches if m is not None]
-        if array is not None and array.rows > 1 and places == [(k, 0) for k in range(array.rows * array.columns)]:
-            # A row of as many channels.
-            places = [(k % array.columns, k // array.columns) for k in range(len(places))]
-        return places, None
-    if any(matches):
+    if not all(matches):
         odd = names[matches.index(None)]
         raise unreadable(f"column {shown(odd)} must be named like x3y5, as the other taxels are", path, line=1)
-    rows, columns = (1, len(names)) if array is None else array.shape
-    if rows * columns != len(names):
-        right = f"must have {rows * columns}, for {rows} x {columns} taxels"
-        raise unreadable(f"{counted(len(names), 'column')} for taxels; {right}", path, line=1)
-    return [(k % columns, k // columns) for k in range(len(names))], list(names)
+    places = [(int(m[1]), int(m[2])) for m in matches if m is not None]
+    if array is not None and array.rows > 1 and places == [(k, 0) for k in range(array.rows * array.columns)]:
+        # A row of as many channels.
+        places = [(k % array.columns, k // array.columns) for k in range(len(places))]
+    return places
 
 
 def _frames(text: Text, names: Sequence[str], separator: str, array: Array | None) -> Frames:
-    path, (places, called) = text.path, _places(text.path, names[1:], array)
+    path, places = text.path, _places(text.path, names[1:], array)
     x, y = np.array(places).T
     rows, columns = (int(y.max()) + 1, int(x.max()) + 1) if array is None else array.shape
     if array is None and rows * columns > min(TAXELS, max(1 << 16, 16 * len(places))):
@@ -212,7 +202,7 @@ def _frames(text: Text, names: Sequence[str], separator: str, array: Array | Non
     if x.max() >= columns or y.max() >= rows:
         k = int(np.flatnonzero((x >= columns) | (y >= rows))[0])
         raise unreadable(f"column {names[k + 1]!r} is outside {rows} x {columns} taxels", path, line=1)
-    sensor = sensor_of(x, y, called) if array is None else array if called is None else replace(array, names=called)
+    sensor = sensor_of(x, y) if array is None else array
     times, values = list[NDArray[np.int64]](), list[NDArray[np.float32]]()
     for block in _blocks(text, names, separator, np.float64):
         if (np.abs(block[:, 1:]) > VALUE).any() or (block[:, 0] % 1 != 0).any():
