@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -32,12 +33,14 @@ from taxel.formats.table_text import SHEETS, TEXTS, Text
 from taxel.formats.times import FEW_ODD, ISO, ODD, in_order, us_of
 from taxel.frames import Frames
 
-__all__ = ["ENDINGS", "Opened", "read_table"]
+__all__ = ["ENDINGS", "Opened", "Rows", "events_of", "read_rows", "read_table"]
 
 ENDINGS = (*TEXTS, *SHEETS)
 #: Cells that pandas converts at once.
 _CELLS = 1 << 22
 _NUMBER = re.compile(r"[-+]?\d+(?:[.,]\d+)?")
+#: The least and the largest value of the columns of events.
+_EVENTS = {"x": (0, 65_534), "y": (0, 65_534), "p": (-1, 1), "intensity": (0, 65_535), "repaired": (0, 1)}
 
 
 @dataclass(frozen=True)
@@ -56,8 +59,8 @@ class _Columns:
 
 
 @dataclass(eq=False)
-class _Rows:
-    """Hold the rows of a table as they are read."""
+class Rows:
+    """Hold the rows of a table as they are read: the values of the columns that are taxels, and the others' cells."""
 
     values: NDArray[np.float32]
     #: A Series of cells, or the times in the lines above frames; None without.
@@ -70,9 +73,17 @@ class _Rows:
     frame_times: list[float] = field(default_factory=list)
     odd: OddLines = field(default_factory=OddLines)
 
-    def line(self, row: int, columns: _Columns) -> int:
+    @classmethod
+    def none(cls, width: int) -> Rows:
+        """Return no rows of so many values."""
+        import pandas as pd  # noqa: PLC0415  takes long
+
+        return cls(np.empty((0, width), np.float32), pd.Series(dtype=np.int64))
+
+    def line(self, row: int, path: Path, form: Form) -> int:
         """Return the number of the line of a row, from 1."""
-        return self.numbers[row] if self.numbers else columns.form.first + 1 + row
+        below = ((n, line) for n, line in enumerate(Text(path).lines(), 1) if n > form.first and line.strip())
+        return self.numbers[row] if self.numbers else next(islice(below, row, None))[0]
 
     def chosen(self, rows: NDArray[np.intp]) -> None:
         """Take only these rows' times, labels and keys."""
@@ -104,13 +115,12 @@ def read_table(path: Path, layout: Layout, array: Array | None = None, label_col
     full, how = form.layout, form.layout.table or Table()
     columns = _columns(path, form, how)
     rows = _read(text, columns, how)
-    _refuse_odd(path, rows)
     read = {columns.time, columns.label, columns.by, *columns.taxels}
     left = [columns.called(k) for k in range(len(form.names)) if k not in read]
     lost = [*([f"columns that are not taxels: {', '.join(left)}"] if left else []), *rows.odd.said()]
     said = [*form.said, *rows.odd.said()]
     if how.events:
-        sources: dict[str, Frames | Events] = {"": _events(path, full, how, columns, rows, array)}
+        sources: dict[str, Frames | Events] = {"": _events(path, full, columns, rows, array)}
         labels: tuple[tuple[str, int], ...] = ()
     else:
         values = _frames_of_lines(path, full, how, rows, said)
@@ -176,12 +186,30 @@ def _column(path: Path, key: str, column: str | int, names: Sequence[str]) -> in
     return names.index(column)
 
 
-def _read(text: Text, columns: _Columns, how: Table) -> _Rows:
+def read_rows(text: Text, form: Form, *, ends_empty: bool = False) -> Rows:
+    """Read all rows of a table whose layout is complete; lines that are none are left out and counted.
+
+    Parameters
+    ----------
+    text : Text
+    form : Form
+    ends_empty : bool
+        Whether the last cell of a line may be empty, which else looks like a line with too few cells.
+
+    Raises
+    ------
+    FormatError : more of them than may be left out, or no line of numbers
+    """
+    how = form.layout.table or Table()
+    return _read(text, _columns(text.path, form, how), how, ends_empty=ends_empty)
+
+
+def _read(text: Text, columns: _Columns, how: Table, *, ends_empty: bool = False) -> Rows:
     """Read all rows: at once by pandas, or, where a line is odd or has marks, after each line was looked at."""
     fits = how.lines == "plain" and how.frame_end is None and how.frame_begin is None
-    if fits and (rows := _at_once(text, columns, how)) is not None:
+    if fits and (rows := _at_once(text, columns, how, ends_empty)) is not None:
         return rows
-    kept, source = _Rows(np.empty((0, 0), np.float32)), io.StringIO()
+    kept, source = Rows(np.empty((0, 0), np.float32)), io.StringIO()
     for number, cells in _good_lines(text, columns, how, kept):
         source.write("\t".join(cells) + "\n")
         kept.numbers.append(number)
@@ -195,16 +223,18 @@ def _read(text: Text, columns: _Columns, how: Table) -> _Rows:
         row, column = large[0].tolist()
         name = columns.called(columns.taxels[column])
         raise unreadable(f"column {name} has a value that does not fit 32 bits", text.path, line=kept.numbers[row])
-    return replace(kept, values=rows.values, times=rows.times, labels=rows.labels, keys=rows.keys)
+    found = replace(kept, values=rows.values, times=rows.times, labels=rows.labels, keys=rows.keys)
+    _refuse_odd(text.path, found)
+    return found
 
 
-def _at_once(text: Text, columns: _Columns, how: Table) -> _Rows | None:
+def _at_once(text: Text, columns: _Columns, how: Table, ends_empty: bool) -> Rows | None:
     """Return the rows of a table; None if a line may be odd."""
-    sep = r"\s+" if how.separator == " " else how.separator
+    options = {"sep": r"\s+" if how.separator == " " else how.separator, "skiprows": columns.form.first}
     for _ in range(2):
-        options = {"encoding": text.encoding} if text.is_file else {}
+        encoding = {"encoding": text.encoding} if text.is_file else {}
         try:
-            return _parsed(text.source, columns, how, sep=sep, skiprows=columns.form.first, whole=True, **options)
+            return _parsed(text.source, columns, how, whole=True, ends_empty=ends_empty, **options, **encoding)
         except UnicodeDecodeError:
             text.as_latin_1()
         except (ValueError, OverflowError):  # of pandas' parser too
@@ -216,7 +246,9 @@ class _OddError(ValueError):
     """A line may be odd."""
 
 
-def _parsed(source: Any, columns: _Columns, how: Table, *, whole: bool = False, **options: Any) -> _Rows:
+def _parsed(
+    source: Any, columns: _Columns, how: Table, *, whole: bool = False, ends_empty: bool = False, **options: Any
+) -> Rows:
     """Return what pandas reads; if the text is `whole`, a line may have another number of cells, which is refused."""
     import pandas as pd  # noqa: PLC0415  takes long
 
@@ -225,6 +257,11 @@ def _parsed(source: Any, columns: _Columns, how: Table, *, whole: bool = False, 
     times = [] if columns.time is None else [columns.time]
     # Kinds of numbers that are stated, not found, take pandas half as long again.
     kinds: dict[int, Any] = dict.fromkeys([*texts, *(times if how.time_unit == ISO else [])], str)
+    missing = [*MISSING, *([] if how.missing is None else [how.missing])]
+    cells = dict.fromkeys(range(count + 1), missing)
+    if whole and not ends_empty:
+        # A cell that is not there is as an empty one to pandas, which then is no number.
+        cells[count - 1] = [cell for cell in missing if cell]
     places: Any = slice(taxels[0], taxels[-1] + 1) if taxels[-1] - taxels[0] + 1 == len(taxels) else taxels
     chunks = pd.read_csv(
         source,
@@ -233,7 +270,7 @@ def _parsed(source: Any, columns: _Columns, how: Table, *, whole: bool = False, 
         index_col=False,
         dtype=kinds,
         decimal=how.decimal,
-        na_values=[*MISSING, *([] if how.missing is None else [how.missing])],
+        na_values=cells,
         keep_default_na=False,
         skipinitialspace=True,
         # An empty line may not be within a frame of so many lines.
@@ -247,7 +284,7 @@ def _parsed(source: Any, columns: _Columns, how: Table, *, whole: bool = False, 
     with chunks, np.errstate(over="ignore"):
         for chunk in chunks:
             part = chunk.iloc[:, places]
-            is_odd = whole and bool(chunk[count].notna().any() or chunk[count - 1].isna().any())
+            is_odd = whole and bool(chunk[count].notna().any() or (chunk[count - 1] == "").any())
             if is_odd or any(kind.kind not in "iuf" for kind in part.dtypes):
                 raise _OddError
             block = part.to_numpy(np.float32)
@@ -263,10 +300,10 @@ def _parsed(source: Any, columns: _Columns, how: Table, *, whole: bool = False, 
     series = pd.concat(stamps, ignore_index=True) if stamps else None
     if whole and series is not None and how.time_unit != ISO and series.dtype.kind not in "iuf":
         raise _OddError
-    return _Rows(together, series, labels, keys)
+    return Rows(together, series, labels, keys)
 
 
-def _good_lines(text: Text, columns: _Columns, how: Table, kept: _Rows) -> Iterator[tuple[int, Sequence[str]]]:
+def _good_lines(text: Text, columns: _Columns, how: Table, kept: Rows) -> Iterator[tuple[int, Sequence[str]]]:
     """Yield the number and the cells of each line that is not odd; count the others, and note where frames begin."""
     form, times = columns.form, frozenset((columns.time,) if how.time_unit == ISO and columns.time is not None else ())
     has_own_names = how.lines in ("marked", "json") and form.is_named and not how.columns
@@ -307,7 +344,7 @@ def _good_lines(text: Text, columns: _Columns, how: Table, kept: _Rows) -> Itera
         kept.odd.rename_last("with too few cells", "cut off at the end", last)
 
 
-def _refuse_odd(path: Path, rows: _Rows) -> None:
+def _refuse_odd(path: Path, rows: Rows) -> None:
     """Refuse a table of which more lines are odd than may be left out."""
     total = len(rows.values) + rows.odd.total
     if rows.odd.total > max(FEW_ODD, ODD * total) or rows.odd.total >= max(1, len(rows.values)):
@@ -316,7 +353,7 @@ def _refuse_odd(path: Path, rows: _Rows) -> None:
         raise unreadable(f"{rows.odd.total} of {total} lines are no frames: {kinds}", path, line=first)
 
 
-def _frames_of_lines(path: Path, layout: Layout, how: Table, rows: _Rows, said: list[str]) -> NDArray[np.float32]:
+def _frames_of_lines(path: Path, layout: Layout, how: Table, rows: Rows, said: list[str]) -> NDArray[np.float32]:
     """Return values of shape (frames, lines, columns); of the rows, times, keys and labels of frames stay."""
     width, count = rows.values.shape[1], len(rows.values)
     if not how.has_lines:
@@ -384,28 +421,58 @@ def _labels(columns: _Columns, cells: list[str], t: NDArray[np.int64]) -> tuple[
     return tuple((f"{name} {cells[k]}" if is_number(cells[k]) else cells[k], int(t[k])) for k in changes)
 
 
-def _events(path: Path, layout: Layout, how: Table, columns: _Columns, rows: _Rows, array: Array | None) -> Events:
+def _events(path: Path, layout: Layout, columns: _Columns, rows: Rows, array: Array | None) -> Events:
     """Return the events of a table with a line each."""
     names = [columns.form.names[k].lower() for k in columns.taxels]
-    by_name = {EVENT_COLUMNS.get(name, name): rows.values[:, k] for k, name in enumerate(names)}
-    if sorted(by_name) != ["p", "x", "y"]:
+    names = [EVENT_COLUMNS.get(name, name) for name in names]
+    if sorted(names) != ["p", "x", "y"]:
         raise unreadable(f"the columns other than the time are {', '.join(names)}; must be x, y, p for events", path)
-    for name, least, most in (("x", 0, 65_534), ("y", 0, 65_534), ("p", -1, 1)):
-        column = by_name[name]
-        wrong = np.flatnonzero((column != np.rint(column)) | ~((column >= least) & (column <= most)))
-        if len(wrong):
-            right = "0 or 1, or -1 or 1" if name == "p" else f"a whole number from 0 to {most}"
-            line = rows.line(int(wrong[0]), columns)
-            raise unreadable(f"{name} is {column[wrong[0]]:g}; must be {right}", path, line=line)
-    # Events may have the same time.
-    us = us_of(rows.times, how.time_unit)
-    back = np.flatnonzero(~(np.diff(us, prepend=us[:1]) >= 0))
-    if len(back):
-        line = rows.line(int(back[0]), columns)
-        raise unreadable("the time is before that of the line above, or is none", path, line=line)
-    x, y = by_name["x"].astype(np.uint16), by_name["y"].astype(np.uint16)
     try:
-        sensor = (array or around(x, y)) if layout.rows is None else layout.array(1)
-        return Events(us.astype(np.int64), x, y, by_name["p"] > 0, array=sensor)
+        sensor = array if layout.rows is None else layout.array(1)
+        return events_of(path, columns.form, names, rows, sensor)
     except ProblemError as error:
         raise FormatError(f"{layout.path}: {path.name}: {first_line(error)}") from None
+
+
+def events_of(
+    path: Path, form: Form, names: Sequence[str], rows: Rows, array: Array | None, *, ascending: bool = True
+) -> Events:
+    """Return the events of a table with a line each; several may have the same time.
+
+    Parameters
+    ----------
+    path : Path
+    form : Form
+    names : sequence of str
+        Of the columns but the time: x, y, p, and perhaps intensity and repaired.
+    rows : Rows
+    array : Array, optional
+        Default: one large enough.
+    ascending : bool
+        Whether a time that is before that of the line above is refused.
+
+    Raises
+    ------
+    FormatError : a value that no event has (names the line)
+    ProblemError : events outside the array
+    """
+    by_name = dict(zip(names, rows.values.T, strict=True))
+    present = ~np.isnan(by_name["intensity"]) if "intensity" in by_name else None
+    for name, column in by_name.items():
+        least, most = _EVENTS[name]
+        wrong = (column != np.rint(column)) | ~((column >= least) & (column <= most))
+        wrong = np.flatnonzero(wrong & present if name == "intensity" and present is not None else wrong)
+        if len(wrong):
+            right = "0 or 1, or -1 or 1" if name == "p" else f"a whole number from {least} to {most}"
+            line = rows.line(int(wrong[0]), path, form)
+            raise unreadable(f"{name} is {column[wrong[0]]:g}; must be {right}", path, line=line)
+    us = us_of(rows.times, (form.layout.table or Table()).time_unit)
+    back = np.flatnonzero(~(np.diff(us, prepend=us[:1]) >= 0) if ascending else np.isnan(us))
+    if len(back):
+        line = rows.line(int(back[0]), path, form)
+        raise unreadable("the time is before that of the line above, or is none", path, line=line)
+    x, y = by_name["x"].astype(np.uint16), by_name["y"].astype(np.uint16)
+    more: dict[str, Any] = {"repaired": by_name["repaired"] > 0} if "repaired" in by_name else {}
+    if present is not None:
+        more |= {"intensity": np.nan_to_num(by_name["intensity"]).astype(np.uint16), "present": present}
+    return Events(us.astype(np.int64), x, y, by_name["p"] > 0, array=array or around(x, y), **more)

@@ -1,4 +1,4 @@
-"""Reads tables of text: a .csv of events or of frames.
+"""Reads tables of text that taxel wrote: a .csv of events or of frames.
 
 A .csv has either the columns ``t_us,x,y,p[,intensity][,repaired]`` (an empty intensity is an absent one), or ``t_us``
 and a column a taxel, named ``x3y5``. A spreadsheet may have saved it: with semicolons or tabs, then with decimal commas
@@ -7,13 +7,10 @@ too, and in UTF-16. A table with other columns behind ``t_us`` is one of another
 
 from __future__ import annotations
 
-import io
-import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +18,16 @@ from numpy.typing import NDArray
 from taxel._base.arguments import shown
 from taxel._base.columns import frozen_whole
 from taxel._base.errors import unreadable
-from taxel._base.limits import COLUMNS, TAXELS, VALUE
+from taxel._base.limits import COLUMNS, TAXELS
 from taxel._base.messages import counted
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats.checks import around
+from taxel.formats.layout import Layout, Table
+from taxel.formats.table import Rows, events_of, read_rows
+from taxel.formats.table_form import Form
 from taxel.formats.table_text import Text, beginning
+from taxel.formats.times import in_order
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory
 
@@ -36,23 +36,12 @@ EVENTS = ("t_us", "x", "y", "p")
 MORE = ("intensity", "repaired")
 _TAXEL = re.compile(r"x([0-9]{1,5})y([0-9]{1,5})")
 _OURS = re.compile(r" *t_us *[,;\t] *(?:x *[,;\t] *y *[,;\t] *p *(?:[,;\t\r\n]|$)|x\d{1,5}y\d{1,5} *(?:[,;\t\r\n]|$))")
-#: Columns of events: the least and the largest number in the file, and the type in memory.
-_LIMITS: dict[str, tuple[int, int, type[Any]]] = {
-    "t_us": (-(1 << 62), 1 << 62, np.int64),
-    "x": (0, 65_535, np.uint16),
-    "y": (0, 65_535, np.uint16),
-    "p": (0, 1, np.bool_),
-    "intensity": (0, 65_535, np.uint16),
-    "repaired": (0, 1, np.bool_),
-}
-#: An empty cell.
-_EMPTY = re.compile(r",[ \t]*(?=,|\n|$)")
-#: Characters of a table that are converted at once.
-_AT_ONCE = 1 << 22
 
 
 def read_csv(path: Path, array: Array | None = None) -> InMemory:
     """Read a .csv of events or of frames.
+
+    Lines that are none are left out and counted, and times of frames are repaired, as those of other tables are.
 
     Raises
     ------
@@ -60,12 +49,22 @@ def read_csv(path: Path, array: Array | None = None) -> InMemory:
     """
     text = Text(path)
     names, separator = _head(path, text)
-    read = _events if tuple(names[:4]) == EVENTS else _frames
+    is_comma = separator != "," and any("," in line for line in text.head[1:])
+    how = Table(separator=separator, decimal="," if is_comma else ".", time_column=1, time_unit="us")
+    form = Form(Layout(path, table=how), tuple(names), True, 1)
+    if any(line.strip() for line in text.head[1:]):
+        rows = read_rows(text, form, ends_empty=names[-1] == "intensity")
+    else:
+        rows = Rows.none(len(names) - 1)
+    lost = rows.odd.said()
     try:
-        table = read(text, names, separator, array)
+        if tuple(names[:4]) == EVENTS:
+            table: Events | Frames = events_of(path, form, names[1:], rows, array, ascending=False)
+        else:
+            table = _frames(path, names[1:], rows, array, lost)
     except ProblemError as error:
         raise FormatError(f"{path}: {error}") from None
-    return InMemory(Facts(path=path, array=table.array, kind="csv"), table)
+    return InMemory(Facts(path=path, array=table.array, kind="csv", lost=tuple(lost)), table)
 
 
 def check_head(path: Path) -> None:
@@ -95,8 +94,7 @@ def is_of_taxel(path: Path) -> bool:
 
 def _head(path: Path, text: Text) -> tuple[list[str], str]:
     """Return the names of the columns in the first line, and what separates the cells."""
-    line = next(iter(text.head), "")
-    names, separator = names_in(line)
+    names, separator = names_in(next(iter(text.head), ""))
     if len(names) > COLUMNS:
         raise unreadable(f"{len(names)} columns; must have at most {COLUMNS}", path, line=1)
     if tuple(names[:4]) == EVENTS and names[4:] != [name for name in MORE if name in names[4:]]:
@@ -106,70 +104,6 @@ def _head(path: Path, text: Text) -> tuple[list[str], str]:
     if repeated is not None:
         raise unreadable(f"column {shown(repeated)} appears twice", path, line=1)
     return names, separator
-
-
-def _blocks(text: Text, names: Sequence[str], separator: str, kind: type[Any]) -> Iterator[NDArray[Any]]:
-    """Yield the numbers of some lines after the others; an empty intensity is -1."""
-    for k, lines in enumerate(text.blocks(_AT_ONCE)):
-        block = lines.partition("\n")[2] if k == 0 else lines
-        if separator != ",":
-            block = block.replace(",", ".").replace(separator, ",")
-        if "intensity" in names:
-            block = _EMPTY.sub(",-1", block)
-        if not block.strip():
-            continue
-        try:
-            read = np.loadtxt(io.StringIO(block), kind, delimiter=",", comments=None, ndmin=2)
-        except (ValueError, OverflowError):
-            _refuse_line(text, names, separator)
-        if read.shape[1] != len(names):
-            _refuse_line(text, names, separator)
-        yield read
-
-
-def _refuse_line(text: Text, names: Sequence[str], separator: str) -> NoReturn:
-    """Refuse the first line below the names that is not a number for each."""
-    for number, line in enumerate(text.lines(), 1):
-        cells = [cell.strip() for cell in line.split(separator)]
-        if number == 1 or not line.strip():
-            continue
-        if len(cells) != len(names):
-            raise unreadable(f"{len(cells)} cells; must be {len(names)} numbers per line", text.path, line=number)
-        for name, cell in zip(names, cells, strict=True):
-            right = _right(name, cell if separator == "," else cell.replace(",", "."), names)
-            if right:
-                raise unreadable(f"column {name}: is {shown(cell)}; {right}", text.path, line=number)
-    raise unreadable("must be a number for each column in each line", text.path)
-
-
-def _right(name: str, cell: str, names: Sequence[str]) -> str:
-    """Return what a cell must be, "" if it is so."""
-    are_events = tuple(names[:4]) == EVENTS
-    try:
-        value = float(cell)
-    except ValueError:
-        return "" if cell == "" and are_events and name == "intensity" else "must be a number"
-    if name != "t_us" and not are_events:
-        return "" if math.isnan(value) or abs(value) <= VALUE else "must fit 32 bits"
-    low, high, _ = _LIMITS[name]
-    if value.is_integer() and low <= value <= high:
-        return ""
-    return "must be a whole number of us" if name == "t_us" else f"must be from {low} to {high}"
-
-
-def _events(text: Text, names: Sequence[str], separator: str, array: Array | None) -> Events:
-    read = np.concatenate([*_blocks(text, names, separator, np.int64), np.empty((0, len(names)), np.int64)])
-    columns: dict[str, Any] = dict(zip(names, read.T, strict=True))
-    if "intensity" in columns:
-        present = columns["intensity"] != -1
-        columns |= {"present": present, "intensity": np.where(present, columns["intensity"], 0)}
-    for name in names:
-        low, high, kind = _LIMITS[name]
-        if ((columns[name] < low) | (columns[name] > high)).any():
-            _refuse_line(text, names, separator)
-        columns[name] = columns[name].astype(kind)
-    t, x, y, p = (columns.pop(name) for name in EVENTS)
-    return Events(t, x, y, p, array=array or around(x, y), **columns)
 
 
 def sensor_of(x: NDArray[np.int64], y: NDArray[np.int64]) -> Array:
@@ -192,25 +126,21 @@ def _places(path: Path, names: Sequence[str], array: Array | None) -> list[tuple
     return places
 
 
-def _frames(text: Text, names: Sequence[str], separator: str, array: Array | None) -> Frames:
-    path, places = text.path, _places(text.path, names[1:], array)
+def _frames(path: Path, names: Sequence[str], rows: Rows, array: Array | None, said: list[str]) -> Frames:
+    places = _places(path, names, array)
     x, y = np.array(places).T
-    rows, columns = (int(y.max()) + 1, int(x.max()) + 1) if array is None else array.shape
-    if array is None and rows * columns > min(TAXELS, max(1 << 16, 16 * len(places))):
-        size = f"{counted(len(places), 'column')} for {rows} x {columns} taxels"
+    height, width = (int(y.max()) + 1, int(x.max()) + 1) if array is None else array.shape
+    if array is None and height * width > min(TAXELS, max(1 << 16, 16 * len(places))):
+        size = f"{counted(len(places), 'column')} for {height} x {width} taxels"
         raise unreadable(f"{size}: most are missing", path, line=1)
-    if x.max() >= columns or y.max() >= rows:
-        k = int(np.flatnonzero((x >= columns) | (y >= rows))[0])
-        raise unreadable(f"column {names[k + 1]!r} is outside {rows} x {columns} taxels", path, line=1)
+    if x.max() >= width or y.max() >= height:
+        k = int(np.flatnonzero((x >= width) | (y >= height))[0])
+        raise unreadable(f"column {names[k]!r} is outside {height} x {width} taxels", path, line=1)
     sensor = sensor_of(x, y) if array is None else array
-    times, values = list[NDArray[np.int64]](), list[NDArray[np.float32]]()
-    for block in _blocks(text, names, separator, np.float64):
-        if (np.abs(block[:, 1:]) > VALUE).any() or (block[:, 0] % 1 != 0).any():
-            _refuse_line(text, names, separator)
-        frames = np.zeros((len(block), rows, columns), np.float32)
-        frames[:, y, x] = block[:, 1:]
-        times.append(block[:, 0].astype(np.int64))
-        values.append(frames)
-    t = np.concatenate([*times, np.empty(0, np.int64)])
-    together = np.concatenate([*values, np.empty((0, rows, columns), np.float32)])
-    return Frames(frozen_whole(together), t, array=sensor)
+    t, order = in_order(path, rows.times, "us", said)
+    values = rows.values if order is None else rows.values[order]
+    if np.array_equal(y * width + x, np.arange(height * width)):
+        return Frames(frozen_whole(values.reshape(-1, height, width)), t, array=sensor)
+    frames = np.zeros((len(values), height, width), np.float32)
+    frames[:, y, x] = values
+    return Frames(frozen_whole(frames), t, array=sensor)
