@@ -18,7 +18,7 @@ GRID = Array(8, 12, 2.0, name="grid")
 
 
 @st.composite
-def some(draw: st.DrawFn, first: int = -(10**6)) -> Events:
+def some(draw: st.DrawFn) -> Events:
     """Any events on the grid, in any order of time, with or without intensities."""
     n = draw(st.integers(0, 40))
     rng = np.random.default_rng(draw(st.integers(0, 10**6)))
@@ -27,8 +27,8 @@ def some(draw: st.DrawFn, first: int = -(10**6)) -> Events:
         ticks = {"intensity": rng.integers(0, 65_536, n), "present": rng.random(n) < 0.5}
     if draw(st.booleans()):
         ticks["repaired"] = rng.random(n) < draw(st.sampled_from([0.05, 0.5]))
-    markers = [(int(t), bool(t % 2)) for t in np.sort(rng.integers(first, 10**6, draw(st.integers(0, 3))))]
-    t = rng.integers(first, 10**6, n)
+    markers = [(int(t), bool(t % 2)) for t in np.sort(rng.integers(-(10**6), 10**6, draw(st.integers(0, 3))))]
+    t = rng.integers(-(10**6), 10**6, n)
     x, y, p = rng.integers(0, 12, n), rng.integers(0, 8, n), rng.random(n) < 0.5
     return Events(t, x, y, p, array=GRID, markers=markers, **ticks)
 
@@ -41,23 +41,16 @@ def test_records_give_the_same_events_back(events: Events) -> None:
     assert repr(back) == repr(events)
 
 
-@given(some())
-def test_tonic_takes_our_array_and_gives_it_back(events: Events) -> None:
-    back = Events.from_tonic(events.to_tonic(), GRID)
-    for name in "txyp":
-        assert np.array_equal(getattr(back, name), getattr(events, name))
-
-
 def test_tonic_makes_the_same_pictures_of_our_events() -> None:
     tonic = pytest.importorskip("tonic")
     rng = np.random.default_rng(1)
     t = np.sort(rng.integers(0, 10_000, 500))
     events = Events(t, rng.integers(0, 12, 500), rng.integers(0, 8, 500), rng.random(500) < 0.5, array=GRID)
-    picture = tonic.transforms.ToImage(sensor_size=(12, 8, 2))(events.to_tonic())
+    picture = tonic.transforms.ToImage(sensor_size=(12, 8, 2))(events.to_numpy())
     expected = np.zeros((2, 8, 12))
     np.add.at(expected, (events.p.astype(int), events.y, events.x), 1)
     assert np.array_equal(picture, expected)
-    cropped = tonic.transforms.CenterCrop(sensor_size=(12, 8, 2), size=(4, 4))(events.to_tonic())
+    cropped = tonic.transforms.CenterCrop(sensor_size=(12, 8, 2), size=(4, 4))(events.to_numpy())
     assert len(cropped) == len(events.region(slice(4, 8), slice(2, 6)))
 
 
@@ -81,29 +74,6 @@ def test_a_mask_that_marks_nothing_is_none() -> None:
     assert Events([1], [2], [3], [True], array=GRID, repaired=[True]) != a
     with refused():
         Events([1], [2], [3], [True], array=GRID, repaired=[True, False])
-
-
-@given(some(first=0))
-def test_faery_takes_our_array_and_gives_it_back(events: Events) -> None:
-    back = Events.from_faery(events.to_faery(), GRID)
-    for name in "txyp":
-        assert np.array_equal(getattr(back, name), getattr(events, name))
-
-
-def test_faery_writes_our_events_and_reads_them_back(tmp_path) -> None:
-    faery = pytest.importorskip("faery")
-    rng = np.random.default_rng(2)
-    t = np.sort(rng.integers(0, 10_000, 500))
-    events = Events(t, rng.integers(0, 12, 500), rng.integers(0, 8, 500), rng.random(500) < 0.5, array=GRID)
-    path = tmp_path / "a.dat"
-    faery.events_stream_from_array(events.to_faery(), (12, 8)).to_file(path)
-    back = np.concatenate(list(faery.events_stream_from_file(path)))
-    assert Events.from_faery(back, GRID) == events
-
-
-def test_faery_times_do_not_start_before_zero() -> None:
-    with refused():
-        Events([3, -5], [0, 0], [0, 0], [1, 1], array=GRID).to_faery()
 
 
 @given(some(), st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
-from rich.table import Table
 
 from taxel._base.arguments import shown
 from taxel._base.messages import counted
@@ -21,13 +20,13 @@ from taxel.array import Array, of_size
 from taxel.cli.app import OUTSIDE, WRONG_INPUT, Limits
 from taxel.cli.console import Console
 from taxel.detect import load
-from taxel.live import Summary, delays
+from taxel.live import Summary
 from taxel.live._stated_options import StatedOptions
 from taxel.tare import Tare
 from taxel.wire import Registers
 from taxel.wire.registers import QUOTED_PRESETS
 
-__all__ = ["REDRAW_S", "counters_table", "exit_code", "for_live", "received", "with_live_options"]
+__all__ = ["REDRAW_S", "counters_line", "exit_code", "for_live", "received", "with_live_options"]
 
 #: A first line may take so long, however short the command is to run, s.
 _FIRST_LINE_S = 3.0
@@ -247,61 +246,32 @@ def unread(counters: dict[str, Any], told: set[tuple[str, str]]) -> Iterator[str
                 yield f"{source + ': ' * bool(source)}{counted(found['lines'], noun)} {words}{first}"
 
 
-def _frames_table(now: dict[str, Any], frames: str, lines: str) -> Table:
-    """Return the rows of a source of frames of numbers."""
-    counts, pace = now["lines"], now["pace"]
-    clock = "-" if now["board_us"] is None else f"{now['board_us'] / 1e6:.2f} s"
-    if pace is not None:
-        clock += f", drift {pace['drift_ppm']:+.1f} ppm, delays {delays(pace['delay'])}"
-    table = Table.grid(padding=(0, 2))
-    for name, total, per_second in (
-        ("lines", f"{counts['lines']:,}", lines),
-        ("frames", f"{now['frames']:,}", frames),
-        ("not read", left_out(counts).removeprefix(", ") or "-", ""),
-        ("lost", f"{now['capture']['dropped_by_queue']:,} by taxel's queue", ""),
-        ("arrival to frame", delays(now["decode_latency"]), ""),
-        ("source's clock", clock, ""),
-    ):
-        table.add_row(name, total, per_second)
-    return table
-
-
-def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
-    """Return rates since `before`, totals and losses, as rows whose places stay the same."""
+def counters_line(before: dict[str, Any], now: dict[str, Any]) -> str:
+    """Return totals, rates since `before` and losses of a board, or of a source of lines, as one line."""
     passed = max(now["seconds"] - before["seconds"], 1e-9)
+    capture, lines, pace = now["capture"], now["lines"], now["pace"]
 
-    def rate(total: float, earlier: float) -> str:
-        return f"{(total - earlier) / passed:,.0f}/s"
+    def flow(count: int, earlier: int, noun: str) -> str:
+        return f"{count:,} {noun} ({(count - earlier) / passed:,.0f}/s)"
 
-    if now["lines"] is not None:
-        return _frames_table(
-            now, rate(now["frames"], before["frames"]), rate(now["lines"]["lines"], before["lines"]["lines"])
-        )
-    capture, wire, earlier = now["capture"], now["wire"], before["capture"]
-    damaged = wire["skipped"] + wire["contradictory"] + wire["outside"] + wire["unpaired"]
-    damage = f"{damaged:,} bytes and words, {wire['back']:,} events out of order"
-    by_kernel = "unknown" if capture["dropped_by_kernel"] is None else f"{capture['dropped_by_kernel']:,}"
-    lost = f"{by_kernel} by the kernel, {capture['dropped_by_queue']:,} by taxel's queue"
-    if now["wire_version"] == 2:
-        second = now["wire_v2"]
-        damaged = second["checksum"] + second["short"] + second["foreign"] + second["malformed"]
-        damage = f"{damaged:,} datagrams, {second['outside']:,} words, {now['wire_refused']:,} bytes of version 1"
-        lost += f", {second['missing']:,} on the way"
-    board = "-" if now["board_us"] is None else f"{now['board_us'] / 1e6:.2f} s"
-    drift = ""
-    pace = now["pace"]
-    if pace is not None:
-        drift = f", drift {pace['drift_ppm']:+.1f} ppm, delays {delays(pace['delay'])}"
-        drift += " (wrong: the sender does not keep pace with its clock)" * bool(pace["doubt"])
-    table = Table.grid(padding=(0, 2))
-    for name, total, per_second in (
-        ("datagrams", f"{capture['datagrams']:,}", rate(capture["datagrams"], earlier["datagrams"])),
-        ("bytes", f"{capture['bytes']:,}", rate(capture["bytes"], earlier["bytes"])),
-        ("events", f"{now['events']:,}", rate(now["events"], before["events"])),
-        ("lost", lost, ""),
-        ("damaged", damage, ""),
-        ("arrival to decoded", delays(now["decode_latency"]), ""),
-        ("board's clock", f"{board}{drift}", ""),
-    ):
-        table.add_row(name, total, per_second)
-    return table
+    by_kernel = capture.get("dropped_by_kernel")
+    lost = {"by taxel's queue": capture["dropped_by_queue"]}
+    if lines is not None:
+        parts = [flow(lines["lines"], before["lines"]["lines"], "lines")]
+        parts.append(flow(now["frames"], before["frames"], "frames"))
+        damaged = lines["strange"] + lines["bytes_in_no_line"]
+    else:
+        parts = [
+            flow(capture["datagrams"], before["capture"]["datagrams"], "datagrams"),
+            flow(now["events"], before["events"], "events"),
+        ]
+        first, second = now["wire"], now["wire_v2"]
+        lost |= {"by the kernel": by_kernel or 0, "on the way": second["missing"] * (now["wire_version"] == 2)}
+        damaged = sum(first[name] for name in ("skipped", "contradictory", "outside", "unpaired"))
+        damaged += sum(second[name] for name in ("checksum", "short", "foreign", "malformed", "outside"))
+    parts += [f"lost {count:,} {where}" for where, count in lost.items() if count] or ["nothing lost"]
+    parts += [f"{damaged:,} damaged"] * bool(damaged)
+    if now["board_us"] is not None:
+        drift = "" if pace is None else f" ({pace['drift_ppm']:+.1f} ppm{', wrong' * bool(pace['doubt'])})"
+        parts.append(f"clock {now['board_us'] / 1e6:.2f} s{drift}")
+    return ", ".join(parts)

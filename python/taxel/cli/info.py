@@ -28,7 +28,6 @@ from taxel.cli._topics import list_topics
 from taxel.cli.app import OUTSIDE, App, Flat
 from taxel.clock import doubt
 from taxel.options import FullReading
-from taxel.spikes import SpikeTrains, to_ms
 
 if TYPE_CHECKING:
     from taxel.recording import Recording
@@ -58,8 +57,6 @@ def info(
 ) -> int:
     """Summarise a recording: contents, losses, rates, pressure, and dead, stuck or noisy taxels.
 
-    For spike trains that taxel encode wrote: number, kind, duration and spikes.
-
     For a ROS bag without --topic: the topics that hold numbers, with shapes and rates.
 
     For several recordings, such as a folder: a row for each, and their sum. Files that cannot be read are named at the
@@ -83,7 +80,7 @@ def info(
         Print all facts about each recording of a folder.
     """
     from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
-    from taxel.recording.kinds import are_spike_trains, is_folder, recordings_in  # noqa: PLC0415
+    from taxel.recording.kinds import is_folder, recordings_in  # noqa: PLC0415
     from taxel.recording.reading_options import names_topic  # noqa: PLC0415
     from taxel.tasks.labels import are_trials, trial_name  # noqa: PLC0415
 
@@ -93,9 +90,6 @@ def info(
         raise ProblemError(f"{table}: the name of a table must end in .csv")
     output.check(picture, table)
     as_json, overwrite = output.json, output.overwrite
-    if are_spike_trains(file):
-        say(*_spikes(file, as_json, drawn=picture is not None or table is not None))
-        return 0
     files = recordings_in(file, reading.layout) if file.exists() and is_folder(file) else []
     if len(files) > 1 and picture is None and table is None:
         return _of_files(file, files, partial(_infos, reading, tare), workers, each=each, as_json=as_json)
@@ -161,26 +155,6 @@ def _of_files(
     elif facts:
         say(*_of_several(folder, facts, {}, as_json=False, each=each))
     return say_failures(files, found) or _code(facts)
-
-
-def _spikes(file: Path, as_json: bool, *, drawn: bool) -> list[str]:
-    """Return what a file of spike trains holds, as one line of JSON or as lines for people."""
-    if drawn:
-        raise ProblemError(f"{file}: contains spike trains; a picture or a table needs a recording")
-    trains = SpikeTrains.load(file)
-    silent, seconds = int(np.count_nonzero(trains.counts == 0)), (trains.stop - trains.start) / to_ms(1_000_000)
-    spikes = int(trains.counts.sum())
-    if as_json:
-        facts = {"file": str(file), "trains": len(trains), "silent_trains": silent, "trains_kind": trains.kind}
-        return [json.dumps(facts | {"spikes": spikes, "start_ms": trains.start, "stop_ms": trains.stop})]
-    rate = f", {spikes / seconds:.4g} per second in all trains" if seconds else ""
-    rows = [
-        ("trains", f"{len(trains)}, {silent} silent; the file does not name the encoder"),
-        ("kind", trains.kind),
-        ("time", f"{trains.start:g} to {trains.stop:g} ms ({seconds:.3f} s)"),
-        ("spikes", f"{spikes}{rate}"),
-    ]
-    return [f"{file}: spike trains", *(f"  {name:<19} {value}" for name, value in rows)]
 
 
 def _draw(picture: Path | None, sensors: Sequence[Recording], tare: str | None, overwrite: bool) -> dict[str, str]:

@@ -11,7 +11,6 @@ from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
-from rich.console import Group
 from rich.live import Live as Display
 from rich.text import Text
 
@@ -28,7 +27,7 @@ from taxel.cli.board import (
     REDRAW_S,
     BitsOption,
     RateOption,
-    counters_table,
+    counters_line,
     doubts,
     exit_code,
     for_live,
@@ -363,7 +362,7 @@ def _watch(
             for line in _warnings(pipeline, now, told):
                 say(f"taxel: {line}", err=True)
             if now["seconds"] - before["seconds"] >= REDRAW_S:
-                display.update(Group(counters_table(before, now), _state(now, pipeline.place)))
+                display.update(Text(f"{counters_line(before, now)}\n{_state(now, pipeline.place)}".rstrip()))
                 before = now
         if not end_request.is_set() and _has_ended(pipeline, panel):
             console.print(f"{pipeline.place} has ended")
@@ -416,15 +415,15 @@ def _silence(now: dict[str, Any], place: str) -> str:
     return f"silent: {since} from {place}, which sent a {sign} at least every {within_ms:g} ms before"
 
 
-def _state(now: dict[str, Any], place: str) -> Text:
-    """Return the lines below the table: silence, the tare, and losses of lines and events."""
+def _state(now: dict[str, Any], place: str) -> str:
+    """Return the lines below the counts: silence, the tare, and losses of lines and events."""
     silence = _silence(now, place)
     if silence:
-        return Text(silence)
+        return silence
     if now["taring"]:
-        return Text("taking a tare: leave the sensor at rest")
+        return "taking a tare: leave the sensor at rest"
     sent = "".join(
         f"\n{counted(counts['lost'], 'line')} not sent to {counts['to']}" for counts in now["sent"] if counts["lost"]
     )
     dropped = f"\n{counted(now['events_dropped'], 'event')} dropped before the readout" if now["events_dropped"] else ""
-    return Text((dropped + sent).lstrip())
+    return (dropped + sent).lstrip()

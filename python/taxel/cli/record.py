@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 from rich.live import Live as Display
+from rich.text import Text
 
 from taxel._base.messages import counted
 from taxel._core import FIREWALL, ProblemError
@@ -23,7 +24,7 @@ from taxel.cli.board import (
     REDRAW_S,
     BitsOption,
     RateOption,
-    counters_table,
+    counters_line,
     doubts,
     exit_code,
     for_live,
@@ -224,7 +225,7 @@ def _watch(
             if not warned and (wrong := outside(now, live.array)):
                 say(f"taxel: {wrong}", err=True)
                 warned = True
-            display.update(counters_table(before, now))
+            display.update(Text(counters_line(before, now)))
             if (trial and not live.records) or live.is_over:
                 return
             before = now

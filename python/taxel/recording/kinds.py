@@ -319,8 +319,7 @@ def unknown(path: Path) -> FormatError:
         return FormatError(f"{path}, line 1: a table of labels (docs/howto.md), not a recording")
     if are_spike_trains(path):
         return FormatError(
-            f"{path}: contains spike trains, not a recording; to describe them, run taxel info; to read them in "
-            "Python, call taxel.SpikeTrains.load"
+            f"{path}: contains spike trains, not a recording; to read them in Python, call taxel.SpikeTrains.load"
         )
     refuse_container(path)
     with open(path, "rb") as file:

@@ -100,7 +100,7 @@ def read_columns(path: Path, array: Array | None = None) -> InMemory:
 
 
 def read_records(path: Path, array: Array | None = None) -> InMemory:
-    """Read a .npy of events, with the fields ``t x y p`` (`Events.to_numpy`, `Events.to_tonic`, `Events.to_faery`).
+    """Read a .npy of events, with the fields ``t x y p`` (`Events.to_numpy`).
 
     Raises
     ------
