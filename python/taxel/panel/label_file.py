@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO, TypeAlias
 
@@ -24,9 +25,6 @@ LOCK = ".taxel-labels.lock"
 #: How long the lock is waited for, and a table that other programs write without a pause, s.
 _LOCKED_S, _WRITTEN_S = 20.0, 5.0
 
-#: A table that does not end with a line and was written within this time is being written, s.
-_UNENDED_S = 1.0
-
 #: Replace the first row by the second; without the first mark the second, without the second delete the first.
 Edit: TypeAlias = tuple[Note | None, Note | None]
 
@@ -35,23 +33,7 @@ _Row: TypeAlias = tuple[Note, Note | None]
 
 
 class _Changed(Exception):  # noqa: N818  no error
-    """Another program has written the table since it was read, or is writing it."""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Hold what a request has changed.
-
-    Parameters
-    ----------
-    rows : tuple of (Note or None)
-        For each edit the row as it is in the table; None where it was deleted.
-    inverse : tuple of Edit
-        What takes the request back; empty where it changed nothing.
-    """
-
-    rows: tuple[Note | None, ...]
-    inverse: tuple[Edit, ...]
+    """Another program has written the table since it was read."""
 
 
 class LabelFile:
@@ -87,37 +69,41 @@ class LabelFile:
         rows, _ = rows_of(self.path, lines_of(decoded(self.path, self._text() or b"")))
         return _in_order(map(self._in_view, rows))
 
-    def change(self, requests: Sequence[Sequence[Edit]]) -> tuple[list[Outcome | str], tuple[Note, ...]]:
-        """Carry out requests in one write of the table as it is now; return what became of each, and the rows.
+    def change(self, edits: Sequence[Edit]) -> tuple[tuple[Edit, ...], tuple[Note, ...]]:
+        """Carry out edits in the table as it is now, all or none; return what takes them back, and the rows.
 
-        Each is carried out whole or not at all: not where a row that it replaces or deletes is no longer there, which
-        its text says then. A row that is there already is not marked again.
+        A row that is there already is not marked again: what takes that back is empty.
 
         Raises
         ------
-        ProblemError : it is no table of labels or cannot be written, or another program holds the lock
+        ProblemError : a row that is replaced or deleted is no longer there; it is no table of labels or cannot be
+            written, or another program holds the lock
         """
         lock = self.path.with_name(LOCK)
         try:
             with FileLock(lock, timeout=_LOCKED_S, poll_interval=0.01):
                 until = time.monotonic() + _WRITTEN_S
-                while True:
-                    try:
-                        return self._try_to_change(requests)
-                    except _Changed:
-                        if time.monotonic() > until:
-                            raise ProblemError(f"{self.path.name} cannot be saved: other programs write it") from None
-                    time.sleep(0.01)
+                try:
+                    while True:
+                        try:
+                            return self._try_to_change(edits)
+                        except _Changed:
+                            if time.monotonic() > until:
+                                reason = "other programs write it"
+                                raise ProblemError(f"{self.path.name} cannot be saved: {reason}") from None
+                        time.sleep(0.01)
+                finally:
+                    # Who waits for it sees that it has gone; Windows, which removes no open file, does so when it ends.
+                    with contextlib.suppress(OSError):
+                        lock.unlink()
         except Timeout:
             raise ProblemError(f"{lock}: another program holds this lock; nothing was saved") from None
         except OSError as error:
             reason = (error.strerror or str(error)).removeprefix("is ").lower()
             raise ProblemError(f"{self.path.name} cannot be saved: {reason}") from error
 
-    def _try_to_change(self, requests: Sequence[Sequence[Edit]]) -> tuple[list[Outcome | str], tuple[Note, ...]]:
+    def _try_to_change(self, edits: Sequence[Edit]) -> tuple[tuple[Edit, ...], tuple[Note, ...]]:
         text = self._text()
-        if text is not None and self._is_being_written(text):
-            raise _Changed
         try:
             lines = lines_of(decoded(self.path, text or b""))
             found, columns = rows_of(self.path, lines)
@@ -128,8 +114,8 @@ class LabelFile:
             raise again from None
         counts_from_beginning = any(is_from_beginning(row.t or 0, self._begin_us) for row in found)
         rows = _Rows(zip(map(self._in_view, found), found, strict=True))
-        outcomes = [rows.carry_out(request) for request in requests]
-        if any(isinstance(outcome, Outcome) and outcome.inverse for outcome in outcomes):
+        inverse = rows.carry_out(edits)
+        if inverse:
             end = next((end for end in ("\r\n", "\r") if lines and lines[0].endswith(end)), "\n")
             separator = separator_of(next((line for line in lines if line.strip()), ""))
             mark, encoding = mark_of(text or b"")
@@ -142,7 +128,7 @@ class LabelFile:
                 self._check_unchanged(text)
 
             write_whole(self.path, write, overwrite=True)
-        return outcomes, _in_order(rows.shown())
+        return inverse, _in_order(rows.shown())
 
     def _text(self) -> bytes | None:
         """Return the text of the table; None where there is none."""
@@ -154,14 +140,6 @@ class LabelFile:
     def _check_unchanged(self, text: bytes | None) -> None:
         if self._text() != text:
             raise _Changed
-
-    def _is_being_written(self, text: bytes) -> bool:
-        """Return whether a program that writes into the table itself has not come to the end of a line."""
-        mark, encoding = mark_of(text)
-        if text[len(mark) :].endswith(("\n".encode(encoding), "\r".encode(encoding))):
-            return False
-        # A time in the future is none at which it was written.
-        return 0 <= time.time() - os.stat(self.path).st_mtime <= _UNENDED_S
 
     def _in_view(self, row: Note) -> Note:
         shown = by_clock(_times_by(row, lambda t: round(t * self._unit_us)), self._begin_us)
@@ -177,7 +155,7 @@ def _times_by(row: Note, convert: Callable[[int], int]) -> Note:
 
 
 class _Rows:
-    """Hold the rows of a table while requests are carried out: in the view, with those that the file has."""
+    """Hold the rows of a table while edits are carried out: in the view, with those that the file has."""
 
     def __init__(self, rows: Iterable[tuple[Note, Note]]) -> None:
         self._of: dict[tuple[object, ...], list[_Row]] = {}
@@ -193,17 +171,15 @@ class _Rows:
         rows = (row for rows in self._of.values() for row in rows)
         return [convert(shown) if in_file is None else in_file for shown, in_file in rows]
 
-    def carry_out(self, request: Sequence[Edit]) -> Outcome | str:
-        """Carry out the edits of a request, or none of them, and say why."""
-        # A single edit changes nothing before it fails.
-        before = {key: list(rows) for key, rows in self._of.items()} if len(request) > 1 else self._of
+    def carry_out(self, edits: Sequence[Edit]) -> tuple[Edit, ...]:
+        """Carry out edits; return what takes them back, nothing where they changed nothing."""
         gone: list[_Row] = []
         added: list[Note] = []
-        rows: list[Note | None] = []
-        for old, wanted in request:
+        for old, wanted in edits:
             if old is not None and not self._of.get(_key(old)):
-                self._of = before
-                return f"{old.text} at {old.t} us is no longer in the table: another window or program changed it"
+                raise ProblemError(
+                    f"{old.text} at {old.t} us is no longer in the table: another window or program changed it"
+                )
             if old is not None:
                 gone.append(self._take(old))
             elif wanted is not None and wanted.replaces is not None:
@@ -217,10 +193,9 @@ class _Rows:
             if new is not None and (stays or not self._of.get(_key(new))):
                 self._add(new, None)
                 added.append(new)
-            rows.append(new)
         removed, made = Counter(row for row, _ in gone), Counter(added)
         undone, restored = (made - removed).elements(), (removed - made).elements()
-        return Outcome(tuple(rows), (*((row, None) for row in undone), *((None, row) for row in restored)))
+        return (*((row, None) for row in undone), *((None, row) for row in restored))
 
     def _add(self, shown: Note, in_file: Note | None) -> None:
         self._of.setdefault(_key(shown), []).append((shown, in_file))

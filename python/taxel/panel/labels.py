@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from taxel._core import ProblemError
 from taxel.labels import Note
 from taxel.panel.folder import Folder, Shown
 from taxel.panel.label_file import Edit, LabelFile
@@ -106,12 +105,10 @@ class LabelTables:
             await self._write(name, self._tables[name], inverse)
 
     async def _write(self, name: str, table: _Table, edits: Sequence[Edit]) -> tuple[Edit, ...]:
-        (outcome,), rows = await in_thread(self._file(name, table).change, [edits])
-        if isinstance(outcome, str):
-            raise ProblemError(outcome)
-        table.rows, table.stamp = rows, self._stamp(name)
+        inverse, table.rows = await in_thread(self._file(name, table).change, edits)
+        table.stamp = self._stamp(name)
         self._tables[name] = table
-        return outcome.inverse
+        return inverse
 
     def _exact(self, edit: Edit, table: _Table, shown: Shown | None) -> Edit:
         """Return an edit with what the page does not know of its rows."""
