@@ -3,7 +3,6 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 
-import { collapsed } from "../../python/taxel/panel/web/clusters.js";
 import { Timeline } from "../../python/taxel/panel/web/timeline.js";
 
 const range = (from, to) => Array.from({ length: to - from }, (_, k) => from + k);
@@ -20,16 +19,4 @@ test("curves of frames have gaps where none arrived", () => {
   assert.equal(gaps(35999).length, 1000 - range(0, 91).filter((k) => k < 20 || k >= 40).length);
   assert.deepEqual(gaps(300000), silent);
   assert.deepEqual(gaps(1e6), []);
-});
-
-test("marks that would cover each other are counted, and none is lost", () => {
-  const random = (seed) => () => (seed = (seed * 16807) % 2147483647) / 2147483647;
-  for (let seed = 1; seed < 50; seed++) {
-    const draw = random(seed);
-    const marks = range(0, Math.floor(1 + 40 * draw())).map((id) => ({ id, x: 600 * draw() })).sort((a, b) => a.x - b.x);
-    const { single, counts } = collapsed(marks, 11, 3);
-    const all = [...single, ...counts.flatMap((count) => count.marks)];
-    assert.deepEqual(all.map(({ id }) => id).sort(), marks.map(({ id }) => id).sort());
-    for (const { from, to, marks: inside } of counts) assert.deepEqual([from, to], [inside[0].x, inside.at(-1).x]);
-  }
 });

@@ -172,13 +172,3 @@ def replay(chromium: Any, recording: Path) -> Iterator[Any]:
     """The recording in a browser, without a board."""
     with shown(chromium, recording) as page:
         yield page
-
-
-def record_form(page: Any, **values: Any) -> None:
-    """Fill in the tab Record."""
-    press(page, "2")
-    for name, value in values.items():
-        if isinstance(value, bool):
-            page.locator(f"#record-{name}").set_checked(value)
-        else:
-            page.locator(f"#record-{name}").fill(str(value))

@@ -56,3 +56,6 @@ def test_another_recording_is_shown_as_by_a_page_that_opens_on_it(chromium: Any,
             page.locator("#label-name").fill("contact")
             page.locator("#files").select_option(name)
             assert said(page, name) == anew[name], f"{name} after {before}"
+            # What is cut from it is named after it.
+            stem, ending = name.rsplit(".", 1)
+            assert page.locator("#cut-name").input_value() == f"{stem}-cut.{ending}"

@@ -23,7 +23,6 @@ from tests.panel.pages import (
     opened,
     page,
     press,
-    record_form,
     recording,
     replay,
     shows,
@@ -59,7 +58,7 @@ def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, 
     ):
         shows(page, "state-word", FOLLOWS)
         shows(page, "detections-none", "^None yet")
-        press(page, "4")
+        press(page, "5")
         assert page.locator("#encoder option[value=contact_area]").inner_text() == "readout: contact area"
         page.locator("#encoder").select_option("contact_area")
         with running("emulate", "--replay", "played.mcap", "--port", port, folder=tmp_path) as board:
@@ -157,7 +156,9 @@ def story(page: Any, folder: Path, name: str, floor_ticks: int) -> None:
     shows(page, "registers-why", "^$")
     until(lambda: floor.input_value() == str(floor_ticks), "the board holds the floor")
     until(lambda: page.evaluate(PIXELS, "pressure-map") != before, "the map moves")
-    record_form(page, name=name, index="7", label="heel", length="")
+    press(page, "2")
+    page.locator("#record-name").fill(f"{name}7")
+    page.locator("#record-label").fill("heel")
     press(page, "r")
     shows(page, "state-word", rf"Recording {name}7\.mcap")
     page.locator("#label-name").evaluate(
@@ -170,6 +171,7 @@ def story(page: Any, folder: Path, name: str, floor_ticks: int) -> None:
     until(lambda: float((page.locator("#record-state").inner_text().split() or ["0"])[0]) >= 2, "two seconds of it")
     press(page, "r")
     shows(page, "record-last-file", rf"^{name}7\.mcap$")
+    assert page.locator("#record-name").input_value() == f"{name}8"
     page.locator("#files").select_option(f"{name}7.mcap")
     shows(page, "state-word", "^Replay$")
     shows(page, "label-count", "^1 label")

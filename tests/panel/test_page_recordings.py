@@ -114,7 +114,7 @@ def test_the_lanes_zoom_and_scroll_and_show_the_spikes_of_an_encoder(replay: Any
     shows(replay, "span", r"^4\.\d s$")
     press(replay, "x", "x", "x")
     until(lambda: span(replay)[1] - span(replay)[0] < 10, "no longer than the recording")
-    press(replay, "End", "4")
+    press(replay, "End", "5")
     until(lambda: clock(replay) > 9, "the end")
     still(replay)
     changes = settled(replay, "raster")
@@ -143,13 +143,13 @@ def test_a_click_anywhere_in_the_row_makes_a_label_and_a_handle_moves_it(replay:
     # One count everywhere.
     assert "5 labels" in replay.locator("#files option:checked").inner_text()
     assert replay.locator("#label-list li").count() == replay.locator(".flag").count() == 5
-    # Without a name nothing is lost: the label is set where the click was, once there is one.
+    # Without a name there is no label: it is asked for.
     replay.locator("#label-name").fill("")
     replay.locator("#label-name").blur()
     replay.mouse.click(pixel(replay, 6.0), low)
     replay.locator("#label-name:focus").wait_for()
     replay.keyboard.type("toe")
-    replay.keyboard.press("Enter")
+    replay.mouse.click(pixel(replay, 6.0), low)
     shows(replay, "label-count", "^6 label")
     flag = replay.locator(".flag", has_text="toe")
     said = flag.get_attribute("aria-label")
@@ -177,10 +177,14 @@ def test_a_click_anywhere_in_the_row_makes_a_label_and_a_handle_moves_it(replay:
     shows(replay, "label-count", "^5 label")
     replay.locator("#notice-offer").click()
     shows(replay, "label-count", "^6 label")
+    a_stretch_is_cut_out(replay, recording)
 
 
-def test_a_stretch_is_cut_out(replay: Any, recording: Path) -> None:
-    press(replay, "Home", "4", "[")
+def a_stretch_is_cut_out(replay: Any, recording: Path) -> None:
+    """Cut from the cursor's keys; the file is named after the recording."""
+    press(replay, "Home", "5")
+    until(lambda: clock(replay) < 0.3, "the beginning")
+    press(replay, "[")
     press(replay, "Shift+ArrowRight")
     until(lambda: clock(replay) > 1.1, "a second on")
     press(replay, "]")

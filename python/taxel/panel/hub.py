@@ -22,7 +22,7 @@ from taxel.live import Live
 from taxel.panel.board import Board
 from taxel.panel.folder import Folder, Shown
 from taxel.panel.labels import LabelTables
-from taxel.panel.messages import MOST_BYTES, text_of
+from taxel.panel.messages import text_of
 from taxel.panel.recorder import Recorder
 from taxel.panel.shown_files import Opening
 from taxel.panel.threads import in_thread
@@ -395,7 +395,6 @@ class Hub:
             "protocol": 1,
             "live": self.source is not None,
             "control": self.board.place,
-            "most_message_bytes": MOST_BYTES,
             "folder": str(self.folder.path),
             "open": self.opened,
             **live,

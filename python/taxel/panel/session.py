@@ -293,7 +293,6 @@ class Session:
             "type": "opened",
             "name": shown.name,
             "bytes": shown.size,
-            "train": self._hub.training.command(shown.path, self._hub.folder.file(readout_of(shown.name))),
             "index_ms": shown.index_ms,
         }
         contents = await in_thread(shown.recording.opened)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 import threading
 from collections.abc import Iterator
 from operator import itemgetter
@@ -99,22 +98,13 @@ class Training:
             raise ProblemError(_STOPPED if stopped else f"the training ended with code {code}")
         lines = [*answer["lines"], *(f"warning: {text}" for text in answer["result"]["warnings"])]
         result = answer["result"]
-        mistakes = [
-            {
-                "label": mistake["label"],
-                "t_us": mistake["t_us"],
-                "is_missed": mistake["missed"],
-                "source": mistake["source"],
-                "trial": mistake["recording"],
-            }
-            for mistake in result["mistakes"]
-        ]
         return {
             "text": "\n".join(lines),
             "judged_on": answer["lines"][0],
             "scores": list(_scores(result)),
-            "mistakes": mistakes,
+            "mistakes": result["mistakes"],
             "next": answer["command"],
+            "pictures": answer["pictures"],
         }
 
     def _answer(self, training: ChildProcess) -> dict[str, Any]:
@@ -133,17 +123,6 @@ class Training:
     def progress(self) -> str:
         """Return how far the training that runs is; empty if none runs."""
         return str(self._steps) if self._training is not None else ""
-
-    def command(self, recording: Path, out: Path) -> str:
-        """Return the command that trains the same in a shell, in the folder where taxel was started.
-
-        It is empty where the recording was opened by options that only a layout file can give to a training.
-        """
-        options = self._opening.options_of(recording)
-        words = options.words()
-        if not options.given().keys() <= {"layout", "label_column"}:
-            return ""
-        return shlex.join(["taxel", "train", typed(recording), "--labels", "notes", "-o", typed(out), *words])
 
     def end(self) -> None:
         """End the training that runs, if one does."""

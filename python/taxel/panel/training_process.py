@@ -5,28 +5,36 @@ it is opened) and `out` (where the readout is written, also over an older one). 
 standard output::
 
     {"type": "progress", "step": "fold 2 of 5", "done": 1, "of": 5}
-    {"type": "result", "result": {"labels": ["contact"], "warnings": [], ...}, "lines": [...], "command": "taxel ..."}
+    {"type": "result", "result": {"labels": ["contact"], "warnings": [], ...}, "lines": [...], "command": "taxel ...",
+     "pictures": [{"title": "...", "svg": "..."}]}
     {"type": "error", "kind": "ProblemError", "text": "walk.mcap: ..."}
 
 Progress comes before each step; `of` is 0 where it is not known. The result is that of `Training.to_dict`, with its
-lines for people and the command that detects by the readout. The exit code is 0, 2 after an error, and 130 of a
-training that was stopped, which writes no last line and leaves no file.
+lines for people, the command that detects by the readout, and the two pictures of its report. The exit code is 0, 2
+after an error, and 130 of a training that was stopped, which writes no last line and leaves no file.
 """
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import matplotlib as mpl
 
 from taxel._base.messages import collected, escaped
 from taxel._base.progress import Progress
 from taxel._base.stopping import leave, stop_on_signals
 from taxel._core import Error, ProblemError
 from taxel.options import FullReading
+from taxel.report import compared
+from taxel.report.svg import STYLE, image
 from taxel.tasks.train import train
+
+if TYPE_CHECKING:
+    from taxel.tasks.train_result import Training
 
 __all__ = ["run"]
 
@@ -50,6 +58,7 @@ def run(request: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
         training = train(FullReading(**request["open"]).open_sensors([recording]), progress=progress)
     if not training.learnt:
         raise ProblemError("; ".join(["no label is learnt, so nothing is written", *training.unreliable()]))
+    pictures = [*_pictures(training)]
     training.readout.save(request["out"], overwrite=True)
     found = training.to_dict()
     found["warnings"] = [*dict.fromkeys([*warnings, *found["warnings"]])]
@@ -58,7 +67,20 @@ def run(request: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
         "result": found,
         "lines": training.lines(),
         "command": training.command(request["out"]),
+        "pictures": pictures,
     }
+
+
+def _pictures(training: Training) -> Iterator[dict[str, str]]:
+    """Yield the pictures of labels beside detections, and of loads beside those of the training."""
+    readout, listened = training.readout, training.outcomes
+    with mpl.rc_context(STYLE):
+        for title, figure in (
+            ("Each label minus its nearest detection, over time", compared.nearest(listened, readout.labels)),
+            ("Loads of this recording beside those of the training", compared.beside_training(readout, listened)),
+        ):
+            if figure is not None:
+                yield {"title": title, "svg": image(figure)}
 
 
 def _say(line: Mapping[str, Any]) -> None:
@@ -67,6 +89,8 @@ def _say(line: Mapping[str, Any]) -> None:
 
 def _main() -> NoReturn:
     stop_on_signals()
+    # Pictures are texts here, whatever windows the user draws in.
+    mpl.use("Agg")
     try:
         _say(
             run(

@@ -52,11 +52,16 @@ def picture(figure: Figure) -> Markup:
     return Markup(f'<div class="{where}">') + Markup(escaped_lines(svg)) + Markup("</div>")
 
 
-def _svg(figure: Figure) -> str:
+def image(figure: Figure) -> str:
+    """Return a figure as a file of SVG, on no ground."""
     text = io.StringIO()
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "taxel"}):
         figure.savefig(text, format="svg", metadata={"Date": None}, transparent=True, dpi=_PIXELS)
-    svg = text.getvalue()
+    return text.getvalue()
+
+
+def _svg(figure: Figure) -> str:
+    svg = image(figure)
     svg = svg[svg.index("<svg") :]
     for colour, variable in ((INK, "--ink"), ("#000000", "--ink"), (_LINE, "--line"), (_GROUND, "--card")):
         svg = svg.replace(f": {colour}", f": var({variable})")

@@ -29,7 +29,7 @@ import { showTab } from "./tabs.js";
  */
 export function bindActions({ server, player, settings, recorder, labels, mistakes, view, maps, cursor, window }, timeline) {
   const help = part("help", HTMLDialogElement);
-  const cutHere = (/** @type {0 | 1} */ end) => player.timeToMark(timeline()?.cursor_us).then((t_us) => view.setCut(end, t_us));
+  const cutHere = (/** @type {0 | 1} */ end) => view.setCut(end, timeline()?.cursor_us ?? player.targetTime);
   const step = (/** @type {KeyboardEvent} */ event) => (event.shiftKey ? 1e6 : 1e5);
   const moveBy = (/** @type {number} */ us) => {
     if (player.targetTime !== null) player.seek(player.targetTime + us);
@@ -56,57 +56,51 @@ export function bindActions({ server, player, settings, recorder, labels, mistak
     server.request({ type: "zero", taxels }).then(() => notify(`zeroed ${taxels.length} taxels`), failed);
   };
   view.cutHere = cutHere;
-  bindKeys(
-    {
-      record: () => recorder.toggle(),
-      play: () => player.toggle(),
-      stepOn: () => player.step(1),
-      stepBack: () => player.step(-1),
-      on: (event) => moveBy(step(event)),
-      back: (event) => moveBy(-step(event)),
-      first: () => player.reach && player.seek(player.reach[0]),
-      last: () => (player.transport.source === null ? player.follow() : player.reach && player.seek(player.reach[1])),
-      faster: () => player.faster(1),
-      slower: () => player.faster(-1),
-      zoomIn: () => window.halve(),
-      zoomOut: () => window.double(),
-      second: () => cursor.second(),
-      showAll: () => window.showAll(),
-      live: () => player.follow(),
-      mark: () => labels.markHere(),
-      nextLabel: () => labels.go(1),
-      labelBefore: () => labels.go(-1),
-      nextMistake: () => mistakes.go(1),
-      mistakeBefore: () => mistakes.go(-1),
-      deleteLabel: () => labels.removeChosen(),
-      undo: () => labels.undo(),
-      cutFrom: () => cutHere(0),
-      cutTo: () => cutHere(1),
-      open: () => part("files", HTMLSelectElement).focus(),
-      crosshair: () => part("pressure-frame", HTMLElement).focus(),
-      rest: () => view.rest("now"),
-      health,
-      tabBoard: () => showTab("board"),
-      tabRecord: () => showTab("record"),
-      tabLabels: () => showTab("labels"),
-      tabView: () => showTab("view"),
-      theme,
-      help: () => help.showModal(),
-    },
-    () => settings.values.letters,
-  );
+  bindKeys({
+    record: () => recorder.toggle(),
+    play: () => player.toggle(),
+    stepOn: () => player.step(1),
+    stepBack: () => player.step(-1),
+    on: (event) => moveBy(step(event)),
+    back: (event) => moveBy(-step(event)),
+    first: () => player.reach && player.seek(player.reach[0]),
+    last: () => (player.transport.source === null ? player.follow() : player.reach && player.seek(player.reach[1])),
+    faster: () => player.faster(1),
+    slower: () => player.faster(-1),
+    zoomIn: () => window.halve(),
+    zoomOut: () => window.double(),
+    second: () => cursor.second(),
+    showAll: () => window.showAll(),
+    live: () => player.follow(),
+    mark: () => labels.markHere(),
+    nextLabel: () => labels.go(1),
+    labelBefore: () => labels.go(-1),
+    nextMistake: () => mistakes.go(1),
+    mistakeBefore: () => mistakes.go(-1),
+    deleteLabel: () => labels.removeChosen(),
+    undo: () => labels.undo(),
+    cutFrom: () => cutHere(0),
+    cutTo: () => cutHere(1),
+    open: () => part("files", HTMLSelectElement).focus(),
+    crosshair: () => part("pressure-frame", HTMLElement).focus(),
+    rest: () => view.rest("now"),
+    health,
+    tabBoard: () => showTab("board"),
+    tabRecord: () => showTab("record"),
+    tabLabels: () => showTab("labels"),
+    tabTrain: () => showTab("train"),
+    tabView: () => showTab("view"),
+    theme,
+    help: () => help.showModal(),
+  });
   const onClick = (/** @type {string} */ id, /** @type {() => void} */ action) => {
     part(id, HTMLButtonElement).onclick = action;
   };
   onClick("theme-button", theme);
   onClick("help-button", () => help.showModal());
   onClick("help-close", () => help.close());
-  onClick("health", health);
   onClick("zero", zero);
   onClick("zero-all", zeroAll);
   onClick("zoom-in", () => window.halve());
   onClick("zoom-out", () => window.double());
-  for (const name of /** @type {const} */ (["pressure", "change"])) {
-    onClick(`${name}-alone`, () => settings.set("maps", settings.values.maps === name ? "both" : name));
-  }
 }

@@ -1,4 +1,4 @@
-// The board: its registers as sliders, presets.
+// The board: its registers, presets.
 
 import { make, part, write } from "./dom.js";
 import { RefusedError } from "./server.js";
@@ -8,38 +8,14 @@ import { integer } from "./words.js";
 /** @typedef {import("./messages.js").Registers} RegistersMessage */
 /** @typedef {import("./messages.js").Presets} PresetsMessage */
 /** @typedef {import("./messages.js").Hello} Hello */
-/** @typedef {import("./messages.js").Counters} Counters */
 /** @typedef {import("./server.js").Server} Server */
 
 /** Registers of the scan's timing, which are always shown, in the order of the scan. */
 const TIMING = ["line_period", "line_read", "step_period", "step_read", "ramp", "noise_floor", "lines"];
-/** Labels of the sliders; the names of the registers are their titles. */
-/** @type {Record<string, string>} */
-const SPOKEN = {
-  line_period: "Line period",
-  line_read: "Line read",
-  step_period: "Step period",
-  step_read: "Step read",
-  ramp: "Ramp",
-  noise_floor: "Noise floor",
-  lines: "Lines",
-  random_lines: "Random line order",
-  mechanoreceptor: "FA-1 mode",
-  invert_comparator: "Invert comparator",
-  frame_sync: "One stamp per frame",
-  wire_version: "Wire version",
-  pattern: "Test pattern",
-  threshold_jump: "FA-1 jump",
-  threshold_rest: "FA-1 threshold",
-  threshold_decay: "FA-1 decay",
-};
 /** Set by recordings, or the board's build. */
 const NOT_HERE = ["record", "channels"];
-const SLIDER = 1000;
-/** Sliders that reach less far have even steps; all others even ratios. */
-const LINEAR = 300;
 
-/** A register with its number, and its slider where it has one. */
+/** A register with its number. */
 class Control {
   /**
    * @param {Field} field
@@ -50,83 +26,37 @@ class Control {
     this.held = field.least;
     /** @type {number | null} typed and not held by the board */
     this.wanted = null;
-    this.unit = field.unit === "10 ns" ? { name: "µs", spoken: "microseconds", per: 100, decimals: 2 } : { name: field.unit, spoken: field.unit, per: 1, decimals: 0 };
+    this.isFlag = field.unit === "flag";
+    const isTime = field.unit === "10 ns";
+    /** Steps of the register in the unit that is written. */
+    this.per = isTime ? 100 : 1;
+    this.unit = isTime ? "µs" : this.isFlag ? "" : field.unit;
     const id = `register-${field.name}`;
-    const label = make("label", { for: id, title: `${field.name} (${field.manual}): ${field.text}` }, SPOKEN[field.name] ?? field.name);
+    const name = field.name.replaceAll("_", " ");
+    const label = make("label", { for: id, title: `${field.name} (${field.manual}): ${field.text}` }, `${name[0].toUpperCase()}${name.slice(1)}`);
     this.reason = make("p", { class: "reason", id: `${id}-reason`, role: "alert", hidden: true });
-    this.row = make("div", { class: "register" }, label);
-    if (field.unit === "flag") {
-      this.input = make("input", { type: "checkbox", id, "aria-describedby": this.reason.id });
-      this.row.classList.add("switch");
-      this.row.append(this.input, this.reason);
-      this.input.addEventListener("change", () => this.setTarget(Number(this.input.checked)));
-    } else {
-      this.input = make("input", { type: "text", inputmode: "decimal", id, autocomplete: "off", "aria-describedby": `${id}-unit ${this.reason.id}` });
-      if (TIMING.includes(field.name)) {
-        this.slider = make("input", { type: "range", min: 0, max: SLIDER, step: 1, "aria-label": `${SPOKEN[field.name]}, slider` });
-        this.row.append(this.slider);
-        this.slider.addEventListener("input", () => {
-          this.setTarget(this.valueAt(Number(this.slider?.value)), false);
-          this.showWanted();
-        });
-        this.slider.addEventListener("change", () => this.notify());
-      }
-      this.row.append(this.input, make("span", { class: "unit", id: `${id}-unit` }, shortUnit(this.unit.name)), this.reason);
-      this.input.addEventListener("change", () => this.setTarget(this.read()));
-      this.input.addEventListener("keydown", (event) => this.key(event));
-    }
-    this.notify = () => typed(this);
+    /** @type {Record<string, string | number>} */
+    const kind = this.isFlag ? { type: "checkbox" } : { type: "number", step: 1 / this.per, min: field.least / this.per, max: field.greatest / this.per };
+    this.input = make("input", { id, autocomplete: "off", "aria-describedby": `${id}-unit ${this.reason.id}`, ...kind });
+    this.row = make("div", { class: "register" }, label, this.input, make("span", { class: "unit", id: `${id}-unit` }, this.unit), this.reason);
+    this.input.addEventListener("change", () => {
+      const value = this.isFlag ? Number(this.input.checked) : Math.round(this.input.valueAsNumber * this.per);
+      this.wanted = value === this.held ? null : value;
+      typed(this);
+    });
+    this.input.addEventListener("keydown", (event) => {
+      if (event.key !== "Escape" || (this.wanted === null && this.input.value === this.text)) return;
+      this.restore();
+      typed(this);
+      event.stopPropagation();
+      event.preventDefault();
+    });
     this.show();
   }
 
-  /** @param {KeyboardEvent} event */
-  key(event) {
-    if (event.key === "Escape") {
-      if (this.wanted === null && this.input.value === this.text(this.held)) return;
-      this.restore();
-      this.notify();
-      event.stopPropagation();
-      event.preventDefault();
-    } else if ((event.key === "ArrowUp" || event.key === "ArrowDown") && this.field.unit !== "flag") {
-      const by = (event.key === "ArrowUp" ? 1 : -1) * (event.shiftKey ? 10 : 1);
-      this.setTarget(Math.max(this.field.least, Math.min(this.field.greatest, (this.wanted ?? this.held) + by)));
-      this.showWanted();
-      event.preventDefault();
-    }
-  }
-
-  /** @returns {number} the number in the field, in the register's unit; NaN if it is not a number */
-  read() {
-    const text = this.input.value.trim().replace(",", ".");
-    return text === "" ? NaN : Math.round(Number(text) * this.unit.per);
-  }
-
-  /** @param {number} value @param {boolean} [notify] */
-  setTarget(value, notify = true) {
-    this.wanted = value === this.held ? null : value;
-    if (notify) this.notify();
-  }
-
-  /** @param {number} position of the slider @returns {number} even steps in ratio, as what is sensible spans decades */
-  valueAt(position) {
-    const { least } = this.field;
-    const low = Math.max(1, least);
-    const { top } = this.field;
-    if (top < LINEAR) return Math.round(least + (position / SLIDER) * (top - least));
-    return Math.round(low * (top / low) ** (position / SLIDER));
-  }
-
-  /** @param {number} value @returns {number} the slider's position */
-  positionOf(value) {
-    const { least, top } = this.field;
-    const low = Math.max(1, least);
-    const share = top < LINEAR ? (value - least) / (top - least) : Math.log(Math.max(low, value) / low) / Math.log(top / low);
-    return Math.round(SLIDER * Math.max(0, Math.min(1, share)));
-  }
-
-  /** @param {number} value */
-  text(value) {
-    return (value / this.unit.per).toFixed(this.unit.decimals);
+  /** @returns {string} the value that the board holds */
+  get text() {
+    return (this.held / this.per).toFixed(this.per > 1 ? 2 : 0);
   }
 
   /** @param {number} value that the board holds */
@@ -148,44 +78,15 @@ class Control {
   show() {
     this.refuse(null);
     this.input.checked = Boolean(this.held);
-    if (this.field.unit !== "flag") this.input.value = this.text(this.held);
-    this.slide(this.held);
-  }
-
-  /** Shows a wanted number, from the slider or the arrow keys. */
-  showWanted() {
-    const value = this.wanted ?? this.held;
-    this.input.value = this.text(value);
-    this.slide(value);
-  }
-
-  /** @param {number} value */
-  slide(value) {
-    if (!this.slider || Number.isNaN(value)) return;
-    this.slider.value = String(this.positionOf(value));
-    this.slider.setAttribute("aria-valuetext", `${this.text(value)} ${this.unit.spoken}`);
+    if (!this.isFlag) this.input.value = this.text;
   }
 
   /** @param {string | null} reason */
   refuse(reason) {
-    this.row.classList.toggle("refused", reason !== null);
     this.input.setAttribute("aria-invalid", String(reason !== null));
     this.reason.hidden = reason === null;
-    write(this.reason, reason === null ? "" : `${reason}. Press Escape to restore ${this.text(this.held)} ${this.unit.name === "flag" ? "" : this.unit.name}`.trim());
+    write(this.reason, reason === null ? "" : `${reason}. Press Escape to restore ${this.text} ${this.unit}`.trim());
   }
-
-  /** @param {boolean} disabled */
-  disable(disabled) {
-    this.input.disabled = disabled;
-    if (this.slider) this.slider.disabled = disabled;
-  }
-}
-
-/** @param {string} name @returns {string} */
-function shortUnit(name) {
-  /** @type {Record<string, string>} */
-  const known = { lines: "", version: "", "1/256 theta_0": "/256 θ", "1/1024": "/1024", "1/1024 theta_0": "/1024 θ" };
-  return known[name] ?? name;
 }
 
 /** The tab of the board. */
@@ -231,7 +132,7 @@ export class Board {
   }
 
   enable() {
-    for (const control of this.controls.values()) control.disable(!this.writable);
+    for (const control of this.controls.values()) control.input.disabled = !this.writable;
     part("read-back", HTMLButtonElement).disabled = !this.writable;
     this.select.disabled = !this.writable;
   }
@@ -305,10 +206,10 @@ export class Board {
     if (control.wanted === null) control.show();
     const waiting = [...this.controls.values()].filter(({ wanted }) => wanted !== null);
     const spoilt = waiting.filter(({ wanted }) => Number.isNaN(wanted));
-    for (const one of spoilt) one.refuse(`${one.input.value.trim() || "nothing"} is not a number`);
+    for (const one of spoilt) one.refuse("must be a number");
     if (!waiting.length || !this.writable || spoilt.length) return;
     for (const one of waiting) one.refuse(null);
-    const values = Object.fromEntries(waiting.map(({ field, wanted }) => [field.name, field.unit === "flag" ? Boolean(wanted) : Number(wanted)]));
+    const values = Object.fromEntries(waiting.map(({ field, wanted }) => [field.name, Number(wanted)]));
     this.server.request({ type: "set", values }).catch((error) => {
       const field = error instanceof RefusedError ? error.field : null;
       (this.controls.get(field ?? "") ?? control).refuse(error.message);

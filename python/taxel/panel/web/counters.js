@@ -1,10 +1,9 @@
 // The counters in the header, and the losses by place.
 
 import { entitle, make, part, write } from "./dom.js";
-import { short, integer } from "./words.js";
+import { integer } from "./words.js";
 
 /** @typedef {import("./messages.js").Counters} CountersMessage */
-/** @typedef {import("./messages.js").Pace} Pace */
 
 /** @type {Record<string, string>} where data can be lost */
 const LOSSES = {
@@ -19,14 +18,11 @@ const LOSSES = {
 
 /**
  * Writes the counters.
- * @param {CountersMessage | null} counters of the live source
- * @param {number} drawn frames a second
+ * @param {CountersMessage} counters of the live source
  */
-export function writeCounters(counters, drawn) {
+export function writeCounters(counters) {
   const number = (/** @type {number | null | undefined} */ value, /** @type {(value: number) => string} */ how) => (value === null || value === undefined ? "–" : how(value));
   const put = (/** @type {string} */ id, /** @type {string} */ text) => write(part(id, HTMLElement), text);
-  put("drawn", String(drawn));
-  if (!counters) return;
   const { lost, latency } = counters;
   put("events", number(counters.events_per_s, integer));
   put("data", number(counters.bytes_per_s, (bytes) => (bytes / 1e6).toFixed(2)));
@@ -54,20 +50,4 @@ export function writeCounters(counters, drawn) {
   }
   put("reach", counters.reach_us ? `the last ${((counters.reach_us[1] - counters.reach_us[0]) / 1e6).toFixed(0)} s can be viewed` : "");
   put("wire", counters.wire_version ? `wire version ${counters.wire_version}` : "");
-}
-
-/** A drift beyond which the source is a simulated board, ppm: as the server has it. */
-const SIMULATED_PPM = 1e6;
-
-/**
- * Writes how the source's clock runs beside this machine's, and how late its datagrams are.
- * @param {Pace | null} pace of what is shown; null where arrivals say nothing
- */
-export function writePace(pace) {
-  if (pace && pace.drift_ppm > SIMULATED_PPM) {
-    write(part("pace", HTMLElement), `Clock: a simulated board, at 1/${(1 + pace.drift_ppm / 1e6).toFixed(0)} of real time`);
-    return;
-  }
-  const delays = pace && pace.delay.p50_us !== null && pace.delay.p99_us !== null ? `; delays beyond the shortest: ${short(pace.delay.p50_us)} (median), ${short(pace.delay.p99_us)} (99 %)` : "";
-  write(part("pace", HTMLElement), pace ? `Clock: drift ${pace.drift_ppm < 0 ? "−" : "+"}${Math.abs(pace.drift_ppm).toFixed(1)} ppm${delays}` : "");
 }

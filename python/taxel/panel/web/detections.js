@@ -1,9 +1,9 @@
 // Detections: the list beside the views, and the marks over the lanes.
 
-import { collapsed } from "./clusters.js";
 import { paintAs } from "./colours.js";
-import { entitle, make, part, write } from "./dom.js";
-import { counted, seconds, short, integer } from "./words.js";
+import { make, part, write } from "./dom.js";
+import { putMarks } from "./marks.js";
+import { seconds, short, integer } from "./words.js";
 
 /** @typedef {{ label: string, t_us: number, latency_us: number | null, source: string }} Detection `source`: which of several sensors it is of, else empty */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
@@ -17,8 +17,6 @@ const named = ({ label, source }) => (source ? `${label}, ${source}` : label);
 /** Detections of the live source that are stored, and the number of those that are listed. */
 const MOST_STORED = 300;
 const LISTED = 100;
-/** Width of a mark, CSS pixels. */
-const MARK = 11;
 
 /** Shapes of the marks, one for each label. */
 const SHAPES = 4;
@@ -84,28 +82,7 @@ export class Detections {
 
   /** Puts the marks over the lanes. @param {Timeline | null} timeline */
   mark(timeline) {
-    const marks = part("detection-marks", HTMLElement);
-    // What is hidden has no width.
-    marks.hidden = !this.shown.length;
-    const { clientWidth } = marks;
-    const inside = this.shown.flatMap(({ label, t_us, source }) => {
-      const share = timeline?.share(t_us) ?? null;
-      return share === null ? [] : [{ label, t_us, source, x: share * clientWidth }];
-    });
-    const { single, counts } = collapsed(inside.sort((a, b) => a.x - b.x), MARK, 1);
-    const all = [
-      ...single.map(({ label, t_us, source, x }) => ({ x, kind: this.shape(label), label, text: "", title: `${named({ label, source })} at ${seconds(t_us)}` })),
-      ...counts.map(({ from, to, marks: { length } }) => ({ x: (from + to) / 2, kind: "count", label: "", text: integer(length), title: counted(length, "detection") })),
-    ];
-    while (marks.children.length > all.length) marks.lastElementChild?.remove();
-    while (marks.children.length < all.length) marks.append(make("span"));
-    all.forEach(({ x, kind, label, text, title }, i) => {
-      const mark = /** @type {HTMLElement} */ (marks.children[i]);
-      mark.className = kind;
-      if (label) paintAs(mark, label);
-      write(mark, text);
-      entitle(mark, "title", title);
-      mark.style.left = `${((100 * x) / clientWidth).toFixed(3)}%`;
-    });
+    const marks = this.shown.map((found) => ({ ...found, kind: this.shape(found.label), title: `${named(found)} at ${seconds(found.t_us)}` }));
+    putMarks(part("detection-marks", HTMLElement), timeline, marks);
   }
 }

@@ -51,6 +51,20 @@ export function make(tag, attributes = {}, ...children) {
 }
 
 /**
+ * Gives an element so many children; those that it has stay.
+ * @template {HTMLElement} T
+ * @param {HTMLElement} parent
+ * @param {number} count
+ * @param {(i: number) => T} create makes the child of this number
+ * @returns {T[]}
+ */
+export function withChildren(parent, count, create) {
+  while (parent.children.length > count) parent.lastElementChild?.remove();
+  while (parent.children.length < count) parent.append(create(parent.children.length));
+  return /** @type {T[]} */ ([...parent.children]);
+}
+
+/**
  * Writes text where it differs: an unchanged text costs no layout.
  * @param {Node} node
  * @param {...string} lines

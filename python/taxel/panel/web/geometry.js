@@ -6,9 +6,7 @@ import { counted, rounded } from "./words.js";
 /** @typedef {import("./messages.js").ArrayInfo} ArrayInfo */
 /** @typedef {import("./messages.js").FrameSourceInfo} FrameSourceInfo */
 /** @typedef {[number, number]} Taxel column and row */
-/** @typedef {{ x: boolean, y: boolean }} Flips */
-/** @typedef {{ words: Uint32Array, levels: Float32Array, ground: string, edge: string }} Colours by taxel a pixel, and its height from 0 to 1;
- *   the colours of the sensor's ground and of its edge */
+/** @typedef {{ words: Uint32Array, levels: Float32Array }} Colours by taxel a pixel, and its height from 0 to 1 */
 
 /** Room around the outermost places of a sensor, in the distance between neighbours. */
 const MARGIN = 0.75;
@@ -111,16 +109,15 @@ class Grid extends Sensor {
     this.pixels = new Uint32Array(this.image.data.buffer);
   }
 
-  /** @param {Taxel} taxel @param {Flips} flips @returns {[number, number]} where it is, in shares of width and height */
-  place([x, y], flips) {
-    return [((flips.x ? this.columns - 1 - x : x) + 0.5) / this.columns, ((flips.y ? this.rows - 1 - y : y) + 0.5) / this.rows];
+  /** @param {Taxel} taxel @returns {[number, number]} where it is, in shares of width and height */
+  place([x, y]) {
+    return [(x + 0.5) / this.columns, (y + 0.5) / this.rows];
   }
 
-  /** @param {number} across @param {number} down shares of width and height @param {Flips} flips @returns {Taxel} */
-  at(across, down, flips) {
+  /** @param {number} across @param {number} down shares of width and height @returns {Taxel} */
+  at(across, down) {
     const index = (/** @type {number} */ share, /** @type {number} */ count) => Math.max(0, Math.min(count - 1, Math.floor(share * count)));
-    const [x, y] = [index(across, this.columns), index(down, this.rows)];
-    return [flips.x ? this.columns - 1 - x : x, flips.y ? this.rows - 1 - y : y];
+    return [index(across, this.columns), index(down, this.rows)];
   }
 
   /** @param {number} x @param {number} y @returns {string} a centre, in columns and rows; in mm, too, where the pitch is known */
@@ -144,16 +141,11 @@ class Grid extends Sensor {
     return this.mm ? " mm" : "";
   }
 
-  /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours @param {Flips} flips */
-  paint(canvas, context, { words }, flips) {
+  /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours */
+  paint(canvas, context, { words }) {
     const { rows, columns, pixels } = this;
     if (canvas.width !== columns || canvas.height !== rows) [canvas.width, canvas.height] = [columns, rows];
-    if (!flips.x && !flips.y) pixels.set(words);
-    else {
-      for (let y = 0; y < rows; y++) {
-        for (let x = 0; x < columns; x++) pixels[(flips.y ? rows - 1 - y : y) * columns + (flips.x ? columns - 1 - x : x)] = words[y * columns + x];
-      }
-    }
+    pixels.set(words);
     context.putImageData(this.image, 0, 0);
   }
 }
@@ -161,7 +153,7 @@ class Grid extends Sensor {
 /** A pixel's word as a colour. @param {number} word @returns {string} */
 const css = (word) => `rgb(${word & 255} ${(word >> 8) & 255} ${(word >> 16) & 255})`;
 
-/** Taxels at places: a dot each, or a cell of its area, within the outline of its source. */
+/** Taxels at places: a dot each, or a cell of its area. */
 class Placed extends Sensor {
   kind = /** @type {const} */ ("places");
   axes = /** @type {[string, string]} */ (["x", "y"]);
@@ -183,8 +175,6 @@ class Placed extends Sensor {
     this.aspect = Math.max(1 / 3, Math.min(8, this.extent[0] / this.extent[1]));
     /** @type {[number, number]} */
     this.limits = [Math.min(left, top), Math.max(right, bottom)];
-    const sides = sources.length ? sources : [{ left: 0, columns: this.columns }];
-    this.outlines = sides.map((side) => outline(this.taxels.filter((t) => t % this.columns >= side.left && t % this.columns < side.left + side.columns).map((t) => [places.x[t], places.y[t]])));
   }
 
   /** @returns {number} how much of the frame's height, and of its width, a unit takes: the same on the screen */
@@ -192,25 +182,23 @@ class Placed extends Sensor {
     return Math.min(1 / this.extent[0], 1 / this.aspect / this.extent[1]);
   }
 
-  /** @param {number} x @param {number} y @param {Flips} flips @returns {[number, number]} shares of width and height */
-  share(x, y, flips) {
+  /** @param {number} x @param {number} y @returns {[number, number]} shares of width and height */
+  share(x, y) {
     const scale = this.scaled();
-    const across = 0.5 + (x - this.from[0] - this.extent[0] / 2) * scale;
-    const down = 0.5 + (y - this.from[1] - this.extent[1] / 2) * scale * this.aspect;
-    return [flips.x ? 1 - across : across, flips.y ? 1 - down : down];
+    return [0.5 + (x - this.from[0] - this.extent[0] / 2) * scale, 0.5 + (y - this.from[1] - this.extent[1] / 2) * scale * this.aspect];
   }
 
-  /** @param {Taxel} taxel @param {Flips} flips @returns {[number, number]} */
-  place([x, y], flips) {
+  /** @param {Taxel} taxel @returns {[number, number]} */
+  place([x, y]) {
     const taxel = y * this.columns + x;
-    return this.share(this.places.x[taxel], this.places.y[taxel], flips);
+    return this.share(this.places.x[taxel], this.places.y[taxel]);
   }
 
-  /** @param {number} across @param {number} down @param {Flips} flips @returns {Taxel} the nearest one */
-  at(across, down, flips) {
+  /** @param {number} across @param {number} down @returns {Taxel} the nearest one */
+  at(across, down) {
     let [least, nearest] = [Infinity, 0];
     for (const taxel of this.taxels) {
-      const [x, y] = this.share(this.places.x[taxel], this.places.y[taxel], flips);
+      const [x, y] = this.share(this.places.x[taxel], this.places.y[taxel]);
       const distance = Math.hypot((x - across) * this.aspect, y - down);
       if (distance < least) [least, nearest] = [distance, taxel];
     }
@@ -239,32 +227,16 @@ class Placed extends Sensor {
     return this.places.unit ? ` ${this.places.unit}` : ", units of the file";
   }
 
-  /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours @param {Flips} flips */
-  paint(canvas, context, { words, ground, edge }, flips) {
+  /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours */
+  paint(canvas, context, { words }) {
     const { width, height, ratio } = fitted(canvas);
     const { near, places } = this;
     const unit = this.scaled() * width;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
-    /** @param {number} x @param {number} y @returns {[number, number]} */
-    const at = (x, y) => {
-      const [across, down] = this.share(x, y, flips);
-      return [across * width, down * height];
-    };
-    context.lineJoin = "round";
-    for (const points of this.outlines) {
-      context.beginPath();
-      for (const [x, y] of points) context.lineTo(...at(x, y));
-      context.closePath();
-      // A wide line around the places, and a narrower one on it, leave an edge.
-      for (const [colour, wide] of /** @type {[string, number][]} */ ([[edge, 1.3 * near * unit], [ground, 1.3 * near * unit - 2]])) {
-        [context.strokeStyle, context.fillStyle, context.lineWidth] = [colour, colour, Math.max(1, wide)];
-        context.stroke();
-        context.fill();
-      }
-    }
     for (const taxel of this.taxels) {
-      const [x, y] = at(places.x[taxel], places.y[taxel]);
+      const [across, down] = this.share(places.x[taxel], places.y[taxel]);
+      const [x, y] = [across * width, down * height];
       const side = unit * (places.area ? Math.sqrt(places.area[taxel]) : DOT * near);
       context.fillStyle = css(words[taxel]);
       context.beginPath();
@@ -297,15 +269,14 @@ class Channels extends Sensor {
     return Math.max(this.rows, this.columns);
   }
 
-  /** @param {Taxel} taxel @param {Flips} flips @returns {[number, number]} */
-  place([x, y], flips) {
-    const share = (Math.max(x, y) + 0.5) / this.count;
-    return [flips.x ? 1 - share : share, 0.5];
+  /** @param {Taxel} taxel @returns {[number, number]} */
+  place([x, y]) {
+    return [(Math.max(x, y) + 0.5) / this.count, 0.5];
   }
 
-  /** @param {number} across @param {number} _down @param {Flips} flips @returns {Taxel} */
-  at(across, _down, flips) {
-    const k = Math.max(0, Math.min(this.count - 1, Math.floor((flips.x ? 1 - across : across) * this.count)));
+  /** @param {number} across @returns {Taxel} */
+  at(across) {
+    const k = Math.max(0, Math.min(this.count - 1, Math.floor(across * this.count)));
     const taxel = /** @type {Taxel} */ (this.columns > 1 ? [k, 0] : [0, k]);
     // Between two sources lies an empty column.
     return this.has(...taxel) ? taxel : this.moved(taxel, [-1, 0]);
@@ -316,8 +287,8 @@ class Channels extends Sensor {
     return "";
   }
 
-  /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours @param {Flips} flips */
-  paint(canvas, context, { words, levels }, flips) {
+  /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours */
+  paint(canvas, context, { words, levels }) {
     const { width, height, ratio } = fitted(canvas);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
@@ -325,7 +296,7 @@ class Channels extends Sensor {
     for (const k of this.existing) {
       const high = Math.max(LEAST_BAR, levels[k]) * height;
       context.fillStyle = css(words[k]);
-      context.fillRect((flips.x ? this.count - 1 - k : k) * wide + Math.min(1, wide / 8), height - high, Math.max(1, wide - Math.min(2, wide / 4)), high);
+      context.fillRect(k * wide + Math.min(1, wide / 8), height - high, Math.max(1, wide - Math.min(2, wide / 4)), high);
     }
   }
 }
@@ -341,28 +312,4 @@ class Channels extends Sensor {
 export function geometry(array, sources) {
   if (array.places) return new Placed(array, sources, array.places);
   return array.pitch_mm === null && Math.min(array.rows, array.columns) === 1 ? new Channels(array, sources) : new Grid(array, sources);
-}
-
-/**
- * The smallest convex outline around points (Andrew's monotone chain).
- * @param {number[][]} points
- * @returns {number[][]}
- */
-function outline(points) {
-  const sorted = [...points].sort(([x, y], [u, v]) => x - u || y - v);
-  /** @param {number[][]} all @returns {number[][]} the half on one side */
-  const half = (all) => {
-    /** @type {number[][]} */
-    const chain = [];
-    for (const [x, y] of all) {
-      while (chain.length > 1) {
-        const [[a, b], [c, d]] = chain.slice(-2);
-        if ((c - a) * (y - b) - (d - b) * (x - a) > 0) break;
-        chain.pop();
-      }
-      chain.push([x, y]);
-    }
-    return chain.slice(0, -1);
-  };
-  return sorted.length < 3 ? sorted : [...half(sorted), ...half(sorted.reverse())];
 }

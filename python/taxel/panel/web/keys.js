@@ -37,7 +37,8 @@ export const KEYS = [
   { keys: ["1"], shown: "1", text: "tab Board", action: "tabBoard" },
   { keys: ["2"], shown: "2", text: "tab Record", action: "tabRecord" },
   { keys: ["3"], shown: "3", text: "tab Labels", action: "tabLabels" },
-  { keys: ["4"], shown: "4", text: "tab View", action: "tabView" },
+  { keys: ["4"], shown: "4", text: "tab Train", action: "tabTrain" },
+  { keys: ["5"], shown: "5", text: "tab View", action: "tabView" },
   { keys: ["t"], shown: "T", text: "theme: dark, light or the system’s", action: "theme" },
   { keys: ["?"], shown: "?", text: "show this list", action: "help" },
 ];
@@ -45,9 +46,8 @@ export const KEYS = [
 /**
  * Calls the action of a key, unless the user types text or the focused element uses the key itself.
  * @param {Record<string, (event: KeyboardEvent) => void>} actions by name
- * @param {() => boolean} letters whether single characters count
  */
-export function bindKeys(actions, letters) {
+export function bindKeys(actions) {
   /** @type {Map<string, string>} */
   const byKey = new Map(KEYS.flatMap(({ keys, action }) => keys.map((key) => [key, action])));
   for (const action of byKey.values()) if (!actions[action]) throw new Error(`no action for key ${action}`);
@@ -55,14 +55,13 @@ export function bindKeys(actions, letters) {
     if (event.altKey || event.defaultPrevented) return;
     const { target } = event;
     if (!(target instanceof Element)) return;
-    const types = target instanceof HTMLInputElement && !["checkbox", "range"].includes(target.type);
+    const types = target instanceof HTMLInputElement && target.type !== "checkbox";
     if (types || target instanceof HTMLTextAreaElement || document.querySelector("dialog[open]")) return;
     const letter = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     // On a Mac it is the command key.
     const key = event.ctrlKey || event.metaKey ? `Ctrl ${event.shiftKey ? "Shift " : ""}${letter}` : letter;
     const action = byKey.get(key);
     if (!action || (event.repeat && ["record", "play", "mark", "theme"].includes(action))) return;
-    if (key.length === 1 && key !== " " && !letters()) return;
     // Elements with keys of their own: lists and sliders use arrows and letters, buttons and boxes the space bar.
     const moves = key.startsWith("Arrow") || key === "Home" || key === "End";
     if (target instanceof HTMLSelectElement || (moves && target.matches("input, [role=tab]"))) return;

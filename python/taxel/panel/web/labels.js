@@ -1,15 +1,13 @@
 // Labels by click: mark, name, move and delete events on the time line.
 
-import { collapsed } from "./clusters.js";
 import { paintAs } from "./colours.js";
-import { entitle, make, part, write } from "./dom.js";
+import { entitle, make, part, withChildren, write } from "./dom.js";
 import { notify, silence } from "./notice.js";
-import { counted, integer, listedTime, readTime, seconds, timeUnit } from "./words.js";
+import { counted, listedTime, numbering, readTime, seconds, timeUnit } from "./words.js";
 
-/** @typedef {import("./messages.js").LabelRow} LabelRow as the server has it */
-/** @typedef {LabelRow & { label_id: number }} Label with a number of this page */
+/** @typedef {import("./messages.js").LabelRow} Label */
 /** @typedef {import("./messages.js").Labels} LabelsMessage */
-/** @typedef {{ old?: LabelRow | null, new?: LabelRow | null }} Change */
+/** @typedef {{ old?: Label | null, new?: Label | null }} Change */
 /** @typedef {import("./server.js").Server} Server */
 /** @typedef {import("./settings.js").Settings} Settings */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
@@ -19,16 +17,17 @@ import { counted, integer, listedTime, readTime, seconds, timeUnit } from "./wor
 const STEP_US = 1000;
 /** From here on a press is a drag, CSS pixels. */
 const DRAG = 4;
-/** Levels on which handles are stacked where they would cover each other; more labels than fit are a count. */
+/** Levels on which handles are stacked where they would cover each other; more labels than fit are lines. */
 const LEVELS = 3;
 /** Width of a handle, CSS pixels. */
 const HANDLE = { mouse: 11, touch: 16 };
-/** What makes a label another one. @param {LabelRow} row */
-const keyOf = ({ label, t_us, source, trial, replaces_us }) => JSON.stringify([label, t_us, source, trial, replaces_us]);
-/** @param {Label} label @returns {LabelRow} */
-const asRow = ({ label, t_us, source, trial, replaces_us }) => ({ label, t_us, source, trial, replaces_us });
 /** Width of a letter of a flag's name, CSS pixels, about. */
 const LETTER = 7;
+
+/** What makes a label another one. @param {Label} row */
+const keyOf = ({ label, t_us, source, trial, replaces_us }) => JSON.stringify([label, t_us, source, trial, replaces_us]);
+/** @param {number} t_us @returns {number} a time that a label can have: that of a frame, where frames are numbered */
+const timeOfLabel = (t_us) => (numbering.number_us ? Math.floor(t_us / numbering.number_us) * numbering.number_us : Math.round(t_us));
 
 /** The lane of flags above the raster, and the tab with all of them. */
 export class Labels {
@@ -39,65 +38,49 @@ export class Labels {
    * @param {() => Timeline | null} timeline
    * @param {(error: unknown) => void} failed
    * @param {() => void} shown called to bring the tab to the front
-   * @param {(from_us: number, to_us: number) => void} closer called to show a stretch of time
    * @param {(file: string) => void} counted called when the number of a recording's labels may have changed
    */
-  constructor(server, settings, player, timeline, failed, shown, closer, counted) {
+  constructor(server, settings, player, timeline, failed, shown, counted) {
     this.server = server;
-    this.settings = settings;
     this.player = player;
     this.timeline = timeline;
     this.failed = failed;
     this.shown = shown;
-    this.closer = closer;
     this.counted = counted;
     /** @type {Map<string, { path: string, labels: Label[] }>} by recording */
     this.files = new Map();
-    this.last_id = 0;
-    /** What labels become by the changes that are under way, by their numbers. @type {Map<number, string>} */
-    this.becoming = new Map();
     /** The recording whose labels are shown. @type {string | null} */
     this.file = null;
     /** Its trial, where the file holds several. @type {string | null} */
     this.trial = null;
-    /** @type {Map<number, HTMLButtonElement>} */
-    this.flags = new Map();
-    /** The counts of flags that would cover each other. @type {HTMLButtonElement[]} */
-    this.counts = [];
-    /** The rows of the list, with what each was made for. @type {Map<number, { made: string, row: HTMLElement }>} */
-    this.rows = new Map();
+    /** The labels whose flags are up, from left to right. @type {Label[]} */
+    this.flagged = [];
     /** The notice that offers to take a deletion back. */
     this.offered = "";
-    /** The answer to the last change: the next one that is taken back is that of after it. @type {Promise<unknown>} */
-    this.saved = Promise.resolve();
-    /** @type {number | null} */
+    /** The chosen label, as the changes that were asked for leave it. @type {Label | null} */
     this.chosen = null;
-    /** The name that was marked by the last click. */
-    this.clicked = "";
-    /** Time of a click that was made before a label name was typed; the label is set when there is a name. @type {number | null} */
-    this.waiting_us = null;
-    /** The one being dragged, and where to. @type {{ label_id: number, t_us: number } | null} */
-    this.dragged = null;
+    /** Where it is dragged to. @type {number | null} */
+    this.dragged_us = null;
+    /** The label that is in the form. @type {Label | null} */
+    this.edited = null;
     this.name = part("label-name", HTMLInputElement);
     this.name.value = settings.values.label;
-    /** Whether the name is one for the recording that is shown: offered by its labels, or typed. */
-    this.named = false;
-    this.name.oninput = () => {
-      this.named = true;
-      settings.set("label", this.name.value);
-    };
+    this.name.oninput = () => settings.set("label", this.name.value);
     this.lane = part("label-lane", HTMLElement);
     let from = 0;
     this.lane.addEventListener("pointerdown", (event) => (from = event.clientX));
     this.lane.addEventListener("click", (event) => {
-      if (event.target === this.lane && Math.abs(event.clientX - from) < DRAG) this.click(event);
+      // The second click of a double one is no label of its own.
+      if (event.target === this.lane && event.detail < 2 && Math.abs(event.clientX - from) < DRAG) this.mark(this.timeAt(event.clientX));
     });
-    part("mark", HTMLButtonElement).onclick = () => this.markHere();
     part("label-form", HTMLFormElement).onsubmit = (event) => {
       event.preventDefault();
-      if (this.waiting_us === null) this.markHere();
-      else this.mark(this.waiting_us);
+      this.markHere();
     };
+    const form = part("chosen-form", HTMLFormElement);
+    form.onsubmit = (event) => event.preventDefault();
+    form.onchange = () => this.edit();
+    part("chosen-delete", HTMLButtonElement).onclick = () => this.removeChosen();
     new ResizeObserver(() => this.arrange()).observe(this.lane);
   }
 
@@ -109,17 +92,7 @@ export class Labels {
 
   /** @param {LabelsMessage} message */
   take({ name, path, labels }) {
-    // A label that was there, or that one becomes, keeps its number.
-    const before = this.files.get(name)?.labels ?? [];
-    const known = new Map(before.map((label) => [keyOf(label), label.label_id]));
-    for (const [id, key] of this.becoming) known.set(key, id);
-    const numbered = labels.map((row) => {
-      const key = keyOf(row);
-      const label_id = known.get(key) ?? ++this.last_id;
-      known.delete(key);
-      return { ...row, label_id };
-    });
-    this.files.set(name, { path, labels: numbered.sort((a, b) => a.t_us - b.t_us) });
+    this.files.set(name, { path, labels: labels.sort((a, b) => a.t_us - b.t_us) });
     if (name === this.file) this.show();
     this.counted(name);
   }
@@ -133,17 +106,8 @@ export class Labels {
   choose(file, trial = null) {
     if (this.file === file && this.trial === trial) return;
     [this.file, this.trial] = [file, trial];
-    this.chosen = this.waiting_us = null;
-    this.named = false;
+    this.chosen = null;
     this.show();
-  }
-
-  /** Offers the name of the last label, where none has the name that was typed for another recording. */
-  offerName() {
-    const last = this.labels.at(-1);
-    if (this.named || !last) return;
-    this.named = true;
-    if (!this.labels.some(({ label }) => label === this.name.value.trim())) this.name.value = last.label;
   }
 
   /** @param {string[]} names to offer: the readout's, and those used */
@@ -161,88 +125,67 @@ export class Labels {
     return t_us === null || !reach ? t_us : Math.max(reach[0], Math.min(reach[1], t_us));
   }
 
-  /** Marks where the pointer is; the second click of a double one is no label of its own. @param {MouseEvent} event */
-  click({ clientX, detail }) {
-    const name = this.name.value.trim();
-    if (detail < 2 || name !== this.clicked) this.mark(this.timeAt(clientX));
-    this.clicked = name;
-  }
-
   /** Marks at the cursor, or at the time shown. */
   markHere() {
-    this.player.timeToMark(this.timeline()?.cursor_us).then((t_us) => this.mark(t_us));
+    this.mark(this.timeline()?.cursor_us ?? this.player.targetTime);
   }
 
-  /** @param {number | null} t_us */
+  /** Makes a label and chooses it. @param {number | null} t_us */
   mark(t_us) {
     const label = this.name.value.trim();
-    this.waiting_us = label ? null : t_us;
     if (!label) {
       this.shown();
       this.name.focus();
-      notify("type the label's name, then Enter");
-      return;
+      return notify("type the label's name first");
     }
-    if (t_us !== null) this.add({ label, t_us });
-  }
-
-  /** Asks for a request about labels; the tab says so until there is an answer. @param {import("./messages.js").Request} message */
-  save(message) {
-    silence(this.offered);
-    const answer = this.server.request(message).finally(() => this.showPlace());
-    this.saved = answer.catch(() => {});
-    this.showPlace();
-    return answer;
+    if (t_us !== null) this.put(null, { label, t_us: timeOfLabel(t_us), source: "", trial: this.trial ?? "", replaces_us: null });
   }
 
   /** Asks for changes of labels, all or none. @param {Change[]} changes */
   change(changes) {
-    return this.save({ type: "change", changes });
+    silence(this.offered);
+    return this.server.request({ type: "change", changes });
   }
 
   /** Takes back the last change of labels that was made in this window. */
   undo() {
-    // The server takes back what it has carried out.
-    this.saved = this.saved.then(() => this.save({ type: "undo" })).then(() => notify("undid the last change of labels"), this.failed);
+    silence(this.offered);
+    this.server.request({ type: "undo" }).then(() => notify("undid the last change of labels"), this.failed);
   }
 
-  /** Makes a label and chooses it. @param {{ label: string, t_us: number }} label */
-  add({ label, t_us }) {
-    const before = new Set(this.labels.map(({ label_id }) => label_id));
-    this.change([{ new: { label, t_us: Math.round(t_us), source: "", trial: "", replaces_us: null } }]).then(() => {
-      this.chosen = this.labels.find(({ label_id }) => !before.has(label_id))?.label_id ?? this.chosen;
-      this.show();
-    }, this.failed);
-  }
-
-  /** Changes a label, which keeps its number. @param {number} label_id @param {Partial<LabelRow>} by */
-  async alter(label_id, by) {
-    // The server knows the label as the change before leaves it.
-    await this.saved;
-    const label = this.labels.find((known) => known.label_id === label_id);
-    if (!label) throw new Error("this label was deleted");
-    const altered = { ...asRow(label), ...by };
-    this.becoming.set(label_id, keyOf(altered));
-    try {
-      await this.change([{ old: asRow(label), new: altered }]);
-    } finally {
-      this.becoming.delete(label_id);
-    }
-  }
-
-  /** @param {number} label_id @param {number} t_us */
-  move(label_id, t_us) {
-    this.alter(label_id, { t_us: Math.round(t_us) }).catch((error) => {
+  /** Puts a label in the place of another or of none, and chooses it; the next change is one of it. @param {Label | null} old @param {Label} wanted */
+  put(old, wanted) {
+    const before = this.chosen;
+    this.chosen = wanted;
+    this.change([{ old, new: wanted }]).catch((error) => {
+      if (this.chosen === wanted) this.chosen = before;
+      this.edited = null;
       this.failed(error);
       this.show();
     });
   }
 
-  /** @param {number} label_id */
-  remove(label_id) {
-    const gone = this.labels.find((label) => label.label_id === label_id);
-    if (!gone) return;
-    this.change([{ old: asRow(gone) }]).then(() => this.offerUndo(`deleted ${gone.label} at ${seconds(gone.t_us)}`), this.failed);
+  /** Changes the chosen label. @param {Partial<Label>} by */
+  alter(by) {
+    if (!this.chosen) return;
+    const wanted = { ...this.chosen, ...by };
+    if (keyOf(wanted) !== keyOf(this.chosen)) this.put(this.chosen, wanted);
+  }
+
+  /** Changes the chosen label to what was typed. */
+  edit() {
+    const time = part("chosen-time", HTMLInputElement).value;
+    const t_us = readTime(time);
+    if (Number.isFinite(t_us)) return this.alter({ label: part("chosen-name", HTMLInputElement).value.trim(), t_us });
+    this.failed(new Error(`${time} is not a number of ${timeUnit()}`));
+    this.edited = null;
+    return this.show();
+  }
+
+  /** @param {Label} gone */
+  remove(gone) {
+    if (this.isChosen(gone)) this.chosen = null;
+    this.change([{ old: gone }]).then(() => this.offerUndo(`deleted ${gone.label} at ${seconds(gone.t_us)}`), this.failed);
   }
 
   /** Says what was changed, and offers to take it back. @param {string} text */
@@ -251,18 +194,27 @@ export class Labels {
     notify(text, false, { text: "Undo", action: () => this.undo() });
   }
 
+  /** @param {Label} label */
+  isChosen(label) {
+    return this.chosen !== null && keyOf(this.chosen) === keyOf(label);
+  }
+
+  /** Chooses a label, and shows its time. @param {Label} label */
+  goTo(label) {
+    this.chosen = label;
+    this.player.seek(label.t_us);
+    this.show();
+  }
+
   /** @param {number} by 1: the next label after the time shown, -1: the one before */
   go(by) {
     const now = this.player.targetTime ?? 0;
     const others = this.labels.filter(({ t_us }) => (by > 0 ? t_us > now : t_us < now));
     const next = by > 0 ? others[0] : others[others.length - 1];
-    if (!next) return;
-    this.chosen = next.label_id;
-    this.player.seek(next.t_us);
-    this.show();
+    if (next) this.goTo(next);
   }
 
-  /** Deletes the label that was chosen last. */
+  /** Deletes the chosen label. */
   removeChosen() {
     if (this.chosen !== null) this.remove(this.chosen);
   }
@@ -270,221 +222,140 @@ export class Labels {
   /** Writes the list and puts up the flags. */
   show() {
     const { labels } = this;
-    this.offerName();
     write(part("label-count", HTMLElement), this.file ? counted(labels.length, "label") : "");
     this.lane.dataset.hint = this.file ? "Labels: click here to add a label" : "Labels: open or start a recording first";
-    this.showPlace();
-    part("train-line", HTMLElement).hidden = !labels.length;
+    const table = this.file ? this.files.get(this.file) : undefined;
+    write(part("label-place", HTMLElement), table ? `${labels.length ? "Saved" : "To be saved"} in ${table.path}` : "Open or start a recording, then label its events.");
+    part("train", HTMLButtonElement).disabled = !labels.length;
     // Who has made labels knows how, and needs the room.
     part("label-how", HTMLElement).hidden = labels.length > 0;
-    const list = part("label-list", HTMLElement);
-    // A row in which a person types stays what it is.
-    const typing = list.contains(document.activeElement) ? document.activeElement?.closest("li")?.dataset.id : undefined;
-    const edited = typing === undefined ? null : list.querySelector(`li[data-id="${CSS.escape(typing)}"]`);
-    const rows = labels.map((label) => (edited instanceof HTMLElement && edited.dataset.id === String(label.label_id) ? edited : this.rowOf(label)));
-    const ids = new Set(labels.map(({ label_id }) => label_id));
-    for (const id of this.rows.keys()) if (!ids.has(id)) this.rows.delete(id);
-    if (rows.length !== list.children.length || rows.some((row, i) => row !== list.children[i])) {
-      const focused = document.activeElement;
-      list.replaceChildren(...rows);
-      if (edited && focused instanceof HTMLElement) focused.focus();
-    }
-    for (const row of rows) row.classList.toggle("chosen", row.dataset.id === String(this.chosen));
+    const rows = withChildren(part("label-list", HTMLElement), labels.length, (i) => this.row(i));
+    labels.forEach((label, i) => {
+      const [go, away] = rows[i].children;
+      write(go.children[0], label.source ? `${label.label}, ${label.source}` : label.label);
+      write(go.children[1], seconds(label.t_us));
+      entitle(away, "aria-label", `delete ${label.label}, ${seconds(label.t_us)}`);
+      go.setAttribute("aria-current", String(this.isChosen(label)));
+      paintAs(rows[i], label.label);
+    });
+    this.showChosen();
     this.arrange();
   }
 
-  /** Says where the labels are saved, or that they are being saved. */
-  showPlace() {
-    const table = this.file ? this.files.get(this.file) : undefined;
-    const how = this.server.saves ? "Saving" : table?.labels.length ? "Saved" : "To be saved";
-    write(part("label-place", HTMLElement), table ? `${how} in ${table.path}` : "Open or start a recording, then label its events.");
+  /** Writes the chosen label into the form; what is typed there stays while it is the same. */
+  showChosen() {
+    const { chosen } = this;
+    part("chosen", HTMLFieldSetElement).disabled = chosen === null;
+    if (chosen === this.edited && chosen !== null) return;
+    this.edited = chosen;
+    part("chosen-name", HTMLInputElement).value = chosen?.label ?? "";
+    part("chosen-time", HTMLInputElement).value = chosen ? listedTime(chosen.t_us) : "";
+    write(part("chosen-unit", HTMLElement), timeUnit() === "seconds" ? "s" : "");
   }
 
-  /** The row of a label, made again only where it is another. @param {Label} label @returns {HTMLElement} */
-  rowOf(label) {
-    const made = JSON.stringify([label, timeUnit()]);
-    let known = this.rows.get(label.label_id);
-    if (known?.made !== made) this.rows.set(label.label_id, (known = { made, row: this.row(label) }));
-    return known.row;
+  /** @param {number} i its number in the list @returns {HTMLElement} */
+  row(i) {
+    const go = make("button", { type: "button", class: "link" }, make("span", { class: "what" }), make("span"));
+    const away = make("button", { type: "button", class: "small" }, "×");
+    go.onclick = () => this.goTo(this.labels[i]);
+    away.onclick = () => this.remove(this.labels[i]);
+    return make("li", {}, go, away);
   }
 
-  /** @param {Label} label @returns {HTMLElement} */
-  row({ label_id, label, t_us, source }) {
-    const name = make("input", { type: "text", value: label, "aria-label": `name of the label at ${seconds(t_us)}`, maxlength: 200, list: "label-names" });
-    const time = make("input", { type: "text", inputmode: "decimal", value: listedTime(t_us), "aria-label": `time of ${label}, ${timeUnit()}` });
-    const go = make("button", { type: "button", class: "small", "aria-label": `go to ${label}, ${seconds(t_us)}` }, "Go");
-    const away = make("button", { type: "button", class: "small", "aria-label": `delete ${label}, ${seconds(t_us)}` }, "×");
-    // The row is older than a label whose time was just typed.
-    const stored = () => this.labels.find((known) => known.label_id === label_id) ?? { label, t_us };
-    const [heldName, heldTime] = [() => stored().label, () => listedTime(stored().t_us)];
-    name.onchange = () => this.typed(name, label_id, { label: name.value.trim() }, heldName);
-    time.onchange = () => {
-      const wanted = readTime(time.value);
-      if (Number.isFinite(wanted)) this.typed(time, label_id, { t_us: wanted }, heldTime);
-      else this.refused(time, heldTime, new Error(`${time.value} is not a number of ${timeUnit()}`));
-    };
-    go.onclick = () => {
-      this.chosen = label_id;
-      this.player.seek(stored().t_us);
-      this.show();
-    };
-    away.onclick = () => this.remove(label_id);
-    const row = make("li", {}, name, time, make("span", { class: "unit" }, timeUnit() === "seconds" ? "s" : ""), go, away, ...(source ? [make("span", { class: "source" }, source)] : []));
-    row.dataset.id = String(label_id);
-    paintAs(row, label);
-    return row;
-  }
-
-  /** Asks for what was typed. @param {HTMLInputElement} input @param {number} label_id @param {Partial<LabelRow>} by @param {() => string} stored */
-  async typed(input, label_id, by, stored) {
-    try {
-      await this.alter(label_id, by);
-      if (input.hasAttribute("aria-invalid")) silence();
-      this.holds(input, stored());
-    } catch (error) {
-      this.refused(input, stored, error);
-    }
-  }
-
-  /** @param {HTMLInputElement} input @param {string} value what the label holds */
-  holds(input, value) {
-    input.value = value;
-    input.removeAttribute("aria-invalid");
-    input.onkeydown = null;
-  }
-
-  /** @param {HTMLInputElement} input @param {() => string} stored what the label holds @param {unknown} error */
-  refused(input, stored, error) {
-    this.failed(error);
-    input.setAttribute("aria-invalid", "true");
-    input.onkeydown = (event) => {
-      if (event.key !== "Escape") return;
-      this.holds(input, stored());
-      event.stopPropagation();
-    };
-  }
-
-  /** Puts each flag in the window where its time is; its handle on the first level where it covers no other. More than have levels are a count. */
+  /** Puts each flag in the window where its time is; its handle on the first level where it covers no other. */
   arrange() {
     const timeline = this.timeline();
-    const { clientWidth } = this.lane;
+    const wide = this.lane.clientWidth;
     const handle = HANDLE[matchMedia("(max-width: 860px)").matches ? "touch" : "mouse"];
     const inside = this.labels.flatMap((label) => {
-      const t_us = this.dragged?.label_id === label.label_id ? this.dragged.t_us : label.t_us;
-      const share = timeline?.share(t_us) ?? null;
-      return share === null ? [] : [{ ...label, t_us, x: share * clientWidth }];
+      const chosen = this.isChosen(label);
+      const share = timeline?.share(chosen && this.dragged_us !== null ? this.dragged_us : label.t_us) ?? null;
+      return share === null ? [] : [{ label, chosen, x: share * wide }];
     });
-    const { single, counts } = collapsed(inside.filter(({ label_id }) => label_id !== this.chosen), handle, LEVELS);
-    const flagged = [...single, ...inside.filter(({ label_id }) => label_id === this.chosen)].sort((a, b) => a.x - b.x);
-    this.arrangeFlags(flagged, handle, clientWidth);
-    while (this.counts.length > counts.length) this.counts.pop()?.remove();
-    while (this.counts.length < counts.length) {
-      const count = make("button", { type: "button", class: "count" });
-      this.counts.push(count);
-      this.lane.append(count);
-    }
-    counts.forEach(({ from, to, marks }, i) => {
-      const count = this.counts[i];
-      const [first, last] = [marks[0].t_us, marks[marks.length - 1].t_us];
-      write(count, integer(marks.length));
-      const name = `${counted(marks.length, "label")} from ${seconds(first)} to ${seconds(last)}: zoom in`;
-      entitle(count, "aria-label", name);
-      entitle(count, "title", name);
-      count.style.left = `${from.toFixed(1)}px`;
-      count.style.width = `${(to - from + handle).toFixed(1)}px`;
-      count.onclick = () => this.closer(first, last);
-    });
-  }
-
-  /** @param {(Label & { x: number })[]} flagged by time @param {number} handle width of a handle @param {number} wide of the lane, CSS pixels */
-  arrangeFlags(flagged, handle, wide) {
-    const seen = new Set();
     /** @type {number[]} where the last handle of each level ends */
     const ends = new Array(LEVELS).fill(-Infinity);
-    flagged.forEach(({ label_id, label, t_us, x }, i) => {
-      seen.add(label_id);
-      let flag = this.flags.get(label_id);
-      if (!flag) {
-        flag = this.flag(label_id);
-        this.flags.set(label_id, flag);
-        this.lane.append(flag);
-      }
+    const lines = new Set();
+    const flags = inside.flatMap(({ label, chosen, x }, i) => {
       const level = ends.findIndex((end) => end <= x);
+      // Of lines on one pixel one is seen.
+      if (level < 0 && !chosen && lines.has(Math.round(x))) return [];
+      lines.add(Math.round(x));
       if (level >= 0) ends[level] = x + handle;
       // The name stands where no other handle of its level follows.
-      const next = flagged.slice(i + 1, i + 1 + LEVELS).reduce((least, later) => Math.min(least, later.x), wide + handle);
-      const named = level === 0 && next - x > handle + LETTER * Math.min(label.length, 14);
-      if (named) ends.fill(x + handle + LETTER * Math.min(label.length, 14));
+      const next = inside.slice(i + 1, i + 1 + LEVELS).reduce((least, later) => Math.min(least, later.x), wide + handle);
+      const length = handle + LETTER * Math.min(label.label.length, 14);
+      const named = level === 0 && next - x > length;
+      if (named) ends.fill(x + length);
+      return [{ label, chosen, x, level, named }];
+    });
+    this.flagged = flags.map(({ label }) => label);
+    const elements = withChildren(this.lane, flags.length, (i) => this.flag(i));
+    flags.forEach(({ label, chosen, x, level, named }, i) => {
+      const flag = elements[i];
       flag.style.left = `${((100 * x) / wide).toFixed(3)}%`;
       flag.dataset.level = String(level);
-      flag.classList.toggle("line", level < 0 && label_id !== this.chosen);
-      write(/** @type {HTMLElement} */ (flag.lastElementChild), named ? label : "");
-      const name = `label ${label} at ${seconds(t_us)}`;
+      flag.classList.toggle("line", level < 0 && !chosen);
+      flag.classList.toggle("chosen", chosen);
+      write(/** @type {HTMLElement} */ (flag.lastElementChild), named ? label.label : "");
+      const name = `label ${label.label} at ${seconds(label.t_us)}`;
       entitle(flag, "aria-label", name);
       entitle(flag, "title", name);
-      flag.classList.toggle("chosen", label_id === this.chosen);
-      paintAs(flag, label);
+      paintAs(flag, label.label);
+      if (chosen && this.dragged_us === null && this.lane.contains(document.activeElement)) flag.focus();
     });
-    for (const [id, flag] of this.flags) {
-      if (seen.has(id)) continue;
-      flag.remove();
-      this.flags.delete(id);
-    }
   }
 
-  /** @param {number} label_id @returns {HTMLButtonElement} */
-  flag(label_id) {
+  /** @param {number} i its number in the lane @returns {HTMLButtonElement} */
+  flag(i) {
     const flag = make("button", { type: "button", class: "flag" }, make("i"), make("span"));
-    const current = () => this.labels.find((label) => label.label_id === label_id);
     let from = 0;
     // The pointer holds the handle, which stands beside the label's time.
     let beside_us = 0;
+    const choose = () => {
+      if (this.isChosen(this.flagged[i])) return;
+      this.chosen = this.flagged[i];
+      this.show();
+    };
+    flag.addEventListener("focus", choose);
     flag.addEventListener("pointerdown", (event) => {
+      choose();
       from = event.clientX;
-      beside_us = (current()?.t_us ?? 0) - (this.timeAt(from) ?? 0);
+      beside_us = this.flagged[i].t_us - (this.timeAt(from) ?? 0);
       flag.setPointerCapture(event.pointerId);
     });
     flag.addEventListener("pointermove", (event) => {
-      if (!flag.hasPointerCapture(event.pointerId)) return;
-      if (!this.dragged && !(Math.abs(event.clientX - from) >= DRAG)) return;
+      if (!flag.hasPointerCapture(event.pointerId) || (this.dragged_us === null && !(Math.abs(event.clientX - from) >= DRAG))) return;
       const t_us = this.timeAt(event.clientX);
       if (t_us === null) return;
-      this.dragged = { label_id, t_us: t_us + beside_us };
+      this.dragged_us = t_us + beside_us;
       this.arrange();
     });
     flag.addEventListener("pointerup", () => {
-      const { dragged } = this;
-      this.dragged = null;
-      this.chosen = label_id;
-      if (dragged) this.move(label_id, dragged.t_us);
-      else this.shown();
+      const { dragged_us } = this;
+      this.dragged_us = null;
+      if (dragged_us === null) this.shown();
+      else this.alter({ t_us: timeOfLabel(dragged_us) });
       this.show();
     });
     flag.addEventListener("pointercancel", () => {
-      this.dragged = null;
+      this.dragged_us = null;
       this.arrange();
     });
-    flag.addEventListener("focus", () => {
-      this.chosen = label_id;
-      this.show();
-    });
     flag.addEventListener("keydown", (event) => {
-      const label = current();
-      if (event.key === "Escape" && this.dragged) {
+      if (event.key === "Escape" && this.dragged_us !== null) {
         // The press goes on, but moves nothing.
-        this.dragged = null;
+        this.dragged_us = null;
         from = NaN;
         return this.arrange();
       }
-      if (!label || event.ctrlKey || event.altKey || event.metaKey) return;
-      const far = event.shiftKey ? 100 * STEP_US : STEP_US;
-      if (event.key === "ArrowLeft") this.move(label_id, label.t_us - far);
-      else if (event.key === "ArrowRight") this.move(label_id, label.t_us + far);
-      else if (event.key === "Delete" || event.key === "Backspace") this.remove(label_id);
+      if (!this.chosen || event.ctrlKey || event.altKey || event.metaKey) return;
+      const far = (numbering.number_us ?? STEP_US) * (event.shiftKey ? 100 : 1);
+      if (event.key === "ArrowLeft") this.alter({ t_us: this.chosen.t_us - far });
+      else if (event.key === "ArrowRight") this.alter({ t_us: this.chosen.t_us + far });
+      else if (event.key === "Delete" || event.key === "Backspace") this.removeChosen();
       else if (event.key === "Enter") {
         this.shown();
-        const input = part("label-list", HTMLElement).querySelector(`li[data-id="${label_id}"] input`);
-        if (input instanceof HTMLElement) input.focus();
+        part("chosen-name", HTMLInputElement).focus();
       } else return;
       event.preventDefault();
       event.stopPropagation();

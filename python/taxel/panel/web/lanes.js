@@ -1,8 +1,9 @@
-// The lanes, one above the other: all share one time. A new lane is an entry of LANES and what draws it: the block on the page, its element, its
-// box in the tab of the view and what the cursor says come from the entry.
+// The lanes, one above the other: all share one time. A new lane is an entry of LANES and what draws it: the block on the page, its element, and
+// what the cursor says come from the entry.
 
 import { Channels } from "./channels.js";
 import { make, part, themed, write } from "./dom.js";
+import { movable } from "./layout.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
 import { Raster } from "./raster.js";
 import uPlot from "./vendor/uPlot.js";
@@ -23,7 +24,7 @@ import { rounded, integer } from "./words.js";
  * @property {{ unit: string, step: number, zero: number, frames: boolean }} values their unit, the size of a tick in it, ticks of the value 0, and whether they are of frames
  * @property {{ unit: string, step: number }} sums unit of the sum of the values, and size of a tick in it
  * @property {number | null} gap_us how long frames of a live source may be away until the curves have a gap; null: however long
- * @property {string} raster "changes" or "spikes"
+ * @property {boolean} encoded whether the raster shows spikes
  * @property {string} spikes encoder and latency
  */
 
@@ -34,8 +35,6 @@ import { rounded, integer } from "./words.js";
  * @property {string} label what it is, for those who hear the page
  * @property {number} least height that it needs with its heading, CSS pixels
  * @property {string} [kind] class of its block and of its element in style.css
- * @property {`show${string}`} setting that shows it
- * @property {string} [box] text of the setting's box; without one it shares the box of another lane
  * @property {(shown: Shown) => boolean} [fits] whether it has anything to show of this source; without it: of all
  * @property {(shown: Shown, sources: string[]) => (Node | string)[]} heading
  * @property {(shown: () => Shown, sources: string[]) => Plan} [plan]
@@ -118,24 +117,20 @@ function centreAt({ sensor }, values) {
 export const LANES = [
   {
     name: "raster", label: "Raster of events by row over time", kind: "raster", least: 96,
-    setting: "showRaster", box: "Raster, channels",
     // The values of frames and of channels say more than their changes.
-    fits: ({ raster, values, sensor }) => raster === "spikes" || (!values.frames && sensor.kind !== "channels"),
-    heading: ({ raster }) =>
-      raster === "spikes" ? ["Raster spikes of ", output({ id: "spikes-info", class: "dim" })] : ["Raster ", make("span", {}, swatch("more"), " more ", swatch("less"), " less, by row")],
+    fits: ({ encoded, values, sensor }) => encoded || (!values.frames && sensor.kind !== "channels"),
+    heading: ({ encoded }) =>
+      encoded ? ["Raster spikes of ", output({ id: "spikes-info", class: "dim" })] : ["Raster ", make("span", {}, swatch("more"), " more ", swatch("less"), " less, by row")],
     painter: (element) => new Raster(element),
   },
   {
     name: "channels", label: "Curve of each channel over time, one above the other", kind: "raster", least: 96,
-    setting: "showRaster",
     fits: ({ sensor }) => sensor.kind === "channels" && sensor.count <= MOST_CHANNELS,
     heading: () => ["Channels ", swatch("more"), " ", output({ id: "channels-scale", class: "dim" })],
     painter: (element) => new Channels(element),
   },
   {
     name: "taxel", label: "History of the watched taxel", least: 72,
-    setting: "showTaxel", box: "Taxel",
-    fits: ({ taxel }) => taxel !== null,
     heading: () => ["Taxel ", make("span", {}, "least to greatest, last"), " ", output()],
     says: ({ values: { unit, step, zero } }, { taxel }) => (taxel === null ? [] : [`${rounded((taxel - zero) * step)} ${unit}`]),
     plan: (shown) => {
@@ -154,7 +149,6 @@ export const LANES = [
   },
   {
     name: "force", label: "Sum of the values, or force", least: 72,
-    setting: "showForce", box: "Sum or force",
     heading: ({ sums }, sources) => [
       make("b", { id: "force-title" }, sums.unit === "N" ? "Force" : "Sum"),
       " ",
@@ -170,7 +164,6 @@ export const LANES = [
   },
   {
     name: "area", label: "Number of taxels pressed", kind: "low", least: 54,
-    setting: "showArea", box: "Area",
     fits: ({ sensor }) => sensor.kind !== "channels",
     heading: () => ["Area ", swatch("less"), " ", output({ id: "area-now" })],
     says: (shown, values) => [areaAt(shown, values)],
@@ -179,7 +172,6 @@ export const LANES = [
   },
   {
     name: "centre", label: "Centre of pressure", kind: "low", least: 62,
-    setting: "showCentre", box: "Centre",
     fits: ({ sensor }) => sensor.kind !== "channels",
     heading: ({ sensor: { axes: [across, down] } }, sources) =>
       // Of several sources each value has the name of its axis.
@@ -226,23 +218,29 @@ export class Lanes {
     const observer = new ResizeObserver(() => this.fit());
     this.all = LANES.map((lane) => {
       const [heading, element] = [make("h2"), make("div", { id: `${lane.name}-lane`, class: `lane ${lane.kind ?? ""}`, role: "img", "aria-label": lane.label })];
-      const block = make("section", { id: `${lane.name}-block`, class: lane.kind ?? "" }, heading, element);
+      const line = make("div", { class: "between", role: "separator", tabindex: 0, "aria-orientation": "horizontal", "aria-label": `${lane.label}: its upper edge, arrow keys` });
+      const block = make("section", { id: `${lane.name}-block`, class: lane.kind ?? "" }, line, heading, element);
+      movable(line, "y", (by) => this.resize(block, by));
       part("axis", HTMLElement).before(block);
       observer.observe(element);
-      return { lane, block, heading, element, painter: lane.painter?.(element), plot: /** @type {uPlot | null} */ (null) };
+      return { lane, block, line, heading, element, painter: lane.painter?.(element), plot: /** @type {uPlot | null} */ (null) };
     });
   }
 
   /** @returns {Lane[]} those that are shown */
   get visible() {
     const shown = this.shown();
-    return LANES.filter(({ setting, fits }) => this.settings.values[setting] && (!fits || fits(shown)));
+    return LANES.filter(({ fits }) => !fits || fits(shown));
   }
 
-  /** Shows the lanes that the settings ask for and the source has. */
+  /** Shows the lanes that the source has. */
   show() {
     const { visible } = this;
-    for (const { lane, block } of this.all) block.hidden = !visible.includes(lane);
+    for (const { lane, block, line } of this.all) {
+      block.hidden = !visible.includes(lane);
+      line.hidden = lane === visible[0];
+      block.style.flexGrow = String(this.settings.values.heights[lane.name] ?? "");
+    }
     this.renew();
   }
 
@@ -250,8 +248,8 @@ export class Lanes {
   renew() {
     const { sources } = this;
     const shown = this.shown();
-    const { sensor, sums, raster } = shown;
-    const key = JSON.stringify([this.settings.theme, sensor.kind, sensor.limits, sensor.axes, sums.unit, raster, sources]);
+    const { sensor, sums, encoded } = shown;
+    const key = JSON.stringify([this.settings.theme, sensor.kind, sensor.limits, sensor.axes, sums.unit, encoded, sources]);
     if (this.made === key) return;
     this.made = key;
     const grid = { stroke: themed("grid"), width: 1 };
@@ -277,6 +275,17 @@ export class Lanes {
         element,
       );
     }
+  }
+
+  /** Moves the upper edge of a lane: what it loses the one above it gains. @param {HTMLElement} block @param {number} by CSS pixels */
+  resize(block, by) {
+    const shown = this.all.filter(({ block: { hidden } }) => !hidden);
+    const heights = shown.map((one) => one.block.clientHeight);
+    const below = shown.findIndex((one) => one.block === block);
+    heights[below - 1] += by;
+    heights[below] -= by;
+    this.settings.set("heights", { ...this.settings.values.heights, ...Object.fromEntries(shown.map(({ lane }, k) => [lane.name, heights[k]])) });
+    this.show();
   }
 
   /** Fits the plots to their elements. */

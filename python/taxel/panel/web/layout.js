@@ -4,47 +4,47 @@ import { part } from "./dom.js";
 
 /** @typedef {import("./settings.js").Settings} Settings */
 
-/** The least and the largest part of the width that the maps take, percent, and a step of the arrow keys. */
-const [LEAST, MOST, STEP] = [15, 85, 2];
+/** The least and the largest part of the width that the maps take, percent. */
+const [LEAST, MOST] = [15, 85];
+/** How far an arrow key moves a line between parts, CSS pixels. */
+const STEP = 16;
 
-/** The divider; its place is a setting. */
-export class Divider {
-  /**
-   * @param {Settings} settings
-   * @param {() => void} resized called after the sizes have changed
-   */
-  constructor(settings, resized) {
-    this.settings = settings;
-    this.views = part("views", HTMLElement);
-    this.line = part("divider", HTMLElement);
-    this.show();
-    this.line.addEventListener("pointerdown", (event) => this.line.setPointerCapture(event.pointerId));
-    this.line.addEventListener("pointermove", (event) => {
-      if (!this.line.hasPointerCapture(event.pointerId)) return;
-      const { left, width } = this.views.getBoundingClientRect();
-      this.move((100 * (event.clientX - left)) / width);
-    });
-    this.line.addEventListener("keydown", (event) => {
-      const by = { ArrowLeft: -STEP, ArrowRight: STEP }[event.key];
-      if (by === undefined) return;
-      event.preventDefault();
-      event.stopPropagation();
-      this.move(settings.values.share + by);
-    });
-    new ResizeObserver(resized).observe(part("lanes", HTMLElement));
-  }
+/**
+ * Lets a line between two parts be moved by the pointer or the arrow keys.
+ * @param {HTMLElement} line
+ * @param {"x" | "y"} axis
+ * @param {(by: number) => void} move CSS pixels
+ */
+export function movable(line, axis, move) {
+  const keys = axis === "x" ? ["ArrowLeft", "ArrowRight"] : ["ArrowUp", "ArrowDown"];
+  line.addEventListener("pointerdown", (event) => {
+    event.stopPropagation();
+    line.setPointerCapture(event.pointerId);
+  });
+  line.addEventListener("pointermove", (event) => {
+    if (line.hasPointerCapture(event.pointerId)) move(axis === "x" ? event.movementX : event.movementY);
+  });
+  line.addEventListener("keydown", (event) => {
+    const at = keys.indexOf(event.key);
+    if (at < 0) return;
+    event.preventDefault();
+    event.stopPropagation();
+    move(at ? STEP : -STEP);
+  });
+}
 
-  /** @param {number} share of the width that the maps take, percent */
-  move(share) {
-    this.settings.set("share", Math.round(Math.min(MOST, Math.max(LEAST, share))));
-    this.show();
-  }
-
-  show() {
-    const share = String(this.settings.values.share);
-    this.views.style.setProperty("--share", `${share}%`);
-    this.line.setAttribute("aria-valuenow", share);
-  }
+/** Makes the line between the maps and the lanes; its place is a setting. @param {Settings} settings */
+export function divide(settings) {
+  const [views, line] = [part("views", HTMLElement), part("divider", HTMLElement)];
+  const show = () => {
+    views.style.setProperty("--share", `${settings.values.share}%`);
+    line.setAttribute("aria-valuenow", settings.values.share.toFixed(0));
+  };
+  movable(line, "x", (by) => {
+    settings.set("share", Math.min(MOST, Math.max(LEAST, settings.values.share + (100 * by) / views.clientWidth)));
+    show();
+  });
+  show();
 }
 
 /** A narrow page has only what must stay in sight in its header and footer, so that these stay low. */

@@ -2,14 +2,14 @@
 
 import { bindActions } from "./actions.js";
 import { Board } from "./board.js";
-import { writeCounters, writePace } from "./counters.js";
+import { writeCounters } from "./counters.js";
 import { Cursor } from "./cursor.js";
 import { Detections, recorded } from "./detections.js";
 import { make, part, write } from "./dom.js";
 import { showKeys } from "./keys.js";
 import { Labels } from "./labels.js";
 import { Lanes } from "./lanes.js";
-import { arrangeForWidth, Divider } from "./layout.js";
+import { arrangeForWidth, divide } from "./layout.js";
 import { Maps } from "./maps.js";
 import { Mistakes } from "./mistakes.js";
 import { Notes } from "./notes.js";
@@ -58,16 +58,17 @@ const cursor = new Cursor(() => timeline, (t_us) => player.seek(t_us), timeWindo
 const pointed = new Pointed(server, () => timeline);
 const maps = new Maps(settings, watch);
 const lanes = new Lanes(settings, shown);
-const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), (from, to) => timeWindow.closer(from, to), listRecordings);
+const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), listRecordings);
 const notes = new Notes(player, labels);
 const mistakes = new Mistakes(player, () => {
   marksDue = true;
 });
 const training = new Training(server, player, mistakes, () => showDetections(detections.shown, detections.labels));
-new Divider(settings, () => (lanesDue = true));
+divide(settings);
+new ResizeObserver(() => (lanesDue = true)).observe(part("lanes", HTMLElement));
 const board = new Board(server, failed);
 const sensor = new Sensor(server);
-const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
+const view = new View(server, settings, failed, (taxel) => maps.point(taxel), showLanes);
 part("turn-values", HTMLButtonElement).onclick = () => {
   const name = opened?.name;
   server.request({ type: "invert" }).then(() => {
@@ -109,8 +110,6 @@ let lanesDue = true;
 let marksDue = true;
 /** Only the line at the time shown is to be drawn again. */
 let timeDue = true;
-/** Frames drawn in the last second. */
-let drawn = 0;
 
 // ------------------------------------------------------------------------------------------------ connection
 
@@ -129,14 +128,7 @@ function showConnection(state, why) {
 
 function writeState() {
   showState(connection, player.transport, hello, opened, recorder.status, counters, opening, refused);
-  writePace(opened ? opened.pace : (counters?.pace ?? null));
 }
-
-/** Whether there are two maps to choose from: of frames there are no events, and of channels no map, only their values. */
-const hasMaps = () => !opened?.frames && maps.geometry.kind !== "channels";
-
-/** The maps that are shown. */
-const mapsShown = () => (hasMaps() ? settings.values.maps : "pressure");
 
 /** Shows values and times as the source has them: ticks and seconds, or a unit and the numbers of frames. */
 function showUnits() {
@@ -167,7 +159,7 @@ function shown() {
   const newtons = opened?.frames?.newtons ?? null;
   // The sum of the values is a force where they are in N, or where it is known of a pressure.
   const sums = newtons === null ? { unit: values.unit, step: values.step } : { unit: "N", step: newtons };
-  return { sensor, taxel, named: maps.named(), values, sums, gap_us: gapOfFrames(), raster: settings.values.raster, spikes };
+  return { sensor, taxel, named: maps.named(), values, sums, gap_us: gapOfFrames(), encoded: view.spikes, spikes };
 }
 
 /** Lists the recordings, with the labels as the page knows them. */
@@ -407,7 +399,7 @@ function open(message) {
     // It opens on something: the first touch.
     if (message.touch_us !== null) player.seek(message.touch_us);
   }
-  training.choose(message.name, message.train, message.frames?.trial ?? null);
+  training.choose(message.name, message.frames?.trial);
   const noisy = message.frames?.flickering ?? [];
   maps.flickering = noisy.length;
   maps.health = noisy.length ? { dead: [], stuck: [], noisy } : null;
@@ -475,20 +467,13 @@ const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
 let lanesAt = 0;
 let textAt = 0;
 let overviewAt = 0;
-let drawnAt = 0;
-let framesDrawn = 0;
 
 /** @param {number} now_ms */
 function drawFrame(now_ms) {
   requestAnimationFrame(drawFrame);
   if (mapsDue) {
     mapsDue = false;
-    framesDrawn++;
     maps.draw(now_ms);
-  }
-  if (now_ms - drawnAt >= 1000) {
-    drawn = Math.round((framesDrawn * 1000) / (now_ms - drawnAt));
-    [drawnAt, framesDrawn] = [now_ms, 0];
   }
   const moving = player.transport.state !== "paused";
   if (timeline && (lanesDue || timeDue) && now_ms - lanesAt >= (reducedMotion.matches && moving ? REDUCED_MS : LANES_MS)) {
@@ -512,7 +497,7 @@ function drawFrame(now_ms) {
 
 function writeText() {
   maps.write();
-  writeCounters(counters, drawn);
+  if (counters) writeCounters(counters);
   timeWindow.write();
   if (training.since !== null) training.write();
   pointed.ask();
@@ -536,22 +521,16 @@ function applyTheme() {
 }
 
 function showLanes() {
-  const { values } = settings;
-  for (const name of ["pressure", "change"]) {
-    part(`${name}-figure`, HTMLElement).hidden = mapsShown() !== "both" && mapsShown() !== name;
-    part(`${name}-alone`, HTMLButtonElement).setAttribute("aria-pressed", String(values.maps === name));
-  }
-  part("pressure-alone", HTMLButtonElement).hidden = part("maps-field", HTMLElement).hidden = !hasMaps();
-  part("maps", HTMLElement).style.setProperty("--count", mapsShown() === "both" ? "2" : "1");
+  // Of frames there are no events, and of channels no map, only their values.
+  const both = !opened?.frames && maps.geometry.kind !== "channels";
+  part("change-figure", HTMLElement).hidden = !both;
+  part("maps", HTMLElement).style.setProperty("--count", both ? "2" : "1");
   lanes.show();
   lanesDue = true;
 }
 
 settings.watch((name) => {
   if (name === "theme") applyTheme();
-  if (name === "map" || name === "gamma") maps.colour();
-  if (name === "flipX" || name === "flipY") maps.mark();
-  if (name.startsWith("show") || name === "raster" || name === "maps") showLanes();
   mapsDue = true;
 });
 matchMedia("(prefers-color-scheme: light)").addEventListener("change", applyTheme);
@@ -577,9 +556,6 @@ view.showCut();
 applyTheme();
 showLanes();
 requestAnimationFrame(drawFrame);
-addEventListener("beforeunload", (event) => {
-  if (server.saves) event.preventDefault();
-});
 if (fragment.get("token")) server.open();
 else {
   connection.why = "the token is missing in the address: copy the whole line that taxel printed";

@@ -1,7 +1,7 @@
 // Two maps side by side: pressure above rest, and change; of channels, which have no map, a bar each.
 
-import { MAPS, UNKNOWN, changeWords, pressureWords, word } from "./colours.js";
-import { entitle, ground, make, part, themed, write } from "./dom.js";
+import { UNKNOWN, changeWords, pressureWords, word } from "./colours.js";
+import { entitle, ground, make, part, write } from "./dom.js";
 import { geometry } from "./geometry.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
 import { counted, quantity, rounded } from "./words.js";
@@ -125,8 +125,6 @@ export class Maps {
     this.words = { pressure: new Uint32Array(256), change: new Uint32Array(256) };
     /** What the last drawn frame says. */
     this.info = { unknown: 0, value: /** @type {number | null} */ (null), rest: /** @type {number | null} */ (null) };
-    /** Colours of a sensor's ground and edge. */
-    this.theme = { ground: "", edge: "" };
     this.colour();
     for (const map of [this.pressure, this.change]) {
       map.element.addEventListener("pointerdown", (event) => this.point(this.at(map, event)));
@@ -171,7 +169,6 @@ export class Maps {
     write(part("pressure-title", HTMLElement), title);
     write(part("top-unit", HTMLElement), this.values.unit);
     entitle(part("pressure-frame", HTMLElement), "aria-label", `${title}: arrow keys move the crosshair, Escape hides it`);
-    entitle(part("pressure-alone", HTMLElement), "aria-label", `${title} alone, larger`);
   }
 
   get rows() {
@@ -182,17 +179,10 @@ export class Maps {
     return this.geometry.columns;
   }
 
-  /** Which way round the maps are. */
-  get flips() {
-    return { x: this.settings.values.flipX, y: this.settings.values.flipY };
-  }
-
-  /** Makes the colours again, after the theme or a setting has changed. */
+  /** Makes the colours again, after the theme has changed. */
   colour() {
-    const { values, theme } = this.settings;
-    this.theme = { ground: themed("raised"), edge: themed("edge") };
-    const name = MAPS.includes(values.map) ? values.map : MAPS[0];
-    this.words = { pressure: pressureWords(name, theme, values.gamma), change: changeWords(theme, values.gamma) };
+    const { theme } = this.settings;
+    this.words = { pressure: pressureWords(theme), change: changeWords(theme) };
     this.pressure.showBar(this.words.pressure);
     this.change.showBar(this.words.change);
     this.mark();
@@ -247,7 +237,7 @@ export class Maps {
       }
     }
     for (const { canvas, context, words } of [this.pressure, this.change]) {
-      if (canvas.clientWidth) this.geometry.paint(canvas, context, { words, levels: this.levels, ...this.theme }, this.flips);
+      if (canvas.clientWidth) this.geometry.paint(canvas, context, { words, levels: this.levels });
     }
     this.info.unknown = unknown;
     const watched = this.taxel ? this.taxel[1] * columns + this.taxel[0] : -1;
@@ -299,29 +289,22 @@ export class Maps {
    */
   at(map, event) {
     const box = map.canvas.getBoundingClientRect();
-    return this.geometry.at((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height, this.flips);
+    return this.geometry.at((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
   }
 
   /** @param {KeyboardEvent} event */
   key(event) {
     if (event.ctrlKey || event.altKey || event.metaKey || !this.columns) return;
-    const { flipX, flipY } = this.settings.values;
     const far = event.shiftKey ? 8 : 1;
     /** @type {Record<string, [number, number]>} */
     const moves = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
     const move = moves[event.key];
     if (event.key === "Escape" && this.taxel) this.point(null);
     else if (move) {
-      const [dx, dy] = [move[0] * far * (flipX ? -1 : 1), move[1] * far * (flipY ? -1 : 1)];
-      this.point(this.taxel ? this.geometry.moved(this.taxel, [dx, dy]) : this.geometry.middle);
+      this.point(this.taxel ? this.geometry.moved(this.taxel, [move[0] * far, move[1] * far]) : this.geometry.middle);
     } else return;
     event.preventDefault();
     event.stopPropagation();
-  }
-
-  /** @returns {number} width over height of a map on the page */
-  get aspect() {
-    return this.geometry.aspect;
   }
 
   /** @param {[number, number] | null} taxel */
@@ -335,7 +318,7 @@ export class Maps {
 
   /** The name of a source, over its taxels. @param {FrameSourceInfo} source @returns {HTMLElement} */
   nameOf({ name, left, columns }) {
-    const ends = [left, left + columns - 1].map((x) => this.geometry.place([x, 0], this.flips)[0]);
+    const ends = [left, left + columns - 1].map((x) => this.geometry.place([x, 0])[0]);
     const label = make("span", {}, name);
     label.style.left = `${50 * (ends[0] + ends[1])}%`;
     return label;
@@ -343,7 +326,7 @@ export class Maps {
 
   /** Puts crosshair and marks where they belong. */
   mark() {
-    const place = (/** @type {[number, number]} */ taxel) => this.geometry.place(taxel, this.flips);
+    const place = (/** @type {[number, number]} */ taxel) => this.geometry.place(taxel);
     for (const map of [this.pressure, this.change]) {
       map.lines.hidden = !this.taxel;
       if (this.taxel) {

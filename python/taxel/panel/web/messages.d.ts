@@ -152,11 +152,11 @@ export interface Mistake {
   /** Board time, us. */
   t_us: number;
   /** Whether a label was missed; else a detection is false. */
-  is_missed: boolean;
+  missed: boolean;
   /** The sensor that it is of, where the recording has several; else empty. */
   source: string;
   /** The trial that it is of, where the file holds several; else empty. */
-  trial: string;
+  recording: string;
 }
 
 /** The drift and the delays that arrivals show. */
@@ -248,8 +248,6 @@ export interface Hello {
   columns_us: [number, number];
   /** Columns of time in a frame, at most. */
   time_columns: number;
-  /** Bytes of a request, at most. */
-  most_message_bytes: number;
 }
 
 /** The registers that the board holds, or is assumed to hold; at the beginning and after every change. */
@@ -396,6 +394,8 @@ export interface Trained {
   mistakes: Mistake[];
   /** The command that detects by it in a shell; empty if it cannot be relied on. */
   next: string;
+  /** Each label minus its nearest detection over time, and loads beside the training's: files of SVG. */
+  pictures: { title: string; svg: string }[];
 }
 
 /** When asked: the latest progress of the training that runs, first after 2 s; empty before, and where none runs. */
@@ -429,8 +429,6 @@ export interface Opened {
   /** 0 of frames. */
   events: number;
   bytes: number;
-  /** The command that trains on its labels. */
-  train: string;
   frames: FrameRecording | null;
   /** What was lost; empty where a file of frames does not say. */
   verdict: string;

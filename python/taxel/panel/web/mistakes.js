@@ -1,20 +1,17 @@
 // What a training missed or detected falsely among the labels that it was scored on: counted in a table, marked over the lanes, walked through.
 
-import { collapsed } from "./clusters.js";
 import { make, part, write } from "./dom.js";
+import { putMarks } from "./marks.js";
 import { notify } from "./notice.js";
-import { counted, integer, seconds, short } from "./words.js";
+import { integer, seconds, short } from "./words.js";
 
 /** @typedef {import("./messages.js").LabelScore} LabelScore */
 /** @typedef {import("./messages.js").Mistake} Mistake */
 /** @typedef {import("./messages.js").Trained} Trained */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
-/** Width of a mark, CSS pixels. */
-const MARK = 11;
-
 /** @param {Mistake} mistake @returns {string} */
-const described = ({ label, t_us, is_missed, source }) => `${is_missed ? "missed" : "false"} ${label} at ${seconds(t_us)}${source ? `, ${source}` : ""}`;
+const described = ({ label, t_us, missed, source }) => `${missed ? "missed" : "false"} ${label} at ${seconds(t_us)}${source ? `, ${source}` : ""}`;
 
 /** The result of the last training of the recording that is shown. */
 export class Mistakes {
@@ -34,22 +31,18 @@ export class Mistakes {
 
   /** @returns {Mistake[]} those of the trial that is shown, by time */
   get shown() {
-    return this.found.filter(({ trial }) => this.trial === null || trial === this.trial).sort((a, b) => a.t_us - b.t_us);
+    return this.found.filter(({ recording }) => this.trial === null || recording === this.trial).sort((a, b) => a.t_us - b.t_us);
   }
 
   /** @param {Trained} trained */
-  take({ judged_on, scores, mistakes }) {
+  take({ judged_on, scores, mistakes, pictures }) {
     this.found = mistakes;
     this.judged = true;
     write(part("train-judged", HTMLElement), judged_on);
     part("train-rows", HTMLElement).replaceChildren(...scores.map(row));
+    part("train-pictures", HTMLElement).replaceChildren(...pictures.map(({ title, svg }) => make("img", { alt: title, title, src: `data:image/svg+xml,${encodeURIComponent(svg)}` })));
     part("train-result", HTMLElement).hidden = false;
     this.show();
-  }
-
-  /** Brings the table into sight. */
-  look() {
-    part("train-result", HTMLElement).scrollIntoView({ block: "nearest" });
   }
 
   /** Another recording, or another trial of it, is shown. @param {string | null} trial @param {boolean} again whether it is the same recording */
@@ -68,11 +61,10 @@ export class Mistakes {
 
   show() {
     const { shown } = this;
-    const missed = shown.filter(({ is_missed }) => is_missed).length;
+    const missed = shown.filter(({ missed }) => missed).length;
     const counts = this.found.length ? `${integer(missed)} missed, ${integer(shown.length - missed)} false` : "no mistakes";
     write(part("mistake-count", HTMLElement), `${counts}${this.trial === null ? "" : " in this trial"}`);
     for (const id of ["mistake-before", "mistake-next"]) part(id, HTMLButtonElement).disabled = !shown.length;
-    part("mistake-marks", HTMLElement).hidden = !shown.length;
     this.changed();
   }
 
@@ -90,22 +82,8 @@ export class Mistakes {
 
   /** Puts the marks over the lanes. @param {Timeline | null} timeline */
   mark(timeline) {
-    const marks = part("mistake-marks", HTMLElement);
-    if (marks.hidden) return;
-    const { clientWidth } = marks;
-    const inside = this.shown.flatMap((mistake) => {
-      const share = timeline?.share(mistake.t_us) ?? null;
-      return share === null ? [] : [{ ...mistake, x: share * clientWidth }];
-    });
-    const { single, counts } = collapsed(inside, MARK, 1);
-    const placed = (/** @type {HTMLElement} */ mark, /** @type {number} */ x) => {
-      mark.style.left = `${((100 * x) / clientWidth).toFixed(3)}%`;
-      return mark;
-    };
-    marks.replaceChildren(
-      ...single.map((mistake) => placed(make("span", { class: mistake.is_missed ? "missed" : "false", title: described(mistake) }), mistake.x)),
-      ...counts.map(({ from, to, marks: { length } }) => placed(make("span", { class: "count bad", title: counted(length, "mistake") }, integer(length)), (from + to) / 2)),
-    );
+    const marks = this.shown.map((mistake) => ({ t_us: mistake.t_us, kind: mistake.missed ? "missed" : "false", title: described(mistake) }));
+    putMarks(part("mistake-marks", HTMLElement), timeline, marks);
   }
 }
 

@@ -1,15 +1,12 @@
 // The notes that a recording holds itself: listed, shown in time, and used as labels.
 
 import { make, part, write } from "./dom.js";
-import { failed, notify } from "./notice.js";
+import { failed } from "./notice.js";
 import { counted, seconds } from "./words.js";
 
 /** @typedef {import("./labels.js").Labels} Labels */
 /** @typedef {import("./player.js").Player} Player */
 /** @typedef {import("./messages.js").RecordedNote} RecordedNote */
-
-/** How many can become labels in one request. */
-const MOST_MARKS = 5000;
 
 /** The list of notes, and the button that makes labels of those with a time. */
 export class Notes {
@@ -65,7 +62,6 @@ export class Notes {
   /** Makes labels of all of them, or of none. */
   async use() {
     const { unused } = this;
-    if (unused.length > MOST_MARKS) return notify(`${unused.length} notes: at most ${MOST_MARKS} notes can become labels at a time`, true);
     this.button.disabled = true;
     const changes = unused.map(({ t_us, text, source }) => ({ new: { label: text, t_us, source, trial: "", replaces_us: t_us } }));
     await this.labels.change(changes).then(() => this.labels.offerUndo(`${counted(unused.length, "note")} used as labels`), failed);

@@ -23,11 +23,6 @@ export class Player {
     /** @type {number | null} */
     this.t_us = null;
     this.seeking = false;
-    /** @type {Promise<void>} of the seeks under way */
-    this.sought = Promise.resolve();
-    /** How many steps and seeks are under way, and when the last one will be where. @type {Promise<number | null>} */
-    this.arrival = Promise.resolve(null);
-    this.moves = 0;
     /** @type {number | null} */
     this.wanted = null;
     /** @type {number | null} */
@@ -92,12 +87,11 @@ export class Player {
 
   /** @param {number} frames */
   step(frames) {
-    // A seek that still waits for its turn came first.
-    this.go(this.sought.then(() => this.ask({ type: "step", frames })).then(() => this.t_us));
+    this.ask({ type: "step", frames });
   }
 
   follow() {
-    this.go(this.ask({ type: "live" }).then(() => this.t_us));
+    this.ask({ type: "live" });
   }
 
   /** @param {number} by to the next (1) or the one before (-1) of the speeds */
@@ -117,29 +111,7 @@ export class Player {
   seek(t_us) {
     const [from, to] = this.reach ?? [t_us, t_us];
     this.asked = this.wanted = Math.round(Math.max(from, Math.min(to, t_us)));
-    if (!this.seeking) this.sought = this.seekNext();
-    const { asked } = this;
-    this.go(this.sought.then(() => asked), Promise.resolve(asked));
-  }
-
-  /**
-   * Notes a move that was asked for.
-   * @param {Promise<number | null>} done when it has been made, and where to
-   * @param {Promise<number | null>} [arrival] the same, where it is known before
-   */
-  go(done, arrival = done) {
-    this.moves++;
-    this.arrival = arrival;
-    done.finally(() => this.moves--);
-  }
-
-  /**
-   * The time that a person means: that of the pointer, else the time shown, after all moves that were asked for before.
-   * @param {number | null} [pointed_us]
-   * @returns {Promise<number | null>} us
-   */
-  async timeToMark(pointed_us = null) {
-    return pointed_us ?? (this.moves ? this.arrival : this.t_us);
+    if (!this.seeking) this.seekNext();
   }
 
   async seekNext() {

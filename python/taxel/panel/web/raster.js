@@ -39,7 +39,7 @@ export class Raster {
    * @param {import("./lanes.js").Shown} shown
    * @returns {string} what the spikes are of
    */
-  draw(timeline, { raster: kind, spikes }) {
+  draw(timeline, { encoded, spikes }) {
     write(this.last, String(timeline.rows - 1));
     const { width, height } = fitted(this.canvas);
     const { columns: shown, window, column_us, span_us, rows } = timeline;
@@ -55,7 +55,7 @@ export class Raster {
       this.image = new ImageData(wide, high);
       this.pixels = new Uint32Array(this.image.data.buffer);
     }
-    const values = kind === "spikes" ? timeline.spikes : timeline.raster;
+    const values = encoded ? timeline.spikes : timeline.raster;
     this.pixels.fill(this.words[0]);
     // Groups begin at whole multiples of their width, so that what is seen moves and does not flicker.
     const group = Math.floor(begin / columns);

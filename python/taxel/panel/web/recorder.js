@@ -1,4 +1,4 @@
-// Recording: name with a number that moves on, length, label of the trial.
+// Recording: name whose number moves on, length, label of the trial.
 
 import { make, part, write } from "./dom.js";
 import { counted, size } from "./words.js";
@@ -37,23 +37,6 @@ export class Recorder {
         text.value = "";
       }, failed);
     };
-    for (const id of ["record-name", "record-index"]) part(id, HTMLElement).addEventListener("input", () => this.preview());
-    this.preview();
-  }
-
-  /** @returns {number | null} */
-  number(/** @type {string} */ id) {
-    const text = part(id, HTMLInputElement).value.trim().replace(",", ".");
-    return text === "" ? null : Number(text);
-  }
-
-  /** @returns {string} the name of the next recording, without its ending */
-  get name() {
-    return part("record-name", HTMLInputElement).value.trim() + part("record-index", HTMLInputElement).value.trim();
-  }
-
-  preview() {
-    write(part("record-file", HTMLElement), this.name && `${this.name}.mcap`);
   }
 
   get busy() {
@@ -68,12 +51,11 @@ export class Recorder {
       return;
     }
     part("record-reason", HTMLElement).hidden = true;
-    for (const [id, field] of /** @type {const} */ ([["record-index", "number"], ["record-length", "length"]])) {
-      if (Number.isNaN(this.number(id))) return this.refuse(`${field}: ${part(id, HTMLInputElement).value.trim()} is not a number`);
-    }
-    const label = part("record-label", HTMLInputElement).value.trim();
+    const [name, label, length] = ["record-name", "record-label", "record-length"].map((id) => part(id, HTMLInputElement).value.trim());
+    const length_s = length ? Number(length.replace(",", ".")) : null;
+    if (Number.isNaN(length_s)) return this.refuse(`length: ${length} is not a number`);
     /** @type {import("./messages.js").RecordRequest} */
-    const message = { type: "record", name: this.name, length_s: this.number("record-length"), label: label || null };
+    const message = { type: "record", name, length_s, label: label || null };
     this.server.request(message).catch((error) => this.refuse(error.message));
   }
 
@@ -90,11 +72,10 @@ export class Recorder {
     const before = this.status;
     this.status = status;
     const { state, error } = status;
-    // The number moves on by itself; one that a person is typing stays.
-    const index = part("record-index", HTMLInputElement);
-    if (before?.state === "finishing" && state === "idle" && !error && index.value.trim() && document.activeElement !== index) {
-      index.value = String(Number(index.value) + 1);
-      this.preview();
+    // The number moves on by itself; a name that a person is typing stays.
+    const name = part("record-name", HTMLInputElement);
+    if (before?.state === "finishing" && state === "idle" && !error && document.activeElement !== name) {
+      name.value = name.value.trim().replace(/\d+$/, (number) => String(Number(number) + 1).padStart(number.length, "0"));
     }
     this.button.classList.toggle("on", this.busy);
     write(part("record-word", HTMLElement), { idle: "Record", recording: "Stop", finishing: "Saving" }[state]);
@@ -104,7 +85,7 @@ export class Recorder {
       reason.hidden = !error;
       write(reason, error ?? "");
     }
-    for (const id of ["note-form"]) part(id, HTMLElement).hidden = state !== "recording";
+    part("note-form", HTMLElement).hidden = state !== "recording";
     const last = part("record-last", HTMLElement);
     last.hidden = !status.last;
     if (status.last) {

@@ -1,7 +1,6 @@
 // The connection to the server: requests with their answers, credits for frames, and reconnecting after a break.
 
 import { VERSION } from "./protocol.js";
-import { size } from "./words.js";
 
 /** @typedef {import("./messages.js").Message} Message */
 /** @typedef {import("./messages.js").Refused} Refused */
@@ -9,9 +8,6 @@ import { size } from "./words.js";
 
 /** Time until the next attempt to connect, ms. */
 const RECONNECT_MS = 2000;
-
-/** Requests that save labels. */
-const SAVES = new Set(["change", "undo"]);
 
 /** The reason why a request was refused. */
 export class RefusedError extends Error {
@@ -38,10 +34,8 @@ export class Server {
     /** @type {WebSocket | null} */
     this.socket = null;
     this.next = 0;
-    /** @type {Map<number, { type: string, done: () => void, refused: (error: Error) => void }>} */
+    /** @type {Map<number, { done: () => void, refused: (error: Error) => void }>} */
     this.pending = new Map();
-    /** Maximum size of a message to the server, bytes. */
-    this.mostBytes = Infinity;
   }
 
   /** Connects, and again whenever the connection has closed. */
@@ -71,14 +65,8 @@ export class Server {
     };
   }
 
-  /** Whether labels are being saved. */
-  get saves() {
-    return [...this.pending.values()].some(({ type }) => SAVES.has(type));
-  }
-
   /** @param {Message} message */
   receive(message) {
-    if (message.type === "hello") this.mostBytes = message.most_message_bytes;
     const request = (message.type === "done" || message.type === "refused") && typeof message.id === "number" ? this.pending.get(message.id) : undefined;
     if (!request) return this.onMessage(message);
     const { id } = /** @type {{ id: number }} */ (message);
@@ -103,10 +91,8 @@ export class Server {
   request(message) {
     if (this.socket?.readyState !== WebSocket.OPEN) return Promise.reject(new Error("no connection to the server"));
     const id = this.next++;
-    const bytes = new Blob([JSON.stringify({ ...message, id })]).size;
-    if (bytes > this.mostBytes) return Promise.reject(new Error(`the request has ${size(bytes)}; must have at most ${size(this.mostBytes)}`));
     return new Promise((done, refused) => {
-      this.pending.set(id, { type: message.type, done, refused });
+      this.pending.set(id, { done, refused });
       this.send({ ...message, id });
     });
   }

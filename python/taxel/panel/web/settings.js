@@ -1,27 +1,10 @@
 // The settings of the page, which the browser stores for this address.
 
-import { LANES } from "./lanes.js";
-
 const PLACE = "taxel.panel";
 
-const OTHERS = {
-  theme: "system",
-  map: "lipari",
-  gamma: 1,
-  top: 0,
-  flipX: false,
-  flipY: false,
-  raster: "changes",
-  maps: "both",
-  share: 42,
-  letters: true,
-  label: "contact",
-};
+const DEFAULTS = { theme: "system", top: 0, share: 42, heights: /** @type {Record<string, number>} */ ({}), label: "contact" };
 
-/** @typedef {typeof OTHERS & Record<`show${string}`, boolean>} Values those of the lanes are in LANES */
-
-/** @type {Values} */
-const DEFAULTS = { ...OTHERS, ...Object.fromEntries(LANES.map(({ setting }) => [setting, true])) };
+/** @typedef {typeof DEFAULTS} Values */
 
 /** Values by name; listeners are called after a change. */
 export class Settings {

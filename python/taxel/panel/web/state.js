@@ -92,7 +92,7 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
   // A board sends what changes: before its first event the value of a taxel is not known.
   part("zero-all", HTMLButtonElement).hidden = cannotZero || !hello.lines;
   const pill = part("state", HTMLElement);
-  pill.dataset.kind = recording && kind !== "lost" ? "rec" : kind;
+  pill.dataset.state = recording && kind !== "lost" ? "recording" : kind;
   write(part("state-word", HTMLElement), recording && kind !== "lost" ? `${word === "Live" ? "" : `${word}, `}Recording ${recording.file ?? ""}` : word);
   const doubt = (connected && (opened ? opened.pace : counters?.pace)?.doubt) || "";
   const nothing = connected && source === null && !hello?.live;
@@ -102,6 +102,7 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
   write(part("silence-text", HTMLElement), text);
   part("turn-values", HTMLButtonElement).hidden = !falling;
   banner.hidden = !text;
+  banner.dataset.state = silent ? "silent" : "doubt";
   const subject = !connected ? why : opening !== null ? `reading ${opening} …` : source !== null ? source : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";
   const about = [subject, connected && source !== null && opening === null && opened?.verdict, shape(opened, hello)].filter(Boolean).join(" · ");
   write(part("source", HTMLElement), about);

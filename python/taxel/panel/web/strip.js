@@ -31,10 +31,6 @@ export class Strip {
     });
     this.canvas.addEventListener("pointermove", (event) => {
       if (event.buttons & 1) this.go(event);
-      this.hover = event.offsetX;
-    });
-    this.canvas.addEventListener("pointerleave", () => {
-      this.hover = undefined;
     });
     this.canvas.addEventListener("keydown", (event) => this.key(event));
   }
@@ -115,10 +111,6 @@ export class Strip {
     labelled(detections, 5);
     labelled(labels, height);
     ticks(mistakes, "bad", 5, 12, 3);
-    if (this.hover !== undefined) {
-      context.fillStyle = themed("dim");
-      context.fillRect(this.hover, 0, 1, height);
-    }
     if (t_us !== null) {
       context.fillStyle = themed("text");
       context.fillRect(Math.min(width - 2, Math.max(0, x(t_us) - 1)), 0, 2, height);

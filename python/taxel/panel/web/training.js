@@ -77,7 +77,7 @@ export class Training {
     this.text(text, next);
     if (name !== this.source) return;
     this.mistakes.take(trained);
-    this.read(readout).then(() => this.mistakes.look());
+    this.read(readout);
   }
 
   /** Lets a readout read what is shown. @param {string} readout */
@@ -112,11 +112,9 @@ export class Training {
     this.show();
   }
 
-  /** @param {string | null} source a recording, or null: the live source @param {string} [command] what trains on it in a shell @param {string | null} [trial] where the file holds several */
-  choose(source, command = "", trial = null) {
+  /** @param {string | null} source a recording, or null: the live source @param {string | null} [trial] where the file holds several */
+  choose(source, trial = null) {
     this.mistakes.choose(trial, source === this.source);
-    part("train-shell", HTMLElement).hidden = !command;
-    write(part("train-command", HTMLElement), command);
     if (source === this.source) return;
     this.source = source;
     this.reads = this.readout.value = "";

@@ -1,14 +1,11 @@
-// The tab of the view: colours, flips, what the lanes show, the health of taxels, and cuts.
+// The tab of the view: the colour scale, what the raster shows, the health of taxels, and cuts.
 
-import { MAPS } from "./colours.js";
 import { make, part, write } from "./dom.js";
-import { LANES } from "./lanes.js";
 import { counted, seconds } from "./words.js";
 
 /** @typedef {import("./messages.js").Health} Health */
 /** @typedef {import("./messages.js").Hello} Hello */
 /** @typedef {import("./settings.js").Settings} Settings */
-/** @typedef {import("./settings.js").Values} Values */
 /** @typedef {import("./server.js").Server} Server */
 
 /** The tab of the view. */
@@ -18,25 +15,21 @@ export class View {
    * @param {Settings} settings
    * @param {(error: unknown) => void} failed
    * @param {(taxel: [number, number]) => void} pointed called for a taxel of the list
+   * @param {() => void} changed called when the raster shows something else
    */
-  constructor(server, settings, failed, pointed) {
+  constructor(server, settings, failed, pointed, changed) {
     this.server = server;
-    this.settings = settings;
     this.failed = failed;
     this.pointed = pointed;
+    this.changed = changed;
+    /** Whether the raster shows spikes, else changes. */
+    this.spikes = false;
     /** @type {[number | null, number | null]} */
     this.cut = [null, null];
     /** Sets an end of the cut where the view is. @type {((end: 0 | 1) => void) | null} */
     this.cutHere = null;
     /** What is shown: a recording or, null, the live board. @type {string | null} */
     this.source = null;
-    part("colour-map", HTMLSelectElement).append(...MAPS.map((name) => make("option", { value: name }, name)));
-    for (const [id, name] of /** @type {const} */ ([["colour-map", "map"], ["theme", "theme"], ["raster-what", "raster"], ["map-choice", "maps"]])) {
-      const select = part(id, HTMLSelectElement);
-      select.value = settings.values[name];
-      select.onchange = () => settings.set(name, select.value);
-    }
-    this.slider();
     const top = part("top", HTMLInputElement);
     top.value = settings.values.top ? String(settings.values.top) : "";
     top.oninput = () => {
@@ -44,19 +37,6 @@ export class View {
       top.setAttribute("aria-invalid", String(!(value >= 0)));
       if (value >= 0) settings.set("top", value);
     };
-    /** @param {HTMLInputElement} box @param {"flipX" | "flipY" | "letters" | `show${string}`} name of its setting */
-    const bind = (box, name) => {
-      box.checked = settings.values[name];
-      box.onchange = () => settings.set(name, box.checked);
-      return box;
-    };
-    for (const [id, name] of /** @type {const} */ ([["flip-x", "flipX"], ["flip-y", "flipY"], ["letters", "letters"]])) bind(part(id, HTMLInputElement), name);
-    for (const { box, setting } of LANES) if (box) part("lane-boxes", HTMLElement).append(make("label", { class: "check" }, bind(make("input", { type: "checkbox" }), setting), ` ${box}`));
-    settings.watch(() => {
-      part("theme", HTMLSelectElement).value = settings.values.theme;
-      part("raster-what", HTMLSelectElement).value = settings.values.raster;
-      part("map-choice", HTMLSelectElement).value = settings.values.maps;
-    });
     /** @type {string[]} */
     this.encoders = [];
     this.encoder = part("encoder", HTMLSelectElement);
@@ -72,24 +52,6 @@ export class View {
     };
   }
 
-  slider() {
-    const slider = part("gamma", HTMLInputElement);
-    // Even steps in ratio: a quarter to four, one in the middle.
-    slider.value = String(Math.log2(this.settings.values.gamma));
-    const show = () => {
-      const value = 2 ** Number(slider.value);
-      write(part("gamma-value", HTMLElement), value.toFixed(2));
-      slider.setAttribute("aria-valuetext", value.toFixed(2));
-      return value;
-    };
-    slider.oninput = () => this.settings.set("gamma", show());
-    slider.ondblclick = () => {
-      slider.value = "0";
-      this.settings.set("gamma", show());
-    };
-    show();
-  }
-
   /** @param {Hello} hello */
   greet(hello) {
     this.encoders = hello.encoders;
@@ -100,23 +62,27 @@ export class View {
   offer(readout) {
     const names = [...new Set([...this.encoders, ...readout])];
     const { value } = this.encoder;
-    this.encoder.replaceChildren(make("option", { value: "" }, "none"), ...names.map((name) => make("option", { value: name }, `${readout.includes(name) ? "readout: " : ""}${name.replaceAll("_", " ")}`)));
+    this.encoder.replaceChildren(make("option", { value: "" }, "changes"), ...names.map((name) => make("option", { value: name }, `${readout.includes(name) ? "readout: " : "spikes: "}${name.replaceAll("_", " ")}`)));
     this.encoder.value = names.includes(value) ? value : "";
-    if (!this.encoder.value) this.settings.set("raster", "changes");
+    if (!this.encoder.value) this.show(false);
   }
 
   /** Asks for the spikes of the encoder that is chosen, or for none. */
   encode() {
     const { value: name } = this.encoder;
-    if (!name && this.settings.values.raster === "changes") return;
-    this.server.request({ type: "encode", encoder: name ? { name } : null }).then(() => {
-      this.settings.set("raster", name ? "spikes" : "changes");
-    }, (error) => {
+    if (!name && !this.spikes) return;
+    this.server.request({ type: "encode", encoder: name ? { name } : null }).then(() => this.show(name !== ""), (error) => {
       // The server encodes nothing any more.
       this.encoder.value = "";
-      this.settings.set("raster", "changes");
+      this.show(false);
       this.failed(error);
     });
+  }
+
+  /** @param {boolean} spikes whether the raster shows them */
+  show(spikes) {
+    this.spikes = spikes;
+    this.changed();
   }
 
   /** @param {"now" | "lowest"} how */

@@ -1,6 +1,6 @@
 // The window of time that the lanes show: it zooms and scrolls as a time axis, and the server sends the columns that it lacks.
 
-import { make, part, write } from "./dom.js";
+import { make, part, withChildren, write } from "./dom.js";
 import { failed } from "./notice.js";
 import { SPAN } from "./timeline.js";
 import { short } from "./words.js";
@@ -104,12 +104,6 @@ export class TimeWindow {
     this.set(from, from + READABLE_US);
   }
 
-  /** Shows what happens from one time to another, with room beside it. @param {number} from_us @param {number} to_us */
-  closer(from_us, to_us) {
-    const room = Math.max(SHORTEST_US, 0.2 * (to_us - from_us));
-    this.set(from_us - room, to_us + room);
-  }
-
   /**
    * Shows this stretch of time, moved so that it lies within what can be viewed.
    * @param {number} from
@@ -180,12 +174,10 @@ export class TimeWindow {
     const timeline = this.timeline();
     if (!timeline) return;
     const ticks = timeline.ticks(this.axis.clientWidth / TICK_PX);
-    while (this.axis.children.length > ticks.length) this.axis.lastElementChild?.remove();
-    while (this.axis.children.length < ticks.length) this.axis.append(make("span"));
+    const marks = withChildren(this.axis, ticks.length, () => make("span"));
     ticks.forEach(({ share, text }, i) => {
-      const mark = /** @type {HTMLElement} */ (this.axis.children[i]);
-      write(mark, text);
-      mark.style.left = `${(100 * share).toFixed(2)}%`;
+      write(marks[i], text);
+      marks[i].style.left = `${(100 * share).toFixed(2)}%`;
     });
     write(part("span", HTMLElement), short(timeline.span_us));
     const [, most] = this.limits() ?? [0, timeline.column_us];
