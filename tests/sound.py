@@ -298,8 +298,6 @@ VALUES: dict[str, Callable[[], Any]] = {
     "ConeXProblem.cone": lambda: CONE_X,
     "ConeXProblem.silence.t": lambda: 5.0,
     "Detections.from_csv.path": lambda: "here.csv",
-    "Detections.from_neo.events": FOUND.to_neo,
-    "Detections.from_numpy.records": FOUND.to_numpy,
     "Detections.label": lambda: ["a"],
     "Events.from_numpy.records": EVENTS.to_numpy,
     "Frames.from_events.period_us": lambda: 100,

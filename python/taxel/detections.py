@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import checked_path, column, fields, instance, nth, several, shown, window
+from taxel._base.arguments import checked_path, column, instance, nth, several, shown, window
 from taxel._base.columns import FrozenColumns, frozen, frozen_column, frozen_copy
 from taxel._base.drawing import draw
 from taxel._base.errors import refused, unreadable
@@ -239,18 +239,6 @@ class Detections(FrozenColumns):
         columns = {name: np.concatenate([getattr(self, name), getattr(other, name)])[order] for name in names}
         return Detections._of(**columns)
 
-    def to_pandas(self) -> Any:
-        """Return a table ``label t_us known_us slope_mv_per_ms``; ``reported_us`` if known, ``repaired`` if any is."""
-        import pandas  # noqa: PLC0415  heavy
-
-        columns: list[NDArray[Any]] = [self.label.astype(object), self.t, self.known, self.slope]
-        names = list(_CSV)
-        if self.reported is not None:
-            columns, names = [*columns, self.reported], [*names, _REPORTED]
-        if self.repaired.any():
-            columns, names = [*columns, self.repaired], [*names, _REPAIRED]
-        return pandas.DataFrame(dict(zip(names, columns, strict=True)))
-
     def to_numpy(self) -> NDArray[np.void]:
         """Return a record for each detection: ``label t known slope``; ``reported`` if known, ``repaired`` if any."""
         width = max(1, self.label.dtype.itemsize // 4)
@@ -285,28 +273,6 @@ class Detections(FrozenColumns):
         columns: list[tuple[Any, ...]] = list(zip(*entries, strict=True)) or [()] * len(Detection._fields)
         label, t, known, slope, reported, _, repaired = columns
         return cls._of(label, t, known, slope, None if None in reported else reported, repaired)
-
-    @classmethod
-    def from_numpy(cls, records: NDArray[np.void]) -> Detections:
-        """Build detections from records of ``label t known slope``, and optionally ``reported``, ``repaired``.
-
-        Parameters
-        ----------
-        records : structured array, shape (n,), with the units of the columns
-
-        Raises
-        ------
-        ProblemError : a field is missing (names it)
-
-        Examples
-        --------
-        >>> found = Detections(["a"], [10], [11])
-        >>> Detections.from_numpy(found.to_numpy())
-        Detections(1: a 1; 10 to 10 us)
-        """
-        names = fields(records, ("label", "t", "known", "slope"))
-        reported, repaired = (records[name] if name in names else None for name in ("reported", _REPAIRED))
-        return cls._of(records["label"], records["t"], records["known"], records["slope"], reported, repaired)
 
     def to_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write a table ``label,t_us,known_us,slope_mv_per_ms[,reported_us][,repaired]`` and return its path.
@@ -377,44 +343,6 @@ class Detections(FrozenColumns):
         label, t, known, slope = zip(*rows, strict=True) if rows else ((), (), (), ())
         repaired = [value != 0 for value in more[_REPAIRED]] if _REPAIRED in more else None
         return cls._of(label, t, known, slope, more.get(_REPORTED), repaired)
-
-    def to_neo(self) -> Any:
-        """Return a ``neo.Event`` at `t`, with the label of each, and `known` (us) and `slope` as array annotations.
-
-        Raises
-        ------
-        ImportError : neo is not installed (``pip install 'taxel[neo]'``)
-        """
-        from neo import Event  # noqa: PLC0415  heavy
-
-        notes: dict[str, NDArray[Any]] = {"known": self.known, "slope": self.slope}
-        if self.reported is not None:
-            notes["reported"] = self.reported
-        if self.repaired.any():
-            notes[_REPAIRED] = self.repaired
-        return Event(self.t, labels=self.label, units="us", array_annotations=notes)
-
-    @classmethod
-    def from_neo(cls, events: Any) -> Detections:
-        """Build detections from a ``neo.Event`` of any time unit that `to_neo` made.
-
-        Parameters
-        ----------
-        events : neo.Event
-
-        Raises
-        ------
-        ProblemError : not such an event, or an event without `known` (us)
-        """
-        notes = getattr(events, "array_annotations", None)
-        if notes is None or "known" not in notes:
-            raise refused(
-                "events", f" is {shown(events)}: must be a neo.Event that has an array annotation named 'known' (us)"
-            )
-        t = np.rint(events.rescale("us").magnitude).astype(np.int64)
-        return cls._of(
-            events.labels, t, notes["known"], notes.get("slope"), notes.get("reported"), notes.get(_REPAIRED)
-        )
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw each label's detections as marks over time (s)."""

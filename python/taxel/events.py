@@ -283,18 +283,6 @@ class Events(FrozenColumns):
         columns = (inside.x - np.uint16(left), inside.y - np.uint16(top), inside.p, self.array._part(x, y))
         return self._unchecked(inside.t, *columns, inside.intensity, inside.present, inside.repaired, self.markers)
 
-    def to_pandas(self) -> Any:
-        """Return a table ``t_us x y p``, with ``intensity`` (missing if absent) and ``repaired`` if there are any."""
-        import pandas  # noqa: PLC0415  heavy
-
-        table = pandas.DataFrame({"t_us": self.t, "x": self.x, "y": self.y, "p": self.p})
-        if self.intensity is not None and self.present is not None:
-            table["intensity"] = pandas.array(self.intensity, "UInt16").copy()
-            table.loc[~self.present, "intensity"] = pandas.NA
-        if self.repaired is not None:
-            table["repaired"] = self.repaired
-        return table
-
     def to_numpy(self) -> NDArray[np.void]:
         """Return a record for each event: ``t x y p``, with ``intensity present`` and ``repaired`` if there are any."""
         fields: list[tuple[str, Any]] = [("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "?")]

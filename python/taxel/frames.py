@@ -373,14 +373,6 @@ class Frames(FrozenColumns):
     def _loaded(self, above: float) -> NDArray[np.bool_]:
         return np.asarray(self.values > np.float64(finite("above", above)))
 
-    def to_pandas(self) -> Any:
-        """Return a table: a row for each frame, indexed by ``t_us``, and a column for each taxel, ``(row, column)``."""
-        import pandas  # noqa: PLC0415  heavy
-
-        taxels = pandas.MultiIndex.from_product([range(n) for n in self.array.shape], names=["row", "column"])
-        index = pandas.Index(self.t, name="t_us")
-        return pandas.DataFrame(self.values.reshape(len(self), taxels.size), index=index, columns=taxels)
-
     def to_numpy(self) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
         """Return values (n, rows, columns) and times (us)."""
         return self.values.copy(), self.t.copy()

@@ -92,11 +92,10 @@ def test_the_spread_is_numpys(values: list[float]) -> None:
     assert np.allclose(spread, expected, rtol=1e-9, atol=1e-6)
 
 
-def test_detections_come_back_from_numpy_and_csv(tmp_path) -> None:
+def test_detections_come_back_from_csv(tmp_path) -> None:
     found = some()
     with_reported = taxel.Detections(found.label, found.t, found.known, [0.5, 1.5, None], reported=[9, 8, 7])
     for one in (found, with_reported, found[:0]):
-        assert taxel.Detections.from_numpy(one.to_numpy()) == one
         path = tmp_path / f"{len(list(tmp_path.iterdir()))}.csv"
         assert one.to_csv(path) == path
         assert taxel.Detections.from_csv(path) == one
@@ -105,15 +104,6 @@ def test_detections_come_back_from_numpy_and_csv(tmp_path) -> None:
     found.to_csv(path, overwrite=True)
     assert taxel.Detections.from_csv(path) == found
     assert sorted(p.suffix for p in tmp_path.iterdir()) == [".csv"] * 3, "nothing half-written stays"
-
-
-def test_detections_come_back_from_neo() -> None:
-    found = some()
-    with_reported = taxel.Detections(found.label, found.t, found.known, [0.5, 1.5, None], reported=[9, 8, 7])
-    for one in (found, with_reported):
-        event = one.to_neo()
-        assert taxel.Detections.from_neo(event) == one
-        assert taxel.Detections.from_neo(event.rescale("ms")).t.tolist() == one.t.tolist()
 
 
 def test_detections_are_chosen_by_label_time_and_place() -> None:

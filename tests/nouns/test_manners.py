@@ -115,29 +115,6 @@ def _values(of: SpikeTrains, k: int) -> np.ndarray:
     return np.ones(len(of[k])) if of.values is None else of.values[of.offsets[k] : of.offsets[k + 1]]
 
 
-def test_tables_of_pandas_hold_the_columns() -> None:
-    pandas = pytest.importorskip("pandas")
-    events = drawn(3, 20)
-    table = events.to_pandas()
-    assert list(table.columns) == ["t_us", "x", "y", "p", "intensity"]
-    assert table.intensity.isna().tolist() == (~events.present).tolist()
-    assert table.intensity.dropna().tolist() == events.intensity[events.present].tolist()
-    assert table[["t_us", "x", "y", "p"]].to_numpy().tolist() == [list(e)[:4] for e in events]
-    assert "intensity" not in drawn(3, 5, ticks=False).to_pandas()
-    assert found(3, 8).to_pandas().columns.tolist() == ["label", "t_us", "known_us", "slope_mv_per_ms"]
-    rows = list(found(3, 8, said=True).to_pandas().itertuples(index=False, name=None))
-    assert rows == [tuple(d)[:5] for d in found(3, 8, said=True)]
-    spikes = trains(4, signed=True)
-    table = spikes.to_pandas()
-    assert [g.t_ms.tolist() for _, g in table.groupby("train")] == [t.tolist() for t in spikes if len(t)]
-    assert np.array_equal(table["value"], spikes.values)
-    frames = Frames(np.arange(24.0).reshape(2, 3, 4), [5, 9])
-    table = frames.to_pandas()
-    assert table.index.tolist() == [5, 9]
-    assert table.loc[9, (2, 1)] == frames.values[1, 2, 1]
-    assert isinstance(table, pandas.DataFrame)
-
-
 def shown_nouns(tmp_path: Any) -> list[Any]:
     events = drawn(5, 20)
     taxel.convert(events, tmp_path / "a.npz")

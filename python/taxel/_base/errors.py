@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from os import PathLike, fspath
-from textwrap import dedent
 from typing import TypeVar
 
 from taxel._base.messages import escaped, escaped_lines
@@ -80,75 +79,17 @@ hint : str or None
     The remedy that the text ends with, in one word; None if there is none. "give": pass the argument; "lay_out" or
     "lay_out_camera": state rows and columns; "pitch": state the distance of the taxels; "unfelt": check the labels,
     as the sensor felt nothing near them.
-
-Examples
---------
->>> import taxel
 """
 _ABOUT = {
-    Error: (
-        "Base class of all errors of taxel: ``except taxel.Error`` catches each of them.",
-        """
-        >>> try:
-        ...     taxel.Array(0, 8)
-        ... except taxel.Error as error:
-        ...     print(f"{error} (argument: {error.argument})")
-        rows is 0: must be a whole number from 1 to 65535 (argument: rows)
-        """,
-    ),
-    FormatError: (
-        "A file, text or bytes cannot be read: it is damaged, or it is not in the format that it should be in.",
-        """
-        >>> try:
-        ...     taxel.Tare.from_json("{}")
-        ... except taxel.FormatError as error:
-        ...     print(error)
-        tare: array: missing field `array`
-        """,
-    ),
-    ProblemError: (
-        "An argument is invalid, or arguments, spike trains or a learning problem make no sense together.",
-        """
-        >>> try:
-        ...     taxel.Frames([[[1.0]], [[2.0]]], t=[5, 5])
-        ... except taxel.ProblemError as error:
-        ...     print(error)
-        t[1] is 5 us, not after t[0] = 5 us
-        """,
-    ),
-    NotFittedError: (
-        "A learner was used before its `fit` was called.",
-        """
-        >>> try:
-        ...     taxel.learn.ConeX().predict([])
-        ... except taxel.NotFittedError as error:
-        ...     print(error)
-        ConeX: not fitted yet, call fit first
-        """,
-    ),
-    DeviceError: (
-        "Registers break a rule of the board, the board does not answer, or its answer is wrong.",
-        """
-        >>> try:
-        ...     taxel.wire.Registers(line_read=3.2)
-        ... except taxel.DeviceError as error:
-        ...     print(error)
-        line_read 3.20 us is longer than line_period 3.00 us (rule 1)
-        """,
-    ),
-    SceneError: (
-        "A simulated scene cannot be played: a parameter is invalid, or a body is off the array.",
-        """
-        >>> try:
-        ...     taxel.simulate.Scene.draw(0, array=taxel.Array(8, 8))
-        ... except taxel.SceneError as error:
-        ...     print(error)
-        a scene needs distances in mm, but the pitch of array is not known; give array with the pitch in mm...
-        """,
-    ),
+    Error: "Base class of all errors of taxel: ``except taxel.Error`` catches each of them.",
+    FormatError: "A file, text or bytes cannot be read: it is damaged, or not in the format that it should be in.",
+    ProblemError: "An argument is invalid, or arguments, spike trains or a learning problem make no sense together.",
+    NotFittedError: "A learner was used before its `fit` was called.",
+    DeviceError: "Registers break a rule of the board, the board does not answer, or its answer is wrong.",
+    SceneError: "A simulated scene cannot be played: a parameter is invalid, or a body is off the array.",
 }
-for _kind, (_summary, _example) in _ABOUT.items():
-    _kind.__doc__ = f"{_summary}\n{_ATTRIBUTES}{dedent(_example).lstrip()}"
+for _kind, _summary in _ABOUT.items():
+    _kind.__doc__ = f"{_summary}\n{_ATTRIBUTES}"
 
 
 def refused(name: str, text: str) -> ProblemError:

@@ -80,12 +80,6 @@ class Text:
                 self.ends_in_line = line.endswith("\n")
                 yield line.rstrip("\n")
 
-    def blocks(self, size: int) -> Iterator[str]:
-        """Yield the text of a file in parts of about so many characters, each of whole lines."""
-        with self._opened() as text:
-            while block := text.read(size):
-                yield block + text.readline()
-
     @cached_property
     def head(self) -> list[str]:
         """The first lines; the last of them is whole, if the text goes on."""

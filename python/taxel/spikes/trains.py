@@ -429,13 +429,6 @@ class SpikeTrains(FrozenColumns):
             kind = "graded" if all(t.annotations.get("value_kind") == "graded" for t in trains) else "signed"
         return cls.from_lists(times, start, stop, values, kind=kind)
 
-    def to_pandas(self) -> Any:
-        """Return a table, train after train: a row a spike, ``train t_ms``, and ``value`` if there are values."""
-        import pandas  # noqa: PLC0415  heavy
-
-        columns: dict[str, Any] = {"train": np.repeat(np.arange(len(self)), self.counts), "t_ms": self.times}
-        return pandas.DataFrame(columns if self.values is None else columns | {"value": self.values})
-
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the trains to a .npz (``times offsets start stop``, ``values`` if any); return its path.
 

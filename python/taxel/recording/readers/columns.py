@@ -7,7 +7,6 @@ Events are ``t x y p``, optionally with ``intensity present``, ``repaired`` and 
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from taxel._base.arrays import hdf5, read_arrays, shapes
 from taxel._base.columns import frozen_whole
 from taxel._base.errors import refused
-from taxel._base.messages import counted, first_line
+from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -95,7 +94,6 @@ def read_columns(path: Path, array: Array | None = None) -> InMemory:
             f"{', '.join(list(found)[:8]) or 'nothing'}"
         )
     chosen = [name for name in (*names, SENSOR) if name in found]
-    _check_shapes(path, {name: found[name] for name in chosen})
     return from_columns(path, path.suffix[1:].lower(), read_arrays(path, chosen, DTYPES), array)
 
 
@@ -112,24 +110,6 @@ def read_records(path: Path, array: Array | None = None) -> InMemory:
     names = records.dtype.fields or ()
     columns = {name: records[name].copy() for name in (*EVENTS, *_MORE) if name in names}
     return from_columns(path, "records", columns, array)
-
-
-def _check_shapes(path: Path, found: Mapping[str, tuple[int, ...]]) -> None:
-    """Refuse columns that do not fit each other, before any is read."""
-    frames = found.get("values")
-    for name, shape in found.items():
-        if name in ("unit", SENSOR):
-            right = "one text" if shape else None
-        elif name == "markers":
-            right = None if shape[1:] == (2,) else "for each marker its time, and 1 if it is a start"
-        elif frames is not None:
-            is_right = name == "values" or shape == frames[:1]
-            right = None if is_right else f"one time for each of {counted(math.prod(frames[:1]), 'frame')}"
-        else:
-            is_right = len(shape) == 1 and shape == found.get("t", shape)
-            right = None if is_right else "one value for each event, as many as in t"
-        if right is not None:
-            raise FormatError(f"{path}: {name} has shape {shape}: must be {right}")
 
 
 def from_columns(path: Path, kind: str, columns: Mapping[str, NDArray[Any]], array: Array | None) -> InMemory:
