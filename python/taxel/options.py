@@ -471,8 +471,7 @@ class CalibrateOptions:
     Parameters
     ----------
     table : path, optional
-        A .csv of reading,value (above rest); with columns x,y for each taxel. Loads, if given, correct the gain of
-        this table.
+        A .csv of reading,value (above rest). Loads, if given, correct the gain of this table.
     unit : {"N", "kPa"}
         Unit of the calibrated values: N or kPa, at a taxel.
     each : bool

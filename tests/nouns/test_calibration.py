@@ -35,10 +35,6 @@ def calibrations(draw):
     rest = draw(st.sampled_from([None, np.full(ARRAY.shape, 7.0), np.arange(12.0).reshape(ARRAY.shape)]))
     common = {"unit": unit, "gain": gain, "rest": rest, "date": DAY}
     kind = draw(st.sampled_from(["table", "power"]))
-    if kind == "table" and draw(st.booleans()):
-        steps = st.lists(st.floats(0.5, 50.0), min_size=24, max_size=24)
-        x = np.cumsum(np.array(draw(steps)).reshape(2, *ARRAY.shape), axis=0)
-        return Calibration.table(ARRAY, x, np.cumsum(draw(st.lists(gains, min_size=2, max_size=2))), **common)
     if kind == "table":
         steps = st.lists(st.floats(0.5, 50.0), min_size=1, max_size=6)
         x = np.cumsum(draw(steps))

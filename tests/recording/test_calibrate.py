@@ -84,20 +84,6 @@ def test_a_table_needs_no_load(tmp_path: Path) -> None:
     assert f"  force               at most {newtons:g} N, at " in run("info", path).stdout
 
 
-def test_a_table_by_taxel_names_what_it_lacks(tmp_path: Path) -> None:
-    path, table = tmp_path / "pad.npz", tmp_path / "table.csv"
-    weighed(path)
-    rows = [(x, y, (1 + x + y) * value, value) for x in range(2) for y in range(2) for value in (1, 4)]
-    lines = [",".join(map(str, row)) for row in rows]
-    table.write_text("\n".join(["x,y,reading,value", *lines[:-1]]))
-    done = run("calibrate", path, "--table", table)
-    assert (done.returncode, "no reading of row 1, column 1 at value 4" in done.stderr) == (2, True)
-    table.write_text("\n".join(["x,y,reading,value", *lines]))
-    assert run("calibrate", path, "--table", table).returncode == 0
-    # 1, 2 and 3 counts on taxels that read 1, 2 and 2 counts a newton.
-    assert taxel.open(path).calibrated().values[15].ravel() == pytest.approx([1.0, 1.0, 1.5, 0.0])
-
-
 @pytest.mark.parametrize(
     ("options", "said"),
     [

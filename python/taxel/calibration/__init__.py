@@ -104,10 +104,6 @@ class Calibration(Saved):
         )
         if not reading_unit or reading_unit in UNITS:
             raise refused("reading_unit", f" is {reading_unit!r}: must be the unit of the readings: ticks, counts")
-        if isinstance(curve, PointCurve) and curve.x.ndim == 3 and curve.x.shape[1:] != array.shape:
-            raise refused(
-                "readings", f" have the shape {curve.x.shape[1:]}: must have that of the array, {array.shape}"
-            )
         calibration.gain = _by_taxel("gain", how.get("gain", 1.0), array)
         if not (np.isfinite(calibration.gain) & (calibration.gain > 0)).all():
             raise refused("gain", ": must be above 0 and finite at every taxel")
@@ -143,13 +139,12 @@ class Calibration(Saved):
         date: str | None = None,
         note: str = "",
     ) -> Calibration:
-        """Interpolate linearly between known points, which are the same for all taxels or given for each.
+        """Interpolate linearly between known points, the same for all taxels except for their gains.
 
         Parameters
         ----------
         array : Array
-        readings : float64, shape (points,) or (points, rows, columns), above rest, rising
-            The same for all taxels except for their gains, or the readings of each taxel under the same values.
+        readings : float64, shape (points,), above rest, rising
         values : float64, shape (points,), in `unit`, rising
             A first point (0, 0) is added. Above the last point the last value is used.
         unit : {"N", "kPa"}
@@ -302,12 +297,10 @@ class Calibration(Saved):
         """Return the calibration of a rectangle of the array."""
         (left, right), (top, bottom) = self.array.region(columns, rows)
         small = self.array._part(columns, rows)
-        curve, rest = self._curve, None if self.rest is None else self.rest[top:bottom, left:right]
-        if isinstance(curve, PointCurve) and curve.x.ndim == 3:
-            curve = PointCurve(curve.x[:, top:bottom, left:right], curve.y)
+        rest = None if self.rest is None else self.rest[top:bottom, left:right]
         gain = self.gain[top:bottom, left:right]
         unchanged = {name: getattr(self, name) for name in ("floor", "date", "residual", "loads", "note")}
-        return self._made(small, curve, self.unit, self.reading_unit, {**unchanged, "gain": gain, "rest": rest})
+        return self._made(small, self._curve, self.unit, self.reading_unit, {**unchanged, "gain": gain, "rest": rest})
 
     def to_json(self) -> str:
         """Return the calibration as JSON that people can read."""

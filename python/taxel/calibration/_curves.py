@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import floats, mapping, number, numbers, shown
+from taxel._base.arguments import floats, mapping, number, shown
 from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
@@ -53,45 +53,30 @@ class Power:
 
 
 class PointCurve:
-    """Straight lines through known points, of one taxel for all or of each; the last value holds beyond its point."""
+    """Straight lines through known points; the last value holds beyond its point."""
 
     def __init__(self, readings: Any, values: Any) -> None:
-        self.x, self.y = numbers("readings", readings, np.float64), floats("values", values)
-        if self.x.ndim not in (1, 3) or not self.y.size or len(self.x) != len(self.y):
-            points = len(self.x) if self.x.ndim else 0
+        self.x, self.y = floats("readings", readings), floats("values", values)
+        if not self.y.size or len(self.x) != len(self.y):
             raise ProblemError(
-                f"the table has {counted(points, 'reading')} and {counted(len(self.y), 'value')}: must have as "
-                f"many readings "
-                "as values, 1 or more; the shape of readings is (points,), or (points, rows, columns) if taxels differ"
+                f"the table has {counted(len(self.x), 'reading')} and {counted(len(self.y), 'value')}: must have as "
+                "many readings as values, 1 or more"
             )
         for name, column in (("readings", self.x), ("values", self.y)):
-            rising = np.isfinite(column) & (np.diff(column, axis=0, prepend=-np.inf) > 0) & (column >= 0)
-            wrong = np.argwhere(~rising)
-            if len(wrong):
-                position = tuple(wrong[0])
-                index = "".join(f"[{k}]" for k in position)
-                raise ProblemError(
-                    f"{name}{index} is {column[position]:g}: the numbers must begin at 0 or more, and rise"
-                )
-        at_rest = self.x[0] == 0
-        if np.any(at_rest != (self.y[0] == 0)):
-            first = float(np.ravel(self.x[0])[0])
+            rising = np.isfinite(column) & (np.diff(column, prepend=-np.inf) > 0) & (column >= 0)
+            if not rising.all():
+                k = int(np.argmin(rising))
+                raise ProblemError(f"{name}[{k}] is {column[k]:g}: the numbers must begin at 0 or more, and rise")
+        if (self.x[0] == 0) != (self.y[0] == 0):
             raise ProblemError(
-                f"the table begins with reading {first:g}, value {self.y[0]:g}: the value must be 0 where the reading "
-                "above rest is 0, and only there"
+                f"the table begins with reading {self.x[0]:g}, value {self.y[0]:g}: the value must be 0 where the "
+                "reading above rest is 0, and only there"
             )
-        if not np.any(at_rest):
-            self.x, self.y = np.concatenate([0 * self.x[:1], self.x]), np.append(0.0, self.y)
+        if self.x[0]:
+            self.x, self.y = np.append(0.0, self.x), np.append(0.0, self.y)
 
     def values(self, readings: Values, rest: Values) -> Values:
-        above = readings - rest
-        if self.x.ndim == 1:
-            return np.asarray(np.interp(above, self.x, self.y))
-        by_taxel = np.broadcast_to(above, np.broadcast_shapes(above.shape, self.x.shape[1:]))
-        out = np.empty(by_taxel.shape)
-        for row, column in np.ndindex(self.x.shape[1:]):
-            out[..., row, column] = np.interp(by_taxel[..., row, column], self.x[:, row, column], self.y)
-        return out
+        return np.asarray(np.interp(readings - rest, self.x, self.y))
 
     def to_dict(self) -> dict[str, Any]:
         return {"table": {"readings": self.x.tolist(), "values": self.y.tolist()}}

@@ -18,7 +18,6 @@ from taxel._base.header_table import HeaderTable, text_of
 from taxel._base.messages import collected
 from taxel._base.times import beginning_us
 from taxel._core import FormatError, ProblemError
-from taxel.array import Array
 from taxel.calibration import Calibration, Load
 from taxel.frames import Frames
 from taxel.options import CalibrateOptions, GivenTare
@@ -151,7 +150,7 @@ def _calibrated(recording: Recording, known: Sequence[KnownLoad], options: Calib
     how |= {"date": options.date, "note": options.note}
     calibration: Calibration | None = None
     if options.table is not None:
-        points = _points(Path(options.table), recording.array)
+        points = _points(Path(options.table))
         calibration = Calibration.table(recording.array, *points, reading_unit=frames.unit, **how)
     measured = [_load(frames, load) for load in known]
     if measured:
@@ -242,30 +241,8 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
         raise unreadable(f"{name} is {shown(cell)}; must be a number", path.name, line=line) from None
 
 
-def _points(path: Path, array: Array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Read a table of readings and values, for all taxels or, with columns x and y, for each that exists."""
+def _points(path: Path) -> tuple[list[float], list[float]]:
+    """Read a table of readings and values."""
     rows = _rows(path, ["reading", "value"])
-    columns = [name for name in ("reading", "value", "x", "y") if not rows or name in rows[0][1]]
-    cells = [[_number(path, line, name, row[name]) for name in columns] for line, row in rows]
-    numbers = np.array(cells).reshape(-1, len(columns))
-    pairs, taxels = numbers[:, :2], numbers[:, 2:]
-    if taxels.shape[1] != 2 or not rows:
-        return pairs[:, 0], pairs[:, 1]
-    exists = array._there()
-    values = np.unique(pairs[:, 1])
-    # Taxels that do not exist get rising values, which are never used.
-    readings = np.where(exists, np.nan, np.arange(1.0, len(values) + 1)[:, None, None])
-    for k, ((x, y), (reading, value)) in enumerate(zip(taxels, pairs, strict=True), start=2):
-        if x != int(x) or y != int(y) or not (0 <= x < array.columns and 0 <= y < array.rows):
-            raise FormatError(
-                f"{path.name}, line {k}: taxel at row {y:g}, column {x:g}; the array has {array.rows} x {array.columns}"
-            )
-        readings[np.searchsorted(values, value), int(y), int(x)] = reading
-    missing = np.argwhere(np.isnan(readings))
-    if len(missing):
-        point, y, x = missing[0]
-        raise FormatError(
-            f"{path.name}: no reading of row {y}, column {x} at value {values[point]:g}; each taxel must have a "
-            "reading for each value"
-        )
+    readings, values = ([_number(path, line, name, row[name]) for line, row in rows] for name in ("reading", "value"))
     return readings, values
