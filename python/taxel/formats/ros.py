@@ -6,9 +6,9 @@ A bag is a ``.bag`` of ROS 1, a ``.db3`` or ``.mcap`` of ROS 2, or a folder with
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass
 from functools import reduce
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,7 +27,7 @@ from taxel.frames import Frames
 from taxel.labels import source_of
 from taxel.reading import Facts, InMemory, Reader
 
-__all__ = ["Topic", "Topics", "is_bag", "read_ros", "topics"]
+__all__ = ["Topic", "is_bag", "read_ros", "topics"]
 
 #: The first bytes of a .bag and of a .db3, which is a database of SQLite.
 _ROS1, _SQLITE = b"#ROSBAG V", b"SQLite format 3\0"
@@ -263,51 +263,19 @@ def _of_topic(bag: Any, topic: str) -> Iterator[Topic]:
         yield Topic(topic, kind, field, _grid(first, field) or content.shape, content.dtype.name, len(times), rate)
 
 
-@dataclass(frozen=True)
-class Topics:
-    """Choose what of a ROS bag is opened; the arguments are those of `taxel.open`.
-
-    Parameters
-    ----------
-    topic, field : str, or list of str, optional
-    ros : str, optional
-    by : str, optional
-        A field whose value says which sensor a message is of: each value is a source.
-
-    Raises
-    ------
-    ProblemError : not a text, or more fields than topics
-    """
-
-    topic: str | Sequence[str] | None
-    field: str | Sequence[str] | None
-    ros: str | None
-    by: str | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("topic", "field", "ros", "by"):
-            _listed(name, getattr(self, name), str)
-
-    @property
-    def are_given(self) -> bool:
-        """Whether any of them is."""
-        return any(option is not None for option in (self.topic, self.field, self.ros))
-
-    def but(self, of_layout: Mapping[str, Any]) -> Topics:
-        """Return what is given, and what a layout says of the rest."""
-        return replace(self, **{name: value for name, value in of_layout.items() if getattr(self, name) is None})
-
-    def chosen(self, array: Array | Sequence[Array] | None) -> list[tuple[str, str | None, Array | None]]:
-        """Return each topic with its field and its array."""
-        given = {name: _listed(name, getattr(self, name), str) for name in ("topic", "field")}
-        given["array"] = _listed("array", array, Array)
-        count = max(map(len, given.values()))
-        for name, listed in given.items():
-            if len(listed) not in (0, 1, count):
-                times = f" is given {len(listed)} times for {count} sources"
-                raise refused(name, f"{times}; must be given once, or once for each source")
-        every = (listed * count if len(listed) == 1 else listed or [None] * count for listed in given.values())
-        return list(zip(*every, strict=True))
+def _chosen(
+    topic: object, field: object, array: Array | Sequence[Array] | None
+) -> list[tuple[str, str | None, Array | None]]:
+    """Return each topic with its field and its array; a single one is that of all."""
+    given = {"topic": _listed("topic", topic, str), "field": _listed("field", field, str)}
+    given["array"] = _listed("array", array, Array)
+    count = max(map(len, given.values()))
+    for name, listed in given.items():
+        if len(listed) not in (0, 1, count):
+            times = f" is given {len(listed)} times for {count} sources"
+            raise refused(name, f"{times}; must be given once, or once for each source")
+    every = (listed * count if len(listed) == 1 else listed or [None] * count for listed in given.values())
+    return list(zip(*every, strict=True))
 
 
 def _listed(name: str, value: Any, kind: type[Any]) -> list[Any]:
@@ -317,35 +285,53 @@ def _listed(name: str, value: Any, kind: type[Any]) -> list[Any]:
     return [check(name, entry) for entry in entries]
 
 
-def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) -> list[Reader]:
+def read_ros(
+    path: Path,
+    array: Array | Sequence[Array] | None = None,
+    *,
+    topic: str | Sequence[str] | None = None,
+    field: str | Sequence[str] | None = None,
+    ros: str | None = None,
+    by: str | None = None,
+) -> list[Reader]:
     """Return a reader of each chosen topic of a ROS bag, and of each value of the field `by`.
+
+    Parameters
+    ----------
+    path : Path
+    array, topic, field, ros
+        As of `taxel.open`.
+    by : str, optional
+        A field whose value says which sensor a message is of: each value is a source.
 
     Raises
     ------
     ImportError : rosbags is not installed
     FormatError : no topic is chosen; damaged; no such topic or field; no message of the array's length
-    ProblemError : an unknown release
+    ProblemError : an unknown release; more fields than topics
     """
-    if not topics.topic:
+    if not topic:
         right = "choose one of its topics, or write [ros] in a layout file"
         error = FormatError(f"{path}: is a ROS bag; {right}; to list the topics, run taxel info {path}")
         raise helped(error, "topic", "give")
-    chosen = topics.chosen(array)
-    names = [topic for topic, _, _ in chosen]
+    chosen = _chosen(topic, field, array)
+    for name, value in (("ros", ros), ("by", by)):
+        arguments.optional(arguments.text, name, value)
+    names = [name for name, _, _ in chosen]
     found: dict[str, Reader] = {}
-    with _open_bag(path, topics.ros) as bag:
+    with _open_bag(path, ros) as bag:
         there = {connection.topic for connection in bag.connections}
-        missing = next((topic for topic in names if topic not in there), None)
+        missing = next((name for name in names if name not in there), None)
         if missing is not None:
             listed = ", ".join(sorted(there)) or "none"
             raise FormatError(f"{path}: the bag has no topic {missing}; its topics are {listed}")
         others = sorted(there - set(names))
         lost = (f"other topics of the bag: {', '.join(others)}",) * bool(others)
-        for topic, field, size in chosen:
-            held = _Messages(path, topic, field, size, topics.by)
-            for connection, at, data in bag.messages([c for c in bag.connections if c.topic == topic]):
+        for name, part, size in chosen:
+            held = _Messages(path, name, part, size, by)
+            for connection, at, data in bag.messages([c for c in bag.connections if c.topic == name]):
                 held.add(bag.deserialize(data, connection.msgtype), at)
-            for key, reader in held.readers(lost, is_named=names.count(topic) > 1):
+            for key, reader in held.readers(lost, is_named=names.count(name) > 1):
                 if key in found:
                     raise ProblemError(f"{path}: two sources would have the name {key}; open one at a time")
                 found[key] = reader

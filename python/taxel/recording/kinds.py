@@ -23,7 +23,7 @@ from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction
 from taxel.formats.foreign import ARRAYS, TABLES, check_foreign, read_foreign, refuse_container
 from taxel.formats.layout import Layout, advice
-from taxel.formats.ros import Topics, is_bag, read_ros
+from taxel.formats.ros import is_bag, read_ros
 from taxel.reading import ENDINGS, Facts, InMemory, Reader
 from taxel.recording.beside import LABELS, is_label_table
 from taxel.recording.layout import check_size
@@ -61,11 +61,6 @@ class OpenOptions:
     differences: bool = False
 
     @property
-    def topics(self) -> Topics:
-        """Topics of a ROS bag that are opened."""
-        return Topics(self.topic, self.field, self.ros)
-
-    @property
     def reduction(self) -> Reduction:
         """Selection of the events of a camera."""
         return Reduction(self.region, self.bin, self.window_ms, self.polarity)
@@ -78,7 +73,7 @@ class OpenOptions:
         ProblemError : topics of a file that is no ROS bag, or what is read of a camera's events for one of a maker
         """
         flag("differences", self.differences)
-        if self.topics.are_given and kind != "ros":
+        if kind != "ros" and not self.topic is self.field is self.ros is None:
             raise ProblemError(f"{path}: is not a ROS bag; topic, field and ros are only for ROS bags")
         if self.label_column is not None and kind != "table":
             raise refused("label_column", f" is {shown(self.label_column)}: is only for tables; {path} is none")
@@ -122,7 +117,9 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
 
     def read_bag(path: Path, layout: Layout | None) -> Sequence[Reader]:
         grid = layout.grid() if how.array is None and layout is not None else how.array
-        return read_ros(path, how.topics.but({} if layout is None else layout.ros), grid)
+        stated = {} if layout is None else layout.ros
+        given = {name: getattr(how, name) for name in ("topic", "field", "ros") if getattr(how, name) is not None}
+        return read_ros(path, grid, **{**stated, **given})
 
     def read_events(path: Path, layout: Layout | None) -> Sequence[Reader]:
         return [read_records(path, layout.grid() if array is None and layout is not None else array)]

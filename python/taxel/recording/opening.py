@@ -249,7 +249,7 @@ def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
     OSError : as of the first file, if none can be read
     """
     found = recordings_in(folder, options.layout)
-    if not options.topics.topic and not all(map(is_bag, found)):
+    if not options.topic and not all(map(is_bag, found)):
         found = [file for file in found if not is_bag(file)]
     whole = {str(kind_of(file)) for file in found} - {*ENDINGS.values(), "records", "ros", *FOREIGN}
     if len(whole) > 1:
