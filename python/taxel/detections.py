@@ -348,9 +348,6 @@ class Detections(FrozenColumns):
         """Draw each label's detections as marks over time (s)."""
         return draw("detections", self, ax)  # type: ignore[no-any-return]
 
-    def _repr_html_(self) -> str:
-        return draw("html", self)  # type: ignore[no-any-return]
-
     def _parts(
         self,
     ) -> tuple[list[str], NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:

@@ -322,9 +322,6 @@ class Events(FrozenColumns):
         """Draw the number of events of each taxel: rises in one colour, falls in another."""
         return draw("event_picture", self, ax)  # type: ignore[no-any-return]
 
-    def _repr_html_(self) -> str:
-        return draw("html", self)  # type: ignore[no-any-return]
-
     @classmethod
     def _unchecked(
         cls,

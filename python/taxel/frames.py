@@ -381,9 +381,6 @@ class Frames(FrozenColumns):
         """Draw the pressure map at `at` us, or of the frame with the largest sum."""
         return draw("pressure_map", self, at, ax)  # type: ignore[no-any-return]
 
-    def _repr_html_(self) -> str:
-        return draw("html", self)  # type: ignore[no-any-return]
-
     def _parts(self) -> _core._Frames:
         """Return the columns, which the compiled part reads in place."""
         return self.array._parts(), self.t, self.values.reshape(-1)

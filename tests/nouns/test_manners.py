@@ -1,8 +1,7 @@
-"""Python's manners: nouns are iterated, indexed, added, shown in notebooks and handed to pandas."""
+"""Python's manners: nouns are iterated, indexed and added."""
 
 from __future__ import annotations
 
-import base64
 import subprocess
 import sys
 from typing import Any
@@ -113,29 +112,6 @@ def test_trains_of_both_are_merged_train_by_train(seed: int, signed: bool) -> No
 
 def _values(of: SpikeTrains, k: int) -> np.ndarray:
     return np.ones(len(of[k])) if of.values is None else of.values[of.offsets[k] : of.offsets[k + 1]]
-
-
-def shown_nouns(tmp_path: Any) -> list[Any]:
-    events = drawn(5, 20)
-    taxel.convert(events, tmp_path / "a.npz")
-    rec = taxel.open(tmp_path / "a.npz")
-    frames = [Frames(np.ones((n, 3, 4)), np.arange(n)) for n in (2, 0)]
-    spikes = [trains(1, signed=True), SpikeTrains.from_lists([])]
-    return [events, events[:0], *frames, *spikes, found(1, 3), found(1, 0), rec, taxel.health(rec)]
-
-
-def test_a_notebook_shows_the_line_and_a_small_picture(tmp_path: Any) -> None:
-    import matplotlib.pyplot as plt
-
-    before = plt.get_fignums()
-    for noun in shown_nouns(tmp_path):
-        html = noun._repr_html_()
-        assert "&" in repr(noun) or repr(noun).replace("<", "&lt;").replace(">", "&gt;") in html
-        if not (isinstance(noun, Frames) and not len(noun)):
-            picture = base64.b64decode(html.split("base64,")[1].split('"')[0])
-            assert picture.startswith(b"\x89PNG")
-            assert len(picture) < 60_000
-    assert plt.get_fignums() == before, "no figure stays open"
 
 
 def test_encoders_tares_health_and_detections_take_a_recording(tmp_path: Any) -> None:

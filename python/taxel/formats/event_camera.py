@@ -140,14 +140,13 @@ def knows(path: Path) -> bool:
     return not head.startswith(_TEXTS) and (below[1:2] == b"\x08" or below.count(0) >= 8)
 
 
-def read_events(path: Path, reduction: Reduction, size: Array | None = None) -> Events | Frames:
-    """Read the events of a file, or their counts in windows; `size` is that of a sensor whose header has none.
+def read_events(path: Path, size: Array | None = None) -> Events:
+    """Read the events of a file; `size` is that of a sensor whose header has none.
 
     Raises
     ------
     FormatError : a file that is damaged, has no header or no event, or is larger than the memory that is available
     ImportError : faery is not installed (``pip install 'taxel[events]'``)
-    ProblemError : a region or a taxel beyond the sensor
     """
     try:
         import faery  # noqa: PLC0415  an extra
@@ -175,10 +174,9 @@ def read_events(path: Path, reduction: Reduction, size: Array | None = None) -> 
     found = np.concatenate(packets)
     try:
         array = Array(rows, columns, name="event camera")
-        events = Events(found["t"].astype(np.int64), found["x"], found["y"], found["on"], array=array)
+        return Events(found["t"].astype(np.int64), found["x"], found["y"], found["on"], array=array)
     except ProblemError as error:
         raise damaged(path, "file of an event camera", first_line(error)) from None
-    return reduced(str(path), events, reduction) if reduction.is_given else events
 
 
 def reduced(name: str, events: Events, reduction: Reduction) -> Events | Frames:

@@ -110,9 +110,8 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
         return [_on_given(each, array) for each in read_foreign(path, layout, array, how.label_column)]
 
     def read_camera(path: Path, layout: Layout | None) -> Sequence[Reader]:
-        reduction = how.reduction.but(None if layout is None else layout.event_camera)
         size = layout.grid() if array is None and layout is not None else array
-        table = event_camera.read_events(path, reduction, size)
+        table = event_camera.read_events(path, size)
         return [InMemory(Facts(path=path, array=table.array, kind="event_camera"), table)]
 
     def read_bag(path: Path, layout: Layout | None) -> Sequence[Reader]:

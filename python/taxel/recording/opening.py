@@ -211,7 +211,7 @@ def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[
     if layout is not None:
         given = options.layout is not None
         opened = [each._each(lambda source: apply_layout(source, layout, given=given)) for each in opened]
-    return opened if kind == "event_camera" else [_of_camera(each, path, options.reduction, layout) for each in opened]
+    return [_of_camera(each, path, options.reduction, layout) for each in opened]
 
 
 def _no_camera(path: Path) -> ProblemError:

@@ -605,9 +605,6 @@ class Recording:
         """Draw events (or the sum of pressure) over time, and the activity of each taxel."""
         return draw("overview", self)  # type: ignore[no-any-return]
 
-    def _repr_html_(self) -> str:
-        return draw("html", self)  # type: ignore[no-any-return]
-
     def __repr__(self) -> str:
         if self.is_several:
             return escaped(f"Recording({self.name}: {len(self._sources)} sources: {', '.join(self._sources)})")

@@ -494,9 +494,6 @@ class SpikeTrains(FrozenColumns):
         """Draw the raster: time (ms) to the right, trains upwards, OFF spikes and values below 0 in another colour."""
         return draw("raster", self, ax)  # type: ignore[no-any-return]
 
-    def _repr_html_(self) -> str:
-        return draw("html", self)  # type: ignore[no-any-return]
-
     def _values(self) -> list[NDArray[np.float32]] | None:
         """Return the values train by train."""
         return None if self.values is None else np.split(self.values, self.offsets[1:-1])

@@ -74,9 +74,6 @@ class Health:
         """Draw the activity of each taxel, with those marked that are dead, stuck or noisy."""
         return draw("health_map", self, ax)  # type: ignore[no-any-return]
 
-    def _repr_html_(self) -> str:
-        return draw("html", self)  # type: ignore[no-any-return]
-
     def __repr__(self) -> str:
         counts = ", ".join(f"{len(places)} {name}" for name, places in self.named().items())
         untested = int(np.count_nonzero(self.untested))
