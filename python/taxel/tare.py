@@ -151,9 +151,7 @@ class Tare(Saved):
         if not isinstance(text, str):
             raise refused("tare", f" is {shown(text)}: must be JSON text")
         if stranger := _OTHER.match(text):
-            raise FormatError(
-                f"is a {stranger[1]}, not a tare: must be a file that Tare.save or taxel live --save-tare wrote"
-            )
+            raise FormatError(f"is a {stranger[1]}, not a tare: must be a file that Tare.save wrote")
         tare = cls.__new__(cls)
         tare._text = _core.check_tare(checked_text("tare", text))
         values: dict[str, Any] = json.loads(tare._text)

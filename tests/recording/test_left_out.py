@@ -25,16 +25,9 @@ def empty(file: Path) -> None:
     file.write_bytes(b"")
 
 
-def spoilt(file: Path) -> None:
-    lines = file.read_text().splitlines()
-    lines[30] = "here the disk was full"
-    file.write_text("\n".join(lines))
-
-
 DAMAGE: dict[str, tuple[str, Callable[[Path], None], str]] = {
     "a cut .npz": (".npz", cut, r"b\.npz: the \.npz file is damaged"),
     "a cut .h5": (".h5", cut, r"b\.h5: the HDF5 file is damaged"),
-    "a bad line": (".csv", spoilt, r"b\.csv, line 31: "),
     **{
         f"an empty {end}": (end, empty, rf"b\{end}.* (is empty|damaged)|b\{end}, line 1: ")
         for end in (".npz", ".h5", ".csv")

@@ -31,7 +31,6 @@ from taxel.simulate import emulate as run
 from taxel.simulate.board import fitting
 from taxel.simulate.circuit import Circuit, Converter, VirtualGround
 from taxel.simulate.options import EmulateOptions
-from taxel.spikes import to_ms
 
 app = App(name="emulate")
 
@@ -41,12 +40,6 @@ def _option(name: str, options: type = EmulateOptions, metavar: str | None = Non
     described = about(options, name)
     limits = Limits(described.get("min"), described.get("max"))
     return Parameter(help=described["help"], metavar=metavar, validator=limits)
-
-
-def _in_ms(name: str) -> Any:
-    """Return the option of the command line, ms, that sets an option of version 2, us."""
-    described = about(Version2, name)
-    return Parameter(help=described["help"], validator=Limits(to_ms(described["min"]), to_ms(described["max"])))
 
 
 @dataclass(frozen=True)
@@ -65,8 +58,6 @@ class _EmulateArguments:
         Play the scene of this .toml, repeatedly, instead of random scenes.
     replay
         Play a recording instead of scenes.
-    speed
-        With --replay: playback speed; 2 takes half the time. Default: 1.
     tare
         How long the noise floor is 0 before the start marker, s. Default: as in the scene's file, or 0.05.
     session
@@ -87,15 +78,11 @@ class _EmulateArguments:
         int | None, Parameter(help=about(EmulateOptions, "seed")["help"], validator=Limits(0, TRAINING_SEED - 1))
     ] = None
     replay: Path | None = None
-    speed: float | None = None
     tare: Annotated[float | None, Parameter(metavar="SECONDS", validator=Limits(0, 60))] = None
     preset: Annotated[str | None, _option("preset")] = None
     wire: Annotated[int | None, _option("wire")] = None
     board: Annotated[int, _option("board", options=Version2)] = Version2.board
     session: Annotated[int | None, Parameter(validator=Limits(0, 65_535))] = None
-    hold: Annotated[float, _in_ms("hold_us")] = to_ms(Version2.hold_us)
-    heartbeat: Annotated[float, _in_ms("heartbeat_us")] = to_ms(Version2.heartbeat_us)
-    states: Annotated[float, _in_ms("states_us")] = to_ms(Version2.states_us)
     reset_every: Annotated[float | None, _option("reset_every_s")] = EmulateOptions.reset_every_s
     drift: Annotated[float, _option("drift_ppm")] = EmulateOptions.drift_ppm
     circuit: Annotated[list[str] | None, _option("circuit", metavar="NAME=VALUE")] = None
@@ -148,8 +135,6 @@ def _check_options(typed: _EmulateArguments) -> None:
         raise ProblemError("--scene: leave out --replay and --rest")
     if replays and (typed.scenes is not None or typed.labels is not None or typed.rest):
         raise ProblemError("--scenes, --truth and --rest are for scenes: leave them out with --replay")
-    if typed.speed is not None and not replays:
-        raise ProblemError("--speed needs --replay: give both, or neither")
 
 
 def _touch_of(typed: _EmulateArguments) -> tuple[Any, str, dict[str, Any]]:
@@ -168,7 +153,6 @@ def _touch_of(typed: _EmulateArguments) -> tuple[Any, str, dict[str, Any]]:
     drawn_seed = secrets.randbelow(TRAINING_SEED) if scene_file is None else scene_file.seed
     seed = drawn_seed if typed.seed is None else typed.seed
     session = secrets.randbelow(65_536) if typed.session is None else typed.session
-    times_us = (round(1e3 * ms) for ms in (typed.hold, typed.heartbeat, typed.states))
     options: dict[str, Any] = {
         "seed": seed,
         "preset": board.preset,
@@ -176,7 +160,7 @@ def _touch_of(typed: _EmulateArguments) -> tuple[Any, str, dict[str, Any]]:
         "array": board.array,
         "sensor": board.sensor,
         "wire": (2 if typed.asynchronous else None) if typed.wire is None else 2 if typed.wire == 2 else 1,
-        "version_2": Version2(typed.board, session, *times_us),
+        "version_2": Version2(typed.board, session),
         "flaws": _flaws(typed.flaw or [], seed),
         "faults": _faults(typed.fault or [], seed),
         "circuit": _circuit(typed.circuit or [], seed),
@@ -187,8 +171,7 @@ def _touch_of(typed: _EmulateArguments) -> tuple[Any, str, dict[str, Any]]:
         "source_port": typed.source_port,
     }
     if typed.replay is not None:
-        speed = 1.0 if typed.speed is None else typed.speed
-        return Replay(open_one(typed.replay), speed), f"replay of {typed.replay}", options
+        return Replay(open_one(typed.replay)), f"replay of {typed.replay}", options
     if scene_file is not None:
         return _from_file(scene_file, typed.scenes, tare_ms), f"{typed.scene}, seed {seed}", options
     return *_scenes(seed, typed.scenes, tare_ms, typed.rest), options

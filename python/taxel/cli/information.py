@@ -11,7 +11,6 @@ import taxel
 from taxel._base.messages import counted
 from taxel._base.parallel import Workers
 from taxel._core import ProblemError
-from taxel.cli._say import say
 from taxel.cli._task import Output, progress, say_warnings
 from taxel.cli.app import App, Flat
 from taxel.options import InformationOptions, Reading
@@ -53,48 +52,16 @@ def information(
     if report.suffix != ".html":
         raise ProblemError(f"--report {report}: the name of the report must end in .html")
     output.check(report)
-    known = _KnownBits()
-    try:
-        with progress(output.json) as update:
-            opened = []
-            for path in recordings:
-                update(f"reading {path}", 0, 0)
-                opened += reading.open_sensors([path])
-            result = taxel.tasks.information(opened, labels, options, progress=update, watch=known.add, workers=workers)
-            update("drawing", 0, 0)
-            taxel.report.write_information(report, result.answer, overwrite=output.overwrite)
-    except KeyboardInterrupt:
-        say(known.line(options.draws), err=True)
-        raise
+    with progress(output.json) as update:
+        opened = []
+        for path in recordings:
+            update(f"reading {path}", 0, 0)
+            opened += reading.open_sensors([path])
+        result = taxel.tasks.information(opened, labels, options, progress=update, workers=workers)
+        update("drawing", 0, 0)
+        taxel.report.write_information(report, result.answer, overwrite=output.overwrite)
     say_warnings(result.warned)
     output.say({**result.to_dict(), "report": str(report)}, *lines(result.answer), f"written to {report}")
-
-
-class _KnownBits:
-    """The bits of the settings of all taxels that are done, for a run that is stopped."""
-
-    def __init__(self) -> None:
-        self._bits: dict[float, dict[float, tuple[float, int]]] = {}
-
-    def add(self, period_ms: float, window_ms: float, bits: float) -> None:
-        """Note the bits of a setting by its draws so far."""
-        by_window = self._bits.setdefault(period_ms, {})
-        by_window[window_ms] = bits, by_window.get(window_ms, (0.0, 0))[1] + 1
-
-    def line(self, draws: int) -> str:
-        """Return one line of all settings so far."""
-        if not self._bits:
-            return "stopped before the bits of any setting were known"
-        counts = sorted({count for by_window in self._bits.values() for _, count in by_window.values()})
-        done = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-        by_period = "; ".join(
-            f"period {period:g} ms: "
-            + ", ".join(f"{bits:.2f} within {window:g} ms" for window, (bits, _) in by_window.items())
-            for period, by_window in self._bits.items()
-        )
-        return (
-            f"stopped after {done} of {counted(draws, 'draw')}; bits so far, without confidence intervals: {by_period}"
-        )
 
 
 def lines(answer: Answer) -> list[str]:

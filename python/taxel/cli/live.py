@@ -14,14 +14,12 @@ from cyclopts import Parameter
 from rich.live import Live as Display
 from rich.text import Text
 
-from taxel._base.files import check_writable
 from taxel._base.messages import counted, plain
 from taxel._base.stopping import asked_to_end
 from taxel._core import FIREWALL, DeviceError, ProblemError
 from taxel.array import Array
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._say import say
-from taxel.cli._task import Output
 from taxel.cli.app import App, Flat, SecondsOption
 from taxel.cli.board import (
     REDRAW_S,
@@ -63,10 +61,6 @@ class _LiveArguments:
     control
         The board's serial line (COM3, /dev/ttyACM0, host:port), on which the panel sets registers, and taxel sets a
         noise floor of 0 while it takes a tare.
-    save_tare
-        Save the fresh tare in a new file (JSON).
-    report
-        With --record: write a report to this folder, with potential, weights, errors and the worst events.
     panel
         Show the board in a browser.
     folder
@@ -76,9 +70,7 @@ class _LiveArguments:
     rate_hz: RateOption = None
     bits: BitsOption = None
     control: str | None = None
-    save_tare: Annotated[Path | None, Parameter(metavar="FILE")] = None
     seconds: SecondsOption = None
-    report: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
     panel: bool = False
     panel_host: PanelHostOption = "127.0.0.1"
     panel_port: PanelPortOption = 0
@@ -104,14 +96,10 @@ def live(*, options: dict[str, Any], typed: Flat[_LiveArguments] = _LiveArgument
     Example: taxel live --panel --control 127.0.0.1:5209
     """
     _check_options(options, typed)
-    given_tare = options["tare"]
     options = for_live(options, typed.rate_hz, typed.bits, typed.seconds)
-    trained, rest, record, lines = (options[name] for name in ("readout", "tare", "record", "lines"))
-    _check_fresh_tare(typed, rest, overwrite=options["overwrite"])
-    if typed.report is not None:
-        if record is None or record.suffix != ".mcap":
-            raise ProblemError("--report needs a recording: give --record FILE.mcap")
-        Output(overwrite=options["overwrite"]).check_report(typed.report)
+    trained, rest, lines = (options[name] for name in ("readout", "tare", "lines"))
+    if typed.control is not None and not typed.panel and not isinstance(rest, float):
+        raise ProblemError("--control needs a fresh tare or the panel: give --tare SECONDS, or --panel")
     console = Console(stderr=True)
     if typed.control is not None and options["registers"] is None:
         sensor = trained.array if options["array"] is None and trained is not None else options["array"]
@@ -137,22 +125,8 @@ def live(*, options: dict[str, Any], typed: Flat[_LiveArguments] = _LiveArgument
             summary = last.stop()
             # Detections that the readout made while `stop` ran.
             _drain(last, None if lines else say)
-    tare = summary.tare
-    if typed.save_tare is not None and tare is not None:
-        tare.save(typed.save_tare, overwrite=options["overwrite"])
-        console.print(f"tare written to {typed.save_tare}")
-    if typed.report is not None and trained is not None and summary.path is not None:
-        printed = list(_summary_lines(summary, options["guard_frames"]))
-        given = tare if tare is not None else rest
-        _report(typed.report, trained, summary, given, printed, overwrite=options["overwrite"])
-        console.print(f"report: {typed.report / 'report.html'}")
     _report_unsent(summary)
     say(*_summary_lines(summary, options["guard_frames"]), err=lines)
-    if typed.save_tare is not None and tare is None and not summary.nothing_came:
-        seconds = summary.counters["seconds"]
-        raise ProblemError(
-            f"--tare {given_tare}: the tare was not complete after {seconds:.1f} s; {typed.save_tare} was not written"
-        )
     return exit_code(summary, pipeline.array)
 
 
@@ -216,28 +190,6 @@ def _show(
     return pipeline if shows is None or shows.live is None else shows.live
 
 
-def _report(
-    folder: Path,
-    readout: Readout | PlainRule,
-    summary: Summary,
-    tare: Tare | float | None,
-    printed: list[str],
-    *,
-    overwrite: bool,
-) -> None:
-    """Write the report on a recording: its events and its detections."""
-    import taxel  # noqa: PLC0415
-    from taxel.detect import Example, Outcome  # noqa: PLC0415
-    from taxel.report import write_detections  # noqa: PLC0415  pictures load slowly
-
-    assert summary.path is not None
-    recording = taxel.open(summary.path)
-    rest = tare if isinstance(tare, Tare) else None
-    outcome = Outcome(str(summary.path), Example(recording, {}, rest), recording.detections)
-    title = f"Live detections, recorded to {summary.path}"
-    write_detections(folder, readout, [outcome], title=title, printed=printed, overwrite=overwrite)
-
-
 def _summary_lines(summary: Summary, guard_frames: float) -> Iterator[str]:
     """Yield what was detected, received and lost."""
     counters = summary.counters
@@ -270,21 +222,10 @@ def _check_options(options: dict[str, Any], typed: _LiveArguments) -> None:
     readout, tare = options["readout"], options["tare"]
     if readout is None and not typed.panel:
         raise ProblemError("nothing to do: give --readout FILE to detect, or --panel to show the board")
-    if readout is None and (tare or typed.report):
-        raise ProblemError("--tare and --report need a readout: give --readout FILE")
+    if readout is None and tare:
+        raise ProblemError("--tare needs a readout: give --readout FILE")
     if typed.folder is not None and not typed.panel:
         raise ProblemError("--folder needs the panel: give --panel")
-
-
-def _check_fresh_tare(typed: _LiveArguments, rest: Tare | float | None, *, overwrite: bool) -> None:
-    """Refuse options that need a fresh tare, if none is taken."""
-    if isinstance(rest, float):
-        if typed.save_tare is not None:
-            check_writable(typed.save_tare, overwrite=overwrite)
-    elif typed.save_tare is not None:
-        raise ProblemError("--save-tare needs a fresh tare: give --tare SECONDS")
-    elif typed.control is not None and not typed.panel:
-        raise ProblemError("--control needs a fresh tare or the panel: give --tare SECONDS, or --panel")
 
 
 def _warn_of_unknown(tare: Tare) -> None:

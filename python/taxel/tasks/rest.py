@@ -211,7 +211,7 @@ def tare_of(path: Path, recording: Recording | None = None) -> Tare:
     Parameters
     ----------
     path : Path
-        A file that `Tare.save` or ``taxel live --save-tare`` wrote, which is JSON; else what `taxel.open` opens.
+        A file that `Tare.save` wrote, which is JSON; else what `taxel.open` opens.
     recording : Recording, optional
         What the tare is for.
 
