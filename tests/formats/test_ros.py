@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import shutil
 import sqlite3
 import sys
@@ -174,32 +173,6 @@ def test_multi_arrays_of_every_number_are_listed_and_read_also_after_empty_ones(
         assert opened.counts["messages_of_another_length"] == begins
 
 
-def test_texts_count_from_the_recordings_beginning_and_json_from_1970(tmp_path: Path, capsys) -> None:
-    values = RNG.integers(0, 2, (200, 4, 4)) + 100 * (np.arange(200) > 120)[:, None, None]
-    sent = [
-        ("/a", bags.array_of(np.float64), 10 * k, None, bags.multi_array(values[k], (4, 4), float)) for k in range(200)
-    ]
-    bag, begin = bags.write(tmp_path / "a.bag", sent), BEGIN_NS // 1000
-    info = ("info", bag, "--topic", "/a")
-    said = call(capsys, *info)[1]
-    assert said.splitlines()[0].startswith(f"{bag}: ROS bag, from /a.data")
-    assert re.search(
-        r"^  rest +that of a quiet stretch, 0\.\d+ to [01]\.\d+ s; later the rest follows slow changes$", said, re.M
-    )
-    assert "losses unknown: the ROS bag does not record them" in said
-    # Only the line that says the beginning has the time since 1970.
-    assert [line.split()[0] for line in said.splitlines() if "1795" in line] == ["from"]
-    quiet = json.loads(call(capsys, *info, "--json")[1])["rest"]["quiet_us"]
-    assert begin <= quiet[0] < quiet[1] <= begin + 1_990_000
-    labels = tmp_path / "labels.csv"
-    (tmp_path / "a.layout.toml").write_text('[ros]\ntopic = "/a"\n')
-    for t in (6_000_000, begin + 10**7):
-        labels.write_text(f"label,t_us\ncontact,{t}\n")
-        wrong = call(capsys, "train", bag, "--labels", labels, "-o", tmp_path / "r.json")[2]
-        assert "none within" in wrong
-        assert f"it begins 2026-11-18 11:06:40.000 UTC, {begin} us since 1970" in wrong
-
-
 def test_messages_of_another_length_are_left_out_and_counted(tmp_path: Path) -> None:
     lengths = (3, 3, 5, 3, 0, 3)
     several = [("/hand", HAND, 10 * k + 3, 10 * k, bags.hand(range(n), [1, 1])) for k, n in enumerate(lengths)]
@@ -332,28 +305,6 @@ def test_without_rosbags_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.
         taxel.open(bag, topic="/palm")
     code, _, said = call(capsys, "info", bag)
     assert (code, "pip install 'taxel[ros]'" in said) == (2, True)
-
-
-@pytest.mark.parametrize("name", KINDS[:3])
-@settings(max_examples=settings.default.max_examples // 3)
-@given(data=st.data())
-def test_a_damaged_bag_never_crashes(name: str, data: st.DataObject, tmp_path_factory: pytest.TempPathFactory) -> None:
-    bag = bags.write(tmp_path_factory.mktemp("damaged") / name, palms(2))
-    content = bytearray(bag.read_bytes())
-    if data.draw(st.booleans()):
-        del content[data.draw(st.integers(8, len(content) - 1)) :]
-    else:
-        for at in data.draw(st.lists(st.integers(30, len(content) - 1), min_size=1, max_size=5)):
-            content[at] = data.draw(st.integers(0, 255))
-    bag.write_bytes(content)
-    try:
-        opened = taxel.open(bag, topic="/palm", array=PALM_ARRAY)
-    except taxel.Error as error:
-        said = str(error)
-    else:
-        said = name if opened.frames().values.shape[1:] == (24, 32) else "another shape"
-    assert name in said
-    assert "\n" not in said
 
 
 def test_from_a_bag_to_a_detection_on_the_command_line(tmp_path: Path, monkeypatch, capsys) -> None:
