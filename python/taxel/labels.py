@@ -355,9 +355,9 @@ def rows_of(location: str | Path, lines: Iterable[str]) -> tuple[tuple[Note, ...
 def _table(file: Path) -> tuple[tuple[str, ...], HeaderTable, bool]:
     """Return the columns of a table, it in columns of taxel, and whether its times count from the beginning.
 
-    A table may be in Windows-1252 too.
+    A table may be in Windows-1252, or in a sheet, too.
     """
-    lines = text_of(file, otherwise="cp1252")
+    lines = text_of(file)
     names = next((line for line in lines if line.strip()), "")
     if is_of_track(names):
         table = track(str(file), lines)

@@ -262,6 +262,14 @@ def test_a_table_of_another_program_is_read_by_the_names_of_its_columns(
     )
 
 
+def test_labels_in_a_sheet_are_read(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("openpyxl")
+    pandas.DataFrame({"label": ["Fuß auf", "Abheben"], "t_s": [0.21, 2]}).to_excel(tmp_path / "a.xlsx", index=False)
+    rows = taxel.Labels(tmp_path / "a.xlsx").rows
+    assert [(row.text, row.t) for row in rows] == [("Fuß auf", 210_000), ("Abheben", 2_000_000)]
+
+
 @pytest.mark.parametrize(
     ("text", "line"),
     [

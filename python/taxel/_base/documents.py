@@ -7,7 +7,6 @@ import json
 import os
 import re
 import tomllib
-from contextlib import suppress
 from typing import Any
 
 from taxel._base.errors import unreadable
@@ -32,7 +31,7 @@ def mark_of(data: bytes) -> tuple[bytes, str]:
     return next(((mark, name) for mark, name in _MARKS.items() if data.startswith(mark)), (b"", "utf-8"))
 
 
-def read_text(path: str | os.PathLike[str], otherwise: str = "") -> str:
+def read_text(path: str | os.PathLike[str]) -> str:
     """Return the text of a file (`decoded`).
 
     Raises
@@ -42,11 +41,11 @@ def read_text(path: str | os.PathLike[str], otherwise: str = "") -> str:
     """
     with open(path, "rb") as file:
         data = file.read()
-    return decoded(path, data, otherwise)
+    return decoded(path, data)
 
 
-def decoded(path: str | os.PathLike[str], data: bytes, otherwise: str = "") -> str:
-    """Return the text of a file's bytes, UTF-8 with or without BOM, or UTF-16 with one; if neither, in `otherwise`.
+def decoded(path: str | os.PathLike[str], data: bytes) -> str:
+    """Return the text of a file's bytes, UTF-8 with or without BOM, or UTF-16 with one.
 
     Raises
     ------
@@ -56,9 +55,6 @@ def decoded(path: str | os.PathLike[str], data: bytes, otherwise: str = "") -> s
     try:
         return data[len(mark) :].decode(encoding)
     except UnicodeDecodeError as error:
-        if otherwise and not mark:
-            with suppress(UnicodeDecodeError):
-                return data.decode(otherwise)
         # Counted in the whole file, with its BOM.
         before = error.object[: error.start].decode(encoding, "replace")
         line = len(before.replace("\r\n", "\n").replace("\r", "\n").split("\n"))

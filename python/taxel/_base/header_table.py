@@ -10,8 +10,8 @@ from itertools import chain
 from pathlib import Path
 
 from taxel._base.arguments import shown
-from taxel._base.documents import read_text
 from taxel._base.errors import unreadable
+from taxel._base.table_text import Text
 
 
 @dataclass(frozen=True)
@@ -141,17 +141,15 @@ def separator_of(names: str) -> str:
     return max(",;\t", key=bare.count)
 
 
-def text_of(path: Path, *, otherwise: str = "") -> list[str]:
-    """Read the lines of a text (`read_text`), including line ends, as a quoted cell may contain one.
-
-    `otherwise` is the encoding of one that is not UTF-8, which is refused without it.
+def text_of(path: Path) -> list[str]:
+    """Read the lines of a text or a sheet, including line ends, as a quoted cell may contain one.
 
     Raises
     ------
     FormatError : not a text
     OSError : the file is not there, or cannot be read
     """
-    return lines_of(read_text(path, otherwise))
+    return lines_of(Text(path).whole())
 
 
 def lines_of(text: str) -> list[str]:

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from taxel._base.errors import unreadable
+from taxel._base.table_text import Text, beginning
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.formats.layout import Layout
-from taxel.formats.table_text import Text, beginning
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory
 

@@ -16,10 +16,10 @@ from taxel._base.columns import frozen, frozen_whole
 from taxel._base.errors import damaged, helped, refused, unreadable
 from taxel._base.limits import check_memory
 from taxel._base.messages import first_line, installing
+from taxel._base.table_text import beginning
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats.table_text import beginning
 from taxel.frames import Frames
 from taxel.spikes import to_us
 

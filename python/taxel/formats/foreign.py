@@ -8,6 +8,7 @@ from pathlib import Path
 
 from taxel._base.errors import unreadable
 from taxel._base.messages import warn
+from taxel._base.table_text import Text
 from taxel.array import Array
 from taxel.formats.array_file import ARRAYS, look, read_array_file
 from taxel.formats.layout import Layout
@@ -15,7 +16,6 @@ from taxel.formats.layout_text import of_layout
 from taxel.formats.table import ENDINGS as TABLES
 from taxel.formats.table import read_table
 from taxel.formats.table_form import form_of
-from taxel.formats.table_text import Text
 from taxel.labels import Note, source_of
 from taxel.reading import Facts, InMemory, Marks
 

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from taxel._base.errors import unreadable
+from taxel._base.table_text import Text, beginning
 from taxel.array import Array
 from taxel.formats.column_names import time_unit
 from taxel.formats.layout import Layout, Table
 from taxel.formats.table import read_table
-from taxel.formats.table_text import Text, beginning
 from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.reading import Facts, InMemory, Marks

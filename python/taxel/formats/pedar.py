@@ -10,10 +10,10 @@ import re
 from pathlib import Path
 
 from taxel._base.errors import unreadable
+from taxel._base.table_text import Text, beginning
 from taxel.array import Array
 from taxel.formats.layout import Layout, Table
 from taxel.formats.table import read_table
-from taxel.formats.table_text import Text, beginning
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory
 

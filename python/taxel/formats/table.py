@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from taxel._base.arguments import shown
 from taxel._base.errors import unreadable
 from taxel._base.messages import counted, first_line
+from taxel._base.table_text import SHEETS, TEXTS, Text
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -29,7 +30,6 @@ from taxel.formats.lines import MISSING, LineShape, OddLines, is_number
 from taxel.formats.opened import Opened, size_of, sources_of
 from taxel.formats.table_columns import EVENT_COLUMNS
 from taxel.formats.table_form import Form, form_of
-from taxel.formats.table_text import SHEETS, TEXTS, Text
 from taxel.formats.times import FEW_ODD, ISO, ODD, in_order, us_of
 from taxel.frames import Frames
 

@@ -16,6 +16,7 @@ import numpy as np
 from taxel._base.errors import unreadable
 from taxel._base.limits import COLUMNS
 from taxel._base.messages import counted
+from taxel._base.table_text import Text
 from taxel.formats import column_names
 from taxel.formats.layout import Layout, Table
 from taxel.formats.layout_text import refuse_to_choose
@@ -31,7 +32,6 @@ from taxel.formats.table_columns import (
     taxels_of,
     time_of,
 )
-from taxel.formats.table_text import Text
 from taxel.formats.times import FEW_ODD, ODD
 
 __all__ = ["Form", "draft_of", "form_of", "lines_between_blanks"]

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from taxel._base.files import beside as beside_file
 from taxel._base.files import named
+from taxel._base.table_text import Text
 from taxel._base.times import SINCE_1970_US
 from taxel._core import FormatError
 from taxel.event_table import are_of_events, is_of_track
-from taxel.formats.table_text import Text
 from taxel.labels import Labels, Note, ahead_us, beside, trial_of
 from taxel.recording.readers.csv import names_in
 from taxel.recording.recording import Recording

@@ -20,13 +20,13 @@ from taxel._base.columns import frozen_whole
 from taxel._base.errors import unreadable
 from taxel._base.limits import COLUMNS, TAXELS
 from taxel._base.messages import counted
+from taxel._base.table_text import Text, beginning
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.layout import Layout, Table
 from taxel.formats.table import Rows, events_of, read_rows
 from taxel.formats.table_form import Form
-from taxel.formats.table_text import Text, beginning
 from taxel.formats.times import in_order
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory

@@ -59,7 +59,7 @@ class Text:
 
     @property
     def encoding(self) -> str:
-        """The encoding: by a byte-order mark, else UTF-8, else Latin-1 if the beginning is not UTF-8."""
+        """The encoding: by a byte-order mark, else UTF-8, else Windows-1252 or Latin-1 if the beginning is none."""
         if not self._encoding:
             with self._bytes() as file:
                 head = file.read(_HEAD)
@@ -80,6 +80,19 @@ class Text:
                 self.ends_in_line = line.endswith("\n")
                 yield line.rstrip("\n")
 
+    def whole(self) -> str:
+        """Return all of the text, its lines with their ends."""
+        if not self.is_file:
+            return self._sheet
+        with self._bytes() as file:
+            data = file.read()
+        try:
+            return data.decode(self.encoding)
+        except UnicodeDecodeError as error:
+            if self.encoding != "utf-16":
+                return data.decode("latin-1")
+            raise unreadable(f"not text in {self.encoding.upper()} ({error.reason})", self.path) from None
+
     @cached_property
     def head(self) -> list[str]:
         """The first lines; the last of them is whole, if the text goes on."""
@@ -99,7 +112,8 @@ class Text:
 
     @contextmanager
     def _opened(self) -> Iterator[io.TextIOWrapper]:
-        with self._bytes() as file, io.TextIOWrapper(file, self.encoding) as text:
+        errors = "replace" if self.encoding == "cp1252" else "strict"
+        with self._bytes() as file, io.TextIOWrapper(file, self.encoding, errors) as text:
             try:
                 yield text
             except UnicodeDecodeError as error:
@@ -153,5 +167,15 @@ def _encoding(path: Path, head: bytes) -> str:
         head.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         # The beginning may end within a character.
-        return "utf-8-sig" if error.start >= len(head) - 3 and len(head) == _HEAD else "latin-1"
+        if error.start < len(head) - 3 or len(head) < _HEAD:
+            return _of_bytes(head)
     return "utf-8-sig"
+
+
+def _of_bytes(head: bytes) -> str:
+    """Return the encoding of a text that is not UTF-8: that of Windows, unless it has no such character."""
+    try:
+        head.decode("cp1252")
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "cp1252"
