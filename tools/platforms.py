@@ -64,7 +64,6 @@ OF_THE_CHECKOUT = {
     "tests/test_command_line.py::test_exit_codes_are_those_of_the_docs": "reads the documentation",
     "tests/test_command_line.py::test_the_help_has_a_whole_line_for_each_command_in_the_order_of_the_work": "taxel study and "
     "taxel bench are other wheels",
-    "tests/detect/test_scoring.py::test_detections_come_back_from_neo": "neo is not installed",
 }
 STARTS = "tests/test_command_line.py::test_ctrl_c_while_it_starts_ends_quietly"
 EARLY = "qemu's vfork does not wait for exec: the test sees its own libraries in the new process and interrupts it too early"
