@@ -203,7 +203,6 @@ VALUES: dict[str, Callable[[], Any]] = {
     "names": lambda: ["a"],
     "neurons": lambda: READOUT.neurons,
     "notes": lambda: [taxel.Note("heel", 100, 0)],
-    "noun": lambda: TRAINS,
     "offsets": lambda: [0, 1, 2],
     "options": lambda: tasks.EncodeOptions("level_crossing", {"levels": [30.0]}),
     "p": lambda: [True],
