@@ -184,7 +184,6 @@ def run(*, quick):
             **{name: run.objective for name, run in peers.items()},
             **{f"relative difference to {name}": mine / run.objective - 1 for name, run in peers.items()},
             "gap": cone.gap_,
-            "engine": cone.engine_,
         },
         "long walk": {
             "rows": large.silent_rows_,

@@ -73,7 +73,6 @@ def case(n, p, lambdas, rounds, absent, *, quick):
     ours, theirs = in_turn(lambda: cone.fit(*examples), peers, rounds)
     said = {
         "status": cone.status_,
-        "engine": cone.engine_,
         "objective": cone.objective_,
         "gap": cone.gap_,
         "violation_mv": cone.violation_,

@@ -91,7 +91,6 @@ def compared(parameters, footfalls, steps):
         "times": np.percentile(whole / mine, [25, 50, 75]).tolist(),
         "ratio to solving alone, median": float(np.median(mine / solve)),
         "objectives differ by at most": float(off.max()),
-        "engine": online.engine_,
     }
 
 

@@ -702,7 +702,6 @@ def send(
 # learn: parameters as JSON
 
 _Status: TypeAlias = Literal["solved", "feasible", "infeasible", "stopped"]
-_Engine: TypeAlias = Literal["native", "cone solver"]
 
 @final
 class ConeRFit:
@@ -713,7 +712,6 @@ class ConeRFit:
     parts: Final[list[float]]
     gap: Final[float]
     status: Final[_Status]
-    engine: Final[_Engine]
     rounds: Final[int]
     rows: Final[int]
     unreachable: Final[list[tuple[int, int]]]
@@ -780,7 +778,6 @@ class ConeXFit:
     violation: Final[float]
     margin: Final[tuple[float, float]]
     asked: Final[tuple[float, float]]
-    engine: Final[_Engine]
     rounds: Final[int]
     held: Final[_Weighed]
     certificate: Final[ConeXCertificate | None]

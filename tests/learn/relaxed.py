@@ -214,7 +214,6 @@ def drawn(seed):
         "sides_b": one("both", "below"),
         "sides_c": one("both", "below"),
         "norm": one("norm", "square"),
-        "engine": one("native", "native", "cone solver"),
         "tolerance": one(1e-6, 1e-6, 1e-3),
     }
     if kernel == "double_exponential" and one(True, False):

@@ -11,7 +11,7 @@ mod statement;
 
 pub use cone::{ConeR, ConeRFit, ConeRProblem, ConeX, ConeXFit, ConeXProblem, GapMultipliers, Horizon, Shares};
 pub use engines::{DualActiveSet, Multipliers, Ray, RowId, SolveOutcome};
-pub use fit::{Engine, Fit, Left, Round, Status};
+pub use fit::{Fit, Left, Round, Status};
 pub use online::OnlineConeR;
 pub use statement::{
     Bound, Bounds, Certificate, Divisor, DivisorC, DivisorD, Margin, Norm, Parts, Row, Sides, StatedRow,

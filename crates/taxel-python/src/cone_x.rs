@@ -85,7 +85,6 @@ pub struct ConeXFitOut {
     /// The margin that holds, and the one that was asked for.
     margin: (f64, f64),
     asked: (f64, f64),
-    engine: &'static str,
     rounds: usize,
     held: Weighed,
     certificate: Option<Py<ConeXCertificate>>,
@@ -172,7 +171,7 @@ impl ConeXProblem {
             self.problem.fit(&start, &mut report, stop)
         })?;
         let ConeXFit { fit, violation, margin, asked, reason, held, certificate, proof } = found;
-        let Fit { status, weights, objective, parts, gap, rounds, engine } = fit;
+        let Fit { status, weights, objective, parts, gap, rounds } = fit;
         let certificate = certificate.map(|c| {
             let rows = weighed(py, &c.rows);
             Py::new(py, ConeXCertificate { rows, gap: c.gap, at_all: c.at_all, text: c.text })
@@ -187,7 +186,6 @@ impl ConeXProblem {
             violation,
             margin,
             asked,
-            engine: engine.name(),
             rounds,
             held: weighed(py, &held),
             certificate: certificate.transpose()?,

@@ -40,7 +40,6 @@ pub struct ConeRFitOut {
     parts: [f64; 5],
     gap: f64,
     status: &'static str,
-    engine: &'static str,
     rounds: usize,
     rows: usize,
     unreachable: Vec<(usize, usize)>,
@@ -178,7 +177,7 @@ fn to_start<'a>((weights, multipliers): &'a StartIn<'_>) -> PyResult<(&'a [f64],
 
 fn fit_out(py: Python<'_>, found: ConeRFit, raised: Option<Py<PyAny>>) -> ConeRFitOut {
     let ConeRFit { fit, rows, multipliers, proof, unreachable, refires, fired } = found;
-    let Fit { status, weights, objective, parts, gap, rounds, engine } = fit;
+    let Fit { status, weights, objective, parts, gap, rounds } = fit;
     let numbers = multipliers.rows.iter().map(|&row| row as i64).collect();
     ConeRFitOut {
         weights: column(py, weights),
@@ -186,7 +185,6 @@ fn fit_out(py: Python<'_>, found: ConeRFit, raised: Option<Py<PyAny>>) -> ConeRF
         parts: [parts.l1, parts.l2, parts.B, parts.C, parts.D],
         gap,
         status: status.name(),
-        engine: engine.name(),
         rounds,
         rows,
         unreachable,

@@ -68,9 +68,6 @@ class ConeR(SpikeLearner):
         End of the silent rows; default: the later of the pattern's stop and its last target + `tau`.
     tolerance : float, from 1e-10 to 0.1
         The proven relative gap at which a fit counts as solved.
-    engine : {"native", "cone solver"}
-        "native": Newton steps on the few rows near threshold; if their result cannot be proven, the cone solver
-        continues from it. "cone solver": row generation around Clarabel from the start, much slower.
     max_seconds : float, s, above 0, optional
         Time limit of a fit, which then ends with the best weights so far and their proven gap.
 
@@ -90,11 +87,9 @@ class ConeR(SpikeLearner):
     status_ : {"solved", "stopped", "assigned"}
         "solved": no weights have an objective smaller by more than `tolerance` of it; these may miss targets and break
         silence, which are costs here and conditions in `ConeX`. "stopped": the gap is above `tolerance`, as
-        `max_seconds` or Ctrl-C ended the fit, or neither engine closed it. "assigned": as in `ConeX`.
-    engine_ : {"native", "cone solver"}
-        Which engine found these weights: "cone solver" also where the native engine's result could not be proven.
+        `max_seconds` or Ctrl-C ended the fit, or rounding did. "assigned": as in `ConeX`.
     rounds_, rows_ : int
-        Rounds of multipliers or of row generation; rows on their kink, or handed to the cone solver, in the last one.
+        Rounds of multipliers; rows on their kink in the last one.
     silent_rows_ : int
         Rows of 6.13.
     unreachable_ : list of (pattern, target)
@@ -113,11 +108,10 @@ class ConeR(SpikeLearner):
     Notes
     -----
     Thesis 6.3.3, equations 6.12 to 6.14. Solved by a proximal augmented Lagrangian with semismooth Newton steps, in
-    which only rows near threshold are computed, or by row generation around the cone solver Clarabel. The gap is
-    computed independently of both, over all rows. A target that the optimum meets is met to 1e-12 mV, the tolerance
-    within which a neuron fires (both for a `theta_0` of 0.3 mV, else in proportion), and an active silent row stays
-    1e-9 of `theta_0` below its limit, as far as the objective stays within the tolerance. The page *Readings* lists the
-    choices that the thesis leaves open.
+    which only rows near threshold are computed. The gap is computed independently of it, over all rows. A target that
+    the optimum meets is met to 1e-12 mV, the tolerance within which a neuron fires (both for a `theta_0` of 0.3 mV,
+    else in proportion), and an active silent row stays 1e-9 of `theta_0` below its limit, as far as the objective stays
+    within the tolerance. The page *Readings* lists the choices that the thesis leaves open.
 
     Examples
     --------
@@ -147,7 +141,6 @@ class ConeR(SpikeLearner):
     margin: float = _DEFAULT.margin
     horizon: float | None = _DEFAULT.horizon
     tolerance: float = _DEFAULT.tolerance
-    engine: Literal["native", "cone solver"] = _DEFAULT.engine
     max_seconds: float | None = _DEFAULT.max_seconds
 
     weights_: NDArray[np.float64] = field(init=False)
@@ -156,7 +149,6 @@ class ConeR(SpikeLearner):
     gap_: float = field(init=False)
     multipliers_: Multipliers = field(init=False)
     status_: Status = field(init=False)
-    engine_: Literal["native", "cone solver"] = field(init=False)
     rounds_: int = field(init=False)
     rows_: int = field(init=False)
     silent_rows_: int = field(init=False)
@@ -335,7 +327,7 @@ class ConeRProblem:
         ----------
         cone : ConeR
             May differ from the learner of the rows in `lambdas`, `kappa`, `lb`, `ub`, `divide_b_by`, `divide_c_by`,
-            `divide_d_by`, `sides_b`, `sides_c`, `norm`, `tolerance`, `engine` and `max_seconds`.
+            `divide_d_by`, `sides_b`, `sides_c`, `norm`, `tolerance` and `max_seconds`.
         start : ConeR, or float64 of shape (trains,), mV, optional
         progress : function of (round, rows, objective, gap), optional
             As in `ConeR.fit`.
@@ -418,7 +410,7 @@ def _keep(
 ) -> None:
     """Set the results of a fit on the learner, those of trains `for_all`; raise what ended the fit."""
     cone.weights_ = for_all(fit.weights)
-    for name in ("objective", "gap", "status", "engine", "rounds", "rows", "unreachable", "refires", "fired"):
+    for name in ("objective", "gap", "status", "rounds", "rows", "unreachable", "refires", "fired"):
         setattr(cone, f"{name}_", getattr(fit, name))
     cone.parts_ = dict(zip(("l1", "l2", "B", "C", "D"), fit.parts, strict=True))
     of_rows, of_behind, pull = fit.proof

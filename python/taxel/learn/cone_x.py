@@ -256,8 +256,6 @@ class ConeX(SpikeLearner):
         `tolerance`: the search was ended by `max_seconds`, Ctrl-C or rounding. Else None.
     violation_ : float, mV
         The largest violation of a row: of a target, or of silence with half its margin.
-    engine_ : {"native", "cone solver"}
-        The engine that closed the gap: taxel's engine, or row generation around Clarabel if taxel's engine did not.
     certificate_ : Certificate or None
         The proof, if infeasible.
     problem_ : ConeXProblem
@@ -317,7 +315,6 @@ class ConeX(SpikeLearner):
     margin_: Margin = field(init=False)
     reason_: str | None = field(init=False)
     violation_: float = field(init=False)
-    engine_: Literal["native", "cone solver"] = field(init=False)
     certificate_: Certificate | None = field(init=False)
     problem_: ConeXProblem = field(init=False)
     rounds_: int = field(init=False)
@@ -362,7 +359,7 @@ class ConeX(SpikeLearner):
         multipliers = np.array([multiplier for _, multiplier in known_rows], dtype=np.float64)
         first = [tuple(row) for row, _ in known_rows]
         fit = problem._problem.fit(first, multipliers, optional(callback, "progress", progress))
-        for name in ("weights", "status", "objective", "gap", "violation", "reason", "engine", "rounds"):
+        for name in ("weights", "status", "objective", "gap", "violation", "reason", "rounds"):
             setattr(self, f"{name}_", getattr(fit, name))
         self.parts_ = dict(zip(("l1", "l2", "B"), fit.parts, strict=True))
         self.multipliers_ = None if fit.proof is None else _multipliers(fit.proof)

@@ -43,7 +43,6 @@ class OnlineConeR(ConeR):
     margin : float, mV, 0 or more
     horizon : float, ms, optional
     tolerance : float, from 1e-10 to 0.1
-    engine : {"native", "cone solver"}
     max_seconds : float, s, above 0, optional
         All up to here as in `ConeR`.
     window : int, 1 or more
@@ -53,7 +52,7 @@ class OnlineConeR(ConeR):
     ----------
     patterns_ : int
         Current number of patterns in the window.
-    weights_, objective_, parts_, gap_, multipliers_, status_, engine_, rounds_, rows_, silent_rows_, unreachable_,
+    weights_, objective_, parts_, gap_, multipliers_, status_, rounds_, rows_, silent_rows_, unreachable_,
     neuron_
         Results of the last fit, as in `ConeR`; patterns are counted from the oldest in the window.
     refires_, fired_ : int, (int, int)

@@ -32,29 +32,6 @@ impl Status {
     }
 }
 
-/// The engine that found the least objective.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum Engine {
-    /// taxel's own solver; if its result cannot be proven, the cone solver continues from it.
-    #[default]
-    #[serde(rename = "native")]
-    Native,
-    /// Clarabel, over the rows that matter.
-    #[serde(rename = "cone solver")]
-    ConeSolver,
-}
-
-impl Engine {
-    /// The engine as words.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Native => "native",
-            Self::ConeSolver => "cone solver",
-        }
-    }
-}
-
 /// Progress after a round of row generation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Round {
@@ -92,6 +69,4 @@ pub struct Fit {
     pub gap: f64,
     /// The number of rounds of row generation.
     pub rounds: usize,
-    /// The engine that found the weights.
-    pub engine: Engine,
 }

@@ -1,8 +1,8 @@
 //! The problem statement, equations 6.9 to 6.14, for all learners: its rows, their times, and its objective.
 //!
 //! `rows` names and computes any row (6.9, 6.10), `targets` stores those of the targets, `silence` evaluates all
-//! others, `objective` has the terms of 6.14 (6.11 is a part of it), `relaxed` its value, `certificate` proofs of
-//! infeasibility.
+//! others, `objective` has the terms of 6.14 (6.11 is a part of it), `program` its value over rows, `certificate` proofs
+//! of infeasibility.
 
 mod bounds;
 mod certificate;
@@ -11,6 +11,7 @@ mod examples;
 mod grid;
 mod objective;
 mod peak;
+mod program;
 mod relaxed;
 mod rows;
 mod silence;
@@ -24,7 +25,8 @@ pub use examples::{check_examples, check_pattern, check_some_target, check_train
 pub(crate) use objective::{Choice, NOTHING, Objective, relative_gap};
 pub use objective::{Divisor, DivisorC, DivisorD, Norm, Parts, Sides};
 pub(crate) use peak::{SilencePeak, exceeds, largest};
-pub(crate) use relaxed::{Relaxed, RelaxedPoint, RelaxedProof, Tangents};
+pub(crate) use program::{Point, Program, Proof, Rows, Tangents};
+pub(crate) use relaxed::Relaxed;
 pub(crate) use rows::end_of;
 pub use rows::{Margin, Row, StatedRow, Statement};
 pub(crate) use silence::Silence;

@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::allowed::{Range, one_weight_a_train};
 use crate::learn::engines::WarmStart;
-use crate::learn::fit::{Engine, Fit, Left, Round, Status};
+use crate::learn::fit::{Fit, Left, Round, Status};
 use crate::learn::statement::{
-    Bound, Choice, Divisor, DivisorC, DivisorD, Margin, Norm, Objective, Relaxed, RelaxedProof, Row, Sides, Statement,
+    Bound, Choice, Divisor, DivisorC, DivisorD, Margin, Norm, Objective, Proof, Relaxed, Row, Sides, Statement,
     bounds_of, check_bounds, check_examples, check_silence, check_trains, end_of,
 };
 use crate::metrics::matching::{WINDOW_MS, match_spikes};
@@ -50,8 +50,6 @@ parameters! {
         pub horizon: Option<f64> = None, "ms", Range::FINITE;
         /// The relative gap between objective and proven bound at which a fit counts as solved.
         pub tolerance: f64 = 1e-6, "", Range::within(1e-10, 0.1);
-        /// The solver to begin with.
-        pub engine: Engine = Engine::Native;
         /// The time after which the caller requests the best weights so far, s; this crate reads no clock.
         pub max_seconds: Option<f64> = None, "s", Range::ABOVE_0;
     }
@@ -129,7 +127,7 @@ pub struct GapMultipliers {
 pub struct ConeRFit {
     /// Weights and objective.
     pub fit: Fit,
-    /// The number of rows in the last cone program.
+    /// The number of rows on their kinks in the last round.
     pub rows: usize,
     /// The multipliers, from which a similar fit may start together with the weights.
     pub multipliers: Shares,
@@ -292,7 +290,7 @@ impl ConeRProblem {
     /// Fits the weights.
     ///
     /// `parameters` may differ from those of the problem in `lambdas`, `kappa`, bounds, divisors, sides, `norm`,
-    /// `tolerance` and `engine`; the others are part of the rows. `silent` are the largest absolute weights (mV) of
+    /// and `tolerance`; the others are part of the rows. `silent` are the largest absolute weights (mV) of
     /// trains without a spike, which were left out of the rows but count in the normalisers. `start` are the weights of
     /// a similar fit, with its multipliers if that fit had the same rows; a closer start is faster. If a stop is
     /// requested, `fit` returns the best weights so far.
@@ -327,8 +325,7 @@ impl ConeRProblem {
         self.check_same_rows(parameters)?;
         let objective = self.objective(parameters, silent)?;
         let start = self.start_from(&objective, start)?;
-        let mut found =
-            self.rows.minimise(&objective, parameters.tolerance, parameters.engine, start, progress, stop)?;
+        let mut found = self.rows.minimise(&objective, parameters.tolerance, start, progress, stop);
         if self.rows.move_to_limits(&objective, parameters.tolerance, &mut found, stop)? {
             found.rounds += 1;
             let (round, left) = (found.rounds, Left::Gap(found.gap));
@@ -351,13 +348,12 @@ impl ConeRProblem {
                 parts: found.parts,
                 gap: found.gap,
                 rounds: found.rounds,
-                engine: found.engine,
             },
         })
     }
 
     /// The nonzero multipliers of a proof, by the names of their rows.
-    fn name_rows(&self, mut proof: RelaxedProof) -> GapMultipliers {
+    fn name_rows(&self, mut proof: Proof) -> GapMultipliers {
         proof.divide(1.0, self.statement.unit);
         let (silent, targets) = proof.multipliers.split_at(self.rows.silent.len());
         let names = || self.rows.targets.names.iter().copied();
@@ -379,7 +375,7 @@ impl ConeRProblem {
         one_weight_a_train(weights, self.rows.trains)?;
         let within = weights.iter().zip(objective.bounds.lower.iter().zip(&objective.bounds.upper));
         let weights = Some(within.map(|(w, (&low, &high))| (w / self.statement.unit).clamp(low, high)).collect());
-        let Some(multipliers) = multipliers else { return Ok(WarmStart { weights, shares: None }) };
+        let Some(multipliers) = multipliers else { return Ok(WarmStart { weights, multipliers: None }) };
         let (silent, all) = (self.rows.silent.len(), self.rows());
         let mut shares = vec![0.0; all];
         for (&row, &share) in multipliers.rows.iter().zip(&multipliers.values) {
@@ -395,7 +391,7 @@ impl ConeRProblem {
             }
             *entry = share;
         }
-        Ok(WarmStart { weights, shares: Some(shares) })
+        Ok(WarmStart { weights, multipliers: Some(shares) })
     }
 
     fn check_same_rows(&self, parameters: &ConeR) -> Result<()> {

@@ -11,7 +11,7 @@ use super::cone_r::GapMultipliers;
 use super::exact::{BestWeights, Exact};
 use super::shortest::{RowGenerationEnd, Shortest};
 use crate::allowed::{ParameterNumbers, Range};
-use crate::learn::fit::{Engine, Fit, Round, Status};
+use crate::learn::fit::{Fit, Round, Status};
 use crate::learn::statement::{
     Bound, Bounds, Certificate, Choice, Divisor, DivisorC, DivisorD, Margin, NOTHING, Norm, Objective, Parts, Row,
     Sides, StatedRow, Statement, bounds_of, check_bounds, check_examples, check_some_target, end_of, largest,
@@ -370,7 +370,7 @@ impl Exact {
         let Shortest { weights, held, rounds, end } = self.shortest(start, progress, stop)?;
         // The other terms are at least 0, so a bound on the l2 term bounds the objective.
         let (least, proof) = self.bound_of_length(&held)?;
-        let best = BestWeights { weights, least, proof, held, engine: Engine::Native, rounds };
+        let best = BestWeights { weights, least, proof, held, rounds };
         Ok(match end {
             RowGenerationEnd::Infeasible(certificate) => self.infeasible_fit(certificate, rounds),
             RowGenerationEnd::Met if self.objective.l1 > 0.0 || self.objective.b > 0.0 => {
@@ -393,7 +393,6 @@ impl Exact {
                 parts: Parts { l1: none, l2: none, B: none, C: none, D: none },
                 gap: f64::NAN,
                 rounds,
-                engine: Engine::Native,
             },
             violation: none,
             margin: Margin { height: f64::NAN, slope: f64::NAN },
@@ -407,7 +406,7 @@ impl Exact {
 
     /// Evaluates the weights over all rows, whichever engine found them.
     fn report(&self, best: BestWeights, cut_short: Option<&str>) -> Result<ConeXFit> {
-        let BestWeights { mut weights, least, proof, held, engine, rounds } = best;
+        let BestWeights { mut weights, least, proof, held, rounds } = best;
         let Bounds { lower, upper } = &self.objective.bounds;
         // Rounding can move a weight across its bound.
         for ((w, &l), &u) in weights.iter_mut().zip(lower).zip(upper) {
@@ -433,7 +432,7 @@ impl Exact {
         let violation = largest([self.worst_target(&weights), self.worst(&weights), 0.0]);
         Ok(ConeXFit {
             margin: self.kept_margin(&weights),
-            fit: Fit { status, weights, objective, parts, gap, rounds, engine },
+            fit: Fit { status, weights, objective, parts, gap, rounds },
             asked: self.statement.margin,
             reason,
             violation,

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use super::cone_r::GapMultipliers;
-use crate::learn::fit::Engine;
 use crate::learn::statement::{
     Margin, Objective, Parts, Row, Silence, SilencePeak, StatedRow, Statement, Targets, exceeds, largest,
 };
@@ -42,7 +41,6 @@ pub(super) struct BestWeights {
     pub(super) least: f64,
     pub(super) proof: GapMultipliers,
     pub(super) held: Vec<(Row, f64)>,
-    pub(super) engine: Engine,
     pub(super) rounds: usize,
 }
 

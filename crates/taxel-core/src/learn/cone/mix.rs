@@ -1,30 +1,52 @@
-//! Objectives beyond the shortest weights (l1, B and sums of terms): row generation around the solver for small working
-//! sets.
+//! Objectives beyond the shortest weights (l1, B and sums of terms): row generation around the augmented Lagrangian, in
+//! which every row is hard.
 
 use std::collections::HashSet;
-use std::sync::Arc;
 
 use super::cone_r::GapMultipliers;
 use super::exact::{BestWeights, Exact, MET, MOST_ROUNDS, Slopes};
-use crate::learn::engines::mixed::{self, MixedProof, Terms};
-use crate::learn::engines::{HardRows, nearest};
+use crate::learn::engines::{Between, HardRows, Reached, nearest};
 use crate::learn::fit::{Left, Round};
-use crate::learn::statement::{Bounds, Row, SilencePeak, StatedRow, Targets, largest};
+use crate::learn::statement::{
+    Bounds, NOTHING, Objective, Point, Program, Proof, Row, Rows, SilencePeak, Targets, largest,
+};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
-/// Cuts demand the full margin, but only violations of this share of it are cut. The share is smaller than that for the
-/// shortest weights, because nearly identical rows are harder for this solver.
-const ASKED_SHARE: f64 = 0.9;
-/// The first rounds only collect rows, at a loose tolerance: silence counts as violated above `NEAR_SHARE` of
-/// `theta_0`, and rows that are slack by more than `SLACK_SHARE` of it are dropped.
+/// Cuts demand the full margin, but only violations of this share of it are cut.
+const ASKED_SHARE: f64 = 0.999;
+/// While the gap is above this, silence counts as violated above `NEAR_SHARE` of `theta_0` only.
 const NEAR: f64 = 1e-3;
 const NEAR_SHARE: f64 = 1e-4;
-const SLACK_SHARE: f64 = 0.05;
-/// The number of rounds in which rows may be dropped: later rounds only add rows, so that they terminate.
-const DROPPING: usize = 10;
+/// The share of the tolerance at which weights are moved to satisfy every row, the factor by which a smaller one is
+/// asked for if they then miss the tolerance, and the least share.
+const ENOUGH: f64 = 0.3;
+const SMALLER: f64 = 0.1;
+const LEAST: f64 = 1e-4;
+/// A round is solved to this share of the gap, but no finer than for a gap of this share of the tolerance.
+const ACCURACY: f64 = 0.03;
+const FINEST: f64 = 1e-2;
+/// How far kinks are smoothed at first, in thresholds.
+const SMOOTH_FROM: f64 = 0.1;
+/// The curvature of the proximal term relative to the smoothing at first, and the factor of each round that proves
+/// little more, and its least value: where the objective is nearly flat, steps must grow.
+const NEAR_CENTRE: f64 = 10.0;
+const FARTHER: f64 = 0.1;
+const FARTHEST: f64 = 1e-9;
+/// The strength of the terms that hold weights at 0 and at their bounds, as a share of the targets' pull, and its factor
+/// after each round that proves little more: the multipliers of hard rows move far, and stiff terms take twice as many
+/// steps.
+const HELD_SHARE: f64 = 0.1;
+const STIFFER: f64 = 3.0;
+/// The number of rounds without a smaller gap after which the search ends.
+const MOST_IDLE: usize = 15;
+/// Rows within this many times the largest violation of their limit count when weights are moved to satisfy every row.
+const AT_LIMIT: f64 = 30.0;
 /// A row of silence this close before a target, in `tau`, is nearly parallel to the target's row.
 const BESIDE: f64 = 1e-2;
+/// A row of silence this close before a target, in `tau`, comes in only after the targets and the slope there are met,
+/// whose row is known to more digits.
+const AT_TARGET: f64 = 1e-4;
 
 impl Exact {
     /// Continues from weights that satisfy every row.
@@ -35,211 +57,272 @@ impl Exact {
         progress: &mut dyn FnMut(Round),
         stop: Stop<'_>,
     ) -> Result<BestWeights> {
-        let objective = &self.objective;
-        let wanted: Vec<f64> = self.targets.thresholds.iter().map(|threshold| objective.kappa * threshold).collect();
-        let terms = Terms {
-            l1: objective.l1,
-            l2: objective.l2,
-            norm: objective.norm,
-            lift: objective.b,
-            behind: &self.targets.behind,
-            wanted: &wanted,
+        let scale = self.parts(&best.weights).sum();
+        if scale == 0.0 {
+            return Ok(best);
+        }
+        let objective = &self.objective.scaled(1.0 / scale).within_reach(1.0);
+        let lifts = self.targets.thresholds.iter().map(|threshold| (objective.kappa * threshold).powi(2));
+        let nothing = NOTHING * objective.b * lifts.sum::<f64>();
+        let theta_0 = self.statement.neuron.theta_0;
+        let trains = self.statement.trains;
+        let gram = if objective.b > 0.0 { self.targets.gram(stop)? } else { vec![0.0; trains * trains] };
+        let mut rows = Written::new(self, &best, start)?;
+        let mut state = Between {
+            weights: best.weights.clone(),
+            multipliers: rows.multipliers(),
+            held: None,
+            smoothing: SMOOTH_FROM,
+            nearness: NEAR_CENTRE,
+            held_share: HELD_SHARE,
         };
-        let Bounds { lower, upper } = &objective.bounds;
-        let size = best.weights.iter().fold(0.0_f64, |most, w| most.max(w.abs()));
-        let mut rows = Dense::new(self, best.held.iter().chain(start).map(|r| r.0))?;
-        let (mut going, mut near, begun) = (None, true, best.rounds);
+        // Where the difference is `nothing`, the gap is the tolerance.
+        let gap_of = |value: f64, bound: f64| {
+            let gap = (value - bound).max(0.0) / value.max(nothing / self.tolerance);
+            if gap.is_nan() { f64::INFINITY } else { gap }
+        };
+        let finest = FINEST * self.tolerance;
+        let (mut value, mut aim, mut least_gap, mut idle) = (1.0, ENOUGH * self.tolerance, f64::INFINITY, 0);
         loop {
             best.rounds += 1;
-            let tolerance = if near { NEAR } else { self.tolerance };
-            let found =
-                mixed::minimise(&terms, &rows.hard(), &objective.bounds, size, going.as_ref(), tolerance, stop)?;
-            if found.bound > best.least {
-                (best.least, best.proof) = (found.bound, rows.name_rows(found.proof));
+            let program = Program {
+                silent: Rows::Written(&rows.coefficients),
+                limit: &rows.limit,
+                targets: &self.targets,
+                gram: &gram,
+                objective,
+                slopes: [[0.0, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]],
+                theta_0,
+            };
+            let accuracy = ACCURACY * (value - best.least / scale).max(finest * value.max(nothing / self.tolerance));
+            let Reached { point, value: reached, mut proof, state: next, stopped } =
+                program.round(state, accuracy, stop);
+            (state, value) = (next, reached);
+            proof.divide(1.0 / scale, 1.0);
+            if proof.bound > best.least {
+                (best.least, best.proof) = (proof.bound, rows.name(proof, &self.targets));
             }
-            if found.stopped || best.rounds >= MOST_ROUNDS {
+            let gap = gap_of(value, best.least / scale);
+            idle = if gap < 0.9 * least_gap { 0 } else { idle + 1 };
+            if idle > 0 {
+                state.nearness = (FARTHER * state.nearness).max(FARTHEST);
+                state.held_share = (STIFFER * state.held_share).min(1.0);
+            }
+            least_gap = least_gap.min(gap);
+            let ended = stopped || best.rounds >= MOST_ROUNDS || idle > MOST_IDLE;
+            let meets = if gap <= aim || ended { rows.meet(objective, &self.targets, &point, stop)? } else { None };
+            let met = meets.as_ref().unwrap_or(&point.weights);
+            let tolerance = if gap > NEAR { NEAR_SHARE * theta_0 } else { self.rounding(met) };
+            let broken = self.broken(met, ASKED_SHARE, tolerance);
+            let objective_there = self.parts(met).sum();
+            let left = Left::Broken(broken.len());
+            progress(Round { round: best.rounds, rows: rows.names.len(), objective: objective_there, left });
+            rows.take(&mut state.multipliers);
+            let more = rows.add(self, met, &broken)?;
+            state.multipliers = rows.multipliers();
+            if more {
+                least_gap = f64::INFINITY;
+            }
+            if !more
+                && self.worst_target(met) <= MET
+                && self.worst(met) <= self.rounding(met)
+                && objective_there < self.parts(&best.weights).sum()
+            {
+                best.weights.clone_from(met);
+            }
+            let least = self.parts(&best.weights).sum();
+            let known = gap_of(least / scale, best.least / scale) <= self.tolerance;
+            if known || ended {
+                // The binding rows of this objective help the next fit, although they do not bind at the shortest
+                // weights.
+                for (&name, &multiplier) in rows.names.iter().zip(&rows.of_rows) {
+                    if multiplier > 0.0 && !best.held.iter().any(|(held, _)| *held == name) {
+                        best.held.push((name, 0.0));
+                    }
+                }
                 return Ok(best);
             }
-            let mut weights = found.weights;
-            let met = rows.worst_row(&weights) <= 0.5 * MET;
-            if !near
-                && !met
-                && let Some(meets) = nearest(&weights, &rows.hard(), lower, upper, stop)?
-            {
-                weights = meets;
+            if !more && gap <= aim {
+                aim = (SMALLER * aim).max(LEAST * self.tolerance);
             }
-            let theta = self.statement.neuron.theta_0;
-            let broken =
-                self.broken(&weights, ASKED_SHARE, if near { NEAR_SHARE * theta } else { self.rounding(&weights) });
-            let value: f64 = self.parts(&weights).sum();
-            let (count, left) = (rows.names.len(), Left::Broken(broken.len()));
-            progress(Round { round: best.rounds, rows: count, objective: value, left });
-            let mut goes_on = found.start;
-            if near && best.rounds < begun + DROPPING {
-                goes_on.retain(&rows.drop_slack(&weights, &found.inequality, SLACK_SHARE * theta));
-            }
-            if rows.add(self, &weights, &broken)? {
-                going = Some(goes_on);
-                continue;
-            }
-            if near {
-                (near, going) = (false, Some(goes_on));
-                continue;
-            }
-            best.engine = found.engine;
-            // The binding rows of this objective help the next fit, although they do not bind at the shortest weights.
-            for (&name, &multiplier) in rows.names.iter().zip(&found.inequality) {
-                if multiplier > 0.0 && !best.held.iter().any(|(held, _)| *held == name) {
-                    best.held.push((name, 0.0));
-                }
-            }
-            if self.worst_target(&weights) <= MET
-                && self.worst(&weights) <= self.rounding(&weights)
-                && value < self.parts(&best.weights).sum()
-            {
-                best.weights = weights;
-            }
-            return Ok(best);
         }
     }
 }
 
-/// The working set as dense rows.
-struct Dense {
-    targets: Arc<Targets>,
-    below: Vec<f64>,
+/// The working set, as coefficients, with the multipliers of its rows and of the targets.
+struct Written {
+    coefficients: Vec<f64>,
     limit: Vec<f64>,
-    /// The names of the rows in `below`.
     names: Vec<Row>,
     /// The target whose row was subtracted from a row of silence beside it, and the factor of the difference.
     beside: Vec<Option<(usize, f64)>>,
     silent: HashSet<(usize, u64)>,
     slopes: Slopes,
+    of_rows: Vec<f64>,
+    of_targets: Vec<f64>,
 }
 
-impl Dense {
-    /// All target rows, and those of the given rows that the problem has.
-    fn new(problem: &Exact, rows: impl Iterator<Item = Row>) -> Result<Self> {
-        let statement = &problem.statement;
-        let slopes = Slopes::new(statement)?;
-        let mut dense = Self {
-            targets: Arc::clone(&problem.targets),
-            below: vec![],
+impl Written {
+    /// The rows that bind at the shortest weights, with the multipliers there, and those of a start.
+    fn new(problem: &Exact, best: &BestWeights, start: &[(Row, f64)]) -> Result<Self> {
+        let mut written = Self {
+            coefficients: vec![],
             limit: vec![],
             names: vec![],
             beside: vec![],
             silent: HashSet::new(),
-            slopes,
+            slopes: Slopes::new(&problem.statement)?,
+            of_rows: vec![],
+            of_targets: vec![0.0; problem.targets.len()],
         };
-        for row in rows {
+        // The multipliers are those of half the square of the weights; if the objective grew in proportion to the
+        // weights, this factor would make them those of the objective, which is 1.
+        let factor = 1.0 / dot(&best.weights, &best.weights);
+        for &(row, multiplier) in &best.held {
             match row {
-                Row::Silence { pattern, t } if statement.is_asked(pattern, t) => {
-                    dense.add_silence(problem, pattern, t)?
-                }
-                Row::Slope { .. } => {
-                    if let Some(k) = dense.slopes.0.iter().position(|s| s.0 == row) {
-                        dense.add_slope(k);
+                Row::Target { pattern, target } => {
+                    if let Some(k) = problem.targets.names.iter().position(|name| *name == (pattern, target)) {
+                        written.of_targets[k] += factor * multiplier;
                     }
                 }
-                Row::Silence { .. } | Row::Target { .. } => {}
+                _ => written.begin(problem, row, factor * multiplier)?,
             }
         }
-        Ok(dense)
+        for &(row, _) in start {
+            if !matches!(row, Row::Target { .. }) {
+                written.begin(problem, row, 0.0)?;
+            }
+        }
+        Ok(written)
     }
 
-    fn hard(&self) -> HardRows<'_> {
-        HardRows { equal: &self.targets.at, equal_to: &self.targets.thresholds, below: &self.below, limit: &self.limit }
+    /// Adds a row that bound elsewhere; for silence at a target, the slope there.
+    fn begin(&mut self, problem: &Exact, row: Row, multiplier: f64) -> Result<()> {
+        let targets = &problem.targets;
+        if let Row::Silence { pattern, t } = row
+            && let Some(k) = targets.next(pattern, t)
+            && let Some(&(slope, _)) = self.slopes.0.get(k)
+            && let ahead = targets.times[k] - t
+            && ahead < AT_TARGET * problem.statement.neuron.tau
+        {
+            self.of_targets[k] += multiplier;
+            return self.push(problem, slope, multiplier * ahead);
+        }
+        self.push(problem, row, multiplier)
     }
 
-    fn add_silence(&mut self, problem: &Exact, pattern: usize, t: f64) -> Result<()> {
-        if self.silent.insert((pattern, t.to_bits())) {
-            let row = Row::Silence { pattern, t };
-            let StatedRow { mut coefficients, mut limit } = problem.statement.state(row)?;
+    /// Adds a row of silence or of slope that the problem has and the set does not.
+    fn push(&mut self, problem: &Exact, row: Row, multiplier: f64) -> Result<()> {
+        let is_new = match row {
+            Row::Silence { pattern, t } => {
+                problem.statement.is_asked(pattern, t) && self.silent.insert((pattern, t.to_bits()))
+            }
+            Row::Slope { .. } => self.slopes.0.iter().any(|s| s.0 == row) && !self.names.contains(&row),
+            Row::Target { .. } => false,
+        };
+        if is_new {
+            let (statement, targets) = (&problem.statement, &problem.targets);
+            let from = self.coefficients.len();
+            self.coefficients.resize(from + statement.trains, 0.0);
+            let coefficients = &mut self.coefficients[from..];
+            let mut limit = statement.state_into(row, coefficients)?;
             // Near a target the two rows are parallel to within rounding. Their difference divided by the time between
             // them limits the slope instead and is as long as the other rows; it is equivalent because the target's row
             // holds with equality.
-            let tau = problem.statement.neuron.tau;
-            let near = self.targets.next(pattern, t).filter(|&k| self.targets.times[k] - t < BESIDE * tau);
-            let beside = near.map(|k| (k, tau / (self.targets.times[k] - t)));
+            let tau = statement.neuron.tau;
+            let beside = match row {
+                Row::Silence { pattern, t } => targets
+                    .next(pattern, t)
+                    .filter(|&k| targets.times[k] - t < BESIDE * tau)
+                    .map(|k| (k, tau / (targets.times[k] - t))),
+                _ => None,
+            };
             if let Some((k, steep)) = beside {
-                let at = self.targets.row(k);
+                let at = targets.row(k);
                 coefficients.iter_mut().zip(at.at).for_each(|(c, at)| *c = steep * (*c - at));
                 limit = steep * (limit - at.threshold);
+                self.of_targets[k] += multiplier;
             }
-            self.push(row, &coefficients, limit, beside);
+            self.limit.push(limit);
+            self.names.push(row);
+            self.of_rows.push(multiplier / beside.map_or(1.0, |(_, steep)| steep));
+            self.beside.push(beside);
         }
         Ok(())
     }
 
-    fn add_slope(&mut self, k: usize) {
-        let (row, stated) = self.slopes.0[k].clone();
-        if !self.names.contains(&row) {
-            self.push(row, &stated.coefficients, stated.limit, None);
-        }
-    }
-
-    fn push(&mut self, row: Row, coefficients: &[f64], limit: f64, beside: Option<(usize, f64)>) {
-        self.names.push(row);
-        self.beside.push(beside);
-        self.below.extend_from_slice(coefficients);
-        self.limit.push(limit);
-    }
-
     /// Adds the violated rows; returns whether any row is new.
     fn add(&mut self, problem: &Exact, weights: &[f64], broken: &[SilencePeak]) -> Result<bool> {
-        let before = self.names.len();
+        let (before, targets) = (self.names.len(), &problem.targets);
+        let missed = problem.worst_target(weights) > MET;
+        let flat = self.slopes.broken(weights, (1.0 - ASKED_SHARE) * problem.statement.margin.slope);
         for peak in broken {
-            self.add_silence(problem, peak.pattern, peak.t)?;
+            let near = targets.next(peak.pattern, peak.t).filter(|&k| {
+                targets.times[k] - peak.t < AT_TARGET * problem.statement.neuron.tau
+                    && !self.slopes.0.is_empty()
+                    && (missed || flat.contains(&k))
+            });
+            if near.is_none() {
+                self.push(problem, peak.row(), 0.0)?;
+            }
         }
-        for k in self.slopes.broken(weights, (1.0 - ASKED_SHARE) * problem.statement.margin.slope) {
-            self.add_slope(k);
+        for k in flat {
+            self.push(problem, self.slopes.0[k].0, 0.0)?;
         }
         Ok(self.names.len() > before)
     }
 
-    /// Drops rows without a multiplier that are slack by more than `room`; returns which rows remain.
-    fn drop_slack(&mut self, weights: &[f64], multipliers: &[f64], room: f64) -> Vec<bool> {
-        let n = weights.len();
-        let most = multipliers.iter().fold(0.0, |m: f64, z| m.max(*z));
-        let rows = self.below.chunks_exact(n).zip(&self.limit).zip(multipliers);
-        let keep: Vec<bool> =
-            rows.map(|((row, limit), z)| *z > 1e-6 * most || limit - dot(row, weights) < room).collect();
-        let kept = |k: &usize| keep[*k];
-        self.below = (0..keep.len()).filter(kept).flat_map(|k| self.below[k * n..(k + 1) * n].to_vec()).collect();
-        self.limit = (0..keep.len()).filter(kept).map(|k| self.limit[k]).collect();
-        self.names = (0..keep.len()).filter(kept).map(|k| self.names[k]).collect();
-        self.beside = (0..keep.len()).filter(kept).map(|k| self.beside[k]).collect();
-        let silent =
-            |row: &Row| if let Row::Silence { pattern, t } = row { Some((*pattern, t.to_bits())) } else { None };
-        self.silent = self.names.iter().filter_map(silent).collect();
-        keep
+    fn multipliers(&self) -> Vec<f64> {
+        self.of_rows.iter().chain(&self.of_targets).copied().collect()
+    }
+
+    fn take(&mut self, multipliers: &mut Vec<f64>) {
+        self.of_targets = multipliers.split_off(self.names.len());
+        self.of_rows = std::mem::take(multipliers);
+    }
+
+    /// The nearest weights that satisfy all rows: those that are 0 stay 0 if that can be.
+    fn meet(
+        &self,
+        objective: &Objective,
+        targets: &Targets,
+        point: &Point,
+        stop: Stop<'_>,
+    ) -> Result<Option<Vec<f64>>> {
+        let n = point.weights.len();
+        let worst = largest(point.excess.iter().copied().chain([0.0]));
+        let near = |k: &usize| point.excess[*k] >= -AT_LIMIT * worst;
+        let near: Vec<usize> = (0..self.names.len()).filter(near).collect();
+        let limit: Vec<f64> = near.iter().map(|&k| self.limit[k]).collect();
+        let below = Rows::Written(&self.coefficients).coefficients(&near, n);
+        let rows = HardRows { equal: &targets.at, equal_to: &targets.thresholds, below: &below, limit: &limit };
+        let Bounds { lower, upper } = &objective.bounds;
+        let held = |bounds: &[f64]| -> Vec<f64> {
+            let held = bounds.iter().zip(&point.weights);
+            held.map(|(&bound, &w)| if w == 0.0 && objective.l1 > 0.0 { 0.0 } else { bound }).collect()
+        };
+        if let Some(found) = nearest(&point.weights, &rows, &held(lower), &held(upper), stop)? {
+            return Ok(Some(found));
+        }
+        nearest(&point.weights, &rows, lower, upper, stop)
     }
 
     /// The nonzero multipliers of a proof, by the names of their rows; those of a difference go to both of its rows.
-    fn name_rows(&self, proof: MixedProof) -> GapMultipliers {
-        let MixedProof { mut equality, inequality, behind, pull } = proof;
-        let mut rows = vec![];
-        for ((&row, beside), z) in self.names.iter().zip(&self.beside).zip(inequality) {
-            let (target, steep) = beside.map_or((None, 1.0), |(k, steep)| (Some(k), steep));
-            rows.push((row, steep * z));
-            if let Some(k) = target {
-                equality[k] -= steep * z;
+    fn name(&self, proof: Proof, targets: &Targets) -> GapMultipliers {
+        let Proof { mut multipliers, behind, pull, .. } = proof;
+        for (k, beside) in self.beside.iter().enumerate() {
+            if let Some((target, steep)) = beside {
+                multipliers[k] *= steep;
+                multipliers[self.names.len() + target] -= multipliers[k];
             }
         }
-        let names = || self.targets.names.iter().copied();
-        let targets = names().zip(equality).map(|((pattern, target), y)| (Row::Target { pattern, target }, y));
+        let names = || targets.names.iter().copied();
+        let of_targets = names().map(|(pattern, target)| Row::Target { pattern, target });
+        let rows = self.names.iter().copied().chain(of_targets).zip(multipliers);
         GapMultipliers {
-            rows: rows.into_iter().chain(targets).filter(|(_, multiplier)| *multiplier != 0.0).collect(),
+            rows: rows.filter(|(_, multiplier)| *multiplier != 0.0).collect(),
             behind: names().zip(behind).filter(|(_, multiplier)| *multiplier != 0.0).collect(),
             pull,
         }
-    }
-
-    /// The largest violation of any row of the working set.
-    fn worst_row(&self, weights: &[f64]) -> f64 {
-        let n = weights.len();
-        let equal = self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs());
-        let below = self.below.chunks_exact(n).zip(&self.limit).map(|(row, limit)| dot(row, weights) - limit);
-        largest(equal.chain(below).chain([0.0]))
     }
 }

@@ -1,10 +1,11 @@
-//! The minimum of 6.14 by a proximal augmented Lagrangian with semismooth Newton steps.
+//! The minimum of an objective with kinks (6.14, and 6.11 with hard rows) by a proximal augmented Lagrangian with
+//! semismooth Newton steps.
 //!
-//! Each row has a multiplier between the two slopes of its kink. With the multipliers fixed and every kink smoothed
-//! over `delta` mV, 6.14 is differentiable, and its curvature comes only from the few rows on their smoothed kinks, the
-//! only rows that are ever written out. All other rows enter by one sweep over the grid (the potential) and one back (a
-//! weighted sum of rows). After each round every multiplier is set to the slope found and `delta` shrinks, until a
-//! lower bound proves the objective.
+//! Each row has a multiplier between the two slopes of its kink; those of a hard row are infinite. With the multipliers
+//! fixed and every kink smoothed over `delta` mV, the objective is differentiable, and its curvature comes only from the
+//! few rows on their smoothed kinks, the only rows that are ever written out. All other rows enter by one sweep over the
+//! grid (the potential) and one back (a weighted sum of rows). After each round every multiplier is set to the slope
+//! found and `delta` shrinks, until a lower bound proves the objective.
 
 mod bound;
 mod line_search;
@@ -14,9 +15,8 @@ use faer::Par;
 use faer::dyn_stack::MemBuffer;
 use faer::linalg::cholesky::llt::factor::cholesky_in_place_scratch;
 
-use super::rounds::Rounds;
 use crate::Stop;
-use crate::learn::statement::{Norm, Objective, Relaxed, RelaxedPoint};
+use crate::learn::statement::{Norm, Point, Program, Proof};
 use crate::vectors::{add, dot};
 
 /// The initial smoothing of the kinks in thresholds: for targets all of them are smooth at weights of 0; less for
@@ -28,6 +28,26 @@ const WARM_FROM: f64 = 0.002;
 /// The factor by which a round reduces the smoothing, and its least value in thresholds.
 const SHRINK: f64 = 0.25;
 const SHARPEST: f64 = 1e-8;
+/// Those of hard rows; a round that is not solved in `STEPS_HARD` steps is begun anew with `BLUNTER` times its
+/// smoothing, because slopes of unsolved rounds may be far off.
+const SHRINK_HARD: f64 = 0.5;
+const SHARPEST_HARD: f64 = 1e-9;
+const STEPS_HARD: usize = 40;
+const BLUNTER: f64 = 8.0;
+/// A round counts as solved at this many times its accuracy if `STEPS_HARD` steps end there: rounding leaves no more.
+const ROUGH: f64 = 1e3;
+/// Kinks stay as smooth as they are while the distances from their limits cost less than this share of the accuracy.
+const ENOUGH_MET: f64 = 0.1;
+/// The least change of a hard row's multiplier over its smoothing, as a share of what the objective is per threshold and
+/// target: all multipliers vanish where B can be met exactly.
+const LEAST_UNIT: f64 = 1e-3;
+/// The norm is smoothed below a length of this share of the weights' scale times the smoothing of the targets in
+/// thresholds: weights of 0 are a kink, at which no step could begin or end.
+const SHORT: f64 = 1e-2;
+/// The least share of the targets' pull in the scale of the terms that hold weights at 0 and at their bounds, and in
+/// that of the proximal term.
+const HELD_SHARE: f64 = 1.0;
+const CENTRE_SHARE: f64 = 1e-3;
 /// The largest number of Newton steps in a round, and of rounds.
 const STEPS: usize = 12;
 const ROUNDS: usize = 60;
@@ -35,31 +55,68 @@ const ROUNDS: usize = 60;
 const FINER: usize = 3;
 /// Bounds wider than this many times the weights that the targets need do not set the scale of the weights.
 const FAR: f64 = 30.0;
+/// The number of rounds with little progress after which the search ends.
+const STALLED: usize = 12;
 
-/// A start: the weights of a similar fit, and its multipliers as shares of their range.
+/// A start: the weights of a similar fit, and its multipliers.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct WarmStart {
     pub(crate) weights: Option<Vec<f64>>,
-    pub(crate) shares: Option<Vec<f64>>,
+    pub(crate) multipliers: Option<Vec<f64>>,
+}
+
+/// The state between two rounds over hard rows; rows may come in between.
+#[derive(Debug, Clone)]
+pub(crate) struct Between {
+    pub(crate) weights: Vec<f64>,
+    pub(crate) multipliers: Vec<f64>,
+    /// The multipliers of l1 and of the bounds; none before the first round.
+    pub(crate) held: Option<Vec<f64>>,
+    /// How far the kinks are smoothed, in thresholds.
+    pub(crate) smoothing: f64,
+    /// The curvature of the proximal term relative to the smoothing.
+    pub(crate) nearness: f64,
+    /// As [`HELD_SHARE`], over hard rows.
+    pub(crate) held_share: f64,
+}
+
+/// The end of a round over hard rows.
+pub(crate) struct Reached {
+    /// Weights that violate the rows by about the accuracy reached.
+    pub(crate) point: Point,
+    /// The objective there, and what the multipliers count the distances from the limits as.
+    pub(crate) value: f64,
+    pub(crate) proof: Proof,
+    pub(crate) state: Between,
+    pub(crate) stopped: bool,
+}
+
+/// The best weights found, proven or not.
+pub(crate) struct Found {
+    pub(crate) best: Point,
+    pub(crate) proof: Proof,
+    pub(crate) rounds: usize,
+    /// The number of rows on their kinks in the last round.
+    pub(crate) rows: usize,
+    pub(crate) multipliers: Vec<f64>,
+    pub(crate) stopped: bool,
 }
 
 struct Lagrangian<'a> {
-    /// Whether the caller gave weights to start from.
-    started: bool,
-    problem: &'a Relaxed,
-    objective: &'a Objective,
+    program: &'a Program<'a>,
     weights: Vec<f64>,
     excess: Vec<f64>,
     behind: Vec<f64>,
-    /// The multipliers as shares: of D's weight from 0 to 1, of the kink of C from its lower slope up to 1 more.
-    shares: Vec<f64>,
+    /// One per row, between its slopes.
+    multipliers: Vec<f64>,
     /// The multipliers of l1 and of the bounds, one per synapse.
     held: Vec<f64>,
     /// The weights at the beginning of the round, the centre of the proximal term.
     centre: Vec<f64>,
-    /// The smoothing of the kinks, mV: silence, targets.
+    /// The change of a multiplier, and the smoothing of the kinks, mV, over which it takes place: silence, targets.
+    unit: [f64; 2],
     delta: [f64; 2],
-    /// The least value of 6.14 so far.
+    /// The least value of the objective so far.
     most: f64,
     /// The scale of differences between weights, mV: the bounds, unless they are far wider than the targets need.
     width: f64,
@@ -68,37 +125,31 @@ struct Lagrangian<'a> {
     rho: f64,
     /// The gradient in the weights.
     gradient: Vec<f64>,
+    /// The slopes of the smoothed rows.
+    factors: Vec<f64>,
     /// The rows on their smoothed kinks.
     inside: Vec<usize>,
-    factors: Vec<f64>,
     hessian: Vec<f64>,
     memory: MemBuffer,
 }
 
-impl Relaxed {
+impl Program<'_> {
     /// Minimises 6.14 (scaled so that it is about 1) until its relative gap is `tolerance`, or until progress ends.
     pub(crate) fn augmented(
         &self,
-        objective: &Objective,
         tolerance: f64,
         start: WarmStart,
         progress: &mut dyn FnMut(usize, usize, f64, f64),
         stop: Stop<'_>,
-    ) -> Rounds {
-        let zero: Vec<f64> = objective
-            .bounds
-            .lower
-            .iter()
-            .zip(&objective.bounds.upper)
-            .map(|(&low, &high)| 0.0_f64.clamp(low, high))
-            .collect();
-        let mut best = self.point(objective, zero);
-        let mut engine = Lagrangian::new(self, objective, start, &best);
+    ) -> Found {
+        let mut best = self.point(self.nearest_to_zero());
+        let started = start.weights.is_some();
+        let mut engine = Lagrangian::new(self, start, &best);
         let mut proof = self.no_proof();
         proof.improve(engine.proof_at_zero(&best));
         engine.most = best.parts.sum();
-        if engine.started {
-            let candidate = self.point(objective, engine.weights.clone());
+        if started {
+            let candidate = self.point(engine.weights.clone());
             proof.improve(engine.proof());
             if candidate.parts.sum() < best.parts.sum() {
                 best = candidate;
@@ -108,24 +159,12 @@ impl Relaxed {
         let (mut rounds, mut rows, mut stalled) = (0, 0, 0);
         let mut gap = best.gap(proof.bound);
         let mut stopped = false;
-        while gap > tolerance && rounds < ROUNDS && stalled < 12 {
+        while gap > tolerance && rounds < ROUNDS && stalled < STALLED && !stopped {
             rounds += 1;
-            let accuracy = 0.03 * (best.parts.sum() - proof.bound);
-            let (mut reached, mut finer) = (false, 0);
-            for _ in 0..STEPS {
-                if stop.asked() {
-                    stopped = true;
-                    break;
-                }
-                let (near, anywhere) = engine.slope();
-                reached |= near <= accuracy;
-                finer += usize::from(reached);
-                if anywhere <= accuracy || finer > FINER || !engine.step() {
-                    break;
-                }
-            }
+            let reached = engine.steps(STEPS, 0.03 * (best.parts.sum() - proof.bound), stop);
+            stopped = stop.asked();
             rows = engine.inside.len();
-            let candidate = self.point(objective, engine.candidate());
+            let candidate = self.point(engine.candidate());
             proof.improve(engine.proof());
             let before = (gap, best.parts.sum());
             if candidate.parts.sum() < best.parts.sum() {
@@ -135,114 +174,169 @@ impl Relaxed {
             gap = best.gap(proof.bound);
             stalled = if gap > 0.9 * before.0 && engine.most > 0.99 * before.1 { stalled + 1 } else { 0 };
             progress(rounds, rows, best.parts.sum(), gap);
-            engine.sharpen(reached);
-            if stopped {
-                break;
+            engine.end_round();
+            if reached {
+                engine.sharpen();
             }
         }
-        Rounds { best, proof, rounds, rows, shares: engine.shares, stopped }
+        Found { best, proof, rounds, rows, multipliers: engine.multipliers, stopped }
+    }
+
+    /// One round over hard rows, solved until the objective (scaled so that it is about 1) could fall by `accuracy` at
+    /// most.
+    pub(crate) fn round(&self, mut state: Between, accuracy: f64, stop: Stop<'_>) -> Reached {
+        let at = self.point(state.weights.clone());
+        let mut engine = Lagrangian::with(self, at, state.multipliers.clone());
+        engine.smooth(&state);
+        match &state.held {
+            Some(held) => engine.held.clone_from(held),
+            None => engine.balance_multipliers(),
+        }
+        let reached = engine.steps(STEPS_HARD, accuracy, stop) || engine.slope().0 <= ROUGH * accuracy;
+        let point = self.point(engine.candidate());
+        let proof = engine.proof();
+        let missed = engine.missed(&point);
+        let value = point.parts.sum() + missed;
+        if reached {
+            engine.end_round();
+            let Lagrangian { weights, multipliers, held, .. } = engine;
+            let smoothing = if missed > ENOUGH_MET * accuracy {
+                (SHRINK_HARD * state.smoothing).max(SHARPEST_HARD)
+            } else {
+                state.smoothing
+            };
+            state = Between { weights, multipliers, held: Some(held), smoothing, ..state };
+        } else {
+            state.smoothing *= BLUNTER;
+        }
+        Reached { point, value, proof, state, stopped: stop.asked() }
     }
 }
 
 impl<'a> Lagrangian<'a> {
-    fn new(problem: &'a Relaxed, objective: &'a Objective, start: WarmStart, zero: &RelaxedPoint) -> Self {
-        let n = problem.trains;
-        let silent = problem.silent.len();
-        let total = silent + problem.targets.len();
-        let theta = problem.theta_0;
-        let started = start.weights.is_some();
-        let (weights, excess, behind) = match start.weights {
-            None => (zero.weights.clone(), zero.excess.clone(), zero.behind.clone()),
-            Some(weights) => {
-                let at = problem.point(objective, weights);
-                (at.weights, at.excess, at.behind)
-            }
-        };
-        let delta =
-            if start.shares.is_some() { [WARM_FROM * theta; 2] } else { [SILENCE_FROM * theta, TARGETS_FROM * theta] };
-        let warm = start.shares.is_some();
-        let mut shares = start.shares.unwrap_or_default();
-        shares.resize(total, 0.0);
-        let widest =
-            objective.bounds.upper.iter().zip(&objective.bounds.lower).fold(0.0_f64, |m, (u, l)| m.max(u.max(-l)));
-        let width =
-            widest.min(FAR * problem.typical_weight()).max(zero.weights.iter().fold(0.0, |m, w| w.abs().max(m)));
-        let scratch = cholesky_in_place_scratch::<f64>(n, Par::Seq, faer::Spec::default());
-        let mut engine = Self {
-            started,
-            problem,
-            objective,
-            centre: weights.clone(),
-            weights,
-            excess,
-            behind,
-            shares,
-            held: vec![0.0; n],
-            delta,
-            most: f64::INFINITY,
-            width,
-            sigma: 1.0,
-            rho: 1.0,
-            gradient: vec![0.0; n],
-            inside: vec![],
-            factors: vec![0.0; total],
-            hessian: vec![0.0; n * n],
-            memory: MemBuffer::new(scratch),
-        };
-        // The gradient of the rows at each synapse for weights of 0 sets the scale of `sigma` and `rho`.
-        engine.multipliers();
-        let mut pull = vec![0.0; n];
-        for (k, target) in problem.targets.iter().enumerate() {
-            add(&mut pull, engine.factors[silent + k].abs().max(objective.c), target.at);
-            add(&mut pull, 2.0 * objective.b * objective.kappa * target.threshold, target.behind);
-        }
-        let most = (dot(&pull, &pull) / n as f64).sqrt();
-        let size = (objective.l1 + objective.l2 / (n as f64).sqrt()).max(1e-3 * most).max(1e-12);
-        engine.sigma = if warm { 500.0 } else { 1.0 } * size / width;
-        engine.rho = if warm { 1e-3 } else { 0.1 } * size / width;
+    fn new(program: &'a Program<'a>, start: WarmStart, zero: &Point) -> Self {
+        let at = start.weights.map_or_else(|| zero.clone(), |weights| program.point(weights));
+        let warm = start.multipliers.is_some();
+        let mut engine = Self::with(program, at, start.multipliers.unwrap_or_default());
+        let from = if warm { [WARM_FROM; 2] } else { [SILENCE_FROM, TARGETS_FROM] };
+        engine.delta = from.map(|from| from * program.theta_0);
+        engine.sigma = if warm { 500.0 } else { 1.0 } * engine.size(HELD_SHARE);
+        engine.rho = if warm { 1e-3 } else { 0.1 } * engine.size(CENTRE_SHARE);
         if warm {
             engine.balance_multipliers();
         }
         engine
     }
 
-    /// Computes the slope of each row, times its weight in 6.14.
-    fn multipliers(&mut self) {
-        let silent = self.problem.silent.len();
-        let (d, (c, low)) = (self.objective.d, self.objective.kink_of_c());
-        let [per_silent, per_slope] = self.delta.map(|delta| 1.0 / delta);
-        let rows = self.factors.iter_mut().zip(&self.excess).zip(&self.shares);
-        for (k, ((factor, &x), &share)) in rows.enumerate() {
-            *factor = if k < silent {
-                d * (share + x * per_silent).clamp(0.0, 1.0)
-            } else {
-                c * (share + x * per_slope).clamp(low, low + 1.0)
-            };
+    /// The Lagrangian at a point; how sharp it is remains to be set.
+    fn with(program: &'a Program<'a>, at: Point, mut multipliers: Vec<f64>) -> Self {
+        let (n, objective) = (program.trains(), program.objective);
+        multipliers.resize(program.rows(), 0.0);
+        let unit = if program.is_hard() {
+            let squares: f64 = multipliers.iter().map(|m| m * m).sum();
+            let count = multipliers.iter().filter(|m| **m != 0.0).count();
+            let least = LEAST_UNIT / (program.theta_0 * program.targets.len() as f64);
+            [if squares > 0.0 { (squares / count as f64).sqrt().max(least) } else { 1.0 }; 2]
+        } else {
+            program.slopes.map(|[low, high]| if low < high { high - low } else { 1.0 })
+        };
+        let bounds = &objective.bounds;
+        let widest = bounds.upper.iter().zip(&bounds.lower).fold(0.0_f64, |m, (u, l)| m.max(u.max(-l)));
+        let zero = program.nearest_to_zero();
+        let width = widest.min(FAR * program.typical_weight()).max(zero.iter().fold(0.0, |m, w| w.abs().max(m)));
+        let scratch = cholesky_in_place_scratch::<f64>(n, Par::Seq, faer::Spec::default());
+        Self {
+            program,
+            centre: at.weights.clone(),
+            weights: at.weights,
+            excess: at.excess,
+            behind: at.behind,
+            factors: vec![0.0; multipliers.len()],
+            multipliers,
+            held: vec![0.0; n],
+            unit,
+            delta: [program.theta_0; 2],
+            most: f64::INFINITY,
+            width,
+            sigma: 1.0,
+            rho: 1.0,
+            gradient: vec![0.0; n],
+            inside: vec![],
+            hessian: vec![0.0; n * n],
+            memory: MemBuffer::new(scratch),
         }
     }
 
-    /// Computes the gradient; returns how much 6.14 could fall along it within `width`, and within the bounds.
+    /// The scale of `sigma` and `rho`: the slope of the l1 and l2 terms at a synapse, or a share of the targets' pull,
+    /// over the scale of the weights.
+    fn size(&mut self, share: f64) -> f64 {
+        let (program, objective, n) = (self.program, self.program.objective, self.weights.len() as f64);
+        self.slopes();
+        let mut pull = vec![0.0; self.weights.len()];
+        let of_targets = &self.factors[program.limit.len()..];
+        for (target, factor) in program.targets.iter().zip(of_targets) {
+            add(&mut pull, factor.abs().max(objective.c), target.at);
+            add(&mut pull, 2.0 * objective.b * objective.kappa * target.threshold, target.behind);
+        }
+        let most = (dot(&pull, &pull) / n).sqrt();
+        (objective.l1 + objective.l2 / n.sqrt()).max(share * most).max(1e-12) / self.width
+    }
+
+    /// Sets the smoothing of hard rows, and the other terms accordingly.
+    fn smooth(&mut self, state: &Between) {
+        self.delta = [state.smoothing * self.program.theta_0; 2];
+        self.sigma = SILENCE_FROM / state.smoothing * self.size(state.held_share);
+        self.rho = state.nearness * state.smoothing * self.size(CENTRE_SHARE);
+    }
+
+    /// Newton steps until the objective could fall by `accuracy` at most; returns whether that is so within `width`.
+    fn steps(&mut self, most: usize, accuracy: f64, stop: Stop<'_>) -> bool {
+        let (mut reached, mut finer) = (false, 0);
+        for _ in 0..most {
+            if stop.asked() {
+                break;
+            }
+            let (near, anywhere) = self.slope();
+            reached |= near <= accuracy;
+            finer += usize::from(reached);
+            if anywhere <= accuracy || finer > FINER || !self.step() {
+                break;
+            }
+        }
+        reached
+    }
+
+    /// How steeply the slope of a smoothed row changes: silence, targets.
+    fn steep(&self) -> [f64; 2] {
+        std::array::from_fn(|kind| self.unit[kind] / self.delta[kind])
+    }
+
+    /// Computes the slope of each smoothed row.
+    fn slopes(&mut self) {
+        let (program, steep) = (self.program, self.steep());
+        let silent = program.limit.len();
+        let rows = self.factors.iter_mut().zip(&self.excess).zip(&self.multipliers);
+        for (k, ((factor, &x), &multiplier)) in rows.enumerate() {
+            let kind = usize::from(k >= silent);
+            let [low, high] = program.slopes[kind];
+            *factor = (multiplier + x * steep[kind]).clamp(low, high);
+        }
+    }
+
+    /// Computes the gradient; returns how much the objective could fall along it within `width`, and within the bounds.
     fn slope(&mut self) -> (f64, f64) {
-        let (problem, o) = (self.problem, self.objective);
-        let silent = problem.silent.len();
-        self.multipliers();
+        let (program, o) = (self.program, self.program.objective);
+        self.slopes();
         self.inside.clear();
-        let (d, (c, low)) = (o.d, o.kink_of_c());
         for (k, &factor) in self.factors.iter().enumerate() {
-            let on_kink =
-                if k < silent { 0.0 < factor && factor < d } else { low * c < factor && factor < (low + 1.0) * c };
-            if on_kink {
+            let [low, high] = program.slopes[program.kind(k)];
+            if low < factor && factor < high {
                 self.inside.push(k);
             }
         }
         self.gradient.fill(0.0);
-        if o.d > 0.0 {
-            problem.silent.add_sum(&self.factors[..silent], &mut self.gradient);
-        }
-        for ((target, &factor), &behind) in problem.targets.iter().zip(&self.factors[silent..]).zip(&self.behind) {
-            add(&mut self.gradient, factor, target.at);
-            add(&mut self.gradient, 2.0 * o.b * o.counts_in_b(behind), target.behind);
-        }
+        program.add_rows(&self.factors, &mut self.gradient);
+        program.add_slope_of_b(&self.behind, &mut self.gradient);
         match o.norm {
             Norm::Square => add(&mut self.gradient, 2.0 * o.l2, &self.weights),
             Norm::Norm => {
@@ -261,17 +355,21 @@ impl<'a> Lagrangian<'a> {
         (near, anywhere)
     }
 
-    /// The gradient of the norm; 0 if all weights are 0.
+    /// The smoothed norm of weights with this sum of squares, mV.
+    fn length(&self, square: f64) -> f64 {
+        square.sqrt().hypot(SHORT * self.width * self.delta[1] / self.program.theta_0)
+    }
+
+    /// The gradient of the smoothed norm.
     fn pull(&self) -> Vec<f64> {
-        let length = dot(&self.weights, &self.weights).sqrt();
-        let factor = if length > 0.0 { self.objective.l2 / length } else { 0.0 };
+        let factor = self.program.objective.l2 / self.length(dot(&self.weights, &self.weights));
         self.weights.iter().map(|w| factor * w).collect()
     }
 
     /// The term that holds weight `n` at 0 and within its bounds: its slope, whether it is active, and the value it
     /// holds to.
     fn penalty(&self, n: usize, w: f64) -> (f64, bool, f64) {
-        let o = self.objective;
+        let o = self.program.objective;
         let z = w + self.held[n] / self.sigma;
         let shift = o.l1 / self.sigma;
         let soft = if z > shift {
@@ -291,8 +389,9 @@ impl<'a> Lagrangian<'a> {
     /// Sets the multipliers of l1 and of the bounds so that the gradient is 0 at weights that are 0 or at a bound.
     fn balance_multipliers(&mut self) {
         self.slope();
+        let o = self.program.objective;
         for n in 0..self.weights.len() {
-            let (w, o) = (self.weights[n], self.objective);
+            let w = self.weights[n];
             let against = self.penalty(n, w).0 - self.gradient[n];
             self.held[n] = if w <= o.bounds.lower[n] || w >= o.bounds.upper[n] {
                 against
@@ -309,24 +408,27 @@ impl<'a> Lagrangian<'a> {
         (0..self.weights.len()).map(|n| self.penalty(n, self.weights[n]).2).collect()
     }
 
-    /// Ends a round: sets the multipliers to the slopes found, reduces the smoothing, and weakens the proximal term.
-    fn sharpen(&mut self, reached: bool) {
-        let silent = self.problem.silent.len();
-        self.multipliers();
-        let (d, (c, _)) = (self.objective.d, self.objective.kink_of_c());
-        for (k, (share, factor)) in self.shares.iter_mut().zip(&self.factors).enumerate() {
-            let weight = if k < silent { d } else { c };
-            *share = if weight > 0.0 { factor / weight } else { 0.0 };
-        }
+    /// What the slopes of the hard rows count their distances from their limits as, at a point.
+    fn missed(&self, at: &Point) -> f64 {
+        let counted = self.factors.iter().zip(&at.excess).filter(|(factor, _)| **factor != 0.0);
+        counted.map(|(factor, x)| (factor * x).abs()).sum()
+    }
+
+    /// Ends a round: sets the multipliers to the slopes found.
+    fn end_round(&mut self) {
+        self.slopes();
+        self.multipliers.copy_from_slice(&self.factors);
         for n in 0..self.weights.len() {
             self.held[n] = self.penalty(n, self.weights[n]).0;
         }
         self.centre.copy_from_slice(&self.weights);
-        let theta = self.problem.theta_0;
-        if reached {
-            self.delta = self.delta.map(|delta| (delta * SHRINK).max(SHARPEST * theta));
-            self.sigma /= SHRINK;
-            self.rho *= SHRINK;
-        }
+    }
+
+    /// Reduces the smoothing, and weakens the proximal term.
+    fn sharpen(&mut self) {
+        let sharpest = SHARPEST * self.program.theta_0;
+        self.delta = self.delta.map(|delta| (delta * SHRINK).max(sharpest));
+        self.sigma /= SHRINK;
+        self.rho *= SHRINK;
     }
 }

@@ -1,13 +1,12 @@
-//! Minimises 6.14: by the augmented Lagrangian, and by the cone solver if the former's result cannot be proven.
+//! Minimises 6.14, from nothing or from a similar fit.
 
-use super::augmented::WarmStart;
-use super::rounds::Rounds;
-use crate::learn::fit::{Engine, Left, Round};
-use crate::learn::statement::{Objective, Parts, Relaxed, RelaxedPoint, RelaxedProof, Tangents};
+use super::augmented::{Found, WarmStart};
+use crate::Stop;
+use crate::learn::fit::{Left, Round};
+use crate::learn::statement::{Objective, Parts, Point, Program, Proof, Relaxed, Rows, Tangents};
 use crate::vectors::dot;
-use crate::{Result, Stop};
 
-/// The weights found, and the engine that proved them.
+/// The weights found, with what proves them.
 pub(crate) struct Minimum {
     pub(crate) weights: Vec<f64>,
     pub(crate) objective: f64,
@@ -15,90 +14,67 @@ pub(crate) struct Minimum {
     pub(crate) gap: f64,
     pub(crate) rounds: usize,
     pub(crate) rows: usize,
-    pub(crate) engine: Engine,
+    /// The multiplier of each row as a share of the difference of its slopes.
     pub(crate) shares: Vec<f64>,
-    pub(crate) proof: RelaxedProof,
+    pub(crate) proof: Proof,
 }
 
 impl Relaxed {
-    /// Finds the least objective; the bound that proves it covers all rows, whichever engine ran.
+    /// Finds the least objective; the bound that proves it covers all rows. The start's multipliers are shares.
     ///
     /// If a stop is requested, returns the best weights so far with their proven bound.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` if the cone solver finds no answer.
     pub(crate) fn minimise(
         &self,
         objective: &Objective,
         tolerance: f64,
-        engine: Engine,
-        start: WarmStart,
+        mut start: WarmStart,
         progress: &mut dyn FnMut(Round),
         stop: Stop<'_>,
-    ) -> Result<Minimum> {
-        let limits = objective.bounds.lower.iter().zip(&objective.bounds.upper);
-        let zero: Vec<f64> = limits.map(|(&low, &high)| 0.0_f64.clamp(low, high)).collect();
-        let at_zero = self.point(objective, zero.clone()).parts.sum();
+    ) -> Minimum {
+        let plain = self.program(objective);
+        let at_zero = plain.point(plain.nearest_to_zero()).parts.sum();
         let scale = if at_zero > 0.0 { 1.0 / at_zero } else { 1.0 };
         let objective = &objective.scaled(scale).within_reach(at_zero * scale);
-        let mut before = 0;
+        let program = self.program(objective);
         let mut report = |round: usize, rows, least: f64, gap| {
             progress(Round { round, rows, objective: least / scale, left: Left::Gap(gap) });
         };
-        let weights = start.weights.clone();
-        let mut by = engine;
-        let mut found = if engine == Engine::Native {
-            match self.near_a_fit(objective, tolerance, start, &mut report, stop) {
-                Ok(found) => found,
-                Err(start) => self.augmented(objective, tolerance, start, &mut report, stop),
-            }
-        } else {
-            let near = weights.is_some();
-            let from = self.point(objective, weights.unwrap_or(zero));
-            self.by_rounds(objective, tolerance, (from, self.no_proof(), near), &mut report, stop)?
-        };
-        if by == Engine::Native && !found.stopped && found.best.gap(found.proof.bound) > tolerance {
-            by = Engine::ConeSolver;
-            before = found.rounds;
-            let mut report = |round, rows, least, gap| report(before + round, rows, least, gap);
-            let near = (found.best, found.proof, true);
-            found = self.by_rounds(objective, tolerance, near, &mut report, stop)?;
+        let ranges = program.slopes.map(|[low, high]| high - low);
+        let range_of = |row: usize| ranges[program.kind(row)];
+        if let Some(shares) = &mut start.multipliers {
+            shares.iter_mut().enumerate().for_each(|(row, share)| *share *= range_of(row));
         }
-        let least = found.best.parts.sum() / scale;
-        let mut parts = found.best.parts;
+        let Found { best, mut proof, rounds, rows, multipliers: mut shares, .. } =
+            match program.near_a_fit(tolerance, start, &mut report, stop) {
+                Ok(found) => found,
+                Err(start) => program.augmented(tolerance, start, &mut report, stop),
+            };
+        for (row, share) in shares.iter_mut().enumerate() {
+            *share = if range_of(row) > 0.0 { *share / range_of(row) } else { 0.0 };
+        }
+        let (least, gap) = (best.parts.sum() / scale, best.gap(proof.bound));
+        let mut parts = best.parts;
         for part in [&mut parts.l1, &mut parts.l2, &mut parts.B, &mut parts.C, &mut parts.D] {
             *part /= scale;
         }
-        let gap = found.best.gap(found.proof.bound);
-        let mut proof = found.proof;
         proof.divide(scale, 1.0);
-        Ok(Minimum {
-            gap,
-            weights: found.best.weights,
-            objective: least,
-            parts,
-            rounds: before + found.rounds,
-            rows: found.rows,
-            engine: by,
-            shares: found.shares,
-            proof,
-        })
+        Minimum { gap, weights: best.weights, objective: least, parts, rounds, rows, shares, proof }
     }
+}
 
-    /// The lower bound that these shares of the multipliers' ranges prove, together with the weights they belong to.
-    fn prove(&self, objective: &Objective, point: &RelaxedPoint, shares: &[f64]) -> RelaxedProof {
-        let times = |(row, share): (usize, &f64)| share * self.hinge_weight(objective, row);
+impl Program<'_> {
+    /// The lower bound that these multipliers prove, together with the weights they belong to.
+    fn prove(&self, point: &Point, multipliers: &[f64]) -> Proof {
         let length = dot(&point.weights, &point.weights).sqrt();
-        let pull = if length > 0.0 { objective.l2 / length } else { 0.0 };
+        let pull = if length > 0.0 { self.objective.l2 / length } else { 0.0 };
         let at = Tangents {
             weights: &point.weights,
             excess: &point.excess,
             behind: &point.behind,
-            multipliers: &shares.iter().enumerate().map(times).collect::<Vec<_>>(),
+            multipliers,
             pull: &point.weights.iter().map(|w| pull * w).collect::<Vec<_>>(),
         };
-        self.proof(objective, &at, point.parts.sum())
+        self.proof(&at, point.parts.sum())
     }
 
     /// Starts from a similar fit: solves over the rows that are near their kinks there, until no other row matters.
@@ -107,49 +83,50 @@ impl Relaxed {
     /// advanced as it got, if there is no such fit or if too many rows matter.
     fn near_a_fit(
         &self,
-        objective: &Objective,
         tolerance: f64,
         start: WarmStart,
         progress: &mut dyn FnMut(usize, usize, f64, f64),
         stop: Stop<'_>,
-    ) -> std::result::Result<Rounds, WarmStart> {
-        let (Some(weights), Some(mut shares)) = (start.weights.clone(), start.shares.clone()) else {
+    ) -> Result<Found, WarmStart> {
+        let (Some(weights), Some(mut multipliers)) = (start.weights.clone(), start.multipliers.clone()) else {
             return Err(start);
         };
-        let silent = self.silent.len();
+        let silent = self.limit.len();
         let near = NEAR * self.theta_0;
-        let mut best = self.point(objective, weights);
+        let mut best = self.point(weights);
         let mut at = best.excess.clone();
         // The multipliers of a fit to the same rows may already prove it.
         let (mut proof, mut rounds) = (self.no_proof(), 0);
-        proof.improve(self.prove(objective, &best, &shares));
+        proof.improve(self.prove(&best, &multipliers));
         if best.gap(proof.bound) <= tolerance {
-            let rows = shares.iter().filter(|share| **share != 0.0).count();
+            let rows = multipliers.iter().filter(|multiplier| **multiplier != 0.0).count();
             progress(1, rows, best.parts.sum(), best.gap(proof.bound));
-            return Ok(Rounds { best, proof, rounds: 1, rows, shares, stopped: false });
+            return Ok(Found { best, proof, rounds: 1, rows, multipliers, stopped: false });
         }
         for _ in 0..ATTEMPTS {
-            let live: Vec<usize> = (0..silent).filter(|&row| at[row] > -near || shares[row] != 0.0).collect();
+            let live: Vec<usize> = (0..silent).filter(|&row| at[row] > -near || multipliers[row] != 0.0).collect();
             if live.len() > MOST_ROWS {
                 break;
             }
-            let small = self.with_silent_rows(&live);
-            let begin = live.iter().map(|&row| shares[row]).chain(shares[silent..].iter().copied());
-            let from = WarmStart { weights: Some(best.weights.clone()), shares: Some(begin.collect()) };
+            let written = self.silent.coefficients(&live, self.trains());
+            let limit: Vec<f64> = live.iter().map(|&row| self.limit[row]).collect();
+            let small = Program { silent: Rows::Written(&written), limit: &limit, ..*self };
+            let begin = live.iter().map(|&row| multipliers[row]).chain(multipliers[silent..].iter().copied());
+            let from = WarmStart { weights: Some(best.weights.clone()), multipliers: Some(begin.collect()) };
             let mut report =
                 |round, rows, _, _| progress(rounds + round, rows, best.parts.sum(), best.gap(proof.bound));
-            let found = small.augmented(objective, 0.3 * tolerance, from, &mut report, stop);
+            let found = small.augmented(0.3 * tolerance, from, &mut report, stop);
             rounds += found.rounds;
             let index = |k: usize| live.get(k).copied().unwrap_or(silent + k - live.len().min(k));
-            for (k, &share) in found.shares.iter().enumerate() {
-                shares[index(k)] = share;
-            }
-            let mut multipliers = vec![0.0; shares.len()];
-            for (k, &multiplier) in found.proof.multipliers.iter().enumerate() {
+            for (k, &multiplier) in found.multipliers.iter().enumerate() {
                 multipliers[index(k)] = multiplier;
             }
-            proof.improve(RelaxedProof { multipliers, ..found.proof });
-            let point = self.point(objective, found.best.weights);
+            let mut proven = vec![0.0; multipliers.len()];
+            for (k, &multiplier) in found.proof.multipliers.iter().enumerate() {
+                proven[index(k)] = multiplier;
+            }
+            proof.improve(Proof { multipliers: proven, ..found.proof });
+            let point = self.point(found.best.weights);
             at.clone_from(&point.excess);
             if point.parts.sum() < best.parts.sum() {
                 best = point;
@@ -157,10 +134,10 @@ impl Relaxed {
             let gap = best.gap(proof.bound);
             progress(rounds, found.rows, best.parts.sum(), gap);
             if gap <= tolerance || found.stopped {
-                return Ok(Rounds { best, proof, rounds, rows: found.rows, shares, stopped: found.stopped });
+                return Ok(Found { best, proof, rounds, multipliers, ..found });
             }
         }
-        Err(WarmStart { weights: Some(best.weights), shares: Some(shares) })
+        Err(WarmStart { weights: Some(best.weights), multipliers: Some(multipliers) })
     }
 }
 

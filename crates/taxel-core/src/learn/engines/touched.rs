@@ -1,9 +1,8 @@
 //! The last step of CONE-R: moves the weights exactly onto the targets that the optimum reaches, and off touched silent
 //! rows.
 
-use super::cone_program::HardRows;
 use super::minimise::Minimum;
-use super::nearest::nearest;
+use super::nearest::{HardRows, nearest};
 use crate::learn::statement::{Objective, Relaxed, relative_gap};
 use crate::{Result, Stop};
 
@@ -36,7 +35,8 @@ impl Relaxed {
         if found.gap > tolerance || found.shares.len() != silent + self.targets.len() {
             return Ok(false);
         }
-        let excess = self.point(objective, found.weights.clone()).excess;
+        let program = self.program(objective);
+        let excess = program.point(found.weights.clone()).excess;
         let within = |row: usize, low: f64| {
             let share = found.shares[row] - low;
             excess[row].abs() <= NEARLY_MET * theta && share > WITHIN && share < 1.0 - WITHIN
@@ -62,7 +62,7 @@ impl Relaxed {
             else {
                 continue;
             };
-            let point = self.point(objective, weights);
+            let point = program.point(weights);
             let sum = point.parts.sum();
             let gap = relative_gap(sum, least);
             if gap <= SPARED * tolerance {

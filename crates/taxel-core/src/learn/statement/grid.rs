@@ -9,7 +9,6 @@ use std::borrow::Cow;
 use super::peak::{SilencePeak, exceeds};
 use super::rows::{Example, Statement, is_lost};
 use crate::neuron::{AfterSpike, Grid, GridTime, KernelSum, Shape, Step};
-use crate::vectors::{add, dot};
 use crate::{Result, Spike, Stop};
 
 /// The contribution of an input to the state at the first grid point at or after it.
@@ -49,11 +48,9 @@ pub(crate) struct SilentRows {
     lanes: Vec<Lane>,
     trains: usize,
     shape: Shape,
-    pub(crate) step_ms: f64,
+    step_ms: f64,
     /// The decay over 0, 1, 2 ... grid steps, so that points between inputs are computed without a recursion.
     steps: Steps,
-    /// The coefficients of selected rows, row after row, instead of lanes.
-    written: Option<Vec<f64>>,
     /// The limit of the potential, mV; infinite where no silence is required.
     pub(crate) limit: Vec<f64>,
 }
@@ -94,7 +91,6 @@ impl SilentRows {
             shape,
             step_ms,
             steps: Steps::new(shape, step_ms),
-            written: None,
             limit: vec![],
         };
         for pattern in 0..statement.examples.len() {
@@ -155,14 +151,6 @@ impl SilentRows {
         Ok(())
     }
 
-    /// The numbers of the rows from `near_ms` before `t` up to and including `t`.
-    pub(crate) fn before(&self, pattern: usize, t: f64, near_ms: f64) -> std::ops::Range<usize> {
-        let Lane { first, points, grid, .. } = self.lanes[pattern];
-        let after = (grid.locate(t).behind() as usize).min(points);
-        let near = (near_ms / self.step_ms).ceil() as usize;
-        first + after.saturating_sub(near + 1)..first + after
-    }
-
     /// The pattern of a row, and its time, ms.
     pub(crate) fn name(&self, row: usize) -> (usize, f64) {
         let pattern = self.lanes.partition_point(|lane| lane.first <= row) - 1;
@@ -179,17 +167,6 @@ impl SilentRows {
         let gone = self.lanes.remove(0).points;
         self.limit.drain(..gone);
         self.lanes.iter_mut().for_each(|lane| lane.first -= gone);
-    }
-
-    /// A copy with the given rows only (ascending), as coefficients.
-    pub(crate) fn with_rows(&self, rows: &[usize]) -> Self {
-        Self {
-            lanes: vec![],
-            steps: self.steps.clone(),
-            written: Some(self.coefficients(rows)),
-            limit: rows.iter().map(|&row| self.limit[row]).collect(),
-            ..*self
-        }
     }
 
     /// These rows for inputs whose values have no sign.
@@ -219,16 +196,11 @@ impl SilentRows {
         }
     }
 
-    /// Computes the potential at every row, mV.
-    pub(crate) fn potential(&self, weights: &[f64], out: &mut Vec<f64>) {
-        out.clear();
-        out.resize(self.len(), 0.0);
+    /// Computes the potential at every row, mV; `out` has one entry per row.
+    pub(crate) fn potential(&self, weights: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
         if weights.iter().all(|&w| w == 0.0) {
             return;
-        }
-        if let Some(written) = &self.written {
-            let rows = out.iter_mut().zip(written.chunks_exact(self.trains));
-            return rows.for_each(|(out, row)| *out = dot(row, weights));
         }
         for lane in &self.lanes {
             self.potential_of(lane, weights, &mut out[lane.first..lane.first + lane.points]);
@@ -289,10 +261,6 @@ impl SilentRows {
 
     /// Adds the sum of all rows, each times its factor, to `sum` (one entry per train); the adjoint of `potential`.
     pub(crate) fn add_sum(&self, factors: &[f64], sum: &mut [f64]) {
-        if let Some(written) = &self.written {
-            let rows = factors.iter().zip(written.chunks_exact(self.trains));
-            return rows.for_each(|(&factor, row)| add(sum, factor, row));
-        }
         for lane in &self.lanes {
             let factors = &factors[lane.first..lane.first + lane.points];
             // The derivative of the factors' sum over all rows from here on with respect to the state here.
@@ -330,9 +298,6 @@ impl SilentRows {
     /// The coefficients of the given rows (ascending), row after row.
     pub(crate) fn coefficients(&self, rows: &[usize]) -> Vec<f64> {
         let n = self.trains;
-        if let Some(written) = &self.written {
-            return rows.iter().flat_map(|row| &written[row * n..(row + 1) * n]).copied().collect();
-        }
         let mut out = vec![0.0; rows.len() * n];
         let mut index = 0;
         for lane in &self.lanes {

@@ -199,17 +199,6 @@ impl Objective {
         if self.sides_c == Sides::Both { (2.0 * self.c, -0.5) } else { (self.c, -1.0) }
     }
 
-    /// The potentials that B requires, mV; none if it counts both sides and so needs no kink.
-    pub(crate) fn kinks_of_b(&self, targets: &Targets) -> Vec<f64> {
-        let kink = |threshold| self.kappa * threshold;
-        if self.sides_b == Sides::Both { vec![] } else { targets.thresholds.iter().map(kink).collect() }
-    }
-
-    /// The factor of the thresholds in B's mixed term; 0 if B has kinks.
-    pub(crate) fn mixed_factor(&self) -> f64 {
-        if self.sides_b == Sides::Both { -2.0 * self.b * self.kappa } else { 0.0 }
-    }
-
     /// The terms of 6.11 at these weights.
     pub(crate) fn exact_parts(&self, targets: &Targets, weights: &[f64]) -> Parts {
         let (l1, l2) = self.norms(weights);

@@ -1,6 +1,7 @@
 //! The rows that are stored: those at the targets (6.9a), and those of B shortly after them (6.10).
 
 use super::rows::{Row, Statement};
+use crate::vectors::add;
 use crate::{Result, Stop};
 
 /// The rows of all targets, stored one after the other.
@@ -63,6 +64,24 @@ impl Targets {
         self.at.append(&mut new.at);
         self.behind.append(&mut new.behind);
         Ok(())
+    }
+
+    /// `B'B` of the rows after the targets, by columns.
+    pub(crate) fn gram(&self, stop: Stop<'_>) -> Result<Vec<f64>> {
+        let mut gram = vec![0.0; self.trains * self.trains];
+        for k in 0..self.len() {
+            stop.check()?;
+            self.add_square(k, 1.0, &mut gram);
+        }
+        Ok(gram)
+    }
+
+    /// Adds the part of the row after target `k` to `B'B`, or subtracts it if `sign` is -1.
+    pub(crate) fn add_square(&self, k: usize, sign: f64, gram: &mut [f64]) {
+        let row = self.row(k).behind;
+        for (column, &v) in gram.chunks_exact_mut(self.trains).zip(row) {
+            add(column, sign * v, row);
+        }
     }
 
     /// Removes the rows of the first pattern; the others are renumbered from 0.

@@ -1,13 +1,13 @@
-//! Lower bounds on 6.14.
+//! Lower bounds on the objective.
 
 use super::Lagrangian;
-use crate::learn::statement::{Norm, RelaxedPoint, RelaxedProof, Tangents};
-use crate::vectors::{add, dot};
+use crate::learn::statement::{Norm, Point, Proof, Tangents};
+use crate::vectors::dot;
 
 impl Lagrangian<'_> {
     /// The lower bound that the present multipliers prove.
-    pub(super) fn proof(&mut self) -> RelaxedProof {
-        self.multipliers();
+    pub(super) fn proof(&mut self) -> Proof {
+        self.slopes();
         let at = Tangents {
             weights: &self.weights,
             excess: &self.excess,
@@ -15,34 +15,28 @@ impl Lagrangian<'_> {
             multipliers: &self.factors,
             pull: &self.pull(),
         };
-        self.problem.proof(self.objective, &at, self.most)
+        self.program.proof(&at, self.most)
     }
 
-    /// The lower bound at weights of 0, with the subgradient of the norm nearest to the sum of all other slopes
+    /// The lower bound on 6.14 at weights of 0, with the subgradient of the norm nearest to the sum of all other slopes
     /// there.
-    pub(super) fn proof_at_zero(&self, zero: &RelaxedPoint) -> RelaxedProof {
-        let (problem, o) = (self.problem, self.objective);
-        let silent = problem.silent.len();
-        let slope = |(k, &x): (usize, &f64)| match k < silent {
-            true => {
-                if x > 0.0 {
-                    o.d
-                } else {
-                    0.0
-                }
+    pub(super) fn proof_at_zero(&self, zero: &Point) -> Proof {
+        let (program, o) = (self.program, self.program.objective);
+        let slope = |(k, &x): (usize, &f64)| {
+            let [low, high] = program.slopes[program.kind(k)];
+            if x > 0.0 {
+                high
+            } else if x < 0.0 {
+                low
+            } else {
+                0.0
             }
-            false if x > 0.0 => o.kink_of_c().0 - o.c,
-            false => o.c * x.signum(),
         };
         let multipliers: Vec<f64> = zero.excess.iter().enumerate().map(slope).collect();
         let mut pull = vec![0.0; self.weights.len()];
         if o.norm == Norm::Norm && o.l2 > 0.0 && zero.weights.iter().all(|&w| w == 0.0) {
-            problem.silent.add_sum(&multipliers[..silent], &mut pull);
-            for ((target, &multiplier), &behind) in problem.targets.iter().zip(&multipliers[silent..]).zip(&zero.behind)
-            {
-                add(&mut pull, multiplier, target.at);
-                add(&mut pull, 2.0 * o.b * o.counts_in_b(behind), target.behind);
-            }
+            program.add_rows(&multipliers, &mut pull);
+            program.add_slope_of_b(&zero.behind, &mut pull);
             for (n, p) in pull.iter_mut().enumerate() {
                 let soft = if *p > o.l1 {
                     *p - o.l1
@@ -66,6 +60,6 @@ impl Lagrangian<'_> {
             multipliers: &multipliers,
             pull: &pull,
         };
-        problem.proof(o, &at, zero.parts.sum())
+        program.proof(&at, zero.parts.sum())
     }
 }

@@ -9,26 +9,23 @@ use crate::vectors::{add, dot};
 const WHOLE: f64 = 0.05;
 const EXACT: f64 = 1e-3;
 
-/// A kink on the searched line: its share at the start, the share's change, and its part of the slope.
+/// A kink on the searched line: its slope at the start, the change of that, how the row rises, and the kind of row.
 struct PassedKink {
-    share: f64,
+    slope: f64,
     change: f64,
-    lean: f64,
-    low: f64,
+    rise: f64,
+    kind: usize,
 }
 
 impl Lagrangian<'_> {
     pub(super) fn move_along(&mut self, direction: &[f64]) -> bool {
-        let (problem, o) = (self.problem, self.objective);
-        let silent = problem.silent.len();
-        let mut rise = Vec::with_capacity(self.excess.len());
-        if o.d > 0.0 {
-            problem.silent.potential(direction, &mut rise);
-        } else {
-            rise.resize(silent, 0.0);
+        let (program, o) = (self.program, self.program.objective);
+        let mut rise = vec![0.0; program.limit.len()];
+        if program.slopes[0] != [0.0; 2] {
+            program.silent.potential(direction, &mut rise);
         }
-        rise.extend(problem.targets.iter().map(|row| dot(row.at, direction)));
-        let lift: Vec<f64> = problem.targets.iter().map(|row| dot(row.behind, direction)).collect();
+        rise.extend(program.targets.iter().map(|row| dot(row.at, direction)));
+        let lift: Vec<f64> = program.targets.iter().map(|row| dot(row.behind, direction)).collect();
         let smooth = {
             let against: f64 =
                 self.weights.iter().zip(&self.centre).zip(direction).map(|((w, c), d)| (w - c) * d).sum();
@@ -87,22 +84,21 @@ impl Lagrangian<'_> {
 
     /// The kinks that a step of length `end` crosses, and the slope of all rows that stay beyond their kinks.
     fn passing(&self, rise: &[f64], end: f64) -> (Vec<PassedKink>, f64) {
-        let silent = self.problem.silent.len();
-        let (d, (c, lower)) = (self.objective.d, self.objective.kink_of_c());
-        let [per_silent, per_slope] = self.delta.map(|delta| 1.0 / delta);
+        let (silent, steep) = (self.program.limit.len(), self.steep());
         let mut passing = Vec::new();
         let mut steady = 0.0;
-        let rows = self.excess.iter().zip(rise).zip(&self.shares);
-        for (k, ((&x, &r), &share)) in rows.enumerate() {
-            let (weight, steep, low) = if k < silent { (d, per_silent, 0.0) } else { (c, per_slope, lower) };
-            let (from, change) = (share + x * steep, r * steep);
-            let to = from + end * change;
-            if from.max(to) <= low {
-                steady += low * weight * r;
-            } else if from.min(to) >= low + 1.0 {
-                steady += (low + 1.0) * weight * r;
+        let rows = self.excess.iter().zip(rise).zip(&self.multipliers);
+        for (k, ((&x, &rise), &multiplier)) in rows.enumerate() {
+            let kind = usize::from(k >= silent);
+            let [low, high] = self.program.slopes[kind];
+            let (slope, change) = (multiplier + x * steep[kind], rise * steep[kind]);
+            let to = slope + end * change;
+            if slope.max(to) <= low {
+                steady += low * rise;
+            } else if slope.min(to) >= high {
+                steady += high * rise;
             } else {
-                passing.push(PassedKink { share: from, change, lean: weight * r, low });
+                passing.push(PassedKink { slope, change, rise, kind });
             }
         }
         (passing, steady)
@@ -118,13 +114,15 @@ impl Lagrangian<'_> {
         lift: &[f64],
     ) -> f64 {
         let mut sum = smooth.0 + t * smooth.1 + steady;
-        if self.objective.sides_b == Sides::Below {
+        let o = self.program.objective;
+        if o.sides_b == Sides::Below {
             for (&x, &l) in self.behind.iter().zip(lift) {
-                sum += 2.0 * self.objective.b * (x + t * l).min(0.0) * l;
+                sum += 2.0 * o.b * (x + t * l).min(0.0) * l;
             }
         }
         for p in passing {
-            sum += p.lean * (p.share + t * p.change).clamp(p.low, p.low + 1.0);
+            let [low, high] = self.program.slopes[p.kind];
+            sum += p.rise * (p.slope + t * p.change).clamp(low, high);
         }
         let (mut along, mut square) = (0.0, 0.0);
         for (n, (&w, &d)) in self.weights.iter().zip(direction).enumerate() {
@@ -133,8 +131,8 @@ impl Lagrangian<'_> {
             along += weight * d;
             square += weight * weight;
         }
-        if self.objective.norm == Norm::Norm && square > 0.0 {
-            sum += self.objective.l2 * along / square.sqrt();
+        if o.norm == Norm::Norm {
+            sum += o.l2 * along / self.length(square);
         }
         sum
     }

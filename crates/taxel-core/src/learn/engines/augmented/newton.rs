@@ -13,39 +13,37 @@ use crate::vectors::{add, dot};
 impl Lagrangian<'_> {
     /// Takes one Newton step with an exact line search; returns false if rounding leaves no direction.
     pub(super) fn step(&mut self) -> bool {
-        let (problem, o) = (self.problem, self.objective);
+        let (program, o) = (self.program, self.program.objective);
         let n = self.weights.len();
-        let silent = problem.silent.len();
+        let silent = program.limit.len();
         let kept = self.inside.partition_point(|&k| k < silent);
-        let mut rows = problem.silent.coefficients(&self.inside[..kept]);
-        let root = (o.d / self.delta[0]).sqrt();
-        rows.iter_mut().for_each(|v| *v *= root);
-        let root = (o.kink_of_c().0 / self.delta[1]).sqrt();
+        let mut rows = program.silent.coefficients(&self.inside[..kept], n);
+        let [of_silence, of_targets] = self.steep().map(f64::sqrt);
+        rows.iter_mut().for_each(|v| *v *= of_silence);
         for &k in &self.inside[kept..] {
-            rows.extend(problem.targets.row(k - silent).at.iter().map(|v| root * v));
+            rows.extend(program.targets.row(k - silent).at.iter().map(|v| of_targets * v));
         }
         let mut count = self.inside.len();
         if o.sides_b == Sides::Below {
             let root = (2.0 * o.b).sqrt();
-            for (target, _) in problem.targets.iter().zip(&self.behind).filter(|(_, behind)| **behind < 0.0) {
+            for (target, _) in program.targets.iter().zip(&self.behind).filter(|(_, behind)| **behind < 0.0) {
                 rows.extend(target.behind.iter().map(|v| root * v));
                 count += 1;
             }
         }
         let curved = if o.sides_b == Sides::Both { 2.0 * o.b } else { 0.0 };
-        let length = dot(&self.weights, &self.weights).sqrt();
+        let length = self.length(dot(&self.weights, &self.weights));
         loop {
-            self.hessian.iter_mut().zip(problem.gram.iter()).for_each(|(h, g)| *h = curved * g);
+            self.hessian.iter_mut().zip(program.gram.iter()).for_each(|(h, g)| *h = curved * g);
             let ridge = match o.norm {
                 Norm::Square => 2.0 * o.l2,
-                Norm::Norm if length > 0.0 => {
+                Norm::Norm => {
                     let f = o.l2 / (length * length * length);
                     for (column, &w) in self.hessian.chunks_exact_mut(n).zip(&self.weights) {
                         add(column, -f * w, &self.weights);
                     }
                     o.l2 / length
                 }
-                Norm::Norm => 0.0,
             };
             let mut steepest = 0.0_f64;
             for i in 0..n {

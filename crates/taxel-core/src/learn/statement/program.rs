@@ -1,0 +1,264 @@
+//! Objectives with kinks over rows of silence and of targets: 6.14, which penalises violations, and 6.11, in which every
+//! row is hard. Their value at given weights, and a lower bound on their least value.
+
+use super::grid::SilentRows;
+use super::objective::{NOTHING, Norm, Objective, Parts, relative_gap};
+use super::targets::Targets;
+use crate::vectors::{add, dot};
+
+/// The rows of silence: those of all grid points, or a few as coefficients.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Rows<'a> {
+    /// Swept, never stored.
+    Grid(&'a SilentRows),
+    /// One after the other.
+    Written(&'a [f64]),
+}
+
+impl Rows<'_> {
+    /// Computes the potential at every row, mV; `out` has one entry per row.
+    pub(crate) fn potential(&self, weights: &[f64], out: &mut [f64]) {
+        match self {
+            Self::Grid(rows) => rows.potential(weights, out),
+            Self::Written(rows) => {
+                let rows = out.iter_mut().zip(rows.chunks_exact(weights.len()));
+                rows.for_each(|(out, row)| *out = dot(row, weights));
+            }
+        }
+    }
+
+    /// Adds the sum of all rows, each times its factor, to `sum` (one entry per train); the adjoint of `potential`.
+    pub(crate) fn add_sum(&self, factors: &[f64], sum: &mut [f64]) {
+        match self {
+            Self::Grid(rows) => rows.add_sum(factors, sum),
+            Self::Written(rows) => {
+                let rows = factors.iter().zip(rows.chunks_exact(sum.len()));
+                rows.filter(|(factor, _)| **factor != 0.0).for_each(|(&factor, row)| add(sum, factor, row));
+            }
+        }
+    }
+
+    /// The coefficients of the given rows (ascending), row after row, of `trains` entries each.
+    pub(crate) fn coefficients(&self, rows: &[usize], trains: usize) -> Vec<f64> {
+        match self {
+            Self::Grid(all) => all.coefficients(rows),
+            Self::Written(all) => rows.iter().flat_map(|row| &all[row * trains..(row + 1) * trains]).copied().collect(),
+        }
+    }
+}
+
+/// An objective over rows, which are numbered: silence first, then targets.
+///
+/// Beside its limit a row of silence, `x` mV above it, costs a slope times `x`, and likewise a target. A row with
+/// infinite slopes is hard: no weights that violate it count.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Program<'a> {
+    pub(crate) silent: Rows<'a>,
+    /// The limit of the potential at the rows of silence, mV; infinite where no silence is required.
+    pub(crate) limit: &'a [f64],
+    pub(crate) targets: &'a Targets,
+    /// `B'B` of the rows after the targets, by columns.
+    pub(crate) gram: &'a [f64],
+    pub(crate) objective: &'a Objective,
+    /// The slopes below and above the limits of silence, and those of targets.
+    pub(crate) slopes: [[f64; 2]; 2],
+    pub(crate) theta_0: f64,
+}
+
+/// Weights, and their potentials relative to the limits.
+#[derive(Debug, Clone)]
+pub(crate) struct Point {
+    pub(crate) weights: Vec<f64>,
+    /// Potential minus limit at the silent rows, then potential minus threshold at the targets, mV.
+    pub(crate) excess: Vec<f64>,
+    /// Potential minus `kappa` thresholds after the targets, mV.
+    pub(crate) behind: Vec<f64>,
+    pub(crate) parts: Parts,
+}
+
+/// The data of the tangents below an objective: weights, their rows' excess, one multiplier per row, and the pull of the
+/// norm.
+pub(crate) struct Tangents<'a> {
+    pub(crate) weights: &'a [f64],
+    pub(crate) excess: &'a [f64],
+    pub(crate) behind: &'a [f64],
+    pub(crate) multipliers: &'a [f64],
+    pub(crate) pull: &'a [f64],
+}
+
+/// A lower bound on an objective, and the slopes of the tangents that prove it.
+#[derive(Debug, Clone)]
+pub(crate) struct Proof {
+    pub(crate) bound: f64,
+    /// One per row.
+    pub(crate) multipliers: Vec<f64>,
+    /// One per target, of B.
+    pub(crate) behind: Vec<f64>,
+    /// One per synapse, of the l2 term.
+    pub(crate) pull: Vec<f64>,
+}
+
+impl Program<'_> {
+    pub(crate) fn trains(&self) -> usize {
+        self.objective.bounds.lower.len()
+    }
+
+    /// The number of rows: silence and targets.
+    pub(crate) fn rows(&self) -> usize {
+        self.limit.len() + self.targets.len()
+    }
+
+    /// The kind of a row: 0 for silence, 1 for a target.
+    pub(crate) fn kind(&self, row: usize) -> usize {
+        usize::from(row >= self.limit.len())
+    }
+
+    /// Whether weights that violate a row do not count.
+    pub(crate) fn is_hard(&self) -> bool {
+        self.slopes[0][1].is_infinite()
+    }
+
+    /// The weights of 0, or as near to 0 as the bounds allow.
+    pub(crate) fn nearest_to_zero(&self) -> Vec<f64> {
+        let bounds = &self.objective.bounds;
+        bounds.lower.iter().zip(&bounds.upper).map(|(&low, &high)| 0.0_f64.clamp(low, high)).collect()
+    }
+
+    /// The typical size of weights that reach the threshold at the targets, mV.
+    pub(crate) fn typical_weight(&self) -> f64 {
+        let (thresholds, lengths) = self
+            .targets
+            .iter()
+            .fold((0.0, 0.0), |sum, row| (sum.0 + row.threshold, sum.1 + dot(row.at, row.at).sqrt()));
+        if lengths > 0.0 { thresholds / lengths } else { f64::INFINITY }
+    }
+
+    /// Adds the sum of all rows, each times its multiplier, to `sum`, one entry per train.
+    pub(crate) fn add_rows(&self, multipliers: &[f64], sum: &mut [f64]) {
+        let (silent, targets) = multipliers.split_at(self.limit.len());
+        if self.slopes[0] != [0.0; 2] {
+            self.silent.add_sum(silent, sum);
+        }
+        for (target, &multiplier) in self.targets.iter().zip(targets) {
+            add(sum, multiplier, target.at);
+        }
+    }
+
+    /// Adds the gradient of B to `sum`, given the potentials after the targets minus `kappa` thresholds.
+    pub(crate) fn add_slope_of_b(&self, behind: &[f64], sum: &mut [f64]) {
+        if self.objective.b > 0.0 {
+            for (target, &behind) in self.targets.iter().zip(behind) {
+                add(sum, 2.0 * self.objective.b * self.objective.counts_in_b(behind), target.behind);
+            }
+        }
+    }
+
+    /// The weights with their potentials and the terms of the objective; hard rows have none.
+    pub(crate) fn point(&self, weights: Vec<f64>) -> Point {
+        let (objective, count) = (self.objective, self.limit.len());
+        let mut excess = vec![0.0; count];
+        self.silent.potential(&weights, &mut excess);
+        excess.iter_mut().zip(self.limit).for_each(|(u, limit)| *u -= limit);
+        excess.extend(self.targets.iter().map(|row| dot(row.at, &weights) - row.threshold));
+        let behind = objective.missing_lift(self.targets, &weights);
+        let (silent, targets) = excess.split_at(count);
+        let (l1, l2) = objective.norms(&weights);
+        let counted: Vec<f64> = behind.iter().map(|&x| objective.counts_in_b(x)).collect();
+        let parts = Parts {
+            l1,
+            l2,
+            B: objective.b * dot(&counted, &counted),
+            C: objective.c * targets.iter().map(|&x| objective.c_at_distance(x)).sum::<f64>(),
+            D: objective.d * silent.iter().map(|x| x.max(0.0)).sum::<f64>(),
+        };
+        Point { weights, excess, behind, parts }
+    }
+
+    /// The proof of a lower bound by these tangents, given that the least value of the objective is at most `most`.
+    pub(crate) fn proof(&self, at: &Tangents<'_>, most: f64) -> Proof {
+        let objective = self.objective;
+        let squares = at.behind.iter().map(|&x| 2.0 * objective.b * objective.counts_in_b(x));
+        Proof {
+            bound: self.bound(at, most),
+            multipliers: at.multipliers.to_vec(),
+            behind: squares.collect(),
+            pull: match objective.norm {
+                Norm::Square => at.weights.iter().map(|w| 2.0 * objective.l2 * w).collect(),
+                Norm::Norm => at.pull.to_vec(),
+            },
+        }
+    }
+
+    /// The proof that the objective is at least 0.
+    pub(crate) fn no_proof(&self) -> Proof {
+        Proof {
+            bound: 0.0,
+            multipliers: vec![0.0; self.rows()],
+            behind: vec![0.0; self.targets.len()],
+            pull: vec![0.0; self.trains()],
+        }
+    }
+
+    /// A lower bound on the objective over all weights within the bounds, given that its least value is at most `most`.
+    ///
+    /// Every term is replaced by a tangent below it at some weights (which need not be within the bounds): rows by
+    /// multipliers between their slopes, the norm by a `pull` no longer than its factor, a square by its slope. The
+    /// remaining function, linear plus l1 over the box, is minimised synapse by synapse. The bound therefore holds for
+    /// any multipliers, however they were found.
+    fn bound(&self, at: &Tangents<'_>, most: f64) -> f64 {
+        let objective = self.objective;
+        let reach = objective.reach(most);
+        let mut gradient = vec![0.0; self.trains()];
+        self.add_rows(at.multipliers, &mut gradient);
+        self.add_slope_of_b(at.behind, &mut gradient);
+        let mut bound: f64 = at.behind.iter().map(|&x| objective.b * objective.counts_in_b(x).powi(2)).sum();
+        match objective.norm {
+            Norm::Square => {
+                add(&mut gradient, 2.0 * objective.l2, at.weights);
+                bound += objective.l2 * dot(at.weights, at.weights);
+            }
+            Norm::Norm => {
+                add(&mut gradient, 1.0, at.pull);
+                bound += dot(at.pull, at.weights);
+            }
+        }
+        for (&multiplier, &x) in at.multipliers.iter().zip(at.excess) {
+            if multiplier != 0.0 {
+                bound += multiplier * x;
+            }
+        }
+        for (n, (&g, &w)) in gradient.iter().zip(at.weights).enumerate() {
+            let cost = |v: f64| g * (v - w) + objective.l1 * v.abs();
+            let (lower, upper) = (objective.bounds.lower[n].max(-reach), objective.bounds.upper[n].min(reach));
+            let ends = cost(lower).min(cost(upper));
+            bound += if lower < 0.0 && upper > 0.0 { ends.min(cost(0.0)) } else { ends };
+        }
+        bound
+    }
+}
+
+impl Point {
+    /// The relative gap to a lower bound; 0 if the objective is 0.
+    pub(crate) fn gap(&self, bound: f64) -> f64 {
+        match self.parts.sum() {
+            least if least <= NOTHING => 0.0,
+            least => relative_gap(least, bound),
+        }
+    }
+}
+
+impl Proof {
+    /// Takes another proof if that proves more.
+    pub(crate) fn improve(&mut self, other: Self) {
+        if other.bound > self.bound {
+            *self = other;
+        }
+    }
+
+    /// The same proof for an objective with every term divided by `scale`, and potentials in units of `unit`.
+    pub(crate) fn divide(&mut self, scale: f64, unit: f64) {
+        self.bound /= scale;
+        let slopes = self.multipliers.iter_mut().chain(&mut self.behind).chain(&mut self.pull);
+        slopes.for_each(|slope| *slope /= scale * unit);
+    }
+}
