@@ -13,8 +13,6 @@ from taxel._base.errors import unreadable
 TAXELS = 1 << 22
 #: Columns of a table of text: a time, and 256 x 256 taxels.
 COLUMNS = (1 << 16) + 1
-#: Bytes of a line of text: 4 MiB, 64 for each column.
-LINE = 1 << 22
 #: The largest value of a frame, which has 32 bits.
 VALUE = float(np.finfo(np.float32).max)
 #: The largest absolute time, us: 142 years, so that it also fits in 64 bits as ns.

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from taxel._base.arguments import shown
 from taxel._base.columns import frozen_whole
 from taxel._base.errors import unreadable
+from taxel._base.header_table import separator_of
 from taxel._base.limits import COLUMNS, TAXELS
 from taxel._base.messages import counted
 from taxel._base.table_text import Text, beginning
@@ -78,9 +79,8 @@ def check_head(path: Path) -> None:
 
 
 def names_in(line: str) -> tuple[list[str], str]:
-    """Return the cells of a first line, without blanks around them, and what separates them: t_us is the first."""
-    first = re.match(r" *t_us *([,;\t])", line)
-    separator = first[1] if first else max(",;\t", key=line.count)
+    """Return the cells of a first line, without blanks around them, and what separates them."""
+    separator = separator_of(line)
     return [name.strip() for name in line.split(separator)], separator
 
 
