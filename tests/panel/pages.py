@@ -21,8 +21,8 @@ from taxel.panel import Panel
 #: Pixels of a map, as a text that changes when the picture does.
 PIXELS = "name => document.getElementById(name).toDataURL()"
 
-#: The state of a board that is followed, whether or not anything arrives.
-FOLLOWS = "^(Live|Quiet|Nothing arrives)$"
+#: The states of a board that is followed, whether or not anything arrives.
+FOLLOWS = "live|quiet"
 
 
 def until(true: Callable[[], Any], what: str) -> Any:
@@ -70,9 +70,18 @@ def opened(
 def shown(browser: Any, file: Path, **how: Any) -> Iterator[Any]:
     """Show a recording in a browser, by a panel in this process."""
     with Panel(file) as panel, opened(browser, panel.url, **how) as page:
-        shows(page, "state-word", "^Replay$")
+        is_in(page, "replay")
         shows(page, "clock", r"\d")
         yield page
+
+
+def is_in(page: Any, state: str, name: str = "state") -> None:
+    """Wait until a part of the page, that of what is shown, is in a state."""
+    from playwright.sync_api import expect
+
+    expect(page.locator(f"#{name}")).to_have_attribute(
+        "data-state", re.compile(f"^({state})$"), timeout=PATIENCE * 1000
+    )
 
 
 def shows(page: Any, name: str, pattern: str) -> None:
@@ -141,7 +150,7 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
 def page(chromium: Any, live: SimpleNamespace) -> Iterator[Any]:
     """The panel in a browser, following the board."""
     with opened(chromium, live.url) as page:
-        shows(page, "state-word", "^Live$")
+        is_in(page, "live")
         shows(page, "events", r"^[1-9]")
         shows(page, "clock", r"\d s")
         yield page

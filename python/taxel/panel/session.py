@@ -159,27 +159,24 @@ class Session:
     async def answer(self, text: str) -> bool:
         """Carry out a request; return whether the client may go on."""
         number, kind = None, ""
-        self.answers = True
         try:
             number, kind, asked, keys = _parsed(text)
             arguments = asked.read(keys)
-            if not asked.is_long:
-                await asked.method(self, **arguments)
-            elif len(self._long) >= _MOST_LONG:
+            if asked.is_long and len(self._long) >= _MOST_LONG:
                 raise ProblemError("too many requests at a time: wait for their answers")
-            else:
-                task = asyncio.create_task(self._carry_out(asked.method(self, **arguments), number, kind))
-                # It goes on when the client has left.
-                for tasks in (self._long, self._hub.tasks):
-                    tasks.add(task)
-                    task.add_done_callback(tasks.discard)
-                return True
         except Exception as error:
             await self._refuse(error, number, kind)
+            return self._may_go_on()
+        work = self._carry_out(asked.method(self, **arguments), number, kind)
+        if asked.is_long:
+            task = asyncio.create_task(work)
+            # It goes on when the client has left.
+            for tasks in (self._long, self._hub.tasks):
+                tasks.add(task)
+                task.add_done_callback(tasks.discard)
         else:
-            if number is not None:
-                await self.say({"type": "done", "id": number})
-        finally:
+            self.answers = True
+            await work
             self.answers = False
         return self._may_go_on()
 

@@ -52,7 +52,7 @@ const server = new Server(fragment.get("token") ?? "", receive, receiveFrame, sh
 const player = new Player(server, failed);
 const detections = new Detections((t_us) => player.seek(t_us));
 const timeWindow = new TimeWindow(server, player, () => timeline, () => hello?.columns_us ?? null, () => {
-  lanesDue = marksDue = true;
+  lanesDue = true;
 });
 const cursor = new Cursor(() => timeline, (t_us) => player.seek(t_us), timeWindow, mark);
 const pointed = new Pointed(server, () => timeline);
@@ -61,7 +61,7 @@ const lanes = new Lanes(settings, shown);
 const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), listRecordings);
 const notes = new Notes(player, labels);
 const mistakes = new Mistakes(player, () => {
-  marksDue = true;
+  lanesDue = true;
 });
 const training = new Training(server, player, mistakes, () => showDetections(detections.shown, detections.labels));
 divide(settings);
@@ -104,10 +104,9 @@ let refused = "";
 let connection = { connected: false, why: "" };
 /** @type {import("./messages.js").Recordings | null} */
 let recordings = null;
-/** What is to be drawn again: the maps, the lanes, the marks over the lanes. */
+/** What is to be drawn again: the maps; the lanes, with the marks over them. */
 let mapsDue = false;
 let lanesDue = true;
-let marksDue = true;
 /** Only the line at the time shown is to be drawn again. */
 let timeDue = true;
 
@@ -201,7 +200,6 @@ function receiveFrame(buffer) {
   mapsDue = timeDue = true;
   // The columns of a window that does not follow the newest change only where the server sends all of them, or where the window moves.
   if (frame.following || frame.restart) lanesDue = true;
-  if (frame.following) marksDue = true;
 }
 
 // ------------------------------------------------------------------------------------------------ messages
@@ -224,7 +222,7 @@ function receive(message) {
     case "detection":
       // Of several sources the first is read out.
       detections.add({ ...message, source: (hello?.sources.length ?? 0) > 1 ? hello?.sources[0] ?? "" : "" });
-      marksDue = true;
+      lanesDue = true;
       if (player.transport.source === null) showDetections(detections.live, hello?.readout ?? []);
       return;
     case "spikes":
@@ -451,7 +449,7 @@ function showDetections(shown, labels) {
     : chosen === training.reads ? `${chosen} detected nothing in this recording.` : `No detections yet: ${chosen} is reading this recording.`;
   const none = opened ? ofRecording : hello?.readout ? "None yet." : "No readout is running: start taxel live with a readout, or choose a readout here.";
   detections.show(shown, none, labels);
-  marksDue = true;
+  lanesDue = true;
 }
 
 // ------------------------------------------------------------------------------------------------ drawing
@@ -476,10 +474,10 @@ function drawFrame(now_ms) {
     maps.draw(now_ms);
   }
   const moving = player.transport.state !== "paused";
-  if (timeline && (lanesDue || timeDue) && now_ms - lanesAt >= (reducedMotion.matches && moving ? REDUCED_MS : LANES_MS)) {
+  if ((lanesDue || timeDue) && now_ms - lanesAt >= (reducedMotion.matches && moving ? REDUCED_MS : LANES_MS)) {
     lanesAt = now_ms;
     if (lanesDue) {
-      lanes.draw(timeline);
+      if (timeline) lanes.draw(timeline);
       labels.arrange();
       mark();
     } else cursor.draw();
@@ -506,10 +504,6 @@ function writeText() {
   strip.draw();
   strip.write();
   detections.list();
-  if (marksDue) {
-    marksDue = false;
-    mark();
-  }
 }
 
 /** Applies the colours of the theme. */

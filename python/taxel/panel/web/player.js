@@ -51,7 +51,7 @@ export class Player {
     const moving = state !== "paused";
     const play = part("play", HTMLButtonElement);
     play.setAttribute("aria-label", moving ? "Pause" : "Play");
-    play.classList.toggle("moving", moving);
+    play.dataset.state = state;
     const anything = this.live || source !== null;
     for (const id of ["play", "step-back", "step-on"]) part(id, HTMLButtonElement).disabled = !anything;
     const live = part("go-live", HTMLButtonElement);

@@ -77,7 +77,7 @@ export class Recorder {
     if (before?.state === "finishing" && state === "idle" && !error && document.activeElement !== name) {
       name.value = name.value.trim().replace(/\d+$/, (number) => String(Number(number) + 1).padStart(number.length, "0"));
     }
-    this.button.classList.toggle("on", this.busy);
+    this.button.dataset.state = state;
     write(part("record-word", HTMLElement), { idle: "Record", recording: "Stop", finishing: "Saving" }[state]);
     write(part("record-start", HTMLButtonElement), this.busy ? "Stop (R)" : "Record (R)");
     const reason = part("record-reason", HTMLElement);

@@ -107,5 +107,4 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
   const about = [subject, connected && source !== null && opening === null && opened?.verdict, shape(opened, hello)].filter(Boolean).join(" · ");
   write(part("source", HTMLElement), about);
   entitle(part("source", HTMLElement), "title", about);
-  document.documentElement.classList.toggle("recording", recording !== null);
 }

@@ -132,6 +132,7 @@ export class Training {
   /** Writes how long the training has run. */
   write() {
     const running = this.since === null ? null : Math.round((performance.now() - this.since) / 1000);
+    this.button.dataset.state = running === null ? "idle" : "running";
     write(this.button, running === null ? "Train on these labels" : `Stop the training (${running} s)`);
   }
 }
