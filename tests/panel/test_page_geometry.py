@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.panel.pages import shown, shows, until
+from tests.panel.pages import press, shown, shows, until
 
 import taxel
 from taxel import Array, Frames, Places
@@ -101,3 +101,7 @@ def drawn(page: Any, name: str) -> None:
     inner = page.locator("#pressure-map").bounding_box()
     page.mouse.click(inner["x"] + x * inner["width"], inner["y"] + y * inner["height"])
     until(lambda at=at: _cross(page) == at, f"the mark is at {at}")
+    # A fixed scale holds for each that is shown.
+    press(page, "5")
+    page.locator("#top").fill("60")
+    shows(page, "pressure-top", "^60 kPa$")
