@@ -14,7 +14,6 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,52 +30,36 @@ if TYPE_CHECKING:
     from nir import NIRGraph
 
 
-@dataclass(frozen=True)
-class Parts:
-    """Hold the parts of a readout.
+def write_nir(
+    path: str | os.PathLike[str],
+    encoder: Encoder,
+    neurons: Mapping[str, TrainedNeuron],
+    delays_ms: NDArray[np.float64],
+    run_threshold: float,
+    *,
+    spike_ms: float | None,
+    overwrite: bool,
+) -> list[str]:
+    """Write the graph of a readout to a file; return what NIR cannot hold.
 
-    Parameters
-    ----------
-    encoder : Encoder
-    neurons : mapping from label to TrainedNeuron
-        With one weight a train of the encoder, also where they receive some of its parts.
-    delays_ms : float64, shape (copies,), ms
-    run_threshold : float
-    time, after_spike : str
-        As its neurons have them.
+    Each neuron has one weight a train of the encoder at each delay, also where it receives some of its parts.
     """
-
-    encoder: Encoder
-    neurons: Mapping[str, TrainedNeuron]
-    delays_ms: Sequence[float] | NDArray[np.float64]
-    run_threshold: float
-    time: str
-    after_spike: str
-
-
-def write_nir(readout: Parts, path: str | os.PathLike[str], *, spike_ms: float | None, overwrite: bool) -> list[str]:
-    """Write the graph of a readout to a file; return what NIR cannot hold."""
     import nir  # noqa: PLC0415  an extra
 
     spike_ms = None if spike_ms is None else finite("spike_ms", spike_ms, least=1e-6, most=1000.0)
-    graph, buffer = _graph(readout, spike_ms), io.BytesIO()
-    # In memory: the library crashes some time after a write to a full disk.
-    nir.write(buffer, graph)
-    write_whole(path, lambda file: file.write(buffer.getbuffer()), overwrite=overwrite)
-    return lost(readout)
-
-
-def _check_ungraded(encoder: Encoder) -> None:
-    """Refuse an encoder of graded spikes: the input spikes of a NIR graph have no values."""
     if encoder.kind == "graded":
         raise ProblemError(
             f"NIR takes no graded trains: the input spikes of its graphs have no values, but those of {encoder.name} do"
         )
+    graph, buffer = _graph(neurons, delays_ms, run_threshold, spike_ms), io.BytesIO()
+    # In memory: the library crashes some time after a write to a full disk.
+    nir.write(buffer, graph)
+    write_whole(path, lambda file: file.write(buffer.getbuffer()), overwrite=overwrite)
+    return lost([trained.neuron for trained in neurons.values()])
 
 
-def lost(readout: Parts) -> list[str]:
-    """Return what NIR's nodes cannot hold of a readout, one line each."""
-    neurons = [trained.neuron for trained in readout.neurons.values()]
+def lost(neurons: Sequence[Neuron]) -> list[str]:
+    """Return what NIR's nodes cannot hold of the neurons of a readout, one line each."""
     lines = [
         "the encoder, whose spike trains are the inputs of the graph",
         "labels and trained delays; the outputs have the order of the labels",
@@ -86,10 +69,10 @@ def lost(readout: Parts) -> list[str]:
     if any(neuron.theta_plus > 0 for neuron in neurons):
         lines.append("the rise of the threshold by a spike")
     lines.append(
-        f'after_spike="{readout.after_spike}": after a spike, the potential of a NIR neuron is 0 and its input current '
-        "continues, so spikes after the first may differ from those of taxel's neuron"
+        f'after_spike="{neurons[0].after_spike}": after a spike, the potential of a NIR neuron is 0 and its input '
+        "current continues, so spikes after the first may differ from those of taxel's neuron"
     )
-    if readout.time == "continuous":
+    if neurons[0].time == "continuous":
         lines.append("continuous time: a simulator has time steps, so its neurons fire up to one step later")
     return lines
 
@@ -122,13 +105,17 @@ def _peak_one(tau: float, tau_s: float) -> float:
     return float(1.0 / (ratio ** (ratio / (1.0 - ratio)) - ratio ** (1.0 / (1.0 - ratio))))
 
 
-def _graph(readout: Parts, spike_ms: float | None) -> NIRGraph:
+def _graph(
+    by_label: Mapping[str, TrainedNeuron],
+    delays_ms: NDArray[np.float64],
+    run_threshold: float,
+    spike_ms: float | None,
+) -> NIRGraph:
     import nir  # noqa: PLC0415  an extra
 
-    _check_ungraded(readout.encoder)
     spike_s = None if spike_ms is None else spike_ms / 1000.0
-    neurons = list(readout.neurons.values())
-    for label, trained in readout.neurons.items():
+    neurons = list(by_label.values())
+    for label, trained in by_label.items():
         if trained.neuron.rearm is not None:
             raise ProblemError(
                 f"NIR: rearm of {label!r} is {trained.neuron.rearm}, but NIR neurons have no rearm; set it to None"
@@ -138,16 +125,15 @@ def _graph(readout: Parts, spike_ms: float | None) -> NIRGraph:
     if len(kinds) > 1:
         raise ProblemError("NIR: exponential kernels and others need different nodes; export them as separate readouts")
     columns = {name: np.array([node[1][name] for node in nodes]) for name in nodes[0][1]}
-    threshold = np.array([trained.neuron.theta_0 * readout.run_threshold / 1000.0 for trained in neurons])
+    threshold = np.array([trained.neuron.theta_0 * run_threshold / 1000.0 for trained in neurons])
     zero = np.zeros(len(neurons))
     nir_neurons = getattr(nir, kinds[0])(v_leak=zero, v_threshold=threshold, v_reset=zero, **columns)
     weights = np.array([trained.weights / 1000.0 * node[2] for trained, node in zip(neurons, nodes, strict=True)])
-    delays = readout.delays_ms
-    inputs = weights.shape[1] // len(delays)
+    inputs = weights.shape[1] // len(delays_ms)
     parts: dict[str, Any] = {"input": nir.Input({"input": np.array([inputs])})}
     edges = []
-    for k, delay in enumerate(delays):
-        name = "weights" if len(delays) == 1 else f"weights_{k}"
+    for k, delay in enumerate(delays_ms):
+        name = "weights" if len(delays_ms) == 1 else f"weights_{k}"
         parts[name] = nir.Linear(weight=weights[:, k * inputs : (k + 1) * inputs])
         source = "input"
         if delay > 0:

@@ -65,8 +65,6 @@ class Trained(NamedTuple):
         By how much its labels were moved to what the sensor felt, by label; empty where the recipe does not align them.
     fitted_levels : bool
         Whether the encoder's levels are of the training data (`Recipe`).
-    chosen : mapping of str to str
-        For each label, the chosen point of `choose`, the first one, and the mistakes of both in the training data.
     """
 
     recipe: Recipe
@@ -74,7 +72,6 @@ class Trained(NamedTuple):
     readout: Readout
     alignments: Mapping[str, Alignment]
     fitted_levels: bool = False
-    chosen: Mapping[str, str] = {}
 
 
 def fit(
@@ -202,11 +199,11 @@ class Fitter:
         plan = fit_levels(self._recipe, self.examples, parts)
         rules = self.rules(parts)
         learners: dict[str, ConeR | TrainedNeuron] = {}
-        delays, alignments, chosen = {}, {}, {}
+        delays, alignments = {}, {}
         points: dict[str, Mapping[str, Any]] = {}
         for label in self.labels:
             try:
-                best, first_wrong = self._best(plan, label, parts, rules[label])
+                best = self._best(plan, label, parts, rules[label])
             except ProblemError as error:
                 if error.hint != "unfelt" or rules[label] is None:
                     raise
@@ -215,12 +212,6 @@ class Fitter:
                 learners[label], delays[label] = silent, silent.delay_ms
                 continue
             learners[label], points[label], delays[label] = best.learner, best.point, best.delay_ms
-            if differs := _differing(best.point, plan.points_of(label)[0]):
-                by, by_first = differs
-                chosen[label] = (
-                    f"learnt with {by}: {best.wrong} missed and false in the training data; with {by_first}: "
-                    f"{first_wrong}"
-                )
             if best.alignment is not None:
                 alignments[label] = best.alignment
         plan = replace(plan, neurons=points)
@@ -228,7 +219,7 @@ class Fitter:
         known = {label: rule for label, rule in rules.items() if rule is not None}
         readout = readout._with(unit=self._unit, pads=self._pads)._with_rules(known)
         fitted_levels = plan.encoder != self._recipe.encoder
-        return Trained(plan, learners, readout, alignments, fitted_levels, chosen)
+        return Trained(plan, learners, readout, alignments, fitted_levels)
 
     def _silent(self, plan: Recipe, label: str) -> TrainedNeuron:
         """Return a neuron that never fires."""
@@ -333,17 +324,13 @@ class Fitter:
         trains = with_rest.encode(trains)
         return trains.split_by_sign() if trains.signed else trains
 
-    def _best(self, plan: Recipe, label: str, parts: Sequence[Part], rule: PlainRule | None) -> tuple[FittedPoint, int]:
+    def _best(self, plan: Recipe, label: str, parts: Sequence[Part], rule: PlainRule | None) -> FittedPoint:
         """Return the first of the points to choose from, or a later one that leaves fewer events missed or false.
 
-        And how many the first one leaves.
-
         They are tried in turn. A later one counts if it leaves as many fewer as its `fewer` says, else `_FEWER`, and
-        `_FEWER_SHARE` of the labels, as some more or less are chance; with 0 it counts if it leaves no more. Where most
-        events are missed whose targets come before the inputs that tell them, as with the true onsets of slow steps,
-        the neuron is trained to fire after the first input. A later point that cannot be learnt is left out. If the
-        first felt nothing, which counts as all labels missed, a later one must leave as many fewer, or none. Warnings
-        are those of the point that counts.
+        `_FEWER_SHARE` of the labels, as some more or less are chance; with 0 it counts if it leaves no more. A later
+        point that cannot be learnt is left out. If the first felt nothing, which counts as all labels missed, a later
+        one must leave as many fewer, or none. Warnings are those of the point that counts.
         """
         points = plan.points_of(label)
         count = sum(map(len, self.labels_in(label, parts)))
@@ -354,7 +341,7 @@ class Fitter:
             if error.hint != "unfelt":
                 raise
             refused = error
-        usual, first_wrong = max(_FEWER, _FEWER_SHARE * count), count if best is None else best.wrong
+        usual = max(_FEWER, _FEWER_SHARE * count)
         for point, stated in zip(points[1:], plan._fewer_of(label), strict=True):
             fewer = usual if stated is None else stated
             wrong, fewer = (count, min(max(1, fewer), count)) if best is None else (best.wrong, fewer)
@@ -369,23 +356,18 @@ class Fitter:
             raise refused
         for caught in best.caught:
             warn(caught, stacklevel=5)
-        return best, first_wrong
+        return best
 
     def _fitted(
         self, plan: Recipe, label: str, point: Mapping[str, Any], parts: Sequence[Part], rule: PlainRule | None
     ) -> FittedPoint:
-        """Return one point of a label's neuron, fitted; one that waits for its inputs where that leaves fewer wrong."""
+        """Return one point of a label's neuron, fitted."""
         received, trains = self._received(plan, point)
         cut = [_cut(trains[part.example], part) for part in parts]
         felt = self._felt(label, parts, rule) if plan.align else None
         given = self.labels_in(label, parts)
         inputs = Inputs(label, received, cut, given, felt, parts, self.examples, self.array, self.report)
-        fitted = inputs.fitted(plan, point)
-        if fitted.precedes_input and 2 * fitted.missed > inputs.count:
-            later = inputs.fitted(plan, point, behind_input=True)
-            if later.rank < fitted.rank:
-                return later._replace(caught=[_waits(label, inputs.count, fitted, later), *later.caught])
-        return fitted
+        return inputs.fitted(plan, point)
 
     def _felt(self, label: str, parts: Sequence[Part], rule: PlainRule | None) -> list[NDArray[np.float64]] | None:
         """Return when a rule felt each event of a label in parts, us, NaN of those that it misses; None if many are."""
@@ -459,28 +441,6 @@ def _readout_of(
         inputs = inputs if isinstance(encoder, Composite) else {}
     threshold = float(recipe.run_threshold)
     return Readout(encoder, learners, array=array, delay_ms=delays_ms, run_threshold=threshold, inputs=inputs)
-
-
-def _differing(point: Mapping[str, Any], first: Mapping[str, Any]) -> tuple[str, str] | None:
-    """Return by what a point and the first one differ, as text; None where they do not."""
-    keys = [key for key in dict(point) | dict(first) if point.get(key) != first.get(key)]
-    if "inputs" in keys:  # the rest suits these
-        keys = ["inputs"]
-
-    def text(values: Mapping[str, Any]) -> str:
-        of_key = {key: values.get(key, "as of all") for key in keys}
-        return ", ".join(f"input {' and '.join(v)}" if key == "inputs" else f"{key} {v}" for key, v in of_key.items())
-
-    return (text(point), text(first)) if keys else None
-
-
-def _waits(label: str, count: int, early: FittedPoint, later: FittedPoint) -> str:
-    """Return the warning that a neuron waits for its inputs, as those of a learner come behind its targets."""
-    out_of_reach, more_ms = len(early.learner.unreachable_), later.delay_ms - early.delay_ms
-    return (
-        f"{label}: {out_of_reach} of {counted(count, 'label')} {'comes' if out_of_reach == 1 else 'come'} before the "
-        f"first input: the neuron waits for this input, and {label} is known {more_ms:.3g} ms later"
-    )
 
 
 def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, ...]:

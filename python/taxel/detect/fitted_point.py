@@ -29,10 +29,6 @@ from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: Two folds need this many labels.
 _TWO_FOLDS = 4
-#: A first input that is later than that after its label, ms, is of something else.
-_MOST_WAIT_MS = 100.0
-#: Where a neuron waits for its first inputs, those of this share of the labels have come.
-_MOST_LABELS = 0.9
 #: Why events cannot be learnt that have too few inputs.
 _UNLEARNT = "cannot be learnt, because too few input spikes come before them"
 
@@ -45,17 +41,9 @@ class FittedPoint(NamedTuple):
     #: How much later than the event it fires, ms, the encoder's latency apart.
     delay_ms: float
     alignment: Alignment | None
-    #: Events missed in the training data, and missed and false, then the error (ms).
-    missed: int
-    rank: tuple[int, float]
-    #: Whether most labels, which are not aligned, are so early that no neuron can fire by their targets.
-    precedes_input: bool
+    #: How many events it misses or detects falsely in the training data.
+    wrong: int
     caught: list[str]
-
-    @property
-    def wrong(self) -> int:
-        """How many events it misses or detects falsely in the training data."""
-        return self.rank[0]
 
 
 @dataclass(frozen=True)
@@ -83,7 +71,7 @@ class Inputs:
         """What errors call each part's example."""
         return [name_of(part.example, self.examples[part.example]) for part in self.parts]
 
-    def fitted(self, plan: Recipe, point: Mapping[str, Any], *, behind_input: bool = False) -> FittedPoint:
+    def fitted(self, plan: Recipe, point: Mapping[str, Any]) -> FittedPoint:
         """Return a point fitted to them.
 
         Raises
@@ -107,7 +95,7 @@ class Inputs:
         # the potential jumps.
         more_ms = ACTS_AFTER_MS if neuron.kernel == "exponential" else neuron.step_ms
         shift_ms = self.received.latency_ms + delay_ms + (0.0 if ages is None else more_ms)
-        later = self._later(felt, ages, alignment, delay_ms, behind_input)
+        later = self._later(felt, ages, alignment, delay_ms)
         targets = [to_ms(t + more) + shift_ms for t, more in zip(felt, later, strict=True)]
         shift_ms += to_ms(float(np.median(np.concatenate(later))))
         graded = self.received.kind == "graded"
@@ -140,9 +128,7 @@ class Inputs:
             point,
             shift_ms - self.received.latency_ms,
             alignment,
-            scored.missed,
-            scored.rank,
-            alignment is None and 2 * len(cone.unreachable_) > self.count,
+            scored.rank[0],
             [f"{self.label}: {remark}" for remark in remarks],
         )
 
@@ -152,13 +138,11 @@ class Inputs:
         ages: Ages | None,
         alignment: Alignment | None,
         delay_ms: float,
-        behind_input: bool,
     ) -> list[NDArray[np.int64]]:
         """Return how much later than the trained delay after what was felt each target is, us."""
         if ages is not None and alignment is not None and alignment.train == ages.trains[0]:
             return [later_us(train, ages, to_ms(t), delay_ms) for train, t in zip(self.trains, felt, strict=True)]
-        wait_ms = _first_input_ms(self.trains, felt, self.received.latency_ms) if behind_input else 0.0
-        return [np.full(len(times), round(to_us(wait_ms)), np.int64) for times in felt]
+        return [np.zeros(len(times), np.int64) for times in felt]
 
     def _score(self, cone: ConeR, run_threshold: float, shift_ms: float) -> Score:
         """Return the score of a fitted learner in the training data, against the labels as given."""
@@ -225,17 +209,6 @@ def _check_apart(label: str, name: str, times: NDArray[np.int64], refractory_ms:
             f"be more than {refractory_ms:g} ms apart, because the neuron fires once in that time: are the times "
             "in us, and is each label listed once?"
         )
-
-
-def _first_input_ms(sources: Sequence[SpikeTrains], felt: Sequence[NDArray[np.int64]], latency_ms: float) -> float:
-    """Return how long after its label the first input spike comes, ms, of nine in ten labels that have one."""
-    waits = []
-    for source, times in zip(sources, felt, strict=True):
-        spikes, labels = np.append(np.sort(source.times), np.inf), to_ms(times) + latency_ms
-        waits.append(spikes[np.searchsorted(spikes, labels - WINDOW_MS)] - labels)
-    wait = np.concatenate(waits)
-    wait = wait[wait <= _MOST_WAIT_MS]
-    return max(0.0, float(np.quantile(wait, _MOST_LABELS))) if len(wait) else 0.0
 
 
 def _begin_ms(trains: SpikeTrains) -> float:

@@ -18,7 +18,7 @@ from taxel._base.saved import read
 from taxel._core import NotFittedError, ProblemError
 from taxel.array import Array
 from taxel.detect.detector import _Detector, detector, tare_text
-from taxel.detect.exchange import Parts, write_nir
+from taxel.detect.exchange import write_nir
 from taxel.detect.plain_rule import PlainRule
 from taxel.detect.trained import TrainedNeuron
 from taxel.detections import Detections
@@ -348,19 +348,13 @@ class Readout(_Detector):
         Input, for each delay a `Delay` (where above 0) and a `Linear`, then `CubaLIF` (alpha kernel: both time
         constants equal) or `LIF` (exponential kernel).
         """
-        lost = write_nir(self._exchanged(), path, spike_ms=spike_ms, overwrite=overwrite)
-        return [
-            *lost,
-            *(f"the plain rule that detects {label}: the graph has its neuron" for label in self.by_rule),
-        ]
-
-    def _exchanged(self) -> Parts:
-        """Return the parts that the exchange format is made of; weights of trains that a neuron lacks are 0."""
         neurons = {label: trained._replace(weights=self._spread(trained)) for label, trained in self.neurons.items()}
-        return Parts(self.encoder, neurons, self.delays_ms, self.run_threshold, self.time, self.after_spike)
+        parts = self.encoder, neurons, self.delays_ms, self.run_threshold
+        lost = write_nir(path, *parts, spike_ms=spike_ms, overwrite=overwrite)
+        return lost + [f"the plain rule that detects {label}: the graph has its neuron" for label in self.by_rule]
 
     def _spread(self, trained: TrainedNeuron) -> NDArray[np.float64]:
-        """Return one weight a train of the whole encoder, at each delay."""
+        """Return one weight a train of the whole encoder, at each delay: 0 of those that the neuron lacks."""
         received = _receives(self.encoder, trained, self.array, len(self.delays_ms))
         if received is None:
             return trained.weights

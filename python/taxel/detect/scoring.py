@@ -17,10 +17,8 @@ from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped, plain, three_digits
 from taxel._core import ProblemError
 from taxel.detections import Detections
-from taxel.spikes import to_ms, to_us
+from taxel.spikes import to_us
 
-#: Missed events have detections at one distance if those of this share of them differ by so much from the median, ms.
-_MOST, _SAME_MS = 0.8, 50.0
 #: Distance between recordings that are scored together, us: no detection pairs with an event of another recording.
 APART_US = 10**12
 #: From which share of the events on missed or false ones are many.
@@ -98,10 +96,6 @@ class Score:
         `t` minus reference (negative is early) and `known` minus reference.
     by_label : dict of str to Score
         Empty in the score of one label.
-    false_beside : int, 0 or more
-        How many of the false ones are within twice the window of a reference event.
-    missed_ms : float64, shape (missed,), ms
-        `t` of the nearest false detection of its label minus reference, for each missed event; NaN without any.
     """
 
     label: str
@@ -112,8 +106,6 @@ class Score:
     errors_ms: NDArray[np.float64]
     delays_ms: NDArray[np.float64]
     by_label: Mapping[str, Score] = field(default_factory=dict)
-    false_beside: int = 0
-    missed_ms: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
     @property
     def events(self) -> int:
@@ -153,19 +145,6 @@ class Score:
         """Spread of `known` minus reference, ms."""
         return Spread.from_values(self.delays_ms)
 
-    @property
-    def missed_text(self) -> str:
-        """Where the nearest detections are, if most events are missed and most of these have one at one distance."""
-        known = self.missed_ms[np.isfinite(self.missed_ms)]
-        if 2 * self.missed <= self.events or len(self.by_label) > 1 or not len(known):
-            return ""
-        ms = float(np.median(known))
-        count = int(np.count_nonzero(np.abs(known - ms) <= _SAME_MS))
-        if count < _MOST * self.missed:
-            return ""
-        where = f"{three_digits(abs(ms))} ms {'after' if ms > 0 else 'before'} the label"
-        return f"the nearest detection comes {where}, for {count} of {counted(self.events, 'label')}"
-
     def __getitem__(self, label: str) -> Score:
         """Return the score of one label."""
         if label not in self.by_label:
@@ -175,10 +154,9 @@ class Score:
     def to_dict(self) -> dict[str, Any]:
         """Return counts and spreads (ms) as plain values, label by label; what is not known is None."""
         plain: dict[str, Any] = {
-            name: getattr(self, name) for name in ("events", "found", "missed", "false", "false_near", "false_beside")
+            name: getattr(self, name) for name in ("events", "found", "missed", "false", "false_near")
         }
-        missed = Spread.from_values(self.missed_ms[np.isfinite(self.missed_ms)])
-        for name, spread in (("error_ms", self.error), ("known_delay_ms", self.delay), ("missed_ms", missed)):
+        for name, spread in (("error_ms", self.error), ("known_delay_ms", self.delay)):
             plain[name] = {part: None if np.isnan(value) else value for part, value in spread._asdict().items()}
         if self.by_label:
             plain["by_label"] = {label: part.to_dict() for label, part in self.by_label.items()}
@@ -187,7 +165,7 @@ class Score:
     def __repr__(self) -> str:
         rows = [*self.by_label.values()] if len(self.by_label) > 1 else []
         scores = [*rows, self]
-        counts = [(score.events, score.found, score.missed, score.false, score.false_beside) for score in scores]
+        counts = [(score.events, score.found, score.missed, score.false, score.false_near) for score in scores]
         table: list[tuple[str, ...]] = [("", "events", "found", "missed", "false", "near")]
         table += [(escaped(score.label), *map(str, row)) for score, row in zip(scores, counts, strict=True)]
         widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
@@ -201,7 +179,6 @@ class Score:
                 title,
                 *(f"{escaped(score.label).ljust(widths[0])}  {getattr(score, spread)!r}" for score in scores),
             ]
-        lines += [f"{escaped(score.label)}: {text}" for score in scores if (text := score.missed_text)]
         return "\n".join(lines)
 
 
@@ -272,35 +249,13 @@ def score(
     scores = {}
     for tally in tallies:
         pairs, lost = np.column_stack([tally.detected, tally.events]), (tally.missed_events, tally.false_detections)
-        of_label = np.array([label == tally.label for label in labels], np.bool_)
-        false, missed = found.t[tally.false_detections], times[tally.missed_events]
-        beside = _within(false, times[of_label], 2 * windows[of_label])
-        apart_ms = tally.errors_ms, tally.delays_ms
-        nearest: dict[str, Any] = {"false_beside": beside, "missed_ms": _nearest_ms(np.sort(false), missed)}
-        scores[tally.label] = Score(tally.label, pairs, *lost, tally.false_near, *apart_ms, **nearest)
+        scores[tally.label] = Score(tally.label, pairs, *lost, tally.false_near, tally.errors_ms, tally.delays_ms)
     no_times, ms = np.empty(0, np.int64), np.empty(0)
     parts = [Score("all", np.empty((0, 2), np.int64), no_times, no_times, 0, ms, ms), *scores.values()]
-    names = ("pairs", "missed_events", "false_detections", "errors_ms", "delays_ms", "missed_ms")
+    names = ("pairs", "missed_events", "false_detections", "errors_ms", "delays_ms")
     together: dict[str, Any] = {name: np.concatenate([getattr(score, name) for score in parts]) for name in names}
-    together |= {name: sum(getattr(score, name) for score in parts) for name in ("false_near", "false_beside")}
-    return Score(parts[-1].label if len(scores) == 1 else "all", by_label=scores, **together)
-
-
-def _nearest_ms(t: NDArray[np.int64], events: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return the nearest of some times (ascending) minus each event, ms; NaN without any."""
-    if not len(t):
-        return np.full(len(events), np.nan)
-    after = np.searchsorted(t, events).clip(max=len(t) - 1)
-    later, earlier = t[after] - events, t[np.maximum(after - 1, 0)] - events
-    nearest: NDArray[np.float64] = to_ms(np.where(np.abs(later) <= np.abs(earlier), later, earlier))
-    return nearest
-
-
-def _within(t: NDArray[np.int64], events: NDArray[np.int64], windows: NDArray[np.int64]) -> int:
-    """Return how many times are within the window of an event, each of which has its own, us."""
-    begun = np.searchsorted(np.sort(events - windows), t, side="right")
-    ended = np.searchsorted(np.sort(events + windows), t, side="left")
-    return int(np.count_nonzero(begun > ended))
+    near = sum(score.false_near for score in parts)
+    return Score(parts[-1].label if len(scores) == 1 else "all", false_near=near, by_label=scores, **together)
 
 
 def mistakes_of(

@@ -294,8 +294,7 @@ def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) 
             of_group = scores[group].get(label)
             if of_group is not None:
                 text = unreliable(label, of_group, "labels", f"this readout in {group.strip()}")
-                # By how much the labels of a recording are off, the score of all does not say.
-                yield from ["; ".join(filter(None, (text, of_group.missed_text)))] if text else []
+                yield from [text] if text else []
 
 
 def _in_few(

@@ -134,7 +134,6 @@ class Training:
             "rests": [taken.to_dict() for taken in self.rests],
             "shift_ms": self.options.shift_ms,
             "fitted_levels": list(self.fitted_levels),
-            "chosen": dict(self.made.chosen),
             "warnings": list(self.warnings),
             "unlabelled": list(self.unlabelled),
         }
