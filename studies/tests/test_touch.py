@@ -90,7 +90,7 @@ def test_scenes_come_back_from_their_files_with_their_labels(tmp_path) -> None:
 def test_the_recipe_is_chosen_for_events_and_has_a_neuron_for_every_label() -> None:
     events = taxel.Events([0], [0], [0], [1], array=taxel.Array(2, 2), intensity=[5])
     labels = ["contact", "Lift", "ball"]
-    assert recipes.fitting(events) == "touch"
+    assert recipes.chosen(events)[0] == "touch"
     recipe = Recipe.load("touch", labels=labels)
     assert isinstance(recipe.encoder, taxel.encode.Composite)
     assert recipe.encoder.parts["moments"].displacement_mm is None

@@ -56,7 +56,7 @@ def on_channels(seed: int, count: int, taps: int, presses: int, hz: int = HZ, un
 )
 def test_on_channels_each_counts_alone(count: int, hz: int, unit: str) -> None:
     learnt, unseen = on_channels(1, count, 20, 10, hz, unit), on_channels(2, count, 20, 10, hz, unit)
-    recipe = recipes.fitting(learnt.source, ["press", "tap"])
+    recipe = recipes.chosen(learnt.source, ["press", "tap"])[0]
     assert recipe == "touch"
     readout = fit([learnt], Recipe.load(recipe, labels=["press", "tap"], noise_floor=measured_floor([learnt])))
     found = run(readout, unseen.source, tare=unseen.tare)
@@ -85,7 +85,7 @@ def test_one_kind_of_touch_has_a_floor_of_its_strength_so_that_a_drift_is_no_tou
         return Example(frames, {"tap": 4000 * begins}, Tare.take(frames, stop_us=1_000_000))
 
     train, drifted = taps(0.0), taps(1.6)
-    recipe = recipes.fitting(train.source, ["tap"])
+    recipe = recipes.chosen(train.source, ["tap"])[0]
     readout = fit([train], Recipe.load(recipe, labels=["tap"], noise_floor=measured_floor([train])))
     found = run(readout, drifted.source, tare=drifted.tare)
     result = score(found, drifted.labels, 50.0)

@@ -30,7 +30,7 @@ def single(shape: tuple[int, int], seed: int, count: int = 14, *, times: float =
 @pytest.mark.parametrize("times", [10.0, 100.0])
 def test_one_loaded_taxel_is_learnt_on_any_array(shape: tuple[int, int], times: float) -> None:
     learnt, unseen = single(shape, 1, times=times), single(shape, 2, times=times)
-    assert recipes.fitting(learnt.source, ["contact", "lift"]) == "touch"
+    assert recipes.chosen(learnt.source, ["contact", "lift"])[0] == "touch"
     readout = fit([learnt], Recipe.load("touch", labels=["contact", "lift"], noise_floor=0.6))
     assert score(run(readout, unseen.source, tare=unseen.tare), unseen.labels, 50.0).rank[0] <= 1
     for label, rule in tune([learnt], noise_floor=0.6).items():
@@ -41,8 +41,8 @@ def test_one_loaded_taxel_is_learnt_on_any_array(shape: tuple[int, int], times: 
 
 def test_steps_of_channels_keep_their_recipes_and_kinds_need_a_rest() -> None:
     source = single((1, 6), 1).source
-    assert recipes.fitting(source, ["contact", "foot_off"]) == "gait_insole"
-    assert [recipes.fitting(source, ["soft", "hard"], rests=rests) for rests in (True, False)] == [
+    assert recipes.chosen(source, ["contact", "foot_off"])[0] == "gait_insole"
+    assert [recipes.chosen(source, ["soft", "hard"], rests=rests)[0] for rests in (True, False)] == [
         "touch",
         "gait_insole",
     ]

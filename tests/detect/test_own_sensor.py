@@ -131,7 +131,7 @@ def test_a_floor_that_the_recipe_or_the_user_states_stays(tmp_path: Path, capsys
 def test_labels_and_neighbours_choose_the_recipe(
     labels: tuple[str, ...], unit: str, shape: tuple[int, int], recipe: str
 ) -> None:
-    assert recipes.fitting(Frames(np.zeros((1, *shape)), [0], unit=unit, array=Array(*shape)), labels) == recipe
+    assert recipes.chosen(Frames(np.zeros((1, *shape)), [0], unit=unit, array=Array(*shape)), labels)[0] == recipe
 
 
 def test_a_refused_training_leaves_no_folder_of_its_report(tmp_path: Path, capsys) -> None:

@@ -46,25 +46,25 @@ def test_every_kind_of_recording_has_one_recipe() -> None:
     assert len(kinds) == len(set(kinds))
     assert all("other" in one for one in every.values())
     frames = np.zeros((2, 1, 33))
-    found = {unit: recipes.fitting(Frames(frames, [0, 1000], unit=unit)) for unit in ("counts", "N", "kPa")}
+    found = {unit: recipes.chosen(Frames(frames, [0, 1000], unit=unit))[0] for unit in ("counts", "N", "kPa")}
     assert found == {"counts": "gait_plate", "N": "gait_insole", "kPa": "gait_channel"}
     few = Frames(np.zeros((2, 1, 32)), [0, 1000], unit="counts")
     for rests, name in ((True, "touch"), (False, "gait_channel")):
-        assert recipes.fitting(few, ["contact", "foot_off"], rests=rests) == name
-    assert recipes.fitting(Events([0], [0], [0], [True], array=Array(1, 1))) in recipes.names()
+        assert recipes.chosen(few, ["contact", "foot_off"], rests=rests)[0] == name
+    assert recipes.chosen(Events([0], [0], [0], [True], array=Array(1, 1)))[0] in recipes.names()
 
 
 def test_counts_of_an_event_camera_have_their_recipe_whatever_window_and_label() -> None:
     for unit in ("events/2.5 ms", "on events/5 ms", "off events/5 ms"):
         frames = Frames(np.zeros((2, 3, 4)), [0, 1000], unit=unit)
         for labels in (["contact", "lift"], ["slip"], ["foot_off"], []):
-            assert recipes.fitting(frames, labels) == "event_counts"
+            assert recipes.chosen(frames, labels)[0] == "event_counts"
     # A row of channels has no neighbours.
-    assert recipes.fitting(Frames(np.zeros((2, 1, 4)), [0, 1000], unit="events/5 ms")) == "gait_channel"
+    assert recipes.chosen(Frames(np.zeros((2, 1, 4)), [0, 1000], unit="events/5 ms"))[0] == "gait_channel"
 
 
 def test_for_events_contact_and_lift_have_their_own_neurons_and_any_other_label_that_of_kinds() -> None:
-    assert recipes.fitting(Events([0], [0], [0], [True], array=Array(1, 1))) == "touch"
+    assert recipes.chosen(Events([0], [0], [0], [True], array=Array(1, 1)))[0] == "touch"
     assert list(Recipe.load("touch").neurons) == ["contact", "lift"]
     recipe = Recipe.load("touch", labels=["Lift", "small", "large"])
     assert {label: recipe.inputs_of(label) for label in recipe.neurons} == {

@@ -24,18 +24,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = [
-    "chosen",
-    "fitting",
-    "for_labels",
-    "kinds",
-    "knows",
-    "names",
-    "names_of",
-    "neuron_of",
-    "read",
-    "spelling",
-]
+__all__ = ["chosen", "for_labels", "kinds", "names", "names_of", "neuron_of", "read", "spelling"]
 
 #: The recipe of recordings that no other fits: its levels are shares of the running range, of any unit.
 _ANY = "gait_channel"
@@ -73,46 +62,34 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(file.stem for file in Path(__file__).parent.glob("*.toml")))
 
 
-def fitting(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool = True) -> str:
-    """Return the name of the recipe that fits a recording, by what it holds, and its labels.
+def chosen(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool = True) -> tuple[str, str]:
+    """Return the name of the recipe that fits a recording and its labels, and for what it is taken.
+
+    Steps, as "foot_off", no labels, and of channels one label alone that is no end of a touch, or all without a rest,
+    have the recipe of the unit. Where there is none, and for all other labels, it is that of touches, if each label is
+    a kind of touch or alone at its end of a touch; else it is that of channels.
 
     Parameters
     ----------
     source : Events or Frames
     labels : sequence of str
-        What is to be learnt. Contact, lift and kinds of touch have one recipe whatever the unit; steps, as "foot_off",
-        no labels, and of channels a contact or one kind alone have that of the unit. Where there is none, contact and
-        foot off of a grid have that of touches, if each is of one label, and so have those of channels, and one kind of
-        them; all else that of channels.
+        What is to be learnt.
     rests : bool
         Whether the rest of its taxels is known, from which touches of channels are distinguished.
 
     Examples
     --------
-    >>> grid = Frames([[[0.0, 0.0]] * 2], [0], unit="counts")
-    >>> fitting(grid, ["contact", "lift"]), fitting(grid, ["contact", "foot off"])
-    ('touch', 'gait_plate')
-    >>> fitting(Frames([[[0.0] * 6] * 6], [0], unit="kPa"), ["Initial Contact", "Toe Off"])
-    'touch'
-    >>> fitting(Frames([[[0.0]]], [0], unit="N")), fitting(Frames([[[0.0]]], [0], unit="V"))
-    ('gait_insole', 'gait_channel')
-    >>> [fitting(Frames([[[0.0] * 40] * rows], [0], unit="N"), ["FC", "FO"]) for rows in (20, 21)]
-    ['gait_insole', 'touch']
-    >>> [fitting(Frames([[[0.0] * 6] * rows], [0], unit="V"), ["soft", "hard"]) for rows in (1, 6)]
-    ['touch', 'touch']
-    >>> [fitting(Frames([[[0.0]]], [0], unit=unit), ["tap"]) for unit in ("V", "N")]
-    ['touch', 'gait_insole']
-    """
-    return chosen(source, labels, rests=rests)[0]
-
-
-def chosen(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool = True) -> tuple[str, str]:
-    """Return the name of the recipe that fits a recording and its labels, as `fitting`, and for what it is taken.
-
-    Examples
-    --------
     >>> chosen(Frames([[[0.0] * 6] * 6], [0], unit="V"), ["soft", "hard"])
     ('touch', 'kinds of touch on a grid of 6 x 6 taxels')
+    >>> grid = Frames([[[0.0, 0.0]] * 2], [0], unit="counts")
+    >>> [chosen(grid, labels)[0] for labels in (["contact", "lift"], ["contact", "foot off"])]
+    ['touch', 'gait_plate']
+    >>> [chosen(Frames([[[0.0]]], [0], unit=unit))[0] for unit in ("N", "V")]
+    ['gait_insole', 'gait_channel']
+    >>> [chosen(Frames([[[0.0] * 40] * rows], [0], unit="N"), ["FC", "FO"])[0] for rows in (20, 21)]
+    ['gait_insole', 'touch']
+    >>> [chosen(Frames([[[0.0]]], [0], unit=unit), ["tap"])[0] for unit in ("V", "N")]
+    ['touch', 'gait_insole']
     """
     recipes = {name: read(name) for name in names()}
     recipe_for = {kind: name for name, values in recipes.items() for kind in values.get("fits", ())}
@@ -120,43 +97,26 @@ def chosen(source: Events | Frames, labels: Sequence[str] = (), *, rests: bool =
     if not isinstance(source, Frames) or (kind in recipe_for and source.array._has_neighbours):
         subject = f"frames in {source.unit}" if isinstance(source, Frames) else "events of a board"
         return recipe_for.get(kind, _ANY), subject
-    array, grids = source.array, recipe_for.get("grids")
-    known, steps = False, None
-    if array.taxels < 2 or not array._has_neighbours:
-        sensor = counted(array.taxels, "channel" if array.is_channels else "taxel")
-        # A contact without its lift may be that of a step, and so may one unknown label, in a unit of steps.
-        kinds = {_listed(recipes[grids], label) for label in labels} if grids is not None else set()
-        ends = [] if grids is None else [_own(recipes[grids], label) for label in labels]
-        if "lift" in kinds and None not in kinds:
-            return str(grids), f"{' and '.join(labels)} on {sensor}"
-        others = [label for label, end in zip(labels, ends, strict=False) if end is None]
-        of_steps = (_is_of_step(label) or _is_known(recipes, label) for label in others)
-        if rests and others and (len(labels) > 1 or source.unit not in recipe_for) and not any(of_steps):
-            return str(grids), f"kinds of touch on {sensor}"
-        if rests and ends and None not in ends and len(set(ends)) == len(ends):
-            steps = str(grids), f"{' and '.join(labels)} on {sensor}"
-        grids = None
-    elif grids is None or not labels:
-        grids, sensor = None, counted(array.taxels, "taxel")
-    else:
-        sensor = f"a grid of {array.rows} x {array.columns} taxels"
-        others = [label for label in labels if _listed(recipes[grids], label) is None]
-        known = any(_is_known(recipes, label) for label in others)
-        ends = [_own(recipes[grids], label) for label in labels]
-        subject = f"{'kinds of touch' if None in ends else ' and '.join(labels)} on {sensor}"
-        if not known and not any(map(_is_of_step, others)):
-            return grids, subject
-        if None not in ends and len(set(ends)) == len(ends):
-            steps = grids, subject
+    array, touch = source.array, recipe_for["grids"]
+    is_grid = array.taxels > 1 and array._has_neighbours
     many = array.taxels > _MOST_CHANNELS
-    for unit in (f"many {source.unit}",) * (many or not array.is_channels) + (source.unit,):
-        by_taxel = unit == source.unit
-        if unit in recipe_for and not (steps and by_taxel and array.taxels > _MOST_BY_TAXEL):
-            return recipe_for[unit], f"frames in {source.unit}"
-    if steps is None and grids is not None and many and not known:
-        # The levels of `_ANY`, 22 trains a taxel, take minutes.
-        steps = grids, sensor
-    return steps or (_ANY, f"{sensor} in {source.unit}")
+    ends = [neuron_of(touch, label) for label in labels]
+    steps = [label for label in labels if _end(label) == "foot_off" or _OF_STEPS & set(spelling(label).split("_"))]
+    are_apart = None not in ends and len(set(ends)) == len(ends)
+    # The levels of `_ANY`, 22 trains a taxel, take minutes on many taxels.
+    may_be_touches = bool(labels) and (is_grid or rests) and (not steps or are_apart or (is_grid and many))
+    unit = f"many {source.unit}" if is_grid or many else source.unit
+    unit = unit if unit in recipe_for else source.unit
+    of_unit = bool(steps) or not labels or (not is_grid and len(labels) == 1 and ends != ["lift"])
+    too_many = may_be_touches and unit == source.unit and array.taxels > _MOST_BY_TAXEL
+    if (of_unit or not may_be_touches) and unit in recipe_for and not too_many:
+        return recipe_for[unit], f"frames in {source.unit}"
+    sensor = f"a grid of {array.rows} x {array.columns} taxels"
+    if not is_grid:
+        sensor = counted(array.taxels, "channel" if array.is_channels else "taxel")
+    if not may_be_touches:
+        return _ANY, f"{sensor} in {source.unit}"
+    return touch, f"{'kinds of touch' if None in ends else ' and '.join(labels)} on {sensor}"
 
 
 def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
@@ -213,12 +173,11 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
     kinds = rest is None or isinstance(rest, Mapping)
     if not kinds:
         rest = listed[text("recipe: other", rest, listed)]
-    named = {label: _listed(values, text("label", label)) for label in labels}
-    last = {label: _own(values, label) or _listed(values, spelling(label).rpartition("_")[2]) for label in labels}
+    known = {label: _neuron(values, text("label", label)) for label in labels}
     neurons = {}
-    for label in labels:
-        alone = not kinds or sum(last[label] in (named[kind], last[kind]) for kind in labels) == 1
-        neuron = listed.get(label, listed.get(named[label] or (last[label] if alone else None), rest))
+    for label, (name, how) in known.items():
+        alone = not kinds or sum(name == other for other, _ in known.values()) == 1
+        neuron = listed.get(label, listed.get(name, rest) if how == "listed" or alone else rest)
         if neuron is None:
             raise ProblemError(
                 f"recipe: is for {' and '.join(listed)}, not for {shown(label)}: leave this label out, or choose "
@@ -226,17 +185,6 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
             )
         neurons[label] = dict(neuron)
     return {**values, "neurons": neurons}
-
-
-def knows(recipe: str, label: str) -> bool:
-    """Return whether a recipe itself names a label, as a neuron or in `also`; names of steps are not names of touches.
-
-    Examples
-    --------
-    >>> knows("touch", "Lift"), knows("touch", "foot_off")
-    (True, False)
-    """
-    return _listed(read(recipe), text("label", label)) is not None
 
 
 def neuron_of(recipe: str, label: str) -> str | None:
@@ -247,7 +195,8 @@ def neuron_of(recipe: str, label: str) -> str | None:
     >>> neuron_of("touch", "left toe off"), neuron_of("touch", "Grip"), neuron_of("touch", "ball")
     ('lift', 'contact', None)
     """
-    return _own(read(recipe), text("label", label))
+    name, how = _neuron(read(recipe), text("label", label))
+    return None if how == "word" else name
 
 
 def kinds(recipe: str, labels: Sequence[str]) -> tuple[str, ...]:
@@ -277,34 +226,20 @@ def names_of(recipe: str, end: str) -> str:
     return ", ".join((end, *(name for name, kind in read(recipe).get("also", {}).items() if kind == end)))
 
 
-def _listed(values: Mapping[str, Any], label: str) -> str | None:
-    """Return the name of the neuron that a recipe itself lists for a label, or None."""
-    plain = spelling(label)
-    name = values.get("also", {}).get(plain, plain)
-    return name if name in values.get("neurons", {}) else None
+def _neuron(values: Mapping[str, Any], label: str) -> tuple[str | None, str]:
+    """Return the name of the neuron that a recipe has for a label, and how it is known: "listed", "end" or "word"."""
+    plain, end, also = spelling(label), _end(label), values.get("also", {})
+    word = plain.rpartition("_")[2]
+    known = {"listed": (plain, also.get(plain)), "end": (end, _SAME_END.get(end)), "word": (word, also.get(word))}
+    found = ((name, how) for how, names in known.items() for name in names if name in values.get("neurons", {}))
+    return next(found, (None, ""))
 
 
-def _is_known(recipes: Mapping[str, Mapping[str, Any]], label: str) -> bool:
-    """Whether any of some recipes lists a label."""
-    return any(_listed(values, label) for values in recipes.values())
-
-
-def _own(values: Mapping[str, Any], label: str) -> str | None:
-    """Return the name of the recipe's neuron for a label: that it lists, or that of an end of a step; or None."""
-    end = _end(label)
-    names = (_listed(values, label), end, _SAME_END.get(end or ""))
-    return next((name for name in names if name in values.get("neurons", {})), None)
-
-
-def _end(label: str) -> str | None:
+def _end(label: str) -> str:
     """Return which end of a step a label names, of a side or of none: "contact", "foot_off", or "lift" of any load."""
     plain = spelling(label)
     side, _, name = plain.partition("_")
-    return _ENDS.get(plain) or (_ENDS.get(name) if side in _SIDES else None)
-
-
-def _is_of_step(label: str) -> bool:
-    return _end(label) == "foot_off" or bool(_OF_STEPS & set(spelling(label).split("_")))
+    return _ENDS.get(plain) or _ENDS.get(name if side in _SIDES else "", "")
 
 
 def spelling(label: str) -> str:
