@@ -1,7 +1,6 @@
 """What is computed together is what the plain way gives: every fold trained anew, every table counted alone."""
 
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -107,21 +106,6 @@ def fano(prior, wrong, trials, confidence):
     return entropy(prior) - (entropy(prior) + entropy(joint.sum(0)) - entropy(joint))
 
 
-def extrapolated(table, seed):
-    """Return the parabola's value at 0 through all, half and a quarter of the trials, five times dealt out."""
-    random = np.random.default_rng(seed)
-    cells = [cell for cell, count in enumerate(table.ravel()) for _ in range(count)]
-    means = [float(plug_in(table))]
-    for parts in (2, 4):
-        ends, values = np.linspace(0, len(cells), parts + 1).astype(int), []
-        for _ in range(5):
-            dealt = random.permutation(cells)
-            for a, b in pairwise(ends):
-                values.append(float(plug_in(np.bincount(dealt[a:b], minlength=table.size).reshape(table.shape))))
-        means.append(np.mean(values))
-    return np.clip((8 * means[0] - 6 * means[1] + means[2]) / 3, 0, entropy(table.sum(1) / table.sum()))
-
-
 @settings(deadline=None, max_examples=25)
 @given(
     st.integers(2, 4), st.integers(8, 40), st.integers(1, 3), st.sampled_from([0.2, 0.7, 0.97, 1.0]), st.integers(0, 99)
@@ -134,7 +118,6 @@ def test_an_estimate_is_that_of_tables_counted_one_by_one(classes, trials, draws
     tables = [table_of(row, one, classes) for one in said]
     assert found.counts.tolist() == [table.tolist() for table in tables]
     assert found.plug_in == pytest.approx(np.mean([plug_in(table) for table in tables]), abs=1e-9)
-    assert found.extrapolated == pytest.approx(np.mean([extrapolated(table, seed) for table in tables]), abs=1e-9)
     if draws == 1:
         assert found.bits == panzeri_treves(tables[0])
         redraw, redrawn = np.random.default_rng(seed), []

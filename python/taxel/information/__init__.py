@@ -8,7 +8,6 @@ from taxel.information.bits import (
     local_information,
     panzeri_treves,
     plug_in,
-    quadratic_extrapolation,
     relevant_responses,
 )
 from taxel.information.estimate import Estimate, ZeroTest, estimate, zero_test
@@ -37,7 +36,6 @@ __all__ = [
     "notes_as_trials",
     "panzeri_treves",
     "plug_in",
-    "quadratic_extrapolation",
     "read_trials",
     "recordings_as_trials",
     "relevant_responses",

@@ -8,10 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._base.arguments import shown
 from taxel._base.errors import refused
 
-#: Labels that one call of NumPy sorts or looks up (30 ms for texts): Ctrl-C is answered between calls.
-_AT_ONCE = 1 << 17
-
-__all__ = ["belonging", "distinct", "labelled", "numbered", "one_label_a_group", "words"]
+__all__ = ["belonging", "labelled", "one_label_a_group", "words"]
 
 
 def words(name: str, values: ArrayLike) -> NDArray[np.generic]:
@@ -27,27 +24,12 @@ def words(name: str, values: ArrayLike) -> NDArray[np.generic]:
     return column
 
 
-def distinct(column: NDArray[np.generic]) -> NDArray[np.generic]:
-    """Return each label of a column once, in ascending order."""
-    parts = [np.unique(column[first : first + _AT_ONCE]) for first in range(0, len(column), _AT_ONCE)]
-    return np.unique(np.concatenate(parts)) if len(parts) > 1 else np.unique(column)
-
-
-def numbered(classes: NDArray[np.generic], column: NDArray[np.generic]) -> NDArray[np.int64]:
-    """Return the place of each label among the classes, which are in ascending order and hold all of them."""
-    flat, ranks = column.ravel(), np.empty(column.shape, np.int64)
-    for first in range(0, len(flat), _AT_ONCE):
-        piece = slice(first, first + _AT_ONCE)
-        ranks.ravel()[piece] = np.searchsorted(classes, flat[piece])
-    return ranks
-
-
 def belonging(groups: ArrayLike, trials: int) -> NDArray[np.int64]:
     """Return the number of each trial's group."""
     names = words("groups", groups)
     if len(names) != trials:
         raise refused("groups", f" has {len(names)} entries: must be {trials}, one per trial")
-    return numbered(distinct(names), names)
+    return np.asarray(np.unique(names, return_inverse=True)[1])
 
 
 def one_label_a_group(row: NDArray[np.int64], groups: NDArray[np.int64]) -> bool:

@@ -6,12 +6,10 @@ takes one table or a stack of them, and all trials count alike.
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import integer, numbers, shown
+from taxel._base.arguments import numbers, shown
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.information._labels import words
@@ -23,12 +21,8 @@ __all__ = [
     "local_information",
     "panzeri_treves",
     "plug_in",
-    "quadratic_extrapolation",
     "relevant_responses",
 ]
-
-#: Cells that one call of NumPy works on: Ctrl-C is answered between calls.
-_AT_ONCE = 1 << 20
 
 
 def confusion_matrix(
@@ -164,11 +158,7 @@ def relevant_responses(counts: ArrayLike) -> NDArray[np.int64]:
     [8, 1]
     """
     table = _counts(counts)
-    rows = table.reshape(-1, table.shape[-1])
-    relevant = np.empty(len(rows), np.int64)
-    for block in _blocks(*rows.shape):
-        relevant[block] = _relevant(rows[block])
-    return np.asarray(relevant.reshape(table.shape[:-1]))
+    return _relevant(table.reshape(-1, table.shape[-1])).reshape(table.shape[:-1])
 
 
 def _relevant(rows: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -246,60 +236,6 @@ def corrected(counts: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(plug_in(table) - bias)
 
 
-def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: int = 0) -> float:
-    """Return the mutual information in bits, extrapolated from half and a quarter of the trials to endlessly many.
-
-    This is a second estimate beside `panzeri_treves`. Their agreement does not prove them right: both err alike where
-    trials are few.
-
-    Parameters
-    ----------
-    counts : int, shape (labels, responses), 0 or more
-    repetitions : int, 1 or more
-        Number of times the trials are dealt out.
-    seed : int, 0 or more
-
-    Returns
-    -------
-    float, bits, within 0 and the labels' entropy
-
-    Raises
-    ------
-    ProblemError : invalid counts, or fewer than four trials
-
-    Notes
-    -----
-    Strong et al. (1998), Phys. Rev. Lett. 80:197: the parabola in 1/N through the means at N, N/2 and N/4 trials.
-    Parts are dealt out of the answers, so the method does not see that a classifier is worse with fewer trials.
-
-    Examples
-    --------
-    >>> round(quadratic_extrapolation([[80, 20], [30, 70]]), 2)
-    0.19
-    """
-    table = _table(counts)
-    if table.ndim != 2:
-        raise refused("counts", f" has shape {table.shape}: must be (labels, responses)")
-    rounds, random = integer("repetitions", repetitions, 1), np.random.default_rng(integer("seed", seed, 0))
-    trials = int(table.sum())
-    if trials < 4:
-        raise refused(
-            "counts", f" contains {trials} trials: must contain at least 4, because they are divided into four parts"
-        )
-    cells = np.repeat(np.arange(table.size), table.ravel())
-    means = [float(plug_in(table))]
-    for parts in (2, 4):
-        ends = np.linspace(0, trials, parts + 1).astype(int)
-        tables = []
-        for _ in range(rounds):
-            dealt = random.permutation(cells)
-            tables += [np.bincount(dealt[a:b], minlength=table.size) for a, b in pairwise(ends)]
-        means.append(float(np.mean(plug_in(np.reshape(tables, (-1, *table.shape))))))
-    # The value at 0 of the parabola through (1, whole), (2, half) and (4, quarter), in units of 1/N.
-    at_zero = (8 * means[0] - 6 * means[1] + means[2]) / 3
-    return float(np.clip(at_zero, 0.0, label_entropy(table)))
-
-
 def local_information(counts: ArrayLike) -> NDArray[np.float64]:
     """Return log2 p(response | label) / p(response) of each cell, in bits: its mean over trials is `plug_in`.
 
@@ -323,13 +259,7 @@ def local_information(counts: ArrayLike) -> NDArray[np.float64]:
     table = _table(counts).astype(np.float64)
     total = table.sum((-1, -2), keepdims=True)
     expected = table.sum(-1, keepdims=True) * table.sum(-2, keepdims=True)
-    bits = np.zeros_like(table)
-    flat = [np.broadcast_to(x, table.shape).reshape(-1, table.shape[-1]) for x in (table, total, expected)]
-    for block in _blocks(*flat[0].shape):
-        here, block_total, even = (x[block] for x in flat)
-        ratio = np.divide(here * block_total, even, out=np.ones_like(here), where=here > 0)
-        bits.reshape(-1, table.shape[-1])[block] = np.log2(ratio)
-    return np.asarray(bits)
+    return np.asarray(np.log2(np.divide(table * total, expected, out=np.ones_like(table), where=table > 0)))
 
 
 def _once(p: NDArray[np.float64], trials: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -339,19 +269,8 @@ def _once(p: NDArray[np.float64], trials: NDArray[np.int64]) -> NDArray[np.float
 
 
 def _entropy(counts: NDArray[np.int64]) -> NDArray[np.float64]:
-    rows = counts.reshape(-1, counts.shape[-1])
-    total, entropy = np.maximum(rows.sum(-1, keepdims=True), 1), np.zeros(len(rows))
-    for block in _blocks(*rows.shape):
-        for part in _blocks(rows.shape[1], 1):
-            p = rows[block, part] / total[block]
-            entropy[block] -= (p * np.log2(np.where(p > 0, p, 1.0))).sum(-1)
-    return np.asarray(entropy.reshape(counts.shape[:-1]) + 0.0)
-
-
-def _blocks(rows: int, columns: int) -> list[slice]:
-    """Return the rows of a table as slices of about `_AT_ONCE` cells."""
-    step = max(1, _AT_ONCE // max(1, columns))
-    return [slice(first, first + step) for first in range(0, rows, step)]
+    p = counts / np.maximum(counts.sum(-1, keepdims=True), 1)
+    return np.asarray(0.0 - (p * np.log2(np.where(p > 0, p, 1.0))).sum(-1))
 
 
 def _counts(counts: ArrayLike) -> NDArray[np.int64]:

@@ -13,14 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._base.arguments import callback, finite, integer, number, shown
 from taxel._base.errors import refused
 from taxel._core import ProblemError
-from taxel.information._labels import belonging, distinct, numbered, one_label_a_group, words
+from taxel.information._labels import belonging, one_label_a_group, words
 from taxel.information.bits import (
     corrected,
     label_entropy,
     local_information,
     panzeri_treves,
     plug_in,
-    quadratic_extrapolation,
     relevant_responses,
 )
 
@@ -30,8 +29,6 @@ __all__ = ["Estimate", "ZeroTest", "estimate", "zero_test"]
 TRIALS_A_RESPONSE = 7
 #: Cells in memory at a time while trials are redrawn.
 _CELLS = 1 << 21
-#: Units that are redrawn, or trials that are counted, by one call of NumPy.
-_DRAWN = 1 << 19
 #: Number of counts that distinguishes shares finely enough.
 _FINE = 1 << 36
 
@@ -50,8 +47,8 @@ class Estimate:
         % at 40. If fewer trials were named wrongly than there are labels, redraws miss errors that did not occur. The
         interval then reaches down to what Fano's inequality leaves with the largest share of errors that so few allow
         (Clopper and Pearson, trial by trial).
-    plug_in, extrapolated : float, bits
-        As counted, and by `quadratic_extrapolation`. That the three agree does not mean that they are right.
+    plug_in : float, bits
+        As counted.
     corrected : float, bits
         As counted, minus the bias of Panzeri and Treves; the mean over draws. With few trials it may be below 0 or
         above `most`.
@@ -70,7 +67,6 @@ class Estimate:
     bits: float
     interval: tuple[float, float]
     plug_in: float
-    extrapolated: float
     corrected: float
     most: float
     right: float
@@ -85,7 +81,6 @@ class Estimate:
             "bits": round(self.bits, 4),
             "interval": [round(end, 4) for end in self.interval],
             "plug_in": round(self.plug_in, 4),
-            "extrapolated": round(self.extrapolated, 4),
             "corrected": round(self.corrected, 4),
             "most": round(self.most, 4),
             "right": round(self.right, 4),
@@ -179,8 +174,8 @@ def estimate(
     rounds, random = integer("redraws", redraws, 2), np.random.default_rng(integer("seed", seed, 0))
     if (truth.dtype.kind == "U") != (answered.dtype.kind == "U"):
         raise ProblemError("labels and responses are of two kinds: must both be texts, or both numbers")
-    classes = np.unique(np.concatenate([distinct(truth), distinct(answered.ravel())]))
-    row, column = numbered(classes, truth), numbered(classes, answered)
+    classes = np.union1d(truth, answered)
+    row, column = (np.searchsorted(classes, names) for names in (truth, answered))
     if len(np.unique(row)) < 2:
         raise refused(
             "labels",
@@ -204,9 +199,6 @@ def estimate(
         bits=bits,
         interval=interval,
         plug_in=float(np.mean(plug_in(counts))),
-        extrapolated=float(np.mean([quadratic_extrapolation(c, repetitions=5, seed=seed) for c in counts]))
-        if len(truth) >= 4
-        else bits,
         corrected=float(np.mean(corrected(counts))),
         most=most,
         right=float(np.mean(answered == truth)),
@@ -219,8 +211,8 @@ def estimate(
 
 def bits_of(labels: NDArray[Any], responses: Sequence[NDArray[Any]]) -> float:
     """Return the bits of draws of responses, without an interval; each response is a label."""
-    classes = distinct(labels)
-    cells = numbered(classes, labels) * len(classes) + numbered(classes, np.stack(responses))
+    classes = np.unique(labels)
+    cells = np.searchsorted(classes, labels) * len(classes) + np.searchsorted(classes, np.stack(responses))
     return float(_held(_tables(cells, np.ones((1, len(labels)), np.int64), len(classes)))[0])
 
 
@@ -302,13 +294,9 @@ def _tables(cells: NDArray[np.int64], weights: NDArray[Any], classes: int) -> ND
     """Return the tables of each redraw and draw, shape (redraws, draws, labels, labels)."""
     draws = np.atleast_2d(cells)
     tables = np.zeros((len(draws), len(weights) * classes**2))
-    # In pieces, as one NumPy call does not answer Ctrl-C; sums of whole numbers are exact.
-    step = max(1, _DRAWN // len(weights))
     for d, cell in enumerate(draws):
-        for first in range(0, len(cell), step):
-            piece = slice(first, first + step)
-            flat = np.arange(len(weights))[:, None] * classes**2 + cell[piece]
-            tables[d] += np.bincount(flat.ravel(), weights[:, piece].ravel(), tables.shape[1])
+        flat = np.arange(len(weights))[:, None] * classes**2 + cell
+        tables[d] = np.bincount(flat.ravel(), weights.ravel(), tables.shape[1])
     shaped = np.rint(tables).astype(np.int64).reshape(len(draws), len(weights), classes, classes).swapaxes(0, 1)
     return np.ascontiguousarray(shaped if cells.ndim == 2 else shaped[:, 0])
 
@@ -350,7 +338,7 @@ def _interval(
         count = min(at_once, redraws - first)
         weights = np.zeros((count, len(owner)), np.int64)
         for group in members:
-            weights[:, group] = _redrawn(random, len(group), count)
+            weights[:, group] = random.multinomial(len(group), np.full(len(group), 1 / len(group)), size=count)
         estimates.append(_held(_tables(cells, weights[:, units], classes)))
     redrawn = np.concatenate(estimates)
     ends = np.quantile(redrawn, [(1 - confidence) / 2, (1 + confidence) / 2]) - redrawn.mean()
@@ -359,32 +347,6 @@ def _interval(
         wider = scipy.special.stdtrit(free, (1 + confidence) / 2) / scipy.special.ndtri((1 + confidence) / 2)
         ends *= wider * np.sqrt(len(owner) / free)
     return float(min(ends[0], 0.0)), float(max(ends[1], 0.0))
-
-
-def _redrawn(random: np.random.Generator, units: int, count: int) -> NDArray[np.int64]:
-    """Return how often each of so many units is drawn, with replacement, in `count` redraws; shape (count, units).
-
-    The numbers are those of one call of ``random.multinomial``. That draws binomials one after the other and answers
-    Ctrl-C after the last of them, so many units are drawn in several calls, each with what is left over.
-    """
-    share = np.full(units, 1 / units)
-    if units <= _DRAWN:
-        return np.asarray(random.multinomial(units, share, size=count))
-    # The conditional probabilities of one call, with the rounding of its running difference.
-    chance = share / np.subtract.accumulate(np.concatenate([[1.0], share[:-1]]))
-    draws = np.zeros((count, units), np.int64)
-    for row in draws:
-        left = units
-        for first in range(0, units - 2, _DRAWN):
-            some = chance[first : min(first + _DRAWN, units - 2)]
-            open_before = np.cumprod(np.concatenate([[1.0], 1 - some]))
-            pieces = random.multinomial(left, np.append(some * open_before[:-1], open_before[-1]))
-            row[first : first + len(some)] = pieces[:-1]
-            left = int(pieces[-1])
-        # At a chance of one half a binomial is drawn the other way round, so the last two units take it as it was.
-        row[-2] = random.binomial(left, chance[-2])
-        row[-1] = left - row[-2]
-    return draws
 
 
 def _left_open(prior: NDArray[np.float64], wrong: int, trials: int, confidence: float) -> float:
