@@ -45,7 +45,7 @@ def test_the_board_keeps_the_recipe_and_slower_events_take_whole_frames() -> Non
     slow = in_frames(recipe, [Example(events, {})], [(10_000.0, 1)])
     assert slow.neurons["small"]["delay_ms"] == 10.0
     assert slow.neurons["small"]["kernel"] == "alpha"
-    assert {1: slow.neurons["contact"]} == {1: recipe.neurons["contact"]}
+    assert slow.points_of("contact") == recipe.points_of("contact")
 
 
 @pytest.mark.parametrize("seed", seeds(2, quick=1))

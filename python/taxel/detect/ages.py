@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from taxel.array import Array
 from taxel.detect.examples import Example
 from taxel.detect.loads import Clock, frame_ms
-from taxel.detect.recipe import Recipe
+from taxel.detect.recipe import Point, Recipe
 from taxel.encode import Composite, Encoder
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -143,26 +143,23 @@ def in_frames(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cloc
     def begin_ms(frames: int) -> float:
         return max(0.0, to_ms(round(to_us((frames - early) * period_ms))))
 
-    def point(values: Mapping[str, Any], under: Mapping[str, Any], seen: dict[int, float]) -> dict[str, Any] | None:
-        merged = {**under, **values}
+    def framed(point: Point, seen: dict[int, float]) -> Point | None:
+        merged = {**recipe.learner, **point.values}
         if not _aged(recipe, merged):
-            return dict(values)
+            return point
         frames = count(_delay_ms(merged))
         if seen.setdefault(frames, _delay_ms(merged)) != _delay_ms(merged):
             return None
         used.add(frames)
         refractory = max(float(merged.get("refractory", Neuron().refractory)), _SILENT_SHARE * period_ms)
-        changed = {**values, "delay_ms": begin_ms(frames), "refractory": refractory}
+        changed = {**point.values, "delay_ms": begin_ms(frames), "refractory": refractory}
         if frames_ms and float(merged.get("tau", Neuron().tau)) < period_ms:
             changed |= {"kernel": "exponential", "tau": _TAU_SHARE * period_ms, "step_ms": _STEP_SHARE * period_ms}
-        return changed
+        return point._replace(values=changed)
 
-    def neuron(values: Mapping[str, Any]) -> dict[str, Any]:
-        first = {name: value for name, value in values.items() if name != "choose"}
-        under, seen = {**recipe.learner, **first}, dict[int, float]()
-        changed = point(first, recipe.learner, seen) or dict(first)
-        tried = [point(listed, under, seen) for listed in values.get("choose", ())]
-        return changed | ({"choose": [point for point in tried if point is not None]} if "choose" in values else {})
+    def each_framed(label: str) -> list[Point]:
+        seen: dict[int, float] = {}
+        return [found for point in recipe.points_of(label) if (found := framed(point, seen)) is not None]
 
     def encoder(part: Encoder) -> Encoder:
         ages = getattr(part, "ages_ms", None)
@@ -171,10 +168,11 @@ def in_frames(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cloc
         counts = {count(age) for age in ages} | used | {number + 1 for number in used}
         return copy(part).set_params(ages_ms=[begin_ms(number) for number in sorted(counts)])
 
-    neurons = {label: neuron(values) for label, values in recipe.neurons.items()}
+    points = {label: each_framed(label) for label in recipe.neurons}
     composite = recipe.encoder
     parts = {name: encoder(part) for name, part in composite.parts.items()} if isinstance(composite, Composite) else {}
-    return replace(recipe, encoder=Composite(parts) if parts else encoder(composite), neurons=neurons)
+    of_frames = replace(recipe, encoder=Composite(parts) if parts else encoder(composite), neurons={})
+    return of_frames._with_points(points)
 
 
 def _aged(recipe: Recipe, values: Mapping[str, Any]) -> bool:

@@ -208,7 +208,7 @@ class Fitter:
                 if error.hint != "unfelt" or rules[label] is None:
                     raise
                 warn(f"{label}: its neuron feels nothing and never fires; its plain rule detects it", stacklevel=4)
-                silent, points[label] = self._silent(plan, label), plan.points_of(label)[0]
+                silent, points[label] = self._silent(plan, label), plan.points_of(label)[0].values
                 learners[label], delays[label] = silent, silent.delay_ms
                 continue
             learners[label], points[label], delays[label] = best.learner, best.point, best.delay_ms
@@ -224,7 +224,7 @@ class Fitter:
     def _silent(self, plan: Recipe, label: str) -> TrainedNeuron:
         """Return a neuron that never fires."""
         learner, delay_ms = plan.learner_of(label)
-        _, trains = self._received(plan, plan.points_of(label)[0])
+        _, trains = self._received(plan, plan.points_of(label)[0].values)
         return TrainedNeuron(learner._on_grid(), np.zeros(len(trains[0])), delay_ms)
 
     def decided(self, parts: Sequence[Part]) -> Trained:
@@ -336,13 +336,13 @@ class Fitter:
         count = sum(map(len, self.labels_in(label, parts)))
         best, refused = None, None
         try:
-            best = self._fitted(plan, label, points[0], parts, rule)
+            best = self._fitted(plan, label, points[0].values, parts, rule)
         except ProblemError as error:
             if error.hint != "unfelt":
                 raise
             refused = error
         usual = max(_FEWER, _FEWER_SHARE * count)
-        for point, stated in zip(points[1:], plan._fewer_of(label), strict=True):
+        for point, stated in points[1:]:
             fewer = usual if stated is None else stated
             wrong, fewer = (count, min(max(1, fewer), count)) if best is None else (best.wrong, fewer)
             if wrong < fewer:

@@ -7,7 +7,7 @@ import json
 import os
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from taxel._base.arguments import finite, flag, instance, integer, mapping, number, parameters, several, shown, text
 from taxel._base.errors import helped, refused
@@ -23,6 +23,21 @@ __all__ = ["Recipe", "change_values", "learner_from", "with_floor"]
 
 #: Keys of a recipe's file that a recipe does not hold: which recordings it fits, whose parameters other labels have.
 _OF_THE_FILE = ("fits", "also", "other")
+
+
+class Point(NamedTuple):
+    """Hold parameters of a neuron that a training tries.
+
+    Attributes
+    ----------
+    values : mapping
+        Those of all neurons not among them.
+    fewer : int, 0 or more, optional
+        With so many fewer mistakes it counts; None: as usual (`Recipe`).
+    """
+
+    values: Mapping[str, Any]
+    fewer: int | None = None
 
 
 @dataclass(frozen=True)
@@ -89,10 +104,8 @@ class Recipe:
             raise refused("neurons", f" is {shown(self.neurons)}: must be parameters by label")
         learner_from("learner", self.learner)
         for label in self.neurons:
-            self.learner_of(text("label", label))
-            for point in self.points_of(label):
-                self._checked(f"neurons.{label}.choose", {**self.learner, **point})
-            self._fewer_of(label)
+            for k, point in enumerate(self.points_of(label)):
+                self._checked(f"neurons.{label}{'.choose' * (k > 0)}", point.values)
 
     def learner_of(self, label: str) -> tuple[ConeR, float]:
         """Return the learner of a label, not yet fitted, and the delay with which it is trained.
@@ -116,14 +129,11 @@ class Recipe:
         >>> Recipe(LevelCrossing([1.0]), {"delay_ms": 1.0}, {"contact": {"ub": 2.0}}).learner_of("contact")[1]
         1.0
         """
-        listed = self.neurons.get(text("label", label), {})
-        if not isinstance(listed, Mapping):
-            raise ProblemError(f"neurons.{label} is {shown(listed)}: must be parameters by name")
-        return self._checked(f"neurons.{label}", self._of(label))
+        return self._checked(f"neurons.{label}", self.points_of(label)[0].values)
 
     def _checked(self, location: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
         """Return the learner and the delay of one point, whose inputs exist and whose delay is one of their ages."""
-        learner, delay_ms = learner_from(location, values)
+        learner, delay_ms = learner_from(location, {**self.learner, **values})
         try:
             parts = self._received(values)._each()
         except ProblemError as error:
@@ -173,14 +183,10 @@ class Recipe:
         >>> Recipe(encoder, neurons={"contact": {"inputs": ["area"]}, "ball": {}}).inputs_of("contact")
         ('area',)
         """
-        return tuple(several("inputs", self._of(label).get("inputs", ())))
+        return tuple(several("inputs", {**self.learner, **self.points_of(label)[0].values}.get("inputs", ())))
 
-    def _of(self, label: str) -> dict[str, Any]:
-        """Return the parameters of a label's neuron, those for all among them."""
-        return {**self.learner, **self.points_of(label)[0]}
-
-    def points_of(self, label: str) -> list[dict[str, Any]]:
-        """Return the parameters of a label's neuron, and behind them the others that every training tries.
+    def points_of(self, label: str) -> list[Point]:
+        """Return the parameters of a label's neuron, and behind them others that every training tries.
 
         Parameters
         ----------
@@ -195,64 +201,50 @@ class Recipe:
         >>> from taxel.encode import LevelCrossing
         >>> recipe = Recipe(LevelCrossing([1.0]), {}, {"contact": {"ub": 2.0, "choose": [{"ub": 3.0, "fewer": 0}]}})
         >>> recipe.points_of("contact")
-        [{'ub': 2.0}, {'ub': 3.0}]
+        [Point(values={'ub': 2.0}, fewer=None), Point(values={'ub': 3.0}, fewer=0)]
         """
-        values = self.neurons.get(text("label", label), {})
-        first = {name: value for name, value in values.items() if name != "choose"}
-        points = [{**first, **point} for point in self._listed(label)]
-        return [first, *({key: value for key, value in point.items() if key != "fewer"} for point in points)]
+        listed, name = self.neurons.get(text("label", label), {}), f"neurons.{label}.choose"
+        if not isinstance(listed, Mapping):
+            raise ProblemError(f"neurons.{label} is {shown(listed)}: must be parameters by name")
+        first = {key: value for key, value in listed.items() if key != "choose"}
+        points = [Point(first)]
+        for point in several(name, listed.get("choose", ())):
+            values = {**first, **mapping(name, point)}
+            fewer = values.pop("fewer", None)
+            points.append(Point(values, None if fewer is None else integer(f"{name}: fewer", fewer, 0)))
+        return points
 
-    def _fewer_of(self, label: str) -> list[int | None]:
-        """Return of each point behind the first how many fewer mistakes make it count; None: as usual.
-
-        Parameters
-        ----------
-        label : str
-
-        Raises
-        ------
-        ProblemError : a number that is not whole
-        """
-        stated = [point.get("fewer") for point in self._listed(label)]
-        return [None if fewer is None else integer(f"neurons.{label}.choose: fewer", fewer, 0) for fewer in stated]
-
-    def _listed(self, label: str) -> list[Mapping[str, Any]]:
-        """Return the points that a neuron lists, as they are written."""
-        name = f"neurons.{label}.choose"
-        return [mapping(name, point) for point in several(name, self.neurons.get(label, {}).get("choose", ()))]
+    def _with_points(self, points: Mapping[str, Sequence[Point]]) -> Recipe:
+        """Return the recipe with other points of its neurons, by label."""
+        neurons = {
+            label: {
+                **first.values,
+                "choose": [{**values, **({} if fewer is None else {"fewer": fewer})} for values, fewer in others],
+            }
+            for label, (first, *others) in points.items()
+        }
+        return replace(self, neurons=neurons)
 
     def _without_parts(self, names: Collection[str]) -> Recipe:
-        """Return the recipe without some parts of a composite encoder, and without the points that receive any of them.
+        """Return the recipe without the points that receive any of some parts of a composite encoder.
 
         Of a neuron whose first point is among these the next one is the first; one without any other keeps it.
 
         Parameters
         ----------
         names : collection of str
-
-        Raises
-        ------
-        ProblemError : parts without which a neuron has nothing left that it can receive
         """
-        if not isinstance(self.encoder, Composite) or not names:
+        if not isinstance(self.encoder, Composite):
             return self
         parts = self.encoder.parts
 
-        def left(label: str) -> dict[str, Any]:
+        def left(label: str) -> list[Point]:
             points = self.points_of(label)
-            stated = [{}, *self._listed(label)]
-            kept = [
-                point | ({"fewer": listed["fewer"]} if "fewer" in listed else {})
-                for point, listed in zip(points, stated, strict=True)
-                if not set(names) & set(point.get("inputs", self.learner.get("inputs", parts)))
-            ]
-            if len(kept) == len(points) or not kept:
-                return dict(self.neurons[label])
-            first, *others = kept
-            first.pop("fewer", None)
-            return {**first, **({"choose": others} if others else {})}
+            inputs = [{**self.learner, **point.values}.get("inputs", parts) for point in points]
+            kept = [point for point, of_point in zip(points, inputs, strict=True) if not set(names) & set(of_point)]
+            return kept or points
 
-        return replace(self, neurons={label: left(label) for label in self.neurons})
+        return self._with_points({label: left(label) for label in self.neurons})
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Recipe:
