@@ -149,3 +149,15 @@ def test_a_training_and_a_detection_warn_of_it(tmp_path: Path) -> None:
         assert int(line.rpartition("--shift-ms ")[2].rstrip(")")) == pytest.approx(-300, abs=10)
     for warnings in (taxel.train(recording, [truth]).warnings, taxel.tasks.detect(rule, recording, [truth]).warnings):
         assert warnings == ()
+
+
+@pytest.mark.parametrize("late_ms", [-80, 60, 120])
+def test_by_how_much_the_labels_of_one_name_are_off_what_was_felt_is_taken_off(tmp_path: Path, late_ms: int) -> None:
+    frames, truth = pressed(4, 20)
+    taxel.convert(frames, tmp_path / "a.npz")
+    labels = {"contact": truth["contact"] + 1000 * late_ms, "lift": truth["lift"]}
+    training = taxel.train(taxel.open(tmp_path / "a.npz"), [labels], taxel.tasks.TrainOptions(folds=0))
+    assert training.constants_ms == {"contact": pytest.approx(late_ms, abs=10)}
+    assert training.score.rank[0] == 0
+    assert any(line.startswith("contact: labels are ") for line in training.lines())
+    assert training.to_dict()["constants_ms"] == training.constants_ms

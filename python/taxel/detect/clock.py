@@ -338,8 +338,37 @@ def off_loads(examples: Sequence[Example]) -> list[str]:
     examples : sequence of Example, checked
         Nothing is known where one has no tare, or is of spike trains.
     """
+    return _lines(examples, _beside_loads(examples), "where a load begins or ends", "loads")
+
+
+def constants_ms(examples: Sequence[Example]) -> dict[str, float]:
+    """Return by how much the labels of contacts, and those of lifts, are later than loads begin and end, ms.
+
+    Of each label whose offset is larger than labels are usually off, and the same for most of them; up to 200 ms, as
+    more may be those of other loads.
+
+    Parameters
+    ----------
+    examples : sequence of Example, checked
+        Nothing is known where one has no tare, is of spike trains, or has labels that are thresholds of a quantity.
+    """
+    if any(example.labels_of for example in examples):
+        return {}
+    beside, constants = _of_clock(examples, _beside_loads(examples)), {}
+    for label in sorted({label for _, label in beside if recipes.neuron_of("touch", label)}):
+        kinds = {kind: pair for kind, pair in beside.items() if kind[1] == label}
+        fit = next(iter(explain(kinds)), None)
+        if fit is None or fit.rate != 1.0 or not fit.is_off or abs(fit.shift_ms) > REACHES_MS[-1]:
+            continue
+        if fit.explained >= _MOST * sum(len(labels) for labels, _ in kinds.values()):
+            constants[label] = fit.shift_ms
+    return constants
+
+
+def _beside_loads(examples: Sequence[Example]) -> dict[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Return the labels of each example, and the begins or ends of loads that they are of, us."""
     if any(example.tare is None or isinstance(example.source, SpikeTrains) for example in examples):
-        return []
+        return {}
     # Late labels let a tare end in a touch.
     early = [example if (tare := early_part(example)) is None else example._replace(tare=tare) for example in examples]
     quantity, threshold = ("peak", PEAK) if lacks_neighbours(examples) else ("area", TOUCH)
@@ -352,7 +381,18 @@ def off_loads(examples: Sequence[Example]) -> list[str]:
         for label, times in example.labels.items():
             edges = {"contact": begins, "lift": ends}.get(recipes.neuron_of("touch", label) or "")
             of_kinds[k, label] = times, np.concatenate([begins, ends]) if edges is None else edges
-    return _lines(examples, of_kinds, "where a load begins or ends", "loads")
+    return of_kinds
+
+
+def _of_clock(
+    examples: Sequence[Example], of_kinds: Mapping[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.int64]]]
+) -> dict[tuple[int, str], tuple[_Times, _Times]]:
+    """Return labels and what they are compared with from the beginning of each example, ms, ascending."""
+    first_us = [_first_us(example) for example in examples]
+    return {
+        (k, label): (np.sort(labels - first_us[k]) / 1e3, np.sort(found - first_us[k]) / 1e3)
+        for (k, label), (labels, found) in of_kinds.items()
+    }
 
 
 def _lines(
@@ -362,11 +402,7 @@ def _lines(
     clock: str,
 ) -> list[str]:
     """Return the fits of which labels are off as lines."""
-    first_us = [_first_us(example) for example in examples]
-    kinds: dict[tuple[int, str], tuple[_Times, _Times]] = {
-        (k, label): (np.sort(labels - first_us[k]) / 1e3, np.sort(found - first_us[k]) / 1e3)
-        for (k, label), (labels, found) in of_kinds.items()
-    }
+    kinds = _of_clock(examples, of_kinds)
     total = sum(len(labels) for labels, _ in kinds.values())
     fits, lines = explain(kinds), []
     # Detections are a little early or late, which those that are in place show.

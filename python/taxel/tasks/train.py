@@ -17,7 +17,7 @@ from taxel._base.progress import Forecast, Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, Readout, Recipe, recipes, score
 from taxel.detect.board import of_training
-from taxel.detect.clock import off_loads
+from taxel.detect.clock import constants_ms, off_loads
 from taxel.detect.drift import training_data
 from taxel.detect.examples import check_examples, sizes_of
 from taxel.detect.fit import Fitter
@@ -160,10 +160,18 @@ def _train(
         warn(
             f"arrays of {len(sizes)} sizes, the smallest {smallest} taxels, are padded at their far edges to {largest}"
         )
+    constants = constants_ms(check_examples(examples))
+    examples = [
+        example._replace(
+            labels={label: times - round(1000.0 * constants.get(label, 0.0)) for label, times in example.labels.items()}
+        )
+        for example in examples
+    ]
     plan = options._plan(names, measured_floor(examples))
     assert plan is not None
     taken = [one for one in rests if isinstance(one, TakenRest)]
-    return replace(_Work(opened, examples, taken, options, update, workers).training(plan), unlabelled=unlabelled)
+    training = _Work(opened, examples, taken, options, update, workers).training(plan)
+    return replace(training, unlabelled=unlabelled, constants_ms=constants)
 
 
 def _like_labels(table: Events | Frames, events: Mapping[str, NDArray[np.int64]]) -> list[str]:

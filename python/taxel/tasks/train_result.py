@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from shlex import quote
 from typing import Any
 
@@ -52,6 +52,8 @@ class Training:
         labels are off what was felt, and what is the matter with the sensor.
     unlabelled : tuple of str
         The sources that no row of the labels names, where rows name sources: they are left out.
+    constants_ms : mapping of str to float, ms
+        By how much the labels of a name were later than what was felt, of those that were: it is taken off.
     """
 
     options: TrainOptions
@@ -63,6 +65,7 @@ class Training:
     rests: Sequence[TakenRest]
     warned: tuple[str, ...] = ()
     unlabelled: tuple[str, ...] = ()
+    constants_ms: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def readout(self) -> Readout:
@@ -133,6 +136,7 @@ class Training:
             "plain_rule": self.scored.plain.to_dict(),
             "rests": [taken.to_dict() for taken in self.rests],
             "shift_ms": self.options.shift_ms,
+            "constants_ms": dict(self.constants_ms),
             "fitted_levels": list(self.fitted_levels),
             "warnings": list(self.warnings),
             "unlabelled": list(self.unlabelled),
@@ -173,6 +177,9 @@ class Training:
         recipe = self.options.recipe
         if self.unlabelled:
             yield f"left out, because no row of labels names this source: {', '.join(self.unlabelled)}"
+        for label, ms in self.constants_ms.items():
+            side = "after" if ms > 0 else "before"
+            yield f"{label}: labels are {abs(ms):.0f} ms {side} what was felt, which is taken off them and off t"
         yield from self._aligned()
         if self.options.shift_ms:
             yield f"labels moved by {self.options.shift_ms:+g} ms before training (--shift-ms)"
