@@ -27,7 +27,6 @@ from taxel.detect.examples import Example, array_of, check_examples, name_of, si
 from taxel.detect.fitted_point import FittedPoint, Inputs
 from taxel.detect.floors import floor_alone, floor_of
 from taxel.detect.folds import Fold, Part, inside, split, whole
-from taxel.detect.levels import fit_levels
 from taxel.detect.loads import Loads, clock_of, lacks, lacks_neighbours
 from taxel.detect.plain_rule import PlainRule
 from taxel.detect.readout import Readout, run
@@ -63,15 +62,12 @@ class Trained(NamedTuple):
         Their neurons and the plain rules, and which of both runs.
     alignments : mapping of str to Alignment
         By how much its labels were moved to what the sensor felt, by label; empty where the recipe does not align them.
-    fitted_levels : bool
-        Whether the encoder's levels are of the training data (`Recipe`).
     """
 
     recipe: Recipe
     learners: Mapping[str, ConeR | TrainedNeuron]
     readout: Readout
     alignments: Mapping[str, Alignment]
-    fitted_levels: bool = False
 
 
 def fit(
@@ -196,7 +192,7 @@ class Fitter:
     def fit(self, parts: Sequence[Part] | None = None) -> Trained:
         """Return neurons and rules of parts of the examples, by default of all; the neurons run."""
         parts = self.whole if parts is None else parts
-        plan = fit_levels(self._recipe, self.examples, parts)
+        plan = self._recipe
         rules = self.rules(parts)
         learners: dict[str, ConeR | TrainedNeuron] = {}
         delays, alignments = {}, {}
@@ -218,8 +214,7 @@ class Fitter:
         readout = _readout_of(learners, delays, plan, self.array)
         known = {label: rule for label, rule in rules.items() if rule is not None}
         readout = readout._with(unit=self._unit, pads=self._pads)._with_rules(known)
-        fitted_levels = plan.encoder != self._recipe.encoder
-        return Trained(plan, learners, readout, alignments, fitted_levels)
+        return Trained(plan, learners, readout, alignments)
 
     def _silent(self, plan: Recipe, label: str) -> TrainedNeuron:
         """Return a neuron that never fires."""

@@ -66,9 +66,6 @@ class Recipe:
         is when the sensor felt the event. Meant for labels that the same input follows each time, such as contact and
         lift. Labels of the kinds of touches have no such input, so their recipes leave it off. Scores are against the
         labels as given.
-    fit_levels : bool
-        Whether an encoder with levels in the sensor's unit (`LevelCrossing`, `ThresholdIzhikevich`) gets others from
-        the training data, where fewer than two of the recipe's levels are within what loaded taxels of frames read.
 
     Raises
     ------
@@ -90,7 +87,6 @@ class Recipe:
     about: str = ""
     source: str = ""
     align: bool = False
-    fit_levels: bool = False
 
     def __post_init__(self) -> None:
         instance("encoder", self.encoder, Encoder)
@@ -99,7 +95,6 @@ class Recipe:
         text("about", self.about)
         text("source", self.source)
         flag("align", self.align)
-        flag("fit_levels", self.fit_levels)
         if not isinstance(self.neurons, Mapping):
             raise refused("neurons", f" is {shown(self.neurons)}: must be parameters by label")
         learner_from("learner", self.learner)
@@ -330,10 +325,6 @@ class Recipe:
         if labels is not None:
             values = recipes.for_labels(values, several("labels", labels))
         values = change_values(values, {} if changes is None else changes)
-        if any(key in ("encoder.name", "encoder.levels") for key in changes or {}) and "fit_levels" not in (
-            changes or {}
-        ):
-            values["fit_levels"] = False  # levels that a user states stay
         return cls.from_dict(values if noise_floor is None else with_floor(values, noise_floor))
 
 

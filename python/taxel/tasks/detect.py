@@ -47,8 +47,6 @@ from taxel.tasks.rest import TakenRest, UnknownRestError, rest
 
 #: So many lines, beside that of each sensor, say what was measured.
 _LINES = 3
-#: So many recordings of several are few.
-_FEW_BAD = 2
 #: No event.
 _NONE = np.empty(0, np.int64)
 
@@ -286,30 +284,13 @@ def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) 
         groups.setdefault(outcome.example.group, []).append(outcome)
     scores = {group: _score_of(members, window_ms).by_label for group, members in groups.items()}
     for label, of_all in together.by_label.items():
-        text = unreliable(label, of_all, "labels", "this readout here")
-        if text and not _in_few(label, groups, scores, window_ms):
+        if text := unreliable(label, of_all, "labels", "this readout here"):
             yield text
             continue
-        for group in groups if len(groups) > 1 else ():
-            of_group = scores[group].get(label)
-            if of_group is not None:
-                text = unreliable(label, of_group, "labels", f"this readout in {group.strip()}")
-                yield from [text] if text else []
-
-
-def _in_few(
-    label: str,
-    groups: Mapping[str, Sequence[Outcome]],
-    scores: Mapping[str, Mapping[str, Score]],
-    window_ms: float,
-) -> bool:
-    """Whether a label is unreliable in a few of several recordings, and not in the others together."""
-    bad = {group for group, of_group in scores.items() if label in of_group and unreliable(label, of_group[label], "")}
-    rest = [outcome for group, members in groups.items() if group not in bad for outcome in members]
-    if not bad or len(bad) > _FEW_BAD or 2 * len(bad) > len(groups):
-        return False
-    of_rest = _score_of(rest, window_ms).by_label.get(label)
-    return of_rest is not None and not unreliable(label, of_rest, "")
+        for group, of_group in scores.items():
+            on = f"this readout in {group.strip()}"
+            if len(scores) > 1 and label in of_group and (text := unreliable(label, of_group[label], "labels", on)):
+                yield text
 
 
 def _of_other_arrays(readout: Readout | PlainRule, recordings: Sequence[Recording]) -> list[Recording]:

@@ -11,7 +11,6 @@ from taxel._base.arguments import text
 from taxel._base.messages import three_digits
 from taxel.detect import Judged, Outcome, Readout, Score, Trained, recipes
 from taxel.detect.examples import unreliable
-from taxel.detect.levels import LEAST_LEVELS
 from taxel.detect.scoring import score_rows
 from taxel.options import TrainOptions
 from taxel.recording import Recording
@@ -137,7 +136,6 @@ class Training:
             "rests": [taken.to_dict() for taken in self.rests],
             "shift_ms": self.options.shift_ms,
             "constants_ms": dict(self.constants_ms),
-            "fitted_levels": list(self.fitted_levels),
             "warnings": list(self.warnings),
             "unlabelled": list(self.unlabelled),
         }
@@ -187,7 +185,6 @@ class Training:
         if recipe is not None:
             about = self.made.recipe.about
             yield f"recipe {recipe}" + (f": {about}" if about else "")
-        yield from self._levels()
         yield from self._rests()
         yield repr(self.readout)
 
@@ -215,11 +212,6 @@ class Training:
         option = f" --tare {quote(str(tare))}" if tare and self.readout._needs_tare else ""
         return f"taxel detect RECORDING --readout {quote(readout)}{option}"
 
-    @property
-    def fitted_levels(self) -> tuple[float, ...]:
-        """The levels of the encoder if they are of the training data, in the sensor's unit; else none."""
-        return tuple(self.made.recipe.encoder.levels) if self.made.fitted_levels else ()  # type: ignore[attr-defined]
-
     def _kinds(self) -> Iterator[str]:
         """Yield the labels that are learnt as kinds of touch, and what ends of touches are called."""
         recipe = self.options.recipe
@@ -228,16 +220,6 @@ class Training:
                 f"{', '.join(kinds)}: learnt as a kind of touch, and detected at an age of the touch; a label of the "
                 f"beginning of a touch must be named {recipes.names_of(recipe, 'contact')}; a label of its end, "
                 f"{recipes.names_of(recipe, 'lift')}"
-            )
-
-    def _levels(self) -> Iterator[str]:
-        """Yield the levels that the training data gave, if they did."""
-        if self.fitted_levels:
-            levels = ", ".join(f"{level:g}" for level in self.fitted_levels)
-            yield (
-                f"levels: {levels} {self.readout.unit}, from the training data, because fewer than {LEAST_LEVELS} "
-                "levels of the recipe are within the range that loaded taxels read; --set encoder.levels=[...] sets "
-                "others"
             )
 
     def _rests(self) -> Iterator[str]:
