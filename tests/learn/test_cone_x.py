@@ -212,20 +212,6 @@ def test_a_start_from_an_earlier_fit_changes_the_way_but_not_the_result():
         ConeX().fit(patterns, targets, start=ConeX())
 
 
-def test_a_shift_in_time_and_another_order_of_trains_change_nothing():
-    patterns, targets = examples(9, trains=40, whole_ms=True)
-    here = ConeX(lb=-1, ub=1).fit(patterns, targets)
-    order = np.random.default_rng(1).permutation(40)
-    there = [
-        SpikeTrains.from_lists([p[n] + 1000.0 for n in order], start=p.start + 1000.0, stop=p.stop + 1000.0)
-        for p in patterns
-    ]
-    moved = ConeX(lb=-1, ub=1).fit(there, [t + 1000.0 for t in targets])
-    assert (here.status_, moved.status_) == ("solved", "solved")
-    assert moved.objective_ == pytest.approx(here.objective_, rel=1e-8)
-    assert moved.weights_ == pytest.approx(here.weights_[order], abs=1e-6)
-
-
 @pytest.mark.parametrize(
     "options",
     [

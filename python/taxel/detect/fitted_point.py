@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.errors import helped
-from taxel._base.messages import are, collected, counted
+from taxel._base.messages import collected, counted
 from taxel._base.progress import Progress
 from taxel._base.times import beginning_us
 from taxel._core import ProblemError
@@ -26,11 +26,6 @@ from taxel.detections import Detections
 from taxel.encode import Encoder
 from taxel.learn import ConeR
 from taxel.spikes import SpikeTrains, to_ms, to_us
-
-#: Two folds need this many labels.
-_TWO_FOLDS = 4
-#: Why events cannot be learnt that have too few inputs.
-_UNLEARNT = "cannot be learnt, because too few input spikes come before them"
 
 
 class FittedPoint(NamedTuple):
@@ -231,16 +226,9 @@ def _remarks(
         at = [(targets[p][k] - shift_ms - begins_ms[p], f" of {names[p]}" * (len(targets) > 1)) for p, k in missed]
         times_and_names = [f"{ms:.10g} ms{name}" for ms, name in at]
         listed = ", ".join(times_and_names[:3]) + f" and {len(times_and_names) - 3} more" * (len(times_and_names) > 3)
-        why = f"{_UNLEARNT} ({listed})"
-        if found > count - len(missed):
-            yield (
-                f"the inputs of {len(missed)} of {counted(count, 'label')} come too late to fire at the label "
-                f"({listed}); the neuron fires later, and finds {found} of {count}"
-            )
-        elif count < _TWO_FOLDS:
-            there = f"there {are(count)} {counted(count, 'event')} to learn from"
-            yield f"{there}; {len(missed)} {why}"
-        else:
-            yield f"{len(missed)} of {count} events {why}" + "; the others were" * (len(missed) < count)
+        yield (
+            f"{len(missed)} of {counted(count, 'event')} cannot be learnt, because too few input spikes come before "
+            f"them ({listed}); the neuron finds {found} of {count}"
+        )
     # The learner names unreachable targets, if any, first.
     yield from caught[bool(missed) :]
