@@ -139,7 +139,7 @@ def test_a_rule_decides_by_the_duration() -> None:
     again = PlainRule.from_json(rule.to_json())
     assert again == rule
     assert score(run(again, unseen.source, tare=unseen.tare), unseen.labels, 50.0).rank[0] == 0
-    assert "at the end: below it tap, else press" in repr(rule)
+    assert repr(rule).startswith("PlainRule(tap, press: one rule for both kinds, the duration (ms) ")
     with refused(argument="age_ms"):
         PlainRule("duration", 500.0, labels=("a", "b"), age_ms=5.0)
     with refused(argument="age_ms"):

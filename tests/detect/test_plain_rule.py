@@ -205,8 +205,8 @@ def test_tuning_finds_a_planted_rule():
     examples = [played(seed) for seed in range(3)]
     rules = tune(examples)
     assert (rules["hit"].quantity, rules["hit"].threshold, rules["hit"].frames) == ("area", 16.0, 1)
-    assert repr(rules["hit"]).endswith("onset hit)")
-    assert repr(rules["gone"]).endswith("end gone)")
+    assert repr(rules["hit"]).startswith("PlainRule(hit: ")
+    assert repr(rules["gone"]).startswith("PlainRule(gone: ")
     for example_ in [played(17), *examples]:
         for name, rule in rules.items():
             found = run(rule, example_.source, tare=example_.tare)

@@ -95,7 +95,7 @@ class PlainRule(_Detector):
     A count that rises to 2 after it was at most 0, dated at 1:
 
     >>> PlainRule("count", 2, 0.25, levels=[5.0, 10.0], dated_at=1.0, labels=("contact", None))
-    PlainRule(count rises to 2 after at most 0, dated at 1; levels 5, 10: onset contact)
+    PlainRule(contact: count rises to 2 after at most 0, dated at 1; levels 5, 10)
     """
 
     _WHAT = "plain rule"
@@ -223,18 +223,7 @@ class PlainRule(_Detector):
         return self.array is None or self.array.fits(array)
 
     def __repr__(self) -> str:
-        first, second = self._parts["labels"]
-        if self.age_ms is not None:
-            kinds = f"below it {first}, else {second}".replace("None", "nothing")
-            when = "the end" if self.age_ms == "end" else f"{self.age_ms:g} ms"
-            return escaped(f"PlainRule({self.quantity} {plain(self.threshold, 6)} at {when}: {kinds})")
-        found = ", ".join(f"{name} {label}" for name, label in (("onset", first), ("end", second)) if label is not None)
-        if self.levels:
-            return escaped(f"PlainRule({self._counted(rises=first is not None)}: {found})")
-        threshold, largest = plain(self.threshold, 6), " of the largest" * self.of_largest
-        return escaped(
-            f"PlainRule({self.quantity} >= {threshold}, release {self.release:g}{largest}, {self._framed}: {found})"
-        )
+        return escaped(f"PlainRule({', '.join(self.labels)}: {self._compared()})")
 
     @property
     def _framed(self) -> str:

@@ -139,8 +139,10 @@ def tune(
     >>> frames = Frames([[[v, v], [0.0, 0.0]] for v in (0.0, 0.0, 9.0, 9.0, 9.0, 0.0, 0.0)], range(0, 70_000, 10_000))
     >>> example = Example(frames, {"touch": [20_000], "removal": [50_000]}, Tare.take(frames, stop_us=20_000))
     >>> rules = tune([example], window_ms=5.0)
-    >>> rules["touch"], rules["removal"]
-    (PlainRule(area >= 1, release 0.5, 1 frame: onset touch), PlainRule(area >= 1, release 0.5, 1 frame: end removal))
+    >>> rules["touch"]
+    PlainRule(touch: area >= 1, release 0.5, 1 frame)
+    >>> rules["removal"]
+    PlainRule(removal: area falls below 0.5 after 1 or more, 1 frame)
     """
     clocks = [clock_of(example) for example in examples] if isinstance(examples, Sequence) else []
     sound = check_examples(examples)
