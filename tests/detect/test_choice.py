@@ -89,13 +89,10 @@ def scored(wrong: int, known: int):
 
 
 def test_fewer_mistakes_are_better_and_of_as_many_what_is_known_earlier():
-    assert better_by_rule(["on"], [(scored(2, 10), scored(1, 900))]) == ("on",)
-    assert better_by_rule(["on"], [(scored(1, 900), scored(2, 10))]) == ()
-    assert better_by_rule(["on"], [(scored(1, 900), scored(1, 800))]) == ("on",)
-    assert better_by_rule(["on"], [(scored(1, 900), scored(1, 900))]) == ()
-    # All folds count together.
-    assert better_by_rule(["on"], [(scored(2, 10), scored(0, 10)), (scored(0, 10), scored(1, 10))]) == ("on",)
-    assert better_by_rule(["on"], []) == ()
+    assert better_by_rule(["on"], scored(2, 10), scored(1, 900)) == ("on",)
+    assert better_by_rule(["on"], scored(1, 900), scored(2, 10)) == ()
+    assert better_by_rule(["on"], scored(1, 900), scored(1, 800)) == ("on",)
+    assert better_by_rule(["on"], scored(1, 900), scored(1, 900)) == ()
     nothing = Detections([], [], [])
     both = _chosen(
         Found(Detections(["a", "b"], [1, 5], [2, 6]), Detections(["a", "b"], [3, 4], [3, 4]), nothing), ["b"]

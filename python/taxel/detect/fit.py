@@ -238,18 +238,15 @@ class Fitter:
             halves = [fold for fold in split(self.examples, parts, 2) if self._has_all(fold.train)]
         except ProblemError:
             halves = []
-        pairs = []
+        found: list[Found] = []
+        parts_found: list[Part] = []
         for fold in halves or [Fold(parts, parts)]:
             with collected(), contextlib.suppress(ProblemError):
                 trained = self.fit(fold.train)
-                found = [self.detected(trained, part) for part in fold.test]
-                pairs.append(
-                    (
-                        self.score([f.by_neurons for f in found], fold.test),
-                        self.score([f.by_rules for f in found], fold.test),
-                    )
-                )
-        return better_by_rule(self.labels, pairs)
+                found += [self.detected(trained, part) for part in fold.test]
+                parts_found += fold.test
+        each = ([one.by_neurons for one in found], [one.by_rules for one in found])
+        return better_by_rule(self.labels, *(self.score(way, parts_found) for way in each)) if found else ()
 
     def _has_all(self, parts: Sequence[Part]) -> bool:
         """Whether parts have an event of each label."""
@@ -378,18 +375,19 @@ class Fitter:
         return times if np.isfinite(np.concatenate(times)).sum() >= _ALIGNS * count else None
 
 
-def better_by_rule(labels: Sequence[str], pairs: Sequence[tuple[Score, Score]]) -> tuple[str, ...]:
-    """Return the labels that rules detect better than neurons, by scores of both on the same events, neurons first.
+def better_by_rule(labels: Sequence[str], neurons: Score, rules: Score) -> tuple[str, ...]:
+    """Return the labels that rules detect better than neurons, by scores of both on the same events.
 
     They have fewer missed and false, or as few and are known earlier at the median.
     """
 
-    def worth(label: str, of: int) -> tuple[int, float]:
-        each = [pair[of].by_label[label] for pair in pairs if label in pair[of].by_label]
-        delays = np.concatenate([np.empty(0), *(one.delays_ms for one in each)])
-        return sum(one.rank[0] for one in each), float(np.median(delays)) if len(delays) else np.inf
+    def worth(scored: Score, label: str) -> tuple[int, float]:
+        one = scored.by_label.get(label)
+        if one is None:
+            return 0, np.inf
+        return one.rank[0], one.delay.median if one.found else np.inf
 
-    return tuple(label for label in labels if worth(label, 1) < worth(label, 0))
+    return tuple(label for label in labels if worth(rules, label) < worth(neurons, label))
 
 
 def _above(recipe: Recipe, noise_floor: float) -> Recipe:

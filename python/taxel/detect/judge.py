@@ -186,16 +186,12 @@ def scored(fitter: Fitter, folds: Sequence[Fold], trained: Sequence[Trained]) ->
         for one in parts_found
     ]
     neurons, rules = (fitter.score(each(way), parts) for way in ("by_neurons", "by_rules"))
-    pairs = [
-        tuple(fitter.score([getattr(one, way) for one in of_fold], fold.test) for way in ("by_neurons", "by_rules"))
-        for of_fold, fold in zip(found, folds, strict=True)
-    ]
     best = fitter.rules(fitter.whole)
     tuned = {label: rule if rules[label].found else None for label, rule in best.items()}
     own_rules = fitter.rules(fitter.whole, own=True)
     own_score = (own_rules, fitter.score(each("by_own"), parts)) if any(own_rules.values()) else None
     plain = PlainScore(tuned, None if fitter.lacks else rules, own_score, fitter.lacks)
-    better = better_by_rule([label for label in fitter.labels if tuned[label] is not None], pairs)  # type: ignore[arg-type]
+    better = better_by_rule([label for label in fitter.labels if tuned[label] is not None], neurons, rules)
     joined, truths = _by_example(fitter, parts, chosen)
     scores = tuple(score(*compared, fitter.window_ms) for compared in zip(joined, truths, strict=True))
     together = score_together(joined, truths, fitter.window_ms)
