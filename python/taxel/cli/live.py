@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -117,19 +118,21 @@ def live(*, options: dict[str, Any], typed: Flat[_LiveArguments] = _LiveArgument
             at_rest.enter_context(at_rest.enter_context(Cable(typed.control)).floor(0))
         say_waiting(options, console)
         with Live(**options) as pipeline:
-            if trained is not None and pipeline.frame_us is None:
-                _say_of_board(trained, pipeline, console)
-            if trained is not None and trained.unit is not None and not pipeline._states_unit:
-                console.print(
-                    f"values are assumed to be in {pipeline.unit}, the unit of the readout: --source states no unit"
-                )
-            for name, counts in pipeline.counters["sources"].items():
-                if "capture" in counts:  # else lines that are no frames, as of an IMU
+            # Detections are printed from here on: what asks to end ends as it does later.
+            with asked_to_end() as end_request:
+                if trained is not None and pipeline.frame_us is None:
+                    _say_of_board(trained, pipeline, console)
+                if trained is not None and trained.unit is not None and not pipeline._states_unit:
                     console.print(
-                        f"{name}: this source is recorded, but neither read out nor shown; a second taxel live can "
-                        "read it out"
+                        f"values are assumed to be in {pipeline.unit}, the unit of the readout: --source states no unit"
                     )
-            last = _show(typed, pipeline, console, at_rest, fresh=isinstance(rest, float))
+                for name, counts in pipeline.counters["sources"].items():
+                    if "capture" in counts:  # else lines that are no frames, as of an IMU
+                        console.print(
+                            f"{name}: this source is recorded, but neither read out nor shown; a second taxel live can "
+                            "read it out"
+                        )
+                last = _show(typed, pipeline, console, at_rest, end_request, fresh=isinstance(rest, float))
             summary = last.stop()
             # Detections that the readout made while `stop` ran.
             _drain(last, None if lines else say)
@@ -179,6 +182,7 @@ def _show(
     pipeline: Live,
     console: Console,
     at_rest: contextlib.ExitStack,
+    end_request: threading.Event,
     *,
     fresh: bool,
 ) -> Live:
@@ -199,7 +203,7 @@ def _show(
                 if not pipeline.is_over:
                     raise
                 console.print("the page was not served: the source ended first")
-        _watch(pipeline, shows, typed.seconds, console, at_rest, fresh=fresh, control=later)
+        _watch(pipeline, shows, typed.seconds, console, at_rest, end_request, fresh=fresh, control=later)
     return pipeline if shows is None or shows.live is None else shows.live
 
 
@@ -290,11 +294,12 @@ def _watch(
     seconds: float | None,
     console: Console,
     at_rest: contextlib.ExitStack,
+    end_request: threading.Event,
     *,
     fresh: bool,
     control: str | None,
 ) -> None:
-    """Show rates and detections until the time is over.
+    """Show rates and detections until the time is over, or the end is requested.
 
     When a `fresh` tare is complete, `at_rest` is closed, and the panel gets the serial line, if `control` names it.
     """
@@ -303,7 +308,7 @@ def _watch(
     # Lines that another thread writes would break a display.
     shown = Console(stderr=True, quiet=True) if echo is None else console
     display = Display(console=shown, refresh_per_second=1 / REDRAW_S, transient=True, redirect_stdout=False)
-    with asked_to_end() as end_request, display:
+    with display:
         before, silence = None, ""
         told: set[tuple[str, str]] = set()
         while not (end_request.is_set() or _has_ended(pipeline, panel)) and (
