@@ -15,17 +15,21 @@ from panel.protocol import (
     heard,
     held_in,
     marker,
+    opened,
     row,
     say,
     section,
     spikes_of,
     word,
 )
+from refusal import refused
 
 import taxel
 import taxel.device
+from taxel import _core
+from taxel._base.errors import Place
 from taxel.live import Live, send
-from taxel.panel import Panel
+from taxel.panel import Panel, shown_files
 
 
 def test_a_recording_is_made_labelled_shown_and_cut(live, panel, tmp_path):  # noqa: PLR0915  one story
@@ -332,3 +336,49 @@ def test_a_pipe_in_the_folder_is_left_to_whom_it_is_for(tmp_path):
         assert [file["name"] for file in page.until("recordings")["files"]] == ["walk.mcap"]
     assert os.read(pipe, 100) == b"1,2\n3,4\n"
     os.close(pipe)
+
+
+@pytest.mark.parametrize("available", [1 << 40, 0])
+def test_events_look_the_same_from_any_file_in_memory_or_not(tmp_path, monkeypatch, available):
+    random = np.random.default_rng(5)
+    t = np.sort(random.integers(1, 3_000_000, 5000))
+    x, y, p, ticks = random.integers(0, 8, 5000), random.integers(0, 6, 5000), t % 2 == 1, random.integers(40, 90, 5000)
+    events = taxel.Events(t, x, y, p, intensity=ticks, array=taxel.Array(6, 8))
+    monkeypatch.setattr(shown_files, "available", lambda: available)
+    files = {"events.mcap", "events.npz"}
+    shown = {}
+    for name in files:
+        taxel.convert(events, tmp_path / name)
+        with Panel(tmp_path / name) as panel, Client(panel) as page:
+            page.send(type="credit", n=2)
+            about = opened(page, name)
+            assert (about["events"], about["start_us"], about["stop_us"]) == (5000, t[0], t[-1])
+            for t_us in (2_500_000, 400_000):
+                assert page.ask("seek", t_us=t_us)["type"] == "done"
+                while head(page.until("frame"))[0]["t_us"] != t_us:
+                    pass
+                shown[name, t_us] = [section(page.frames[-1], k, "u1").tobytes() for k in (0, 1, 2, 3)]
+                frame = section(page.frames[-1], 0, "<u2").reshape(6, 8)
+                for row_of, column in np.ndindex(6, 8):
+                    there = (t <= t_us) & (y == row_of) & (x == column)
+                    assert frame[row_of, column] == ticks[there][-1]
+            assert page.ask("health")["type"] == "done"
+    for t_us in (2_500_000, 400_000):
+        assert len({tuple(shown[name, t_us]) for name in files}) == 1
+    assert {file.name for file in tmp_path.iterdir()} == files
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits the size of files")
+def test_events_that_fit_neither_memory_nor_the_disk_are_refused(tmp_path):
+    import resource
+
+    n = 5000
+    events = taxel.Events(range(n), [0] * n, [0] * n, [True] * n, array=taxel.Array(6, 8))
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (n, before[1]))
+    try:
+        with refused(place=Place(file=tmp_path.name)):
+            _core.PanelRecording.of_events(events._parts(), None, 0, tmp_path, 0)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.iterdir())

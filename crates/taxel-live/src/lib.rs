@@ -11,7 +11,7 @@ pub mod line_place;
 pub mod locked;
 mod named_pipe;
 pub mod ports;
-mod read_at;
+pub mod read_at;
 mod readable_file;
 pub mod serial_line;
 mod system_error;

@@ -31,7 +31,7 @@ pub use causes::{Cause, CauseKind, Counts};
 pub use event_previews::EventPreviews;
 pub use frames::{FrameEncoding, FrameProperties, Frames};
 pub use lsa::{DecodedLsa, decode_lsa, write_lsa};
-pub use mcap_reader::{Datagrams, DecodedRecording, Message, ReadPosition, Reader, Remarks, begin_with};
+pub use mcap_reader::{Datagrams, DecodedRecording, Message, Reader, Remarks};
 pub use mcap_writer::{SourceWriter, Writer};
 pub use output::OutputFile;
 pub use stream::{Samples, StreamColumns, StreamFaults};

@@ -1,13 +1,14 @@
 //! Keyframe indices: the changes of a source, readable from any time on.
 //!
-//! A source is the last minute of a live board ([`live`]) or a recording of any length ([`recording`]). Both store
-//! keyframes. Decoding on from a keyframe gives the same as decoding from the beginning.
+//! A source is the last minute of a live board ([`live`]) or a recording of any length, of events ([`events`]) or of frames
+//! ([`frames`]). All store keyframes. Going on from a keyframe gives the same as going on from the beginning.
 
 mod activity;
+mod change_blocks;
 mod event_rate;
+pub mod events;
 pub mod frames;
 pub mod live;
-pub mod recording;
 mod stepped_frames;
 
 use std::sync::Arc;
@@ -22,27 +23,17 @@ use super::time_columns::TimeColumns;
 
 pub use activity::Activity;
 
-/// Result of [`ChangeReader::read`].
-#[derive(Debug)]
-pub enum ReadOutcome {
-    /// Changes were appended.
-    Changes,
-    /// Changes are missing; these are the values held after the gap, and the number of events up to there.
-    Held(Vec<u16>, u64),
-    /// The rest of each taxel from here on.
-    Rest(Vec<u16>),
-    /// No further change is indexed yet.
-    End,
-}
-
-/// Reads the changes that follow a keyframe.
-pub trait ChangeReader: Send {
-    /// Appends the next changes.
-    ///
-    /// # Errors
-    ///
-    /// `File` where the file cannot be read.
-    fn read(&mut self, out: &mut Vec<TaxelChange>) -> Result<ReadOutcome>;
+/// Changes that follow one another.
+#[derive(Debug, Default)]
+pub struct Block {
+    /// Number of the next block.
+    pub next: u64,
+    /// Where changes are missing before these: the values held after the gap, and the number of events up to there.
+    pub held: Option<(Vec<u16>, u64)>,
+    /// The changes.
+    pub changes: Vec<TaxelChange>,
+    /// The rest of each taxel after these changes, where it is another from there on.
+    pub rest: Option<Vec<u16>>,
 }
 
 /// The frames of several sources, one by one.
@@ -79,7 +70,7 @@ pub trait FrameSources: Send + Sync {
     fn frame(&self, source: usize, k: usize) -> Option<(i64, Vec<f32>)>;
 }
 
-/// Keyframes of a source and what reads on from them.
+/// Keyframes of a source and the changes that follow them.
 pub trait KeyframeIndex: Send + Sync {
     /// The sensor.
     fn array(&self) -> &Array;
@@ -87,7 +78,7 @@ pub trait KeyframeIndex: Send + Sync {
     /// The noise floor, ticks above rest.
     fn noise_floor(&self) -> u16;
 
-    /// The frames, if it holds such: then the rest is that of the keyframe and of [`ReadOutcome::Rest`], and a change without a
+    /// The frames, if it holds such: then the rest is that of the keyframe and of [`Block::rest`], and a change without a
     /// value is a value that is missing from then on.
     fn frames(&self) -> Option<Arc<dyn FrameSources>> {
         None
@@ -96,12 +87,19 @@ pub trait KeyframeIndex: Send + Sync {
     /// First and last time with events, us; `None` without events.
     fn range(&self) -> Option<(i64, i64)>;
 
-    /// The last keyframe at or before `t` (us), or the first one, and a reader of the changes that follow it.
+    /// The last keyframe at or before `t` (us), or the first one, and the number of the block of changes that follows it.
     ///
     /// # Errors
     ///
     /// `Core(Problem)` where there is no keyframe.
-    fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn ChangeReader>)>;
+    fn open(&self, t: i64) -> Result<(Keyframe, u64)>;
+
+    /// The changes of a block; `None` where no further one is indexed yet.
+    ///
+    /// # Errors
+    ///
+    /// `File` where a temporary file cannot be read.
+    fn block(&self, number: u64) -> Result<Option<Block>>;
 
     /// Time of the last keyframe before `t`, us.
     fn keyframe_before(&self, t: i64) -> Option<i64>;

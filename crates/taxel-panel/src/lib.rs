@@ -15,8 +15,8 @@ mod view;
 
 pub use array_state::RestSource;
 pub use keyframe_index::Activity;
-pub use keyframe_index::frames::{FrameArea, FrameFile, FrameIndex, FrameRest, FrameSource};
-pub use keyframe_index::recording::RecordingIndex;
+pub use keyframe_index::events::{EventIndex, Kept};
+pub use keyframe_index::frames::{FrameArea, FrameIndex, FrameRest, FrameSource};
 pub use live_source::{LiveSource, News, limits};
 pub use readout_encoders::encoder_names;
 pub use shown::Shown;

@@ -7,21 +7,18 @@ use taxel_core::Array;
 
 use crate::array_state::RestSource;
 use crate::keyframe_index::KeyframeIndex;
+use crate::keyframe_index::events::EventIndex;
 use crate::keyframe_index::frames::{FrameArea, FrameIndex};
-use crate::keyframe_index::recording::RecordingIndex;
 use crate::time_columns::{COLUMN_US, TimeColumns};
 
 /// A label may lie so long before the first event or after the last one, us.
 const LATE_LABEL_US: i64 = 1_000_000;
 
-/// Maximum number of detections of a recording in a message.
-const MOST_DETECTIONS: usize = 10_000;
-
 /// An indexed recording.
 #[derive(Debug, Clone)]
 pub enum Shown {
     /// Of a board's events.
-    Events(Arc<RecordingIndex>),
+    Events(Arc<EventIndex>),
     /// Of frames.
     Frames(Arc<FrameIndex>),
 }
@@ -38,7 +35,7 @@ impl Shown {
     #[must_use]
     pub fn array(&self) -> &Array {
         match self {
-            Self::Events(index) => &index.header().array,
+            Self::Events(index) => KeyframeIndex::array(index),
             Self::Frames(index) => KeyframeIndex::array(index),
         }
     }
@@ -48,7 +45,7 @@ impl Shown {
     pub fn us(&self) -> i64 {
         match self {
             Self::Events(_) => 1,
-            Self::Frames(index) => index.file.number_us.unwrap_or(1),
+            Self::Frames(index) => index.number_us.unwrap_or(1),
         }
     }
 
@@ -84,7 +81,7 @@ impl Shown {
         })
     }
 
-    /// What the `opened` message says of its contents.
+    /// What the `opened` message says of its values.
     #[must_use]
     pub fn opened(&self) -> Value {
         let index = self.index();
@@ -93,51 +90,20 @@ impl Shown {
         let touch = index.time_columns().and_then(TimeColumns::first_touch);
         let touch_us =
             touch.zip(range).map(|(column, (first, last))| ((column + 1) * COLUMN_US - 1).clamp(first, last));
-        let (events, frames) = match self {
-            Self::Events(index) => (Some(index), None),
-            Self::Frames(index) => (None, Some(index)),
-        };
-        let registers = events.and_then(|index| index.header().registers);
-        let (remarks, note_sources, detection_sources) = match self {
-            Self::Events(index) => (&index.remarks, &[][..], &[][..]),
+        let (touch_us, events, preload_at, frames) = match self {
+            Self::Events(index) => (touch_us, index.events(), index.preload_at.as_str(), None),
             Self::Frames(index) => {
-                (&index.file.remarks, &index.file.note_sources[..], &index.file.detection_sources[..])
+                (touch_us.map(|t| index.frame_until(t).unwrap_or(t)), 0, "", Some(about_frames(index)))
             }
-        };
-        let us = self.us();
-        let notes =
-            remarks.notes.iter().zip(then_none(note_sources)).map(
-                |(note, source)| json!({ "t_us": note.t_us.map(|t| t * us), "text": note.text, "source": source }),
-            );
-        let found = remarks.detections.iter().take(MOST_DETECTIONS).zip(then_none(detection_sources));
-        let detections = found.map(|((_, found), source)| {
-            json!({ "label": found.label, "t_us": found.t * us, "known_us": found.known * us, "source": source })
-        });
-        let markers = remarks.markers.iter().map(|marker| json!({ "t_us": marker.t * us, "start": marker.start }));
-        let zeroed = remarks.zeroings.iter().map(|(_, zeroing)| {
-            json!({ "taxel": (zeroing.x, zeroing.y), "t_us": zeroing.t, "rest": zeroing.rest, "before": zeroing.before })
-        });
-        let verdict = match self {
-            Self::Events(index) => &index.verdict,
-            Self::Frames(index) => &index.file.verdict,
         };
         json!({
             "array": sensor(index.array()),
             "start_us": range.map(|(first, _)| first),
             "stop_us": range.map(|(_, last)| last),
-            "touch_us": touch_us.map(|t| frames.and_then(|index| index.frame_until(t)).unwrap_or(t)),
-            "events": events.map_or(0, |index| index.events),
-            "frames": frames.map(|index| about_frames(index)),
-            "verdict": verdict,
-            "unfinished": events.is_some_and(|index| index.unfinished),
-            "preload_at": events.map_or("", |index| index.preload_at.as_str()),
-            "pace": events.and_then(|index| index.pace.clone()),
-            "registers": registers,
-            "frame_us": registers.map(|registers| registers.frame_us()),
-            "markers": markers.collect::<Vec<_>>(),
-            "notes": notes.collect::<Vec<_>>(),
-            "zeroed": zeroed.collect::<Vec<_>>(),
-            "detections": detections.collect::<Vec<_>>(),
+            "touch_us": touch_us,
+            "events": events,
+            "frames": frames,
+            "preload_at": preload_at,
         })
     }
 }
@@ -151,14 +117,8 @@ pub(crate) fn sensor(array: &Array) -> Value {
     sensor
 }
 
-/// These sources, and then none.
-fn then_none(sources: &[String]) -> impl Iterator<Item = String> {
-    sources.iter().cloned().chain(std::iter::repeat(String::new()))
-}
-
 /// What `opened` says of frames.
 fn about_frames(index: &FrameIndex) -> Value {
-    let file = &index.file;
     let source = |(area, rest, falls, preload_at): (&FrameArea, RestSource, bool, &str)| {
         json!({
             "name": area.name, "left": area.left, "rows": area.rows, "columns": area.columns,
@@ -167,16 +127,13 @@ fn about_frames(index: &FrameIndex) -> Value {
     };
     json!({
         "count": index.count,
-        "unit": file.unit,
+        "unit": index.unit,
         "step": index.step,
         "zero": index.zero,
         "floor": index.floor,
         "newtons": index.newtons,
-        "number_us": file.number_us,
+        "number_us": index.number_us,
         "sources": index.areas().map(source).collect::<Vec<_>>(),
         "flickering": index.flickering().collect::<Vec<_>>(),
-        "trial": file.trial,
-        "trials": file.trials,
-        "left_s": file.left_s,
     })
 }

@@ -546,7 +546,7 @@ mod tests {
     use taxel_core::encode::{ChangeEvents, Composite, Fa1};
 
     use super::*;
-    use crate::keyframe_index::recording::{RecordingIndex, tests::recorded};
+    use crate::keyframe_index::events::tests::{indexed, recorded};
 
     /// The `spikes` message of the next frame, and whether it is of the readout's encoder.
     fn spikes(view: &mut View) -> (Value, bool) {
@@ -564,7 +564,7 @@ mod tests {
     #[test]
     fn an_encoder_by_its_name_alone_is_the_readout_s() {
         let path = recorded("readout-encoder", 3);
-        let index = RecordingIndex::open(&path).unwrap();
+        let (index, _) = indexed(&path, u64::MAX);
         let last = index.range().unwrap().1;
         let mut view = View::new(None);
         view.show(Shown::Events(index), Some(last)).unwrap();

@@ -7,21 +7,21 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use serde_json::{Map, Value};
-use taxel_core::detect::Detection;
+use serde_json::{Map, Value, json};
 use taxel_core::encode::Encoder;
 use taxel_core::held::UNKNOWN;
 use taxel_core::rest::Value as _;
 use taxel_core::wire::Registers;
-use taxel_live::recording::{self, Remarks};
+use taxel_live::clock::BoardClock;
+use taxel_live::recording::Condition;
 use taxel_panel::{
-    Activity, FrameArea, FrameFile, FrameIndex, FrameRest, FrameSource, LiveSource, RecordingIndex, RestSource, Shown,
-    View,
+    Activity, EventIndex, FrameArea, FrameIndex, FrameRest, FrameSource, Kept, LiveSource, RestSource, Shown, View,
 };
 
 use crate::held::{TouchesOut, from_touches};
 use crate::live::Live;
-use taxel_border::convert::{ArrayParts, array, from_array, slice, to_array};
+use crate::recording::{RecordingReader, Remarks};
+use taxel_border::convert::{ArrayParts, EventsIn, array, from_array, slice, to_array};
 use taxel_border::enter::enter;
 use taxel_border::errors::{ProblemError, core};
 use taxel_border::parameters::{Plain, parsed};
@@ -151,11 +151,44 @@ pub struct PanelRecording(Shown);
 
 #[pymethods]
 impl PanelRecording {
-    /// Reads a `.mcap` of a board's events; None of any other file, those of other programs among them.
+    /// Decodes the datagrams of a board; changes beyond so many bytes of memory are in a temporary file in a folder. Returns
+    /// also what else the recording holds, and the drift and the delays that the datagrams' arrivals show.
     #[staticmethod]
-    fn of_events(py: Python<'_>, path: PathBuf) -> PyResult<Option<Self>> {
-        let index = enter(py, |_| RecordingIndex::of_a_board(&path))?;
-        Ok(index.map(|index| Self(Shown::Events(index))))
+    fn of_board(
+        py: Python<'_>,
+        reader: &RecordingReader,
+        folder: PathBuf,
+        memory: u64,
+    ) -> PyResult<(Self, Remarks, Plain<Value>)> {
+        let reader = &reader.reader;
+        enter(py, |_| {
+            let (index, remarks, decoded) = EventIndex::of_board(reader, Kept { memory, folder: &folder })?;
+            let condition = reader.condition(&remarks, decoded.bad_chunks);
+            let condition = Condition { decoded: Some(decoded.found), ..condition };
+            let mut clock = BoardClock::default();
+            for (&left, &arrived_ns) in
+                decoded.left.iter().zip(&decoded.arrived_ns).filter(|(left, _)| **left > i64::MIN)
+            {
+                clock.note(left, arrived_ns);
+            }
+            let shown = Self(Shown::Events(Arc::new(index)));
+            Ok::<_, taxel_live::Error>((shown, Remarks::new(&remarks, &condition), Plain(json!(clock.pace()))))
+        })
+    }
+
+    /// Takes events, and the ticks that the taxels held before them, 65 535 where unknown.
+    #[staticmethod]
+    fn of_events(
+        py: Python<'_>,
+        events: EventsIn<'_>,
+        held: Option<PyReadonlyArray1<'_, u16>>,
+        noise_floor: u16,
+        folder: PathBuf,
+        memory: u64,
+    ) -> PyResult<Self> {
+        let (events, held) = (events.view()?, held.as_ref().map(|held| slice("held", held)).transpose()?);
+        let index = enter(py, |_| EventIndex::of_events(events, held, noise_floor, Kept { memory, folder: &folder }))?;
+        Ok(Self(Shown::Events(Arc::new(index))))
     }
 
     /// Takes frames, `ReadFrames` of Python.
@@ -164,9 +197,9 @@ impl PanelRecording {
         to_index(py, frames).map(|index| Self(Shown::Frames(Arc::new(index))))
     }
 
-    /// What the `opened` message says of its contents, a JSON object.
-    fn opened(&self, py: Python<'_>) -> String {
-        py.detach(|| self.0.opened().to_string())
+    /// What the `opened` message says of its values.
+    fn opened(&self, py: Python<'_>) -> Plain<Value> {
+        Plain(py.detach(|| self.0.opened()))
     }
 
     /// Its `overview` message.
@@ -186,11 +219,10 @@ impl PanelRecording {
     }
 
     /// Counts by which unhealthy taxels are found; None of frames.
-    fn activity<'py>(&self, py: Python<'py>) -> Option<ActivityOut<'py>> {
-        match &self.0 {
-            Shown::Events(index) => Some(activity_out(py, self.0.array(), index.activity.clone())),
-            Shown::Frames(_) => None,
-        }
+    fn activity<'py>(&self, py: Python<'py>) -> PyResult<Option<ActivityOut<'py>>> {
+        let Shown::Events(index) = &self.0 else { return Ok(None) };
+        let activity = enter(py, |_| index.activity())?;
+        Ok(Some(activity_out(py, self.0.array(), activity)))
     }
 }
 
@@ -365,25 +397,11 @@ struct ReadFrames<'py> {
     sources: Vec<ReadSource<'py>>,
     unit: String,
     number_us: Option<i64>,
-    notes: Vec<(Option<i64>, String, String)>,
-    detections: Vec<(String, i64, i64, String)>,
-    verdict: String,
-    trial: Option<String>,
-    trials: Vec<String>,
-    left_s: Option<f64>,
 }
 
 fn to_index(py: Python<'_>, frames: ReadFrames<'_>) -> PyResult<FrameIndex> {
-    let ReadFrames { array, sources, unit, number_us, notes, detections, verdict, trial, trials, left_s } = frames;
+    let ReadFrames { array, sources, unit, number_us } = frames;
     let array = to_array(array)?;
-    let (notes, note_sources) =
-        notes.into_iter().map(|(t_us, text, source)| (recording::Note { at_ns: 0, t_us, text }, source)).unzip();
-    let (detections, detection_sources) = detections
-        .into_iter()
-        .map(|(label, t, known, source)| ((0, Detection { label, t, known, slope: f64::NAN, repaired: false }), source))
-        .unzip();
-    let remarks = Remarks { notes, detections, ..Remarks::default() };
-    let file = FrameFile { unit, number_us, remarks, note_sources, detection_sources, verdict, trial, trials, left_s };
     let mut placed = vec![];
     for ReadSource { name, left, rows, columns, t, values, rest } in &sources {
         let (t, values, rests) = (slice("t", t)?, slice("values", values)?, slice("rest", &rest.values)?);
@@ -407,5 +425,5 @@ fn to_index(py: Python<'_>, frames: ReadFrames<'_>) -> PyResult<FrameIndex> {
         let area = FrameArea { name: name.clone(), left: *left, rows: *rows, columns: *columns };
         placed.push(FrameSource { area, t: t.to_vec(), values, rest });
     }
-    enter(py, |_| Ok::<_, taxel_core::Error>(FrameIndex::new(array, file, placed)))
+    enter(py, |_| Ok::<_, taxel_core::Error>(FrameIndex::new(array, unit, number_us, placed)))
 }

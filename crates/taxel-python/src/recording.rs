@@ -12,8 +12,8 @@ use taxel_core::encode::Zeroing;
 use taxel_core::{Marker, wire};
 use taxel_live::clock::{self, BoardClock, Offset};
 use taxel_live::recording::{
-    Basis, BoardChange, Counts, FrameEncoding, Header, Reader, RecordingCounts, SourceWriter, Verdict, Writer,
-    WriterOptions, decode_lsa,
+    self, Basis, BoardChange, Condition, Counts, FrameEncoding, Header, Reader, RecordingCounts, SourceWriter, Verdict,
+    Writer, WriterOptions, decode_lsa,
 };
 
 use crate::threaded::Threaded;
@@ -57,6 +57,8 @@ pub struct Remarks {
     /// The registers each time they were set, with the host's time (ns); notes; changes of the board with the host's time.
     registers: Plain<Value>,
     notes: Plain<Value>,
+    /// Starts (true) and stops that the board marked, us.
+    markers: Vec<(i64, bool)>,
     board: Plain<Value>,
     /// Detections: host's time (ns), label, t and known (us), slope, repaired.
     detections: Plain<Value>,
@@ -71,6 +73,27 @@ pub struct Remarks {
     samples: u64,
     /// The values that taxels held at the beginning, ticks; none if that is not known.
     held: Option<Vec<u16>>,
+}
+
+impl Remarks {
+    pub(crate) fn new(all: &recording::Remarks, condition: &Condition) -> Self {
+        let detections: Vec<_> =
+            all.detections.iter().map(|(at, d)| (at, &d.label, d.t, d.known, d.slope, d.repaired)).collect();
+        Self {
+            registers: Plain(json!(all.registers)),
+            notes: Plain(json!(all.notes)),
+            markers: all.markers.iter().map(|marker| (marker.t, marker.start)).collect(),
+            board: Plain(json!(all.board.iter().map(|c| (c.at_ns, c)).collect::<Vec<_>>())),
+            detections: Plain(json!(detections)),
+            zeroings: Plain(json!(all.zeroings)),
+            counts: Plain(json!(all.counts)),
+            condition: Plain(json!(condition)),
+            datagrams: all.datagrams,
+            datagram_bytes: all.datagram_bytes,
+            samples: all.samples,
+            held: all.held.clone(),
+        }
+    }
 }
 
 /// Bytes of datagrams, by name.
@@ -89,7 +112,7 @@ type FramesOut<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f32>>, u64
 /// A recording of the live format, opened.
 #[pyclass(frozen)]
 pub struct RecordingReader {
-    reader: Reader,
+    pub(crate) reader: Reader,
 }
 
 #[pymethods]
@@ -141,21 +164,7 @@ impl RecordingReader {
     /// What the recording holds beside its data.
     fn remarks(&self, py: Python<'_>) -> PyResult<Remarks> {
         let (all, bad_chunks) = enter(py, |stop| self.reader.remarks(stop))?;
-        let detections: Vec<_> =
-            all.detections.iter().map(|(at, d)| (at, &d.label, d.t, d.known, d.slope, d.repaired)).collect();
-        Ok(Remarks {
-            registers: Plain(json!(all.registers)),
-            notes: Plain(json!(all.notes)),
-            board: Plain(json!(all.board.iter().map(|c| (c.at_ns, c)).collect::<Vec<_>>())),
-            detections: Plain(json!(detections)),
-            zeroings: Plain(json!(all.zeroings)),
-            counts: Plain(json!(all.counts)),
-            condition: Plain(json!(self.reader.condition(&all, bad_chunks))),
-            datagrams: all.datagrams,
-            datagram_bytes: all.datagram_bytes,
-            samples: all.samples,
-            held: all.held,
-        })
+        Ok(Remarks::new(&all, &self.reader.condition(&all, bad_chunks)))
     }
 
     /// Decodes all datagrams.

@@ -7,10 +7,10 @@ import re
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from taxel import _core
 from taxel._base.errors import refused
-from taxel._core import ProblemError
 from taxel.panel.shown_files import Opening, ShownFiles
 from taxel.panel.threads import in_thread
 
@@ -36,6 +36,8 @@ class Shown:
     trial : str
         The trial that it is, where the file has several; else "".
     recording : PanelRecording
+    contents : dict
+        What the message `opened` says of it.
     size : int, bytes
     left_s : float or None
         How long the rest of the file takes to read, where this is its beginning, s.
@@ -48,6 +50,7 @@ class Shown:
     asked: str | None
     trial: str
     recording: _core.PanelRecording
+    contents: dict[str, Any]
     size: int
     left_s: float | None
     index_ms: float
@@ -155,21 +158,19 @@ class Folder:
 
     def _index(self, name: str, path: Path, trial: str | None, entire: bool) -> Shown:
         begun, size = time.monotonic(), _size(path)
-        recording, shown_trial, left_s = self._read(path, trial, entire)
-        return Shown(name, path, trial, shown_trial, recording, size, left_s, 1e3 * (time.monotonic() - begun))
-
-    def _read(self, path: Path, trial: str | None, entire: bool) -> tuple[_core.PanelRecording, str, float | None]:
-        if path.name != self._asked:
-            of_board = _core.PanelRecording.of_events(path)
-            if of_board is not None:
-                return of_board, "", None
-        events, frames = self.files.read(path, trial, entire=entire)
-        if frames is not None:
-            return _core.PanelRecording.of_frames(frames), frames.trial or "", frames.left_s
-        converted = None if events is None else _core.PanelRecording.of_events(events)
-        if converted is None:
-            raise ProblemError(f"{path}: contains neither events nor frames")
-        return converted, "", None
+        viewed = self.files.read(path, trial, entire=entire, by_options=path.name == self._asked)
+        frames = viewed.contents["frames"] or {}
+        return Shown(
+            name,
+            path,
+            trial,
+            frames.get("trial") or "",
+            viewed.recording,
+            viewed.contents,
+            size,
+            frames.get("left_s"),
+            1e3 * (time.monotonic() - begun),
+        )
 
 
 def _size(path: Path) -> int:

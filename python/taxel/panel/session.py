@@ -22,7 +22,7 @@ from taxel.live.lines import preview
 from taxel.panel.declared import Number, Request, Several, Text, Time, Whole, long_request, request, requests_of
 from taxel.panel.folder import Shown
 from taxel.panel.label_file import Edit
-from taxel.panel.messages import dumps, text_of
+from taxel.panel.messages import text_of
 from taxel.panel.refusals import at_field, field_of, reason
 from taxel.panel.shown_files import judged
 from taxel.panel.threads import in_thread
@@ -291,9 +291,9 @@ class Session:
             "name": shown.name,
             "bytes": shown.size,
             "index_ms": shown.index_ms,
+            **shown.contents,
         }
-        contents = await in_thread(shown.recording.opened)
-        await self.say(f"{dumps(opened)[:-1]},{contents[1:]}")
+        await self.say(opened)
         await self.say(self._hub.labels.message(shown.name))
         await self._say_transport()
         if trouble is not None:

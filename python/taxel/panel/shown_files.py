@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +20,13 @@ from taxel._base.documents import read_text
 from taxel._base.errors import refused
 from taxel._base.files import beside as file_beside
 from taxel._base.files import named, whole_file
-from taxel._core import FormatError, ProblemError
+from taxel._base.limits import available
+from taxel._core import UNKNOWN, FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats import layout_text
 from taxel.formats.layout import Layout, layout_name
 from taxel.frames import Frames
-from taxel.labels import Labels, Note, beside, by_clock
+from taxel.labels import Labels, beside, by_clock
 from taxel.options import FullReading
 from taxel.recording import Recording
 from taxel.recording.analysis.health import health, judge
@@ -33,6 +35,8 @@ from taxel.recording.convert import convert
 from taxel.recording.cut import cut
 from taxel.recording.kinds import is_recording
 from taxel.recording.reading_options import layout_for
+from taxel.verdict import Verdict
+from taxel.wire import Registers
 
 #: A text table of more bytes than the first number is shown by its beginning first, of as many bytes as the second.
 _LARGE, _BEGINNING = 8 << 20, 1 << 19
@@ -40,6 +44,12 @@ _TEXTS = {".csv", ".txt", ".asc", ".asf", ".lst"}
 
 #: Time from one frame to the next, us, where frames are numbered: a view shows them as 100 a second.
 _NUMBER_US = 10_000
+
+#: Detections of a recording that are shown.
+_MOST_DETECTIONS = 10_000
+
+#: Changes of a recording take one in so many bytes of the memory that is available, at most.
+_MEMORY_SHARE = 4
 
 _Taxels = list[tuple[int, int]]
 
@@ -88,7 +98,7 @@ class ReadSource:
 
 @dataclass(frozen=True)
 class ReadFrames:
-    """Hold a recording of frames for the panel's server.
+    """Hold the frames of a recording for its view.
 
     Parameters
     ----------
@@ -97,26 +107,26 @@ class ReadFrames:
     unit : str
     number_us : int, optional
         Time from one frame to the next, us, where frames are numbered.
-    notes : list of (time in us or None, text, source)
-    detections : list of (label, time, time at which it was known, us; and which of several sensors it is of)
-    verdict : str
-        Empty if it is unknown.
-    trial, trials : str and list of str
-        The trial, and all of the file where it has several.
-    left_s : float, optional
-        How long the rest of the file takes to read, s.
     """
 
     array: _core._Array
     sources: list[ReadSource]
     unit: str
     number_us: int | None
-    notes: list[tuple[int | None, str, str]]
-    detections: list[tuple[str, int, int, str]]
-    verdict: str
-    trial: str | None = None
-    trials: list[str] = field(default_factory=list)
-    left_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Viewed:
+    """Hold a recording for its view, and what the message `opened` says of it.
+
+    Parameters
+    ----------
+    recording : PanelRecording
+    contents : dict
+    """
+
+    recording: _core.PanelRecording
+    contents: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -177,7 +187,7 @@ def judged(activity: _core._Activity) -> dict[str, Any]:
 
 
 class ShownFiles:
-    """Read recordings for the panel; the events of tables are written to temporary .mcap files, until `close`."""
+    """Read recordings for the panel; the beginnings of large tables are written to temporary files, until `close`."""
 
     def __init__(self, opening: Opening | None = None) -> None:
         self._opening = Opening() if opening is None else opening
@@ -221,8 +231,8 @@ class ShownFiles:
             raise ProblemError(f"{path.name}: contains no trial {trial}")
         return recordings[0 if trial is None else names.index(trial)], names
 
-    def read(self, path: Path, trial: str | None, *, entire: bool) -> tuple[Path | None, ReadFrames | None]:
-        """Read a recording that is not a file of a board's events.
+    def read(self, path: Path, trial: str | None, *, entire: bool, by_options: bool) -> Viewed:
+        """Read a recording for its view.
 
         Parameters
         ----------
@@ -231,23 +241,26 @@ class ShownFiles:
             Of a file with several; default: the first.
         entire : bool
             Whether all of a large text table is read, not only its beginning.
-
-        Returns
-        -------
-        path or None
-            Of events, a .mcap that holds them, until `close`.
-        ReadFrames or None
-            Frames.
+        by_options : bool
+            Whether also a board's .mcap is read by the options of `Opening`, not as it is.
         """
+        board = None if by_options else _board(path)
+        if board is not None:
+            return board
         beginning = None if entire else self._beginning(path)
         if beginning is not None:
             recording, names, left_s = beginning
         else:
             (recording, names), left_s = self.opened(path, trial), None
         if not recording.is_several and recording.has_events:
-            return self._converted(recording), None
-        frames = _frames(recording)
-        return None, replace(frames, trial=recording.name if names else None, trials=names, left_s=left_s)
+            return _events(recording)
+        viewed = _frames(recording)
+        viewed.contents["frames"] |= {
+            "trial": recording.name if names else None,
+            "trials": names,
+            "left_s": left_s,
+        }
+        return viewed
 
     def judge(self, path: Path, trial: str | None) -> dict[str, Any]:
         """Return what `judged` does, of a recording of frames; its taxels are in the array that is shown."""
@@ -294,11 +307,6 @@ class ShownFiles:
                 self._folder = tempfile.TemporaryDirectory(prefix="taxel-panel-")
             return Path(tempfile.mkdtemp(dir=self._folder.name))
 
-    def _converted(self, recording: Recording) -> Path:
-        target = self._temporary() / f"{recording.path.stem}.mcap"
-        convert(recording, target)
-        return target
-
     def _beginning(self, path: Path) -> tuple[Recording, list[str], float] | None:
         """Return the beginning of a large text table, and how long the rest takes to read (s); None of any other file.
 
@@ -341,7 +349,101 @@ def _array_of(frames: dict[str, Frames]) -> tuple[Array, list[int]]:
     return Array._beside([sensor.array for sensor in frames.values()], gap=1)
 
 
-def _frames(recording: Recording) -> ReadFrames:
+def _board(path: Path) -> Viewed | None:
+    """Read a .mcap of a board's events; None of any other file, those of other programs among them."""
+    if path.suffix != ".mcap":
+        return None
+    try:
+        reader = _core.RecordingReader(path)
+    except (_core.Error, OSError):
+        return None
+    header, _, rebuilt = reader.about()
+    if header.get("frames") is not None:
+        return None
+    shown, remarks, pace = _core.PanelRecording.of_board(reader, path.parent, available() // _MEMORY_SHARE)
+    values = header.get("registers")
+    contents = _contents(
+        shown,
+        Verdict._of({"file": remarks.condition}),
+        ((note["t_us"], note["text"], "") for note in remarks.notes),
+        ((label, t, known, "") for _, label, t, known, *_ in remarks.detections),
+        registers=None if values is None else Registers._of_file(values, Array._from_geometry(header["array"])),
+        zeroed=((each["x"], each["y"], each["t"], each["rest"], each["before"]) for _, each in remarks.zeroings),
+        markers=remarks.markers,
+    )
+    return Viewed(shown, contents | {"unfinished": rebuilt["unfinished"], "pace": pace})
+
+
+def _events(recording: Recording) -> Viewed:
+    """Read another recording of events."""
+    held, registers, events = recording.held, recording.registers, recording.events.sorted()
+    labels = _labels_beside(recording, int(events.t[0]) if len(events) else 0)
+    ticks = None if held is None else np.where(np.isnan(held), UNKNOWN, held).astype(np.uint16).ravel()
+    shown = _core.PanelRecording.of_events(
+        events._parts(),
+        ticks,
+        0 if registers is None else registers.noise_floor,
+        recording.path.parent,
+        available() // _MEMORY_SHARE,
+    )
+    contents = _contents(
+        shown,
+        _verdict(recording),
+        ((note.t, note.text, "") for note in recording.notes if (note.t, note.text) not in labels),
+        ((found.label, found.t, found.known, "") for found in recording.detections),
+        registers=registers,
+        zeroed=((each.x, each.y, each.t, each.rest, each.before) for each in recording.zeroings),
+        markers=events.markers,
+    )
+    return Viewed(shown, contents)
+
+
+def _contents(
+    recording: _core.PanelRecording,
+    verdict: str,
+    notes: Iterable[tuple[int | None, str, str]],
+    detections: Iterable[tuple[str, int, int, str]],
+    *,
+    registers: Registers | None = None,
+    zeroed: Iterable[tuple[int, int, int, float, float | None]] = (),
+    markers: Iterable[tuple[int, bool]] = (),
+) -> dict[str, Any]:
+    """Return what the message `opened` says of a recording, of which these are the notes and the detections.
+
+    Parameters
+    ----------
+    recording : PanelRecording
+    verdict : str
+        Empty if it is unknown.
+    notes : (time in us or None, text, source)
+    detections : (label, time, time at which it was known, us; and which of several sensors it is of)
+    registers : Registers, optional
+    zeroed : (column, row, time in us, rest, rest before)
+    markers : (time in us, whether it is a start)
+    """
+    us = recording.times()[2]
+    return {
+        **recording.opened(),
+        "verdict": verdict,
+        "unfinished": False,
+        "pace": None,
+        "registers": None if registers is None else registers._held,
+        "frame_us": None if registers is None else registers.frame_us,
+        "markers": [{"t_us": t * us, "start": start} for t, start in markers],
+        "notes": [{"t_us": None if t is None else t * us, "text": text, "source": source} for t, text, source in notes],
+        "zeroed": [{"taxel": (x, y), "t_us": t, "rest": rest, "before": before} for x, y, t, rest, before in zeroed],
+        "detections": [
+            {"label": label, "t_us": t * us, "known_us": known * us, "source": source}
+            for label, t, known, source in itertools.islice(detections, _MOST_DETECTIONS)
+        ],
+    }
+
+
+def _verdict(recording: Recording) -> str:
+    return "" if recording.verdict.status == "unknown" else recording.verdict
+
+
+def _frames(recording: Recording) -> Viewed:
     sources = _sources(recording)
     frames = {name: _in_its_unit(sensor) for name, sensor in sources.items()}
     units = {sensor.unit for sensor in frames.values()}
@@ -358,21 +460,21 @@ def _frames(recording: Recording) -> ReadFrames:
     notes = {(t, text, "") for t, text in of_all}
     notes |= {(t, text, name) for name, of_source in noted.items() for t, text in of_source - of_all}
     begin_us = min((int(read.t.min()) for read in frames.values() if len(read.t)), default=0)
-    rows = (by_clock(row, begin_us) for row in _labels_beside(recording))
-    labels = {(row.t, row.text) for row in rows}
+    labels = _labels_beside(recording, begin_us)
     notes = {note for note in notes if note[:2] not in labels}
     each = sources.items() if len(sources) > 1 else [("", sensor) for sensor in sources.values()]
-    found = [(d.label, d.t, d.known, name) for name, sensor in each for d in sensor.detections]
+    found = ((d.label, d.t, d.known, name) for name, sensor in each for d in sensor.detections)
     sorted_notes = sorted(notes, key=lambda note: (note[0] or 0, note[1]))
-    verdict = "" if recording.verdict.status == "unknown" else recording.verdict
-    number_us = None if us == 1 else us
-    return ReadFrames(array._parts(), parts, units.pop(), number_us, sorted_notes, found, verdict)
+    read_frames = ReadFrames(array._parts(), parts, units.pop(), None if us == 1 else us)
+    shown = _core.PanelRecording.of_frames(read_frames)
+    return Viewed(shown, _contents(shown, _verdict(recording), sorted_notes, found))
 
 
-def _labels_beside(recording: Recording) -> tuple[Note, ...]:
-    """Return the labels of the table beside a file, which the panel shows as such and not as notes."""
+def _labels_beside(recording: Recording, begin_us: int) -> set[tuple[int | None, str]]:
+    """Return time and text of the labels in the table beside a file, which the panel shows as such and not as notes."""
     table = beside(recording.path)
-    return Labels(table).rows if table.is_file() else ()
+    rows = Labels(table).rows if table.is_file() else ()
+    return {(row.t, row.text) for row in (by_clock(row, begin_us) for row in rows)}
 
 
 def _in_its_unit(recording: Recording) -> Frames:

@@ -27,7 +27,8 @@ use crate::clock::leaves;
 use crate::{Error, Result};
 use blocks::Blocks;
 pub use message::Message;
-pub use remarks::{Remarks, begin_with};
+pub use remarks::Remarks;
+use remarks::begin_with;
 use walk::FileWalk;
 
 /// An open recording in the live format.
@@ -45,19 +46,11 @@ pub struct Reader {
 }
 
 /// State between blocks: the file's channels, and the last arrival number.
-#[derive(Debug, Clone, Default)]
-pub struct ReadPosition {
+#[derive(Debug, Default)]
+struct ReadPosition {
     topics: BTreeMap<u16, Option<Topic>>,
     last: u64,
     bytes: Vec<u8>,
-}
-
-impl ReadPosition {
-    /// The same state without the reusable buffer.
-    #[must_use]
-    pub fn clone_counts(&self) -> Self {
-        Self { bytes: vec![], topics: self.topics.clone(), ..*self }
-    }
 }
 
 /// The topic of what a source sends.
@@ -97,12 +90,14 @@ pub struct DecodedRecording {
     pub left: Vec<i64>,
     /// What the decoder could not use, as a verdict states it.
     pub found: Found,
+    /// Number of chunks that could not be read.
+    pub bad_chunks: u64,
 }
 
 impl DecodedRecording {
     fn empty(events: Events) -> Self {
         let (counts, version_2) = (wire::Counts::default(), wire::v2::Counts::default());
-        Self { events, counts, version_2, arrived_ns: vec![], left: vec![], found: Found::default() }
+        Self { events, counts, version_2, arrived_ns: vec![], left: vec![], found: Found::default(), bad_chunks: 0 }
     }
 }
 
@@ -285,18 +280,13 @@ impl Reader {
     }
 
     /// Number of blocks (chunks).
-    #[must_use]
-    pub fn blocks(&self) -> usize {
+    fn blocks(&self) -> usize {
         self.blocks.blocks.len()
     }
 
     /// Passes the messages of one block to `take`; `position` is the state after earlier blocks, all or some of them.
     /// Returns whether the block is valid.
-    ///
-    /// # Errors
-    ///
-    /// As [`Reader::messages`].
-    pub fn block(
+    fn block(
         &self,
         block: usize,
         position: &mut ReadPosition,
@@ -414,24 +404,44 @@ impl Reader {
     ///
     /// As [`Reader::messages`].
     pub fn decode(&self, stop: Stop<'_>) -> Result<DecodedRecording> {
+        let mut datagrams = 0;
+        let mut decoded = self.decode_each(stop, |message, events| {
+            datagrams += usize::from(message.topic == Topic::Datagrams);
+            self.fits("events", events.size() + 16 * datagrams)
+        })?;
+        mark_repaired(&mut decoded.events, &self.header().decoding.repaired);
+        Ok(decoded)
+    }
+
+    /// Decodes all datagrams; passes each message to `take` with the events that were decoded up to it, which `take` may remove:
+    /// those that are left are in the result.
+    ///
+    /// # Errors
+    ///
+    /// As [`Reader::messages`].
+    pub fn decode_each(
+        &self,
+        stop: Stop<'_>,
+        mut take: impl FnMut(&Message<'_>, &mut Events) -> Result<()>,
+    ) -> Result<DecodedRecording> {
         let header = self.header();
         let array = header.array.clone();
         let decoder = Decoder::new(array.clone()).differences(header.decoding.difference);
         let mut sender = wire::SenderDecoder::new(decoder, 1);
         let mut decoded = DecodedRecording::empty(Events::empty(array));
+        let origin_us = header.decoding.origin_us;
         #[allow(clippy::cast_possible_truncation)]
         let frame_us = header.registers.map_or(0, |registers| registers.frame_us() as i64);
-        self.messages(stop, |message| {
+        decoded.bad_chunks = self.messages(stop, |message| {
+            let events = &mut decoded.events;
+            let before = (events.len(), events.markers.len());
             if message.topic == Topic::Datagrams {
-                let before = decoded.events.len();
                 let arrived = Some(message.at_ns / 1000);
-                let info = sender.push(message.data, arrived, &mut decoded.events);
-                let last = decoded.events.t.get(before..).and_then(<[i64]>::last).copied();
-                let left = leaves(&info, last, message.data.len(), frame_us)
-                    .map_or(i64::MIN, |t| t + header.decoding.origin_us);
+                let info = sender.push(message.data, arrived, events);
+                let last = events.t.get(before.0..).and_then(<[i64]>::last).copied();
+                let left = leaves(&info, last, message.data.len(), frame_us).map_or(i64::MIN, |t| t + origin_us);
                 decoded.left.push(left);
                 decoded.arrived_ns.push(message.at_ns);
-                self.fits("events", decoded.events.size() + 16 * decoded.left.len())?;
             }
             if message.topic == Topic::Held {
                 begin_with(&mut sender, message.data);
@@ -441,19 +451,25 @@ impl Reader {
                 && let Ok(BoardChange { change: BoardChangeKind::Wire { version, asked: true }, .. }) =
                     serde_json::from_slice(message.data)
             {
-                sender.expect(version, &mut decoded.events);
+                sender.expect(version, events);
             }
-            Ok(())
+            move_later(events, before, origin_us);
+            take(&message, events)
         })?;
+        let before = (decoded.events.len(), decoded.events.markers.len());
         sender.finish_into(&mut decoded.events);
-        mark_repaired(&mut decoded.events, &header.decoding.repaired);
-        decoded.events.t.iter_mut().for_each(|t| *t += header.decoding.origin_us);
-        decoded.events.markers.iter_mut().for_each(|m| m.t += header.decoding.origin_us);
+        move_later(&mut decoded.events, before, origin_us);
         decoded.counts = *sender.counts();
         decoded.version_2 = sender.version_2().counts();
-        decoded.found = Found::of_sender(&sender, header.decoding.origin_us);
+        decoded.found = Found::of_sender(&sender, origin_us);
         Ok(decoded)
     }
+}
+
+/// Adds `us` to the times of the events and the markers from these indices on.
+fn move_later(events: &mut Events, from: (usize, usize), us: i64) {
+    events.t[from.0..].iter_mut().for_each(|t| *t += us);
+    events.markers[from.1..].iter_mut().for_each(|marker| marker.t += us);
 }
 
 /// The number with these low 32 bits that is closest to the last one.

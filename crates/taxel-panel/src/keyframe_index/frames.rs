@@ -11,11 +11,10 @@ use taxel_core::held::UNKNOWN;
 use taxel_core::rest::{FrameNoise, ValueSteps, above_noise};
 use taxel_live::Result;
 use taxel_live::pipeline::TaxelChange;
-use taxel_live::recording::Remarks;
 
 use super::stepped_frames::SteppedFrames;
 pub use super::stepped_frames::{FrameArea, FrameRest, FrameSource};
-use super::{ChangeReader, FrameSources, KeyframeIndex, ReadOutcome};
+use super::{Block, FrameSources, KeyframeIndex};
 use crate::array_state::{Keyframe, RestSource};
 use crate::load::Coordinates;
 use crate::load::Load;
@@ -31,37 +30,13 @@ const BINS: i64 = 1000;
 /// Maximum number of sources that each have a curve of their sum.
 const MOST_SOURCES: usize = 4;
 
-/// Number of changes that are read at once.
-const AT_ONCE: usize = 4096;
-
-/// What a file of frames states beside them.
-#[derive(Debug, Clone, Default)]
-pub struct FrameFile {
+/// An indexed recording of frames.
+#[derive(Debug)]
+pub struct FrameIndex {
     /// Unit of the values.
     pub unit: String,
     /// Time from one frame to the next in the index, where the frames are numbered, us; `None` where they have times.
     pub number_us: Option<i64>,
-    /// Notes, markers, detections.
-    pub remarks: Remarks,
-    /// The source that each note is of; "" where it is of all of them.
-    pub note_sources: Vec<String>,
-    /// The sensor that each detection is of, of several; "" of a single one.
-    pub detection_sources: Vec<String>,
-    /// One line that states what was lost.
-    pub verdict: String,
-    /// The trial of its file that is shown, and all of them, where there are several.
-    pub trial: Option<String>,
-    /// See `trial`.
-    pub trials: Vec<String>,
-    /// How long the whole takes to read, s, where these frames are only those at the beginning of the file.
-    pub left_s: Option<f64>,
-}
-
-/// An indexed recording of frames.
-#[derive(Debug)]
-pub struct FrameIndex {
-    /// What the file states.
-    pub file: FrameFile,
     /// Size of a step of the shown values, in the unit.
     pub step: f64,
     /// Ticks of the value 0.
@@ -75,36 +50,40 @@ pub struct FrameIndex {
     weights: Weights,
     array: Array,
     sources: Vec<SteppedFrames>,
+    /// The frames of all sources in order of time: number of the source, and of its frame.
+    order: Vec<(usize, usize)>,
     time_columns: Option<TimeColumns>,
     /// Up to this sum of ticks above rest there is noise alone, of each source.
     noise: Vec<u32>,
     range: Option<(i64, i64)>,
 }
 
-/// Number of the next frame of each source.
-type Cursor = Vec<usize>;
-
 impl FrameIndex {
     /// Indexes frames of sources that have areas in `array`.
     #[must_use]
-    pub fn new(array: Array, file: FrameFile, sources: Vec<FrameSource<'_>>) -> Self {
+    pub fn new(array: Array, unit: String, number_us: Option<i64>, sources: Vec<FrameSource<'_>>) -> Self {
         let steps = ValueSteps::fitting(sources.iter().map(|source| source.values), array.len());
         let floor = sources.iter().map(|source| source.floor(steps)).max().unwrap_or(0);
         let sources: Vec<SteppedFrames> = sources.into_iter().map(|source| SteppedFrames::new(source, steps)).collect();
-        let first = sources.iter().filter_map(|source| source.t.first()).min();
-        let last = sources.iter().filter_map(|source| source.t.last()).max();
-        let (weights, newtons) = Weights::new(&array, &file.unit);
+        let frames = |(number, source): (usize, &SteppedFrames)| (0..source.t.len()).map(move |k| (number, k));
+        let mut order: Vec<(usize, usize)> = sources.iter().enumerate().flat_map(frames).collect();
+        order.sort_by_key(|&(source, k)| sources[source].t[k]);
+        let time = |&(source, k): &(usize, usize)| sources[source].t[k];
+        let range = order.first().map(time).zip(order.last().map(time));
+        let (weights, newtons) = Weights::new(&array, &unit);
         let mut index = Self {
-            file,
+            unit,
+            number_us,
             step: steps.size,
             zero: steps.zero,
-            count: sources.iter().map(|source| source.t.len() as u64).sum(),
+            count: order.len() as u64,
             floor,
             newtons: newtons.map(|newtons| newtons * steps.size),
             weights,
-            range: first.copied().zip(last.copied()),
+            range,
             array,
             sources,
+            order,
             time_columns: None,
             noise: vec![],
         };
@@ -133,13 +112,6 @@ impl FrameIndex {
     #[must_use]
     pub fn frame_until(&self, t: i64) -> Option<i64> {
         self.sources.iter().filter_map(|source| source.t[..source.until(t)].last().copied()).max()
-    }
-
-    /// The source and the number of the next frame, with its time.
-    fn next(&self, cursor: &Cursor) -> Option<(usize, usize, i64)> {
-        let ahead = self.sources.iter().zip(cursor).enumerate();
-        let ahead = ahead.filter_map(|(number, (source, &k))| source.t.get(k).map(|&t| (number, k, t)));
-        ahead.min_by_key(|&(_, _, t)| t)
     }
 
     /// Mean time from one frame of a source to the next, us; 0 where there is one alone.
@@ -185,11 +157,11 @@ impl FrameIndex {
         let mut columns = TimeColumns::new(&self.array, TIME_COLUMN_BYTES).with_sources(self.curves());
         let mut channels = vec![0; columns.channel_count()];
         let mut loads: Vec<Option<Load>> = vec![None; self.sources.len()];
-        let (mut cursor, mut latest) = (vec![0; self.sources.len()], None);
+        let mut latest = None;
         let mut during = columns.no_curves();
         let at = Coordinates::new(&self.array);
-        while let Some((source, k, t)) = self.next(&cursor) {
-            cursor[source] += 1;
+        for &(source, k) in &self.order {
+            let t = self.sources[source].t[k];
             if let Some(before) = latest.filter(|&before| t > before) {
                 self.extend(&mut during, &loads, &channels, &at);
                 let (now, next) = (column_of(before, COLUMN_US), column_of(t, COLUMN_US));
@@ -242,6 +214,16 @@ impl FrameIndex {
         source.taxels(self.array.columns).zip(values.map(above))
     }
 
+    /// The rest of each taxel at a time, us.
+    fn rest(&self, t: i64) -> Vec<u16> {
+        let mut rest = vec![UNKNOWN; self.array.len()];
+        for source in &self.sources {
+            let of_last = source.rest(source.until(t).saturating_sub(1));
+            source.taxels(self.array.columns).zip(of_last).for_each(|(k, &ticks)| rest[k] = ticks);
+        }
+        rest
+    }
+
     /// The load of a source's frame.
     fn load(&self, source: &SteppedFrames, k: usize, at: &Coordinates) -> Load {
         let mut load = Load::default();
@@ -252,63 +234,13 @@ impl FrameIndex {
     }
 }
 
-struct FrameChanges {
-    index: Arc<FrameIndex>,
-    cursor: Cursor,
-    held: Vec<u16>,
-    rest: Vec<u16>,
-    /// Whether the rest has changed with the last frame.
-    rest_moved: bool,
-}
-
-impl ChangeReader for FrameChanges {
-    fn read(&mut self, out: &mut Vec<TaxelChange>) -> Result<ReadOutcome> {
-        if std::mem::take(&mut self.rest_moved) {
-            return Ok(ReadOutcome::Rest(self.rest.clone()));
-        }
-        let begun = out.len();
-        while out.len() - begun < AT_ONCE && !self.rest_moved {
-            let Some((number, k, t)) = self.index.next(&self.cursor) else { break };
-            self.cursor[number] += 1;
-            let (source, before) = (&self.index.sources[number], out.len());
-            let mut put = |taxel: usize, ticks: u16, up: bool| {
-                // A sensor has 2^22 taxels at most (the limits of recordings).
-                #[allow(clippy::cast_possible_truncation)]
-                out.push(TaxelChange { t, taxel: taxel as u32, ticks, up, repaired: false });
-            };
-            for (taxel, &ticks) in source.taxels(self.index.array.columns).zip(source.frame(k)) {
-                let held = std::mem::replace(&mut self.held[taxel], ticks);
-                if held != ticks {
-                    put(taxel, ticks, ticks > held);
-                }
-            }
-            if out.len() == before {
-                // A frame equal to the one before has a time of its own.
-                let same = source.taxels(self.index.array.columns).zip(source.frame(k)).next();
-                out.extend(same.map(|(taxel, &ticks)| {
-                    #[allow(clippy::cast_possible_truncation)]
-                    TaxelChange { t, taxel: taxel as u32, ticks, up: true, repaired: false }
-                }));
-            }
-            if source.rest_moves(k) {
-                self.rest_moved = true;
-                source
-                    .taxels(self.index.array.columns)
-                    .zip(source.rest(k))
-                    .for_each(|(taxel, &rest)| self.rest[taxel] = rest);
-            }
-        }
-        Ok(if out.len() == begun { ReadOutcome::End } else { ReadOutcome::Changes })
-    }
-}
-
 impl FrameSources for FrameIndex {
     fn array(&self) -> &Array {
         &self.array
     }
 
     fn numbered(&self) -> bool {
-        self.file.number_us.is_some()
+        self.number_us.is_some()
     }
 
     fn rest_source(&self) -> RestSource {
@@ -399,25 +331,40 @@ impl KeyframeIndex for Arc<FrameIndex> {
         self.range
     }
 
-    fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn ChangeReader>)> {
-        let (mut held, mut rest) = (vec![UNKNOWN; self.array.len()], vec![UNKNOWN; self.array.len()]);
-        let cursor: Cursor = self.sources.iter().map(|source| source.until(t)).collect();
-        for (source, &next) in self.sources.iter().zip(&cursor).filter(|(_, next)| **next > 0) {
-            source.taxels(self.array.columns).zip(source.frame(next - 1)).for_each(|(k, &ticks)| held[k] = ticks);
+    fn open(&self, t: i64) -> Result<(Keyframe, u64)> {
+        let mut held = vec![UNKNOWN; self.array.len()];
+        for source in &self.sources {
+            if let Some(last) = source.until(t).checked_sub(1) {
+                source.taxels(self.array.columns).zip(source.frame(last)).for_each(|(k, &ticks)| held[k] = ticks);
+            }
         }
-        for (source, &next) in self.sources.iter().zip(&cursor) {
-            let of_last = source.rest(next.saturating_sub(1));
-            source.taxels(self.array.columns).zip(of_last).for_each(|(k, &ticks)| rest[k] = ticks);
-        }
-        let keyframe = Keyframe {
-            latest: self.keyframe_before(t.saturating_add(1)),
-            events: cursor.iter().map(|&next| next as u64).sum(),
-            held: held.clone(),
-            rest: rest.clone(),
-            tracked: None,
+        let next = self.order.partition_point(|&(source, k)| self.sources[source].t[k] <= t) as u64;
+        let latest = self.keyframe_before(t.saturating_add(1));
+        Ok((Keyframe { latest, events: next, held, rest: self.rest(t), tracked: None }, next))
+    }
+
+    /// A frame; the changes are the cells that differ from the one before.
+    fn block(&self, number: u64) -> Result<Option<Block>> {
+        let frame = usize::try_from(number).ok().and_then(|number| self.order.get(number));
+        let Some(&(source, k)) = frame else { return Ok(None) };
+        let source = &self.sources[source];
+        let before = k.checked_sub(1).map(|before| source.frame(before));
+        let t = source.t[k];
+        let change = |(cell, (taxel, &ticks)): (usize, (usize, &u16))| {
+            let held = before.map_or(UNKNOWN, |before| before[cell]);
+            // A sensor has 2^22 taxels at most (the limits of recordings).
+            #[allow(clippy::cast_possible_truncation)]
+            let change = TaxelChange { t, taxel: taxel as u32, ticks, up: ticks >= held, repaired: false };
+            (change, held != ticks)
         };
-        let changes = FrameChanges { index: Arc::clone(self), cursor, held, rest, rest_moved: false };
-        Ok((keyframe, Box::new(changes)))
+        let all = || source.taxels(self.array.columns).zip(source.frame(k)).enumerate().map(change);
+        let mut changes: Vec<TaxelChange> = all().filter(|&(_, differs)| differs).map(|(change, _)| change).collect();
+        if changes.is_empty() {
+            // A frame equal to the one before has a time of its own.
+            changes.extend(all().next().map(|(change, _)| change));
+        }
+        let rest = source.rest_moves(k).then(|| self.rest(t));
+        Ok(Some(Block { next: number + 1, held: None, changes, rest }))
     }
 
     fn keyframe_before(&self, t: i64) -> Option<i64> {
@@ -465,7 +412,7 @@ mod tests {
             values,
             rest: rest.clone(),
         });
-        Arc::new(FrameIndex::new(array, FrameFile::default(), sources.collect()))
+        Arc::new(FrameIndex::new(array, String::new(), None, sources.collect()))
     }
 
     fn drawn(random: &mut StdRng, fractions: bool) -> (Vec<i64>, Vec<f32>) {
@@ -587,7 +534,7 @@ mod tests {
                 rest: rest.clone(),
             });
             let array = Array::new(4, 9, 1.0, "feet").unwrap();
-            let index = FrameIndex::new(array, FrameFile::default(), sources.collect());
+            let index = FrameIndex::new(array, String::new(), None, sources.collect());
             let at = Coordinates::new(&index.array);
             for k in 0..600 {
                 let load = |foot: usize| index.load(&index.sources[foot], k, &at);
@@ -618,7 +565,7 @@ mod tests {
                 rest: rest.clone(),
             });
             let array = Array::new(2, 7, 1.0, "feet").unwrap();
-            let index = FrameIndex::new(array, FrameFile::default(), sources.into());
+            let index = FrameIndex::new(array, String::new(), None, sources.into());
             index.noise
         });
         assert_eq!(noise[0], noise[1]);

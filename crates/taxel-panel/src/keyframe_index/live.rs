@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use taxel_core::{Array, problem};
 
 use super::event_rate::EventRate;
-use super::{ChangeReader, KeyframeIndex, ReadOutcome};
+use super::{Block, KeyframeIndex};
 use crate::array_state::{ArrayState, Keyframe};
 use crate::taxel_history::TaxelHistory;
 use crate::time_columns::{SPAN, TimeColumns};
@@ -164,36 +164,6 @@ impl Ring {
     }
 }
 
-struct LiveChanges {
-    index: LiveIndex,
-    number: u64,
-    /// The piece whose held values were returned last.
-    held_returned: Option<u64>,
-}
-
-impl ChangeReader for LiveChanges {
-    fn read(&mut self, out: &mut Vec<TaxelChange>) -> Result<ReadOutcome> {
-        let ring = self.index.ring();
-        let lost = self.number < ring.first;
-        self.number = self.number.max(ring.first);
-        #[allow(clippy::cast_possible_truncation)]
-        let Some(stored) = ring.pieces.get((self.number - ring.first) as usize).cloned() else {
-            return Ok(ReadOutcome::End);
-        };
-        drop(ring);
-        if (lost || stored.piece.missing > 0 || stored.piece.reset)
-            && self.held_returned != Some(self.number)
-            && let Some(held) = &stored.piece.held
-        {
-            self.held_returned = Some(self.number);
-            return Ok(ReadOutcome::Held(held.clone(), stored.piece.before));
-        }
-        out.extend_from_slice(&stored.piece.changes);
-        self.number += 1;
-        Ok(ReadOutcome::Changes)
-    }
-}
-
 impl KeyframeIndex for LiveIndex {
     fn array(&self) -> &Array {
         &self.array
@@ -211,16 +181,26 @@ impl KeyframeIndex for LiveIndex {
         Some((ring.pieces.iter().find_map(begin).unwrap_or(latest), latest))
     }
 
-    fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn ChangeReader>)> {
+    fn open(&self, t: i64) -> Result<(Keyframe, u64)> {
         let ring = self.ring();
         let index = ring.keyframe_at(t).ok_or_else(|| problem!("no events yet"))?;
         let stored = &ring.pieces[index];
         let held = stored.piece.held.clone().unwrap_or_default();
         let rest = stored.rest.as_ref().map_or_else(|| held.clone(), |rest| rest.to_vec());
         let keyframe = Keyframe { latest: stored.piece.since, events: stored.piece.before, held, rest, tracked: None };
-        let number = ring.first + index as u64;
+        Ok((keyframe, ring.first + index as u64))
+    }
+
+    fn block(&self, number: u64) -> Result<Option<Block>> {
+        let ring = self.ring();
+        let at = number.max(ring.first);
+        #[allow(clippy::cast_possible_truncation)]
+        let Some(stored) = ring.pieces.get((at - ring.first) as usize).cloned() else { return Ok(None) };
         drop(ring);
-        Ok((keyframe, Box::new(LiveChanges { index: self.clone(), number, held_returned: Some(number) })))
+        let piece = &stored.piece;
+        let is_gap = at > number || piece.missing > 0 || piece.reset;
+        let held = piece.held.as_ref().filter(|_| is_gap).map(|held| (held.clone(), piece.before));
+        Ok(Some(Block { next: at + 1, held, changes: piece.changes.clone(), rest: None }))
     }
 
     fn keyframe_before(&self, t: i64) -> Option<i64> {
@@ -248,7 +228,7 @@ mod tests {
     use rand::{Rng, SeedableRng, rngs::StdRng};
 
     use super::*;
-    use crate::keyframe_index::recording::tests::held_at;
+    use crate::keyframe_index::events::tests::held_at;
     use crate::time_columns::COLUMN_US;
     use crate::view::player::{Player, ViewOptions};
 

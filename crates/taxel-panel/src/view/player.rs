@@ -6,13 +6,12 @@ use taxel_core::problem;
 
 use super::encoded_spikes::EncodedSpikes;
 use crate::array_state::{ArrayState, FORGET};
-use crate::keyframe_index::{ChangeReader, KeyframeIndex, ReadOutcome};
+use crate::keyframe_index::{Block, KeyframeIndex};
 use crate::readout_encoders::ViewEncoder;
 use crate::taxel_history::TaxelHistory;
 use crate::time_columns::{COLUMN_US, LATE_US, SPAN, TimeColumns, column_of};
 use taxel_core::held::UNKNOWN;
 use taxel_live::Result;
-use taxel_live::pipeline::TaxelChange;
 
 /// Maximum number of changes that are decoded only for the history of a taxel and the spikes of an encoder.
 const HISTORY_CHANGES: u64 = 2_000_000;
@@ -47,12 +46,11 @@ impl ViewOptions {
 /// A source at a time.
 pub struct Player {
     index: Arc<dyn KeyframeIndex>,
-    reader: Box<dyn ChangeReader>,
     state: ArrayState,
     /// First column that the state has itself; earlier ones come from the whole source.
     first_of_view: i64,
-    /// Changes that were read, and how many of them were applied.
-    pending: Vec<TaxelChange>,
+    /// The changes that were read last, and how many of them were applied.
+    block: Block,
     applied: usize,
     t: i64,
     history: Option<TaxelHistory>,
@@ -65,7 +63,7 @@ impl Player {
     ///
     /// # Errors
     ///
-    /// As [`KeyframeIndex::open`] and [`ChangeReader::read`]; `Core(Problem)` where the encoder does not fit the array, or
+    /// As [`KeyframeIndex::open`] and [`KeyframeIndex::block`]; `Core(Problem)` where the encoder does not fit the array, or
     /// the frames.
     pub fn open(index: Arc<dyn KeyframeIndex>, t: i64, options: ViewOptions) -> Result<Self> {
         let (first, last) =
@@ -76,7 +74,7 @@ impl Player {
         let needs_changes = options.watched.is_some() || options.encoder.is_some();
         let dense = index.events_before(t).saturating_sub(index.events_before(t - span)) > HISTORY_CHANGES;
         let before = if stored && (!needs_changes || dense) { 0 } else { span };
-        let (keyframe, reader) = index.open(t.saturating_sub(before.max(FORGET * COLUMN_US) + LATE_US))?;
+        let (keyframe, next) = index.open(t.saturating_sub(before.max(FORGET * COLUMN_US) + LATE_US))?;
         let unit_us = options.column_us.min(COLUMN_US);
         let bytes = TimeColumns::bytes_for(index.array(), span / unit_us);
         let mut state = ArrayState::new(index.array(), index.noise_floor(), &keyframe, unit_us, bytes);
@@ -94,8 +92,8 @@ impl Player {
             None => EncodedSpikes::new(encoder, index.array(), options.column_us, &keyframe.held, keyframe.latest),
         });
         let spikes = spikes.transpose()?;
-        let mut player =
-            Self { index, reader, state, first_of_view, pending: vec![], applied: 0, t, history, spikes, options };
+        let block = Block { next, ..Block::default() };
+        let mut player = Self { index, state, first_of_view, block, applied: 0, t, history, spikes, options };
         player.advance(t)?;
         Ok(player)
     }
@@ -104,7 +102,7 @@ impl Player {
     ///
     /// # Errors
     ///
-    /// As [`ChangeReader::read`].
+    /// As [`KeyframeIndex::block`].
     pub fn advance(&mut self, t: i64) -> Result<bool> {
         let last = self.index.range().map_or(t, |(_, last)| last);
         self.follow(t.min(last))?;
@@ -119,10 +117,10 @@ impl Player {
     ///
     /// # Errors
     ///
-    /// As [`ChangeReader::read`].
+    /// As [`KeyframeIndex::block`].
     pub fn follow(&mut self, t: i64) -> Result<()> {
         loop {
-            let ahead = &self.pending[self.applied..];
+            let ahead = &self.block.changes[self.applied..];
             let now = ahead.iter().position(|change| change.t > t).unwrap_or(ahead.len());
             let (now, later) = ahead.split_at(now);
             self.state.apply(now);
@@ -150,14 +148,14 @@ impl Player {
 
     /// Reads the next changes, or what the index says of values and rest; returns false at the end.
     fn read(&mut self) -> Result<bool> {
-        self.pending.clear();
-        self.applied = 0;
-        match self.reader.read(&mut self.pending)? {
-            ReadOutcome::Changes => {}
-            ReadOutcome::Held(held, events) => self.state.set_held(&held, events),
-            ReadOutcome::Rest(rest) => self.state.set_rest(rest),
-            ReadOutcome::End => return Ok(false),
+        if let Some(rest) = self.block.rest.take() {
+            self.state.set_rest(rest);
         }
+        let Some(block) = self.index.block(self.block.next)? else { return Ok(false) };
+        if let Some((held, events)) = &block.held {
+            self.state.set_held(held, *events);
+        }
+        (self.block, self.applied) = (block, 0);
         Ok(true)
     }
 
@@ -165,10 +163,10 @@ impl Player {
     ///
     /// # Errors
     ///
-    /// As [`ChangeReader::read`].
+    /// As [`KeyframeIndex::block`].
     pub fn next_stamp(&mut self) -> Result<Option<i64>> {
         loop {
-            if let Some(change) = self.pending.get(self.applied) {
+            if let Some(change) = self.block.changes.get(self.applied) {
                 return Ok(Some(change.t.max(self.t)));
             }
             if !self.read()? {
@@ -181,25 +179,20 @@ impl Player {
     ///
     /// # Errors
     ///
-    /// As [`KeyframeIndex::open`] and [`ChangeReader::read`].
+    /// As [`KeyframeIndex::open`] and [`KeyframeIndex::block`].
     pub fn last_stamp(&self) -> Result<Option<i64>> {
         let mut from = self.t;
         loop {
-            let (_, mut reader) = self.index.open(from.saturating_sub(1))?;
-            let (mut changes, mut found) = (vec![], None);
-            'reading: loop {
-                changes.clear();
-                match reader.read(&mut changes)? {
-                    ReadOutcome::Changes => {}
-                    ReadOutcome::Held(..) | ReadOutcome::Rest(_) => continue,
-                    ReadOutcome::End => break,
-                }
-                for change in &changes {
+            let (_, mut next) = self.index.open(from.saturating_sub(1))?;
+            let mut found = None;
+            'reading: while let Some(block) = self.index.block(next)? {
+                for change in &block.changes {
                     if change.t >= self.t {
                         break 'reading;
                     }
                     found = found.max(Some(change.t));
                 }
+                next = block.next;
             }
             if found.is_some() {
                 return Ok(found);

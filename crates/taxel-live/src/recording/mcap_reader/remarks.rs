@@ -120,7 +120,7 @@ fn held(data: &[u8]) -> Option<Vec<u16>> {
 }
 
 /// Passes the taxels' values before the recording's first datagram to a decoder.
-pub fn begin_with(decoder: &mut wire::SenderDecoder, data: &[u8]) {
+pub(super) fn begin_with(decoder: &mut wire::SenderDecoder, data: &[u8]) {
     if let Some(held) = held(data) {
         decoder.begin_with(held.iter().map(|ticks| (*ticks != UNKNOWN).then_some(*ticks)));
     }

@@ -1,5 +1,7 @@
 //! The view of any time of a recording equals that of a full decode.
 
+use std::path::PathBuf;
+
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use taxel_core::board::Board;
 use taxel_core::encode::{ChangeEvents, Encoder};
@@ -11,7 +13,7 @@ use crate::time_columns::{Extent, SPAN};
 use crate::view::encoded_spikes::EncodedSpikes;
 use crate::view::frame::{About, of_player};
 use crate::view::player::{Player, ViewOptions};
-use taxel_live::recording::{Writer, WriterOptions};
+use taxel_live::recording::{Header, Writer, WriterOptions};
 
 /// The taxel whose history is shown.
 const WATCHED: u32 = 2080;
@@ -66,11 +68,13 @@ pub(in crate::keyframe_index) fn held_at(changes: &[TaxelChange], t: i64, taxels
     (held, events)
 }
 
-fn decode_all(index: &Arc<RecordingIndex>) -> Vec<TaxelChange> {
-    let events = index.reader.decode(taxel_core::Stop::never()).unwrap().events;
-    let mut changes = vec![];
-    index.changes(&events, &mut changes);
-    changes
+/// The index of a recording with so many bytes in memory, and all of its changes.
+pub(crate) fn indexed(path: &Path, memory: u64) -> (Arc<EventIndex>, Vec<TaxelChange>) {
+    let reader = Reader::open(path).unwrap();
+    // A temporary file is in the folder of the system, as this one cannot be written.
+    let kept = Kept { memory, folder: Path::new("/nowhere") };
+    let (index, ..) = EventIndex::of_board(&reader, kept).unwrap();
+    (Arc::new(index), changes(reader.decode(Stop::never()).unwrap().events.view()))
 }
 
 /// Raster and curves of a frame, and of which columns they are.
@@ -99,11 +103,10 @@ fn counted(changes: &[TaxelChange], columns: std::ops::Range<i64>, us: i64, t: i
 
 #[test]
 fn any_time_of_a_recording_looks_as_after_a_full_decode() {
-    for seed in [1, 2] {
+    for (seed, memory) in [(1, u64::MAX), (2, 10 << 20)] {
         let path = recorded("any-time", seed);
-        let index = RecordingIndex::open(&path).unwrap();
-        let changes = decode_all(&index);
-        assert_eq!(index.events, changes.len() as u64);
+        let (index, changes) = indexed(&path, memory);
+        assert_eq!(index.events(), changes.len() as u64);
         assert!(index.keys.len() >= 5, "{seed}: {} keyframes", index.keys.len());
         let (first, last) = index.range.unwrap();
         let (mut random, mut some) = (StdRng::seed_from_u64(7), 0);
@@ -116,26 +119,26 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
             let options =
                 ViewOptions { watched: Some(WATCHED), encoder: Some(spiking.clone()), ..ViewOptions::plain(us) };
             let mut player = Player::open(Arc::new(Arc::clone(&index)), t, options).unwrap();
-            let (held, events) = held_at(&changes, t, index.header.array.len());
+            let (held, events) = held_at(&changes, t, index.array.len());
             assert_eq!((player.state().held(), player.state().events()), (&held[..], events), "{seed} at {t} us");
             let (columns, raster, curves) = shown(&mut player, us);
             assert_eq!(columns.end, column_of(t, us) + 1);
             let begin = (columns.end - SPAN).max(column_of(first, us));
             assert_eq!(columns.start, begin, "{seed} at {t} us: all of the window");
             assert!(
-                raster == counted(&changes, columns.clone(), us, t, &index.header.array),
+                raster == counted(&changes, columns.clone(), us, t, &index.array),
                 "{seed}: raster at {t} us by {us} us"
             );
             // Curves and changes by a state of the same column width, from the beginning, without a keyframe.
-            let blank = Keyframe::blank(index.header.array.len());
-            let mut slow = ArrayState::new(&index.header.array, index.noise_floor(), &blank, us, 1 << 28);
+            let blank = Keyframe::blank(index.array.len());
+            let mut slow = ArrayState::new(&index.array, index.noise_floor, &blank, us, 1 << 28);
             changes.iter().filter(|change| change.t <= t).for_each(|change| slow.apply_one(change));
             slow.advance(t);
             slow.update_curve();
             assert_eq!(player.state().change(), slow.change(), "{seed} at {t} us");
             // A column wider than those that are stored has the least and the greatest of its parts.
             let part_us = us.min(COLUMN_US);
-            let mut parts = ArrayState::new(&index.header.array, index.noise_floor(), &blank, part_us, 1 << 28);
+            let mut parts = ArrayState::new(&index.array, index.noise_floor, &blank, part_us, 1 << 28);
             changes.iter().filter(|change| change.t <= t).for_each(|change| parts.apply_one(change));
             parts.advance(t);
             parts.update_curve();
@@ -149,13 +152,13 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
             assert!(curves == same, "{seed}: curves at {t} us by {us} us");
             // An encoder that is given all changes from the beginning has the same spikes. Where stamps are not multiples of
             // its period it may sample one period earlier or later, so that a spike may cross an edge of the window.
-            let mut full = EncodedSpikes::new(&spiking, &index.header.array, us, &[], None).unwrap();
+            let mut full = EncodedSpikes::new(&spiking, &index.array, us, &[], None).unwrap();
             changes.iter().filter(|change| change.t <= t).for_each(|change| full.push(&[*change]));
             full.advance(if t >= last { last + 1 } else { t });
             let (mut spikes, mut all) = (vec![], vec![]);
             player.spikes().unwrap().write(columns.clone(), &mut spikes);
             full.write(columns, &mut all);
-            let rows = usize::from(index.header.array.rows);
+            let rows = usize::from(index.array.rows);
             let of_row = |cells: &[u8], row: usize| -> i64 {
                 cells.iter().skip(row).step_by(rows).map(|&cell| i64::from(cell & 15) + i64::from(cell >> 4)).sum()
             };
@@ -163,8 +166,7 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
             let edges = [begin * us, t];
             let at_edge = |t: i64| edges.iter().any(|edge| (t - edge).abs() <= 100);
             for row in 0..rows {
-                let is_of_row =
-                    |change: &&TaxelChange| change.taxel as usize / usize::from(index.header.array.columns) == row;
+                let is_of_row = |change: &&TaxelChange| change.taxel as usize / usize::from(index.array.columns) == row;
                 let may = changes.iter().filter(|change| at_edge(change.t)).filter(is_of_row).count() as i64;
                 let differ = (of_row(&spikes, row) - of_row(&all, row)).abs();
                 assert!(differ <= may, "{seed}: spikes of row {row} at {t} us by {us} us: {differ}, not {may}");
@@ -179,8 +181,8 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
 #[test]
 fn steps_go_from_stamp_to_stamp_both_ways_and_through_silence() {
     let path = recorded("steps", 3);
-    let index = RecordingIndex::open(&path).unwrap();
-    let mut stamps: Vec<i64> = decode_all(&index).iter().map(|change| change.t).collect();
+    let (index, changes) = indexed(&path, 0);
+    let mut stamps: Vec<i64> = changes.iter().map(|change| change.t).collect();
     stamps.dedup();
     let mut random = StdRng::seed_from_u64(8);
     for _ in 0..20 {
