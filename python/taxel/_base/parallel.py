@@ -13,7 +13,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -138,9 +138,13 @@ class Workers:
                 atexit.register(_end_workers)
                 try:
                     yield joblib.Parallel(n_jobs=self.jobs, return_as="generator_unordered", batch_size=1, **watch)
-                except KeyboardInterrupt:
-                    _end_workers()
-                    raise
+                except (KeyboardInterrupt, RuntimeError) as error:
+                    if not any(isinstance(one, KeyboardInterrupt) for one in (error, error.__context__)):
+                        raise
+                    # A loky that was interrupted while it began cannot end; its workers see that this process has.
+                    with suppress(RuntimeError):
+                        _end_workers()
+                    raise KeyboardInterrupt from None
 
 
 #: This process alone.
