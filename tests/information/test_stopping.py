@@ -15,15 +15,15 @@ import os, signal, sys, time
 import taxel.information
 from taxel.cli import main
 
-asked, done, stopped = taxel.information.answer, [], []
+asked, stopped = taxel.information.answer, []
 
-def counted(*trials, watch=None, **ask):
-    def stop(*point):
-        done.append(point)
-        if len(done) == int(sys.argv[1]):
+def counted(*trials, progress=None, **ask):
+    def stop(what, done, of):
+        if done == int(sys.argv[1]):
             stopped.append(time.process_time())
             os.kill(os.getpid(), signal.SIGINT)
-    return asked(*trials, watch=stop, **ask)
+        progress(what, done, of)
+    return asked(*trials, progress=stop, **ask)
 
 taxel.information.answer = counted
 try:
@@ -34,7 +34,7 @@ finally:
 
 
 def stopped(place: Path, *, after: int, more: Sequence[str] = ()) -> subprocess.CompletedProcess[str]:
-    """Run the command on made touches, and send it SIGINT when so many settings are done."""
+    """Run the command on made touches, and send it SIGINT when so many steps are done."""
     recording, labels = folder(place, 60)
     asked = ["--window-ms", "60", "--windows", "10", "--periods", "1,10", "--draws", "3", "--taxels", "1"]
     command = ["information", str(recording), "--labels", str(labels), *asked, *more]
@@ -43,7 +43,7 @@ def stopped(place: Path, *, after: int, more: Sequence[str] = ()) -> subprocess.
 
 
 def test_ctrl_c_ends_the_command_soon(tmp_path: Path) -> None:
-    ended = stopped(tmp_path, after=5)  # the first draw has two periods to two windows
+    ended = stopped(tmp_path, after=5)
     assert ended.returncode == 130, ended.stderr
     assert float(ended.stdout) < SOON_S
     assert not (tmp_path / "page.html").exists()

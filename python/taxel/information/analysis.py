@@ -16,7 +16,7 @@ from taxel._base.parallel import HERE, Workers
 from taxel.encode import ChangeEvents, Encoder
 from taxel.information._threads import threads
 from taxel.information.answers import Answer, Control, Point, is_above_chance
-from taxel.information.estimate import Estimate, bits_of, zero_test
+from taxel.information.estimate import Estimate, zero_test
 from taxel.information.keeping import Keeping, keeps
 from taxel.information.nested import WORTH_THREADS, Matrices, predictions
 from taxel.information.question import Question
@@ -41,7 +41,6 @@ def answer(
     shuffles: int = 20,
     seed: int = 0,
     progress: Callable[[str, int, int], object] | None = None,
-    watch: Callable[[float, float, float], object] | None = None,
     workers: Workers = HERE,
 ) -> Answer:
     """Estimate how many bits the events of labelled trials hold about the labels, by period, time, taxels and cost.
@@ -70,8 +69,6 @@ def answer(
     progress : function of (what, done, all), optional
         Called before each step with its name, the number of steps done and that of all. An exception that it raises
         ends the work.
-    watch : function of (period_ms, window_ms, bits), optional
-        Called after each draw of a setting with all taxels, with the bits by the draws so far.
     workers : Workers, optional
         Who computes the draws of each period; default: this process alone.
 
@@ -85,16 +82,15 @@ def answer(
         in any trial
     """
     listed = [instance(f"trials[{k}]", trial, LabelledTrial) for k, trial in enumerate(several("trials", trials))]
-    for name, function in (("progress", progress), ("watch", watch)):
-        if function is not None:
-            callback(name, function)
+    if progress is not None:
+        callback("progress", progress)
     for name, value, least in (("draws", draws, 1), ("folds", folds, 2), ("shuffles", shuffles, 1), ("seed", seed, 0)):
         integer(name, value, least)
     answering = _Answering(listed, encoder, window_ms, int(draws), int(folds), int(seed))
     answering.set_out(periods_ms, windows_ms, taxels)
     # On small matrices several threads are slower than one, and far slower where other processes compute as well.
     with threads(several=len(listed) >= WORTH_THREADS):
-        return answering.answer(int(shuffles), progress, watch, instance("workers", workers, Workers))
+        return answering.answer(int(shuffles), progress, instance("workers", workers, Workers))
 
 
 class _Answering(Question):
@@ -104,7 +100,6 @@ class _Answering(Question):
         self,
         shuffles: int,
         progress: Callable[[str, int, int], object] | None,
-        watch: Callable[[float, float, float], object] | None,
         workers: Workers,
     ) -> Answer:
         """Return the answer for all settings."""
@@ -124,9 +119,6 @@ class _Answering(Question):
                 responses_at.setdefault((period, window), {})[draw] = responses
                 about.setdefault((period, window), {})[draw] = counts
                 missing |= lacking
-                if watch is not None:
-                    so_far = list(responses_at[period, window].values())
-                    watch(to_ms(period), to_ms(window), bits_of(self.labels, so_far))
             if done < len(settings):
                 self._begin(_step(*settings[done]))
         self._begin("intervals")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -207,13 +207,6 @@ def estimate(
         local=local,
         warnings=_warnings(int(n[n > 0].min()), float(relevant), interval),
     )
-
-
-def bits_of(labels: NDArray[Any], responses: Sequence[NDArray[Any]]) -> float:
-    """Return the bits of draws of responses, without an interval; each response is a label."""
-    classes = np.unique(labels)
-    cells = np.searchsorted(classes, labels) * len(classes) + np.searchsorted(classes, np.stack(responses))
-    return float(_held(_tables(cells, np.ones((1, len(labels)), np.int64), len(classes)))[0])
 
 
 def zero_test(

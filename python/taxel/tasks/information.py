@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,7 +49,6 @@ def information(
     options: InformationOptions | None = None,
     *,
     progress: Progress | None = None,
-    watch: Callable[[float, float, float], object] | None = None,
     workers: Workers = HERE,
 ) -> Information:
     """Estimate how many bits labelled touches hold.
@@ -64,9 +63,6 @@ def information(
         that begins at its time. Without either each recording is a trial, and its folder's name is the label.
     options : InformationOptions, optional
     progress : function of (step, done, all), optional
-    watch : function of (period, window, bits), optional
-        Called with the bits of each setting of all taxels as they are known, draw by draw, so that a task that is
-        stopped has reported them.
     workers : Workers, optional
         Who computes; default: this process alone.
 
@@ -101,7 +97,6 @@ def information(
             shuffles=options.shuffles,
             seed=options.seed,
             progress=show,
-            watch=watch,
             workers=workers,
         )
     return Information(found, tuple(warnings))
