@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import json
-import threading
+import math
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
@@ -25,6 +26,9 @@ from taxel.recording.kinds import is_folder, recordings_in
 from taxel.recording.reading_options import names_topic
 
 app = App(name="view")
+
+#: The system may give Ctrl-C to a thread of the server, which does not wake the main thread: it looks this often, s.
+_AWAKE_S = 0.2
 
 
 @app.default
@@ -65,7 +69,9 @@ def view(
             say(json.dumps({"url": panel.url, "token": panel.token}))
         announce(panel, opens, console)
         console.print("Ctrl-C ends")
-        threading.Event().wait(None if seconds is None else min(seconds, threading.TIMEOUT_MAX))
+        until = math.inf if seconds is None else time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0:
+            time.sleep(min(left, _AWAKE_S))
 
 
 def _opening(

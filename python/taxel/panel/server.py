@@ -16,7 +16,7 @@ from concurrent.futures import Future
 from email.utils import formatdate
 from http import HTTPStatus
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 from urllib.parse import quote
 
 from websockets.asyncio.server import ServerConnection, serve
@@ -105,6 +105,7 @@ class Server:
         self._hosts = {self._shown}
         if ipaddress.ip_address(shown).is_loopback:
             self._hosts.add(f"localhost:{self.address[1]}")
+        self._clients: set[asyncio.Task[None]] = set()
         ready: Future[asyncio.AbstractEventLoop] = Future()
         self._thread = threading.Thread(target=self._run, args=(ready,), name="taxel-panel", daemon=True)
         self._thread.start()
@@ -150,13 +151,17 @@ class Server:
             close_timeout=1,
             server_header=None,
             logger=_QUIET,
-        ):
+        ) as server:
             tasks = [asyncio.create_task(work) for work in (self._beat(), *self._hub.works())]
             ready.set_result(asyncio.get_running_loop())
             await self._ended.wait()
             for task in tasks:
                 task.cancel()
             await self._hub.end()
+            server.close()
+            # A request that takes long is not waited for.
+            for client in self._clients:
+                client.cancel()
 
     # ---------------------------------------------------------------------------------------------- access
 
@@ -208,6 +213,7 @@ class Server:
     async def _client(self, connection: ServerConnection) -> None:
         session = Session(self._hub, connection)
         self._hub.join(session)
+        self._clients.add(this := cast("asyncio.Task[None]", asyncio.current_task()))
         try:
             await session.greet()
             async for message in connection:
@@ -217,9 +223,11 @@ class Server:
                 if not await session.answer(message):
                     await connection.close(1008, "too many refused messages")
                     break
-        except ConnectionClosed:
+        # The server cancels it at its end; the connection is closed in order then too.
+        except (ConnectionClosed, asyncio.CancelledError):
             pass
         finally:
+            self._clients.discard(this)
             self._hub.leave(session)
 
     async def _beat(self) -> None:
