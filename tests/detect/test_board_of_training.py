@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 import taxel
 from taxel import Array
-from taxel.detect import PlainRule, Readout, run
-from taxel.detect.board import differences, summary
+from taxel.detect import Example, PlainRule, Readout, run
+from taxel.detect.board import differences, of_training, other_frames, summary
 from taxel.encode import ContactArea
 from taxel.reading import Facts, InMemory, Marks
 from taxel.simulate import Board
@@ -69,3 +69,17 @@ def test_a_readout_says_in_what_its_board_differs_from_that_of_the_training():
         part = next(part for part in line.split(";") if name in part)
         assert all(str(value) in part for value in values), part
     assert "none" in differences(training, slow.replace(noise_floor=11))
+
+
+def walked(rate_hz: int, side: str) -> taxel.Recording:
+    frames = taxel.Frames(np.zeros((20, 4, 4), np.float32), np.arange(20) * (10**6 // rate_hz), array=ARRAY)
+    return taxel.Recording.of(InMemory(Facts(array=ARRAY, side=side), frames))
+
+
+@given(st.integers(1, 1000), st.integers(1, 1000), *2 * [st.sampled_from(["", "left", "right"])])
+def test_a_readout_says_where_rate_or_side_of_frames_differ_from_those_of_the_training(then, now, side, other):
+    training = of_training([Example(walked(then, side), {})])
+    line = other_frames(training, walked(now, other))
+    assert ("frames a second" in line) == (10**6 // then > 1.1 * (10**6 // now) or 10**6 // now > 1.1 * (10**6 // then))
+    assert (" side" in line) == ("" not in (side, other) and side != other)
+    assert other_frames({}, walked(now, other)) == ""

@@ -1,14 +1,21 @@
-"""What the registers of a board were in a training, and in what those of another time differ."""
+"""What sent the data of a training, a board or a sensor of frames, and in what that of another time differs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from taxel._base.messages import plain
+import numpy as np
+
+from taxel._base.messages import plain, three_digits
 from taxel.detect.examples import Example
+from taxel.frames import Frames
+from taxel.recorded import recorded
 from taxel.recording.recording import Recording
 from taxel.wire.registers import Registers, preset_of
+
+#: A rate differs that is not within this ratio of another.
+_OTHER_RATE = 1.1
 
 
 def noise_floor(source: object) -> float:
@@ -19,14 +26,21 @@ def noise_floor(source: object) -> float:
     return float(max(registers.noise_floor for registers in held))
 
 
-def of_training(examples: Sequence[Example]) -> dict[str, Any] | None:
-    """Return what a readout's file keeps of the board of its training; None where it is not known, or not the same."""
-    each = [
-        summary(source.registers)
-        for source in (example.source for example in examples)
-        if isinstance(source, Recording) and source.has_events and source.registers is not None
-    ]
-    return each[0] if each and len(each) == len(examples) and all(board == each[0] for board in each) else None
+def of_training(examples: Sequence[Example]) -> dict[str, Any]:
+    """Return what a readout's file keeps of what sent the data of its training.
+
+    Its ``board``, where it is known and always the same; ``period_us`` of frames; ``sides``, where all are stated.
+    """
+    sources = [example.source for example in examples if isinstance(example.source, Recording)]
+    boards = [summary(source.registers) for source in sources if source.has_events and source.registers is not None]
+    is_one = len(boards) == len(examples) and all(board == boards[0] for board in boards)
+    periods = [period for source in sources if (period := _period_us(source)) is not None]
+    sides = {source.side for source in sources}
+    return {
+        "board": boards[0] if boards and is_one else None,
+        "period_us": float(np.median(periods)) if periods else None,
+        "sides": [] if "" in sides else sorted(sides),
+    }
 
 
 def summary(registers: Registers) -> dict[str, Any]:
@@ -62,3 +76,30 @@ def differences(training: Mapping[str, Any], registers: Registers) -> str:
     pairs = zip(words(now).items(), words(then).values(), strict=True)
     differing = [f"{name} {here}, in training {there}" for (name, here), there in pairs if here != there]
     return f"the board differs from that of the training: {'; '.join(differing)}" if differing else ""
+
+
+def other_frames(training: Mapping[str, Any], recording: Recording) -> str:
+    """Return in what frames of a recording differ from those of the training, in words: their rate, their side.
+
+    "" where they do not, or nothing is known.
+
+    Parameters
+    ----------
+    training : mapping
+        As of `differences`.
+    recording : Recording
+    """
+    here, then, sides = _period_us(recording), training.get("period_us"), training.get("sides", [])
+    differing = []
+    if here and then and max(here, then) > _OTHER_RATE * min(here, then):
+        now, before = (three_digits(1e6 / period_us) for period_us in (here, then))
+        differing.append(f"{now} frames a second, in training {before}")
+    if sides and recording.side and recording.side not in sides:
+        differing.append(f"{recording.side} side, in training {' and '.join(sides)}")
+    return f"{recording.title} differs from the training: {'; '.join(differing)}" if differing else ""
+
+
+def _period_us(recording: Recording) -> float | None:
+    """Return the median time from one frame to the next, us; None of events, and of fewer than two frames."""
+    source = None if recording.has_events else recorded(recording, hold=False)
+    return float(np.median(np.diff(source.t))) if isinstance(source, Frames) and len(source) > 1 else None

@@ -62,7 +62,9 @@ def of_loads(examples: Sequence[Example], noise_floor: float) -> dict[str, _Valu
     return {name: np.concatenate(values) for name, values in features.items()}
 
 
-def training_data(examples: Sequence[Example], scored: Score, board: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def training_data(
+    examples: Sequence[Example], scored: Score, sender: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
     """Return what a readout's file keeps of its training: quantiles of loads, and how late detections were.
 
     Parameters
@@ -70,9 +72,10 @@ def training_data(examples: Sequence[Example], scored: Score, board: Mapping[str
     examples : sequence of Example, checked
     scored : Score
         Of the detector in its training data, or of folds of them.
-    board : mapping, optional
-        The registers of the board that sent them, as `taxel.detect.board.summary` returns them.
+    sender : mapping, optional
+        What sent them, as `taxel.detect.board.of_training` returns it.
     """
+    board = None if sender is None else sender["board"]
     noise_floor = max(floor_of(examples), 0.0 if board is None else float(board["noise_floor"]))
     return {
         "noise_floor": noise_floor,
@@ -82,8 +85,7 @@ def training_data(examples: Sequence[Example], scored: Score, board: Mapping[str
             for name, values in of_loads(examples, noise_floor).items()
             if len(values)
         },
-        "board": board,
-    }
+    } | dict(sender or {})
 
 
 def error_ms(scored: Score) -> dict[str, float]:

@@ -18,7 +18,7 @@ from taxel._base.parallel import Workers
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, PlainRule, Readout, Score, drift, recipes, score
-from taxel.detect.board import differences, noise_floor
+from taxel.detect.board import differences, noise_floor, other_frames
 from taxel.detect.clock import off_detections
 from taxel.detect.detector import detector
 from taxel.detect.examples import check_examples, unreliable
@@ -248,7 +248,9 @@ def detect(
             )
     training = readout._parts.get("training") or {}
     boards = (recording.registers for recording in opened if recording.has_events)
-    warnings += dict.fromkeys(filter(None, (differences(training, held) for held in boards if held is not None)))
+    differing = [differences(training, held) for held in boards if held is not None]
+    differing += [other_frames(training, recording) for recording in opened]
+    warnings += dict.fromkeys(filter(None, differing))
     names = (*(recording.title for recording in left_out), *unknown_rests)
     with_labels = [outcome for outcome in scored if outcome.score is not None and outcome.score.events]
     bad = (

@@ -19,6 +19,12 @@ pub struct TrainingData {
     /// The board that sent the data, where its registers are known and were the same in all of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub board: Option<TrainedBoard>,
+    /// The median time from one frame to the next, us, where the data were frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub period_us: Option<f64>,
+    /// The feet or hands of the sensors, "left" or "right", where all are stated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sides: Vec<String>,
 }
 
 /// What a board's registers held in a training.
@@ -56,8 +62,11 @@ impl TrainingData {
         if let Some((label, ms)) = self.error_ms.iter().find(|(_, ms)| !ms.is_finite()) {
             return Err(problem!("training: error_ms of {label} is {ms}: must be finite"));
         }
-        if let Some(board) = self.board.as_ref().filter(|board| !(board.frame_us > 0.0 && board.frame_us.is_finite())) {
-            return Err(problem!("training: frame_us is {}: must be above 0, and finite", board.frame_us));
+        for (name, us) in [("frame_us", self.board.as_ref().map(|board| board.frame_us)), ("period_us", self.period_us)]
+        {
+            if let Some(us) = us.filter(|us| !(*us > 0.0 && us.is_finite())) {
+                return Err(problem!("training: {name} is {us}: must be above 0, and finite"));
+            }
         }
         for (feature, Quantiles { count, values }) in &self.loads {
             let finite = values.iter().all(|value| value.is_finite());
@@ -86,6 +95,8 @@ mod tests {
             error_ms: BTreeMap::from([("contact".to_owned(), -3.0)]),
             loads: BTreeMap::from([("peak".to_owned(), peak)]),
             board: Some(board(192.0)),
+            period_us: Some(1e4),
+            sides: vec!["left".to_owned()],
         }
     }
 
@@ -103,6 +114,7 @@ mod tests {
             TrainingData { loads: of(3, vec![2.0, 1.0]), ..data() },
             TrainingData { loads: of(3, vec![1.0, f64::NAN]), ..data() },
             TrainingData { board: Some(board(0.0)), ..data() },
+            TrainingData { period_us: Some(f64::NAN), ..data() },
         ] {
             assert!(wrong.check().is_err());
         }
