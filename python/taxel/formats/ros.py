@@ -5,10 +5,11 @@ A bag is a ``.bag`` of ROS 1, a ``.db3`` or ``.mcap`` of ROS 2, or a folder with
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import reduce
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -109,35 +110,46 @@ def _type(value: Any) -> str:
     return str(getattr(value, "__msgtype__", ""))
 
 
-def _leaves(message: Any, path: str = "", *, listed: bool = False) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield the fields of a message that hold numbers, each with its path; a single number only in a list of messages.
+def _paths(message: Any, path: str = "", *, listed: bool = False) -> Iterator[str]:
+    """Yield the paths of the fields of a message that hold numbers; a single number only in a list of messages.
 
     A part of the messages of a list is one field: ``sensors.taxels`` are the taxels of all sensors, in their order.
 
     Raises
     ------
-    FormatError : the message is an image that is not read, or holds bytes
+    FormatError : the message holds bytes
     """
     if _type(message) in _BYTES and not path:
         raise FormatError(_BYTES[_type(message)])
     if isinstance(message, np.ndarray) or _type(message) == IMAGE:
-        yield path, _values(message, "")
+        yield path
     elif isinstance(message, list):
-        for inner, _ in _leaves(message[0], listed=True) if message and is_dataclass(message[0]) else ():
-            yield f"{path}.{inner}", _values(message, inner)
+        for inner in _paths(message[0], listed=True) if message and is_dataclass(message[0]) else ():
+            yield f"{path}.{inner}"
     elif is_dataclass(message) and _type(message) not in (*_WITHOUT_READINGS, *_BYTES):
         for field in fields(message):
-            yield from _leaves(getattr(message, field.name), f"{path}.{field.name}".lstrip("."), listed=listed)
+            yield from _paths(getattr(message, field.name), f"{path}.{field.name}".lstrip("."), listed=listed)
     elif listed and isinstance(message, int | float | np.number):
-        yield path, _values(message, "")
+        yield path
+
+
+def _numbers(message: Any) -> dict[str, NDArray[Any]]:
+    """Return the fields of a message that hold more numbers than one.
+
+    Raises
+    ------
+    FormatError : the message is an image that is not read, or holds bytes
+    """
+    return {path: values for path in _paths(message) if (values := _values(message, path)).size > 1}
 
 
 def _values(message: Any, path: str) -> NDArray[Any]:
-    """Return the numbers of a field, shape (n,), or (rows, columns) of an image.
+    """Return the numbers of a field, shape (n,), or (rows, columns) of an image or a multi-array that states them.
 
     Raises
     ------
     LookupError : there is no such field, or it holds no numbers
+    FormatError : an image that is not read
     """
     step, _, rest = path.partition(".")
     if isinstance(message, list):
@@ -148,7 +160,10 @@ def _values(message: Any, path: str) -> NDArray[Any]:
     if step:
         if not is_dataclass(message) or not hasattr(message, step):
             raise LookupError(step)
-        return _values(getattr(message, step), rest)
+        found = _values(getattr(message, step), rest)
+        is_whole = _type(message).endswith("MultiArray") and not message.layout.data_offset
+        sizes = [int(dimension.size) for dimension in message.layout.dim] if is_whole else []
+        return found.reshape(sizes) if len(sizes) == 2 and sizes[0] * sizes[1] == found.size else found
     if isinstance(message, np.ndarray) and message.dtype.kind in "uifb":
         return message
     if isinstance(message, int | float | np.number):
@@ -170,23 +185,6 @@ def _pixels(image: Any) -> NDArray[Any]:
         return np.empty((0, 0))
     lines = np.asarray(image.data[: image.height * image.step], np.uint8).reshape(image.height, image.step)
     return np.ascontiguousarray(lines[:, :width]).view(kind).reshape(image.height, image.width)
-
-
-def _grid(message: Any, path: str) -> tuple[int, int] | None:
-    """Return rows and columns of a field, if the message states them: of an image, or of a std_msgs multi-array."""
-    *parents, last = path.split(".")
-    try:
-        parent = reduce(lambda m, step: m[int(step)] if isinstance(m, list) else getattr(m, step), parents, message)
-        inner = getattr(parent, last) if last else parent
-    except (LookupError, AttributeError, ValueError):  # of a list of messages
-        return None
-    if _type(inner) == IMAGE:
-        return int(inner.height), int(inner.width)
-    if _type(parent).startswith("std_msgs/msg/") and _type(parent).endswith("MultiArray"):
-        sizes = tuple(int(dimension.size) for dimension in parent.layout.dim)
-        if len(sizes) == 2 and sizes[0] * sizes[1] == len(parent.data) and not parent.layout.data_offset:
-            return sizes
-    return None
 
 
 @dataclass(frozen=True)
@@ -246,21 +244,18 @@ def _of_topic(bag: Any, topic: str) -> Iterator[Topic]:
     if kind not in bag.typestore.fielddefs:
         yield Topic(topic, kind, "", (), "", count, None, f"no definition of {kind}")
         return
-    times, found, first = list[int](), list[tuple[str, NDArray[Any]]](), None
+    times, found = list[int](), dict[str, NDArray[Any]]()
     for connection, at, data in bag.messages(connections):
         times.append(at)
-        if found:
-            continue
         try:
-            first = bag.deserialize(data, connection.msgtype)
-            found = [(field, content) for field, content in _leaves(first) if content.size > 1]
+            found = found or _numbers(bag.deserialize(data, connection.msgtype))
         except FormatError as error:
             yield Topic(topic, kind, "", (), "", count, None, str(error))
             return
     span = np.ptp(times) / 1e9 if times else 0.0
     rate = (len(times) - 1) / span if span > 0 else None
-    for field, content in found:
-        yield Topic(topic, kind, field, _grid(first, field) or content.shape, content.dtype.name, len(times), rate)
+    for field, values in found.items():
+        yield Topic(topic, kind, field, values.shape, values.dtype.name, len(times), rate)
 
 
 def _chosen(
@@ -283,6 +278,15 @@ def _listed(name: str, value: Any, kind: type[Any]) -> list[Any]:
     entries = [] if value is None else [value] if isinstance(value, kind) else arguments.several(name, value)
     check = arguments.text if kind is str else lambda name, entry: arguments.instance(name, entry, Array)
     return [check(name, entry) for entry in entries]
+
+
+class _Message(NamedTuple):
+    """What is read of a message: its times by the bag and by its stamp, ns; `key` is the value of the field `by`."""
+
+    values: NDArray[Any]
+    at: int
+    stamp: int
+    key: str
 
 
 def read_ros(
@@ -325,150 +329,142 @@ def read_ros(
         if missing is not None:
             listed = ", ".join(sorted(there)) or "none"
             raise FormatError(f"{path}: the bag has no topic {missing}; its topics are {listed}")
-        others = sorted(there - set(names))
-        lost = (f"other topics of the bag: {', '.join(others)}",) * bool(others)
+        others = ", ".join(sorted(there - set(names)))
+        lost = (f"other topics of the bag: {others}",) * bool(others)
         for name, part, size in chosen:
-            held = _Messages(path, name, part, size, by)
-            for connection, at, data in bag.messages([c for c in bag.connections if c.topic == name]):
-                held.add(bag.deserialize(data, connection.msgtype), at)
-            for key, reader in held.readers(lost, is_named=names.count(name) > 1):
-                if key in found:
-                    raise ProblemError(f"{path}: two sources would have the name {key}; open one at a time")
-                found[key] = reader
+            for reader in _readers(path, bag, name, part, size, by, lost, is_named=names.count(name) > 1):
+                if reader.facts.label in found:
+                    raise ProblemError(
+                        f"{path}: two sources would have the name {reader.facts.label}; open one at a time"
+                    )
+                found[reader.facts.label] = reader
     return list(found.values())
 
 
-class _Message(NamedTuple):
-    """What is read of a message: its times by the bag and by its stamp, ns."""
-
-    values: NDArray[Any]
-    at: int
-    stamp: int
-    key: str
-    grid: tuple[int, int] | None
-
-
-class _Messages:
-    """The messages of a field of a topic."""
-
-    def __init__(self, path: Path, topic: str, field: str | None, array: Array | None, by: str | None) -> None:
-        self.path, self.topic, self.field, self.array, self.by = path, topic, field, array, by
-        self.type = ""
-        self.messages = list[_Message]()
-        #: The names of channels of the first message that has some; those of others are put in their order.
-        self.names: tuple[str, ...] = ()
-        #: Why a message has no numbers to read: those of most may have some.
-        self.trouble = ""
-
-    @property
-    def location(self) -> str:
-        return f"{self.path}: topic {self.topic}" + f", field {self.field}" * bool(self.field)
-
-    def add(self, message: Any, at: int) -> None:
-        """Add a message, which the bag got `at` ns."""
-        self.type = _type(message)
+def _readers(
+    path: Path,
+    bag: Any,
+    topic: str,
+    field: str | None,
+    array: Array | None,
+    by: str | None,
+    lost: tuple[str, ...],
+    *,
+    is_named: bool,
+) -> Iterator[InMemory]:
+    """Yield the frames of a topic, those of each key apart."""
+    location = f"{path}: topic {topic}" + f", field {field}" * bool(field)
+    kind, names, trouble, messages = "", (), "", list[_Message]()
+    for connection, at, data in bag.messages([each for each in bag.connections if each.topic == topic]):
+        message = bag.deserialize(data, connection.msgtype)
+        kind = _type(message)
         try:
-            self.field = self._only_field(message) if self.field is None else self.field
-            numbers = np.empty(0) if self.field is None else self._numbers(message, self.field)
-            key = "" if self.by is None else str(reduce(getattr, self.by.split("."), message))
+            field = _only_field(message) if field is None else field
+            values, names = _ordered(message, field, names)
+            key = "" if by is None else str(reduce(getattr, by.split("."), message))
+        except LookupError as error:
+            values, key, trouble = np.empty(0), "", str(error.args[0])
         except AttributeError:
-            raise FormatError(f"{self.location}: has no field {self.by}, which by names") from None
+            raise FormatError(f"{location}: has no field {by}, which by names") from None
         except FormatError as error:
-            raise FormatError(f"{self.location}: {error}") from None
+            raise FormatError(f"{location}: {error}") from None
         stamp = getattr(getattr(message, "header", None), "stamp", None)
-        stamped = 0 if stamp is None else int(stamp.sec) * 10**9 + int(stamp.nanosec)
-        grid = None if self.field is None else _grid(message, self.field)
-        self.messages.append(_Message(numbers, at, stamped, key, grid))
-
-    def _only_field(self, message: Any) -> str | None:
-        """Return the field of a message that holds more numbers than one; None of a message without any."""
-        there = [path for path, numbers in _leaves(message) if numbers.size > 1]
-        if len(there) > 1:
-            raise helped(FormatError(f"has several fields with numbers: {', '.join(there)}"), "field", "give")
-        if not there:
-            self.trouble = "no field has more than one number; to find topics with such a field, run taxel info"
-        return there[0] if there else None
-
-    def _numbers(self, message: Any, field: str) -> NDArray[Any]:
-        """Return the numbers of a field, in the order of the first message's names, if a message names its channels."""
-        try:
-            numbers = _values(message, field)
-        except LookupError:
-            there = ", ".join(path for path, each in _leaves(message) if each.size > 1) or "none"
-            self.trouble = f"the field has no numbers; fields with numbers: {there}"
-            return np.empty(0)
-        for named in ("name", "names", "channels", "channel_names"):
-            names = getattr(message, named, None)
-            if isinstance(names, list) and len(names) == numbers.size and all(isinstance(n, str) for n in names):
-                self.names = self.names or tuple(names)
-                is_same = sorted(names) == sorted(self.names)
-                return numbers[[names.index(name) for name in self.names]] if is_same else np.empty(0)
-        return numbers
-
-    def readers(self, lost: tuple[str, ...], *, is_named: bool) -> Iterator[tuple[str, Reader]]:
-        """Yield the frames of each key."""
-        # Files of a bag may overlap.
-        whole = sorted((each for each in self.messages if each.values.size), key=lambda each: each.at)
-        if not whole:
-            raise FormatError(f"{self.location}: {self.trouble or 'contains no message with values'}")
-        array = self.array or self._stated(whole)
-        fits = [
-            m for m in whole if (m.values.shape == array.shape if m.values.ndim == 2 else m.values.size == array.taxels)
-        ]
-        if not fits:
-            raise FormatError(
-                f"{self.location}: the messages have {whole[0].values.size} values each; the array has {array.rows} x "
-                f"{array.columns} taxels"
-            )
-        name = source_of(f"{self.topic}.{self.field}" if is_named else self.topic)
-        for key in dict.fromkeys(message.key for message in fits):
-            label = source_of(f"{name}_{key}") if key else name
-            yield (
-                label,
-                self._reader(label, array, [m for m in fits if m.key == key], len(self.messages) - len(fits), lost),
-            )
-
-    def _reader(
-        self, label: str, array: Array, messages: Sequence[_Message], left_out: int, lost: tuple[str, ...]
-    ) -> InMemory:
-        rows = np.stack([message.values.reshape(-1) for message in messages])
-        with np.errstate(over="ignore"):
-            frames = rows.astype(np.float32)
-        if np.isinf(frames).any():
-            raise FormatError(f"{self.location}: a value is infinite, or does not fit 32 bits")
-        bag, stamps = (np.array([getattr(m, name) for m in messages], np.int64) for name in ("at", "stamp"))
-        right = (stamps > 0) & (np.abs(bag.astype(np.float64) - stamps) <= _DAY_NS)
-        found, by_the_bag = repaired(np.where(right, stamps, bag) // 1000), int((~right).sum())
-        are_few = 2 * len(np.unique(stamps)) < len(stamps)
-        if are_few or right.mean() < _MOST or found.wrong > (1 - _MOST) * len(messages):
-            found, by_the_bag = repaired(bag // 1000), len(messages)
-        frames = frames if found.order is None else frames[found.order]
-        said = [f"{left_out} of {counted(len(self.messages), 'message')} are left out, of another length"] * bool(
-            left_out
-        )
-        if stamps.any() and by_the_bag:
-            said.append(
-                f"{by_the_bag} of {counted(len(messages), 'message')} have the time of the bag: their stamps are wrong"
-            )
-        said += found.said
-        for line in said:
-            warn(f"{self.path}: topic {self.topic}: {line}", stacklevel=6)
-        unit = "counts" if rows.dtype.kind in "ui" else "as sent"
-        table = Frames(frozen_whole(frames.reshape(-1, *array.shape)), frozen_whole(found.t), unit=unit, array=array)
-        remarks = () if stamps.any() else ("the times are those of the bag, because the messages have no header",)
-        source = self.topic + f".{self.field}" * bool(self.field) + f" ({self.type})"
-        counts = {"messages": len(messages), "messages_of_another_length": left_out, "times_by_the_bag": by_the_bag}
+        messages.append(_Message(values, at, 0 if stamp is None else int(stamp.sec) * 10**9 + int(stamp.nanosec), key))
+    # Files of a bag may overlap.
+    whole = sorted((each for each in messages if each.values.size), key=lambda each: each.at)
+    if not whole:
+        raise FormatError(f"{location}: {trouble or 'contains no message with values'}")
+    shape = _shape(whole) if array is None else array.shape
+    # What states other rows and columns than those of one row does not fit.
+    fits = [m for m in whole if m.values.shape in (shape, (math.prod(shape),), (1, math.prod(shape)))]
+    if not fits:
+        sizes = f"{whole[0].values.size} values each; the array has {shape[0]} x {shape[1]} taxels"
+        raise FormatError(f"{location}: the messages have {sizes}")
+    try:
+        array = array or Array(*shape, name=topic, names=names or None)
+    except ProblemError as error:
+        raise FormatError(f"{location}: {shape} values each: {first_line(error)}") from None
+    name = source_of(f"{topic}.{field}" if is_named else topic)
+    short = len(messages) - len(fits)
+    said = [f"{short} of {counted(len(messages), 'message')} are left out, of another length"] * bool(short)
+    for key in dict.fromkeys(message.key for message in fits):
+        of_key = [message for message in fits if message.key == key]
         facts = Facts(
-            path=self.path, array=array, kind="ros", label=label, source=source, remarks=remarks, lost=(*said, *lost)
+            path=path,
+            array=array,
+            kind="ros",
+            label=source_of(f"{name}_{key}") if key else name,
+            source=topic + f".{field}" * bool(field) + f" ({kind})",
+            lost=lost,
         )
-        return InMemory(facts, table, counted=counts)
+        yield _reader(location, facts, of_key, said, short)
 
-    def _stated(self, whole: Sequence[_Message]) -> Array:
-        """Return the most frequent length: in rows and columns as most of its messages state them, else in one row."""
-        ((most, _),) = Counter(message.values.shape for message in whole).most_common(1)
-        stated = Counter(message.grid for message in whole if message.grid and message.values.shape == most)
-        rows, columns = stated.most_common(1)[0][0] if stated else (1, int(np.prod(most)))
-        try:
-            return Array(rows, columns, name=self.topic, names=self.names or None)
-        except ProblemError as error:
-            raise FormatError(f"{self.location}: {most} values each: {first_line(error)}") from None
+
+def _only_field(message: Any) -> str:
+    """Return the field of a message that holds more numbers than one.
+
+    Raises
+    ------
+    LookupError : there is none
+    FormatError : there are several
+    """
+    there = list(_numbers(message))
+    if len(there) > 1:
+        raise helped(FormatError(f"has several fields with numbers: {', '.join(there)}"), "field", "give")
+    if not there:
+        raise LookupError("no field has more than one number; to find topics with such a field, run taxel info")
+    return there[0]
+
+
+def _ordered(message: Any, field: str, known: tuple[str, ...]) -> tuple[NDArray[Any], tuple[str, ...]]:
+    """Return the numbers of a field in the order of `known` names, and these: those of the message if none are known.
+
+    Raises
+    ------
+    LookupError : there is no such field, or it holds no numbers
+    """
+    try:
+        numbers = _values(message, field)
+    except LookupError:
+        there = ", ".join(_numbers(message)) or "none"
+        raise LookupError(f"the field has no numbers; fields with numbers: {there}") from None
+    for named in ("name", "names", "channels", "channel_names"):
+        names = getattr(message, named, None)
+        if isinstance(names, list) and len(names) == numbers.size and all(isinstance(n, str) for n in names):
+            known = known or tuple(names)
+            is_same = sorted(names) == sorted(known)
+            return numbers[[names.index(name) for name in known]] if is_same else np.empty(0), known
+    return numbers, known
+
+
+def _shape(whole: Sequence[_Message]) -> tuple[int, int]:
+    """Return rows and columns of the most frequent number of values: as most messages state them, else one row."""
+    ((size, _),) = Counter(message.values.size for message in whole).most_common(1)
+    stated = Counter(m.values.shape for m in whole if m.values.size == size and m.values.ndim == 2).most_common(1)
+    return stated[0][0] if stated else (1, size)
+
+
+def _reader(location: str, facts: Facts, messages: Sequence[_Message], said: Sequence[str], short: int) -> InMemory:
+    """Return the frames of messages, by their stamps, or by the bag's times where many of these are wrong."""
+    rows = np.stack([message.values.reshape(-1) for message in messages])
+    with np.errstate(over="ignore"):
+        frames = rows.astype(np.float32)
+    if np.isinf(frames).any():
+        raise FormatError(f"{location}: a value is infinite, or does not fit 32 bits")
+    bag, stamps = (np.array([getattr(m, name) for m in messages], np.int64) for name in ("at", "stamp"))
+    right = (stamps > 0) & (np.abs(bag.astype(np.float64) - stamps) <= _DAY_NS)
+    found, by_the_bag = repaired(np.where(right, stamps, bag) // 1000), int((~right).sum())
+    are_few = 2 * len(np.unique(stamps)) < len(stamps)
+    if are_few or right.mean() < _MOST or found.wrong > (1 - _MOST) * len(messages):
+        found, by_the_bag = repaired(bag // 1000), len(messages)
+    frames = frames if found.order is None else frames[found.order]
+    wrong = f"{by_the_bag} of {counted(len(messages), 'message')} have the time of the bag: their stamps are wrong"
+    said = [*said, *[wrong] * bool(stamps.any() and by_the_bag), *found.said]
+    for line in said:
+        warn(f"{location.partition(', field ')[0]}: {line}", stacklevel=6)
+    unit = "counts" if rows.dtype.kind in "ui" else "as sent"
+    values = frozen_whole(frames.reshape(-1, *facts.array.shape))
+    table = Frames(values, frozen_whole(found.t), unit=unit, array=facts.array)
+    remarks = () if stamps.any() else ("the times are those of the bag, because the messages have no header",)
+    counts = {"messages": len(messages), "messages_of_another_length": short, "times_by_the_bag": by_the_bag}
+    return InMemory(replace(facts, remarks=remarks, lost=(*said, *facts.lost)), table, counted=counts)
