@@ -54,14 +54,16 @@ GivenTare: TypeAlias = Tare | str | os.PathLike[str] | float
 
 
 def settings(_: Any, tokens: Sequence[Any]) -> dict[str, Any]:
-    """Return the values of ``--set KEY=VALUE``; a VALUE that is not TOML is text."""
+    """Return the values of an option KEY=VALUE, such as ``--set``; a VALUE that is not TOML is text."""
     values = {}
     for token in tokens:
         key, equals, value = token.value.partition("=")
         if not equals or not key.strip():
-            raise ProblemError(f"--set {short(token.value)}: must be KEY=VALUE")
+            raise ProblemError(f"{token.keyword} {short(token.value)}: must be KEY=VALUE")
+        # People type .5, which TOML has not.
+        toml = f"value = {'0' * value.startswith('.')}{value}"
         try:
-            values[key.strip()] = of_toml(f"--set {short(key.strip())}", f"value = {value}")["value"]
+            values[key.strip()] = of_toml(f"{token.keyword} {short(key.strip())}", toml)["value"]
         except FormatError:
             values[key.strip()] = value.strip()
     return values

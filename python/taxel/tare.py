@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -160,6 +161,10 @@ class Tare(Saved):
         tare.noise = _of_taxels(values["noise"], tare.array)
         tare.start_us, tare.stop_us, tare.note = values["start_us"], values["stop_us"], values["note"]
         return tare
+
+    def _with(self, **parts: Sequence[float | None]) -> Tare:
+        """Return the tare with other values by taxel."""
+        return self.from_json(json.dumps(json.loads(self._text) | parts))
 
     def _padded_to(self, array: Array) -> Tare:
         """Return the tare as that of a larger array's first rows and columns; taxels beyond have none."""

@@ -115,11 +115,12 @@ def test_noise_has_no_centre_and_each_press_has_one(spread: float, share: float)
     frames = taxel.Frames(np.round(values), np.arange(1200) * 10_000, unit="counts")
     of = series(Recording.of(InMemory(Facts(array=frames.array), frames)))
     assert of.rest.source == "quiet"
-    has = ~np.isnan(of.centre).any(axis=1)
+    centre = np.stack([of.columns["centre_x_taxels"], of.columns["centre_y_taxels"]], axis=1)
+    has = ~np.isnan(centre).any(axis=1)
     assert has[during].all()
     # Where few taxels are above the floor, their number is now and then more than twice that of the quietest stretch.
     assert np.count_nonzero(has & ~during) <= 1
-    found = of.centre[during]
+    found = centre[during]
     assert found.min() >= 3.0
     assert (found <= (12.0, 9.0)).all()
 

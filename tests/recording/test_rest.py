@@ -42,8 +42,7 @@ def test_a_board_with_nothing_on_it_reads_nothing(tmp_path: Path) -> None:
     found = series(taxel.open(tmp_path / "a.npz"))
     assert found is not None
     assert found.rest.source == "quiet"
-    assert found.area_unit == "taxels"
-    assert np.median(found.area) <= 6
+    assert np.median(found.columns["area_taxels"]) <= 6
 
 
 def test_a_load_that_stays_and_one_that_comes_back(tmp_path: Path) -> None:
@@ -56,13 +55,14 @@ def test_a_load_that_stays_and_one_that_comes_back(tmp_path: Path) -> None:
     taxel.convert(events, tmp_path / "a.npz")
     found = series(taxel.open(tmp_path / "a.npz"))
     assert found is not None
+    total, area = found.columns["sum_ticks"], found.columns["area_mm2"]
     pressed = (found.t >= 1_000_000) & (found.t < 2_000_000)
     assert found.rest.quiet_us == (0, 500_000)
-    assert found.total[pressed][0] == pytest.approx(160.0)
+    assert total[pressed][0] == pytest.approx(160.0)
     # Of a load that stays, a rest that is known takes a 3600th a second.
-    assert found.total[pressed][-1] == pytest.approx(160.0 * np.exp(-1 / 3600), rel=1e-4)
-    assert found.area[pressed].tolist() == [4.0] * np.count_nonzero(pressed)
-    assert not found.total[~pressed].any()
+    assert total[pressed][-1] == pytest.approx(160.0 * np.exp(-1 / 3600), rel=1e-4)
+    assert area[pressed].tolist() == [4.0] * np.count_nonzero(pressed)
+    assert not total[~pressed].any()
 
 
 def test_a_tare_comes_first_then_the_calibrations_rest_then_a_quiet_stretch(tmp_path: Path) -> None:

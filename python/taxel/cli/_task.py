@@ -75,15 +75,6 @@ class Output:
         say(*([to_json.dumps(result)] if self.json else lines))
 
 
-def pairs(option: str, texts: Iterable[str], form: str = "NAME=VALUE") -> Iterator[tuple[str, str]]:
-    """Yield names and values that an option gives as NAME=VALUE."""
-    for text in texts:
-        name, _, value = text.partition("=")
-        if not name or not value:
-            raise ProblemError(f"{option} {text}: must be {form}")
-        yield name, value
-
-
 def one_or_several(texts: Sequence[str]) -> str | list[str]:
     """Return what an option gives once, or all that it gives."""
     return texts[0] if len(texts) == 1 else list(texts)

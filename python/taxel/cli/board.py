@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 from collections.abc import Callable, Iterator
-from dataclasses import Field, fields
-from itertools import chain
+from dataclasses import Field, fields, make_dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -54,12 +51,10 @@ BitsOption = Annotated[
 _TYPES = {"int": int, "float": float, "bool": bool, "str": str}
 
 
-def _parameter(field: Field[Any]) -> inspect.Parameter:
-    """Return the option of the command line that sets an option of `Live`."""
+def _typed(field: Field[Any]) -> tuple[str, Any, Any]:
+    """Return an option of `Live` as a field that the command line types: its name, kind and default."""
     words, kind, described = field.metadata["typed"], str(field.type), about(StatedOptions, field.name)
-    flag = words.get("flag", "--" + field.name.replace("_", "-"))
     help_ = " ".join([described.pop("help"), *filter(None, [words.get("typed")])])
-    help_ = help_.replace("`taxel.wire.PRESETS`", QUOTED_PRESETS)
     plain = kind.removesuffix(" | None")
     default = field.default if plain in _TYPES else None
     read: Any = _TYPES.get(plain, str)
@@ -69,52 +64,45 @@ def _parameter(field: Field[Any]) -> inspect.Parameter:
         read = Path | None
     elif "Sequence" in kind or "Mapping" in kind:
         read = list[str] | None
-    limits = Limits(described.get("min"), described.get("max"))
-    option = Parameter(name=flag, metavar=words.get("metavar"), help=help_, validator=limits)
-    return inspect.Parameter(
-        field.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[read, option]
+    option = Parameter(
+        name=words.get("flag", "--" + field.name.replace("_", "-")),
+        metavar=words.get("metavar"),
+        help=help_.replace("`taxel.wire.PRESETS`", QUOTED_PRESETS),
+        validator=Limits(described.get("min"), described.get("max")),
     )
+    return field.name, Annotated[read, option], default
 
 
-def with_live_options(command: str, *names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Return a decorator that gives a command options of `Live`, in its argument `options`, by name.
+def with_live_options(command: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return a decorator that gives a command its options of `Live`, as the fields of its argument `options`.
 
     Parameters
     ----------
     command : str
-        A command whose options these are.
-    *names : str
-        Those of its options that are taken. Default: all.
+        The command whose options these are.
     """
-    commands_of = {field: field.metadata["typed"].get("commands", "live").split() for field in fields(StatedOptions)}
     chosen = [
-        field for field, commands in commands_of.items() if command in commands and (not names or field.name in names)
+        field for field in fields(StatedOptions) if command in field.metadata["typed"].get("commands", "live").split()
     ]
+    # A class of `types` would be taken for a value.
+    options = make_dataclass("LiveOptions", map(_typed, chosen), frozen=True, namespace={"__module__": __name__})
 
-    own = [_parameter(field) for field in chosen]
-
-    def decorate(work: Callable[..., Any]) -> Callable[..., Any]:
-        def call(*arguments: Any, **typed: Any) -> Any:
-            options = {one.name: typed.pop(one.name, one.default) for one in own}
-            return work(*arguments, options=options, **typed)
-
-        parameters = inspect.signature(work, eval_str=True).parameters.items()
-        each = [own if name == "options" else [parameter] for name, parameter in parameters]
-        functools.update_wrapper(call, work)
-        call.__signature__ = inspect.Signature([*chain.from_iterable(each)])  # type: ignore[attr-defined]
-        call.__annotations__ = {}  # those of `work`, which the signature replaces
-        return call
+    def decorate(work: Any) -> Callable[..., Any]:
+        work.__annotations__["options"] = Annotated[options, Parameter(name="*")]
+        work.__kwdefaults__["options"] = options()
+        return work  # type: ignore[no-any-return]
 
     return decorate
 
 
 def for_live(
-    options: dict[str, Any], rate_hz: float | None = None, bits: int | None = None, seconds: float | None = None
+    typed: Any, rate_hz: float | None = None, bits: int | None = None, seconds: float | None = None
 ) -> dict[str, Any]:
     """Return typed options as `Live` takes them: files are read.
 
     Each source of lines may be silent before its first line for `seconds`, by default as long as it takes.
     """
+    options: dict[str, Any] = vars(typed)
     readout, size = options.get("readout"), options["array"]
     trained = None if readout is None else load(readout)
     # The wire's pitch is that of the board; a sensor of one's own has the one that is stated, or none.
@@ -122,10 +110,8 @@ def for_live(
     sensor = trained.array if array is None and trained is not None else array
     registers = _registers(options["registers"], rate_hz, bits, sensor)
     read = {"readout": trained, "array": array, "registers": registers, "tare": _rest(options.get("tare"))}
-    given = {"send": options.get("send") or ()}
-    if "sources" in options:
-        given["sources"] = options["sources"] or None
-        given["first_line_s"] = _ALWAYS_S if seconds is None else max(_FIRST_LINE_S, seconds)
+    first_line_s = _ALWAYS_S if seconds is None else max(_FIRST_LINE_S, seconds)
+    given = {"send": options.get("send") or (), "sources": options["sources"] or None, "first_line_s": first_line_s}
     return options | read | given
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import secrets
 from collections import deque
-from collections.abc import Collection, Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, TypeVar
 
 from cyclopts import Parameter
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -20,11 +20,12 @@ from taxel._base.messages import counted
 from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.cli._say import say
-from taxel.cli._task import pairs, progress
+from taxel.cli._task import progress
 from taxel.cli.app import App, Flat, JsonOption, Limits
 from taxel.cli.console import Console
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
 from taxel.live.sending import PORT
+from taxel.options import settings
 from taxel.recording.opening import open_one
 from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Replay, Scene, SceneFile, Version2
 from taxel.simulate import emulate as run
@@ -35,11 +36,28 @@ from taxel.simulate.options import EmulateOptions
 app = App(name="emulate")
 
 
-def _option(name: str, options: type = EmulateOptions, metavar: str | None = None) -> Any:
+#: The parts of the circuit that an option sets.
+_LINES, _CONVERTER = ("gain", "switch_ohm", "wire_ohm", "offset_mv"), ("hysteresis_v", "settle_us", "amplifier_us")
+_T = TypeVar("_T")
+
+
+def _option(name: str, options: type = EmulateOptions) -> Any:
     """Return the option of the command line that sets an option of `emulate`: its text and range."""
     described = about(options, name)
     limits = Limits(described.get("min"), described.get("max"))
-    return Parameter(help=described["help"], metavar=metavar, validator=limits)
+    return Parameter(help=described["help"], validator=limits)
+
+
+def _several(name: str, flag: str, value: str) -> Any:
+    """Return the option of the command line that sets the values of an option of `emulate` by their names."""
+    return Parameter(
+        name=flag,
+        help=about(EmulateOptions, name)["help"],
+        metavar=f"NAME={value}",
+        n_tokens=-1,
+        accepts_keys=False,
+        converter=settings,
+    )
 
 
 @dataclass(frozen=True)
@@ -85,10 +103,10 @@ class _EmulateArguments:
     session: Annotated[int | None, Parameter(validator=Limits(0, 65_535))] = None
     reset_every: Annotated[float | None, _option("reset_every_s")] = EmulateOptions.reset_every_s
     drift: Annotated[float, _option("drift_ppm")] = EmulateOptions.drift_ppm
-    circuit: Annotated[list[str] | None, _option("circuit", metavar="NAME=VALUE")] = None
+    circuit: Annotated[Mapping[str, Any], _several("circuit", "--circuit", "VALUE")] = field(default_factory=dict)
     asynchronous: Annotated[bool, _option("asynchronous")] = EmulateOptions.asynchronous
-    flaw: Annotated[list[str] | None, _option("flaws", metavar="NAME=SIZE[:SEED]")] = None
-    fault: Annotated[list[str] | None, _option("faults", metavar="NAME=SHARE")] = None
+    flaw: Annotated[Mapping[str, Any], _several("flaws", "--flaw", "SIZE")] = field(default_factory=dict)
+    fault: Annotated[Mapping[str, Any], _several("faults", "--fault", "SHARE")] = field(default_factory=dict)
     control: Annotated[int | None, _option("control")] = None
     source_port: Annotated[int, _option("source_port")] = EmulateOptions.source_port
     rest: bool = False
@@ -161,9 +179,7 @@ def _touch_of(typed: _EmulateArguments) -> tuple[Any, str, dict[str, Any]]:
         "sensor": board.sensor,
         "wire": (2 if typed.asynchronous else None) if typed.wire is None else 2 if typed.wire == 2 else 1,
         "version_2": Version2(typed.board, session),
-        "flaws": _flaws(typed.flaw or [], seed),
-        "faults": _faults(typed.fault or [], seed),
-        "circuit": _circuit(typed.circuit or [], seed),
+        **_trouble(typed, seed),
         "reset_every_s": typed.reset_every,
         "drift_ppm": typed.drift,
         "control": None if typed.control is None else f"127.0.0.1:{typed.control}",
@@ -233,60 +249,32 @@ def _print(report: EmulatorReport) -> None:
     say(report.verdict)
 
 
-def _pairs(option: str, assignments: Iterable[str], known: Collection[str]) -> dict[str, str]:
-    """Return names and values of NAME=VALUE; refuse a name that is not known."""
-    values = dict(pairs(f"--{option}", assignments))
-    for name in values:
-        if name not in known:
-            raise ProblemError(f"--{option} {name}: must be one of {', '.join(known)}")
-    return values
-
-
-def _number(option: str, name: str, value: str) -> float:
-    """Return a number as it was typed: an error shows 2, not 2.0."""
+def _part(option: str, values: Mapping[str, Any], names: Collection[str], make: Callable[..., _T]) -> _T | None:
+    """Return what the values of an option make, None of none; an error names the option."""
+    wrong = next((name for name in values if name not in names), None)
+    if wrong is not None:
+        raise ProblemError(f"--{option} {wrong}: must be one of {', '.join(names)}")
     try:
-        number = float(value)
-    except ValueError:
-        raise ProblemError(f"--{option} {name}={value}: must be a number") from None
-    return int(number) if number.is_integer() else number
-
-
-@contextmanager
-def _name_option(option: str) -> Iterator[None]:
-    """Name the option that an error is about."""
-    try:
-        yield
+        return make(**values) if values else None
     except ProblemError as error:
         raise ProblemError(f"--{option} {error}") from None
 
 
-def _flaws(assignments: list[str], seed: int) -> Flaws | None:
-    sizes: dict[str, Any] = {}
-    seeds = {}
-    for name, value in _pairs("flaw", assignments, Flaws._names()).items():
-        size, _, own_seed = value.partition(":")
-        sizes[name] = _number("flaw", name, size)
-        seeds[name] = int(_number("flaw", name, own_seed)) if own_seed else seed
-    with _name_option("flaw"):
-        return Flaws(**sizes, seeds=seeds) if sizes else None
+def _trouble(typed: _EmulateArguments, seed: int) -> dict[str, Any]:
+    """Return the circuit, the flaws and the faults, all of one seed."""
 
+    def circuit(**values: Any) -> Circuit:
+        lines, converter = ({name: values[name] for name in part if name in values} for part in (_LINES, _CONVERTER))
+        return Circuit(readout=VirtualGround(**lines, seed=seed), converter=Converter(**converter))
 
-def _circuit(assignments: list[str], seed: int) -> Circuit | None:
-    readout: dict[str, Any] = {"seed": seed}
-    converter: dict[str, Any] = {}
-    parts = dict.fromkeys(("gain", "switch_ohm", "wire_ohm", "offset_mv"), readout)
-    parts |= dict.fromkeys(("hysteresis_v", "settle_us", "amplifier_us"), converter)
-    for name, value in _pairs("circuit", assignments, parts).items():
-        parts[name][name] = _number("circuit", name, value)
-    with _name_option("circuit"):
-        return Circuit(readout=VirtualGround(**readout), converter=Converter(**converter)) if assignments else None
+    def flaws(**sizes: Any) -> Flaws:
+        return Flaws(**sizes, seeds=dict.fromkeys(sizes, seed))
 
-
-def _faults(assignments: list[str], seed: int) -> Faults | None:
-    values = _pairs("fault", assignments, Faults._names())
-    shares = {name: _number("fault", name, value) for name, value in values.items()}
-    with _name_option("fault"):
-        return Faults(**shares, seed=seed) if shares else None
+    return {
+        "circuit": _part("circuit", typed.circuit, (*_LINES, *_CONVERTER), circuit),
+        "flaws": _part("flaw", typed.flaw, Flaws._names(), flaws),
+        "faults": _part("fault", typed.fault, Faults._names(), partial(Faults, seed=seed)),
+    }
 
 
 #: A board that is behind its time by less than this holds its rate, s: threads wake late, and catch up.

@@ -220,32 +220,28 @@ def _overview(place: Path, of_each: Sequence[dict[str, Any]]) -> list[str]:
     """Return a row for each sensor of recordings, then their sum, as lines for people."""
     sensors = [sensor for facts in of_each for sensor in _sensors(facts)]
     sums = {noun: sum(facts.get(f"{noun}s", 0) for facts in sensors) for noun in ("event", "frame")}
-    notes = Counter(note["text"] for facts in of_each for note in _notes(facts))
+    # Those of several sources are those of the first that has any.
+    noted: list[Any] = [
+        next((notes for sensor in _sensors(facts) if (notes := sensor["notes"])), []) for facts in of_each
+    ]
+    notes = Counter(note["text"] for of in noted for note in of)
     faults = Counter(str(facts["verdict"]) for facts in of_each if facts["verdict"].status not in _SOUND)
-    # Columns that say the same of each recording say nothing.
-    with_gaps = any(facts["gaps"] for facts in sensors)
-    with_verdict = any(facts["verdict"].status != "unknown" for facts in sensors)
-    head: tuple[str, ...] = ("recording", "array", "time (s)", "contents", "rate (1/s)", "notes", *_TAXELS)
-    head += ("gaps",) * with_gaps + ("verdict",) * with_verdict
-    contents = ", ".join(counted(total, noun) for noun, total in sums.items() if total)
-    bad = [str(sum(len(facts["taxels"][name]) for facts in sensors)) for name in _TAXELS]
-    last: tuple[str, ...] = (
-        "sum",
-        "",
-        f"{sum(facts['seconds'] for facts in sensors):.3f}",
-        contents,
-        "",
-        str(notes.total()),
-        *bad,
-    )
-    last += ("",) * (with_gaps + with_verdict)
-    columns = {"with_gaps": with_gaps, "with_verdict": with_verdict}
-    rows = [head, *(_row(facts, **columns) for facts in sensors), last]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    last = {
+        "recording": "sum",
+        "time (s)": f"{sum(facts['seconds'] for facts in sensors):.3f}",
+        "contents": ", ".join(counted(total, noun) for noun, total in sums.items() if total),
+        "notes": str(notes.total()),
+        **{name: str(sum(len(facts["taxels"][name]) for facts in sensors)) for name in _TAXELS},
+    }
+    rows = [*map(_row, sensors), last]
+    # What no recording has to say is no column.
+    names = [name for name in rows[0] if any(row.get(name) not in (None, "", "unknown") for row in rows)]
+    cells = [names, *([row.get(name, "") for name in names] for row in rows)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     of_notes = ", ".join(f"{text} {count}" for text, count in sorted(notes.items()))
     return [
         f"{place}: {counted(len(of_each), 'recording')}",
-        *("  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows),
+        *("  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in cells),
         *([f"notes: {of_notes}"] if notes else []),
         *(f"{counted(count, 'recording')}: {verdict}" for verdict, count in faults.items()),
         "--each prints all facts about each recording",
@@ -257,30 +253,23 @@ def _sensors(facts: dict[str, Any]) -> list[dict[str, Any]]:
     return list(facts["sources"].values()) if "sources" in facts else [facts]
 
 
-def _notes(facts: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the notes of a recording, those of several sources from the first that has any."""
-    return next((notes for sensor in _sensors(facts) if (notes := sensor["notes"])), [])
-
-
-def _row(facts: dict[str, Any], *, with_gaps: bool, with_verdict: bool) -> tuple[str, ...]:
+def _row(facts: dict[str, Any]) -> dict[str, str]:
     """Return the cells of a sensor in the table of several recordings."""
-    array, events = Array._from_geometry(facts["array"]), facts.get("events")
+    array, events, gaps = Array._from_geometry(facts["array"]), facts.get("events"), facts["gaps"]
     rate = facts["frames_per_s"] if events is None else facts["events_per_s_board"]
-    return (
-        Path(facts["file"]).name,
-        f"{array.rows} x {array.columns}",
-        f"{facts['seconds']:.3f}" if facts["timed"] else "none",
-        f"{counted(facts['frames'], 'frame')} ({facts['unit']})" if events is None else counted(events, "event"),
-        "" if rate is None else f"{rate:.4g}",
-        str(len(facts["notes"])),
-        *(str(len(facts["taxels"][name])) for name in _TAXELS),
-        *([_gaps(facts["gaps"])] if with_gaps else []),
-        *([facts["verdict"].status] if with_verdict else []),
-    )
-
-
-def _gaps(gaps: dict[str, Any] | None) -> str:
-    return "" if gaps is None else f"{gaps['count']} ({plain(gaps['total_us'] / 1e6, 3)} s)"
+    return {
+        "recording": Path(facts["file"]).name,
+        "array": f"{array.rows} x {array.columns}",
+        "time (s)": f"{facts['seconds']:.3f}" if facts["timed"] else "none",
+        "contents": f"{counted(facts['frames'], 'frame')} ({facts['unit']})"
+        if events is None
+        else counted(events, "event"),
+        "rate (1/s)": "" if rate is None else f"{rate:.4g}",
+        "notes": str(len(facts["notes"])),
+        **{name: str(len(facts["taxels"][name])) for name in _TAXELS},
+        "gaps": "" if gaps is None else f"{gaps['count']} ({plain(gaps['total_us'] / 1e6, 3)} s)",
+        "verdict": facts["verdict"].status,
+    }
 
 
 def _pages(facts: dict[str, Any]) -> list[str]:
@@ -293,12 +282,7 @@ def _pages(facts: dict[str, Any]) -> list[str]:
 
 def _lines(pressed: Series) -> Iterator[str]:
     """Yield the lines of a table of pressure over time; the centre is empty where nothing is loaded."""
-    columns = {f"area_{pressed.area_unit}": pressed.area} if pressed.area is not None else {}
-    columns |= {f"peak_{pressed.unit}": pressed.peak, f"sum_{pressed.unit}": pressed.total}
-    if pressed.centre is not None:
-        columns |= {
-            f"centre_{axis}_{pressed.centre_unit}": centre for axis, centre in zip("xy", pressed.centre.T, strict=True)
-        }
+    columns = {name: values for name, values in pressed.columns.items() if name != "force_N"}
     yield ",".join(["t_us", *columns])
     for t, *values in zip(*(column.tolist() for column in (pressed.t, *columns.values())), strict=True):
         yield ",".join([str(t), *("" if np.isnan(value) else f"{value:.10g}" for value in values)])

@@ -85,7 +85,7 @@ class _LiveArguments:
 
 @app.default
 @with_live_options("live")
-def live(*, options: dict[str, Any], typed: Flat[_LiveArguments] = _LiveArguments()) -> int:
+def live(*, options: Any, typed: Flat[_LiveArguments] = _LiveArguments()) -> int:
     """Receive a board's events, or frames of numbers, and print what a readout detects, live; with --panel, show them.
 
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
@@ -256,9 +256,9 @@ def _report_unsent(summary: Summary) -> None:
             say(f"taxel: {lost} of {line['sent'] + lost} lines not sent to {line['to']}: {why}", err=True)
 
 
-def _check_options(options: dict[str, Any], typed: _LiveArguments) -> None:
+def _check_options(options: Any, typed: _LiveArguments) -> None:
     """Refuse options that would have no effect."""
-    readout, tare = options["readout"], options["tare"]
+    readout, tare = options.readout, options.tare
     if readout is None and not typed.panel:
         raise ProblemError("nothing to do: give --readout FILE to detect, or --panel to show the board")
     if readout is None and (tare or typed.report):

@@ -78,7 +78,7 @@ class _RecordArguments:
 def record(
     file: OutArgument,
     *,
-    options: dict[str, Any],
+    options: Any,
     typed: Flat[_RecordArguments] = _RecordArguments(),
 ) -> int:
     """Record what a board sends by UDP, and report what was lost.

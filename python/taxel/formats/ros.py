@@ -161,8 +161,8 @@ def _values(message: Any, path: str) -> NDArray[Any]:
         if not is_dataclass(message) or not hasattr(message, step):
             raise LookupError(step)
         found = _values(getattr(message, step), rest)
-        is_whole = _type(message).endswith("MultiArray") and not message.layout.data_offset
-        sizes = [int(dimension.size) for dimension in message.layout.dim] if is_whole else []
+        layout: Any = getattr(message, "layout", None) if _type(message).endswith("MultiArray") else None
+        sizes = [] if layout is None or layout.data_offset else [int(dimension.size) for dimension in layout.dim]
         return found.reshape(sizes) if len(sizes) == 2 and sizes[0] * sizes[1] == found.size else found
     if isinstance(message, np.ndarray) and message.dtype.kind in "uifb":
         return message
@@ -354,7 +354,7 @@ def _readers(
 ) -> Iterator[InMemory]:
     """Yield the frames of a topic, those of each key apart."""
     location = f"{path}: topic {topic}" + f", field {field}" * bool(field)
-    kind, names, trouble, messages = "", (), "", list[_Message]()
+    kind, names, trouble, messages = "", tuple[str, ...](), "", list[_Message]()
     for connection, at, data in bag.messages([each for each in bag.connections if each.topic == topic]):
         message = bag.deserialize(data, connection.msgtype)
         kind = _type(message)

@@ -21,6 +21,7 @@ from taxel.recording.analysis.rest import Rest
 
 F = TypeVar("F", bound=FigureBase)
 
+_AXES = {"x": "#c44e52", "y": "#4c72b0"}
 _COLOURS = {"dead": "#4c72b0", "stuck": "#dd8452", "noisy": "#c44e52"}
 
 
@@ -134,21 +135,23 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
     series = Series.from_frames(frames, above, Rest("none", nowhere))
     if figure is None:
         figure = plt.figure(figsize=(11, 6), layout="constrained")
-    curves = [(f"peak ({series.unit})", series.peak), (f"sum ({series.unit})", series.total)]
-    if series.area is not None:
-        curves.insert(0, (f"contact area ({series.area_unit})", series.area))
-    rows = instance("figure", figure, FigureBase).subplots(len(curves) + (series.centre is not None), 1, sharex=True)
     begin_us = beginning_us(frames.t)
     t = (frames.t - begin_us) / 1e6
-    for ax, (name, values) in zip(rows, curves, strict=False):
-        ax.plot(t, values, color="black", linewidth=0.8)
-        ax.set_ylabel(escaped(name))
-    if series.centre is not None:
-        names = ("column", "row") if series.centre_unit == "taxels" else ("x", "y")
-        for axis, colour, name in zip(series.centre.T, ("#c44e52", "#4c72b0"), names, strict=True):
-            rows[-1].plot(t, axis, color=colour, linewidth=0.8, label=name)
-        rows[-1].set_ylabel(escaped(f"centre ({series.centre_unit})"))
-        rows[-1].legend(loc="upper right")
+    # Both parts of a centre are one curve of two lines.
+    parted = {name: name.split("_", 1) for name in series.columns if name != "force_N"}
+    kinds = dict.fromkeys(kind for kind, _ in parted.values())
+    rows = instance("figure", figure, FigureBase).subplots(len(kinds), 1, sharex=True)
+    for ax, kind in zip(rows, kinds, strict=True):
+        for name, (of, unit) in parted.items():
+            if of == kind != "centre":
+                ax.plot(t, series.columns[name], color="black", linewidth=0.8)
+                ax.set_ylabel(escaped(f"{'contact ' * (kind == 'area')}{kind} ({unit})"))
+            elif of == kind:
+                axis, _, of_axis = unit.partition("_")
+                title = {"x": "column", "y": "row"}[axis] if of_axis == "taxels" else axis
+                ax.plot(t, series.columns[name], color=_AXES[axis], linewidth=0.8, label=title)
+                ax.set_ylabel(escaped(f"centre ({of_axis})"))
+                ax.legend(loc="upper right")
     rows[-1].set_xlabel(_time(begin_us))
     return figure
 

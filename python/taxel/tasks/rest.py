@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from errno import ENOENT
@@ -169,9 +168,8 @@ def _before(source: Events | Frames, labels: Mapping[str, NDArray[np.int64]]) ->
 
 def _without(tare: Tare, load: NDArray[np.float64]) -> Tare:
     """Return a tare less what lay on the taxels while it was measured."""
-    document = json.loads(tare.to_json())
-    rest = [None if value is None else value - less for value, less in zip(document["rest"], load, strict=True)]
-    return Tare.from_json(json.dumps(document | {"rest": rest}))
+    rest = tare.rest.reshape(-1) - load
+    return tare._with(rest=[None if np.isnan(value) else value for value in rest.tolist()])
 
 
 def given_tare(tare: GivenTare, recording: Recording) -> Tare:

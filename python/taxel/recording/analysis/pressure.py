@@ -46,32 +46,20 @@ class Series:
     unit : str
     above : float
         The value above which a taxel counts as loaded, in `unit`.
-    area : float64, shape (n,), mm2 or taxels; None of channels
-    area_unit : {"mm2", "taxels"}
-        "taxels", a number of taxels, if their area is not known.
-    peak, total : float64, shape (n,), in `unit`
-        The largest value, and the sum of the loaded taxels, 0 without one; of all where `above` is 0.
-    centre : float64, shape (n, 2), in `centre_unit`; None of channels
-        As of `Frames.centre`; NaN in frames above the rest of a quiet stretch whose sum is one that noise adds up to.
-    centre_unit : {"mm", "taxels", "places"}
-        As of `Array.centre_unit`.
+    columns : dict from str to float64, shape (n,)
+        By name and unit, as ``peak_kPa``: `area` (mm2, or taxels where their area is not known); the largest value,
+        `peak`; the `sum` of the loaded taxels, 0 without one, and of all where `above` is 0; `centre_x` and `centre_y`
+        (`Array.centre_unit`), NaN in frames above the rest of a quiet stretch whose sum is one that noise adds up to;
+        `force` (N), of values in kPa whose areas are known. Channels have neither area nor centre.
     rest : Rest
         What was subtracted.
-    force : float64, shape (n,), N
-        Of values in kPa, if the area of each taxel is known.
     """
 
     t: NDArray[np.int64]
     unit: str
     above: float
-    area: NDArray[np.float64] | None
-    peak: NDArray[np.float64]
-    total: NDArray[np.float64]
-    centre: NDArray[np.float64] | None
-    area_unit: str
-    centre_unit: str
+    columns: dict[str, NDArray[np.float64]]
     rest: Rest
-    force: NDArray[np.float64] | None = None
 
     @classmethod
     def from_frames(cls, frames: Frames, above: float, rest: Rest) -> Series:
@@ -90,15 +78,18 @@ class Series:
             values = np.where(block._loaded(above), block.values, 0.0) if is_cut_off else block.values
             return np.asarray(values.sum(axis=(1, 2), dtype=np.float64))
 
-        in_mm2 = array.area_mm2 is not None
-        area = over(lambda block: block.area(above) if in_mm2 else block.loaded(above).astype(np.float64))
-        centre, total = None if array.is_channels else over(lambda block: block.centre(above)), over(loaded_sum)
-        if centre is not None and rest.source == "quiet" and len(frames):
-            centre[total <= _core.frame_noise(frames.t, total, above)] = np.nan
-        return cls(
-            frames.t, frames.unit, above, None if array.is_channels else area, over(Frames.peak), total,
-            centre, "mm2" if in_mm2 else "taxels", array.centre_unit or "", rest, force_n(frames),
-        )  # fmt: skip
+        columns = {f"peak_{frames.unit}": over(Frames.peak), f"sum_{frames.unit}": over(loaded_sum)}
+        if not array.is_channels:
+            in_mm2 = array.area_mm2 is not None
+            area = over(lambda block: block.area(above) if in_mm2 else block.loaded(above).astype(np.float64))
+            total, centre = columns[f"sum_{frames.unit}"], over(lambda block: block.centre(above))
+            if rest.source == "quiet" and len(frames):
+                centre[total <= _core.frame_noise(frames.t, total, above)] = np.nan
+            columns = {"area_mm2" if in_mm2 else "area_taxels": area, **columns}
+            columns |= {f"centre_{axis}_{array.centre_unit}": centre[:, k] for k, axis in enumerate("xy")}
+        if (force := force_n(frames)) is not None:
+            columns["force_N"] = force
+        return cls(frames.t, frames.unit, above, columns, rest)
 
 
 def force_n(frames: Frames) -> NDArray[np.float64] | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import wraps
@@ -153,8 +152,7 @@ def by_unit(frames: Frames) -> Tare | None:
     middle, above = quantile(np.where(np.isnan(still).all(axis=0), 0.0, still), (0.5, 0.75))
     noise = 1.4826 * np.asarray(above - middle, np.float64)
     nothing = Frames(np.zeros((2, *frames.array.shape)), [0, 1], unit=frames.unit, array=frames.array)
-    document = json.loads(Tare.take(nothing, note=BY_UNIT).to_json())
-    return Tare.from_json(json.dumps(document | {"noise": noise.reshape(-1).tolist()}))
+    return Tare.take(nothing, note=BY_UNIT)._with(noise=noise.reshape(-1).tolist())
 
 
 def loaded_from(frames: Frames, rest: Rest) -> float:

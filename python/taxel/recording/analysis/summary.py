@@ -117,24 +117,20 @@ def _pressure(pressed: Series) -> dict[str, Any] | None:
     if not len(pressed.t):
         return None
     facts: dict[str, Any] = {"unit": pressed.unit, "above": pressed.above}
-    curves: dict[str, Any] = {
-        f"area_{pressed.area_unit}": pressed.area,
-        "peak": pressed.peak,
-        "sum": pressed.total,
-        "force_n": pressed.force,
-    }
-    for name, values in curves.items():
-        if values is not None:
+    for name, values in pressed.columns.items():
+        kind, _, unit = name.partition("_")
+        if kind == "centre":
+            axis, _, unit = unit.partition("_")
+            known = values[~np.isnan(values)]
+            limits = facts.setdefault(f"centre_{unit}", {} if len(known) else None)
+            if limits is not None:
+                limits[axis] = [float(known.min()), float(known.max())]
+        else:
             # A frame of missing values alone has no peak.
             k = int(np.where(np.isnan(values), -np.inf, values).argmax())
-            facts[name] = {"most": float(values[k]), "t_us": int(pressed.t[k])}
-    if pressed.centre is None:
-        return facts
-    centre = pressed.centre[~np.isnan(pressed.centre).any(axis=1)]
-    limits = {"x": [float(v) for v in (centre[:, 0].min(), centre[:, 0].max())]} if len(centre) else None
-    if limits is not None:
-        limits["y"] = [float(v) for v in (centre[:, 1].min(), centre[:, 1].max())]
-    return facts | {f"centre_{pressed.centre_unit}": limits}
+            key = {"area": name, "force": "force_n"}.get(kind, kind)
+            facts[key] = {"most": float(values[k]), "t_us": int(pressed.t[k])}
+    return facts
 
 
 def _peak(events: Events) -> tuple[float | None, bool]:
