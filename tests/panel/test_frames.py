@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import threading
 
 import numpy as np
 import pytest
@@ -26,7 +25,7 @@ from panel.protocol import (
 import taxel
 from taxel import Array, Frames, Places
 from taxel.options import FullReading
-from taxel.panel import Panel, shown_files
+from taxel.panel import Panel
 from taxel.reading import Facts, InMemory
 from taxel.recording.analysis.pressure import above_rest, force_n
 from taxel.recording.analysis.rest import ticks_by_unit
@@ -210,7 +209,6 @@ def test_events_of_a_table_are_shown_as_those_of_a_board(tmp_path):
         about = opened(page, "events.npz")
         assert about["frames"] is None
         assert about["events"] == 2
-        assert panel._hub.folder.files._folder is None, "no file is written for it"
 
 
 def test_a_folder_opens_on_its_first_recording(tmp_path):
@@ -220,31 +218,6 @@ def test_a_folder_opens_on_its_first_recording(tmp_path):
     with Panel(tmp_path) as panel, Client(panel) as page:
         assert page.until("hello")["open"] == "step2.npz"
         assert sorted(file["name"] for file in page.until("recordings")["files"]) == ["step10.npz", "step2.npz"]
-
-
-def test_a_large_table_is_shown_from_its_beginning_and_then_whole(tmp_path, monkeypatch):
-    file = write_gaitpdb(tmp_path)
-    monkeypatch.setattr(shown_files, "_LARGE", 1000)
-    monkeypatch.setattr(shown_files, "_BEGINNING", file.stat().st_size // 3)
-    reading, looked_at = shown_files.ShownFiles.opened, threading.Event()
-
-    def slowly(self, path, trial):
-        assert looked_at.wait(60)
-        return reading(self, path, trial)
-
-    monkeypatch.setattr(shown_files.ShownFiles, "opened", slowly)
-    [whole] = FullReading().open_trials(file)
-    frames = sum(len(one.frames()) for one in whole.sources.values())
-    with Panel(file) as panel, Client(panel) as page:
-        first = opened(page, file.name)
-        assert 0 < first["frames"]["count"] < frames / 2
-        assert first["frames"]["left_s"] > 0
-        share = page.until("loading", name=file.name)["share"]
-        assert 0 < share < 1
-        looked_at.set()
-        then = page.until("opened", name=file.name)
-        assert (then["frames"]["count"], then["frames"]["left_s"]) == (frames, None)
-        assert page.until("transport")["t_us"] == first["start_us"]
 
 
 def test_what_is_no_recording_is_refused_at_once(tmp_path):

@@ -521,19 +521,19 @@ impl View {
         Ok(())
     }
 
-    /// Shows a recording at a time, us, or at its beginning, paused.
+    /// Shows a recording at its beginning, paused.
     ///
     /// # Errors
     ///
     /// `File` or `Core` where the recording cannot be read.
-    pub fn show(&mut self, recording: Shown, t: Option<i64>) -> Result<()> {
+    pub fn show(&mut self, recording: Shown) -> Result<()> {
         let index = recording.index();
         self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < index.array().len());
         (self.recording, self.window_us) = (Some(recording), None);
         self.recording_encoders = ReadoutEncoders::default();
         self.playback.pause();
         match index.range() {
-            Some((first, _)) => self.go(t.unwrap_or(first))?,
+            Some((first, _)) => self.go(first)?,
             None => self.position = Position::At(None),
         }
         Ok(())
@@ -567,7 +567,8 @@ mod tests {
         let (index, _) = indexed(&path, u64::MAX);
         let last = index.range().unwrap().1;
         let mut view = View::new(None);
-        view.show(Shown::Events(index), Some(last)).unwrap();
+        view.show(Shown::Events(index)).unwrap();
+        view.seek(last).unwrap();
         let coarse = Encoder::ChangeEvents(ChangeEvents { noise_floor: 20.0, ..ChangeEvents::default() });
         let by_name = || json!({ "name": "change_events" });
         let (defaults, of_readout) = encode(&mut view, by_name());

@@ -359,10 +359,10 @@ impl PanelView {
         self.with(py, View::follow)
     }
 
-    /// Shows a recording at a time, us, or at its beginning.
-    fn show(&self, py: Python<'_>, recording: &PanelRecording, t_us: Option<i64>) -> PyResult<()> {
+    /// Shows a recording at its beginning.
+    fn show(&self, py: Python<'_>, recording: &PanelRecording) -> PyResult<()> {
         let recording = recording.0.clone();
-        self.with(py, |view| view.show(recording, t_us))
+        self.with(py, |view| view.show(recording))
     }
 }
 

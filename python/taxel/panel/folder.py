@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import re
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -39,8 +39,6 @@ class Shown:
     contents : dict
         What the message `opened` says of it.
     size : int, bytes
-    left_s : float or None
-        How long the rest of the file takes to read, where this is its beginning, s.
     index_ms : float, ms
         How long reading it took.
     """
@@ -52,9 +50,7 @@ class Shown:
     recording: _core.PanelRecording
     contents: dict[str, Any]
     size: int
-    left_s: float | None
     index_ms: float
-    reading: asyncio.Task[None] | None = field(default=None)
 
     @property
     def us(self) -> int:
@@ -130,7 +126,7 @@ class Folder:
         self.files.forget()
         self._open = {key: shown for key, shown in self._open.items() if shown.path != path}
 
-    async def open(self, name: str, trial: str | None, *, entire: bool = False) -> Shown:
+    async def open(self, name: str, trial: str | None) -> Shown:
         """Return a recording, indexed once however many clients show it.
 
         Raises
@@ -139,26 +135,21 @@ class Folder:
         OSError : it cannot be read
         """
         path = self.file(name)
-        # What is known is shown at once, also while the rest of a large table is read.
-        if (known := self._known(path, trial, entire)) is not None:
-            return known
         async with self._locks.setdefault(path, asyncio.Lock()):
-            if (known := self._known(path, trial, entire)) is not None:
+            if (known := self._known(path, trial)) is not None:
                 return known
-            shown = await in_thread(self._index, name, path, trial, entire)
+            shown = await in_thread(self._index, name, path, trial)
             self._open = dict([*self._open.items()][-3:]) | {(path, trial): shown}
             return shown
 
-    def _known(self, path: Path, trial: str | None, entire: bool) -> Shown | None:
-        """Return a recording that was opened and is as it was; None of one of which more is asked for."""
+    def _known(self, path: Path, trial: str | None) -> Shown | None:
+        """Return a recording that was opened and is as it was."""
         known = self._open.get((path, trial))
-        if known is None or (entire and known.left_s is not None) or known.size != _size(path):
-            return None
-        return known
+        return None if known is None or known.size != _size(path) else known
 
-    def _index(self, name: str, path: Path, trial: str | None, entire: bool) -> Shown:
+    def _index(self, name: str, path: Path, trial: str | None) -> Shown:
         begun, size = time.monotonic(), _size(path)
-        viewed = self.files.read(path, trial, entire=entire, by_options=path.name == self._asked)
+        viewed = self.files.read(path, trial, by_options=path.name == self._asked)
         frames = viewed.contents["frames"] or {}
         return Shown(
             name,
@@ -168,7 +159,6 @@ class Folder:
             viewed.recording,
             viewed.contents,
             size,
-            frames.get("left_s"),
             1e3 * (time.monotonic() - begun),
         )
 

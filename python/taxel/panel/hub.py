@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import threading
-import time
 from collections.abc import Callable, Coroutine, Iterator
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -46,9 +45,6 @@ class Client(Protocol):
 
     async def say(self, message: dict[str, Any] | str) -> None:
         """Send a message."""
-
-    async def show_whole(self, whole: Shown) -> None:
-        """Show the whole of a recording whose beginning is shown."""
 
     async def send_frame(self) -> None:
         """Send a frame, if there is a new one."""
@@ -119,9 +115,8 @@ class Hub:
             return self._live
 
     def close(self) -> None:
-        """Close the serial line, remove temporary files, and end a `Live` that was begun here."""
+        """Close the serial line, and end a `Live` that was begun here."""
         self.board.close()
-        self.folder.files.close()
         if self._live is not None and self._live is not self._first:
             self._live.stop()
 
@@ -354,35 +349,9 @@ class Hub:
         """Read the recording to show first while the browser starts; who opens it gets the error."""
         if self.opened is not None:
             try:
-                await self.open(self.opened, None)
+                await self.folder.open(self.opened, None)
             except (OSError, _core.Error):
                 return
-
-    async def open(self, name: str, trial: str | None) -> Shown:
-        """Return a recording of the folder, indexed; of a large text table its beginning, and the rest is read."""
-        shown = await self.folder.open(name, trial)
-        if shown.left_s is not None and shown.reading is None:
-            shown.reading = asyncio.create_task(self._read_rest(shown))
-        return shown
-
-    async def _read_rest(self, shown: Shown) -> None:
-        """Read the whole of a file whose beginning is shown, with progress for the clients."""
-        assert shown.left_s is not None
-        begun = time.monotonic()
-        whole = asyncio.create_task(self.folder.open(shown.name, shown.asked, entire=True))
-        while not (await asyncio.wait({whole}, timeout=1.0))[0]:
-            share = min(0.99, (time.monotonic() - begun) / max(1.0, shown.left_s))
-            await self.say({"type": "loading", "name": shown.name, "share": share})
-        try:
-            complete = whole.result()
-        except (OSError, _core.Error) as error:
-            self.folder.forget(shown.path)
-            await self.warn(f"{error}; only the beginning of the recording is shown")
-            return
-        await self.say({"type": "loading", "name": shown.name, "share": 1.0})
-        for session in list(self.sessions):
-            if session.shown is shown:
-                await session.show_whole(complete)
 
     # ---------------------------------------------------------------------------------------------- messages
 

@@ -270,21 +270,20 @@ class Session:
         """Show a recording of the folder at its beginning, paused: any file that `taxel.open` reads.
 
         Of a file with several trials the one that `trial` names, or the first. `opened`, `labels` and `transport`
-        follow. Of a large text table the beginning is shown first, `loading` follows each second, and then `opened`
-        again, at the same time of the view.
+        follow.
         """
         with at_field("name"):
-            shown = await self._hub.open(name, trial)
-            await self._show(shown, None)
+            shown = await self._hub.folder.open(name, trial)
+            await self._show(shown)
 
-    async def _show(self, shown: Shown, t_us: int | None) -> None:
+    async def _show(self, shown: Shown) -> None:
         trouble = None
         try:
             if await self._hub.labels.read(shown):
                 await self._hub.say_labels(shown.name)
         except (OSError, _core.Error) as error:
             trouble = reason(error)
-        await in_thread(self.view.show, shown.recording, t_us)
+        await in_thread(self.view.show, shown.recording)
         self.shown = shown
         opened = {
             "type": "opened",
@@ -298,16 +297,6 @@ class Session:
         await self._say_transport()
         if trouble is not None:
             await self.say({"type": "warning", "text": trouble})
-
-    async def show_whole(self, whole: Shown) -> None:
-        """Show the whole of a recording whose beginning is shown, at the same time."""
-        state, speed, t_us = self.view.transport()
-        try:
-            await self._show(whole, t_us)
-            if state == "playing":
-                await in_thread(self.view.play, speed)
-        except (OSError, _core.Error) as error:
-            await self.say({"type": "warning", "text": reason(error)})
 
     @long_request
     async def values(self, t_us: Time) -> None:

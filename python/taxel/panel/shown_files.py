@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import os
-import tempfile
 import threading
-import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -37,10 +34,6 @@ from taxel.recording.kinds import is_recording
 from taxel.recording.reading_options import layout_for
 from taxel.verdict import Verdict
 from taxel.wire import Registers
-
-#: A text table of more bytes than the first number is shown by its beginning first, of as many bytes as the second.
-_LARGE, _BEGINNING = 8 << 20, 1 << 19
-_TEXTS = {".csv", ".txt", ".asc", ".asf", ".lst"}
 
 #: Time from one frame to the next, us, where frames are numbered: a view shows them as 100 a second.
 _NUMBER_US = 10_000
@@ -187,21 +180,13 @@ def judged(activity: _core._Activity) -> dict[str, Any]:
 
 
 class ShownFiles:
-    """Read recordings for the panel; the beginnings of large tables are written to temporary files, until `close`."""
+    """Read recordings for the panel."""
 
     def __init__(self, opening: Opening | None = None) -> None:
         self._opening = Opening() if opening is None else opening
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._lock = threading.Lock()
         #: The trials of the file with several that was read last, by its path and the time of its last change.
         self._trials: tuple[tuple[Path, int], list[Recording]] | None = None
-
-    def close(self) -> None:
-        """Remove the temporary files."""
-        with self._lock:
-            if self._folder is not None:
-                self._folder.cleanup()
-                self._folder = None
 
     def forget(self) -> None:
         """Read again the next recording whose layout file was written."""
@@ -231,7 +216,7 @@ class ShownFiles:
             raise ProblemError(f"{path.name}: contains no trial {trial}")
         return recordings[0 if trial is None else names.index(trial)], names
 
-    def read(self, path: Path, trial: str | None, *, entire: bool, by_options: bool) -> Viewed:
+    def read(self, path: Path, trial: str | None, *, by_options: bool) -> Viewed:
         """Read a recording for its view.
 
         Parameters
@@ -239,27 +224,17 @@ class ShownFiles:
         path : path
         trial : str or None
             Of a file with several; default: the first.
-        entire : bool
-            Whether all of a large text table is read, not only its beginning.
         by_options : bool
             Whether also a board's .mcap is read by the options of `Opening`, not as it is.
         """
         board = None if by_options else _board(path)
         if board is not None:
             return board
-        beginning = None if entire else self._beginning(path)
-        if beginning is not None:
-            recording, names, left_s = beginning
-        else:
-            (recording, names), left_s = self.opened(path, trial), None
+        recording, names = self.opened(path, trial)
         if not recording.is_several and recording.has_events:
             return _events(recording)
         viewed = _frames(recording)
-        viewed.contents["frames"] |= {
-            "trial": recording.name if names else None,
-            "trials": names,
-            "left_s": left_s,
-        }
+        viewed.contents["frames"] |= {"trial": recording.name if names else None, "trials": names}
         return viewed
 
     def judge(self, path: Path, trial: str | None) -> dict[str, Any]:
@@ -300,37 +275,6 @@ class ShownFiles:
         written = layout_text.with_falls(target, "" if there is None else read_text(there))
         with whole_file(target, overwrite=True) as part:
             part.write_text(written, "utf-8", newline="\n")
-
-    def _temporary(self) -> Path:
-        with self._lock:
-            if self._folder is None:
-                self._folder = tempfile.TemporaryDirectory(prefix="taxel-panel-")
-            return Path(tempfile.mkdtemp(dir=self._folder.name))
-
-    def _beginning(self, path: Path) -> tuple[Recording, list[str], float] | None:
-        """Return the beginning of a large text table, and how long the rest takes to read (s); None of any other file.
-
-        Reading takes as long for each line, so the time of the beginning tells that of all.
-        """
-        size = path.stat().st_size
-        if path.suffix.lower() not in _TEXTS or size <= _LARGE:
-            return None
-        with open(path, "rb") as file:
-            head = file.read(_BEGINNING)
-        part = self._temporary() / path.name
-        part.write_bytes(head[: head.rfind(b"\n") + 1])
-        begun = time.perf_counter()
-        try:
-            recordings = self._opening.opens(part)
-        except (FormatError, ProblemError, OSError):
-            # A format whose files have no beginning of their own, or options that are of the whole file.
-            return None
-        finally:
-            os.unlink(part)
-        if len(recordings) != 1:
-            return None
-        taken = time.perf_counter() - begun
-        return recordings[0], [], taken * size / max(1, len(head))
 
 
 def _sources(recording: Recording) -> dict[str, Recording]:

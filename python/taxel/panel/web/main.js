@@ -276,8 +276,6 @@ function receive(message) {
       return sensor.take(message);
     case "cut":
       return notify(`wrote ${message.name}${message.lost.length ? `; left out: ${message.lost.join(", ")}` : ""}`);
-    case "loading":
-      return notify(message.share < 1 ? `${message.name}: ${Math.round(100 * message.share)} % read; the beginning is shown` : `${message.name} is read`);
     case "warning":
       return notify(message.text, true);
     case "refused":

@@ -64,8 +64,6 @@ export interface FrameRecording {
   trial: string | null;
   /** The trials of a file with several. */
   trials: string[];
-  /** These are only the frames at the beginning of a large text table, and reading it all takes about so many seconds; `loading` follows each second, and then `opened` again, with all of it, at the same time of the view. */
-  left_s: number | null;
 }
 
 /** A source of frames; sources are side by side in `array`. */
@@ -448,13 +446,6 @@ export interface Opened {
   index_ms: number;
 }
 
-/** How much of a large text table is read, 0 to 1, as its first lines let expect. */
-export interface Loading {
-  type: "loading";
-  name: string;
-  share: number;
-}
-
 /** Events, and the greatest sum of ticks above rest, over time, for the strip: 1000 bins at most. */
 export interface Overview {
   type: "overview";
@@ -784,7 +775,6 @@ export type Message =
   | Training
   | Detections
   | Opened
-  | Loading
   | Overview
   | Transport
   | Labels
