@@ -13,6 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import msgspec.inspect
 from docutils import nodes
 from docutils.parsers.rst import Directive
 from docutils.statemachine import StringList
@@ -22,7 +23,6 @@ from sphinx.pycode import ModuleAnalyzer
 from taxel.cli._commands import OWN, plugins
 from taxel.cli._commands import command as imported
 from taxel.cli.app import about, own_commands, rows
-from taxel.panel.declared import described
 from taxel.panel.session import REQUESTS
 from taxel_studies import STUDIES
 
@@ -158,12 +158,38 @@ class Requests(FromProgram):
         rows = []
         for name, request in REQUESTS.items():
             keys = [
-                f"``{key}`` {described(kind)}{', may be left out' if key in request.optional else ''}"
-                for key, kind in request.kinds.items()
+                f"``{key.name}`` {described(key.type)}{'' if key.required else ', may be left out'}"
+                for key in msgspec.inspect.type_info(request.keys).fields
             ]
             about = " ".join((request.method.__doc__ or "").split())
-            rows.append([f"``{name}``", ". ".join(keys), re.sub("(?<!`)`(?!`)", "``", about)])
+            rows.append([f"``{name}``", ". ".join(keys), about])
         return table(["request", "keys", ""], rows, "12 38 50")
+
+
+def described(kind: Any) -> str:  # noqa: PLR0911  a line for each kind
+    """Return a type of a key in words."""
+    match kind:
+        case msgspec.inspect.Metadata(type=inner, extra_json_schema=schema):
+            return schema.get("description") or described(inner)
+        case msgspec.inspect.UnionType(types=types):
+            return ", or ".join(
+                "null" if isinstance(one, msgspec.inspect.NoneType) else described(one) for one in types
+            )
+        case msgspec.inspect.LiteralType(values=values):
+            return " or ".join(f"`{one}`" for one in values)
+        case msgspec.inspect.IntType(ge=least, le=most):
+            return f"whole number, {least} to {most}"
+        case msgspec.inspect.FloatType(ge=least, le=most):
+            return f"number, {least:g} to {most:g}"
+        case msgspec.inspect.StrType(min_length=least, max_length=most):
+            return f"text, {least} to {most} characters"
+        case msgspec.inspect.ListType(item_type=one, min_length=least, max_length=most):
+            return f"{least} to {most} of: {described(one)}"
+        case msgspec.inspect.TupleType(item_types=types):
+            return f"[{', '.join(map(described, types))}]"
+        case msgspec.inspect.StructType(fields=fields):
+            return "{" + "; ".join(f"`{one.name}` {described(one.type)}" for one in fields) + "}"
+    return "true or false" if isinstance(kind, msgspec.inspect.BoolType) else "object"
 
 
 def command(name: str, app: Any) -> list[str]:

@@ -9,8 +9,9 @@ import math
 import time
 from collections import deque
 from collections.abc import Coroutine
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from msgspec import Meta, Struct
 from websockets.exceptions import ConnectionClosed
 
 from taxel import _core
@@ -19,7 +20,7 @@ from taxel._core import ProblemError
 from taxel.device import ports
 from taxel.labels import Note
 from taxel.live.lines import preview
-from taxel.panel.declared import Number, Request, Several, Text, Time, Whole, long_request, request, requests_of
+from taxel.panel.declared import Request, Time, line, long_request, request, requests_of, whole
 from taxel.panel.folder import Shown
 from taxel.panel.label_file import Edit
 from taxel.panel.messages import text_of
@@ -44,21 +45,21 @@ _MOST_WAITING = 1 << 21
 _LOOK_S = 2.0
 
 
-class Row(TypedDict):
+class Row(Struct, forbid_unknown_fields=True):
     """Hold a label as the page has it."""
 
-    label: Annotated[str, Text(200, least=0)]
+    label: Annotated[str, line(200, least=0)]
     t_us: Time
-    source: Annotated[str, Text(64, least=0)]
-    trial: Annotated[str, Text(255, least=0)]
-    replaces_us: NotRequired[Time | None]
+    source: Annotated[str, line(64, least=0)]
+    trial: Annotated[str, line(255, least=0)]
+    replaces_us: Time | None = None
 
 
-class Change(TypedDict):
+class Change(Struct, forbid_unknown_fields=True):
     """Hold a change of labels: `new` in the place of `old`; without `old` a new label, without `new` a deletion."""
 
-    old: NotRequired[Row | None]
-    new: NotRequired[Row | None]
+    old: Row | None = None
+    new: Row | None = None
 
 
 class Session:
@@ -203,13 +204,13 @@ class Session:
     # ------------------------------------------------------------------------------------------ requests: the view
 
     @request
-    async def credit(self, n: Annotated[int, Whole(1, _MOST_CREDITS)]) -> None:
+    async def credit(self, n: Annotated[int, whole(1, _MOST_CREDITS)]) -> None:
         """Give credits for `n` more frames."""
         self.credits = min(_MOST_CREDITS, self.credits + n)
 
     @request
     async def watch(
-        self, taxel: tuple[Annotated[int, Whole(0, 65_535)], Annotated[int, Whole(0, 65_535)]] | None
+        self, taxel: tuple[Annotated[int, whole(0, 65_535)], Annotated[int, whole(0, 65_535)]] | None
     ) -> None:
         """Send the history of this taxel; null for none."""
         await in_thread(self.view.watch, taxel)
@@ -225,7 +226,7 @@ class Session:
             await in_thread(self.view.encode, None if encoder is None else json.dumps(encoder))
 
     @request
-    async def zoom(self, column_us: Annotated[int, Whole(1, 2**40)], end_us: Time | None = None) -> None:
+    async def zoom(self, column_us: Annotated[int, whole(1, 2**40)], end_us: Time | None = None) -> None:
         """Send columns of time of this width, for this view: 125 us times a power of two.
 
         With `end_us`, in a view that does not follow the newest, the columns end there, wherever the view's time is,
@@ -241,7 +242,7 @@ class Session:
         await self._say_transport()
 
     @request
-    async def play(self, speed: Annotated[float, Number(0.001, 100)] | None = None) -> None:
+    async def play(self, speed: Annotated[float, Meta(ge=0.001, le=100)] | None = None) -> None:
         """Play from here at this speed (board time over real time; the last one where left out)."""
         await in_thread(self.view.play, speed)
         await self._say_transport()
@@ -253,7 +254,7 @@ class Session:
         await self._say_transport()
 
     @request
-    async def step(self, frames: Annotated[int, Whole(-1000, 1000)]) -> None:
+    async def step(self, frames: Annotated[int, whole(-1000, 1000)]) -> None:
         """Go forward or back (negative) by this number of time stamps with events; stops playing."""
         await in_thread(self.view.step, frames)
         await self._say_transport()
@@ -266,7 +267,7 @@ class Session:
         await self._say_transport()
 
     @request
-    async def open(self, name: Annotated[str, Text(110)], trial: Annotated[str, Text(255)] | None = None) -> None:
+    async def open(self, name: Annotated[str, line(110)], trial: Annotated[str, line(255)] | None = None) -> None:
         """Show a recording of the folder at its beginning, paused: any file that `taxel.open` reads.
 
         Of a file with several trials the one that `trial` names, or the first. `opened`, `labels` and `transport`
@@ -335,7 +336,8 @@ class Session:
     async def zero(
         self,
         taxels: Annotated[
-            list[tuple[Annotated[int, Whole(0, 65_535)], Annotated[int, Whole(0, 65_535)]]], Several(1 << 16)
+            list[tuple[Annotated[int, whole(0, 65_535)], Annotated[int, whole(0, 65_535)]]],
+            Meta(min_length=1, max_length=1 << 16),
         ],
     ) -> None:
         """Take the present values of these taxels as their rest from now on, also for the readout; all or none.
@@ -357,7 +359,7 @@ class Session:
         await self._hub.on_board(self._hub.board.read)
 
     @request
-    async def preset_apply(self, name: Annotated[str, Text(60)]) -> None:
+    async def preset_apply(self, name: Annotated[str, line(60)]) -> None:
         """Write the registers of one of the manual's presets, which does not change the version of the wire."""
         array = self._hub.needed_live().array
         await self._hub.on_board(lambda: self._hub.board.apply(name, array))
@@ -371,7 +373,7 @@ class Session:
         await self.say({"type": "ports", "ports": listed})
 
     @long_request
-    async def guess(self, port: Annotated[str, Text(255)], baud: Annotated[int, Whole(*_core.BAUDS)]) -> None:
+    async def guess(self, port: Annotated[str, line(255)], baud: Annotated[int, whole(*_core.BAUDS)]) -> None:
         """Send `guess`: how the lines of a sensor on a serial port look, within two seconds.
 
         `source` is what `connect` takes, with rows, columns and what else the lines show.
@@ -380,7 +382,7 @@ class Session:
         await self.say({"type": "guess", "lines": lines, "about": about, "source": source})
 
     @request
-    async def connect(self, source: Annotated[str, Text(1024)]) -> None:
+    async def connect(self, source: Annotated[str, line(1024)]) -> None:
         """Receive the lines of numbers of a sensor instead, for all clients; refused while recording."""
         if not source.startswith("serial:"):
             raise refused("source", ": must begin with serial:; taxel live --source takes the others")
@@ -415,9 +417,9 @@ class Session:
     @request
     async def record(
         self,
-        name: Annotated[str, Text(100)],
-        label: Annotated[str, Text(200)] | None = None,
-        length_s: Annotated[float, Number(0.01, 86_400)] | None = None,
+        name: Annotated[str, line(100)],
+        label: Annotated[str, line(200)] | None = None,
+        length_s: Annotated[float, Meta(ge=0.01, le=86_400)] | None = None,
     ) -> None:
         """Record to NAME.mcap, for `length_s`, or else until `stop`.
 
@@ -431,12 +433,12 @@ class Session:
         self._hub.recorder.end()
 
     @request
-    async def note(self, text: Annotated[str, Text(200)]) -> None:
+    async def note(self, text: Annotated[str, line(200)]) -> None:
         """Write a note into the recording that runs, with the time of now."""
         await in_thread(self._hub.needed_live().note, text)
 
     @long_request
-    async def cut(self, start_us: Time, stop_us: Time, name: Annotated[str, Text(100)]) -> None:
+    async def cut(self, start_us: Time, stop_us: Time, name: Annotated[str, line(100)]) -> None:
         """Write a stretch of the recording shown to a new file of the folder: what `taxel cut` does."""
         shown, out = self._needed("cut"), self._hub.folder.file(name)
         if start_us >= stop_us:
@@ -452,7 +454,7 @@ class Session:
     # ------------------------------------------------------------------------------------------ requests: labels
 
     @request
-    async def change(self, changes: Annotated[list[Change], Several(_MOST_LABELS)]) -> None:
+    async def change(self, changes: Annotated[list[Change], Meta(min_length=1, max_length=_MOST_LABELS)]) -> None:
         """Change labels of the recording shown, or of the one that runs; all or none.
 
         `old` is a label as `labels` has it. A label with `replaces_us` replaces the recording's own note of that time,
@@ -460,9 +462,9 @@ class Session:
         time outside the recording, and where another window or program has changed the label since.
         """
         trial = "" if self.shown is None else self.shown.trial
-        if any(new is not None and not new["label"].strip() for new in (change.get("new") for change in changes)):
+        if any(one.new is not None and not one.new.label.strip() for one in changes):
             raise refused("label", ": must be a text of 1 to 200 characters")
-        edits = [(_note(change.get("old"), None), _note(change.get("new"), trial)) for change in changes]
+        edits = [(_note(one.old, None), _note(one.new, trial)) for one in changes]
         await self._change(edits)
 
     async def _change(self, edits: list[Edit]) -> None:
@@ -517,7 +519,7 @@ class Session:
         await in_thread(self._hub.training.end)
 
     @long_request
-    async def read_out(self, readout: Annotated[str, Text(110)]) -> None:
+    async def read_out(self, readout: Annotated[str, line(110)]) -> None:
         """Read what this view shows with a readout or a plain rule of the folder.
 
         A recording: `detections` follows. The live source: from now on, for all clients; it begins again. A readout
@@ -572,5 +574,5 @@ def _note(row: Row | None, trial: str | None) -> Note | None:
     """Return a label of the page as a table holds it; a new one without a trial is of the one that is shown."""
     if row is None:
         return None
-    of_trial = row["trial"] or trial or ""
-    return Note(row["label"].strip(), row["t_us"], 0, of_trial, row["source"], row.get("replaces_us"))
+    of_trial = row.trial or trial or ""
+    return Note(row.label.strip(), row.t_us, 0, of_trial, row.source, row.replaces_us)
