@@ -155,13 +155,6 @@ def latency(result: dict[str, Any]) -> list[Table]:
     return [("From the last byte of a frame to the callback, us", head, rows)]
 
 
-def growth(result: dict[str, Any]) -> list[Table]:
-    """Return the cost of CONE-X by the number of input trains and patterns."""
-    head = ["time", "input trains", "patterns", "CPU time, s", "status"]
-    of = ("time", "N", "p", "cpu_s", "status")
-    return [("Growth of the cost", head, [[number(row[key]) for key in of] for row in result["growth"]["table"]])]
-
-
 def training(result: dict[str, Any]) -> list[Table]:
     """Return what neurons and tuned plain rules find, by how the sensor is worn."""
     runs = result["trainings"]
@@ -206,7 +199,7 @@ def gait_search(result: dict[str, Any]) -> list[Table]:
 
 
 #: Tables of a benchmark beside its ratios and goals.
-MORE = {"demo": demo, "gait-search": gait_search, "latency": latency, "learn_cone_x": growth, "training": training}
+MORE = {"demo": demo, "gait-search": gait_search, "latency": latency, "training": training}
 
 
 def number(value: Any) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import textwrap
 import time
 from collections.abc import Mapping
 from importlib import import_module
@@ -17,7 +16,7 @@ import taxel_benchmarks
 from taxel import ProblemError
 from taxel.cli.app import App, JsonOption, say
 
-__all__ = ["app", "bench", "benchmarks", "doubts_of", "question_of"]
+__all__ = ["app", "bench", "benchmarks", "doubts_of"]
 
 app = App(name="bench")
 
@@ -58,14 +57,14 @@ def bench(
         List the goals of the saved results, and what speaks against times; exit code 1 where a goal is not reached or
         not measured.
     """
-    from taxel_studies.commit import code_version  # noqa: PLC0415  the command line starts quickly
+    from taxel_benchmarks._rounds import question_of  # noqa: PLC0415  the command line starts quickly
+    from taxel_studies.commit import code_version  # noqa: PLC0415
 
     known = benchmarks()
     if name is None and not goals:
         for one, benchmark in known.items():
             took = _saved(results / f"{one}.json").get("took_s")
-            first = f"{one:<28}{'no result' if took is None else f'{took:.0f} s':>9}  "
-            say(*_wrapped(question_of(benchmark), first, " " * len(first)))
+            say(f"{one:<28}{'no result' if took is None else f'{took:.0f} s':>9}  {question_of(benchmark)}")
         return 0
     if name not in (None, "all", *known):
         raise ProblemError(f"no benchmark {name!r}: there are {', '.join(known)} and all")
@@ -99,11 +98,6 @@ def benchmarks() -> dict[str, Any]:
         for stem, module in modules.items()
         for name, one in getattr(module, "BENCHMARKS", {stem: module}).items()
     }
-
-
-def question_of(benchmark: Any) -> str:
-    """Return the question that a benchmark asks."""
-    return str(getattr(benchmark, "about", benchmark.__doc__)).partition("\n")[0]
 
 
 def _measured(name: str, *, quick: bool) -> dict[str, Any]:
@@ -172,7 +166,7 @@ def _list_goals(results: Path, wanted: Mapping[str, Any]) -> bool:
         about = [machine.get("cpu", "unknown processor"), f"commit {result.get('commit', 'unknown')}"]
         about += [str(result.get("date", "")), _others(machine), *doubts_of(result)]
         say(f"{name}: {found.count('reached')} of {len(found)} goals reached")
-        say(*_wrapped("; ".join(filter(None, dict.fromkeys(about)))), *_rows(benchmark, result, {}), "")
+        say(f"  {'; '.join(filter(None, dict.fromkeys(about)))}", *_rows(benchmark, result, {}), "")
         verdicts += found
     say(f"{len(verdicts)} goals: " + ", ".join(f"{verdicts.count(one)} {one}" for one in reversed(_ORDER)))
     return set(verdicts) <= {"reached"}
@@ -180,25 +174,15 @@ def _list_goals(results: Path, wanted: Mapping[str, Any]) -> bool:
 
 def _rows(benchmark: Any, result: Mapping[str, Any], figures: Mapping[str, Any]) -> list[str]:
     """Return a row for each goal and each other figure: verdict, figure, limit, name and the quartiles of rounds."""
+    goals = sorted(benchmark.goals(result), key=lambda goal: _ORDER.index(goal.verdict))
+    rows = [(g.verdict, g.what, g.figure, f"{'<=' if g.at_most else '>='} {g.limit:<10.5g}") for g in goals]
+    rows += [("", name, figure, "") for name, figure in figures.items() if name not in {goal.what for goal in goals}]
     lines = []
-    for goal in sorted(benchmark.goals(result), key=lambda goal: _ORDER.index(goal.verdict)):
-        limit = f"{'<=' if goal.at_most else '>='} {goal.limit:<10.5g}"
-        lines += _row(f"{goal.verdict:<13}", goal.what, goal.figure, limit, result)
-        figures = {name: figure for name, figure in figures.items() if name != goal.what}
-    for name, figure in figures.items():
-        lines += _row(" " * 13, name, figure, " " * 13, result)
+    for verdict, name, value, limit in rows:
+        shown = "" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value)
+        # The figure of a peer that was stopped is a bound.
+        shown = "> " * (name in result.get("larger", ())) + shown
+        spread = result.get("spread", {}).get(name)
+        rounds = "" if spread is None else f" ({spread[0]:.3g} to {spread[1]:.3g})"
+        lines.append(f"  {verdict:<13}{shown:>10} {limit:<13} {name}{rounds}")
     return lines
-
-
-def _row(verdict: str, name: str, value: Any, limit: str, result: Mapping[str, Any]) -> list[str]:
-    # The figure of a peer that was stopped is a bound.
-    shown = "" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value)
-    shown = "> " * (name in result.get("larger", ())) + shown
-    spread = result.get("spread", {}).get(name)
-    rounds = "" if spread is None else f" ({spread[0]:.3g} to {spread[1]:.3g})"
-    first = f"  {verdict}{shown:>10} {limit} "
-    return _wrapped(name + rounds, first, " " * len(first))
-
-
-def _wrapped(text: str, first: str = "  ", later: str = "  ") -> list[str]:
-    return textwrap.wrap(text, 80, initial_indent=first, subsequent_indent=later, break_on_hyphens=False)

@@ -1,4 +1,7 @@
-"""Measuring: ours and peers in one run, in turn, by the CPU time of the process; BLAS in one thread."""
+"""Measuring: ours and peers in one run, in turn, by the CPU time of the process; BLAS in one thread.
+
+``python -m taxel_benchmarks._rounds NAME SIZE`` runs a benchmark, and prints its result.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +25,10 @@ from threadpoolctl import threadpool_limits
 
 from taxel import Error, ProblemError
 
+#: What needs all the modules of its line, without which nothing can be measured.
+ALL = "all of it"
+#: The packages of modules that have another name.
+PACKAGES = {"sklearn": "scikit-learn"}
 #: A ratio is not stable if the interquartile range of the rounds is larger than this share of the median.
 WIDEST = 0.15
 
@@ -90,6 +97,60 @@ def compared(
     return ratios, spread
 
 
+def measured(
+    runs: Mapping[str, Callable[[], Any]],
+    pairs: Mapping[str, tuple[str, str]] | None = None,
+    *,
+    rounds: int,
+    work: float = 1.0,
+    warm_up: bool = True,
+) -> dict[str, Any]:
+    """Return times of runs (as `measure`), ratios of those `pairs` that ran, and whether times are stable."""
+    results = measure(runs, rounds=rounds, work=work, warm_up=warm_up)
+    there = {name: pair for name, pair in (pairs or {}).items() if set(pair) <= results.keys()}
+    ratios, spread = compared(results, there)
+    stable = all(result["stable"] for result in results.values())
+    return {"results": results, "ratios": ratios, "spread": spread, "stable": stable}
+
+
+def together(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return of the rounds the sums of counts, and the median of all else that is a number."""
+    merged: dict[str, Any] = {}
+    for key, first in rows[0].items():
+        values = [row[key] for row in rows if key in row]
+        if isinstance(first, dict):
+            merged[key] = together(values)
+        elif first is None or isinstance(first, bool):
+            merged[key] = first
+        elif isinstance(first, int):
+            merged[key] = sum(values)
+        else:
+            merged[key] = float(np.median(values))
+            if key == "p50":
+                merged["p50 quartiles"] = np.percentile(values, [25, 75]).tolist()
+    return merged
+
+
+def script(code: str, *arguments: object, **pipes: Any) -> subprocess.Popen[str]:
+    """Start Python code in a process of its own; what it prints can be read, unless a pipe is given for it."""
+    command = [sys.executable, "-P", "-c", code, *map(str, arguments)]
+    return subprocess.Popen(command, text=True, **({"stdout": subprocess.PIPE} | pipes))
+
+
+def printed(code: str, *arguments: object) -> str:
+    """Return what Python code prints in a process of its own.
+
+    Raises
+    ------
+    ProblemError : it failed
+    """
+    with script(code, *arguments) as process:
+        said = process.communicate()[0]
+    if process.returncode:
+        raise ProblemError(f"a process of the benchmark ended with status {process.returncode}")
+    return said
+
+
 def thread_seconds() -> dict[str, float]:
     """Return the CPU time of each named thread of this process so far, s."""
     # The system does not know the names that Python gives its threads.
@@ -101,12 +162,26 @@ def thread_seconds() -> dict[str, float]:
     return seconds
 
 
-def stamp(*packages: str) -> dict[str, Any]:
+def missing(peers: Mapping[str, str]) -> dict[str, str]:
+    """Return the peers that cannot be measured here, and how to install them.
+
+    Parameters
+    ----------
+    peers : by name, the modules that each needs, with spaces between them
+    """
+    lacks = {name: [one for one in modules.split() if find_spec(one) is None] for name, modules in peers.items()}
+    return {
+        name: f"{' and '.join(modules)} not installed: pip install {' '.join(PACKAGES.get(m, m) for m in modules)}"
+        for name, modules in lacks.items()
+        if modules
+    }
+
+
+def stamp(peers: Mapping[str, str]) -> dict[str, Any]:
     """Return machine, versions and commit; `taxel bench` writes a result of a clean commit only."""
     from taxel_studies.commit import code_version  # noqa: PLC0415  what a benchmark measures is loaded by itself
 
-    versions = {"python": platform.python_version()}
-    versions |= {package: _version(package) for package in ("taxel", "numpy", *packages)}
+    packages = ["taxel", "numpy", "scipy", *(PACKAGES.get(one, one) for of in peers.values() for one in of.split())]
     return {
         "machine": {
             "cpu": processor(),
@@ -114,7 +189,7 @@ def stamp(*packages: str) -> dict[str, Any]:
             "load": os.getloadavg()[0],
             "system": platform.platform(),
         },
-        "versions": versions,
+        "versions": {"python": platform.python_version()} | {package: _version(package) for package in packages},
         "commit": code_version("taxel", "taxel_benchmarks"),
     }
 
@@ -136,7 +211,12 @@ def _version(package: str) -> str:
         return "absent"
 
 
-def alone(name: str, *, quick: bool, environment: Mapping[str, str] | None = None) -> dict[str, Any]:
+def question_of(benchmark: Any) -> str:
+    """Return the question that a benchmark asks."""
+    return str(getattr(benchmark, "about", benchmark.__doc__)).partition("\n")[0]
+
+
+def alone(name: str, *, quick: bool) -> dict[str, Any]:
     """Run a benchmark in a process of its own.
 
     Benchmarks of one command do not share libraries, threads and memory then, and no peer pays for the command line's
@@ -147,9 +227,7 @@ def alone(name: str, *, quick: bool, environment: Mapping[str, str] | None = Non
     ProblemError : it ended without a result
     """
     command = [sys.executable, "-P", "-m", "taxel_benchmarks._rounds", name, "quick" if quick else "whole"]
-    done = subprocess.run(
-        command, stdout=subprocess.PIPE, text=True, check=False, env=os.environ | dict(environment or {})
-    )
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
     if done.returncode:
         raise ProblemError(f"{name}: ended with status {done.returncode}, without a result")
     result: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
@@ -157,14 +235,27 @@ def alone(name: str, *, quick: bool, environment: Mapping[str, str] | None = Non
 
 
 def _main(name: str, size: str) -> None:
-    # Only the module that has it is loaded: `encode` has encode_fa1.
-    stem = name if find_spec(f"taxel_benchmarks.{name}") is not None else name.partition("_")[0]
+    # Only the module that has it is loaded: `encode` has encode_fa1, `learn_cone_x` has learn_cone_x_mixed.
+    stem = next(stem for stem in _stems(name) if find_spec(f"taxel_benchmarks.{stem}") is not None)
     module = import_module(f"taxel_benchmarks.{stem}")
     benchmark = getattr(module, "BENCHMARKS", {name: module})[name]
+    peers = getattr(module, "PEERS", {})
+    absent = missing(peers)
+    result = {"question": question_of(benchmark), **stamp(peers), "left out": absent, "ratios": {}}
     try:
-        print(json.dumps(benchmark.run(quick=size == "quick")))
+        if ALL not in absent:
+            result |= benchmark.run(quick=size == "quick")
+        elif size != "quick":
+            raise ProblemError(absent[ALL])
     except Error as error:
         sys.exit(f"{name}: {error}")
+    print(json.dumps(result))
+
+
+def _stems(name: str) -> list[str]:
+    """Return a name, and what is left of it word by word."""
+    words = name.split("_")
+    return ["_".join(words[:n]) for n in range(len(words), 0, -1)]
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from scipy.sparse.linalg import splu
 
 from taxel.simulate.circuit import Fabric, VirtualGround
 from taxel_benchmarks._goals import at_most, not_slower
-from taxel_benchmarks._rounds import compared, measure, stamp
+from taxel_benchmarks._rounds import measured
 
 #: By the ratio's name, ours and the peer.
 PAIRS = {
@@ -101,7 +101,7 @@ def run(*, quick):
         "half the lines": float(np.abs(plain.volts(g) - eliminated(plain, g)).max()),
         "with wires": float(np.abs(wired.volts(g) - sparse(wired, g)).max()),
     }
-    results = measure(
+    found = measured(
         {
             "taxel": lambda: plain.volts(g),
             "numpy.linalg.solve": lambda: dense(plain, g),
@@ -109,16 +109,7 @@ def run(*, quick):
             "taxel, with wires": lambda: wired.volts(g),
             "scipy splu, with wires": lambda: sparse(wired, g),
         },
+        PAIRS,
         rounds=rounds,
     )
-    ratios, spread = compared(results, PAIRS)
-    return {
-        "question": __doc__.splitlines()[0],
-        **stamp("scipy"),
-        "size": [size, size],
-        "largest difference, V": apart,
-        "results": results,
-        "ratios": ratios,
-        "spread": spread,
-        "stable": all(result["stable"] for result in results.values()),
-    }
+    return found | {"size": [size, size], "largest difference, V": apart}

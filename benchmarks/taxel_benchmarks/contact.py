@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from taxel.simulate import Layer, Scene, Silence, play, truth
 from taxel.wire import FRAME_US
 from taxel_benchmarks._goals import Goal, at_least, at_most
-from taxel_benchmarks._peer import missing
-from taxel_benchmarks._rounds import compared, measure, stamp
+from taxel_benchmarks._rounds import measure, measured, missing
 
 #: Our tolerance beside the peer, which is some 4e-7 off with its own.
 EXACT = 3e-7
@@ -35,6 +34,7 @@ ALIKE = ("frames from nothing", "frames begun from the last", "the whole array f
 FOAM = {"modulus_kpa": 60.0, "poisson": 0.0, "yield_strain": 0.9, "densification_strain": 0.99}
 RADIUS_MM, DEPTH_MM, PITCH_MM = 35.0, 2.0, 2.67
 FRAMES = 40
+PEERS = {"ContactMechanics": "ContactMechanics SurfaceTopography"}
 BODIES = ("a footprint", "the whole array")
 
 
@@ -144,7 +144,7 @@ def goals(result: Mapping[str, Any]) -> list[Goal]:
 def run(*, quick: bool) -> dict[str, Any]:
     """Measure; return seconds, ratios and real-time factors."""
     rounds = 2 if quick else 15
-    absent = missing({"ContactMechanics": "ContactMechanics SurfaceTopography"})
+    absent = missing(PEERS)
     engines: dict[str, type[Ours | Theirs]] = {"taxel": Ours} | ({} if absent else {"ContactMechanics": Theirs})
     runs: dict[str, Callable[[], Any]] = {}
     off: dict[str, float] = {}
@@ -163,26 +163,15 @@ def run(*, quick: bool) -> dict[str, Any]:
         runs[f"{name}, the whole array from nothing"] = partial(alone, kept[sole])
         off |= {f"{name}, a footprint": furthest_off(ball, kept[ball])}
         off |= {f"{name}, the whole array": furthest_off(sole, kept[sole])}
-    results = measure(runs, rounds=rounds)
-    peers = (
-        {}
-        if absent
-        else {f"{what}, both / ContactMechanics": (f"taxel, {what}", f"ContactMechanics, {what}") for what in ALIKE}
-    )
-    ratios, spread = compared(results, peers)
-    frame_us = 1e6 * results[f"taxel, {ALIKE[1]}"]["cpu_s"]["median"] / FRAMES
+    pairs = {f"{what}, both / ContactMechanics": (f"taxel, {what}", f"ContactMechanics, {what}") for what in ALIKE}
+    found = measured(runs, pairs, rounds=rounds)
+    ratios = found["ratios"]
+    frame_us = 1e6 * found["results"][f"taxel, {ALIKE[1]}"]["cpu_s"]["median"] / FRAMES
     ratios |= {"a frame of a footprint, us": frame_us, "of the board's frame": frame_us / FRAME_US}
     if not absent:
         apart = {body: off[f"taxel, {body}"] / off[f"ContactMechanics, {body}"] for body in BODIES}
         ratios |= {f"{body}: furthest off / ContactMechanics": one for body, one in apart.items()}
     shown = played(scenes(), 2 if quick else 7)
     ratios |= {f"{name}, times real time": one["rate"] for name, one in shown.items()}
-    return {
-        "about": __doc__,
-        **stamp("ContactMechanics"),
-        "results": results | shown,
-        "ratios": ratios,
-        "spread": spread,
-        "furthest off": off,
-        "left out": absent,
-    }
+    found["results"] |= shown
+    return found | {"furthest off": off}

@@ -17,7 +17,6 @@ from taxel.demo.shipped import shipped
 from taxel.detect import Score, Spread
 from taxel.simulate import Act, Contact, Silence, play, truth
 from taxel_benchmarks._goals import Goal, at_least, at_most
-from taxel_benchmarks._rounds import stamp
 
 _SEED = 1
 #: Classes of touch; impacts by speed, presses by peak force.
@@ -84,5 +83,4 @@ def run(*, quick: bool) -> dict[str, Any]:
             ratios[f"{touch}, {label}: plain rule's delay over ours"] = (
                 rule["known_ms"]["p50"] / ours["known_ms"]["p50"]
             )
-    result = {"what": "taxel demo", "scenes": scenes, "seed": _SEED, **values, "noise": noise}
-    return result | stamp() | {"ratios": ratios}
+    return {"scenes": scenes, "seed": _SEED, **values, "noise": noise, "ratios": ratios}

@@ -16,7 +16,7 @@ import numpy as np
 from taxel import Array, SpikeTrains
 from taxel.metrics import pairwise
 from taxel_benchmarks._goals import at_most, not_slower
-from taxel_benchmarks._rounds import compared, measure, stamp
+from taxel_benchmarks._rounds import measured
 from taxel_studies.dropped import REGION, distances_of, smoothed, spatial_grams
 
 PERIOD_MS, SAMPLES, SPIKES = 1.0, 50, 740
@@ -75,9 +75,10 @@ def beside_metrics(count, rounds):
             "van_rossum_spatial", as_trains, array=array, tau=0.4, sigma=2.0, normalisation="none", threads=1
         )
 
-    results = measure({"by samples": ours, "taxel.metrics.pairwise": theirs}, rounds=rounds)
+    runs = {"by samples": ours, "taxel.metrics.pairwise": theirs}
+    found = measured(runs, {"taxel.metrics.pairwise": ("by samples", "taxel.metrics.pairwise")}, rounds=rounds)
     off = np.abs(distances["ours"] - distances["theirs"]).max() / distances["theirs"].max()
-    return {"patterns": count, "results": results, "largest difference": float(off)}
+    return found | {"patterns": count, "largest difference": float(off)}
 
 
 def goals(result):
@@ -91,14 +92,4 @@ def run(*, quick, share=1.0):
     taus = TAUS_MS[:: max(1, round(1 / share))]
     whole = all_of_them(90, TAUS_MS[:2]) if quick else all_of_them(1800, taus)
     peer = beside_metrics(20, 1) if quick else beside_metrics(300, 5)
-    pairs = {"taxel.metrics.pairwise": ("by samples", "taxel.metrics.pairwise")}
-    ratios, spread = compared(peer["results"], pairs)
-    return {
-        "question": __doc__.splitlines()[0],
-        **stamp(),
-        "all distances": whole,
-        "beside taxel.metrics": peer,
-        "ratios": ratios,
-        "spread": spread,
-        "stable": all(result["stable"] for result in peer["results"].values()),
-    }
+    return peer | {"all distances": whole, "beside taxel.metrics": peer}

@@ -19,7 +19,6 @@ from taxel.detect import Example, Recipe, fit, score
 from taxel.detect import run as detect
 from taxel.detections import Detections
 from taxel_benchmarks._goals import Goal, at_least, at_most
-from taxel_benchmarks._rounds import stamp
 
 LABELS = ("press", "tap")
 HZ, WINDOW_MS, NOISE = 60, 50.0, 1.0
@@ -87,5 +86,4 @@ def run(*, quick: bool) -> dict[str, Any]:
     sums = {key: sum(each["runs"][key] for each in trainings.values()) for key in ("touches", "right", "false")}
     shares = {key: sums[key] / sums["touches"] for key in ("right", "false")}
     ratios = {f"{key}, of the touches": share for key, share in shares.items()}
-    about = {"question": (__doc__ or "").splitlines()[0], **stamp()}
-    return {**about, "ratios": ratios, "trainings": trainings, "shares": shares}
+    return {"ratios": ratios, "trainings": trainings, "shares": shares}

@@ -34,7 +34,6 @@ import numpy as np
 
 import taxel
 from taxel_benchmarks._goals import Goal, at_most
-from taxel_benchmarks._rounds import stamp
 from taxel_studies.datasets import plate
 
 PERSON, WALKER = "subj000", "GaPt23"
@@ -133,8 +132,6 @@ def run(*, quick: bool) -> dict[str, Any]:
                 "found": times[name][0]["found"],
             }
     return {
-        "question": __doc__.splitlines()[0],
-        **stamp(),
         "results": results,
         "left out": absent,
         "ratios": {f"{name}: goal over time": GOALS_S[name] / one["wall_s"] for name, one in results.items()},

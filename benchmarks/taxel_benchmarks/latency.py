@@ -25,11 +25,9 @@ from __future__ import annotations
 
 import os
 import pickle
-import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,7 +41,7 @@ from taxel.live import Live
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers
 from taxel_benchmarks._goals import Goal, at_most
-from taxel_benchmarks._rounds import stamp
+from taxel_benchmarks._rounds import printed, script, together
 
 SEED, REST, FALLEN, TOUCHED = 20_261_121, 100, 60, 140
 #: To which the stamps of version 1 are rounded down.
@@ -183,8 +181,7 @@ def measured(way: Way, seconds: float, payload: Path, touches: Touches) -> dict[
         0, host="127.0.0.1", array=array, registers=way.registers, readout=judge, tare=tare,
         say=lambda said: called.append((said, time.time_ns())),
     ) as live:  # fmt: skip
-        arguments = [str(live.address[1]), str(payload), str(way.registers.frame_us), str(log)]
-        subprocess.run([sys.executable, "-c", SEND, *arguments], check=True)
+        printed(SEND, live.address[1], payload, way.registers.frame_us, log)
         time.sleep(0.2)
         counters = live.stop().counters
     used = time.process_time() - used
@@ -223,22 +220,6 @@ def measured(way: Way, seconds: float, payload: Path, touches: Touches) -> dict[
         "sender_late_us": quantiles(((sent_ns - due_ns) / 1e3).tolist()),
         "cores": used / (seconds * way.share),
     }
-
-
-def together(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return of the rounds the sums of counts, and and the median of all else."""
-    merged: dict[str, Any] = {}
-    for key in rows[0]:
-        values = [row[key] for row in rows if key in row]
-        if isinstance(values[0], dict):
-            merged[key] = together(values)
-        elif isinstance(values[0], int):
-            merged[key] = sum(values)
-        else:
-            merged[key] = float(np.median(values))
-            if key == "p50":
-                merged["p50 quartiles"] = np.percentile(values, [25, 75]).tolist()
-    return merged
 
 
 def quantiles(values: list[float]) -> dict[str, float]:
@@ -282,25 +263,22 @@ def run(*, quick: bool) -> dict[str, Any]:
             made[way.name][0].write_bytes(pickle.dumps(frames))
             del frames
         for state in ("at rest", "loaded"):
-            crowd = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(os.cpu_count() or 1)]
-            if state == "at rest":
-                end(crowd)
             rows[state] = {way.name: [] for way in WAYS}
+            crowd = [script(BUSY) for _ in range(os.cpu_count() or 1) if state == "loaded"]
             try:
                 for _ in range(rounds):
                     for way in WAYS:
                         rows[state][way.name].append(measured(way, seconds, *made[way.name]))
             finally:
-                end(crowd)
+                for one in crowd:
+                    one.kill()
+                    one.communicate()
     results = {state: {name: together(of) for name, of in ways.items()} for state, ways in rows.items()}
     ratio, (one, two) = "version 1's p50 over version 2's, 64 x 64", [rows["at rest"][way.name] for way in WAYS[:2]]
     turns = [p50(a, "last byte") / p50(b, "last byte") for a, b in zip(one, two, strict=True)]
     low, middle, high = np.percentile(turns, [25, 50, 75]).tolist()
     since = "last byte", "first event's stamp"
     return {
-        "question": (__doc__ or "").splitlines()[0],
-        **stamp(),
-        "load_before": load,
         "rounds": rounds,
         "results": results,
         "ratios": {ratio: middle},
@@ -313,11 +291,3 @@ def run(*, quick: bool) -> dict[str, Any]:
         # Other processes determine the tails, and if they are as many as the processors, the medians too.
         "stable": bool(load < 0.5 * (os.cpu_count() or 1)),
     }
-
-
-def end(crowd: list[subprocess.Popen[bytes]]) -> None:
-    """End the busy processes that were started."""
-    for one in crowd:
-        one.kill()
-    for one in crowd:
-        one.wait()

@@ -1,306 +1,270 @@
-"""ConeX against general solvers on the memory task (6.4.4, C = 3); and the growth of its cost.
+"""ConeX against general solvers on the memory task (6.4.4, C = 3), with shortest weights and with mixes of terms.
 
-Shortest weights on the grid, one thread. *Rows on demand*: DAQP, PIQP and HiGHS begin with the targets alone, as ConeX
-does, and solve again with the violated rows (its peaks, from our sweep), DAQP and HiGHS from where they ended. *All
-rows*: Clarabel, CVXPY, HiGHS and PIQP get the whole problem at once, up to N = 400, as it takes them minutes at 1000.
-HiGHS decides feasibility alone, which is easier. Each runs in a process of its own; one that needs 3 s at most runs in
-turn with ConeX, and all are stopped after 60 s of CPU, so that their ratio is a bound. CPU time of the process; the
-statement of all rows is not counted, that of rows on demand is; for ConeX it is the whole `fit`.
+On the grid, one thread. `learn_cone_x` finds the shortest weights, beside DAQP and PIQP; `learn_cone_x_mixed` has l1,
+norm and B in the objective, beside CVXPY with Clarabel. Peers get *rows on demand*, as ConeX does: they begin with the
+targets alone, and solve again with the violated rows (their peaks, from our sweep), DAQP from where it ended. CPU time
+of the process: a peer's is that of solving and of stating rows on demand, ours the whole `fit`.
 
-Peer: DAQP, PIQP and HiGHS with rows on demand; Clarabel, CVXPY, HiGHS and PIQP with all. Unit: times the CPU seconds of
-a fit. Goal: not slower than the fastest of them, with the verdict and the objective of each.
+Peer: DAQP and PIQP; CVXPY with Clarabel. Unit: times the CPU seconds of a fit. Goal: not slower than any of them, with
+its verdict and objective.
 """
 
-import argparse
-import json
-import sys
-import time
+from __future__ import annotations
+
+import math
 import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
-from taxel import Neuron
+from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeX, check_certificate
-from taxel_benchmarks._goals import at_least, at_most, not_slower
-from taxel_benchmarks._memory import BOUND, END, THETA_0, draw, equalities, every_row, on_demand, trains
-from taxel_benchmarks._peer import ask, in_turn, missing, ratios_of
-from taxel_benchmarks._rounds import WIDEST, stamp
+from taxel_benchmarks._goals import Goal, at_least, at_most, not_slower
+from taxel_benchmarks._rounds import measured, missing
 
-CASES = [(100, 24), (400, 99), (1000, 300), (400, 141), (1000, 360)]
-QUICK = [(100, 24), (400, 99), (400, 141)]
-#: The most trains with which a peer gets all rows.
-MOST = 400
-#: The modules that each peer needs.
+TAU, THETA_0, THETA_PLUS, REFRACTORY, BOUND, END = 15.0, 0.3, 0.2, 3.0, 0.3, 200
+#: How much the potential may be above its limit of silence.
+TOLERANCE = 1e-8
+KAPPA, DELTA_T = 1.2, 1.5
+SIZES = [(100, 24), (400, 99), (1000, 300), (400, 141), (1000, 360)]
+#: With terms that are mixed: sizes, and lambdas of l1, norm and B.
+MIXED_SIZES = [(100, 18), (400, 99), (1000, 300)]
+MIXES = [(1, 0, 0), (2, 2, 200), (1, 4, 0), (0, 2, 100)]
 PEERS = {
     "DAQP, rows on demand": "daqp",
     "PIQP, rows on demand": "piqp",
-    "HiGHS, rows on demand": "highspy",
-    "Clarabel, all rows": "clarabel",
-    "CVXPY with Clarabel, all rows": "cvxpy clarabel",
-    "HiGHS, all rows": "highspy",
-    "PIQP, all rows": "piqp",
+    "CVXPY + Clarabel, rows on demand": "cvxpy clarabel",
 }
-#: How far the objective of a peer may differ, relative to it.
-APART = 1e-5
-GROWTH = [250, 500, 1000, 2000, 4000]
+DAQP, PIQP, CVXPY = PEERS
+
+#: Takes the rows that are added, and their limits; returns the verdict, the weights and the objective.
+Solve = Callable[[Any, Any], tuple[str, Any, float]]
 
 
-def timed(solve):
-    """Return CPU time, verdict and objective of a call that returns the last two."""
-    begun = time.process_time()
-    verdict, objective = solve()
-    return time.process_time() - begun, verdict, objective
+def draw(n: int, p: int, seed: int = 0) -> tuple[Any, Any]:
+    """Draw one spike per train on whole ms 1 to 200, shape (p, n), and the target of each pattern."""
+    random = np.random.default_rng(seed)
+    return random.integers(1, END + 1, (p, n)).astype(float), END * (1 + np.arange(p) % 3) / 4
 
 
-def by_clarabel(n, p):
-    """Solve it with Clarabel, from the matrices."""
-    import clarabel  # noqa: PLC0415  a peer need not be there
-
-    (unequal, limits), identity = every_row(n, p), sp.eye_array(n)
-    a = sp.vstack([sp.csc_array(equalities(n, p)), sp.csc_array(unequal), identity, -identity], format="csc")
-    b = np.concatenate([np.full(p, THETA_0), limits, np.full(2 * n, BOUND)])
-    cones = [clarabel.ZeroConeT(p), clarabel.NonnegativeConeT(len(limits) + 2 * n)]
-    settings = clarabel.DefaultSettings()
-    settings.verbose, settings.max_threads = False, 1
-
-    def solve():
-        found = clarabel.DefaultSolver(sp.eye_array(n, format="csc"), np.zeros(n), a, b, cones, settings).solve()
-        names = {"Solved": "solved", "PrimalInfeasible": "infeasible"}
-        return names.get(str(found.status), str(found.status)), found.obj_val
-
-    return timed(solve)
+def kernel(ages: Any) -> Any:
+    """Alpha kernel at these ages, ms."""
+    x = np.maximum(ages, 0.0) / TAU
+    return x * np.exp(-x)
 
 
-def by_cvxpy(n, p):
-    """Solve it with Clarabel through CVXPY."""
-    import cvxpy as cp  # noqa: PLC0415  a peer need not be there
-
-    unequal, limits = every_row(n, p)
-    w = cp.Variable(n)
-    rows = [equalities(n, p) @ w == THETA_0, unequal @ w <= limits, w >= -BOUND, w <= BOUND]
-    problem = cp.Problem(cp.Minimize(0.5 * cp.sum_squares(w)), rows)
-
-    def solve():
-        problem.solve(solver=cp.CLARABEL)
-        return {"optimal": "solved"}.get(problem.status, problem.status), problem.value
-
-    return timed(solve)
+def limits(target: float) -> Any:
+    """Limits of silence on whole ms (6.9b): the threshold; none at the target and while the neuron is refractory."""
+    t = np.arange(END + 1.0)
+    raised = np.where(t > target, THETA_0 + THETA_PLUS * np.exp(-(t - target - REFRACTORY) / (2 * TAU)), THETA_0)
+    return np.where((t < target) | (t > target + REFRACTORY), raised, np.inf)
 
 
-class Highs:
-    """HiGHS with the targets' rows, to which rows are added; its simplex goes on from where it ended."""
-
-    def __init__(self, n, p):
-        import highspy  # noqa: PLC0415  a peer need not be there
-
-        self.of, self.solver = highspy, highspy.Highs()
-        for name, value in (("output_flag", False), ("threads", 1), ("primal_feasibility_tolerance", 1e-9)):
-            self.solver.setOptionValue(name, value)
-        self.solver.addVars(n, np.full(n, -BOUND), np.full(n, BOUND))
-        self.add(equalities(n, p), np.full(p, THETA_0), np.full(p, THETA_0))
-
-    def add(self, rows, least, most):
-        """Add rows between two limits each."""
-        a = sp.csr_array(rows)
-        self.solver.addRows(len(rows), least, most, a.nnz, a.indptr[:-1], a.indices, a.data)
-
-    def solve(self, rows, limits):
-        """Add rows of silence, and solve."""
-        self.add(rows, np.full(len(rows), -self.of.kHighsInf), limits)
-        self.solver.run()
-        states = self.of.HighsModelStatus
-        names = {states.kOptimal: "solved", states.kInfeasible: "infeasible"}
-        status = self.solver.getModelStatus()
-        verdict = names.get(status, self.solver.modelStatusToString(status))
-        return verdict, np.array(self.solver.getSolution().col_value), None
+def equalities(n: int, p: int, after: float = 0.0) -> Any:
+    """Return the rows of the potential at the targets, or so many ms after them."""
+    spikes, targets = draw(n, p)
+    return np.array([kernel(t + after - row) for row, t in zip(spikes, targets, strict=True)])
 
 
-def by_highs(n, p):
-    """Decide it with HiGHS, all rows at once."""
-    solver, rows = Highs(n, p), every_row(n, p)
-    return timed(lambda: solver.solve(*rows)[::2])
+def on_demand(n: int, p: int, solve: Solve) -> tuple[str, float]:
+    """Solve from the targets alone, adding the peak of each stretch above the limit of silence; return the verdict."""
+    spikes, targets = draw(n, p)
+    silence = np.array([limits(t) for t in targets])
+    at = spikes.astype(int) + (END + 1) * np.arange(p)[:, None]
+    decay = math.exp(-1 / TAU)
+    rows, most = np.empty((0, n)), np.empty(0)
+    while True:
+        verdict, w, objective = solve(rows, most)
+        if verdict != "solved":
+            return verdict, objective
+        inputs = np.bincount(at.ravel(), np.tile(w, p), p * (END + 1)).reshape(p, END + 1)
+        potential, a, b = np.zeros((p, END + 1)), np.zeros(p), np.zeros(p)
+        for t in range(1, END + 1):
+            a, b = a * decay, (b + a / TAU) * decay
+            potential[:, t] = b
+            a = a + inputs[:, t]
+        excess = potential - silence
+        broken = [np.flatnonzero(over > TOLERANCE) for over in excess]
+        added = [
+            (pattern, stretch[np.argmax(excess[pattern, stretch])])
+            for pattern, times in enumerate(broken)
+            for stretch in np.split(times, np.flatnonzero(np.diff(times) > 1) + 1)
+            if len(stretch)
+        ]
+        if not added:
+            return "solved", objective
+        rows = np.array([kernel(t - spikes[pattern]) for pattern, t in added])
+        most = np.array([silence[pattern, t] for pattern, t in added])
 
 
-def by_highs_on_demand(n, p):
-    """Decide it with HiGHS, with rows on demand."""
-    return timed(lambda: on_demand(n, p, Highs(n, p).solve))
-
-
-def piqp_solve(n, p, rows, limits):
-    """Solve it with PIQP with these rows of silence, dense; return verdict, weights and objective."""
-    import piqp  # noqa: PLC0415  a peer need not be there
-
-    solver = piqp.DenseSolver()
-    solver.settings.verbose = False
-    none = np.full(len(rows), -np.inf)
-    bounds = np.full(n, -BOUND), np.full(n, BOUND)
-    silence = (rows, none, limits) if len(rows) else (None, None, None)
-    solver.setup(np.eye(n), np.zeros(n), equalities(n, p), np.full(p, THETA_0), *silence, *bounds)
-    status = solver.solve()
-    verdict = {piqp.PIQP_SOLVED: "solved", piqp.PIQP_PRIMAL_INFEASIBLE: "infeasible"}.get(status, str(status))
-    return verdict, solver.result.x, solver.result.info.primal_obj
-
-
-def by_piqp(n, p):
-    """Solve it with PIQP, all rows at once."""
-    rows = every_row(n, p)
-    return timed(lambda: piqp_solve(n, p, *rows)[::2])
-
-
-def by_piqp_on_demand(n, p):
-    """Solve it with PIQP, with rows on demand."""
-    held = [np.empty((0, n)), np.empty(0)]
-
-    def solve(rows, limits):
-        held[:] = np.concatenate([held[0], rows]), np.concatenate([held[1], limits])
-        return piqp_solve(n, p, *held)
-
-    return timed(lambda: on_demand(n, p, solve))
-
-
-def by_daqp_on_demand(n, p):
-    """Solve it with DAQP, with rows on demand, from the active rows of the last solution."""
+def by_daqp(n: int, p: int) -> Solve:
+    """Return shortest weights by DAQP, from the active rows of the last solution."""
     import daqp  # noqa: PLC0415  a peer need not be there
 
     # DAQP's states of a row: active, active at its lower limit, and an equality.
     active, lower, equal = 1, 3, 5
     held = [equalities(n, p), np.full(p, THETA_0), np.empty(0)]
 
-    def solve(rows, limits):
-        held[:2] = np.concatenate([held[0], rows]), np.concatenate([held[1], limits])
-        most = np.concatenate([np.full(n, BOUND), held[1]])
+    def solve(rows: Any, most: Any) -> tuple[str, Any, float]:
+        held[:2] = np.concatenate([held[0], rows]), np.concatenate([held[1], most])
+        upper = np.concatenate([np.full(n, BOUND), held[1]])
         least = np.concatenate([np.full(n, -BOUND), np.full(p, THETA_0), np.full(len(held[1]) - p, -1e30)])
-        state, last = np.zeros(len(most), np.intc), held[2]
+        state, last = np.zeros(len(upper), np.intc), held[2]
         state[: len(last)] = np.where(last > 0, active, np.where(last < 0, lower, 0))
         state[n : n + p] = equal
-        w, objective, flag, info = daqp.solve(np.eye(n), np.zeros(n), held[0], most, least, state, iter_limit=1_000_000)
+        w, objective, flag, info = daqp.solve(
+            np.eye(n), np.zeros(n), held[0], upper, least, state, iter_limit=1_000_000
+        )
         held[2] = info["lam"]
         return {1: "solved", -1: "infeasible"}.get(flag, f"flag {flag}"), w, objective
 
-    return timed(lambda: on_demand(n, p, solve))
+    return solve
 
 
-RUNS = dict(
-    zip(
-        PEERS,
-        (by_daqp_on_demand, by_piqp_on_demand, by_highs_on_demand, by_clarabel, by_cvxpy, by_highs, by_piqp),
-        strict=True,
-    )
-)
+def by_piqp(n: int, p: int) -> Solve:
+    """Return shortest weights by PIQP, from nothing with all rows so far."""
+    import piqp  # noqa: PLC0415  a peer need not be there
+
+    held = [np.empty((0, n)), np.empty(0)]
+    names = {piqp.PIQP_SOLVED: "solved", piqp.PIQP_PRIMAL_INFEASIBLE: "infeasible"}
+
+    def solve(rows: Any, most: Any) -> tuple[str, Any, float]:
+        held[:] = np.concatenate([held[0], rows]), np.concatenate([held[1], most])
+        solver = piqp.DenseSolver()
+        solver.settings.verbose = False
+        bounds = np.full(n, -BOUND), np.full(n, BOUND)
+        silence = (held[0], np.full(len(held[0]), -np.inf), held[1]) if len(held[0]) else (None, None, None)
+        solver.setup(np.eye(n), np.zeros(n), equalities(n, p), np.full(p, THETA_0), *silence, *bounds)
+        status = solver.solve()
+        return names.get(status, str(status)), solver.result.x, solver.result.info.primal_obj
+
+    return solve
 
 
-def peer(name, n, p):
-    """Run one peer; return its time and result."""
-    warnings.simplefilter("ignore")
-    took, verdict, objective = RUNS[name](n, p)
-    return {"cpu_s": took, "verdict": verdict, "objective": objective}
+def by_cvxpy(lambdas: tuple[int, ...], n: int, p: int) -> Solve:
+    """Return weights of 6.11 by CVXPY with Clarabel."""
+    import cvxpy as cp  # noqa: PLC0415  a peer need not be there
+
+    at, behind, wanted = equalities(n, p), equalities(n, p, after=DELTA_T), np.full(p, KAPPA * THETA_0)
+    share = np.array(lambdas) / sum(lambdas)
+    share /= [n * BOUND, np.sqrt(n) * BOUND, np.sum((BOUND * behind.sum(1) + wanted) ** 2)]
+    w = cp.Variable(n)
+    terms = [cp.norm1(w), cp.norm(w, 2), cp.sum_squares(behind @ w - wanted)]
+    objective = cp.Minimize(sum(s * term for s, term in zip(share, terms, strict=True) if s > 0))
+    met = [at @ w == THETA_0, w >= -BOUND, w <= BOUND]
+
+    def solve(rows: Any, most: Any) -> tuple[str, Any, float]:
+        if len(rows):
+            met.append(rows @ w <= most)
+        problem = cp.Problem(objective, met)
+        problem.solve(solver=cp.CLARABEL, max_threads=1)
+        return {"optimal": "solved"}.get(problem.status, problem.status), w.value, float(problem.value)
+
+    return solve
 
 
-def asked(n):
-    """Return the peers of a case with this many trains."""
-    return [name for name in PEERS if n <= MOST or name.endswith("on demand")]
+@dataclass(frozen=True)
+class Objective:
+    """The benchmark of one kind of objective: sizes, lambdas (none for the shortest weights), how far peers may be."""
 
+    about: str
+    sizes: list[tuple[int, int]]
+    mixes: list[tuple[int, ...]]
+    peers: tuple[str, ...]
+    apart: float
 
-def against(n, p, rounds, absent, *, quick):
-    """Measure one case: ConeX and the peers in turn."""
-    patterns, targets = trains(*draw(n, p))
-    cone = ConeX(neuron=Neuron(time="grid"), horizon=float(END))
-    peers = {name: partial(ask, __file__, name, n, p, quick=quick) for name in asked(n) if name not in absent}
-    ours, theirs = in_turn(lambda: cone.fit(patterns, targets), peers, rounds)
-    ours |= {"verdict": cone.status_, "rounds": cone.rounds_, "held": len(cone.held_)}
-    if cone.status_ == "solved":
-        ours["objective"] = 0.5 * float(cone.weights_ @ cone.weights_)
-        ours["violation_mv"] = cone.violation_
-        ours["gap"] = cone.gap_
-    else:
-        ours["certificate checked"] = bool(check_certificate(cone.problem_, cone.certificate_))
-    for name, found in theirs.items():
-        if found.get("verdict") == cone.status_ == "solved" and found["objective"] is not None:
-            found["objective, relative difference"] = abs(found["objective"] / ours["objective"] - 1)
-        print(f"{n}/{p} {name}: {found}", file=sys.stderr)
-    return {"ConeX": ours, **theirs}
+    def cases(self) -> dict[str, tuple[int, int, tuple[int, ...]]]:
+        """Return trains, patterns and lambdas by name."""
+        named = {mix: f", lambda {mix}" if mix else "" for mix in self.mixes}
+        return {f"{n}/{p}{named[mix]}": (n, p, mix) for n, p in self.sizes for mix in self.mixes}
 
+    def goals(self, result: Mapping[str, Any]) -> list[Goal]:
+        """Return the goals with what a result reached."""
+        agree, apart, proven = {}, {}, {}
+        for name, case in result["cases"].items():
+            ours = case["ConeX"]
+            verdict = ours.get("verdict", ours.get("status"))
+            found = [one for peer, one in case.items() if peer in self.peers and "verdict" in one]
+            same = [one["verdict"] == verdict for one in found]
+            # A peer that was stopped has no verdict.
+            if same:
+                agree[f"{name}, share of peers with ConeX's verdict"] = float(np.mean(same))
+            off = [abs(one[key]) for one in found for key in one if key == "objective, relative difference"]
+            if verdict == "solved" and off:
+                apart[f"{name}, objectives differ by at most"] = max(off)
+            elif verdict != "solved":
+                proven[f"{name}, certificate of infeasibility checked"] = float(ours["certificate checked"])
+        return (
+            not_slower(result, *(f"{name}, {peer}" for name in self.cases() for peer in self.peers))
+            + at_least(dict.fromkeys(agree | proven, 1.0), agree | proven)
+            + at_most(dict.fromkeys(apart, self.apart), apart)
+        )
 
-def growth(most):
-    """Measure ConeX as N and p grow, grid and continuous, one fit each."""
-    table = []
-    for clock in ("grid", "continuous"):
-        for share in (0.25, 0.3):
-            for n in (n for n in GROWTH if n <= most):
-                p = round(share * n / 3) * 3
-                patterns, targets = trains(*draw(n, p))
-                cone = ConeX(neuron=Neuron(time=clock), horizon=float(END))
-                begun = time.process_time()
-                cone.fit(patterns, targets)
-                table.append(
-                    {
-                        "time": clock,
-                        "N": n,
-                        "p": p,
-                        "cpu_s": time.process_time() - begun,
-                        "status": cone.status_,
-                        "rounds": cone.rounds_,
-                        "rows held": len(cone.held_),
-                    }
-                )
-                print(table[-1], file=sys.stderr)
-    return table
+    def run(self, *, quick: bool) -> dict[str, Any]:
+        """Measure; quick: no N = 1000, one round."""
+        warnings.simplefilter("ignore")
+        found: dict[str, Any] = {"cases": {}, "results": {}, "ratios": {}, "spread": {}, "stable": True}
+        for name, (n, p, mix) in self.cases().items():
+            if n < 1000 or not quick:
+                case, part = self._case(name, n, p, mix, rounds=1 if quick or n == 1000 else 3)
+                found["cases"][name] = case
+                for of in ("results", "ratios", "spread"):
+                    found[of] |= part[of]
+                found["stable"] &= part["stable"]
+        return found
 
+    def _case(
+        self, name: str, n: int, p: int, mix: tuple[int, ...], *, rounds: int
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Measure one case, ConeX and the peers in turn; return verdicts, and times."""
+        spikes, targets = draw(n, p)
+        examples = [SpikeTrains.from_lists([[s] for s in row], stop=float(END)) for row in spikes]
+        options: dict[str, Any] = {"lambdas": mix, "kappa": KAPPA} if mix else {}
+        cone = ConeX(neuron=Neuron(time="grid"), horizon=float(END), **options)
+        made = {DAQP: by_daqp, PIQP: by_piqp, CVXPY: partial(by_cvxpy, mix)}
+        there = [peer for peer in self.peers if peer not in missing(PEERS)]
+        theirs: dict[str, tuple[str, float]] = {}
 
-WHY = (
-    "Rows held grow as N (.78 N at p = .3 N). Each round multiplies its new rows (2 N in all) with those held and "
-    "updates their factor: N^3 in both, but as a few matrix products and blocked solves, so N^2 work (writing rows "
-    "out, pricing) and overheads show at small N and N^3 only at large. Rounds hardly grow. "
-    "Continuous time has slope rows besides, and finds its cuts between inputs: about as many."
-)
+        def ask(peer: str) -> None:
+            theirs[peer] = on_demand(n, p, made[peer](n, p))
 
-
-def goals(result):
-    """Return the goals with what a result reached."""
-    names = [f"{n}/{p}, {name}" for n, p in CASES for name in asked(n)]
-    # A peer that was stopped has no verdict.
-    agree, apart, proven = {}, {}, {}
-    for size, case in result["cases"].items():
-        ours = case["ConeX"]
-        found = [one for name, one in case.items() if name in PEERS and "verdict" in one]
-        same = [one["verdict"] == ours["verdict"] for one in found]
-        agree[f"{size}, share of peers with ConeX's verdict"] = np.mean(same) if same else None
-        off = [abs(one[key]) for one in found for key in one if key == "objective, relative difference"]
-        if ours["verdict"] == "solved":
-            apart[f"{size}, objectives differ by at most"] = max(off, default=None)
+        runs: dict[str, Callable[[], Any]] = {f"{name}, ConeX": lambda: cone.fit(examples, [[t] for t in targets])}
+        runs |= {f"{name}, {peer}": partial(ask, peer) for peer in there}
+        pairs = {f"{name}, {peer}": (f"{name}, ConeX", f"{name}, {peer}") for peer in there}
+        part = measured(runs, pairs, rounds=rounds, warm_up=rounds > 1)
+        ours = {"verdict": cone.status_, "rounds": cone.rounds_, "held": len(cone.held_)}
+        solved = cone.status_ == "solved"
+        objective = 0.0
+        if solved:
+            objective = cone.objective_ if mix else 0.5 * float(cone.weights_ @ cone.weights_)
+            ours |= {"objective": objective, "violation_mv": cone.violation_, "gap": cone.gap_}
         else:
-            proven[f"{size}, certificate of infeasibility checked"] = float(ours["certificate checked"])
-    return (
-        not_slower({"ratios": result.get("ratios", {})}, *names)
-        + at_least(dict.fromkeys(agree | proven, 1.0), agree | proven)
-        + at_most(dict.fromkeys(apart, APART), apart)
-    )
+            ours["certificate checked"] = bool(check_certificate(cone.problem_, cone.certificate_))
+        case: dict[str, Any] = {"ConeX": ours}
+        for peer, (verdict, one) in theirs.items():
+            case[peer] = {"verdict": verdict, "objective": one}
+            if solved and verdict == "solved":
+                case[peer]["objective, relative difference"] = abs(one / objective - 1)
+        return case, part
 
 
-def run(*, quick):
-    """Measure; quick: no N = 1000, growth to N = 1000."""
-    rounds, absent = 3 if quick else 7, missing(PEERS)
-    cases = {f"{n}/{p}": against(n, p, rounds, absent, quick=quick) for n, p in (QUICK if quick else CASES)}
-    return {
-        "question": __doc__.splitlines()[0],
-        **stamp("clarabel", "cvxpy", "daqp", "highspy", "piqp"),
-        "left out": absent,
-        "unit": "N/p: trains and patterns; C = 3; CPU seconds, one thread",
-        "not asked": f"peers with all rows above N = {MOST}, which takes them minutes",
-        "cases": cases,
-        **ratios_of(cases),
-        "growth": {"table": growth(1000 if quick else 4000), "why": WHY},
-        "stable": all(case["ConeX"]["stable"] for case in cases.values()),
-        "widest": WIDEST,
-    }
-
-
-if __name__ == "__main__":
-    arguments = argparse.ArgumentParser()
-    arguments.add_argument("peer", choices=PEERS)
-    arguments.add_argument("trains", type=int)
-    arguments.add_argument("patterns", type=int)
-    given = arguments.parse_args()
-    print(json.dumps(peer(given.peer, given.trains, given.patterns)))
+#: The benchmarks of this module.
+BENCHMARKS = {
+    "learn_cone_x": Objective(
+        "ConeX against DAQP and PIQP: the shortest weights of the memory task (6.4.4, C = 3).",
+        SIZES,
+        [()],
+        (DAQP, PIQP),
+        1e-5,
+    ),
+    "learn_cone_x_mixed": Objective(
+        "ConeX with l1, norm and B in the objective against CVXPY + Clarabel (6.4.4, C = 3, on the grid).",
+        MIXED_SIZES,
+        MIXES,
+        (CVXPY,),
+        1e-4,
+    ),
+}

@@ -5,16 +5,13 @@ process reads them live, records them to a .mcap on the disk, runs a readout of 
 serves the panel to a client in another process, which reads every frame. CPU is of this process, all threads; a wall
 second has one core second.
 
-Peer: NumPy, which only parses the same lines (`numpy.fromstring` of each). Unit: cores. Goal: .15 core for all of it,
+Peer: none. Unit: cores. Goal: .15 core for all of it,
 nothing lost, each line a frame.
 """
 
 from __future__ import annotations
 
 import os
-import resource
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Mapping
@@ -24,17 +21,16 @@ from typing import Any
 import numpy as np
 
 import taxel
-from taxel import Array, Neuron, ProblemError, Readout
+from taxel import Array, Neuron, Readout
 from taxel.encode import LevelCrossing
 from taxel.live import Live
 from taxel.panel import Panel
 from taxel_benchmarks._goals import Goal
-from taxel_benchmarks._peer import missing
-from taxel_benchmarks._rounds import stamp
+from taxel_benchmarks._rounds import ALL, script
 
 SIDE, RATE, SEED = 16, 1000, 20_261_127
 #: The module that the client of the page needs.
-PEERS = {"all of it": "websockets"}
+PEERS = {ALL: "websockets"}
 
 #: Prints lines at their times; a late line is printed at once.
 SEND = """
@@ -89,17 +85,15 @@ def live(seconds: float, folder: Path) -> dict[str, Any]:
     count = int(seconds * RATE)
     lines, path = folder / "lines", folder / "lines.mcap"
     os.mkfifo(lines)
-    sender = [sys.executable, "-c", SEND, *map(str, (SIDE, RATE, count, SEED))]
     found: list[taxel.Detection] = []
     reading = os.open(lines, os.O_RDWR)  # so that the sender does not wait
-    with lines.open("wb", buffering=0) as pipe, subprocess.Popen(sender, stdout=pipe):
+    with lines.open("wb", buffering=0) as pipe, script(SEND, SIDE, RATE, count, SEED, stdout=pipe):
         source = f"lines:{lines},array={SIDE}x{SIDE},rate={RATE}"
         with (
             Live(readout=readout(), sources=source, record=path, say=found.append) as pipeline,
             Panel(pipeline, folder=folder) as panel,
         ):
-            watching = [sys.executable, "-c", WATCH, panel.url, str(seconds)]
-            with subprocess.Popen(watching, stdout=subprocess.PIPE, text=True) as client:
+            with script(WATCH, panel.url, seconds) as client:
                 while pipeline.counters["frames"] < RATE // 2:
                     time.sleep(0.01)
                 before, wall, cpu = pipeline.counters, time.perf_counter(), time.process_time()
@@ -127,16 +121,6 @@ def live(seconds: float, folder: Path) -> dict[str, Any]:
     }
 
 
-def parsing() -> float:
-    """Return the cores that NumPy takes to parse lines at this rate, and nothing else."""
-    draw = np.random.default_rng(SEED)
-    lines = [",".join(map(str, draw.integers(0, 400, SIDE * SIDE))) for _ in range(RATE)]
-    cpu = time.process_time()
-    for line in lines:
-        np.fromstring(line, np.float32, sep=",")
-    return time.process_time() - cpu
-
-
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals."""
     if "live" not in result:
@@ -151,26 +135,6 @@ def goals(result: Mapping[str, Any]) -> list[Goal]:
 
 def run(*, quick: bool) -> dict[str, Any]:
     """Return the result."""
-    absent = missing(PEERS)
-    if absent and not quick:
-        raise ProblemError("lines: the client of the page needs websockets: pip install websockets")
-    if absent:
-        return stamp() | {"left out": absent, "ratios": {}}
-    load = os.getloadavg()[0]
     with tempfile.TemporaryDirectory() as folder:
         measured = live(3.0 if quick else 20.0, Path(folder))
-    parsed = parsing()
-    return {
-        "question": (__doc__ or "").splitlines()[0],
-        **stamp(),
-        "load_before": load,
-        "load_after": os.getloadavg()[0],
-        "live": measured,
-        "numpy_parses_cores": parsed,
-        "largest_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
-        "ratios": {
-            ".15 core over all of ours": 0.15 / measured["cores"],
-            "NumPy's parsing over all of ours": parsed / measured["cores"],
-        },
-        "stable": load < (os.cpu_count() or 1),
-    }
+    return {"live": measured, "ratios": {".15 core over all of ours": 0.15 / measured["cores"]}}

@@ -1,27 +1,24 @@
-"""Distances between spike trains against elephant's matrices: the cost of a pair, and of a large matrix.
+"""Distances between spike trains against elephant's matrices: the cost of a pair.
 
 Trains of 1 s, Victor-Purpura at 50/s, van Rossum at 20 ms. Elephant is called for a whole matrix of trains
 (``victor_purpura_distance``, ``van_rossum_distance``), as are we (``taxel.metrics.pairwise``); its calls on two trains
-take 2 to 20 times as long a pair as its matrices. Then patterns of 256 taxels with about 100 spikes each, as in a
-matrix of 1800 by 1800: 240 or fewer against each other, scaled to all 1 619 100 pairs. One thread.
+take 2 to 20 times as long a pair as its matrices. Ours are called several times in a round, so that the time can be
+measured. One thread. The large matrices of figure 5.11 are measured by `drop_distances`.
 
-Peer: elephant. Unit: CPU seconds a pair; of the large matrix, minutes. Goal: Victor-Purpura 300 times, van Rossum 50
-times elephant's speed, and the same distances.
+Peer: elephant. Unit: pairs per CPU second. Goal: Victor-Purpura 300 times, van Rossum 50 times elephant's speed, and
+the same distances.
 """
 
-import time
 import warnings
 
 import numpy as np
 
-from taxel import Array, SpikeTrains
+from taxel import SpikeTrains
 from taxel.metrics import pairwise
 from taxel_benchmarks._goals import at_least, at_most
-from taxel_benchmarks._peer import missing
-from taxel_benchmarks._rounds import compared, measure, stamp
+from taxel_benchmarks._rounds import compared, measure, missing
 
 Q, TAU = 0.05, 20.0
-MATRIX, TAXELS, SPIKES = 1800, 256, 100
 
 #: The ratios to elephant, with their goals.
 MEASURED = {"elephant victor_purpura": 300, "elephant van_rossum": 50}
@@ -31,11 +28,6 @@ PEERS = {"elephant": "elephant neo quantities"}
 
 def trains(random, count, spikes, stop=1000.0):
     return [np.sort(random.uniform(0, stop, spikes)) for _ in range(count)]
-
-
-def pattern(random):
-    times = [np.sort(random.uniform(0, 1000, random.poisson(SPIKES))) for _ in range(TAXELS)]
-    return SpikeTrains.from_lists(times, 0.0, 1000.0)
 
 
 def off(ours, theirs):
@@ -66,63 +58,26 @@ def against_elephant(spikes, absent, *, quick):
     lists = trains(random, count, spikes)
     ours = SpikeTrains.from_lists(lists, 0.0, 1000.0)
     pairs = count * (count - 1) / 2
-    # Fast functions are called several times in a round, so that the time can be measured.
     often = 5 if quick else 50
-    repeated = {
+    ours_by = {
         "taxel victor_purpura": lambda: pairwise("victor_purpura", ours, q=Q, threads=1),
         "taxel van_rossum": lambda: pairwise("van_rossum", ours, tau=TAU, threads=1),
     }
     peers = {} if absent else by_elephant(lists)
-    mine = {name: (lambda run=run: [run() for _ in range(often)]) for name, run in repeated.items()}
+    mine = {name: (lambda run=run: [run() for _ in range(often)]) for name, run in ours_by.items()}
     results = measure({**mine, **peers}, rounds=1 if quick else 5, work=pairs)
     for name in mine:
-        for clock in ("cpu_s", "wall_s"):
-            results[name][clock] = {key: (np.array(one) / often).tolist() for key, one in results[name][clock].items()}
         results[name]["rate"] *= often
-    for result in results.values():
-        result["us_a_pair"] = 1e6 / result["rate"]
     couples = {name: (f"taxel {name.split()[1]}", name) for name in peers}
     ratios, spread = compared(results, {f"{name}, {spikes} spikes": couple for name, couple in couples.items()})
     return {
         "trains": count,
+        "calls a round": often,
         "results": results,
         "ratios": ratios,
         "spread": spread,
-        "largest difference": {name: off(repeated[couple[0]](), peers[name]()) for name, couple in couples.items()},
+        "largest difference": {name: off(ours_by[couple[0]](), peers[name]()) for name, couple in couples.items()},
     }
-
-
-def minutes(metric, patterns, **parameters):
-    """Return the CPU minutes of a matrix of all of these patterns, on one thread."""
-    begun = time.process_time()
-    pairwise(metric, patterns, threads=1, **parameters)
-    return (time.process_time() - begun) / 60
-
-
-def large(*, quick):
-    """Measure matrices over patterns of many taxels, and scale them to `MATRIX` patterns."""
-    most = 12 if quick else 240
-    random = np.random.default_rng(0)
-    patterns = [pattern(random) for _ in range(most)]
-    array = {"array": Array(16, 16, pitch_mm=2.67)}
-    whole = MATRIX * (MATRIX - 1) / 2
-    found = {}
-    for name, metric, count, parameters in (
-        ("Victor-Purpura summed over taxels", "victor_purpura", most, {"q": Q}),
-        ("van Rossum summed over taxels", "van_rossum", most, {"tau": TAU}),
-        ("van Rossum with the spatial kernel", "van_rossum_spatial", most // 6, {"tau": TAU, **array}),
-        ("the same, tau 0.4 ms as in the thesis", "van_rossum_spatial", most // 6, array),
-    ):
-        pairs = count * (count - 1) / 2
-        took = minutes(metric, patterns[:count], **parameters)
-        found[name] = {
-            "patterns": count,
-            "pairs": pairs,
-            "share of all pairs": pairs / whole,
-            "cpu_minutes": took,
-            "cpu_minutes for all pairs, scaled": took * whole / pairs,
-        }
-    return {"matrix": MATRIX, "taxels": TAXELS, "spikes a taxel": SPIKES, "results": found}
 
 
 def goals(result):
@@ -142,11 +97,7 @@ def run(*, quick):
     absent = missing(PEERS)
     small = {f"{spikes} spikes": against_elephant(spikes, absent, quick=quick) for spikes in (20, 200)}
     return {
-        "question": __doc__.splitlines()[0],
-        **stamp("elephant", "neo"),
-        "left out": absent,
         "against peers": small,
-        "large matrices": large(quick=quick),
         **{of: {name: one for part in small.values() for name, one in part[of].items()} for of in ("ratios", "spread")},
         "stable": all(r["stable"] for part in small.values() for r in part["results"].values()),
     }

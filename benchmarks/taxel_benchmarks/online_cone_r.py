@@ -19,7 +19,6 @@ from taxel.detect.recipe import learner_from
 from taxel.learn import ConeR, OnlineConeR
 from taxel.neuron import Neuron
 from taxel_benchmarks._goals import at_most
-from taxel_benchmarks._rounds import stamp
 from taxel_studies.gait.recipes import RECIPE
 from taxel_studies.gait.sources import encoded
 
@@ -113,8 +112,6 @@ def run(*, quick):
         results["drawn"] = compared(*drawn(), steps)
     times = {f"{event}, from nothing over OnlineConeR": one["times"] for event, one in results.items()}
     return {
-        "question": __doc__.splitlines()[0],
-        **stamp(),
         "results": results,
         "ratios": {name: middle for name, (_, middle, _) in times.items()},
         "spread": {name: [low, high] for name, (low, _, high) in times.items()},

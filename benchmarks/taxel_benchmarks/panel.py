@@ -7,7 +7,7 @@ with its 5 s of raster.
 
 Recordings of frames are an hour of both insoles, 2 x 99 sensors at 100 Hz, as .mcap, one of them as .h5 and as a text
 table, all in the page cache. A client's times of opening are from its request to the first frame, the overview and
-the whole. CPU is of this process and its children, medians of rounds. Commands are processes of their own.
+the whole. CPU is of this process and its children, medians of rounds.
 
 Peer: none but ten clients, as nothing else speaks its protocol. Unit: frames; cores; ms of a seek; s. Goal: 50 frames
 a second beside nine others, nothing lost, .06 core of the server alone and .14 with the others, a GB
@@ -18,43 +18,30 @@ within 5, a text table shows its first frame in 2 s, then progress; taxel view a
 from __future__ import annotations
 
 import json
-import os
 import pickle
 import resource
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
+from subprocess import Popen
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import taxel
-from taxel import ProblemError
 from taxel.live import Live
 from taxel.panel import Panel
 from taxel_benchmarks._goals import Goal
-from taxel_benchmarks._peer import missing
-from taxel_benchmarks._rounds import stamp, thread_seconds
+from taxel_benchmarks._rounds import ALL, script, thread_seconds
 
 if TYPE_CHECKING:
     from websockets.sync.client import ClientConnection
 
-SIDES, CHANGES_PER_S = (64,), 1e5
+SIDE, CHANGES_PER_S = 64, 1e5
 #: The modules that the clients of the panel need.
-PEERS = {"all of it": "websockets"}
-#: Runs a command, then prints the largest memory of its process: wait4 would give that of the process that began it.
-COMMAND = """
-import sys
-from taxel.cli import main
-try:
-    main(sys.argv[1:])
-finally:
-    print(next(line for line in open("/proc/self/status") if line.startswith("VmHWM")), flush=True)
-"""
+PEERS = {ALL: "websockets"}
 #: Goals for the server's cores, by the number of other clients.
 CORES = {0: 0.06, 9: 0.14}
 
@@ -86,15 +73,15 @@ asyncio.run(all())
 """
 
 
-def events(side: int, count: int, seconds: float) -> taxel.Events:
+def events(count: int, seconds: float) -> taxel.Events:
     """Return changes spread over an array and over time, ten touches a second."""
     random = np.random.default_rng(18)
     t = np.sort(random.uniform(0, seconds * 1e6, count).astype(np.int64) // 100 * 100)
-    middle = (t // 100_000 * 17) % side
-    x, y = (np.clip(middle + random.integers(-6, 7, count), 0, side - 1) for _ in range(2))
+    middle = (t // 100_000 * 17) % SIDE
+    x, y = (np.clip(middle + random.integers(-6, 7, count), 0, SIDE - 1) for _ in range(2))
     p = random.integers(0, 2, count) == 1
     return taxel.Events(
-        t, x, y, p, intensity=random.integers(40, 140, count), array=taxel.Array(side, side, name="bench")
+        t, x, y, p, intensity=random.integers(40, 140, count), array=taxel.Array(SIDE, SIDE, name="bench")
     )
 
 
@@ -114,12 +101,12 @@ def connected(panel: Panel) -> ClientConnection:
     return client
 
 
-def sending(side: int, port: int, seconds: float, scratch: Path) -> subprocess.Popen[bytes]:
+def sending(port: int, seconds: float, scratch: Path) -> Popen[str]:
     """Send events to a port, by a process of its own."""
-    words = taxel.wire.encode(events(side, round(CHANGES_PER_S), 1.0))
-    payload = scratch / f"{side}.pickle"
+    words = taxel.wire.encode(events(round(CHANGES_PER_S), 1.0))
+    payload = scratch / "events.pickle"
     payload.write_bytes(pickle.dumps([words[k : k + EACH] for k in range(0, len(words), EACH)]))
-    return subprocess.Popen([sys.executable, "-c", SEND, str(payload), str(port), str(seconds)])
+    return script(SEND, payload, port, seconds)
 
 
 def server_seconds() -> float:
@@ -127,16 +114,16 @@ def server_seconds() -> float:
     return sum(seconds for name, seconds in thread_seconds().items() if name in ("taxel-panel", "taxel-view"))
 
 
-def following(side: int, others: int, seconds: float, scratch: Path) -> dict[str, Any]:
+def following(others: int, seconds: float, scratch: Path) -> dict[str, Any]:
     """Count the frames of a fast client while events arrive."""
-    array = taxel.Array(side, side, name="bench")
+    array = taxel.Array(SIDE, SIDE, name="bench")
     with Live(0, host="127.0.0.1", array=array) as live, Panel(live, folder=scratch) as panel:
         address = "{}:{}".format(*panel.address)
-        crowd = subprocess.Popen([sys.executable, "-c", CROWD, address, panel.token, str(others)])
+        crowd = script(CROWD, address, panel.token, others)
         good = connected(panel)
         while panel.viewers <= others:
             time.sleep(0.05)
-        sender = sending(side, live.address[1], seconds + 1.0, scratch)
+        sender = sending(live.address[1], seconds + 1.0, scratch)
         time.sleep(0.5)
         frames, before, begun = 0, server_seconds(), time.perf_counter()
         while time.perf_counter() - begun < seconds:
@@ -151,7 +138,6 @@ def following(side: int, others: int, seconds: float, scratch: Path) -> dict[str
         good.socket.close()
         capture = live.counters["capture"]
     return {
-        "side": side,
         "others": others,
         "frames_per_s": frames / wall,
         "server_cores": cpu / wall,
@@ -161,7 +147,7 @@ def following(side: int, others: int, seconds: float, scratch: Path) -> dict[str
 
 def seeking(version: int, count: int, seeks: int, scratch: Path) -> dict[str, Any]:
     """Seek in a recording of this number of changes, in the words of a version of the wire."""
-    path, made = scratch / f"seek{version}.mcap", events(64, count, count / CHANGES_PER_S)
+    path, made = scratch / f"seek{version}.mcap", events(count, count / CHANGES_PER_S)
     if version == 1:
         raw = scratch / "seek.lsa"
         raw.write_bytes(taxel.wire.encode(made))
@@ -263,29 +249,21 @@ def medians(rounds: int, measured: Callable[[], dict[str, Any]]) -> dict[str, fl
     return {name: float(np.median([one[name] for one in every])) for name in every[0]}
 
 
-def command(*words: str | Path) -> dict[str, float]:
-    """Run a command to its end, or `taxel view` until it says its address; measure time, CPU and largest memory."""
+def answering(file: Path) -> dict[str, float]:
+    """Return how long `taxel view` takes until it says its address."""
     begun = time.perf_counter()
-    process = subprocess.Popen([sys.executable, "-c", COMMAND, *map(str, words)], stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None  # a pipe
-    if words[0] == "view":
-        process.stdout.readline()
-        memory = {}
+    with script(
+        "import sys\nfrom taxel.cli import main\nmain(sys.argv[1:])", "view", file, "--no-open", "--json"
+    ) as view:
+        assert view.stdout is not None  # a pipe
+        view.stdout.readline()
         wall = time.perf_counter() - begun
-        process.kill()
-    else:
-        memory = {"memory_mb": int(process.stdout.read().split()[-2]) * 1024 / 1e6}
-        wall = time.perf_counter() - begun
-    process.stdout.close()
-    _, status, of = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode > 0:
-        raise ProblemError(f"taxel {' '.join(map(str, words))}: ended with {process.returncode}")
-    return {"wall_s": wall, "cpu_s": of.ru_utime + of.ru_stime, **memory}
+        view.kill()
+    return {"wall_s": wall}
 
 
 def openings(seconds: float, rounds: int, scratch: Path) -> list[dict[str, Any]]:
-    """Open both insoles from a .mcap, one from a .h5 and from a text table: by a client, by commands."""
+    """Open both insoles from a .mcap, one from a .h5 and from a text table: by a client, and by `taxel view`."""
     both = insoles(seconds)
     files = {
         scratch / "insoles.mcap": both,
@@ -296,19 +274,12 @@ def openings(seconds: float, rounds: int, scratch: Path) -> list[dict[str, Any]]
         taxel.convert(of, file)
         row: dict[str, Any] = {"file": file.name, "file_mb": file.stat().st_size / 1e6}
         row |= medians(rounds, partial(opening, file))
-        words: dict[str, tuple[str | Path, ...]] = {
-            "view": ("view", file, "--no-open", "--json"),
-            "info": ("info", file),
-            "convert": ("convert", file, scratch / "converted.mcap", "--overwrite"),
-        }
-        rows.append(row | {name: medians(rounds, partial(command, *said)) for name, said in words.items()})
+        rows.append(row | {"view": medians(rounds, partial(answering, file))})
     return rows
 
 
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals with what a result reached."""
-    if "following" not in result:
-        return []
     rows, (*hours, table) = result["following"], result["opening"]
     found = [
         Goal("frames/s beside others, the least", min(row["frames_per_s"] for row in rows), 50),
@@ -338,38 +309,14 @@ def goals(result: Mapping[str, Any]) -> list[Goal]:
 
 
 def run(*, quick: bool) -> dict[str, Any]:
-    absent = missing(PEERS)
-    if "all of it" in absent:
-        if not quick:
-            raise ProblemError("panel: its clients need websockets: pip install websockets")
-        return stamp() | {"left out": absent, "ratios": {}}
     seconds = 1.0 if quick else 5.0
-    load = os.getloadavg()[0]
     with tempfile.TemporaryDirectory() as folder:
         scratch = Path(folder)
-        rows = [following(side, others, seconds, scratch) for side in SIDES for others in CORES]
+        rows = [following(others, seconds, scratch) for others in CORES]
         sought = [seeking(v, 200_000 if quick else 20_000_000, 5 if quick else 50, scratch) for v in (1, 2)]
         opened = openings(10.0 if quick else 3600.0, 1 if quick else 3, scratch)
-    return {
-        "question": (__doc__ or "").splitlines()[0],
-        **stamp(),
-        "load_before": load,
-        "load_after": os.getloadavg()[0],
-        "following": rows,
-        "seeking": sought,
-        "opening": opened,
-        "left out": absent,
-        "ratios": {
-            **{
-                f"{row['side']} x {row['side']}, {row['others']} others: {what}": of
-                for row in rows
-                for what, of in {
-                    "frames/s over 50": row["frames_per_s"] / 50,
-                    "the server's cores": row["server_cores"],
-                }.items()
-            },
-            **{f"{one['file']}: 2 s over the first frame": 2 / one["frame_s"] for one in opened},
-            **{f"{one['file']}: 5 s over all of it": 5 / one["complete_s"] for one in opened[:-1]},
-        },
-        "stable": load < (os.cpu_count() or 1),
-    }
+    ratios = {f"{row['others']} others: frames/s over 50": row["frames_per_s"] / 50 for row in rows}
+    ratios |= {f"{row['others']} others: the server's cores": row["server_cores"] for row in rows}
+    ratios |= {f"{one['file']}: 2 s over the first frame": 2 / one["frame_s"] for one in opened}
+    ratios |= {f"{one['file']}: 5 s over all of it": 5 / one["complete_s"] for one in opened[:-1]}
+    return {"following": rows, "seeking": sought, "opening": opened, "ratios": ratios}

@@ -23,7 +23,7 @@ import numpy as np
 from taxel.recording.writers.mcap import RecordingWriter
 from taxel_benchmarks._goals import Goal, at_most
 from taxel_benchmarks._opening import STEPS
-from taxel_benchmarks._rounds import compared, stamp, summary
+from taxel_benchmarks._rounds import compared, summary
 from taxel_benchmarks.recording_write import BYTES, HEADER, datagrams
 
 
@@ -60,11 +60,4 @@ def run(*, quick: bool) -> dict[str, Any]:
     ratios, spread = compared(results, {f"{name} / decoded, time": ("decoded", name) for name in steps})
     peak = max(1.0, results["decoded"]["peak_mb"])
     ratios |= {f"{name} / decoded, memory": results[name]["peak_mb"] / peak for name in steps}
-    return {
-        "question": __doc__.splitlines()[0],
-        **stamp(),
-        "bytes": raw.size,
-        "results": results,
-        "ratios": ratios,
-        "spread": spread,
-    }
+    return {"bytes": raw.size, "results": results, "ratios": ratios, "spread": spread}

@@ -10,8 +10,6 @@ Peer: pandas.read_csv. Unit: CPU seconds, and times the size of the frames. Goal
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import tempfile
 import warnings
 from collections.abc import Mapping
@@ -23,7 +21,7 @@ import pandas as pd
 
 import taxel
 from taxel_benchmarks._goals import Goal, at_least, at_most
-from taxel_benchmarks._rounds import compared, measure, stamp
+from taxel_benchmarks._rounds import measured, printed
 
 _SENSORS = 99
 #: Separator and decimal mark of each table.
@@ -59,7 +57,7 @@ def written(path: Path, rows: int, separator: str, decimal: str) -> None:
 def run(*, quick: bool) -> dict[str, Any]:
     """Measure, with few rows and rounds if it is quick."""
     rows, rounds = (4_000, 2) if quick else (200_000, 5)
-    results, pairs, ratios = dict[str, Any](), dict[str, tuple[str, str]](), dict[str, float]()
+    runs, pairs, ratios = dict[str, Any](), dict[str, tuple[str, str]](), dict[str, float]()
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for name, (separator, decimal) in _FORMS.items():
@@ -67,20 +65,12 @@ def run(*, quick: bool) -> dict[str, Any]:
             written(path, rows, separator, decimal)
             written(first, 100, separator, decimal)
             megabytes = path.stat().st_size / 1e6
-            runs = {
+            runs |= {
                 f"taxel, {name}": lambda path=path: taxel.open(path).frames(),
                 f"pandas, {name}": lambda path=path, s=separator, d=decimal: pd.read_csv(path, sep=s, decimal=d),
             }
-            results |= measure(runs, rounds=rounds, work=megabytes)
             pairs[f"{name}, time"] = (f"taxel, {name}", f"pandas, {name}")
-            command = [sys.executable, "-P", "-c", _MEMORY, first, path]
-            done = subprocess.run(command, capture_output=True, text=True, check=True)
-            ratios[f"{name}, memory"] = float(done.stdout)
-    found, spread = compared(results, pairs)
-    return {
-        "question": __doc__.splitlines()[0],
-        **stamp(),
-        "results": results,
-        "ratios": found | ratios,
-        "spread": spread,
-    }
+            ratios[f"{name}, memory"] = float(printed(_MEMORY, first, path))
+        found = measured(runs, pairs, rounds=rounds, work=megabytes)
+    found["ratios"] |= ratios
+    return found

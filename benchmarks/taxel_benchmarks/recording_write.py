@@ -21,10 +21,11 @@ import numpy as np
 
 from taxel.recording.writers.mcap import RecordingWriter
 from taxel_benchmarks._goals import Goal, not_slower
-from taxel_benchmarks._peer import missing
-from taxel_benchmarks._rounds import compared, measure, stamp
+from taxel_benchmarks._rounds import measured, missing
 
 PEERS = {"mcap (Python)": "mcap zstandard"}
+#: Compressions.
+WAYS = ("none", "lz4", "zstd")
 WORDS = 280
 BYTES = WORDS * 5
 #: 21.3 million words/s, the sensor's worst case.
@@ -49,7 +50,7 @@ def datagrams(n: int) -> np.ndarray[Any, np.dtype[np.uint8]]:
 
 def goals(result: Mapping[str, Any]) -> list[Goal]:
     """Return the goals with what a result reached."""
-    return not_slower(result, *(f"taxel, {c} / mcap (Python), {c}" for c in ("none", "lz4", "zstd")))
+    return not_slower(result, *(f"taxel, {c} / mcap (Python), {c}" for c in WAYS))
 
 
 def run(*, quick: bool) -> dict[str, Any]:
@@ -69,33 +70,20 @@ def run(*, quick: bool) -> dict[str, Any]:
             writer.finish("{}")
 
         runs: dict[str, Callable[[], Any]] = {}
-        for compression in ("none", "lz4", "zstd"):
+        for compression in WAYS:
             runs[f"taxel, {compression}"] = lambda c=compression: ours(c)
             if not absent:
                 runs[f"mcap (Python), {compression}"] = official(path, messages, compression)
-        results = measure(runs, rounds=rounds, work=raw.size)
+        pairs = {f"taxel, {c} / mcap (Python), {c}": (f"taxel, {c}", f"mcap (Python), {c}") for c in WAYS}
+        found = measured(runs, pairs, rounds=rounds, work=raw.size)
         sizes = {}
-        for compression in ("none", "lz4", "zstd"):
+        for compression in WAYS:
             ours(compression)
             sizes[compression] = path.stat().st_size / raw.size
-        cores = {c: paced(path, c, seconds, (arrived, number, offsets, raw)) for c in ("none", "lz4", "zstd")}
-    pairs = (
-        {} if absent else {f"taxel, {c} / mcap (Python), {c}": (f"taxel, {c}", f"mcap (Python), {c}") for c in sizes}
-    )
-    ratios, spread = compared(results, pairs)
-    ratios |= {f"taxel, {c}, MB per CPU second": results[f"taxel, {c}"]["rate"] / 1e6 for c in sizes}
-    ratios |= {f"taxel, {c}, at 107 MB/s, cores": cores[c] for c in cores}
-    return {
-        "question": __doc__.splitlines()[0],
-        **stamp("mcap"),
-        "left out": absent,
-        "bytes": raw.size,
-        "size": sizes,
-        "results": results,
-        "ratios": ratios,
-        "spread": spread,
-        "stable": all(result["stable"] for result in results.values()),
-    }
+        cores = {c: paced(path, c, seconds, (arrived, number, offsets, raw)) for c in WAYS}
+    found["ratios"] |= {f"taxel, {c}, MB per CPU second": found["results"][f"taxel, {c}"]["rate"] / 1e6 for c in WAYS}
+    found["ratios"] |= {f"taxel, {c}, at 107 MB/s, cores": cores[c] for c in WAYS}
+    return found | {"bytes": raw.size, "size": sizes}
 
 
 def official(path: Path, messages: list[bytes], compression: str) -> Callable[[], Any]:

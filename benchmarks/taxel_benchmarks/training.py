@@ -39,7 +39,6 @@ from taxel.encode import Composite
 from taxel.live import Live
 from taxel.simulate import Contact, Scene, emulate, play, truth
 from taxel_benchmarks._goals import Goal, at_least, at_most
-from taxel_benchmarks._rounds import stamp
 from taxel_benchmarks._worn import worn
 
 LABELS = ("contact", "lift")
@@ -301,4 +300,4 @@ def run(*, quick: bool) -> dict[str, Any]:
     """Run all parts; return sums and results."""
     results = run_all(quick=quick)
     sums = summed(results)
-    return {"question": (__doc__ or "").splitlines()[0], **stamp(), "ratios": sums, **results}
+    return {"ratios": sums, **results}

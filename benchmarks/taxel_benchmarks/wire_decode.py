@@ -1,19 +1,16 @@
-"""Decoding of bytes to events, beside a plain C loop, blocked NumPy, expelliarmus and faery (both EVT2).
+"""Decoding of bytes to events, beside blocked NumPy, expelliarmus and faery (both EVT2).
 
 One thread, 20 million words. Like is compared with like, `fresh` or `file` (`DOES`): from the same place, into new
-memory. Ours are the nouns' own columns (t int64, x and y uint16, p bool: 13 bytes an event, and 3 more for
-values); so are the C loop's, which is told beforehand whether there are values; NumPy writes 11 bytes (x and y uint8),
-which is its best. The peers on EVT2 read a file of as many events of their own format, and ours one of our words.
+memory. Ours are the nouns' own columns (t int64, x and y uint16, p bool: 13 bytes an event, and 3 more for values);
+NumPy decodes clean changes alone, and writes 11 bytes (x and y uint8), which is its best. The peers on EVT2 read a file
+of as many events of their own format, and ours one of our words.
 
-Peer: a plain C loop, blocked NumPy, expelliarmus and faery. Unit: million words/s. Goal: not slower than any; from
-files 2.4 times expelliarmus and 4.5 times faery.
+Peer: blocked NumPy, expelliarmus and faery. Unit: million words/s. Goal: not slower than any; from files 2.4 times
+expelliarmus and 4.5 times faery.
 """
 
 from __future__ import annotations
 
-import ctypes
-import shutil
-import subprocess
 import tempfile
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -26,50 +23,16 @@ from numpy.typing import NDArray
 import taxel
 from taxel import wire
 from taxel_benchmarks._goals import Goal, at_least, not_slower
-from taxel_benchmarks._peer import missing
-from taxel_benchmarks._rounds import compared, measure, stamp
+from taxel_benchmarks._rounds import measured, missing
 
 WORDS, BLOCK = 20_000_000, 65_536
 
-#: Clean changes; changes that alternate with their values; a random mix of both.
-STREAMS = ("clean", "pairs", "mix")
 #: What each row does, by the end of its name.
 DOES = {
     "fresh": "words in memory, into columns that are allocated in the call",
     "file": f"a file in the page cache, read and decoded in chunks of {BLOCK} words, each into new columns",
     "EVT2": f"a file in the page cache, read and decoded in chunks ({BLOCK} events by expelliarmus), into new columns",
 }
-
-C_LOOP = r"""
-#include <stdint.h>
-#include <stddef.h>
-/* Word by word, with a look at every byte's place; an intensity belongs to the change directly before it. */
-size_t decode(const uint8_t *b, size_t n, int64_t *t, uint16_t *x, uint16_t *y, uint8_t *p, uint16_t *ticks,
-              uint8_t *present) {
-  size_t rows = 0, i = 0;
-  int64_t latest = -1;
-  int open = 0;
-  while (i + 5 <= n) {
-    if (!(b[i] & 0x80) || ((b[i + 1] | b[i + 2] | b[i + 3] | b[i + 4]) & 0x80)) { i++; continue; }
-    uint16_t value = (uint16_t)(b[i] << 14 | b[i + 1] << 7 | b[i + 2]), cx = b[i + 3] & 63, cy = b[i + 4] & 63;
-    if (!(b[i] & 0x28)) {
-      uint16_t ahead = (uint16_t)(value - latest);
-      int64_t now = latest < 0 ? value : ahead >= 64536 ? latest + ahead - 65536 : latest + ahead;
-      if (now > latest) latest = now;
-      t[rows] = now * 100; x[rows] = cx; y[rows] = cy; p[rows] = b[i] >> 6 & 1;
-      if (ticks) { ticks[rows] = 0; present[rows] = 0; }
-      rows++; open = 1;
-    } else {
-      if (ticks && (b[i] & 0x28) == 0x20 && open && x[rows - 1] == cx && y[rows - 1] == cy) {
-        ticks[rows - 1] = value; present[rows - 1] = 1;
-      }
-      open = 0;
-    }
-    i += 5;
-  }
-  return rows;
-}
-"""
 
 #: Goals of more than the peer's speed.
 FASTER = {
@@ -78,7 +41,7 @@ FASTER = {
 }
 
 #: The modules that each peer on EVT2 needs: faery writes the file.
-EVT2 = {"faery, EVT2": "faery", "expelliarmus, EVT2": "faery expelliarmus"}
+PEERS = {"faery, EVT2": "faery", "expelliarmus, EVT2": "faery expelliarmus"}
 
 
 def streams(words: int) -> dict[str, bytes]:
@@ -125,21 +88,9 @@ def numpy_blocked(data: bytes, columns: tuple[NDArray[Any], ...]) -> None:
         p[to] &= 1
 
 
-def compiled(folder: Path) -> Callable[..., int] | None:
-    """Return the C loop, compiled on this machine; None without a compiler."""
-    if shutil.which("cc") is None:
-        return None
-    (folder / "loop.c").write_text(C_LOOP)
-    library = folder / "loop.so"
-    subprocess.run(["cc", "-O3", "-shared", "-fPIC", "-o", library, folder / "loop.c"], check=True)
-    function = ctypes.CDLL(str(library)).decode
-    function.restype = ctypes.c_size_t
-    return function
-
-
 def evt2(folder: Path, words: int) -> dict[str, Callable[[], Any]]:
     """Return the peers that read as many events from an EVT2 file; those that are not installed are left out."""
-    absent = missing(EVT2)
+    absent = missing(PEERS)
     if "faery, EVT2" in absent:
         return {}
     import faery  # noqa: PLC0415  a peer need not be there
@@ -171,9 +122,7 @@ def evt2(folder: Path, words: int) -> dict[str, Callable[[], Any]]:
 
 def pairs() -> dict[str, tuple[str, str]]:
     """Return ours and the peer of each ratio, by its name."""
-    both = [(f"taxel, {of}, fresh", f"C loop, {of}, fresh") for of in STREAMS]
-    both += [("taxel, clean, fresh", "numpy, clean, fresh")]
-    both += [("taxel, clean, file", peer) for peer in EVT2]
+    both = [("taxel, clean, fresh", "numpy, clean, fresh"), *(("taxel, clean, file", peer) for peer in PEERS)]
     return {f"{ours} / {peer}": (ours, peer) for ours, peer in both}
 
 
@@ -197,41 +146,18 @@ def run(*, quick: bool) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         (folder / "words").write_bytes(data["clean"])
-        loop = compiled(folder)
-        if loop is not None:
-            for name, stream in data.items():
-                runs[f"C loop, {name}, fresh"] = partial(by_loop, loop, stream, values=name == "pairs")
         runs["taxel, clean, file"] = partial(from_file, folder / "words")
         runs |= evt2(folder, words)
-        _agree(data, blocked(), loop)
+        _agree(data["clean"], blocked())
         # Each peer directly behind ours.
         order = sorted(runs, key=lambda name: (name.partition(", ")[2], not name.startswith("taxel")))
-        results = measure({name: runs[name] for name in order}, rounds=rounds, work=words)
-    for name, row in results.items():
+        found = measured({name: runs[name] for name in order}, pairs(), rounds=rounds, work=words)
+    for name, row in found["results"].items():
         row["does"] = DOES[name.rpartition(", ")[2]]
-    ratios, spread = compared(results, {name: pair for name, pair in pairs().items() if pair[1] in results})
     for name in data:
-        ratios[f"taxel, {name}, fresh, million words/s"] = results[f"taxel, {name}, fresh"]["rate"] / 1e6
-    return {
-        "question": __doc__.splitlines()[0],
-        **stamp("expelliarmus", "faery"),
-        "words": words,
-        "left out": missing(EVT2) | ({} if loop is not None else {"C loop": "no cc"}),
-        "results": results,
-        "ratios": ratios,
-        "spread": spread,
-        "stable": all(result["stable"] for result in results.values()),
-    }
-
-
-def by_loop(loop: Callable[..., int], stream: bytes, *, values: bool) -> list[NDArray[Any]]:
-    """Decode with the C loop into new columns; return them."""
-    room = len(stream) // 5
-    sizes = (np.int64, np.uint16, np.uint16, np.uint8, np.uint16, np.uint8)[: 6 if values else 4]
-    into = [np.empty(room, size) for size in sizes]
-    places = [ctypes.c_void_p(column.ctypes.data) for column in into] + [None] * (6 - len(sizes))
-    rows = loop(stream, ctypes.c_size_t(len(stream)), *places)
-    return [column[:rows] for column in into]
+        fresh = f"taxel, {name}, fresh"
+        found["ratios"][f"{fresh}, million words/s"] = found["results"][fresh]["rate"] / 1e6
+    return found | {"words": words}
 
 
 def from_file(path: Path) -> None:
@@ -242,17 +168,10 @@ def from_file(path: Path) -> None:
             len(decoder.push(chunk))
 
 
-def _agree(data: dict[str, bytes], blocked: tuple[NDArray[Any], ...], loop: Callable[..., int] | None) -> None:
-    """Check that all decode the same, before anything is measured."""
-    expected = wire.decode(data["clean"])
-    numpy_blocked(data["clean"], blocked)
+def _agree(clean: bytes, blocked: tuple[NDArray[Any], ...]) -> None:
+    """Check that both decode the same, before anything is measured."""
+    expected = wire.decode(clean)
+    numpy_blocked(clean, blocked)
     for ours, theirs in zip((expected.t, expected.x, expected.y, expected.p), blocked, strict=True):
         if not np.array_equal(ours, theirs):
             raise taxel.Error("the NumPy decoder disagrees with ours")
-    for stream in data.values() if loop is not None else ():
-        ours = wire.decode(stream)
-        pairs = () if ours.intensity is None else (ours.intensity, ours.present)
-        columns = by_loop(loop, stream, values=bool(pairs))  # type: ignore[arg-type]
-        for mine, theirs in zip((ours.t, ours.x, ours.y, ours.p, *pairs), columns, strict=True):
-            if not np.array_equal(mine, theirs):
-                raise taxel.Error("the C loop disagrees with ours")

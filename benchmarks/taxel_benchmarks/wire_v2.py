@@ -32,7 +32,7 @@ from taxel import wire
 from taxel.simulate import Board, FrameSequence, Scene, Silence, Version2, play
 from taxel.wire import FRAME_US, Registers
 from taxel_benchmarks._goals import Goal, at_least, at_most
-from taxel_benchmarks._rounds import compared, measure, stamp
+from taxel_benchmarks._rounds import compared, measure
 
 SEED, TARE_MS = 20_261_121, 50.0
 
@@ -199,12 +199,5 @@ def run(*, quick: bool) -> dict[str, Any]:
     found, spread = compared(results, pairs)
     ratios |= found
     ratios["version 2, a heartbeat, ns"] = 1e9 / results["heartbeats of the drop"]["rate"]
-    return {
-        "question": __doc__.splitlines()[0],
-        **stamp(),
-        "seed": SEED,
-        "bytes_an_event": bytes_an_event,
-        "results": results,
-        "ratios": ratios,
-        "spread": spread,
-    }
+    about = {"seed": SEED, "bytes_an_event": bytes_an_event}
+    return about | {"results": results, "ratios": ratios, "spread": spread}

@@ -15,7 +15,7 @@ import pytest
 from tests.shell import call
 
 import taxel_benchmarks
-from taxel_benchmarks import _peer, _rounds
+from taxel_benchmarks import _rounds
 from taxel_benchmarks._command import benchmarks
 
 PACKAGE = Path(taxel_benchmarks.__file__).parent
@@ -108,14 +108,14 @@ QUIET = {"cpu": "one, AVX2", "others": 0.04, "cores": 2}
         (
             MET | {"machine": {"load": 9.7, "cores": 2}},
             "fast: 3 of 3 goals reached\n"
-            "  unknown processor; commit 0123abc; what other programs used was not measured,\n  load 9.7\n"
+            "  unknown processor; commit 0123abc; what other programs used was not measured, load 9.7\n"
             f"{ALL}",
         ),
         (
             MET | {"machine": QUIET, "stable": False},
             "fast: 3 of 3 goals reached\n"
-            "  one, AVX2; commit 0123abc; other programs used 0.0 of 2 cores; quartiles more\n"
-            "  than 15 % of the median apart\n" + ALL,
+            "  one, AVX2; commit 0123abc; other programs used 0.0 of 2 cores; "
+            "quartiles more than 15 % of the median apart\n" + ALL,
         ),
     ],
 )
@@ -128,7 +128,6 @@ def test_the_list_of_goals_says_what_is_reached_on_what_beside_what_and_of_which
     assert code == 1
     assert out.startswith(said)
     assert "\n\nother: no result\n\n4 goals: " in out
-    assert max(map(len, out.splitlines())) <= 80
 
 
 @pytest.mark.parametrize(("b", "code"), [(2.0, 0), (2.5, 1), (None, 1)])
@@ -207,10 +206,10 @@ def test_a_benchmark_runs_in_a_process_of_its_own_on_no_other_calls(folder: Path
 
 
 def test_a_peer_that_is_left_out_is_named_with_how_to_install_it(folder: Path, capsys, monkeypatch) -> None:
-    absent = _peer.missing({"here": "json", "of scikit-learn": "sklearn absent_one"})
+    absent = _rounds.missing({"here": "json", "of scikit-learn": "sklearn absent_one"})
     assert absent.keys() == {"of scikit-learn"}
-    monkeypatch.setattr(_peer.importlib.util, "find_spec", lambda name: None)
-    absent = _peer.missing({"of scikit-learn": "sklearn other"})
+    monkeypatch.setattr(_rounds, "find_spec", lambda name: None)
+    absent = _rounds.missing({"of scikit-learn": "sklearn other"})
     assert absent["of scikit-learn"].endswith(": pip install scikit-learn other")
     result = {"ratios": {"a": 3.5}, "machine": {"cores": 2}, "left out": absent}
     monkeypatch.setattr(_rounds, "alone", lambda name, quick: result)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,8 +11,7 @@ import pytest
 from scipy.optimize import minimize
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from taxel import SpikeTrains, wire
-from taxel_benchmarks import _memory, _peer, _rounds, encode, latency, wire_decode
+from taxel_benchmarks import _rounds, learn_cone_x
 
 
 class Clock:
@@ -32,16 +30,6 @@ class Clock:
             self.called += name
 
         return call
-
-    def peer(self, name: str, *seconds: float, **more: Any) -> Callable[[], dict[str, Any]]:
-        call = self.run(name, *seconds)
-
-        def ask() -> dict[str, Any]:
-            before = self.now
-            call()
-            return more or {"cpu_s": self.now - before}
-
-        return ask
 
 
 @pytest.fixture
@@ -92,75 +80,28 @@ def test_blas_has_one_thread() -> None:
     assert set(counts) == {1}
 
 
-def test_peers_run_in_turn_with_ours_and_long_ones_once(clock: Clock) -> None:
-    peers = {
-        "fast": clock.peer("f", 2.0, 3.0, 2.0),
-        "slow": clock.peer("s", 50.0),
-        "stopped": clock.peer("x", 60.0, stopped="after 60 s", limit_s=60),
-        "broken": clock.peer("b", 0.0, failed=["ImportError"]),
-    }
-    ours, found = _peer.in_turn(clock.run("o", 1.0, 1.0, 1.0, 2.0), peers, 3)
-    assert clock.called == "oofsxbofof"
-    assert ours["cpu_s"]["rounds"] == [1.0, 1.0, 2.0]
-    assert found.pop("broken") == {"failed": ["ImportError"]}
-    times = {name: (one["times"], one["rounds"]) for name, one in found.items()}
-    assert times == {"fast": (2.0, 3), "slow": (50.0, 1), "stopped": (60.0, 1)}
-    assert found["fast"]["quartiles"] == [1.5, 2.5]
-    told = _peer.ratios_of({"small": {"ours": ours, **found}})
-    assert told["ratios"] == {"small, fast": 2.0, "small, slow": 50.0, "small, stopped": 60.0}
-    assert told["spread"] == {"small, fast": [1.5, 2.5]}
-    assert told["larger"] == ["small, stopped"]
-
-
-@pytest.mark.parametrize(
-    ("theirs", "share"),
-    [
-        ([(1000, 0, 1), (3000, 1, -1)], 1.0),
-        ([(1000, 0, 1), (2000, 1, -1)], 0.5),
-        ([(1000, 0, 1), (3000, 0, -1)], 0.5),
-        ([(1000, 0, 1), (3000, 1, 1)], 0.5),
-        ([(1000, 0, 1)], 1.0),
-        ([(3000, 1, -1)], 0.5),
-        ([(1000, 0, 1), (3000, 1, -1), (3000, 0, 1), (3000, 0, 1)], 0.5),
-    ],
-)
-def test_spikes_are_equal_in_time_train_and_value(theirs: list[tuple[int, ...]], share: float) -> None:
-    """Ours may go on after the last of the NumPy version, and must not have others before."""
-    ours = SpikeTrains.from_lists([[1.0], [3.0]], stop=4.0, values=[[1.0], [-1.0]])
-    assert encode.shared(ours, theirs) == share
+def test_a_pair_with_a_peer_that_is_left_out_is_not_compared(clock: Clock) -> None:
+    runs = {"ours": clock.run("o", 1.0), "there": clock.run("t", 2.0)}
+    pairs = {"there": ("ours", "there"), "absent": ("ours", "absent")}
+    found = _rounds.measured(runs, pairs, rounds=2)
+    assert found["ratios"] == {"there": 2.0}
+    assert found["spread"] == {"there": [2.0, 2.0]}
+    assert found["stable"]
 
 
 def test_latencies_of_rounds_are_summed_where_they_count_and_else_the_median() -> None:
     rounds = [{"found": n, "lost": {"queue": 1}, "late": {"p50": p}} for n, p in ((3, 1.0), (4, 9.0), (5, 2.0))]
-    assert latency.together(rounds) == {
+    assert _rounds.together(rounds) == {
         "found": 12,
         "lost": {"queue": 3},
         "late": {"p50": 2.0, "p50 quartiles": [1.5, 5.5]},
     }
 
 
-def test_decoding_is_compared_from_the_same_place_into_the_same_memory() -> None:
-    ends = {(ours.rpartition(", ")[2], peer.rpartition(", ")[2]) for ours, peer in wire_decode.pairs().values()}
-    assert ends == {("fresh", "fresh"), ("file", "EVT2")}
-    for ours, peer in wire_decode.pairs().values():
-        assert ours.split(", ")[1] in ("clean", peer.split(", ")[1])
-
-
-def test_the_c_loop_decodes_what_ours_does(tmp_path: Path) -> None:
-    loop = wire_decode.compiled(tmp_path)
-    if loop is None:
-        pytest.skip("no C compiler")
-    for name, stream in wire_decode.streams(1000).items():
-        ours = wire.decode(stream)
-        t, _, _, _, *intensities = wire_decode.by_loop(loop, stream, values=name == "pairs")
-        assert np.array_equal(t, ours.t)
-        assert name != "pairs" or np.array_equal(intensities[0], ours.intensity)
-
-
 def test_a_peer_with_rows_on_demand_gets_those_that_its_solution_breaks() -> None:
     """The rows that it ends with are enough: the verdict and the least weights are those of all rows."""
     n, p, held = 20, 3, [np.empty((0, 20))]
-    equal = _memory.equalities(n, p)
+    equal = learn_cone_x.equalities(n, p)
 
     def solve(rows: Any, limits: Any) -> tuple[str, Any, float]:
         held[0] = np.concatenate([held[0], rows])
@@ -172,9 +113,9 @@ def test_a_peer_with_rows_on_demand_gets_those_that_its_solution_breaks() -> Non
             lambda w: 0.5 * w @ w,
             np.zeros(n),
             jac=lambda w: w,
-            bounds=[(-_memory.BOUND, _memory.BOUND)] * n,
+            bounds=[(-learn_cone_x.BOUND, learn_cone_x.BOUND)] * n,
             constraints=[
-                {"type": "eq", "fun": lambda w: equal @ w - _memory.THETA_0, "jac": lambda w: equal},
+                {"type": "eq", "fun": lambda w: equal @ w - learn_cone_x.THETA_0, "jac": lambda w: equal},
                 *([{"type": "ineq", "fun": lambda w: limits - rows @ w, "jac": lambda w: -rows}] if len(rows) else []),
             ],
             tol=1e-12,
@@ -182,8 +123,12 @@ def test_a_peer_with_rows_on_demand_gets_those_that_its_solution_breaks() -> Non
         return "solved", found.x, float(found.fun)
 
     most: list[float] = []
-    verdict, objective = _memory.on_demand(n, p, solve)
-    rows, limits = _memory.every_row(n, p)
+    verdict, objective = learn_cone_x.on_demand(n, p, solve)
+    t = np.arange(learn_cone_x.END + 1.0)
+    of = list(zip(*learn_cone_x.draw(n, p), strict=True))
+    limits = np.concatenate([learn_cone_x.limits(target) for _, target in of])
+    rows = np.concatenate([learn_cone_x.kernel(t[:, None] - spikes) for spikes, _ in of])[np.isfinite(limits)]
+    limits = limits[np.isfinite(limits)]
     _, w, least = answer(rows, limits)
     assert verdict == "solved"
     assert 0 < len(held[0]) < len(rows) / 4
