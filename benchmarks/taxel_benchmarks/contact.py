@@ -127,7 +127,6 @@ def scenes() -> dict[str, Scene]:
     press = {"peak_n": 300.0, "speed_mm_s": 40.0, "hold_ms": 500.0}
     foot = {"shape": {"height_map": {"heights_mm": sole, "pitch_mm": 4.0}}, "x_mm": 84.0, "y_mm": 84.0}
     return {
-        "a ball on columns": Scene({"bodies": [dropped(84, 84)], "surface": "columns"}),
         "a ball": Scene({"bodies": [dropped(84, 84)]}),
         "two balls": Scene({"bodies": [dropped(50, 84), dropped(118, 84)]}),
         "a foot": Scene({"bodies": [{**foot, "motion": {"pressed": press}}]}),

@@ -85,8 +85,7 @@ def staying(seed: int, index: int) -> Scene:
     rng = np.random.default_rng([seed, index, 7])
     x_mm, y_mm = rng.uniform(40.0, 50.0), rng.uniform(40.0, 128.0)
     stay = {"dropped": {"ending": {"left_to_rest": {"rest_ms": 2900.0, "lift_mm_s": 50.0}}}}
-    scene = Scene.draw(seed, index, left_to_rest=True).replace(surface="layer")
-    scene = scene.body(x_mm=x_mm, y_mm=y_mm, motion=stay)
+    scene = Scene.draw(seed, index, left_to_rest=True).body(x_mm=x_mm, y_mm=y_mm, motion=stay)
     beside = {
         **Scene.draw(seed + 50_000, index).parameters["bodies"][0],
         "x_mm": x_mm + rng.uniform(72.0, 80.0),

@@ -185,8 +185,6 @@ def _scene(p: Mapping[str, Any], condition: Condition, rng: np.random.Generator,
     gives = {} if rig.stiffness_n_mm is None else {"stiffness_n_mm": rig.stiffness_n_mm}
     return Scene(
         {
-            # All slants use one model of the surface: otherwise its numerical error would reveal the slant.
-            "surface": "layer",
             "foam": {},
             "bodies": [
                 {

@@ -19,7 +19,7 @@ LONG = {
         scene = Scene.draw(1)
         body = scene.parameters["bodies"][0]
         bodies = [{**body, "x_mm": 30.0 + 50.0 * i, "y_mm": 30.0 + 50.0 * j} for i in range(3) for j in range(3)]
-        scene = scene.replace(surface="layer", lead_ms=10_000.0, bodies=bodies)
+        scene = scene.replace(lead_ms=10_000.0, bodies=bodies)
         begun()
         scene.motion(step_us=1.0)
     """,

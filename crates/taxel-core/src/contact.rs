@@ -1,12 +1,10 @@
 //! Simulated touch: the effect of a ball on foam on the taxels beneath, frame by frame.
 //!
 //! Bodies ([`body`], [`shape`]) move over foam as a [`scene`] describes ([`motion`], `trajectory`); the
-//! reaction force follows a law that is tabulated once ([`push`]). The scene chooses one of two models of the foam:
-//! `layer`, foam bonded to the board, for any bodies ([`bonded`]); or `columns`, independent columns whose pressure the
-//! layer smooths, for one ball that moves vertically on foam with a Poisson ratio of up to 0.1. Within these limits
-//! `columns` agrees with `layer` within a few per cent and is faster ([`foam`], [`footprint`]). Fabric, amplifier and
-//! ramp convert stress at the base of the foam to ticks of the converter ([`sensor`]); a [`stage`] plays scenes as
-//! frames. The times of touches are known to a fraction of a frame, so that detections can be scored against them.
+//! reaction force follows a law that is tabulated once ([`push`]). The foam is an elastic layer that is bonded to the
+//! board ([`bonded`]). Fabric, amplifier and ramp convert stress at its base to ticks of the converter ([`sensor`]); a
+//! [`stage`] plays scenes as frames. The times of touches are known to a fraction of a frame, so that detections can be
+//! scored against them.
 
 use crate::allowed::{Parameter, Range};
 use crate::{Array, Error, Result};
@@ -15,7 +13,6 @@ pub mod act;
 pub mod body;
 pub mod bonded;
 pub mod foam;
-pub mod footprint;
 pub mod layer;
 pub mod motion;
 pub mod narrow;
@@ -32,11 +29,10 @@ pub use act::{Act, FrameSequence};
 pub use body::{Along, Body, Ending, Material, Move, Press};
 pub use bonded::Bonded;
 pub use foam::Foam;
-pub use footprint::Footprint;
 pub use motion::Motion;
 pub use narrow::Narrow;
 pub use push::Push;
-pub use scene::{Scene, Surface};
+pub use scene::Scene;
 pub use sensor::{Sensor, Taxels};
 pub use shape::BodyShape;
 pub use stage::{Prepared, Stage};

@@ -35,12 +35,12 @@ def _fall_ms(scene: Scene) -> float:
 
 
 def drawn(seed: int, index: int) -> Scene:
-    """Draw scene `index` of a seed as the demo plays it: on foam bonded to the board, every second scene on a slant.
+    """Draw scene `index` of a seed as the demo plays it: every second scene on a slant.
 
     On the level array the ball bounces, is caught and pressed by hand; from the tilted one it glances off along the
     rows, and is taken away.
     """
-    scene = Scene.draw(seed, index).replace(surface="layer")
+    scene = Scene.draw(seed, index)
     if index % 2 == 0:
         return scene
     ending = {"left_to_rest": {"rest_ms": _fall_ms(scene) + _AWAY_MS, "lift_mm_s": _HAND_MM_S}}
@@ -49,7 +49,7 @@ def drawn(seed: int, index: int) -> Scene:
 
 
 def left_to_rest(seed: int, index: int) -> Scene:
-    """Draw scene `index` of a seed on a level array, on columns of foam, where the ball bounces on."""
+    """Draw scene `index` of a seed on a level array, where the ball bounces on."""
     return Scene.draw(seed, index, left_to_rest=True)
 
 

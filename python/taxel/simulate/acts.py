@@ -126,8 +126,6 @@ class Scene:
           ``ending`` is ``{"caught": {"after", "press"}}`` or ``{"left_to_rest": {"rest_ms", "lift_mm_s"}}``.
         - ``foam``: modulus_kpa, thickness_mm, poisson, yield_strain, densification_strain, exponent, damping_s_m,
           dashpot_ms.
-        - ``surface``: "layer", foam bonded to the board, for any bodies; or "columns", for one ball that moves straight
-          up and down on foam with poisson up to 0.1: the fastest.
         - ``cells_per_pitch``: how many cells of the layer there are along the pitch of taxels; usually 1, more for a
           touch narrower than two taxels.
         - ``slant_deg``, ``downhill_deg``: how far the array is tilted, and which way; ``lead_ms``, ``tail_ms``.

@@ -26,7 +26,7 @@ __all__ = ["SceneFile"]
 
 #: Keys of a file beside those of a scene.
 _OWN = ("seed", "preset", "tare_ms", "array", "taxels")
-_SCENE = ("surface", "cells_per_pitch", "foam", "bodies", "slant_deg", "downhill_deg", "lead_ms", "tail_ms")
+_SCENE = ("cells_per_pitch", "foam", "bodies", "slant_deg", "downhill_deg", "lead_ms", "tail_ms")
 _TAXELS = (
     "v_trans",
     "feedback_kohm",

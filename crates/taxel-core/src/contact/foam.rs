@@ -1,6 +1,4 @@
-//! Open-cell foam as independent columns: stress of a strain, force of a ball's depth.
-
-use std::f64::consts::PI;
+//! Open-cell foam: stress of a strain in a column.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +20,7 @@ parameters! {
         pub modulus_kpa: f64 = 60.0, "kPa", Range::ABOVE_0;
         /// The thickness of the layer, mm (thesis 4.3.1).
         pub thickness_mm: f64 = 10.0, "mm", Range::ABOVE_0;
-        /// Poisson's ratio in compression; independent columns are a good approximation only near 0.
+        /// Poisson's ratio in compression.
         pub poisson: f64 = 0.0, "", Range::FROM_0.below(0.5);
         /// Strain e_y at which cells collapse.
         pub yield_strain: f64 = 0.05;
@@ -83,57 +81,6 @@ impl Foam {
         let (begins, stress, slope) = self.solid();
         stress + slope * (strain - begins)
     }
-
-    /// The integrals over strain of stress and of strain times stress, from 0; kPa.
-    fn moments(&self, strain: f64) -> (f64, f64) {
-        let (modulus, m) = (self.modulus_kpa, self.exponent);
-        let linear = strain.clamp(0.0, self.yield_strain);
-        let (mut zeroth, mut first) = (modulus * linear.powi(2) / 2.0, modulus * linear.powi(3) / 3.0);
-        if strain > self.yield_strain {
-            let range = self.densification_strain - self.yield_strain;
-            let left = (self.densification_strain - strain).max(SOLID);
-            let scale = modulus * self.yield_strain * range.powf(m);
-            let rise = scale * (left.powf(1.0 - m) - range.powf(1.0 - m)) / (m - 1.0);
-            zeroth += rise;
-            first += self.densification_strain * rise - scale * (range.powf(2.0 - m) - left.powf(2.0 - m)) / (2.0 - m);
-        }
-        let (begins, stress, slope) = self.solid();
-        if strain > begins {
-            let past = strain - begins;
-            zeroth += stress * past + slope * past * past / 2.0;
-            first +=
-                begins * stress * past + (stress + slope * begins) * past.powi(2) / 2.0 + slope * past.powi(3) / 3.0;
-        }
-        (zeroth, first)
-    }
-
-    /// Force of a ball held at a depth, N, and how it grows with depth, N/mm.
-    ///
-    /// Columns sum in closed form: `F = 2 pi` times the integral over `u` from 0 to the depth `d` of
-    /// `stress(u / h) (R - d + u)`.
-    #[must_use]
-    pub fn force(&self, radius_mm: f64, depth_mm: f64) -> (f64, f64) {
-        if depth_mm <= 0.0 {
-            return (0.0, 0.0);
-        }
-        let (depth, h) = (depth_mm.min(self.floor_mm()), self.thickness_mm);
-        let (zeroth, first) = self.moments(depth / h);
-        let milli = 1e-3 * 2.0 * PI;
-        let force = milli * ((radius_mm - depth) * h * zeroth + h * h * first);
-        let stiffness = milli * (radius_mm * self.stress_kpa(depth / h) - h * zeroth);
-        (force, stiffness)
-    }
-
-    /// The depth at which a ball is held by `force_n`, mm.
-    #[must_use]
-    pub fn depth_of(&self, radius_mm: f64, force_n: f64) -> f64 {
-        let (mut low, mut high) = (0.0, self.floor_mm());
-        while high - low > 1e-9 {
-            let middle = f64::midpoint(low, high);
-            if self.force(radius_mm, middle).0 < force_n { low = middle } else { high = middle }
-        }
-        f64::midpoint(low, high)
-    }
 }
 
 #[cfg(test)]
@@ -141,49 +88,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_closed_force_equals_the_sum_over_columns() {
-        let foam = Foam::default();
-        for (radius, depth) in [(25.0_f64, 0.3_f64), (25.0, 4.0), (35.0, 7.5), (30.0, 9.3), (25.0, 9.7)] {
-            let rings = 400_000;
-            let edge = (2.0 * radius * depth - depth * depth).sqrt();
-            let sum: f64 = (0..rings)
-                .map(|k| {
-                    let r = edge * (f64::from(k) + 0.5) / f64::from(rings);
-                    let column = depth - (radius - (radius * radius - r * r).sqrt());
-                    foam.stress_kpa(column / foam.thickness_mm) * 2.0 * PI * r * edge / f64::from(rings)
-                })
-                .sum();
-            let (force, stiffness) = foam.force(radius, depth);
-            assert!((force / (sum * 1e-3) - 1.0).abs() < 1e-6, "{radius} {depth}: {force} against {sum}");
-            let next = foam.force(radius, depth + 1e-6).0;
-            assert!(((next - force) / 1e-6 / stiffness - 1.0).abs() < 1e-4);
-        }
-    }
-
-    #[test]
-    fn a_small_depth_follows_the_linear_column_law() {
-        // F = pi R E d^2 / h to first order in d / R.
-        let foam = Foam::default();
-        let (force, _) = foam.force(30.0, 0.05);
-        let linear = PI * 30.0 * 60.0 * 0.05 * 0.05 / 10.0 * 1e-3;
-        assert!((force / linear - 1.0).abs() < 2e-3);
-    }
-
-    #[test]
     fn stress_rises_without_a_jump() {
         let foam = Foam::default();
         let stresses: Vec<f64> = (0..9_490).map(|k| foam.stress_kpa(f64::from(k) * 1e-4)).collect();
         assert!(stresses.windows(2).all(|w| w[1] >= w[0] && w[1] - w[0] < 0.03 * (1.0 + w[1])));
         assert!(foam.stress_kpa(-1.0) == 0.0);
-    }
-
-    #[test]
-    fn depth_is_the_inverse_of_force() {
-        let foam = Foam::default();
-        for force in [0.05, 0.35, 4.9, 60.0] {
-            let depth = foam.depth_of(28.0, force);
-            assert!((foam.force(28.0, depth).0 / force - 1.0).abs() < 1e-6);
-        }
     }
 
     type Spoil = fn(&mut Foam);

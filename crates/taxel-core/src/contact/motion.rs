@@ -1,7 +1,7 @@
 //! A scene worked out: each body's trajectory at even steps, and all touches.
 
 use super::trajectory::{MOST_STEPS, Track, Trajectory, too_many};
-use super::{Bonded, Contact, Narrow, Push, Scene, Surface};
+use super::{Bonded, Contact, Narrow, Push, Scene};
 use crate::spikes::us;
 use crate::{Array, Error, Result, Stop};
 
@@ -28,19 +28,8 @@ impl Motion {
     pub fn compute(scene: &Scene, array: &Array, step_us: f64, stop: Stop<'_>) -> Result<Self> {
         scene.check(array)?;
         check_step(scene, step_us)?;
-        Self::compute_on(scene, array, Self::layer(scene, array, stop)?.as_mut(), step_us, stop)
-    }
-
-    /// The bonded layer that the scene's foam is, or nothing for columns.
-    ///
-    /// # Errors
-    ///
-    /// `Scene` where the foam makes no sense; `Interrupted`.
-    pub fn layer(scene: &Scene, array: &Array, stop: Stop<'_>) -> Result<Option<Bonded>> {
-        match scene.surface {
-            Surface::Layer => Bonded::new(&scene.foam, array, scene.cells_per_pitch, stop).map(Some),
-            Surface::Columns => Ok(None),
-        }
+        let mut layer = Bonded::new(&scene.foam, array, scene.cells_per_pitch, stop)?;
+        Self::compute_on(scene, array, &mut layer, step_us, stop)
     }
 
     /// As [`Motion::compute`], of a scene that was checked, on its foam.
@@ -48,17 +37,11 @@ impl Motion {
     /// # Errors
     ///
     /// As [`Motion::compute`].
-    pub fn compute_on(
-        scene: &Scene,
-        array: &Array,
-        mut layer: Option<&mut Bonded>,
-        step_us: f64,
-        stop: Stop<'_>,
-    ) -> Result<Self> {
+    pub fn compute_on(scene: &Scene, array: &Array, layer: &mut Bonded, step_us: f64, stop: Stop<'_>) -> Result<Self> {
         check_step(scene, step_us)?;
         let mut trajectories = vec![];
         for (n, body) in scene.bodies.iter().enumerate() {
-            let push = Push::new(&scene.foam, body, layer.as_deref_mut(), stop)?;
+            let push = Push::new(&scene.foam, body, layer, stop)?;
             let mut trajectory = Trajectory::new(scene, body, push, step_us * 1e-3, stop);
             trajectory
                 .run()
@@ -76,9 +59,7 @@ impl Motion {
             motion.contacts.append(&mut trajectory.contacts);
         }
         motion.contacts.sort_by(|a, b| a.start_us.total_cmp(&b.start_us));
-        if scene.surface == Surface::Layer {
-            motion.narrow = Narrow::find(scene, array, &motion.tracks)?;
-        }
+        motion.narrow = Narrow::find(scene, array, &motion.tracks)?;
         Ok(motion)
     }
 

@@ -26,62 +26,38 @@ const POINTS: [(f64, f64); 9] = [
 ///
 /// A body that deforms (`stiffness_n_mm`) is a spring in series: it comes down by the foam's depth and its own compression.
 #[derive(Debug, Clone)]
-pub enum Push {
-    /// A rigid ball on columns, in closed form.
-    Columns {
-        /// The foam that it sinks into.
-        foam: Foam,
-        /// mm.
-        radius_mm: f64,
-    },
-    /// Any other, worked out once.
-    Table {
-        /// How far the body has come down, mm, its face's depth in the foam, mm, and force, N; all rise.
-        entries: Vec<[f64; 3]>,
-    },
+pub struct Push {
+    /// How far the body has come down, mm, its face's depth in the foam, mm, and force, N; all rise.
+    entries: Vec<[f64; 3]>,
 }
 
 impl Push {
-    /// The law of a body on `foam`; `layer` is that foam, bonded, where it is not modelled as columns.
+    /// The law of a body on `foam`, which `layer` is, bonded.
     ///
     /// # Errors
     ///
-    /// `Scene` where foam and ball do not fit columns; `Interrupted`.
-    pub fn new(foam: &Foam, body: &Body, layer: Option<&mut Bonded>, stop: Stop<'_>) -> Result<Self> {
+    /// `Interrupted`.
+    pub fn new(foam: &Foam, body: &Body, layer: &mut Bonded, stop: Stop<'_>) -> Result<Self> {
         let give = body.stiffness_n_mm.map_or(0.0, f64::recip);
-        let mut forces: Box<dyn FnMut(f64) -> Result<f64>> = match (layer, &body.shape) {
-            (None, BodyShape::Sphere { radius_mm }) => {
-                let (foam, radius_mm) = (foam.clone(), *radius_mm);
-                if give == 0.0 {
-                    return Ok(Self::Columns { foam, radius_mm });
+        let (mut sinking, shape, at) = (Sinking::default(), &body.shape, (body.x_mm, body.y_mm));
+        // The rim of a touch moves from cell to cell, so that force has steps that come from the grid alone: the mean over
+        // points within a cell removes them.
+        let mut forces = |depth: f64| -> Result<f64> {
+            sinking.find(layer, &[(shape, at, depth)]);
+            // With many cells the rim is a small part: one point is enough.
+            let many = sinking.cells.len() > MOST_SWEPT;
+            let points = if many { &POINTS[4..5] } else { &POINTS[..] };
+            let mut sum = 0.0;
+            for (right, down) in points {
+                let point = (at.0 + (right - 0.5) * layer.pitch_mm(), at.1 + (down - 0.5) * layer.pitch_mm());
+                sinking.find(layer, &[(shape, point, depth)]);
+                if !many {
+                    layer.forget();
                 }
-                Box::new(move |depth| Ok(foam.force(radius_mm, depth).0))
+                let pressure: f64 = layer.press(&sinking.cells, stop)?.iter().sum();
+                sum += pressure * layer.area_mm2();
             }
-            (None, _) => return Err(super::scene::columns_take_one_ball()),
-            (Some(layer), shape) => {
-                let (mut sinking, shape, at) = (Sinking::default(), shape.clone(), (body.x_mm, body.y_mm));
-                // The rim of a touch moves from cell to cell, so that force has steps that come from the grid alone: the
-                // mean over points within a cell removes them.
-                Box::new(move |depth| {
-                    // With many cells the rim is a small part: one point is enough.
-                    let many = {
-                        sinking.find(layer, &[(&shape, at, depth)]);
-                        sinking.cells.len() > MOST_SWEPT
-                    };
-                    let points = if many { &POINTS[4..5] } else { &POINTS[..] };
-                    let mut sum = 0.0;
-                    for (right, down) in points {
-                        let point = (at.0 + (right - 0.5) * layer.pitch_mm(), at.1 + (down - 0.5) * layer.pitch_mm());
-                        sinking.find(layer, &[(&shape, point, depth)]);
-                        if !many {
-                            layer.forget();
-                        }
-                        let pressure: f64 = layer.press(&sinking.cells, stop)?.iter().sum();
-                        sum += pressure * layer.area_mm2();
-                    }
-                    Ok(sum / points.len() as f64)
-                })
-            }
+            Ok(sum / points.len() as f64)
         };
         let depth = |k: usize| foam.floor_mm() * (k as f64 / (DEPTHS - 1) as f64).powi(2);
         let force =
@@ -96,26 +72,22 @@ impl Push {
             let smooth = smooth.max(entries[k - 1][2]);
             entries.push([depth(k) + give * smooth, depth(k), smooth]);
         }
-        Ok(Self::Table { entries })
+        Ok(Self { entries })
     }
 
     /// Force, N, and how it grows, N/mm, of a body that has come down so far.
     #[must_use]
     pub fn force(&self, down_mm: f64) -> (f64, f64) {
-        match self {
-            Self::Columns { foam, radius_mm } => foam.force(*radius_mm, down_mm),
-            Self::Table { entries } => {
-                if down_mm <= 0.0 {
-                    return (0.0, 0.0);
-                }
-                let ([from, _, low], [to, _, high]) = around(entries, 0, down_mm);
-                let share = ((down_mm - from) / (to - from)).min(1.0);
-                let after = entries.partition_point(|e| e[0] < down_mm).clamp(1, entries.len() - 1);
-                // A dashpot's force depends on the slope, which therefore must not jump from entry to entry.
-                let (before, next) = (slope(entries, after - 1), slope(entries, after));
-                (low + (high - low) * share, before + (next - before) * share)
-            }
+        if down_mm <= 0.0 {
+            return (0.0, 0.0);
         }
+        let entries = &self.entries;
+        let ([from, _, low], [to, _, high]) = around(entries, 0, down_mm);
+        let share = ((down_mm - from) / (to - from)).min(1.0);
+        let after = entries.partition_point(|e| e[0] < down_mm).clamp(1, entries.len() - 1);
+        // A dashpot's force depends on the slope, which therefore must not jump from entry to entry.
+        let (before, next) = (slope(entries, after - 1), slope(entries, after));
+        (low + (high - low) * share, before + (next - before) * share)
     }
 
     /// Force where the face lies at a depth, N.
@@ -127,46 +99,31 @@ impl Push {
     /// Depth of the body's face in the foam at a displacement, mm; equal to the displacement above the foam.
     #[must_use]
     pub fn depth_mm(&self, down_mm: f64) -> f64 {
-        match self {
-            Self::Table { entries } if down_mm > 0.0 => {
-                let ([from, low, _], [to, high, _]) = around(entries, 0, down_mm);
-                low + (high - low) * ((down_mm - from) / (to - from)).min(1.0)
-            }
-            _ => down_mm,
+        if down_mm <= 0.0 {
+            return down_mm;
         }
+        let ([from, low, _], [to, high, _]) = around(&self.entries, 0, down_mm);
+        low + (high - low) * ((down_mm - from) / (to - from)).min(1.0)
     }
 
     /// How far down a force holds the body, mm.
     #[must_use]
     pub fn down_mm(&self, force_n: f64) -> f64 {
-        match self {
-            Self::Columns { foam, radius_mm } => foam.depth_of(*radius_mm, force_n),
-            Self::Table { entries } => {
-                let ([from, _, low], [to, _, high]) = around(entries, 2, force_n);
-                if high > low { from + (to - from) * ((force_n - low) / (high - low)).clamp(0.0, 1.0) } else { to }
-            }
-        }
+        let ([from, _, low], [to, _, high]) = around(&self.entries, 2, force_n);
+        if high > low { from + (to - from) * ((force_n - low) / (high - low)).clamp(0.0, 1.0) } else { to }
     }
 
     /// How far down a body's middle is whose face lies at a depth, mm.
     #[must_use]
     pub fn down_of_depth_mm(&self, depth_mm: f64) -> f64 {
-        match self {
-            Self::Columns { .. } => depth_mm,
-            Self::Table { entries } => {
-                let ([from, low, _], [to, high, _]) = around(entries, 1, depth_mm);
-                from + (to - from) * ((depth_mm - low) / (high - low)).clamp(0.0, 1.0)
-            }
-        }
+        let ([from, low, _], [to, high, _]) = around(&self.entries, 1, depth_mm);
+        from + (to - from) * ((depth_mm - low) / (high - low)).clamp(0.0, 1.0)
     }
 
     /// How far down a body is that has gone through all of the foam, mm.
     #[must_use]
     pub fn floor_mm(&self) -> f64 {
-        match self {
-            Self::Columns { foam, .. } => foam.floor_mm(),
-            Self::Table { entries } => entries[entries.len() - 1][0],
-        }
+        self.entries[self.entries.len() - 1][0]
     }
 }
 

@@ -14,25 +14,10 @@ use crate::{Array, Error, Result};
 /// How far from the array's edge drawn scenes stay, mm: nearer to it the layer's influence would be cut off.
 const MARGIN_MM: f64 = 36.0;
 
-/// The model of the foam under bodies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Surface {
-    /// Foam bonded to the board: any bodies.
-    #[default]
-    Layer,
-    /// Independent columns, smoothed by the layer and tabulated: the fastest. One ball that moves straight up and down on
-    /// foam whose Poisson ratio is 0.1 at most.
-    Columns,
-}
-
 /// Bodies over the array, the foam that they touch, and their motions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
-    /// The model of the foam under them.
-    #[serde(default)]
-    pub surface: Surface,
     /// How many cells of the layer lie along the pitch of taxels: more than one where a touch is narrower than some two
     /// taxels.
     #[serde(default = "one_cell", skip_serializing_if = "is_one")]
@@ -63,16 +48,6 @@ fn one_cell() -> u16 {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
 fn is_one(value: &u16) -> bool {
     *value == 1
-}
-
-/// The largest Poisson ratio of foam modelled as columns: columns do not widen, and up to here foam hardly does.
-const WIDENS: f64 = 0.1;
-
-pub(super) fn columns_take_one_ball() -> Error {
-    Error::scene(format!(
-        "surface is \"columns\": must be \"layer\", except for a single sphere that is thicker than the foam and \
-         moves straight up and down, on foam with poisson up to {WIDENS}"
-    ))
 }
 
 impl Scene {
@@ -129,12 +104,10 @@ impl Scene {
             after_ms: 0.0,
             motion: Move::Dropped { height_mm, ending },
         };
-        let (surface, bodies) = (Surface::Columns, vec![body]);
         Ok(Self {
-            surface,
             cells_per_pitch: 1,
             foam,
-            bodies,
+            bodies: vec![body],
             slant_deg: 0.0,
             downhill_deg: 0.0,
             lead_ms,
@@ -171,22 +144,6 @@ impl Scene {
             let off = |error: Error| Error::scene(format!("{error} (the body is off the array)"));
             within(&path, "x_mm", body.x_mm, "mm", last(array.columns)).map_err(off)?;
             within(&path, "y_mm", body.y_mm, "mm", last(array.rows)).map_err(off)?;
-        }
-        if self.surface == Surface::Columns {
-            if self.cells_per_pitch > 1 {
-                return Err(Error::scene(format!(
-                    "scene: cells_per_pitch is {}: must be 1 with surface \"columns\", which has no cells; or use \
-                     \"layer\"",
-                    self.cells_per_pitch
-                )));
-            }
-            let [Body { shape: BodyShape::Sphere { radius_mm }, motion, .. }] = self.bodies.as_slice() else {
-                return Err(columns_take_one_ball());
-            };
-            let straight = matches!(motion, Move::Dropped { .. } | Move::Pressed(_)) && self.slant_deg == 0.0;
-            if !straight || self.foam.poisson > WIDENS || *radius_mm <= self.foam.thickness_mm || *radius_mm > 60.0 {
-                return Err(columns_take_one_ball());
-            }
         }
         Ok(())
     }
@@ -242,12 +199,9 @@ mod tests {
     fn each_nonsense_parameter_is_named() {
         let good = Scene::draw(&Array::thesis(), 1, 0, false).unwrap();
         good.check(&Array::thesis()).unwrap();
-        let wrong: [(&str, Spoil); 14] = [
+        let wrong: [(&str, Spoil); 11] = [
             ("radius_mm", |s| s.bodies[0].shape = BodyShape::Sphere { radius_mm: -5.0 }),
-            ("\"layer\"", |s| s.bodies[0].shape = BodyShape::Sphere { radius_mm: 5.0 }),
-            ("\"layer\"", |s| s.foam.poisson = 0.2),
-            ("\"layer\"", |s| s.slant_deg = 20.0),
-            ("\"layer\"", |s| s.bodies.push(s.bodies[0].clone())),
+            ("slant_deg", |s| s.slant_deg = 90.0),
             ("mass_g", |s| s.bodies[0].mass_g = Some(0.0)),
             ("mass_g", |s| s.bodies[0].mass_g = None),
             ("height_mm", |s| *dropped(s).0 = -1.0),

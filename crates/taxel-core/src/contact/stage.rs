@@ -1,16 +1,12 @@
 //! Acts played one after the other into the frames that the board reads.
 
-use super::{Act, Contact, FrameSequence, Motion, Narrow, Taxels};
+use super::{Act, Bonded, Contact, FrameSequence, Motion, Narrow, Taxels};
 use crate::spikes::us;
 use crate::{Array, Error, Result, Stop};
 
-mod columns;
-mod groups;
 mod layer;
 
-use columns::BallOnColumns;
-use groups::GROUPS;
-use layer::LayerScene;
+use layer::{GROUPS, LayerScene};
 
 /// The most frames whose forces are listed: 10 hours of the preset "5.2 kHz", and 800 MB.
 const MOST_FORCES: usize = 200_000_000;
@@ -57,8 +53,8 @@ impl Prepared {
             }
             Act::Scene(scene) => {
                 scene.check(array)?;
-                let mut layer = Motion::layer(scene, array, stop)?;
-                let mut motion = Motion::compute_on(scene, array, layer.as_mut(), frame_us / GROUPS as f64, stop)?;
+                let mut layer = Bonded::new(&scene.foam, array, scene.cells_per_pitch, stop)?;
+                let mut motion = Motion::compute_on(scene, array, &mut layer, frame_us / GROUPS as f64, stop)?;
                 if motion.len() < 2 {
                     return Err(Error::scene(format!(
                         "scene: is shorter than a quarter of a frame; a frame lasts {frame_us} us"
@@ -66,14 +62,7 @@ impl Prepared {
                 }
                 let (contacts, narrow) = (std::mem::take(&mut motion.contacts), motion.narrow.take());
                 let frames = motion.len().div_ceil(GROUPS);
-                let kind = match layer {
-                    Some(layer) => ScenePartKind::Layer(Box::new(LayerScene::new(scene, layer, motion, array))),
-                    None => ScenePartKind::Columns(Box::new(BallOnColumns::new(
-                        scene,
-                        motion.tracks.swap_remove(0),
-                        array,
-                    )?)),
-                };
+                let kind = ScenePartKind::Layer(Box::new(LayerScene::new(scene, layer, motion, array)));
                 Ok(Self { part: ScenePart { frames, kind }, contacts, narrow })
             }
             Act::Frames(sequence) => {
@@ -97,7 +86,6 @@ struct ScenePart {
 #[derive(Debug)]
 enum ScenePartKind {
     Silence,
-    Columns(Box<BallOnColumns>),
     Layer(Box<LayerScene>),
     Frames { sequence: FrameSequence, count: usize },
 }
@@ -175,7 +163,6 @@ impl Stage {
         let mut force = Vec::with_capacity(self.frames());
         for part in &self.parts {
             match &part.kind {
-                ScenePartKind::Columns(ball) => force.extend((0..part.frames).map(|k| ball.track.force_n[GROUPS * k])),
                 ScenePartKind::Layer(layer) => force.extend((0..part.frames).map(|k| layer.motion.force_n(GROUPS * k))),
                 ScenePartKind::Silence | ScenePartKind::Frames { .. } => force.resize(force.len() + part.frames, 0.0),
             }
@@ -201,7 +188,6 @@ impl Stage {
         let Some(part) = self.parts.get_mut(self.part) else { return Ok(false) };
         match &mut part.kind {
             ScenePartKind::Silence => {}
-            ScenePartKind::Columns(ball) => ball.show(self.frame, self.frame_us, &self.taxels, &mut self.clean),
             ScenePartKind::Layer(layer) => {
                 layer.show(self.frame, self.frame_us, &self.taxels, &mut self.clean, stop)?
             }

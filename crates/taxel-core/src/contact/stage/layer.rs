@@ -3,8 +3,13 @@
 use super::super::bonded::MOST_SWEPT;
 use super::super::push::Sinking;
 use super::super::{BodyShape, Bonded, Motion, Scene, Taxels};
-use super::groups::{GROUPS, steps_before};
 use crate::{Array, Result, Stop};
+
+/// The board's lines are read in four groups a frame, each as the touch then is.
+pub(super) const GROUPS: usize = 4;
+
+/// The delay of the fabric's response, us (thesis 4.4.1).
+const FABRIC_US: f64 = 50.0;
 
 /// Stress that no taxel senses, MPa: a millionth of a newton on it, a hundred-thousandth of what the thesis could detect.
 const FAINT_MPA: f32 = 2e-7;
@@ -148,4 +153,10 @@ impl LayerScene {
         }
         Ok(())
     }
+}
+
+/// When a group of lines is read that shows the touch of `GROUPS` steps a frame.
+fn steps_before(frame: usize, group: usize, frame_us: f64) -> f64 {
+    let lag = FABRIC_US / (frame_us / GROUPS as f64) - 0.5;
+    ((GROUPS * frame + group) as f64 - lag).max(0.0)
 }

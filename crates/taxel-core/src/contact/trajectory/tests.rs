@@ -1,7 +1,7 @@
 //! Against energy, momentum, Coulomb's law and the ranges of the model.
 
 use super::super::shape::rotate;
-use super::super::{BodyShape, Foam, Motion, Surface};
+use super::super::{BodyShape, Foam, Motion};
 use super::*;
 
 const QUARTER_US: f64 = 48.0;
@@ -21,15 +21,15 @@ fn body(shape: BodyShape, mass_g: f64, motion: Move) -> Body {
     }
 }
 
-fn alone(surface: Surface, foam: Foam, body: Body) -> Scene {
+fn alone(foam: Foam, body: Body) -> Scene {
     let bodies = vec![body];
-    Scene { surface, cells_per_pitch: 1, foam, bodies, slant_deg: 0.0, downhill_deg: 0.0, lead_ms: 20.0, tail_ms: 20.0 }
+    Scene { cells_per_pitch: 1, foam, bodies, slant_deg: 0.0, downhill_deg: 0.0, lead_ms: 20.0, tail_ms: 20.0 }
 }
 
 fn dropped(foam: Foam, radius_mm: f64, height_mm: f64, after: u32) -> Scene {
     let press = Press { peak_n: Some(1.0), depth_mm: None, speed_mm_s: 50.0, hold_ms: 100.0, wait_ms: 50.0 };
     let motion = Move::Dropped { height_mm, ending: Ending::Caught { after, press } };
-    alone(Surface::Columns, foam, body(BodyShape::Sphere { radius_mm }, 36.0, motion))
+    alone(foam, body(BodyShape::Sphere { radius_mm }, 36.0, motion))
 }
 
 fn play(scene: &Scene, step_us: f64) -> Result<Motion> {
@@ -162,15 +162,15 @@ fn a_course_that_leads_off_the_array_and_a_lift_before_the_landing_are_said() {
         Move::Rolled(Along { speed_mm_s: 300.0, ..along(2_000.0) }),
         Move::Slid(Along { speed_mm_s: 300.0, press_n: Some(1.0), ..along(2_000.0) }),
     ] {
-        let mut scene = alone(Surface::Layer, Foam::default(), ball(motion));
+        let mut scene = alone(Foam::default(), ball(motion));
         scene.bodies[0].rolling_friction = 0.0;
         assert!(matches!(play(&scene, QUARTER_US), Err(Error::Scene(_))));
     }
     let early = Ending::LeftToRest { rest_ms: 150.0, lift_mm_s: 50.0 };
-    let scene = alone(Surface::Layer, Foam::default(), ball(Move::Dropped { height_mm: 120.0, ending: early.clone() }));
+    let scene = alone(Foam::default(), ball(Move::Dropped { height_mm: 120.0, ending: early.clone() }));
     assert!(matches!(play(&scene, QUARTER_US), Err(Error::Scene(_))));
     let heavy = body(BodyShape::Sphere { radius_mm: 20.0 }, 1e300, Move::Dropped { height_mm: 50.0, ending: early });
-    assert!(matches!(play(&alone(Surface::Columns, Foam::default(), heavy), QUARTER_US), Err(Error::Scene(_))));
+    assert!(matches!(play(&alone(Foam::default(), heavy), QUARTER_US), Err(Error::Scene(_))));
 }
 
 fn ball(motion: Move) -> Body {
@@ -194,8 +194,7 @@ fn speed_at(scene: &Scene, ms: f64) -> f64 {
 fn a_ball_that_slides_ends_rolling_at_five_sevenths_of_its_speed() {
     // Whatever the friction: angular momentum about the point of contact is kept.
     for friction in [0.1, 0.6] {
-        let mut scene = alone(Surface::Columns, Foam::default(), ball(Move::Slid(along(400.0))));
-        scene.surface = Surface::Layer;
+        let mut scene = alone(Foam::default(), ball(Move::Slid(along(400.0))));
         scene.bodies[0].friction = friction;
         let speed = speed_at(&scene, 365.0);
         assert!((speed / 60.0 - 5.0 / 7.0).abs() < 2e-3, "{friction}: {speed} mm/s");
@@ -205,7 +204,7 @@ fn a_ball_that_slides_ends_rolling_at_five_sevenths_of_its_speed() {
 #[test]
 fn a_block_that_slides_stops_where_coulomb_says() {
     let flat = BodyShape::HeightMap { heights_mm: vec![vec![0.0; 2]; 2], pitch_mm: 20.0 };
-    let mut scene = alone(Surface::Layer, Foam::default(), body(flat, 80.0, Move::Slid(along(200.0))));
+    let mut scene = alone(Foam::default(), body(flat, 80.0, Move::Slid(along(200.0))));
     scene.bodies[0].friction = 0.3;
     let motion = play(&scene, QUARTER_US).unwrap();
     let track = &motion.tracks[0];
@@ -219,8 +218,7 @@ fn a_block_that_slides_stops_where_coulomb_says() {
 #[test]
 fn a_ball_rolls_down_a_slant_at_five_sevenths_of_gravity_and_slides_down_a_slippery_one() {
     for (friction, share) in [(0.6, 5.0 / 7.0), (0.0, 1.0)] {
-        let mut scene =
-            alone(Surface::Layer, Foam::default(), ball(Move::Rolled(Along { speed_mm_s: 1.0, ..along(300.0) })));
+        let mut scene = alone(Foam::default(), ball(Move::Rolled(Along { speed_mm_s: 1.0, ..along(300.0) })));
         (scene.slant_deg, scene.downhill_deg, scene.bodies[0].friction) = (5.0, 30.0, friction);
         let speed = speed_at(&scene, 350.0) - speed_at(&scene, 150.0);
         let expected = 1e3 * share * GRAVITY * 5f64.to_radians().sin() * 200.0;
@@ -233,7 +231,7 @@ fn a_cylinder_rolls_across_its_axis_and_slides_along_it() {
     let shape = BodyShape::Cylinder { radius_mm: 15.0, length_mm: 30.0, axis_deg: 120.0 };
     let scene = |toward_deg| {
         let along = Along { toward_deg, ..along(120.0) };
-        alone(Surface::Layer, Foam::default(), body(shape.clone(), 60.0, Move::Rolled(along)))
+        alone(Foam::default(), body(shape.clone(), 60.0, Move::Rolled(along)))
     };
     assert!((speed_at(&scene(30.0), 165.0) / 60.0 - 1.0).abs() < 1e-3, "{}", speed_at(&scene(30.0), 165.0));
     assert!(speed_at(&scene(120.0), 165.0) < 0.1);
@@ -245,7 +243,7 @@ fn friction_acts_against_the_slip_of_a_cylinder_that_slides_aslant() {
     let (friction, steps, dt) = (0.3, 1_400, 1e-3 * QUARTER_US);
     let shape = BodyShape::Cylinder { radius_mm: 10.0, length_mm: 30.0, axis_deg: 45.0 };
     let course = Along { speed_mm_s: 500.0, toward_deg: 0.0, for_ms: 80.0, press_n: None };
-    let mut scene = alone(Surface::Layer, Foam::default(), body(shape, 100.0, Move::Slid(course)));
+    let mut scene = alone(Foam::default(), body(shape, 100.0, Move::Slid(course)));
     (scene.bodies[0].friction, scene.bodies[0].x_mm) = (friction, 60.0);
     let motion = play(&scene, QUARTER_US).unwrap();
     let track = &motion.tracks[0];
@@ -266,8 +264,7 @@ fn friction_acts_against_the_slip_of_a_cylinder_that_slides_aslant() {
 
 #[test]
 fn a_fall_on_a_slant_meets_it_where_it_should() {
-    let mut scene =
-        alone(Surface::Layer, Foam::default(), ball(Move::Dropped { height_mm: 100.0, ending: Ending::default() }));
+    let mut scene = alone(Foam::default(), ball(Move::Dropped { height_mm: 100.0, ending: Ending::default() }));
     (scene.slant_deg, scene.downhill_deg) = (25.0, 90.0);
     let motion = play(&scene, QUARTER_US).unwrap();
     let first = &motion.contacts[0];
@@ -282,7 +279,7 @@ fn a_fall_on_a_slant_meets_it_where_it_should() {
 fn a_ball_that_gives_is_off_sooner_and_without_bottoming_out() {
     // A tennis ball: 56 g from 0.6 m. A rigid one would press the solid.
     let motion = Move::Dropped { height_mm: 600.0, ending: Ending::LeftToRest { rest_ms: 420.0, lift_mm_s: 50.0 } };
-    let mut scene = alone(Surface::Layer, Foam::default(), body(BodyShape::Sphere { radius_mm: 33.0 }, 56.0, motion));
+    let mut scene = alone(Foam::default(), body(BodyShape::Sphere { radius_mm: 33.0 }, 56.0, motion));
     let rigid = play(&scene, QUARTER_US).unwrap().contacts[0].peak_n;
     scene.bodies[0].stiffness_n_mm = Some(25.0);
     let motion = play(&scene, QUARTER_US).unwrap();
@@ -297,20 +294,8 @@ fn a_touch_that_is_too_narrow_is_told_how_many_cells_would_do() {
     // A touch that needs more cells than allowed is reported with the most there may be; a wide touch is not.
     let press = Press { peak_n: None, depth_mm: Some(0.05), speed_mm_s: 50.0, hold_ms: 2.0, wait_ms: 0.0 };
     let shape = BodyShape::Edge { slope_deg: 45.0, length_mm: 20.0, axis_deg: 0.0 };
-    let mut scene = alone(Surface::Layer, undamped(), body(shape, 36.0, Move::Pressed(press)));
+    let mut scene = alone(undamped(), body(shape, 36.0, Move::Pressed(press)));
     assert!(play(&scene, 200.0).unwrap().narrow.unwrap().to_string().contains("the maximum is 16"));
     scene.bodies[0].shape = BodyShape::Sphere { radius_mm: 60.0 };
     assert_eq!(play(&scene, 200.0).unwrap().narrow, None);
-}
-
-#[test]
-fn columns_and_layer_agree_where_columns_are_allowed() {
-    let columns = dropped(Foam::default(), 30.0, 120.0, 2);
-    let layer = Scene { surface: Surface::Layer, ..columns.clone() };
-    let (a, b) = (play(&columns, QUARTER_US).unwrap(), play(&layer, QUARTER_US).unwrap());
-    assert_eq!(a.contacts.len(), b.contacts.len(), "{:?} {:?}", a.contacts, b.contacts);
-    let long = |c: &Contact| c.stop_us - c.start_us;
-    for (a, b) in a.contacts.iter().zip(&b.contacts).take(2) {
-        assert!((long(a) / long(b) - 1.0).abs() < 0.1 && (a.peak_n / b.peak_n - 1.0).abs() < 0.25, "{a:?} {b:?}");
-    }
 }
