@@ -87,10 +87,10 @@ def unnamed_sources(names: dict[str, Any]) -> list[str]:
     missing = []
     for row in (DOCS / "readings.md").read_text("utf-8").splitlines():
         cells = [cell.strip() for cell in row.strip("|").split("|")]
-        if len(cells) != 4:
+        if len(cells) != 3:
             continue
-        sources = re.findall(r"\b\d\.\d+(?:\.\d)?\b", cells[1])
-        for option in re.findall(r"`(\w+)\(\w+=", cells[3]):
+        sources = re.findall(r"\b\d\.\d+(?:\.\d)?\b", cells[0])
+        for option in re.findall(r"`(\w+)\(\w+=", cells[2]):
             about = inspect.getdoc(there[option]) if option in there else None
             if about is not None and sources and not any(source in about for source in sources):
                 missing.append(f"{option}: {', '.join(sources)}")
