@@ -1,7 +1,7 @@
 """Parts of the documentation that are made from the program: figures, options of commands, keys, requests, names.
 
-A page asks for them by directives: ``.. studies::``, ``.. commands::``, ``.. keys::``, ``.. requests::`` and
-``.. names:: MODULE``.
+A page asks for them by directives: ``.. studies::``, ``.. commands::``, ``.. keys::``, ``.. requests::``,
+``.. registers:: TABLE`` and ``.. names:: MODULE``.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import json
 import re
+import tomllib
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -20,15 +21,18 @@ from docutils.statemachine import StringList
 from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
 
+from taxel._core import registers_fields, registers_preset
 from taxel.cli._commands import OWN, plugins
 from taxel.cli._commands import command as imported
 from taxel.cli.app import about, own_commands, rows
 from taxel.panel.session import REQUESTS
+from taxel.wire import PRESETS
 from taxel_studies import STUDIES
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURES = ROOT / "benchmarks" / "results" / "figures"
 KEYS = ROOT / "python" / "taxel" / "panel" / "web" / "keys.js"
+REGISTERS = ROOT / "registers.toml"
 KEY = r'shown: "([^"]+)", text: "([^"]+)"'
 #: Characters; the values of longer constants are not shown.
 LONGEST_VALUE = 80
@@ -166,6 +170,50 @@ class Requests(FromProgram):
         return table(["request", "keys", ""], rows, "12 38 50")
 
 
+class Registers(FromProgram):
+    """The board's registers: ``fields``, ``rules`` or ``presets``."""
+
+    required_arguments = 1
+
+    def lines(self) -> list[str]:
+        """Return a table, a row a field, rule or preset."""
+        self.state.document.settings.env.note_dependency(str(REGISTERS))
+        return {"fields": fields, "rules": rules, "presets": presets}[self.arguments[0]]()
+
+
+def fields() -> list[str]:
+    """Return the fields of the registers: where, in which unit, and what they are at reset."""
+    reset = registers_preset(PRESETS[0])
+    rows = []
+    for field in registers_fields():
+        low, offset = field["shift"], field["offset"]
+        high = low + field["mask"].bit_length() - 1
+        bits = f"REG{field['register']}[{low if high == low else f'{high}:{low}'}]"
+        cells = [field["name"], field["manual"], f"{bits}{f', less {offset}' * bool(offset)}", field["unit"]]
+        least, greatest = field["least"], field["greatest"]
+        rows.append([*cells, str(int(reset[field["name"]])), f"{least} to {greatest}", field["text"]])
+    head = ["field", "the manual's name", "where", "unit", "at reset", "range", "what it is"]
+    return table(head, [[f"``{name}``", *cells] for name, *cells in rows], "15 15 12 9 7 12 30")
+
+
+def rules() -> list[str]:
+    """Return what the registers must hold."""
+    stated = sorted(tomllib.loads(REGISTERS.read_text())["rule"], key=lambda rule: rule["number"])
+    rows = [[str(r["number"]), "warns" if r.get("warns") else "refuses", f"``{r['holds']}``"] for r in stated]
+    return table(["rule", "if broken", "what must hold"], rows, "10 15 75")
+
+
+def presets() -> list[str]:
+    """Return the presets: values, version of the wire, and frames a second."""
+    keys = ["line_period", "line_read", "step_period", "step_read", "ramp", "noise_floor", "lines", "channels"]
+    rows = []
+    for name in PRESETS:
+        values = registers_preset(name)
+        rate = 1e8 / (values["lines"] * values["line_period"])
+        rows.append([name, *(str(values[key]) for key in [*keys, "wire_version"]), f"{rate:.2f}"])
+    return table(["preset", *keys, "wire", "frames/s"], rows, "20 8 8 8 8 8 8 8 8 8 8")
+
+
 def described(kind: Any) -> str:  # noqa: PLR0911  a line for each kind
     """Return a type of a key in words."""
     match kind:
@@ -247,5 +295,6 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.add_directive("commands", Commands)
     app.add_directive("keys", Keys)
     app.add_directive("requests", Requests)
+    app.add_directive("registers", Registers)
     app.add_directive("names", Names)
     return {"parallel_read_safe": True}

@@ -1,4 +1,4 @@
-"""Make the tables of Rust and the docs from registers.toml (`make registers`).
+"""Make the tables of Rust and of recordings from registers.toml (`make registers`).
 
 Usage: python tools/registers.py [ROOT]. Python reads Rust's table. A test compares the files with what this script makes.
 """
@@ -230,114 +230,6 @@ pub static POWER_LAW: LazyLock<[u32; {law["entries"]}]> = LazyLock::new(|| {{
 """)
 
 
-def docs(source: Table) -> str:
-    """Write the page of the docs."""
-    rows, less = [], []
-    for f in source["field"]:
-        high = f.get("low", 0) + f["bits"] - 1
-        where = f"REG{f['register']}[{high}:{f['low']}]" if "register" in f else "the board's build"
-        where = where.replace(f"[{f.get('low')}:{f.get('low')}]", f"[{f.get('low')}]")
-        limits = f"{f['least']} to {f['greatest']}" if f["unit"] != "flag" else "off, on"
-        default = ("on" if f["default"] else "off") if f["unit"] == "flag" else f["default"]
-        held = ""
-        if "register" in f:
-            held = f"the value less {f['offset']}" if f["offset"] else "the value"
-        if f["offset"]:
-            less.append(f"`{f['name']}` {f['greatest']} is {f['greatest'] - f['offset']} in {where}")
-        rows.append(
-            f"| `{f['name']}` | `{f['manual']}` | {where} | {held} | {f['unit']} | {default} | {limits} | {f['text']} |"
-        )
-    rules = [
-        f"| {r['number']} | {'warns' if r['warns'] else 'refuses'} | `{r['holds']}` |"
-        for r in sorted(source["rule"], key=lambda r: r["number"])
-    ]
-    keys = ("line_period", "line_read", "step_period", "step_read", "ramp", "noise_floor", "lines", "channels")
-    default = {f["name"]: f["default"] for f in source["field"]}
-    presets = []
-    for p in source["preset"]:
-        values = default | p["values"]
-        rate = 1e8 / (values["lines"] * values["line_period"])
-        cells = " | ".join(str(values[key]) for key in keys)
-        presets.append(f"| {p['name']} | {cells} | {values['wire_version']} | {rate:.2f} |")
-    law = source["power_law"]
-    newline = "\n"
-    return f"""<!-- {HEAD} -->
-# Registers
-
-This page lists the board's registers, the rules that their values obey, and the presets. The board has eight 32-bit registers (thesis,
-Appendix 1, Table 5.5), each set as a whole by five bytes on the serial line (`taxel.wire.Command`). A *line* is a driven line, the outer
-loop of the scan; a *step* is one of the multiplexer, the inner loop. The manual's names are aliases everywhere, in the manual's units.
-
-| field | the manual's name | where | bits hold | unit | at reset | range | what it is |
-|---|---|---|---|---|---|---|---|
-{newline.join(rows)}
-
-Where the bits hold less than the value, so must a word that is written: {", ".join(less)}.
-
-All other bits are reserved and written 0. REG6 has no value: writing a register's number (0 to 7) to it reads that register back, and
-writing 8 makes the board identify itself as at reset. Writing 9 requests its totals ([the wire](wire.md)).
-
-## Rules
-
-The logic, the emulated board and the host check these rules before a write; a write that breaks one changes nothing. `steps` is the number of
-multiplexer steps for each line: the array's rows, at least 64, divided by the channels and rounded up; `driven_lines` and `sense_lines` are the
-array's columns and rows. Rule 4 also says that every value is within its range and reserved bits are 0. A refusal names the first
-broken rule: rule 4 is checked first, the others follow in the order of their numbers.
-
-| rule | if broken | what must hold |
-|---|---|---|
-{newline.join(rules)}
-
-## Presets
-
-| preset | {" | ".join(f"`{key}`" for key in keys)} | wire | frames/s |
-|---|{"---|" * (len(keys) + 2)}
-{newline.join(presets)}
-
-A board of up to 64 lines resets to the first preset of as many channels (*5.2 kHz* or *20.8 kHz*), with the lines of its array. A larger
-one resets to wire version 2 and *128 x 128, 1 kHz*, or with 16 channels to *128 x 128, 1.3 kHz*, with the lines of its array, and line
-times no shorter than its steps. *wire* is the version of a board that starts with the preset. Applying a preset to a running board by
-its name (`taxel device apply`, the panel) changes neither its version nor its channels, which are fixed in hardware.
-
-## The pattern
-
-With `pattern` set, values that anyone can compute take the place of the comparators': those of a ball that rolls over the array, so that
-everything behind the converter can be checked without a sensor. No comparator counts as a fault meanwhile. All else is as always: a value
-makes an event where it differs by more than `noise_floor` from the one sent last, and with `mechanoreceptor` it drives the afferent.
-
-The frames of the pattern are counted: `n` is 0 in the first frame that has it, and the number before plus 1, modulo 65536, in each further
-frame. A frame without it ends the count, a reset too; the frame before time 0 never has it. Taxel (`x`, `y`), of driven line `x` and sense
-line `y`, reads `v` ticks in frame `n`, in whole numbers, with `//` rounding down and `mod` never negative:
-
-```
-C, R = the array's columns and rows, each rounded up to a power of two
-p    = (n // 16 - 16 * x) mod (16 * C)        a = min(p, 16 * C - p)
-q    = (n // 2  - 16 * y) mod (16 * R)        b = min(q, 16 * R - q)
-v    = max(0, min(128, ramp) - max(a, b) - min(a, b) // 2)
-```
-
-So positions are in sixteenths of a taxel, the ball's middle is at `n // 16` across the lines and `n // 2` along them, and a ball that
-leaves the array on one side comes back on the other. Of 64 x 64 taxels each one has read 64 or more after 16384 frames. Examples for
-64 x 64 taxels and a ramp of 150: with `n` = 0 taxel (0, 0) reads 128, (1, 0) 112, (1, 1) 104, (63, 63) 104 and (5, 2) 32; with `n` = 100
-(0, 3) reads 121 and (0, 4) 111.
-
-A board may begin with the pattern after a reset: the Colorlight i9 does where its button is held for two seconds or more
-([the board's logic](hardware.md)).
-
-## FA-1 on the board
-
-With `mechanoreceptor` set each taxel is the FA-1 afferent of 5.4.2, in whole numbers of 2^-{law["fraction_bits"]}. The compression 5.1
-is a table of {law["entries"]} entries, `round(ticks ** {law["exponent"]} * 2 ** {law["fraction_bits"]})`; larger values use the
-last entry. theta_0 is `threshold_rest` 1/1024; a spike raises the threshold by `threshold_jump * theta_0 / 256`, a quiet frame lowers
-it by `threshold_decay * theta_0 / 1024` while it lies above theta_0, else sets it to theta_0; both are rounded down. The integral is the
-compressed value less that at the taxel's last spike; a spike fires where its size exceeds the threshold. A taxel's first
-frame in this mode in which its comparator had returned counts as the state at all earlier times, so it has no event. A frame in which it
-had not returned changes nothing. An event is a spike: `Pol` is its sign, the intensity word the size of the
-integral in 1/1024, 65535 at most. If the queue is full, the spike is dropped and counted, and the afferent is
-reset as after any spike.
-"""
-
-
 def schema(source: Table) -> str:
     """Write the schema that recordings carry."""
     properties = {}
@@ -355,7 +247,6 @@ MADE = {
     "crates/taxel-core/src/wire/registers/rules.rs": rust_checks,
     "crates/taxel-core/src/wire/registers/power_law.rs": rust_power_law,
     "crates/taxel-live/src/recording/schemas/Registers.json": schema,
-    "docs/registers.md": docs,
 }
 
 

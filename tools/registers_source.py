@@ -1,4 +1,4 @@
-"""Read registers.toml, from which the tables of Rust, JavaScript and the docs, and the RTL's package are made."""
+"""Read registers.toml, from which the tables of Rust and the docs, and the RTL's package are made."""
 
 from __future__ import annotations
 

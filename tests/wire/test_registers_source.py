@@ -22,7 +22,6 @@ MADE = (
     "crates/taxel-core/src/wire/registers/rules.rs",
     "crates/taxel-core/src/wire/registers/power_law.rs",
     "crates/taxel-live/src/recording/schemas/Registers.json",
-    "docs/registers.md",
 )
 
 
