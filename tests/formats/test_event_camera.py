@@ -91,14 +91,6 @@ def test_counts_are_those_of_events_one_after_the_other(
     assert frames.values.sum() == len(rows) or (region, polarity or "both") != (None, "both")
 
 
-def test_both_polarities_are_the_sum_of_each(tmp_path: Path) -> None:
-    path = write(tmp_path / "a.raw", some_rows())
-    both, on, off = (taxel.open(path, window_ms=2, polarity=name).frames() for name in ("both", "on", "off"))
-    assert (both.values == on.values + off.values).all()
-    assert on.values.any()
-    assert off.values.any()
-
-
 def test_a_region_and_larger_taxels_make_events_too(tmp_path: Path) -> None:
     rows = some_rows()
     path = write(tmp_path / "a.raw", rows)
@@ -123,17 +115,6 @@ def test_the_layout_and_the_command_line_say_the_same(tmp_path: Path, capsys: py
     # What is given comes before what the layout says.
     assert taxel.open(path, bin=8).array.shape == (4, 4)
     capsys.readouterr()
-
-
-def test_a_folder_of_files_is_a_list_of_recordings(tmp_path: Path) -> None:
-    for k in (10, 2):
-        write(tmp_path / f"take{k}.raw", some_rows(seed=k))
-    (tmp_path / "layout.toml").write_text("[event_camera]\nwindow_ms = 5\n")
-    (tmp_path / "labels.csv").write_text("recording,label,t_us\ntake2,contact,2000\ntake10,contact,3000\n")
-    opened = taxel.open_all(tmp_path, bin=16)
-    assert [recording.name for recording in opened] == ["take2.raw", "take10.raw"]
-    assert [recording.array.shape for recording in opened] == [(3, 4)] * 2
-    assert [[note.t for note in recording.notes] for recording in opened] == [[2000], [3000]]
 
 
 def test_a_table_named_dat_is_a_table(tmp_path: Path) -> None:

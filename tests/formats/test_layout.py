@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import warnings
 from pathlib import Path
 from typing import Any
@@ -88,17 +87,6 @@ def test_channels_of_our_own_table_keep_their_names(tmp_path: Path, array: Array
     assert taxel.open(tmp_path / "b.csv").array.names is None
 
 
-def test_a_compressed_table_a_numbered_time_column_and_missing_cells(tmp_path: Path) -> None:
-    text = lines(np.column_stack([VALUES[:, :2], [0.5, 1.0, 1.5], VALUES[:, 2:]])).replace("6.5", "NA")
-    (tmp_path / "step.csv.gz").write_bytes(gzip.compress(text.encode()))
-    (tmp_path / "layout.toml").write_text('[table]\ntime_column = 3\nmissing = "NA"\n')
-    frames = taxel.open(tmp_path / "step.csv.gz").frames()
-    expected = VALUES.copy()
-    expected[1, 0] = np.nan
-    np.testing.assert_array_equal(frames.values[:, 0], expected.astype(np.float32))
-    assert frames.t.tolist() == [500_000, 1_000_000, 1_500_000]
-
-
 def test_readings_that_fall_are_turned_once(tmp_path: Path) -> None:
     for falls, expected in (("true", -VALUES), ("10", 10 - VALUES), ("false", VALUES)):
         recording = table(tmp_path, lines(VALUES), f"falls = {falls}\nrate_hz = 100")
@@ -141,30 +129,6 @@ def test_values_that_fall_as_the_layout_turns_them_name_it(tmp_path: Path, falls
 
 def test_without_times_frames_are_numbered(tmp_path: Path) -> None:
     assert table(tmp_path, lines(VALUES), "rows = 2\ncolumns = 3").frames().t.tolist() == [0, 1, 2]
-
-
-@pytest.mark.parametrize("ending", [".npy", ".npz", ".h5"])
-@pytest.mark.parametrize("flat", [True, False])
-def test_arrays_of_somebody_else(tmp_path: Path, ending: str, flat: bool) -> None:
-    values = (VALUES if flat else VALUES.reshape(3, 2, 3)).astype(np.int16)
-    place = tmp_path / f"grasp{ending}"
-    if ending == ".npy":
-        np.save(place, values)
-    elif ending == ".npz":
-        np.savez(place, palm=values, other=np.zeros(2), when=[0.0, 0.25, 0.75])
-    else:
-        import h5py
-
-        with h5py.File(place, "w") as h5:
-            h5["palm"], h5["other"], h5["when"] = values, np.zeros(2), [0.0, 0.25, 0.75]
-    data = "" if ending == ".npy" else '[data]\narray = "palm"\ntime = "when"\n'
-    layout = tmp_path / "elsewhere.toml"
-    layout.write_text(("rows = 2\ncolumns = 3\n" if flat else "") + ("rate_hz = 4\n" if not data else "") + data)
-    recording = taxel.open(place, layout=layout)
-    assert recording.lost == (("other arrays of the file: other",) if data else ())
-    frames = recording.frames()
-    np.testing.assert_array_equal(frames.values, values.reshape(3, 2, 3).astype(np.float32))
-    assert frames.t.tolist() == ([0, 250_000, 750_000] if data else [0, 250_000, 500_000])
 
 
 @pytest.mark.parametrize(
@@ -223,11 +187,6 @@ def test_a_given_sensor_lays_out_arrays_of_somebody_else_and_another_is_refused(
         taxel.open(tmp_path / "a.npy", array="2x3")
 
 
-def test_times_that_are_no_us_are_told_their_unit() -> None:
-    with pytest.raises(taxel.ProblemError, match=r"t\[1\] is 0\.25: must be a whole number that fits int64, in us"):
-        Frames(VALUES[:, None], [0.0, 0.25, 0.75])
-
-
 def test_a_layout_names_a_data_set_in_a_group_by_its_path(tmp_path: Path) -> None:
     import h5py
 
@@ -261,16 +220,6 @@ def test_a_layout_says_what_our_own_files_lack(tmp_path: Path) -> None:
     taxel.convert(events, tmp_path / "touch.npz")
     (tmp_path / "touch.layout.toml").write_text("pitch_mm = 4.5")
     assert taxel.open(tmp_path / "touch.npz").events.array.pitch_mm == 4.5
-
-
-def test_a_folder_of_tables_opens_by_its_one_layout(tmp_path: Path) -> None:
-    for name in ("step10.csv", "step2.csv"):
-        (tmp_path / name).write_text(lines(VALUES))
-    (tmp_path / "layout.toml").write_text("rows = 2\ncolumns = 3\nrate_hz = 10\n")
-    (tmp_path / "labels.csv").write_text("recording,label,t_us\nstep2,contact,100000\n")
-    opened = taxel.open_all(tmp_path)
-    assert [one.name for one in opened] == ["step2.csv", "step10.csv"]
-    assert [len(one.notes) for one in opened] == [1, 0]
 
 
 @pytest.mark.parametrize(
@@ -318,26 +267,6 @@ def test_a_layout_that_makes_no_sense_is_refused_in_one_line(tmp_path: Path, lay
         table(tmp_path, lines(VALUES), layout)
     assert "\n" not in str(refused.value)
     assert "step" in str(refused.value)
-
-
-@pytest.mark.parametrize(("stated", "there"), [(",", ";"), (";", ","), (",", "\t"), (";", " ")])
-@pytest.mark.parametrize("head", ["", "heel, N\n"])
-def test_a_table_of_another_separator_is_named(tmp_path: Path, stated: str, there: str, head: str) -> None:
-    head = head.replace(", ", there)
-    with pytest.raises(FormatError, match=r"line 1: no line of numbers between separators"):
-        table(tmp_path, head + lines(VALUES, there), f'rate_hz = 50\n[table]\nseparator = "{stated}"')
-
-
-@pytest.mark.parametrize("given", [True, False])
-def test_a_table_of_times_in_us_with_another_separator_follows_its_layout(tmp_path: Path, given: bool) -> None:
-    head = "t_us;" + ";".join("abcdef") + "\n"
-    text = head + "".join(f"{20_000 * k};{';'.join(f'{v:g}' for v in row)}\n" for k, row in enumerate(VALUES))
-    (tmp_path / "step.csv").write_text(text)
-    layout = tmp_path / ("given.toml" if given else "step.layout.toml")
-    layout.write_text("rows = 2\ncolumns = 3\n[table]\nseparator = ';'\ntime_column = 't_us'\ntime_unit = 'us'\n")
-    frames = taxel.open(tmp_path / "step.csv", layout=layout if given else None).frames()
-    assert np.array_equal(frames.values.reshape(3, 6), VALUES)
-    assert frames.t.tolist() == [0, 20_000, 40_000]
 
 
 @pytest.mark.parametrize(

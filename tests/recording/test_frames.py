@@ -13,8 +13,6 @@ import numpy as np
 import pytest
 from formats.making import write_icub, write_moticon, write_pedar
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from mcap.reader import make_reader
 from shell import call
 
@@ -27,44 +25,9 @@ from taxel.options import FullReading
 from taxel.reading import Facts, InMemory, Marks
 from taxel.tasks.labels import references
 
-WHOLE = st.integers(0, 65_535).map(float)
-ANY = st.one_of(WHOLE, st.floats(width=32, allow_nan=True, allow_infinity=False), st.sampled_from([-0.0, 65_536.0]))
-
-
-@st.composite
-def some_frames(draw: st.DrawFn) -> Frames:
-    rows, columns, n = draw(st.integers(1, 4)), draw(st.integers(1, 5)), draw(st.integers(0, 6))
-    cells = draw(
-        st.lists(draw(st.sampled_from([WHOLE, ANY])), min_size=n * rows * columns, max_size=n * rows * columns)
-    )
-    t = sorted(draw(st.sets(st.integers(-(2**52), 2**52), min_size=n, max_size=n)))
-    exists = draw(st.none() | st.just(np.arange(rows * columns).reshape(rows, columns) % 3 > 0))
-    array = Array(rows, columns, 2.5, None if exists is None or not exists.any() else exists, name="mat")
-    return Frames(
-        np.array(cells, np.float32).reshape(n, rows, columns),
-        t,
-        unit=draw(st.sampled_from(["kPa", "a.u."])),
-        array=array,
-    )
-
 
 def bits(frames: Frames) -> np.ndarray:
     return frames.values.view(np.uint32)
-
-
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(frames=some_frames())
-def test_a_mcap_gives_frames_back_to_the_last_bit(tmp_path: Path, frames: Frames) -> None:
-    place = tmp_path / "a.mcap"
-    assert taxel.convert(frames, place, overwrite=True) == []
-    recording = taxel.open(place)
-    back = recording.frames()
-    assert (back.unit, back.array.name, back.array.shape) == (frames.unit, "mat", frames.array.shape)
-    assert (back.array.exists is None) == (frames.array.exists is None)
-    assert np.array_equal(back.t, frames.t)
-    assert np.array_equal(bits(back), bits(frames))
-    assert recording.timed
-    assert recording.verdict == "nothing lost"
 
 
 def decoded(place: Path) -> list[tuple[str, dict[str, str], int, object]]:
@@ -196,16 +159,6 @@ def test_frames_of_events_say_that_the_datagrams_are_left(tmp_path: Path) -> Non
     assert lost == ["raw datagrams"]
     back = taxel.open(tmp_path / "frames.mcap")
     assert back.frames() == taxel.open(tmp_path / "events.mcap").frames(100)
-
-
-def test_encoders_find_the_same_in_a_mcap_as_in_its_source(tmp_path: Path) -> None:
-    draw = np.random.default_rng(3)
-    frames = Frames(
-        draw.random((80, 2, 3)).astype(np.float32) * 9, np.arange(80) * 10_000 + 3, unit="kPa", array=Array(2, 3)
-    )
-    taxel.convert(frames, tmp_path / "a.mcap")
-    encoder = LevelCrossing([2.0, 5.0])
-    assert encoder.encode(taxel.open(tmp_path / "a.mcap")) == encoder.encode(frames)
 
 
 @pytest.mark.parametrize("make", [write_pedar, write_moticon])

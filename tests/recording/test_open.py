@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from formats import making as foreign
 from refusal import refused
 
 import taxel
@@ -110,12 +109,6 @@ def test_nonsense_in_options_is_refused_by_name(tmp_path: Path, arguments: dict)
     path.write_bytes(b"")
     with pytest.raises(ProblemError, match=f"{next(iter(arguments))} is"):
         taxel.open(path, **arguments)
-
-
-def test_kinds_are_known_by_their_bytes_where_the_name_says_nothing(tmp_path: Path) -> None:
-    record(tmp_path / "a.mcap", some_events(20))
-    (tmp_path / "a.mcap").rename(tmp_path / "recording")
-    assert taxel.open(tmp_path / "recording").kind == "mcap"
 
 
 def test_raw_bytes_need_no_magic_and_say_whether_they_are_complete(tmp_path: Path) -> None:
@@ -307,23 +300,6 @@ def test_a_recording_draws_itself(rec: taxel.Recording, tmp_path: Path) -> None:
     taxel.open(tmp_path / "empty.mcap").plot()
 
 
-def test_losses_while_recording_are_in_the_verdict(tmp_path: Path) -> None:
-    import json
-
-    from taxel import _core
-
-    path = tmp_path / "a.mcap"
-    writer = _core.RecordingWriter(path, json.dumps(HEADER), "none", False)
-    for number in (0, 1, 4):
-        writer.datagram(number, number, b"\xc0\x00\x00\x03\x04")
-    said = {"received": 5, "dropped_by_kernel": 2, "dropped_by_queue": 2, "decoder": {"bytes_skipped": 3}}
-    writer.finish(json.dumps(said))
-    rec = taxel.open(path)
-    assert rec.verdict == (
-        "LOST: 2 messages dropped by the kernel, 2 datagrams dropped by taxel's queue; damaged: 3 bytes skipped"
-    )
-
-
 def test_a_finished_writer_takes_no_more_and_nonsense_is_refused(tmp_path: Path) -> None:
     import json
 
@@ -346,16 +322,6 @@ def test_a_finished_writer_takes_no_more_and_nonsense_is_refused(tmp_path: Path)
     for call in (lambda: writer.datagram(0, 0, b""), lambda: writer.finish("{}")):
         with pytest.raises(ProblemError, match="the recording is finished"):
             call()
-
-
-def test_one_recording_is_opened_and_of_a_folder_all(tmp_path: Path) -> None:
-    both = taxel.open(foreign.write_pedar(tmp_path))
-    assert [each.side for each in both.sources.values()] == ["left", "right"]
-    taxel.convert(both.sources["left"], tmp_path / "left.npz")
-    assert taxel.open(tmp_path / "left.npz").frames() == taxel.open_all(tmp_path / "left.npz")[0].frames()
-    with pytest.raises(ProblemError, match=r": is a folder; name one of its recordings"):
-        taxel.open(tmp_path)
-    assert [one.name for one in taxel.open_all(tmp_path)] == ["left.npz"]
 
 
 @pytest.mark.parametrize("ending", [".npz", ".h5", ".csv", ".mcap"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 import subprocess
 import sys
@@ -11,8 +10,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from shell import run
 
 import taxel
@@ -20,18 +17,7 @@ from taxel._core import FormatError, ProblemError
 
 from .making import record, some_events, some_frames
 
-QUIET = settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-
-
 # .h5
-
-
-@pytest.mark.parametrize("source", [some_events(), some_events(50, intensity=False), some_events()[:0], some_frames()])
-def test_a_h5_gives_back_what_was_written(tmp_path: Path, source: taxel.Events | taxel.Frames) -> None:
-    taxel.convert(source, tmp_path / "a.h5")
-    rec = taxel.open(tmp_path / "a.h5")
-    assert (rec.kind, rec.array) == ("h5", source.array)
-    assert (rec.events if rec.has_events else rec.frames()) == source
 
 
 def test_another_program_reads_a_h5_as_the_layout_says(tmp_path: Path) -> None:
@@ -78,11 +64,6 @@ def test_a_folder_is_a_list_in_the_order_of_the_names_with_its_labels_as_notes(t
         taxel.open_all(tmp_path)
 
 
-def test_a_folder_without_a_recording_says_what_there_is_to_read(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"contains no recording; taxel reads .mcap, .lsa"):
-        taxel.open_all(tmp_path)
-
-
 def test_a_folder_without_a_recording_names_bags_arrays_and_tables_too(tmp_path: Path) -> None:
     (tmp_path / "notes.pdf").write_bytes(b"%PDF")
     readable = r"taxel reads .*ROS bags .*tekscan.*arrays and tables of other programs, for example \.npy"
@@ -91,35 +72,12 @@ def test_a_folder_without_a_recording_names_bags_arrays_and_tables_too(tmp_path:
     assert "\n" not in str(said.value)
 
 
-def test_info_of_a_folder_says_all_of_them(tmp_path: Path) -> None:
-    for k in range(2):
-        taxel.convert(some_events(40, seed=k), tmp_path / f"walk{k}.npz")
-    said = run("info", tmp_path)
-    assert said.returncode == 0, said.stderr
-    head, _, *rows, last, end = said.stdout.splitlines()
-    assert head == f"{tmp_path}: 2 recordings"
-    assert [row.split()[0] for row in rows] == ["walk0.npz", "walk1.npz"]
-    assert last.split()[2:4] == ["80", "events"]
-    assert end == "--each prints all facts about each recording"
-    each = run("info", tmp_path, "--each").stdout
-    assert [f"walk{k}.npz: .npz" in each for k in range(2)] == [True, True]
-
-
 # cut and merge
 
 
 def opened(table: taxel.Events | taxel.Frames, folder: Path, name: str = "a.npz") -> taxel.Recording:
     taxel.convert(table, folder / name, overwrite=True)
     return taxel.open(folder / name)
-
-
-@QUIET
-@given(at=st.lists(st.integers(-1000, 80_000), max_size=4), seed=st.integers(0, 50))
-def test_what_is_cut_anywhere_and_merged_is_whole_again(tmp_path: Path, at: list[int], seed: int) -> None:
-    rec = opened(some_events(200, seed=seed).sorted(), tmp_path)
-    ends = [-np.inf, *sorted(at), np.inf]
-    parts = [taxel.cut(rec, start_us=a, stop_us=b)[0] for a, b in itertools.pairwise(ends)]
-    assert taxel.merge(parts).events == rec.events
 
 
 @pytest.mark.parametrize(

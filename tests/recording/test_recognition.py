@@ -10,7 +10,7 @@ import pytest
 from formats import bags, making
 
 import taxel
-from taxel import FormatError, ProblemError
+from taxel import FormatError
 from taxel.formats.layout import Layout
 from taxel.reading import Facts, InMemory, Reader
 from taxel.recording.kinds import check_recording, is_recording, kind_of, recordings_in
@@ -147,30 +147,6 @@ def test_a_folder_that_holds_nothing_else_says_what_it_is(write: Write, says: st
     refused = why(lambda: taxel.open_all(tmp_path))
     assert refused == why(lambda: taxel.open(path))
     assert says in str(refused)
-
-
-@pytest.mark.parametrize("name", MADE)
-def test_a_path_is_converted_as_its_recording(name: str, tmp_path: Path) -> None:
-    path, target = getattr(making, f"write_{name}")(tmp_path), tmp_path / "target.npz"
-    opened = taxel.open_all(path)
-    if opened[0].is_several:
-        with pytest.raises(ProblemError, match="contains 2 sources"):
-            taxel.convert(path, target)
-        target = target.with_suffix(".mcap")
-    (tmp_path / "again").mkdir()
-    again = tmp_path / "again" / target.name
-    assert taxel.convert(path, target) == taxel.convert(opened[0], again)
-    written = [taxel.open(place) for place in (target, again)]
-    one, other = ([source._main.table for source in rec.sources.values()] for rec in written)
-    assert one == other
-
-
-def test_a_converted_path_keeps_the_labels_of_its_folder(tmp_path: Path) -> None:
-    path = of_taxel("press.npz", frames=True)(tmp_path)
-    (tmp_path / "labels.csv").write_text("recording,label,t_us\npress,heel,5\n")
-    taxel.convert(path, tmp_path / "target.mcap")
-    (tmp_path / "labels.csv").unlink()
-    assert [(note.text, note.t) for note in taxel.open(tmp_path / "target.mcap").notes] == [("heel", 5)]
 
 
 class Distribution:

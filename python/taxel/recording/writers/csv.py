@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -35,8 +36,8 @@ def write_csv(file: BinaryIO, table: Events | Frames) -> None:
             values = table.values[k : k + _FRAMES, y, x]
             # Each value is written once; as bits, because 0 equals -0.
             bits, positions = np.unique(values.view(np.uint32), return_inverse=True)
-            # str of a float32 is the shortest text that reads back as the same value.
-            texts = np.array([str(value).removesuffix(".0") for value in bits.view(np.float32)], object)
+            # str of a float32 is the shortest text that reads back as the same value; -0 would read back as a whole 0.
+            texts = np.array([re.sub(r"(?<!^-0)\.0$", "", str(value)) for value in bits.view(np.float32)], object)
             rows = texts[positions.reshape(values.shape)].tolist()
             times = table.t[k : k + _FRAMES].tolist()
             file.writelines(f"{t},{','.join(row)}\n".encode() for t, row in zip(times, rows, strict=True))
