@@ -294,16 +294,20 @@ class Detections(FrozenColumns):
         text = self._csv().encode()
         return write_whole(path, lambda file: file.write(text), overwrite=overwrite)
 
-    def _csv(self, repaired: bool | None = None) -> str:
-        """Return the table; the column ``repaired`` is in it if any detection is repaired, or on request."""
+    def _csv(self, repaired: bool | None = None, recording: str | None = None) -> str:
+        """Return the table; the column ``repaired`` is in it if any detection is repaired, or on request.
+
+        Of several recordings each row begins with its recording's name.
+        """
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
         more = {} if self.reported is None else {_REPORTED: self.reported.tolist()}
         shown = self.repaired.any() if repaired is None else repaired
         more |= {_REPAIRED: self.repaired.astype(int).tolist()} if shown else {}
-        table.writerow([*_CSV, *more])
+        of = {} if recording is None else {"recording": [recording] * len(self)}
+        table.writerow([*of, *_CSV, *more])
         columns = [self.label.tolist(), self.t.tolist(), self.known.tolist(), map(repr, self.slope.tolist())]
-        table.writerows(zip(*columns, *more.values(), strict=True))
+        table.writerows(zip(*of.values(), *columns, *more.values(), strict=True))
         return text.getvalue()
 
     @classmethod

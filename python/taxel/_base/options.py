@@ -25,22 +25,6 @@ def about(options: Any, name: str) -> dict[str, Any]:
     return {key: value for key, value in metadata.items() if value is not None and key != "typed"}
 
 
-def with_options(options: Callable[_P, _Options]) -> Callable[[Callable[[_Options], _Result]], Callable[_P, _Result]]:
-    """Make a function of a dataclass of options accept the fields of that dataclass as arguments."""
-
-    def decorate(work: Callable[[_Options], _Result]) -> Callable[_P, _Result]:
-        def call(*arguments: _P.args, **keywords: _P.kwargs) -> _Result:
-            return work(options(*arguments, **keywords))
-
-        functools.update_wrapper(call, work)
-        returned = inspect.signature(work).return_annotation
-        signature = inspect.signature(options).replace(return_annotation=returned)
-        call.__signature__ = signature  # type: ignore[attr-defined]
-        return call
-
-    return decorate
-
-
 def with_fields_of(
     options: Callable[_P, _Options],
 ) -> Callable[[Callable[[_First, _Options], _Result]], Callable[Concatenate[_First, _P], _Result]]:

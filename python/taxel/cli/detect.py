@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import replace
 from math import isnan
@@ -169,20 +167,10 @@ def _table(outcomes: Sequence[Outcome]) -> str:
     """Return the detections as a table; of several recordings each row begins with its recording's name."""
     if len(outcomes) == 1:
         return outcomes[0].found._csv()
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
     # All recordings share one header.
     repaired = any(outcome.found.repaired.any() for outcome in outcomes)
-    for outcome in outcomes:
-        # A label may hold line breaks.
-        head, *rows = csv.reader(io.StringIO(outcome.found._csv(repaired=repaired), newline=""))
-        name = '"' + Path(outcome.name).name.replace('"', '""') + '"'
-        if not text.tell():
-            table.writerow(["recording", *head])
-        for row in rows:
-            text.write(f"{name},")
-            table.writerow(row)
-    return text.getvalue()
+    tables = [outcome.found._csv(repaired, Path(outcome.name).name) for outcome in outcomes]
+    return tables[0] + "".join(table.partition("\n")[2] for table in tables[1:])
 
 
 def _score_lines(found: Detecting, labels: Sequence[str], truth: str | None, *, several: bool) -> Iterator[str]:

@@ -22,8 +22,6 @@ from taxel.formats.opened import Opened, size_of, sources_of
 from taxel.formats.times import in_order, unit_of_times
 from taxel.frames import Frames
 
-__all__ = ["ARRAYS", "look", "read_array_file"]
-
 #: The endings of files of arrays.
 ARRAYS = (".npy", ".npz", ".h5", ".hdf5", ".mat")
 

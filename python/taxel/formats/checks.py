@@ -14,8 +14,6 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["around", "check_table"]
-
 
 def check_table(location: Path | str, data: Events | Frames) -> None:
     """Refuse events or frames of a file whose sensor or times are beyond the limits.

@@ -5,20 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-__all__ = [
-    "AXES",
-    "are_units",
-    "axes_of",
-    "is_counter",
-    "is_key",
-    "is_label",
-    "is_other",
-    "is_slow_time",
-    "places_of",
-    "time_unit",
-    "unit_of",
-]
-
 AXES = ("x", "y", "z")
 
 #: Units of time as people write them.

@@ -21,8 +21,6 @@ from taxel.formats.layout import Layout
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory
 
-__all__ = ["knows", "read"]
-
 _NUMBER = r"(\d+(?:\.\d+)?)"
 _HEAD = re.compile(
     rf"(?s)(?=.*Matrix:\s*(\d+)\s*x\s*(\d+))(?=.*Sensor size:\s*{_NUMBER}\s*x\s*{_NUMBER}\s*cm)"

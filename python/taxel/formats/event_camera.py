@@ -23,8 +23,6 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.spikes import to_us
 
-__all__ = ["ENDINGS", "POLARITIES", "Reduction", "are_counts", "knows", "read_events", "reduced"]
-
 #: The endings of these files, and how faery names what is in them.
 ENDINGS: dict[str, str] = {".raw": "evt", ".dat": "dat", ".aedat4": "aedat"}
 POLARITIES = ("both", "on", "off")

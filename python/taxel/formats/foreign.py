@@ -13,13 +13,10 @@ from taxel.array import Array
 from taxel.formats.array_file import ARRAYS, look, read_array_file
 from taxel.formats.layout import Layout
 from taxel.formats.layout_text import of_layout
-from taxel.formats.table import ENDINGS as TABLES
 from taxel.formats.table import read_table
 from taxel.formats.table_form import form_of
 from taxel.labels import Note, source_of
 from taxel.reading import Facts, InMemory, Marks
-
-__all__ = ["ARRAYS", "CONTAINERS", "TABLES", "check_foreign", "read_foreign", "refuse_container"]
 
 #: What to save instead of files of other programs that taxel does not read, by their endings.
 CONTAINERS = {

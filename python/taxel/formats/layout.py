@@ -25,8 +25,6 @@ from taxel.formats.event_camera import Reduction
 from taxel.formats.lines import KINDS
 from taxel.formats.times import ISO, UNITS_US
 
-__all__ = ["Data", "Layout", "PrintedFrames", "Table", "advice"]
-
 
 @dataclass(frozen=True)
 class Table:

@@ -15,8 +15,6 @@ from taxel._core import ProblemError
 from taxel.array import Places
 from taxel.formats.layout import Layout, advice
 
-__all__ = ["of_layout", "refuse_to_choose", "with_falls"]
-
 _RATE_NOT_SAID = "# rate_hz = 100  # frames per second, which the file does not state"
 
 

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from taxel.formats.lines import MISSING, Line, has_marks, is_number, read_line
 from taxel.formats.times import epoch_of, is_day, is_time
 
-__all__ = ["Fit", "fits_in", "fits_of"]
-
 #: Forms that are tried: kind of line, separator, decimal mark.
 _FORMS = [
     ("json", ",", "."),

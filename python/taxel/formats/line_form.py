@@ -18,8 +18,6 @@ from taxel.formats.table_columns import Draft, said_of, taxels_of, time_of
 from taxel.formats.table_form import draft_of, lines_between_blanks
 from taxel.formats.times import ISO, UNITS_US
 
-__all__ = ["LineForm", "form_of_lines", "stated_count"]
-
 
 @dataclass(frozen=True)
 class LineForm:

@@ -18,8 +18,6 @@ from taxel._base.limits import VALUE
 from taxel._base.messages import counted
 from taxel.formats.times import is_time, seconds_of
 
-__all__ = ["KINDS", "MISSING", "Line", "LineShape", "OddLines", "has_marks", "is_number", "read_line"]
-
 #: How the cells of a line are found: between separators; where marks and names are between them too; JSON; hex.
 KINDS = ("plain", "marked", "json", "hex")
 #: Cells that tables hold where a value is missing.

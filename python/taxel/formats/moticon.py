@@ -22,8 +22,6 @@ from taxel.frames import Frames
 from taxel.labels import Note
 from taxel.reading import Facts, InMemory, Marks
 
-__all__ = ["MARKERS", "knows", "read"]
-
 #: Markers in the columns of steps, by the foot.
 MARKERS = {"left": {"11": "contact", "15": "foot_off"}, "right": {"21": "contact", "25": "foot_off"}}
 

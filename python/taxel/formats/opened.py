@@ -18,8 +18,6 @@ from taxel.formats.column_names import AXES
 from taxel.formats.layout import Layout
 from taxel.frames import Frames
 
-__all__ = ["Opened", "size_of", "sources_of"]
-
 
 @dataclass(frozen=True, eq=False)
 class Opened:

@@ -17,8 +17,6 @@ from taxel.formats.table import read_table
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory
 
-__all__ = ["knows", "read"]
-
 
 def knows(path: Path) -> bool:
     """Return whether a file is of this kind: an ``.asc`` whose head names pressures."""

@@ -8,7 +8,6 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from fnmatch import fnmatchcase
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import shown
 from taxel._base.errors import unreadable
 from taxel._base.messages import counted, first_line
 from taxel._base.table_text import SHEETS, TEXTS, Text
@@ -24,16 +22,14 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import around
-from taxel.formats.column_names import AXES, axes_of, time_unit
-from taxel.formats.layout import Layout, Table
-from taxel.formats.lines import MISSING, LineShape, OddLines, is_number
+from taxel.formats.column_names import AXES, axes_of
+from taxel.formats.layout import Layout
+from taxel.formats.lines import MISSING, OddLines, is_number
 from taxel.formats.opened import Opened, size_of, sources_of
 from taxel.formats.table_columns import EVENT_COLUMNS
 from taxel.formats.table_form import Form, form_of
 from taxel.formats.times import FEW_ODD, ISO, ODD, in_order, us_of
 from taxel.frames import Frames
-
-__all__ = ["ENDINGS", "Opened", "Rows", "events_of", "read_rows", "read_table"]
 
 ENDINGS = (*TEXTS, *SHEETS)
 #: Cells that pandas converts at once.
@@ -43,30 +39,14 @@ _NUMBER = re.compile(r"[-+]?\d+(?:[.,]\d+)?")
 _EVENTS = {"x": (0, 65_534), "y": (0, 65_534), "p": (-1, 1), "intensity": (0, 65_535), "repaired": (0, 1)}
 
 
-@dataclass(frozen=True)
-class _Columns:
-    """Hold which column of a table is what, by its place."""
-
-    form: Form
-    time: int | None
-    label: int | None
-    by: int | None
-    taxels: tuple[int, ...]
-
-    def called(self, column: int) -> str:
-        """Return the name of a column, or its number if it has none."""
-        return self.form.names[column] or f"column {column + 1}"
-
-
 @dataclass(eq=False)
 class Rows:
-    """Hold the rows of a table as they are read: the values of the columns that are taxels, and the others' cells."""
+    """Hold the rows of a table as they are read."""
 
+    #: The values of the columns that are taxels.
     values: NDArray[np.float32]
-    #: A Series of cells, or the times in the lines above frames; None without.
-    times: Any = None
-    labels: list[str] = field(default_factory=list)
-    keys: list[str] = field(default_factory=list)
+    #: A DataFrame with the cells of the other columns that count, "time", "label" and "by", as far as there are these.
+    beside: Any
     #: The number of the line of each row, none if they are one after the other, and the rows at which frames begin.
     numbers: list[int] = field(default_factory=list)
     begins: list[int] = field(default_factory=list)
@@ -78,18 +58,25 @@ class Rows:
         """Return no rows of so many values."""
         import pandas as pd  # noqa: PLC0415  takes long
 
-        return cls(np.empty((0, width), np.float32), pd.Series(dtype=np.int64))
+        return cls(np.empty((0, width), np.float32), pd.DataFrame({"time": np.empty(0, np.int64)}))
 
-    def line(self, row: int, path: Path, form: Form) -> int:
+    @property
+    def times(self) -> Any:
+        """A Series of the cells of times, or of the times in the lines above frames; None without."""
+        return self.beside.get("time")
+
+    def texts(self, name: str) -> list[str]:
+        """Return the cells of labels or of keys; none without such a column."""
+        return self.beside[name].fillna("").tolist() if name in self.beside else []
+
+    def line(self, row: int, form: Form) -> int:
         """Return the number of the line of a row, from 1."""
-        below = ((n, line) for n, line in enumerate(Text(path).lines(), 1) if n > form.first and line.strip())
+        below = ((n, line) for n, line in enumerate(Text(form.path).lines(), 1) if n > form.first and line.strip())
         return self.numbers[row] if self.numbers else next(islice(below, row, None))[0]
 
     def chosen(self, rows: NDArray[np.intp]) -> None:
         """Take only these rows' times, labels and keys."""
-        if self.times is not None:
-            self.times = self.times.iloc[rows].reset_index(drop=True)
-        self.labels, self.keys = ([column[k] for k in rows] if column else [] for column in (self.labels, self.keys))
+        self.beside = self.beside.iloc[rows].reset_index(drop=True)
 
 
 def read_table(path: Path, layout: Layout, array: Array | None = None, label_column: str | int | None = None) -> Opened:
@@ -112,82 +99,39 @@ def read_table(path: Path, layout: Layout, array: Array | None = None, label_col
     """
     text = Text(path)
     form = form_of(text, layout, label_column)
-    full, how = form.layout, form.layout.table or Table()
-    columns = _columns(path, form, how)
-    rows = _read(text, columns, how)
+    how, columns = form.table, form.columns
+    rows = read_rows(text, form)
     read = {columns.time, columns.label, columns.by, *columns.taxels}
-    left = [columns.called(k) for k in range(len(form.names)) if k not in read]
+    left = [form.called(k) for k in range(len(form.names)) if k not in read]
     lost = [*([f"columns that are not taxels: {', '.join(left)}"] if left else []), *rows.odd.said()]
-    said = [*form.said, *rows.odd.said()]
+    said, full, labels = [*form.said, *rows.odd.said()], form.layout, tuple[tuple[str, int], ...]()
     if how.events:
-        sources: dict[str, Frames | Events] = {"": _events(path, full, columns, rows, array)}
-        labels: tuple[tuple[str, int], ...] = ()
+        sources: dict[str, Frames | Events] = {"": _events(form, rows, array)}
     else:
-        values = _frames_of_lines(path, full, how, rows, said)
+        values, taxels = _frames_of_lines(form, rows, said), columns.taxels
         empty = np.isnan(values).all(axis=(0, 1)) if form.said and values.shape[1] == 1 else np.zeros(1, bool)
         if empty.any() and not empty.all():
-            places = [columns.taxels[k] for k in np.flatnonzero(empty)]
-            said.append(f"{', '.join(map(columns.called, places))} left out: empty")
+            places = [taxels[k] for k in np.flatnonzero(empty)]
+            said.append(f"{', '.join(map(form.called, places))} left out: empty")
             full = replace(full, table=replace(how, leave_out=[*how.leave_out, *(k + 1 for k in places)]))
-            columns = replace(columns, taxels=tuple(k for k in columns.taxels if k not in places))
-            values = values[:, :, ~empty]
+            values, taxels = values[:, :, ~empty], tuple(k for k in taxels if k not in places)
         t = np.arange(len(values), dtype=np.int64)
         if rows.times is not None:
             t, order = in_order(path, rows.times, how.frame_time or how.time_unit, said)
             if order is not None:
                 values = values[order]
                 rows.chosen(order)
-        sources = dict(_sources(path, full, columns, values, t, rows.keys))
-        labels = _labels(columns, rows.labels, t)
+        names = [form.names[k] for k in taxels]
+        sources = dict(_sources(path, full, names, values, t, rows.texts("by")))
+        labels = _labels(form, rows.texts("label"), t)
     line = f"{path.name}: read as {size_of(sources)}: {'; '.join(said)}" if form.said else ""
     return Opened(sources, rows.times is not None, full, line, labels, tuple(lost))
 
 
-def _columns(path: Path, form: Form, how: Table) -> _Columns:
-    """Return which column is what, by the layout.
-
-    Raises
-    ------
-    FormatError : columns that differ from the layout, or a column of times that it does not name
-    """
-    names = form.names
-    time, label, by = (
-        None if getattr(how, key) is None else _column(path, key, getattr(how, key), names)
-        for key in ("time_column", "label_column", "by")
-    )
-    left = {_column(path, "leave_out", column, names) for column in how.leave_out}
-    if time in left:
-        raise unreadable(f"column {shown(names[time or 0])} is the time_column, but is also in leave_out", path)
-    kept = [k for k in range(len(names)) if k not in {*left, time, label, by}]
-    kept = [k for k in kept if how.keep is None or fnmatchcase(names[k], how.keep)]
-    if not kept:
-        raise unreadable("the layout leaves no column that is a taxel", path)
-    timed = next((k for k in kept if time is None and time_unit(names[k]) is not None), None)
-    if timed is not None and (timed == 0 or len(names[timed]) > 1) and how.frame_time is None:
-        raise unreadable(
-            f"column {shown(names[timed])} contains times, as its name shows; write time_column, or leave_out, in "
-            "[table] of the layout file",
-            path,
-            line=form.first,
-        )
-    return _Columns(form, time, label, by, tuple(kept))
-
-
-def _column(path: Path, key: str, column: str | int, names: Sequence[str]) -> int:
-    """Return the place of a column of a name or number."""
-    if isinstance(column, int):
-        if column > len(names):
-            raise unreadable(f"{key} is {column}, but the table has {counted(len(names), 'column')}", path)
-        return column - 1
-    if names.count(column) != 1:
-        problem = "is missing" if column not in names else "appears twice; name it by its number"
-        there = ", ".join(name or str(k) for k, name in enumerate(names[:20], 1)) + ", ..." * (len(names) > 20)
-        raise unreadable(f"column {shown(column)} of {key} {problem}; the columns are {there}", path)
-    return names.index(column)
-
-
 def read_rows(text: Text, form: Form, *, ends_empty: bool = False) -> Rows:
     """Read all rows of a table whose layout is complete; lines that are none are left out and counted.
+
+    At once by pandas, or, where a line is odd or has marks, after each line was looked at.
 
     Parameters
     ----------
@@ -200,41 +144,40 @@ def read_rows(text: Text, form: Form, *, ends_empty: bool = False) -> Rows:
     ------
     FormatError : more of them than may be left out, or no line of numbers
     """
-    how = form.layout.table or Table()
-    return _read(text, _columns(text.path, form, how), how, ends_empty=ends_empty)
-
-
-def _read(text: Text, columns: _Columns, how: Table, *, ends_empty: bool = False) -> Rows:
-    """Read all rows: at once by pandas, or, where a line is odd or has marks, after each line was looked at."""
+    how = form.table
     fits = how.lines == "plain" and how.frame_end is None and how.frame_begin is None
-    if fits and (rows := _at_once(text, columns, how, ends_empty)) is not None:
+    if fits and (rows := _at_once(text, form, ends_empty)) is not None:
         return rows
-    kept, source = Rows(np.empty((0, 0), np.float32)), io.StringIO()
-    for number, cells in _good_lines(text, columns, how, kept):
+    kept, source = Rows(np.empty((0, 0), np.float32), None), io.StringIO()
+    for number, cells in _good_lines(text, form, kept):
         source.write("\t".join(cells) + "\n")
         kept.numbers.append(number)
     if not kept.numbers:
         kinds = "; ".join(kept.odd.said())
         raise unreadable(f"contains no line of numbers{': ' * bool(kinds)}{kinds}", text.path)
     source.seek(0)
-    rows = _parsed(source, columns, how, sep="\t", quoting=csv.QUOTE_NONE)
+    rows = _parsed(source, form, sep="\t", quoting=csv.QUOTE_NONE)
     large = np.argwhere(np.isinf(rows.values))
     if len(large):
         row, column = large[0].tolist()
-        name = columns.called(columns.taxels[column])
+        name = form.called(form.columns.taxels[column])
         raise unreadable(f"column {name} has a value that does not fit 32 bits", text.path, line=kept.numbers[row])
-    found = replace(kept, values=rows.values, times=rows.times, labels=rows.labels, keys=rows.keys)
-    _refuse_odd(text.path, found)
+    found = replace(kept, values=rows.values, beside=rows.beside)
+    total = len(found.values) + found.odd.total
+    if found.odd.total > max(FEW_ODD, ODD * total) or found.odd.total >= max(1, len(found.values)):
+        first, kinds = min(found.odd.first.values()), "; ".join(found.odd.said())
+        raise unreadable(f"{found.odd.total} of {total} lines are no frames: {kinds}", text.path, line=first)
     return found
 
 
-def _at_once(text: Text, columns: _Columns, how: Table, ends_empty: bool) -> Rows | None:
+def _at_once(text: Text, form: Form, ends_empty: bool) -> Rows | None:
     """Return the rows of a table; None if a line may be odd."""
-    options = {"sep": r"\s+" if how.separator == " " else how.separator, "skiprows": columns.form.first}
+    separator = form.table.separator
+    options = {"sep": r"\s+" if separator == " " else separator, "skiprows": form.first}
     for _ in range(2):
         encoding = {"encoding": text.encoding} if text.is_file else {}
         try:
-            return _parsed(text.source, columns, how, whole=True, ends_empty=ends_empty, **options, **encoding)
+            return _parsed(text.source, form, whole=True, ends_empty=ends_empty, **options, **encoding)
         except UnicodeDecodeError:
             text.as_latin_1()
         except (ValueError, OverflowError):  # of pandas' parser too
@@ -246,17 +189,15 @@ class _OddError(ValueError):
     """A line may be odd."""
 
 
-def _parsed(
-    source: Any, columns: _Columns, how: Table, *, whole: bool = False, ends_empty: bool = False, **options: Any
-) -> Rows:
+def _parsed(source: Any, form: Form, *, whole: bool = False, ends_empty: bool = False, **options: Any) -> Rows:
     """Return what pandas reads; if the text is `whole`, a line may have another number of cells, which is refused."""
     import pandas as pd  # noqa: PLC0415  takes long
 
-    count, taxels = len(columns.form.names), list(columns.taxels)
-    texts = [k for k in (columns.label, columns.by) if k is not None]
-    times = [] if columns.time is None else [columns.time]
+    how, count, taxels = form.table, len(form.names), list(form.columns.taxels)
+    beside = {name: k for name in ("time", "label", "by") if (k := getattr(form.columns, name)) is not None}
+    time = beside.get("time")
     # Kinds of numbers that are stated, not found, take pandas half as long again.
-    kinds: dict[int, Any] = dict.fromkeys([*texts, *(times if how.time_unit == ISO else [])], str)
+    kinds: dict[int, Any] = {k: str for name, k in beside.items() if name != "time" or how.time_unit == ISO}
     missing = [*MISSING, *([] if how.missing is None else [how.missing])]
     cells = dict.fromkeys(range(count + 1), missing)
     if whole and not ends_empty:
@@ -279,7 +220,7 @@ def _parsed(
         low_memory=False,
         **options,
     )
-    values, stamps, labels, keys = list[NDArray[np.float32]](), list[Any](), list[str](), list[str]()
+    values, others = list[NDArray[np.float32]](), list[Any]()
     # A value that 32 bits do not hold is infinite, which is refused below.
     with chunks, np.errstate(over="ignore"):
         for chunk in chunks:
@@ -288,37 +229,22 @@ def _parsed(
             if is_odd or any(kind.kind not in "iuf" for kind in part.dtypes):
                 raise _OddError
             block = part.to_numpy(np.float32)
-            if whole and (np.isinf(block).any() or (times and bool(chunk[times[0]].isna().any()))):
+            if whole and (np.isinf(block).any() or (time is not None and bool(chunk[time].isna().any()))):
                 raise _OddError
             values.append(block)
-            stamps += [chunk[k] for k in times]
-            labels += chunk[columns.label].fillna("").tolist() if columns.label is not None else []
-            keys += chunk[columns.by].fillna("").tolist() if columns.by is not None else []
+            others.append(chunk[list(beside.values())].set_axis(list(beside), axis=1))
     if not values:
         raise _OddError
     together = np.concatenate(values, out=np.empty((sum(map(len, values)), len(taxels)), np.float32))
-    series = pd.concat(stamps, ignore_index=True) if stamps else None
-    if whole and series is not None and how.time_unit != ISO and series.dtype.kind not in "iuf":
+    rows = Rows(together, pd.concat(others, ignore_index=True))
+    if whole and time is not None and how.time_unit != ISO and rows.times.dtype.kind not in "iuf":
         raise _OddError
-    return Rows(together, series, labels, keys)
+    return rows
 
 
-def _good_lines(text: Text, columns: _Columns, how: Table, kept: Rows) -> Iterator[tuple[int, Sequence[str]]]:
+def _good_lines(text: Text, form: Form, kept: Rows) -> Iterator[tuple[int, Sequence[str]]]:
     """Yield the number and the cells of each line that is not odd; count the others, and note where frames begin."""
-    form, times = columns.form, frozenset((columns.time,) if how.time_unit == ISO and columns.time is not None else ())
-    has_own_names = how.lines in ("marked", "json") and form.is_named and not how.columns
-    clock = columns.time if not times else None
-    shape = LineShape(
-        len(form.names),
-        frozenset((*columns.taxels, *(() if clock is None else (clock,)))),
-        times,
-        how.lines,
-        how.separator,
-        how.decimal,
-        clock,
-        frozenset((*MISSING, *(() if how.missing is None else (how.missing,)))),
-        form.names if has_own_names else (),
-    )
+    how, shape = form.table, form.shape
     waiting, row, last, number = True, 0, 0, 0
     for number, line in enumerate(text.lines(), 1):
         is_begin = how.frame_begin is not None and line.lstrip().startswith(how.frame_begin)
@@ -344,17 +270,9 @@ def _good_lines(text: Text, columns: _Columns, how: Table, kept: Rows) -> Iterat
         kept.odd.rename_last("with too few cells", "cut off at the end", last)
 
 
-def _refuse_odd(path: Path, rows: Rows) -> None:
-    """Refuse a table of which more lines are odd than may be left out."""
-    total = len(rows.values) + rows.odd.total
-    if rows.odd.total > max(FEW_ODD, ODD * total) or rows.odd.total >= max(1, len(rows.values)):
-        first = min(rows.odd.first.values())
-        kinds = "; ".join(rows.odd.said())
-        raise unreadable(f"{rows.odd.total} of {total} lines are no frames: {kinds}", path, line=first)
-
-
-def _frames_of_lines(path: Path, layout: Layout, how: Table, rows: Rows, said: list[str]) -> NDArray[np.float32]:
+def _frames_of_lines(form: Form, rows: Rows, said: list[str]) -> NDArray[np.float32]:
     """Return values of shape (frames, lines, columns); of the rows, times, keys and labels of frames stay."""
+    path, how, layout = form.path, form.table, form.layout
     width, count = rows.values.shape[1], len(rows.values)
     if not how.has_lines:
         return rows.values.reshape(count, 1, width)
@@ -385,8 +303,7 @@ def _frames_of_lines(path: Path, layout: Layout, how: Table, rows: Rows, said: l
     if how.frame_time is not None:
         import pandas as pd  # noqa: PLC0415  takes long
 
-        rows.times = pd.Series(np.array(rows.frame_times)[: len(fits)][fits])
-        rows.labels = rows.keys = []
+        rows.beside = pd.DataFrame({"time": np.array(rows.frame_times)[: len(fits)][fits]})
     else:
         rows.chosen(begins)
     values: NDArray[np.float32] = rows.values[begins[:, None] + np.arange(lines)]
@@ -396,13 +313,12 @@ def _frames_of_lines(path: Path, layout: Layout, how: Table, rows: Rows, said: l
 def _sources(
     path: Path,
     layout: Layout,
-    columns: _Columns,
+    names: list[str],
     values: NDArray[np.float32],
     t: NDArray[np.int64],
     keys: list[str],
 ) -> Iterator[tuple[str, Frames]]:
     """Yield the frames of each source by its name."""
-    names = [columns.form.names[k] for k in columns.taxels]
     if layout.axis is not None:
         by_taxel = axes_of(names)
         if by_taxel is None or values.shape[1] > 1:
@@ -414,34 +330,31 @@ def _sources(
         yield from sources_of(path, layout, key, values[chosen], t[chosen], names if any(names) else None)
 
 
-def _labels(columns: _Columns, cells: list[str], t: NDArray[np.int64]) -> tuple[tuple[str, int], ...]:
+def _labels(form: Form, cells: list[str], t: NDArray[np.int64]) -> tuple[tuple[str, int], ...]:
     """Return a label where the value of its column changes: the text, or the name of the column and the number."""
-    name = columns.called(columns.label or 0)
+    name = form.called(form.columns.label or 0)
     changes = (k for k in range(1, len(cells)) if cells[k] != cells[k - 1] and cells[k] not in MISSING)
     return tuple((f"{name} {cells[k]}" if is_number(cells[k]) else cells[k], int(t[k])) for k in changes)
 
 
-def _events(path: Path, layout: Layout, columns: _Columns, rows: Rows, array: Array | None) -> Events:
+def _events(form: Form, rows: Rows, array: Array | None) -> Events:
     """Return the events of a table with a line each."""
-    names = [columns.form.names[k].lower() for k in columns.taxels]
+    path, layout = form.path, form.layout
+    names = [form.names[k].lower() for k in form.columns.taxels]
     names = [EVENT_COLUMNS.get(name, name) for name in names]
     if sorted(names) != ["p", "x", "y"]:
         raise unreadable(f"the columns other than the time are {', '.join(names)}; must be x, y, p for events", path)
     try:
-        sensor = array if layout.rows is None else layout.array(1)
-        return events_of(path, columns.form, names, rows, sensor)
+        return events_of(form, names, rows, array if layout.rows is None else layout.array(1))
     except ProblemError as error:
         raise FormatError(f"{layout.path}: {path.name}: {first_line(error)}") from None
 
 
-def events_of(
-    path: Path, form: Form, names: Sequence[str], rows: Rows, array: Array | None, *, ascending: bool = True
-) -> Events:
+def events_of(form: Form, names: Sequence[str], rows: Rows, array: Array | None, *, ascending: bool = True) -> Events:
     """Return the events of a table with a line each; several may have the same time.
 
     Parameters
     ----------
-    path : Path
     form : Form
     names : sequence of str
         Of the columns but the time: x, y, p, and perhaps intensity and repaired.
@@ -464,13 +377,13 @@ def events_of(
         wrong = np.flatnonzero(wrong & present if name == "intensity" and present is not None else wrong)
         if len(wrong):
             right = "0 or 1, or -1 or 1" if name == "p" else f"a whole number from {least} to {most}"
-            line = rows.line(int(wrong[0]), path, form)
-            raise unreadable(f"{name} is {column[wrong[0]]:g}; must be {right}", path, line=line)
-    us = us_of(rows.times, (form.layout.table or Table()).time_unit)
+            line = rows.line(int(wrong[0]), form)
+            raise unreadable(f"{name} is {column[wrong[0]]:g}; must be {right}", form.path, line=line)
+    us = us_of(rows.times, form.table.time_unit)
     back = np.flatnonzero(~(np.diff(us, prepend=us[:1]) >= 0) if ascending else np.isnan(us))
     if len(back):
-        line = rows.line(int(back[0]), path, form)
-        raise unreadable("the time is before that of the line above, or is none", path, line=line)
+        line = rows.line(int(back[0]), form)
+        raise unreadable("the time is before that of the line above, or is none", form.path, line=line)
     x, y = by_name["x"].astype(np.uint16), by_name["y"].astype(np.uint16)
     more: dict[str, Any] = {"repaired": by_name["repaired"] > 0} if "repaired" in by_name else {}
     if present is not None:

@@ -18,18 +18,6 @@ from taxel.formats.line_fits import Fit
 from taxel.formats.lines import MISSING
 from taxel.formats.times import ISO, unit_of_times
 
-__all__ = [
-    "EVENT_COLUMNS",
-    "Changes",
-    "Draft",
-    "are_events",
-    "ask_for_events",
-    "ask_for_unit_of_events",
-    "said_of",
-    "taxels_of",
-    "time_of",
-]
-
 #: So many lines show that an unnamed column ascends as times do, and that one counts lines.
 _ASCENDS, _COUNTS = 8, 20
 #: So many different texts are names of sensors, not remarks.

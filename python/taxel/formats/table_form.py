@@ -9,10 +9,14 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import NoReturn
+from fnmatch import fnmatchcase
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 
+from taxel._base.arguments import shown
 from taxel._base.errors import unreadable
 from taxel._base.limits import COLUMNS
 from taxel._base.messages import counted
@@ -21,7 +25,7 @@ from taxel.formats import column_names
 from taxel.formats.layout import Layout, Table
 from taxel.formats.layout_text import refuse_to_choose
 from taxel.formats.line_fits import FITS, Fit, fits_in, fits_of
-from taxel.formats.lines import is_number, read_line
+from taxel.formats.lines import MISSING, LineShape, is_number, read_line
 from taxel.formats.table_columns import (
     Changes,
     Draft,
@@ -32,9 +36,7 @@ from taxel.formats.table_columns import (
     taxels_of,
     time_of,
 )
-from taxel.formats.times import FEW_ODD, ODD
-
-__all__ = ["Form", "draft_of", "form_of", "lines_between_blanks"]
+from taxel.formats.times import FEW_ODD, ISO, ODD
 
 #: Two readings fit about equally if one fits this share of the other.
 _EQUALLY = 0.999
@@ -47,12 +49,23 @@ _ABOVE_FRAME = re.compile(
 _PLACE_IN_LIST = re.compile(r"\[\d+\]")
 
 
+class Columns(NamedTuple):
+    """Say which column is what, by its place."""
+
+    time: int | None
+    label: int | None
+    by: int | None
+    taxels: tuple[int, ...]
+
+
 @dataclass(frozen=True)
 class Form:
     """Hold how a table is read.
 
     Parameters
     ----------
+    path : Path
+        The table, for errors.
     layout : Layout
         Complete.
     names : tuple of str
@@ -65,11 +78,83 @@ class Form:
         What was understood beyond the given layout, a text each.
     """
 
+    path: Path
     layout: Layout
     names: tuple[str, ...]
     is_named: bool
     first: int
     said: tuple[str, ...] = ()
+
+    @property
+    def table(self) -> Table:
+        """How the lines are read."""
+        return self.layout.table or Table()
+
+    def called(self, column: int) -> str:
+        """Return the name of a column, or its number if it has none."""
+        return self.names[column] or f"column {column + 1}"
+
+    @cached_property
+    def columns(self) -> Columns:
+        """Which column is what, by the layout.
+
+        Raises
+        ------
+        FormatError : columns that differ from the layout, or a column of times that it does not name
+        """
+        how, names, path = self.table, self.names, self.path
+        time, label, by = (
+            None if getattr(how, key) is None else self._place(key, getattr(how, key))
+            for key in ("time_column", "label_column", "by")
+        )
+        left = {self._place("leave_out", column) for column in how.leave_out}
+        if time in left:
+            raise unreadable(f"column {shown(names[time or 0])} is the time_column, but is also in leave_out", path)
+        kept = [k for k in range(len(names)) if k not in {*left, time, label, by}]
+        kept = [k for k in kept if how.keep is None or fnmatchcase(names[k], how.keep)]
+        if not kept:
+            raise unreadable("the layout leaves no column that is a taxel", path)
+        timed = next((k for k in kept if time is None and column_names.time_unit(names[k]) is not None), None)
+        if timed is not None and (timed == 0 or len(names[timed]) > 1) and how.frame_time is None:
+            raise unreadable(
+                f"column {shown(names[timed])} contains times, as its name shows; write time_column, or leave_out, in "
+                "[table] of the layout file",
+                path,
+                line=self.first,
+            )
+        return Columns(time, label, by, tuple(kept))
+
+    def _place(self, key: str, column: str | int) -> int:
+        """Return the place of a column of a name or number."""
+        names = self.names
+        if isinstance(column, int):
+            if column > len(names):
+                raise unreadable(f"{key} is {column}, but the table has {counted(len(names), 'column')}", self.path)
+            return column - 1
+        if names.count(column) != 1:
+            problem = "is missing" if column not in names else "appears twice; name it by its number"
+            there = ", ".join(name or str(k) for k, name in enumerate(names[:20], 1)) + ", ..." * (len(names) > 20)
+            raise unreadable(f"column {shown(column)} of {key} {problem}; the columns are {there}", self.path)
+        return names.index(column)
+
+    @property
+    def shape(self) -> LineShape:
+        """What the cells of a line are."""
+        how, columns = self.table, self.columns
+        is_text = how.time_unit == ISO and columns.time is not None
+        numbers = {*columns.taxels, *([] if columns.time is None or is_text else [columns.time])}
+        has_own_names = how.lines in ("marked", "json") and self.is_named and not how.columns
+        return LineShape(
+            len(self.names),
+            frozenset(numbers),
+            frozenset([columns.time] if columns.time is not None and is_text else []),
+            how.lines,
+            how.separator,
+            how.decimal,
+            None if is_text else columns.time,
+            frozenset((*MISSING, *([] if how.missing is None else [how.missing]))),
+            self.names if has_own_names else (),
+        )
 
 
 def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -> Form:
@@ -132,7 +217,7 @@ def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -
         full = _with_size(replace(layout, table=draft.table), draft, taxels)
     if draft.asked and not (stated and draft.asked[0][0].startswith("the first line")):
         _refuse(text, full, draft)
-    return Form(full, draft.names, any(draft.names), fit.first, (*said_of(draft, time), *draft.said))
+    return Form(text.path, full, draft.names, any(draft.names), fit.first, (*said_of(draft, time), *draft.said))
 
 
 def _refuse_lines_above(text: Text, fit: Fit) -> None:
@@ -160,7 +245,7 @@ def _stated(text: Text, layout: Layout, how: Table) -> Form:
     if how.columns and not len(draft.names) <= len(names) <= fit.count:
         wrong = f"{counted(len(names), 'name')} for {counted(len(draft.names), 'column')}"
         raise unreadable(wrong, text.path, line=line)
-    return Form(layout, names, any(names), fit.first)
+    return Form(text.path, layout, names, any(names), fit.first)
 
 
 def _fits_as_well(other: Fit, fit: Fit, size: int) -> bool:

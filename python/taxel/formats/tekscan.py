@@ -21,8 +21,6 @@ from taxel.formats.layout import Layout
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory
 
-__all__ = ["knows", "read"]
-
 _LENGTHS_MM = {"mm": 1.0, "millimeters": 1.0, "cm": 10.0, "centimeters": 10.0, "in": 25.4, "inches": 25.4}
 #: Tekscan's names of units, and ours; any other name is not changed.
 _UNITS = {"kpa": "kPa", "raw": "counts"}

@@ -19,22 +19,6 @@ from taxel._base.errors import unreadable
 from taxel._base.limits import TIME_US
 from taxel._base.messages import counted
 
-__all__ = [
-    "FEW_ODD",
-    "ISO",
-    "ODD",
-    "UNITS_US",
-    "Repaired",
-    "epoch_of",
-    "in_order",
-    "is_day",
-    "is_time",
-    "repaired",
-    "seconds_of",
-    "unit_of_times",
-    "us_of",
-]
-
 #: So many odd lines, or times, are left out or repaired in any file, and of longer ones this share.
 FEW_ODD, ODD = 2, 0.1
 #: Rates of usual sensors, and those that may be, Hz.

@@ -17,8 +17,6 @@ from taxel.frames import Frames
 from taxel.labels import Note, source_of
 from taxel.reading import Facts, InMemory, Marks
 
-__all__ = ["knows", "read"]
-
 
 def knows(path: Path) -> bool:
     """Return whether a file is of this kind, by its first bytes."""

@@ -19,11 +19,13 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats import emed, event_camera, moticon, pedar, tekscan, xdf
+from taxel.formats.array_file import ARRAYS
 from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction
-from taxel.formats.foreign import ARRAYS, TABLES, check_foreign, read_foreign, refuse_container
+from taxel.formats.foreign import check_foreign, read_foreign, refuse_container
 from taxel.formats.layout import Layout, advice
 from taxel.formats.ros import is_bag, read_ros
+from taxel.formats.table import ENDINGS as TABLES
 from taxel.reading import ENDINGS, Facts, InMemory, Reader
 from taxel.recording.beside import LABELS, is_label_table
 from taxel.recording.layout import check_size

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._base.arguments import callback, flag, instance, integer, mapping, number, parameters, several, shown, text
 from taxel._base.errors import refused
-from taxel._base.options import with_options
+from taxel._base.options import with_fields_of
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -150,8 +150,8 @@ def play(
     return Played(Events._from_parts(played.events), played.datagrams, played.words, played.bytes)
 
 
-@with_options(EmulateOptions)
-def emulate(options: EmulateOptions) -> EmulatorReport:
+@with_fields_of(EmulateOptions)
+def emulate(to: str, options: EmulateOptions) -> EmulatorReport:
     """Play a touch to an emulated board in real time, and send its datagrams by UDP.
 
     When acts are played, the board arms after the first frame, sets the noise floor to 0 for `tare_ms`, marks a start,
@@ -238,7 +238,7 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
 
     callback("watch", options.watch), callback("touched", options.touched)
     report = _core.emulate(
-        text("to", options.to),
+        text("to", to),
         sensed._parts(),
         parameters({} if options.sensor is None else mapping("sensor", options.sensor)),
         integer("seed", options.seed, 0),

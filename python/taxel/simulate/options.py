@@ -30,7 +30,6 @@ def _nothing(_: object) -> None:
 class EmulateOptions:
     """Hold the options of `emulate`, which documents each, with their defaults."""
 
-    to: str
     touch: Iterable[Act] | Replay
     _: KW_ONLY
     seed: int = option(0, "Seed of scenes, taxels and noise.", least=0)
