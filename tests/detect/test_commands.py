@@ -368,7 +368,7 @@ def test_a_folder_of_trials_is_trained_on_and_heard_as_its_recordings_are(tmp_pa
     assert [len(one["detections"]) for one in alone] == [1, 1, 1, 1]
     assert (folder["score"]["found"], folder["score"]["missed"], folder["score"]["false"]) == (4, 0, 0)
     assert [line.split(",")[:2] for line in table.read_text().splitlines()[1:]] == [
-        [f'"t{k}.npz"', "contact"] for k in range(4)
+        [f"t{k}.npz", "contact"] for k in range(4)
     ]
     assert "t3.npz" in (tmp_path / "r" / "report.html").read_text()
     code, said, _ = call(capsys, "detect", *files, "--readout", out, "--truth", trials / "labels.csv", "--json")

@@ -118,18 +118,6 @@ def test_slices_of_the_whole_hold_each_marker_once_and_in_its_time(events: Event
             assert b == len(events) or t < events.t[b]
 
 
-def test_a_slice_has_the_markers_of_its_time_and_no_other() -> None:
-    markers = [(-50, True), (150, False), (160, True), (900, False)]
-    events = Events([0, 100, 200, 300], [0, 1, 2, 3], [0] * 4, [True, False] * 2, array=GRID, markers=markers)
-    assert events[:].markers == tuple(markers)
-    assert events[:2].markers == tuple(markers[:3])
-    assert events[2:].markers == (markers[3],)
-    assert events[1:3].markers == tuple(markers[1:3])
-    assert events[2:3].markers == events[:0].markers == ()
-    assert events[events.p].markers == tuple(markers[:3])
-    assert events.region(slice(1, 3), slice(None)).markers == tuple(markers[1:3])
-
-
 @given(some())
 def test_sorted_events_are_the_same_in_order(events: Events) -> None:
     ordered = events.sorted()
@@ -161,13 +149,6 @@ def test_what_did_not_come_has_no_value() -> None:
     assert a != Events([0], [1], [2], [True], array=GRID)
 
 
-def test_columns_are_copied_or_kept_but_never_changed() -> None:
-    t = np.array([5, 6])
-    events = Events(t, [1, 2], [3, 4], [1, 0], array=GRID)
-    assert t.tolist() == events.t.tolist() == [5, 6]
-    assert (events.t.dtype, events.x.dtype, events.p.dtype) == (np.int64, np.uint16, np.bool_)
-
-
 def test_held_intensities_are_the_last_that_came_at_each_time() -> None:
     events = Events(
         [0, 100, 100, 250], [1, 1, 2, 1], [0, 0, 0, 0], [1, 1, 1, 0], array=GRID, intensity=[5, 6, 7, 0],
@@ -178,9 +159,3 @@ def test_held_intensities_are_the_last_that_came_at_each_time() -> None:
     assert frames.values[:, 0, 1].tolist() == [5, 6, 6]
     assert frames.values[:, 0, 2].tolist() == [0, 7, 7]
     assert Frames.from_events(events, 100, 50, 350).t.tolist() == [50, 150, 250]
-
-
-@given(some())
-def test_repr_is_one_line_and_names_the_count(events: Events) -> None:
-    assert repr(events).startswith(f"Events({len(events)} event{'s' * (len(events) != 1)}, ")
-    assert "\n" not in repr(events)

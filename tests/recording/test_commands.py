@@ -160,11 +160,6 @@ def test_a_cut_within_a_recording_may_be_of_silence_and_reaches_its_last_event(w
         assert len(taxel.open(file).events) == events
 
 
-@pytest.mark.parametrize("command", ["info", "convert"])
-def test_help_shows_an_example(command: str) -> None:
-    assert "Example: taxel" in run(command, "--help").stdout
-
-
 def test_the_sensor_of_a_table_of_events_is_said_once_and_kept(walk: Path, tmp_path: Path) -> None:
     table, kept = tmp_path / "walk.csv", tmp_path / "walk.npz"
     assert run("convert", walk, table).returncode == 0
@@ -181,12 +176,3 @@ def test_the_sensor_of_a_table_of_events_is_said_once_and_kept(walk: Path, tmp_p
     assert np.array_equal(taxel.open(kept).events.t, taxel.open(walk).events.t)
     assert json.loads(run("info", table, "--json").stdout)["array_assumed"]
     assert not json.loads(run("info", kept, "--json").stdout)["array_assumed"]
-
-
-def test_spike_trains_are_refused_by_name(tmp_path: Path) -> None:
-    path = taxel.SpikeTrains.from_lists([[1.0, 5.0], [], [20.0]], 0, 500).save(tmp_path / "spikes.npz")
-    refused = run("train", path, "-o", tmp_path / "r.json")
-    assert (refused.returncode, "contains spike trains, not a recording" in refused.stderr) == (
-        2,
-        True,
-    )

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from shell import call
 
 import taxel
 from taxel import Frames, _core
@@ -211,14 +210,6 @@ def test_a_source_that_is_no_recording_says_so(tmp_path: Path) -> None:
     path.write_bytes(b"\x1f\x8b\x08\x00")
     with pytest.raises(FormatError, match="byte 3: this byte is zero"):
         taxel.convert(path, tmp_path / "b.npz")
-
-
-def test_the_command_says_in_one_line_what_an_export_leaves_out(tmp_path: Path, capsys) -> None:
-    frames = taxel.Frames(np.ones((5, 3, 4)), np.arange(5) * 10_000, unit="N", array=taxel.Array(3, 4, pitch_mm=5.0))
-    taxel.convert(frames, tmp_path / "mat.npz")
-    code, out, error = call(capsys, "convert", tmp_path / "mat.npz", tmp_path / "mat.csv")
-    assert (code, error) == (0, "")
-    assert "lost: a .csv holds the table alone: not the sensor, the unit (N)\n" in out
 
 
 def test_what_was_received_and_dropped_is_there_again_after_any_conversions(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from taxel._base.messages import counted
 from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.array import Array, of_size
+from taxel.cli._say import say
 from taxel.cli.app import OUTSIDE, WRONG_INPUT, Limits
 from taxel.cli.console import Console
 from taxel.detect import load
@@ -218,7 +219,15 @@ _UNREAD = {
 }
 
 
-def unread(counters: dict[str, Any], told: set[tuple[str, str]]) -> Iterator[str]:
+def say_wrong(counters: dict[str, Any], array: Array, told: set[tuple[str, str]]) -> None:
+    """Print what is wrong with what arrives, each once: `told` holds what was."""
+    say(*(f"taxel: {line}" for line in _unread(counters, told)), err=True)
+    if ("", "outside") not in told and (wrong := outside(counters, array)):
+        told.add(("", "outside"))
+        say(f"taxel: {wrong}", err=True)
+
+
+def _unread(counters: dict[str, Any], told: set[tuple[str, str]]) -> Iterator[str]:
     """Yield what is wrong with lines of each source, each kind once: `told` holds those that were."""
     for source, counts in {"": counters, **counters["sources"]}.items():
         lines = counts.get("lines")

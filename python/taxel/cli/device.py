@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Annotated, Any
 
 from cyclopts import Parameter
@@ -16,7 +16,7 @@ from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.board_check import check_board
 from taxel.cli._say import say
-from taxel.cli.app import OUTSIDE, App, JsonOption, Limits, SecondsOption
+from taxel.cli.app import OUTSIDE, App, Flat, JsonOption, Limits, SecondsOption
 from taxel.cli.console import Console
 from taxel.device import Device, ports
 from taxel.live.sending import PORT
@@ -26,7 +26,20 @@ from taxel.wire.registers import QUOTED_PRESETS
 app = App(name="device", help="Find a board on its serial line, set its registers by name, and read them back.")
 
 PlaceArgument = Annotated[str, Parameter(help="A serial port (COM3, /dev/ttyACM0), or host:port.")]
-BaudOption = Annotated[int, Parameter(help="Baud rate of the serial line.")]
+
+
+@dataclass(frozen=True)
+class _Line:
+    """Hold how a board's line is read, and how the board is shown.
+
+    Parameters
+    ----------
+    baud
+        Baud rate of the serial line.
+    """
+
+    baud: int = 115_200
+    as_json: JsonOption = False
 
 
 @app.command(name="ports")
@@ -47,13 +60,13 @@ def listed(*, as_json: JsonOption = False) -> None:
 
 
 @app.command
-def show(place: PlaceArgument, /, *, baud: BaudOption = 115_200, as_json: JsonOption = False) -> None:
+def show(place: PlaceArgument, /, *, line: Flat[_Line] = _Line()) -> None:
     """Show a board's identity, and every register with its unit.
 
     Example: taxel device show /dev/ttyACM0
     """
-    with Device(place, baud=baud) as device:
-        _print(device, device.registers, as_json)
+    with Device(place, baud=line.baud) as device:
+        _print(device, device.registers, line.as_json)
 
 
 @app.command(name="set")
@@ -62,19 +75,18 @@ def set_registers(
     fields: Annotated[list[str], Parameter(help="NAME=VALUE, for example ramp=140 noise_floor=4; times in us.")],
     /,
     *,
-    baud: BaudOption = 115_200,
-    as_json: JsonOption = False,
+    line: Flat[_Line] = _Line(),
 ) -> None:
     """Set registers by name, in an order in which the board is never without a valid set, and print what changed.
 
     Example: taxel device set /dev/ttyACM0 noise_floor=5 wire_version=2
     """
     values = dict(_field(assignment) for assignment in fields)
-    with Device(place, baud=baud) as device:
+    with Device(place, baud=line.baud) as device:
         before = {name: value for name, value, *_ in described(device.registers)}
         after = device.set(**values)
-        if as_json:
-            _print(device, after, as_json)
+        if line.as_json:
+            _print(device, after, line.as_json)
             return
         changed = [(name, value, unit) for name, value, unit, *_ in described(after) if value != before[name]]
         for name, value, unit in changed:
@@ -91,16 +103,15 @@ def apply(
     preset: Annotated[str, Parameter(help=f"One of {QUOTED_PRESETS}.")],
     /,
     *,
-    baud: BaudOption = 115_200,
-    as_json: JsonOption = False,
+    line: Flat[_Line] = _Line(),
 ) -> None:
     """Set a board to a preset, and read it back; its version of the wire stays as it is.
 
     Example: taxel device apply /dev/ttyACM0 "2 kHz"
     """
     text("preset", preset, PRESETS)
-    with Device(place, baud=baud) as device:
-        _print(device, device.apply(preset), as_json)
+    with Device(place, baud=line.baud) as device:
+        _print(device, device.apply(preset), line.as_json)
 
 
 @app.command
@@ -109,8 +120,7 @@ def record(
     mark: Annotated[str, Parameter(help="The mark: start or stop.")],
     /,
     *,
-    baud: BaudOption = 115_200,
-    as_json: JsonOption = False,
+    line: Flat[_Line] = _Line(),
 ) -> None:
     """Make a board mark the start or stop of a recording, in its events and on its sync pin.
 
@@ -118,25 +128,18 @@ def record(
     """
     if mark not in ("start", "stop"):
         raise ProblemError(f"{mark}: must be start or stop")
-    with Device(place, baud=baud) as device:
-        _print(device, device.record(mark == "start"), as_json)
+    with Device(place, baud=line.baud) as device:
+        _print(device, device.record(mark == "start"), line.as_json)
 
 
 @app.command
-def watch(
-    place: PlaceArgument,
-    /,
-    *,
-    seconds: SecondsOption = None,
-    baud: BaudOption = 115_200,
-    as_json: JsonOption = False,
-) -> None:
+def watch(place: PlaceArgument, /, *, seconds: SecondsOption = None, line: Flat[_Line] = _Line()) -> None:
     """Print the faults that a board reports, as they come; waits for a cable that was pulled.
 
     Example: taxel device watch /dev/ttyACM0 --seconds 60
     """
-    with Device(place, baud=baud, patience=float("inf")) as device:
-        console = Console(stderr=True, quiet=as_json)
+    with Device(place, baud=line.baud, patience=float("inf")) as device:
+        console = Console(stderr=True, quiet=line.as_json)
         console.print(f"{device}; Ctrl-C ends")
         begun, before = time.monotonic(), None
         while seconds is None or time.monotonic() - begun < seconds:
@@ -144,7 +147,7 @@ def watch(
             if now != before:
                 faults = ", ".join(f"{n} {name}" for name, n in device.faults.items()) or "no faults"
                 reconnect_text = f"; reconnected {counted(device.reconnects, 'time')}" if device.reconnects else ""
-                say(json.dumps(now) if as_json else faults + reconnect_text)
+                say(json.dumps(now) if line.as_json else faults + reconnect_text)
                 before = now
             time.sleep(_POLL_S)
 

@@ -31,10 +31,9 @@ from taxel.cli.board import (
     doubts,
     exit_code,
     for_live,
-    outside,
     received,
     say_waiting,
-    unread,
+    say_wrong,
     with_live_options,
 )
 from taxel.cli.console import Console
@@ -340,21 +339,12 @@ def _watch(
                 if fresh and pipeline.tare is not None:
                     fresh = False
                     _warn_of_unknown(pipeline.tare)
-            for line in _warnings(pipeline, now, told):
-                say(f"taxel: {line}", err=True)
+            say_wrong(now, pipeline.array, told)
             if now["seconds"] - before["seconds"] >= REDRAW_S:
                 display.update(Text(f"{counters_line(before, now)}\n{_state(now, pipeline.place)}".rstrip()))
                 before = now
         if not end_request.is_set() and _has_ended(pipeline, panel):
             console.print(f"{pipeline.place} has ended")
-
-
-def _warnings(pipeline: Live, now: dict[str, Any], told: set[tuple[str, str]]) -> Iterator[str]:
-    """Yield what is wrong with what arrives, each once: `told` holds what was."""
-    yield from unread(now, told)
-    if ("", "outside") not in told and (wrong := outside(now, pipeline.array)):
-        told.add(("", "outside"))
-        yield wrong
 
 
 def _has_ended(pipeline: Live, panel: Panel | None) -> bool:

@@ -29,10 +29,9 @@ from taxel.cli.board import (
     exit_code,
     for_live,
     left_out,
-    outside,
     received,
     say_waiting,
-    unread,
+    say_wrong,
     with_live_options,
 )
 from taxel.cli.console import Console
@@ -206,7 +205,7 @@ def _watch(
     if keys:
         console.print(keys)
     with Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True) as display:
-        before, warned = live.counters, False
+        before = live.counters
         told: set[tuple[str, str]] = set()
         began = before["seconds"]
         if trial:
@@ -220,11 +219,7 @@ def _watch(
                 if markers and not start:
                     return
             now = live.counters
-            for line in unread(now, told):
-                say(f"taxel: {line}", err=True)
-            if not warned and (wrong := outside(now, live.array)):
-                say(f"taxel: {wrong}", err=True)
-                warned = True
+            say_wrong(now, live.array, told)
             display.update(Text(counters_line(before, now)))
             if (trial and not live.records) or live.is_over:
                 return

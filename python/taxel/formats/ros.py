@@ -28,6 +28,8 @@ from taxel.frames import Frames
 from taxel.labels import source_of
 from taxel.reading import Facts, InMemory, Reader
 
+__all__ = ["Topic", "is_bag", "read_ros", "topics"]
+
 #: The first bytes of a .bag and of a .db3, which is a database of SQLite.
 _ROS1, _SQLITE = b"#ROSBAG V", b"SQLite format 3\0"
 #: The first bytes of a .mcap: its magic and the code of the header, before the header's length and its profile.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base import limits
-from taxel._base.arguments import finite, flag, integer, number, text
 from taxel._base.columns import frozen
 from taxel._base.limits import available
 from taxel._core import FormatError, ProblemError
@@ -73,7 +71,7 @@ class McapReader(Reader):
         self._stream = self._header.get("stream")
         about, header = self._frames or {}, self._header
         # Those of the recording that it was converted from.
-        self._before = _entry(path, "counts", counts_of, header.get("counts")) or {}
+        self._before: dict[str, Any] = header.get("counts") or {}
         is_board = self._frames is None and self._stream is None
         columns = about.get("columns") or ()
         if self._stream is not None:
@@ -89,8 +87,8 @@ class McapReader(Reader):
             has_events=is_board,
             timed=about.get("clock", True),
             columns=tuple(columns),
-            turned=_entry(path, "turned", _turned_of, about.get("turned")),
-            frame_us=_entry(path, "frame_us", _frame_us_of, about.get("frame_us")),
+            turned=about.get("turned"),
+            frame_us=about.get("frame_us"),
             raw="datagrams" if is_board else "lines" if self._stream is not None else "",
             begins_us=int(header["origin_us"]) if is_board else None,
             remarks=tuple(header.get("remarks", ())),
@@ -146,10 +144,13 @@ class McapReader(Reader):
         first = self._header.get("registers")
         at_beginning = settings[0][1] if settings else None
         return Marks(
-            notes=notes_of(remarks.notes),
-            detections=detections_of(remarks.detections),
-            zeroings=zeroings_of([remark for _, remark in remarks.zeroings]),
-            changes=board_changes_of(remarks.board),
+            notes=tuple(Note(note["text"], note["t_us"], note["at_ns"]) for note in remarks.notes),
+            detections=_detections(remarks.detections),
+            zeroings=tuple(sorted((Zeroing(**zeroing) for _, zeroing in remarks.zeroings), key=lambda one: one.t)),
+            changes=tuple(
+                BoardChange(one["t_us"], at, one["change"], one.get("version"), one.get("asked", False))
+                for at, one in remarks.board
+            ),
             registers=at_beginning if first is None else Registers._of_file(first, self._driven()),
             settings=settings,
             held=self._held(remarks.held),
@@ -277,79 +278,13 @@ class McapReader(Reader):
         return {} if self._header.get("converted") else counts
 
 
-def _entry(path: Path, entry: str, read: Callable[[Any], Any], value: Any) -> Any:
-    """Return what an entry of a header states; None if it is not there."""
-    try:
-        return None if value is None else read(value)
-    except ProblemError as error:
-        raise FormatError(f"{path}, header, {entry}: {error}") from None
-
-
 def ascending(t: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return times of frames, with equal times moved apart by 1 us."""
     steps = np.arange(len(t))
     return np.maximum.accumulate(t - steps) + steps if len(t) else t
 
 
-def notes_of(records: Any) -> tuple[Note, ...]:
-    """Return notes from records of text, t_us and at_ns."""
-    return tuple(Note(text("text", n["text"]), _time("t_us", n["t_us"]), integer("at_ns", n["at_ns"])) for n in records)
-
-
-def detections_of(records: Any) -> Detections:
+def _detections(records: Any) -> Detections:
     """Return detections from records of (host ns, label, t, known, slope, repaired); JSON has no NaN."""
-    rows = list(records)
-    slopes = [float("nan") if row[4] is None else float(row[4]) for row in rows]
-    label, t, known, repaired = ([row[k] for row in rows] for k in (1, 2, 3, 5))
-    return Detections._of(label, t, known, slopes, repaired=repaired)
-
-
-def zeroings_of(records: Any) -> tuple[Zeroing, ...]:
-    """Return zeroed taxels, in order of time, from records of t, x, y, rest and before."""
-    zeroings = (
-        Zeroing(
-            integer("t", record["t"], -limits.TIME_US, limits.TIME_US),
-            integer("x", record["x"], 0, 65_535),
-            integer("y", record["y"], 0, 65_535),
-            number("rest", record["rest"]),
-            None if record["before"] is None else number("before", record["before"]),
-        )
-        for record in records
-    )
-    return tuple(sorted(zeroings, key=lambda zeroing: zeroing.t))
-
-
-def board_changes_of(records: Any) -> tuple[BoardChange, ...]:
-    """Return changes of the board from pairs of a host time (ns) and a record of t_us, change, version, asked."""
-    return tuple(
-        BoardChange(
-            _time("t_us", record["t_us"]),
-            integer("at_ns", at),
-            text("change", record["change"]),
-            None if record.get("version") is None else integer("version", record["version"], 0, 255),
-            flag("asked", record.get("asked", False)),
-        )
-        for at, record in records
-    )
-
-
-def _time(name: str, value: Any) -> int | None:
-    return None if value is None else integer(name, value, -limits.TIME_US, limits.TIME_US)
-
-
-def counts_of(counts: Any, depth: int = 0) -> dict[str, Any]:
-    """Return counts by cause, whole numbers of 0 or more; those of the decoder are a nested mapping."""
-    if not isinstance(counts, dict):
-        raise ProblemError("not an object")
-    return {
-        name: n if n is None else counts_of(n, 1) if isinstance(n, dict) and depth == 0 else integer(name, n, 0)
-        for name, n in counts.items()
-    }
-
-
-def _turned_of(value: Any) -> float:
-    return finite("turned", value, least=-limits.VALUE, most=limits.VALUE)
-
-
-def _frame_us_of(value: Any) -> float:
-    return finite("frame_us", value, least=1.0, most=3.6e9)
+    label, t, known, slopes, repaired = ([row[k] for row in records] for k in range(1, 6))
+    return Detections._of(label, t, known, [np.nan if slope is None else slope for slope in slopes], repaired=repaired)

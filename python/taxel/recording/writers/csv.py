@@ -6,13 +6,12 @@ import re
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import around
 from taxel.frames import Frames
-from taxel.recording.readers.csv import EVENTS, MORE, sensor_of
+from taxel.recording.readers.csv import EVENTS, sensor_of
 
 #: Number of frames that are written at once.
 _FRAMES = 4096
@@ -42,18 +41,14 @@ def write_csv(file: BinaryIO, table: Events | Frames) -> None:
             times = table.t[k : k + _FRAMES].tolist()
             file.writelines(f"{t},{','.join(row)}\n".encode() for t, row in zip(times, rows, strict=True))
         return
-    columns: list[NDArray[Any]] = [table.t, table.x, table.y, table.p.astype(np.uint8)]
-    more = [name for name in MORE if getattr(table, name) is not None]
-    file.write(",".join([*EVENTS, *more]).encode() + b"\n")
-    block = 1 << 16
-    for k in range(0, len(table), block):
-        rows = [column[k : k + block].astype(str) for column in columns]
-        if table.intensity is not None and table.present is not None:
-            ticks = table.intensity[k : k + block].astype(str)
-            rows.append(np.where(table.present[k : k + block], ticks, ""))
-        if table.repaired is not None:
-            rows.append(table.repaired[k : k + block].astype(np.uint8).astype(str))
-        file.write("\n".join(map(",".join, zip(*(r.tolist() for r in rows), strict=True))).encode() + b"\n")
+    import pandas as pd  # noqa: PLC0415  takes long
+
+    columns: dict[str, Any] = dict(zip(EVENTS, (table.t, table.x, table.y, table.p.astype(np.uint8)), strict=True))
+    if table.intensity is not None and table.present is not None:
+        columns["intensity"] = pd.arrays.IntegerArray(table.intensity.copy(), ~table.present)
+    if table.repaired is not None:
+        columns["repaired"] = table.repaired.astype(np.uint8)
+    pd.DataFrame(columns).to_csv(file, index=False, lineterminator="\n")
 
 
 def _places(array: Array) -> list[tuple[int, int]]:
