@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel.array import Array
-from taxel.detect.examples import Example
-from taxel.detect.loads import Clock, frame_ms
+from taxel.detect.examples import Example, frame_ms
+from taxel.detect.loads import Clock
 from taxel.detect.recipe import Point, Recipe
 from taxel.encode import Composite, Encoder
 from taxel.neuron import Neuron
@@ -130,7 +130,7 @@ def in_frames(recipe: Recipe, examples: Sequence[Example], clocks: Sequence[Cloc
         return recipe
     parameters = [{**recipe.learner, **neuron} for neuron in recipe.neurons.values()]
     delays = [_delay_ms(point) for point in parameters if _aged(recipe, point)]
-    frames_ms = max(frame_ms(example) for example in examples)
+    frames_ms = max(frame_ms(example.source) for example in examples)
     period_ms = frames_ms or max(to_ms(frame_us or 0.0) for frame_us, _ in clocks)
     if not delays or not period_ms or (not frames_ms and period_ms <= min(delays)):
         return recipe

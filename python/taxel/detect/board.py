@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from taxel._base.messages import plain, three_digits
-from taxel.detect.examples import Example
-from taxel.frames import Frames
+from taxel.detect.examples import Example, frame_ms
 from taxel.recorded import recorded
 from taxel.recording.recording import Recording
+from taxel.spikes import to_us
 from taxel.wire.registers import Registers, preset_of
 
 #: A rate differs that is not within this ratio of another.
@@ -34,7 +34,7 @@ def of_training(examples: Sequence[Example]) -> dict[str, Any]:
     sources = [example.source for example in examples if isinstance(example.source, Recording)]
     boards = [summary(source.registers) for source in sources if source.has_events and source.registers is not None]
     is_one = len(boards) == len(examples) and all(board == boards[0] for board in boards)
-    periods = [period for source in sources if (period := _period_us(source)) is not None]
+    periods = [period for source in sources if (period := _period_us(source))]
     sides = {source.side for source in sources}
     return {
         "board": boards[0] if boards and is_one else None,
@@ -99,7 +99,6 @@ def other_frames(training: Mapping[str, Any], recording: Recording) -> str:
     return f"{recording.title} differs from the training: {'; '.join(differing)}" if differing else ""
 
 
-def _period_us(recording: Recording) -> float | None:
-    """Return the median time from one frame to the next, us; None of events, and of fewer than two frames."""
-    source = None if recording.has_events else recorded(recording, hold=False)
-    return float(np.median(np.diff(source.t))) if isinstance(source, Frames) and len(source) > 1 else None
+def _period_us(recording: Recording) -> float:
+    """Return the median time from one frame to the next, us; 0 of events."""
+    return 0.0 if recording.has_events else float(to_us(frame_ms(recorded(recording, hold=False))))

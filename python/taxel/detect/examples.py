@@ -23,7 +23,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded, recorded
 from taxel.recorded import unit_of as recorded_unit
-from taxel.spikes import SpikeTrains, to_us
+from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.tare import Tare
 
 #: So many labels that are all in the first such share of a recording may be in another unit of time.
@@ -206,6 +206,11 @@ def unit_of(examples: Sequence[Example]) -> str | None:
             difference = f"{name_of(k, examples[k])} is in {unit}, {name_of(0, examples[0])} in {units[0]}"
             raise ProblemError(f"{difference}: must be in one unit, because a readout learns values of one unit only")
     return units[0]
+
+
+def frame_ms(source: object) -> float:
+    """Return the median distance of frames, ms; 0 of what are no frames, or fewer than two."""
+    return to_ms(float(np.median(np.diff(source.t)))) if isinstance(source, Frames) and len(source) > 1 else 0.0
 
 
 def unreliable(label: str, scored: Score, labels: str, on: str = "this readout") -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._base.progress import Progress
 from taxel.detect.detector import tare_text
-from taxel.detect.examples import Example, name_of, unit_of
+from taxel.detect.examples import Example, frame_ms, name_of, unit_of
 from taxel.detect.scoring import APART_US
 from taxel.frames import Frames
 from taxel.recording import Recording
@@ -79,7 +79,7 @@ class Loads:
         self._labels = [{name: np.sort(times) for name, times in example.labels.items()} for example in examples]
         self.whole_examples: list[Stretch] = [(k, -np.inf, np.inf) for k in range(len(examples))]
         self._shift = [k * APART_US - _first(example) for k, example in enumerate(examples)]
-        self._frame_ms = max(map(frame_ms, examples))
+        self._frame_ms = max(frame_ms(example.source) for example in examples)
         self._curves: dict[tuple[str, tuple[float, ...]], list[_core.LoadCurve]] = {}
         self._changes: dict[tuple[str, tuple[float, ...]], list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
         self._ages: dict[float, FoundTimes] = {}
@@ -249,12 +249,6 @@ def lacks_neighbours(examples: Sequence[Example]) -> bool:
     """Whether taxels of an example have no known neighbours, as channels and a single taxel."""
     arrays = [example.source.array for example in examples if not isinstance(example.source, SpikeTrains)]  # type: ignore[union-attr]
     return any(array.taxels < 2 or not array._has_neighbours for array in arrays)
-
-
-def frame_ms(example: Example) -> float:
-    """Return the median distance of the frames of a (checked) example, ms; 0 of what has no frames."""
-    source = example.source
-    return to_ms(float(np.median(np.diff(source.t)))) if isinstance(source, Frames) and len(source) > 1 else 0.0
 
 
 def _first(example: Example) -> int:
