@@ -196,7 +196,7 @@ def test_faults_are_counted_as_the_board_says_them() -> None:
 
 
 def test_the_command_does_all_of_it_on_an_emulated_board() -> None:
-    emulate = [sys.executable, "-m", "taxel", "emulate", "--control", "0", "--port", "9", "--wire", "2"]
+    emulate = [sys.executable, "-m", "taxel", "emulate", "--control", "0", "--port", "9", "--wire", "2", "--tare", "0"]
     board = subprocess.Popen(emulate, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         place = next(line.split()[-1] for line in board.stderr if line.startswith("commands are accepted"))
