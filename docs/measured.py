@@ -107,7 +107,8 @@ def _detections(rows: dict[tuple[str, str], str]) -> list[list[str]]:
         f"a worn sensor: wrong, of {rows['training', 'worn, touches']} contacts and lifts": "worn, wrong",
         f"an object stays: wrong, of {rows['training', 'an object stays, touches']}": "an object stays, wrong",
     }
-    return [[what, *(rows["training", f"{of}, {who}"] for who in ("runs", "neuron", "rule"))] for what, of in kinds.items()]
+    ways = "runs", "neuron", "rule"
+    return [[what, *(rows["training", f"{of}, {who}"] for who in ways)] for what, of in kinds.items()]
 
 
 def benchmark(file: Path) -> dict[str, Any]:
