@@ -42,7 +42,7 @@ def toy_result(name: str, data: Path | None = None) -> dict[str, Any]:
     """Run a study at its smallest size; return parameters and results, with commit, date and machine."""
     with tempfile.TemporaryDirectory() as report:
         section = load(name).run(Path(report), size="toy", data=data, quiet=True)
-    return {key: section[key] for key in ("parameters", "unread", "said", "commit", "date", "machine")}
+    return {key: section[key] for key in ("parameters", "said", "commit", "date", "machine")}
 
 
 def judged(section: dict[str, Any]) -> list[dict[str, Any]]:

@@ -36,7 +36,7 @@ def recorded(event):
     data = encoded(folder, "plate", point["encoder"])
     cone, delay_ms = learner_from("point", point["learner"])
     later = data.latency_ms + delay_ms
-    pieces = [p for p in data.pieces.values() if len(p.spikes.times) and len(p.truth[event])]
+    pieces = [p for p in data.pieces if len(p.spikes.times) and len(p.truth[event])]
     order = np.random.default_rng(0).permutation(len(pieces))
     return cone.get_params(deep=False), [(pieces[k].spikes, pieces[k].truth[event] + later) for k in order]
 

@@ -34,8 +34,6 @@ class StudyOptions:
         Folder of recordings, for the studies that need some (or TAXEL_DATA names it).
     report
         Folder for the page, pictures and all results. Results that it contains are not computed again.
-    strict
-        End the study at a recording that cannot be read. Otherwise the recording is left out.
     json
         Print the summary as JSON, and no progress.
     """
@@ -44,14 +42,13 @@ class StudyOptions:
     changes: Settings = field(default_factory=dict)
     data: Path | None = None
     report: Path = Path("taxel-studies")
-    strict: bool = False
     json: bool = False
 
     def run(self, name: str, workers: Workers, changes: Mapping[str, Any]) -> dict[str, Any]:
         """Run a study, and return its part of the page."""
         data = self.recordings
         run = load(name).run
-        given: dict[str, Any] = {"size": self.size, "data": data, "strict": self.strict, "quiet": self.json}
+        given: dict[str, Any] = {"size": self.size, "data": data, "quiet": self.json}
         return run(self.report, workers=workers, changes=changes, **given)
 
     @property
@@ -156,5 +153,3 @@ def tell(section: dict[str, Any]) -> None:
             for row in shown["rows"]:
                 table.add_row(*row)
             console.print(table)
-    for file, why in section["unread"].items():
-        say(f"left out, because it could not be read: {file}: {why}")

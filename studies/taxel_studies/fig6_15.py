@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,11 +9,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from taxel_studies.gait import fits, protocols, sources
+from taxel_studies.gait import fits, outcomes, protocols, sources
 from taxel_studies.gait.judgement import STANDS_FOR
 from taxel_studies.gait.outcomes import EVENTS
 from taxel_studies.gait.recipes import PRINTED, RECIPE
-from taxel_studies.gait.sources import SOURCES, fingerprint
+from taxel_studies.gait.sources import SOURCES
 from taxel_studies.study import Parameters, Row, Statement, Summary, Task
 
 WHERE = "thesis 6.5.4, figure 6.15"
@@ -47,32 +45,18 @@ LOWEST = 0.1
 def tasks(p: Parameters, *, data: Path) -> list[Task]:
     """List a fit of each learner a source, recipe, event and fold; 0 scopes or folds stand for all of them."""
     listed = []
-    for source, folder in sources.readable(data, p["sources"]).items():
-        protocol = protocols.of(source, STANDS_FOR[source][0])
-        scopes = protocols.scopes(folder, source, protocol.name)
-        names = protocols.names(folder, source)
-        common = {
-            "source": source,
-            "protocol": protocol.name,
-            "data": fingerprint(folder, source),
-            "folds": hashlib.sha256(json.dumps(protocols.to_json(scopes, names)).encode()).hexdigest()[:16],
-            "train": dict(protocol.train),
-        }
+    for source, folder in sources.present(data, p["sources"]).items():
+        all_of = list(outcomes.folds(folder, source, protocols.of(source, STANDS_FOR[source][0])))
+        scopes = list(dict.fromkeys(fold["scope"] for fold in all_of))[: p["scopes"] or None]
+        chosen = [f for f in all_of if f["scope"] in scopes and (not p["folds"] or f["left_out"] < p["folds"])]
+        skim = {"pulse_ms": p["pulse_ms"], "ridge": p["ridge"]}
         for recipe in p["recipes"]:
             for event, point in RECIPES[recipe][1][source].items():
-                for scope in scopes[: p["scopes"] or None]:
-                    for group in range(len(scope.groups))[: p["folds"] or None]:
-                        fold = {"recipe": recipe, "event": event, "scope": scope.name, "left_out": [group]}
-                        both = common | fold
-                        skim = {"pulse_ms": p["pulse_ms"], "ridge": p["ridge"]}
-                        listed.append(Task(both | {"kind": "neuron", "points": [point]}, 1))
-                        listed.append(Task(both | {"kind": "skim", "point": point, "skim": skim}, 1))
+                for fold in chosen:
+                    both = fold | {"recipe": recipe, "event": event}
+                    listed.append(Task(both | {"kind": "neuron", "points": [point]}, 1))
+                    listed.append(Task(both | {"kind": "skim", "point": point, "skim": skim}, 1))
     return listed
-
-
-def unread(p: Parameters, data: Path) -> dict[str, str]:
-    """Return which files of the sources cannot be read, and why."""
-    return sources.unread(data, p["sources"])
 
 
 realise = fits.realise
@@ -102,7 +86,7 @@ def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
 
 
 def _added(tested: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    units = [unit for groups in tested for units in groups.values() for unit in units.values()]
+    units = [unit for units in tested for unit in units.values()]
     events, false = sum(u["events"] for u in units), sum(u["false"] for u in units)
     errors = np.array([e for u in units for e in u["errors"]])
     return {

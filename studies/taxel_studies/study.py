@@ -44,7 +44,6 @@ __all__ = [
     "one_task",
     "only_result",
     "read_section",
-    "refuse",
     "results",
     "svg",
 ]
@@ -144,7 +143,7 @@ class Table:
 
 #: What a module must define to be a study, and what it may define.
 _REQUIRED = ("WHERE", "PROTOCOL", "PARAMETERS", "SIZES", "tasks", "realise", "summarise", "statements", "draw")
-_OPTIONAL = ("then", "tables", "unread", "DATA", "KEEPS", "NEEDS")
+_OPTIONAL = ("then", "tables", "DATA", "KEEPS", "NEEDS")
 
 
 @dataclass(frozen=True)
@@ -182,8 +181,6 @@ class Study:
         The realisations that depend on the results of others: asked again until it lists nothing new.
     tables : function of (parameters, summary), optional
         Tables below the picture.
-    unread : function of (parameters, data), optional
-        Which files of the recordings cannot be read, and why. It raises `FormatError` where none can.
     data : tuple of str
         Folders of recordings that it needs.
     keeps : bool
@@ -205,7 +202,6 @@ class Study:
     draw: Callable[[Parameters, Summary], Figure | Sequence[Figure]]
     then: Callable[..., Sequence[Task]] | None = None
     tables: Callable[[Parameters, Summary], Sequence[Table]] | None = None
-    unread: Callable[[Parameters, Path], Mapping[str, str]] = lambda _parameters, _data: {}
     data: tuple[str, ...] = ()
     keeps: bool = False
     needs: tuple[str, ...] = ()
@@ -265,7 +261,6 @@ class Study:
         changes: Mapping[str, Any] | None = None,
         data: Path | None = None,
         workers: Workers | None = None,
-        strict: bool = False,
         quiet: bool = False,
     ) -> Section:
         """Run what is not in `report` yet, draw, judge; leave ``summary.json`` and the picture there.
@@ -284,8 +279,6 @@ class Study:
             Where the recordings lie, for the studies that need some.
         workers : Workers, optional
             Default: this process alone.
-        strict : bool
-            A file of recordings that cannot be read ends the study before it begins; else it is left out, and named.
         quiet : bool
             No progress line, nor one on stderr while recordings are read.
 
@@ -296,18 +289,16 @@ class Study:
         Raises
         ------
         ProblemError : an unknown size or parameter; a module that is not installed
-        FormatError : recordings that it needs are not there, or cannot be read (none of them; one, with `strict`)
+        FormatError : recordings that it needs are not there, or one cannot be read
         """
         workers = Workers() if workers is None else workers
         parameters = self.set(size, **(changes or {}))
         if self.lacks is not None:
             raise ProblemError(f"{self.name}: {self.lacks}")
-        begun, given, unread = time.time(), dict[str, Any](), dict[str, str]()
+        begun, given = time.time(), dict[str, Any]()
         if self.data:
             given["data"] = self._recordings(data)
             _say(quiet, f"{self.name}: reading the recordings in {data}; hundreds of them take minutes")
-            unread = dict(self.unread(parameters, given["data"]))
-            refuse(unread, strict=strict)
         kept = Kept(report / "cache", code_version("taxel", "taxel_rules", "taxel_studies"))
         tasks = self.tasks(parameters, **given)
         if text := forecast([self.name], size, workers.jobs):
@@ -330,7 +321,6 @@ class Study:
             "size": size,
             "parameters": parameters,
             "changed": sorted(changes or {}),
-            "unread": unread,
             "realisations": len(rows),
             "statements": [asdict(s) for s in self.statements(parameters, summary)],
             "tables": [asdict(t) for t in self.tables(parameters, summary)] if self.tables is not None else [],
@@ -357,14 +347,6 @@ class Study:
 def _say(quiet: bool, text: str) -> None:
     if not quiet:
         print(text, file=sys.stderr)
-
-
-def refuse(unread: Mapping[str, str], *, strict: bool) -> None:
-    """Raise `FormatError` for the first file that cannot be read, where that ends a study."""
-    if strict and unread:
-        file, why = next(iter(unread.items()))
-        more = f" ({len(unread) - 1} more cannot be read)" if len(unread) > 1 else ""
-        raise FormatError(f"{file}: {why}{more}")
 
 
 def _alike(value: Any, other: Any) -> bool:

@@ -1,82 +1,86 @@
-"""The results of the study: every foot, summed up by row, event, person and group."""
+"""What is run, and its results: every foot, summed up by row, event and person."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from taxel import ProblemError
 from taxel_studies.gait import insole, sources
-from taxel_studies.gait.plans import Plan, key, plans
-from taxel_studies.gait.protocols import ROWS
-from taxel_studies.gait.recipes import RECIPE, SEARCH
+from taxel_studies.gait.protocols import PROTOCOLS, ROWS, Protocol, scopes
+from taxel_studies.gait.recipes import PRINTED, RECIPE, RULE_ENCODERS, SEARCH
 from taxel_studies.gait.rules import RULES
-from taxel_studies.gait.sources import SOURCES
+from taxel_studies.gait.sources import SOURCES, fingerprint
 from taxel_studies.study import Parameters, Row, Summary, Task
 
-__all__ = ["EVENTS", "Outcome", "Unit", "figures", "summarise"]
+__all__ = ["EVENTS", "PARAMETERS", "SIZES", "figures", "folds", "summarise", "tasks"]
 
 EVENTS = {"contact": "contact", "heel_off": "heel-off", "foot_off": "foot-off"}
+PARAMETERS: dict[str, Any] = {
+    "sources": list(SOURCES),  # those that are absent are skipped, and listed
+    "protocols": [],  # all
+    "events": 0,  # all; else so many of the first
+    "points": 0,  # to choose from: all; else so many of the first
+}
+SIZES = {"toy": {"protocols": ["people left out"], "events": 1, "points": 2}}
 
 
-class Known:
-    """The results of realisations, by their tasks."""
-
-    def __init__(self, rows: Sequence[Row]) -> None:
-        self._rows = {key(row): row for row in rows}
-
-    def __getitem__(self, task: Task) -> Any:
-        """Return a task's result."""
-        return self._rows[key(task)].result
-
-    def seconds(self, tasks: Sequence[Task]) -> float:
-        """Return the CPU seconds that tasks took."""
-        return sum(self._rows[key(task)].seconds for task in tasks)
+def folds(folder: Path, source: str, protocol: Protocol) -> Iterator[dict[str, Any]]:
+    """Give what names each fold of a protocol, and how much trains in it."""
+    common = {"source": source, "data": fingerprint(folder, source), "protocol": protocol.name}
+    for scope in scopes(folder, source, protocol.name):
+        for left_out in range(len(scope.groups)):
+            yield common | {"scope": scope.name, "left_out": left_out, "train": dict(protocol.train)}
 
 
-@dataclass(frozen=True)
-class Unit:
-    """The result at one foot in one fold."""
+def tasks(p: Parameters, *, data: Path) -> list[Task]:
+    """List the fits of every row in every fold, ordered so that one encoding serves many of them in turn.
 
-    name: str
-    person: str
-    group: str
-    events: int
-    false: int
-    minutes: float
-    errors: tuple[float, ...]
-    delays: tuple[float, ...]
-
-
-@dataclass
-class Outcome:
-    """One row of the study: an event, a row's name, and every foot.
-
-    Attributes
-    ----------
-    points : list
-        The parameters of each fold, where they were chosen inside.
-    seconds : float
-        CPU time of the folds' fits, the choice inside them included.
+    Raises
+    ------
+    ProblemError : a source or protocol that is none
     """
+    known = dict.fromkeys(protocol.name for listed in PROTOCOLS.values() for protocol in listed)
+    if unknown := [name for name in p["protocols"] if name not in known]:
+        raise ProblemError(f"protocols is {unknown[0]!r}: must be one of {', '.join(map(repr, known))}")
+    listed = []
+    for name, folder in sources.present(data, p["sources"]).items():
+        for protocol in PROTOCOLS[name]:
+            if protocol.name in (p["protocols"] or known):
+                groups = min((len(scope.groups) for scope in scopes(folder, name, protocol.name)), default=0)
+                for event in SOURCES[name].events[: p["events"] or None]:
+                    for row in protocol.rows:
+                        # A choice inside a fold leaves out a group more; some labels are no threshold of a sum.
+                        if (row != "chosen" or groups > 2) and (
+                            row != "labels' own rule" or event in SOURCES[name].sums
+                        ):
+                            asked = _asked(name, event, row, protocol, p["points"])
+                            listed += [Task(fold | asked, seed=1) for fold in folds(folder, name, protocol)]
+    return sorted(listed, key=_by_encoder)
 
-    event: str
-    row: str
-    units: list[Unit] = field(default_factory=list)
-    points: list[Any] = field(default_factory=list)
-    seconds: float = 0.0
+
+def _asked(source: str, event: str, row: str, protocol: Protocol, points: int) -> dict[str, Any]:
+    """Return what a row asks for in every fold of a protocol: a rule, or a neuron's points."""
+    asked = {"row": row, "event": event}
+    if row in RULES:
+        return asked | {"kind": "rule", "rule": row, "encoder": RULE_ENCODERS[source][event]}
+    if row == "chosen":
+        tried = SEARCH[source][event][: points or None]
+        return asked | {"kind": "neuron", "points": tried, "search": dict(protocol.search)}
+    return asked | {"kind": "neuron", "points": [{"recipe": RECIPE, "printed": PRINTED}[row][source][event]]}
 
 
-def figures(units: Sequence[Unit]) -> dict[str, Any]:
-    """Sum up feet.
+def _by_encoder(task: Task) -> str:
+    encoder = task.params["encoder"] if task.params["kind"] == "rule" else task.params["points"][0]["encoder"]
+    return json.dumps([task.params["source"], encoder, task.params["event"]])
 
-    Parameters
-    ----------
-    units : sequence of Unit
+
+def figures(units: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Sum up feet: what `fits.realise` gives as tested.
 
     Returns
     -------
@@ -85,11 +89,8 @@ def figures(units: Sequence[Unit]) -> dict[str, Any]:
         10 ms and within 3.4 ms (one sample at 300 Hz); errors of `t` and delays to `known`: mean, sd, median, 2.5th
         and 97.5th percentile, ms. None where nothing is known.
     """
-    events = sum(u.events for u in units)
-    errors = np.array([e for u in units for e in u.errors])
-    delays = np.array([d for u in units for d in u.delays])
-    false = sum(u.false for u in units)
-    minutes = sum(u.minutes for u in units)
+    events, false, minutes = (sum(u[name] for u in units) for name in ("events", "false", "minutes"))
+    errors, delays = (np.array([e for u in units for e in u[name]]) for name in ("errors", "delays"))
     return {
         "events": events,
         "found": len(errors),
@@ -124,52 +125,85 @@ def _spread(values: np.ndarray[Any, Any]) -> dict[str, float] | None:
 
 
 def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
-    """Put all outcomes into plain values, with the folds, so that other learners can be judged on the same."""
-    known, listed = Known(rows), plans(p, data)
-    there = {plan.source for plan in listed}
-    present = sources.readable(data, p["sources"])
-    skipped = [SOURCES[name].folder for name in SOURCES if name in p["sources"] and name not in present]
-    skipped += [f"{SOURCES[n].folder} (too few people or recordings)" for n in present if n not in there]
-    skipped += [
-        f"{plan.source}, {plan.protocol.name}: chosen inside (too few people)" for plan in listed if not plan.can_choose
-    ]
+    """Put all outcomes into plain values."""
+    ran: dict[str, dict[str, list[Row]]] = {}
+    for row in rows:
+        ran.setdefault(row.params["source"], {}).setdefault(row.params["protocol"], []).append(row)
+    here = sources.present(data, p["sources"])
+    skipped = [SOURCES[name].folder for name in SOURCES if name in p["sources"] and name not in here]
+    skipped += [f"{SOURCES[name].folder} (too few people or recordings)" for name in here if name not in ran]
+    listed: list[dict[str, Any]] = []
+    for name in (name for name in SOURCES if name in ran):
+        source = SOURCES[name]
+        about = {key: getattr(source, key) for key in ("title", "truth", "shows", "by_minute")}
+        listed.append({"source": name, **about, "protocols": []})
+        for protocol in (one for one in PROTOCOLS[name] if one.name in ran[name]):
+            listed[-1]["protocols"].append(_protocol(protocol, ran[name][protocol.name]))
+            if "chosen" not in {row.params["row"] for row in ran[name][protocol.name]}:
+                skipped.append(f"{name}, {protocol.name}: chosen inside (too few people)")
     return {
         "skipped": skipped,
         "search_points": {s: {e: len(points) for e, points in events.items()} for s, events in SEARCH.items()},
-        "sources": [
-            {
-                "source": name,
-                "title": SOURCES[name].title,
-                "truth": SOURCES[name].truth,
-                "shows": SOURCES[name].shows,
-                "by_minute": SOURCES[name].by_minute,
-                "protocols": [_protocol(plan, known) for plan in listed if plan.source == name],
-            }
-            for name in SOURCES
-            if name in there
-        ],
-        "folds": {f"{plan.source}/{plan.protocol.name}": plan.folds for plan in listed},
-        "conversion": _conversion(data) if "plate" in there else None,
+        "sources": listed,
+        "conversion": _conversion(here["plate"]) if "plate" in ran else None,
     }
 
 
-def _protocol(plan: Plan, known: Known) -> dict[str, Any]:
-    rows = [_row(outcome) for outcome in _outcomes(plan, known)]
+def _protocol(protocol: Protocol, ran: Sequence[Row]) -> dict[str, Any]:
+    outcomes = [
+        _row(event, row, here)
+        for event in EVENTS
+        for row in protocol.rows
+        if (here := [r for r in ran if (r.params["event"], r.params["row"]) == (event, row)])
+    ]
     return {
-        "protocol": plan.protocol.name,
-        "title": plan.protocol.title,
-        "train": dict(plan.protocol.train),
-        "search": dict(plan.protocol.search),
-        "rows": rows,
-        "beside": _beside(rows),
+        "protocol": protocol.name,
+        "title": protocol.title,
+        "train": dict(protocol.train),
+        "search": dict(protocol.search),
+        "rows": outcomes,
+        "beside": _beside(outcomes),
     }
 
 
-def _conversion(data: Path) -> dict[str, Any]:
+def _row(event: str, row: str, ran: Sequence[Row]) -> dict[str, Any]:
+    units = [unit for one in ran for unit in one.result["tested"].values()]
+    chosen = "point" if row == "chosen" else "fit" if row in RULES else ""
+    # Each different point once, with the number of folds that chose it, the most frequent first.
+    points = [json.dumps(one.result[chosen], sort_keys=True) for one in ran if chosen]
+    often = sorted(dict.fromkeys(points), key=lambda point: -points.count(point))
+    return {
+        "event": event,
+        "row": row,
+        "about": ROWS[row],
+        "figures": figures(units),
+        "by_person": {
+            person: figures([unit for unit in units if unit["person"] == person])
+            for person in sorted({unit["person"] for unit in units})
+        },
+        "chosen": [{"folds": points.count(point), "point": json.loads(point)} for point in often],
+        "cpu_seconds": round(sum(one.seconds for one in ran), 1),
+    }
+
+
+def _beside(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Compare the neuron with the count, event by event: by missed + false."""
+    lines = []
+    for event in dict.fromkeys(row["event"] for row in rows):
+        wrong = {
+            row["row"]: row["figures"]["missed"] + row["figures"]["false"] for row in rows if row["event"] == event
+        }
+        if "count" in wrong:
+            neuron = wrong.get("chosen", wrong["recipe"])
+            lines.append(f"{EVENTS[event]}: the neuron has {neuron} missed and false, the count {wrong['count']}.")
+    return lines
+
+
+def _conversion(folder: Path) -> dict[str, Any]:
     """Return pressure and spikes of one footfall of the plate: what figures 6.12 and 6.13 draw."""
-    folder, encoder = data / SOURCES["plate"].folder, RECIPE["plate"]["contact"]["encoder"]
+    encoder = RECIPE["plate"]["contact"]["encoder"]
     cut = sources.cuts(folder, "plate")[0]
-    piece = sources.encoded(folder, "plate", encoder).pieces[cut.name]
+    piece = next(one for one in sources.encoded(folder, "plate", encoder).pieces if one.name == cut.name)
     begins = float(piece.truth["contact"][0])
     peak = cut.values.max(axis=0)
     first = np.concatenate([[0], np.cumsum(insole.CELLS)])
@@ -186,63 +220,3 @@ def _conversion(data: Path) -> dict[str, Any]:
         "spikes_ms": [[round(float(t), 3) for t in train - begins] for train in piece.spikes],
         "truth_ms": {event: [float(t) for t in times - begins] for event, times in piece.truth.items()},
     }
-
-
-def _unit(name: str, unit: Mapping[str, Any]) -> Unit:
-    return Unit(
-        name,
-        unit["person"],
-        unit["group"],
-        unit["events"],
-        unit["false"],
-        unit["minutes"],
-        tuple(unit["errors"]),
-        tuple(unit["delays"]),
-    )
-
-
-def _outcomes(plan: Plan, known: Known) -> list[Outcome]:
-    outcomes: dict[tuple[str, str], Outcome] = {}
-    for event, row, left_out, task in plan.fits():
-        outcome = outcomes.setdefault((event, row), Outcome(event, row))
-        result = known[task]
-        if row == "chosen" or row in RULES:
-            outcome.points.append(result["point" if row == "chosen" else "fit"])
-        outcome.units += [_unit(name, unit) for name, unit in result["tested"][str(left_out)].items()]
-        outcome.seconds += known.seconds([task])
-    return list(outcomes.values())
-
-
-def _row(outcome: Outcome) -> dict[str, Any]:
-    people = sorted({u.person for u in outcome.units})
-    return {
-        "event": outcome.event,
-        "row": outcome.row,
-        "about": ROWS[outcome.row],
-        "figures": figures(outcome.units),
-        "by_person": {p: figures([u for u in outcome.units if u.person == p]) for p in people},
-        "chosen": _counted(outcome.points),
-        "cpu_seconds": round(outcome.seconds, 1),
-    }
-
-
-def _counted(points: Sequence[Any]) -> list[dict[str, Any]]:
-    """Return each different point once, with the number of folds that chose it, the most frequent first."""
-    times: dict[str, int] = {}
-    for point in points:
-        text = json.dumps(point, sort_keys=True)
-        times[text] = times.get(text, 0) + 1
-    return [{"folds": n, "point": json.loads(text)} for text, n in sorted(times.items(), key=lambda item: -item[1])]
-
-
-def _beside(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Compare the neuron with the count, event by event: by missed + false."""
-    lines = []
-    for event in dict.fromkeys(row["event"] for row in rows):
-        wrong = {
-            row["row"]: row["figures"]["missed"] + row["figures"]["false"] for row in rows if row["event"] == event
-        }
-        if "count" in wrong:
-            neuron = wrong.get("chosen", wrong["recipe"])
-            lines.append(f"{EVENTS[event]}: the neuron has {neuron} missed and false, the count {wrong['count']}.")
-    return lines

@@ -1,4 +1,4 @@
-"""What is run on which recordings, and in which folds: by person, by count, by time."""
+"""What is run on which recordings, and in which folds: by person, by footfall, by time."""
 
 from __future__ import annotations
 
@@ -6,30 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from taxel.detect import Part
-from taxel.spikes import to_ms, to_us
+from taxel.spikes import to_us
 from taxel_studies.gait.pieces import Piece
 from taxel_studies.gait.recipes import RECIPE
 from taxel_studies.gait.rules import RULES
 from taxel_studies.gait.sources import encoded
 
-__all__ = [
-    "PROTOCOLS",
-    "ROWS",
-    "Protocol",
-    "Scope",
-    "by_count",
-    "by_person",
-    "by_time",
-    "names",
-    "of",
-    "scopes",
-    "to_json",
-]
+__all__ = ["PROTOCOLS", "ROWS", "Protocol", "Scope", "by_footfall", "by_person", "by_time", "of", "scopes"]
 
 #: The rows of the study.
 ROWS = {
@@ -38,6 +25,8 @@ ROWS = {
     "printed": "Table 6.2 as printed",
     **RULES,
 }
+#: Draws the folds.
+SEED = 1
 
 
 @dataclass(frozen=True)
@@ -56,32 +45,29 @@ class Scope:
     groups: tuple[tuple[Part, ...], ...]
 
 
-def by_person(pieces: Sequence[Piece], folds: int, seed: int) -> list[Scope]:
+def by_person(pieces: Sequence[Piece], folds: int) -> list[Scope]:
     """Leave whole people out: as many folds as asked, each with its share of healthy people and patients.
 
     With no more people than folds each fold is one person.
     """
-    rng = np.random.default_rng(seed)
-    groups: list[list[str]] = [[] for _ in range(folds)]
-    k = 0
-    for group in sorted({p.group for p in pieces}):
-        people = sorted({p.person for p in pieces if p.group == group})
-        for person in rng.permutation(people):
-            groups[k % folds].append(str(person))
-            k += 1
-    return [Scope("all people", tuple(tuple(n for person in g for n in _of(pieces, person)) for g in groups if g))]
+    rng = np.random.default_rng(SEED)
+    people = [
+        str(person)
+        for group in sorted({p.group for p in pieces})
+        for person in rng.permutation(sorted({p.person for p in pieces if p.group == group}))
+    ]
+    groups = [tuple(n for person in people[k::folds] for n in _of(pieces, person)) for k in range(folds)]
+    return [Scope("all people", tuple(group for group in groups if group))]
 
 
-def by_count(pieces: Sequence[Piece], folds: int, repeats: int, seed: int) -> list[Scope]:
-    """Split each person's footfalls at random: with 3 folds 40 of 60 train and 20 test, `repeats` times."""
-    rng = np.random.default_rng(seed)
+def by_footfall(pieces: Sequence[Piece], folds: int) -> list[Scope]:
+    """Split each person's footfalls at random: with 3 folds 40 of 60 train and 20 test."""
+    rng = np.random.default_rng(SEED)
     scopes = []
     for person in sorted({p.person for p in pieces}):
         mine = _of(pieces, person)
-        for r in range(repeats):
-            order = rng.permutation(len(mine))
-            groups = tuple(tuple(mine[k] for k in sorted(order[g::folds])) for g in range(folds))
-            scopes.append(Scope(person if repeats == 1 else f"{person}, split {r + 1}", groups))
+        order = rng.permutation(len(mine))
+        scopes.append(Scope(person, tuple(tuple(mine[k] for k in sorted(order[g::folds])) for g in range(folds))))
     return scopes
 
 
@@ -104,16 +90,6 @@ def _of(pieces: Sequence[Piece], person: str) -> list[Part]:
     return [Part(n) for n, piece in enumerate(pieces) if piece.person == person]
 
 
-def to_json(scopes: Sequence[Scope], names: Sequence[str]) -> list[dict[str, Any]]:
-    """Return scopes as plain values: a part is the name of a piece, or that with start and stop in ms."""
-
-    def plain(part: Part) -> str | list[Any]:
-        name = names[part.example]
-        return name if np.isinf(part.stop) else [name, to_ms(part.start), to_ms(part.stop)]
-
-    return [{"scope": s.name, "groups": [[plain(p) for p in g] for g in s.groups]} for s in scopes]
-
-
 @dataclass(frozen=True)
 class Protocol:
     """Describe how a source is split and what is run on it.
@@ -121,11 +97,8 @@ class Protocol:
     Attributes
     ----------
     name, title : str
-    split : str
-        "people", "footfalls" or "time".
+        `SPLITS` has its split by name.
     folds : int
-    repeats : int
-        Of random splits.
     rows : tuple of str
         Of `ROWS`.
     train, search : dict
@@ -134,39 +107,30 @@ class Protocol:
 
     name: str
     title: str
-    split: str
     folds: int
     rows: tuple[str, ...]
     train: Mapping[str, int]
     search: Mapping[str, int]
-    repeats: int = 1
-
-    def scopes(self, all_pieces: Sequence[Piece]) -> list[Scope]:
-        """Split pieces as this protocol says."""
-        if self.split == "people":
-            return by_person(all_pieces, self.folds, seed=1)
-        if self.split == "footfalls":
-            return by_count(all_pieces, self.folds, self.repeats, seed=1)
-        return by_time(all_pieces, self.folds)
 
 
+#: How pieces are split, by protocol.
+SPLITS = {"people left out": by_person, "own footfalls": by_footfall, "time within a person": by_time}
+_NEURONS = ("recipe", "chosen", "printed")
 PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
     "plate": (
         Protocol(
             "people left out",
             "each person is tested by what five others trained",
-            "people",
             6,
-            ("recipe", "chosen", "printed", "count", "labels' own rule"),
+            (*_NEURONS, "count", "labels' own rule"),
             {"count": 40},
             {"count": 10},
         ),
         Protocol(
             "own footfalls",
             "40 of a person's 60 footfalls train, 20 test; every footfall is tested once a split",
-            "footfalls",
             3,
-            ("recipe", "chosen", "printed"),
+            _NEURONS,
             {"count": 60},
             {"count": 60},
         ),
@@ -175,9 +139,8 @@ PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
         Protocol(
             "people left out",
             "four folds by person, half healthy, half patients",
-            "people",
             4,
-            ("recipe", "chosen", "printed", "count", "labels' own rule"),
+            (*_NEURONS, "count", "labels' own rule"),
             {"seconds": 30},
             {"seconds": 15},
         ),
@@ -186,16 +149,14 @@ PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
         Protocol(
             "people left out",
             "four folds by person, healthy people and patients spread",
-            "people",
             4,
-            ("recipe", "chosen", "printed", "count"),
+            (*_NEURONS, "count"),
             {"seconds": 120},
             {"seconds": 60},
         ),
         Protocol(
             "time within a person",
             "four folds by time within each person (6.5.3)",
-            "time",
             4,
             ("recipe", "chosen"),
             {"seconds": 300},
@@ -211,17 +172,9 @@ def of(source: str, name: str) -> Protocol:
 
 
 @lru_cache(maxsize=32)
-def scopes(folder: Path, source: str, protocol: str) -> tuple[Scope, ...]:
+def scopes(folder: Path, source: str, name: str) -> tuple[Scope, ...]:
     """Split the recordings of a source's folder as one of its protocols says; scopes of one group are left out."""
-    split = of(source, protocol).scopes(list(_pieces(folder, source).values()))
-    return tuple(scope for scope in split if len(scope.groups) > 1)
-
-
-def names(folder: Path, source: str) -> list[str]:
-    """Return the names of a source's pieces, in their order."""
-    return list(_pieces(folder, source))
-
-
-def _pieces(folder: Path, source: str) -> Mapping[str, Piece]:
     # Any encoder will do: the names and lengths of the pieces count.
-    return encoded(folder, source, next(iter(RECIPE[source].values()))["encoder"]).pieces
+    pieces = encoded(folder, source, next(iter(RECIPE[source].values()))["encoder"]).pieces
+    split = SPLITS[name](pieces, of(source, name).folds)
+    return tuple(scope for scope in split if len(scope.groups) > 1)

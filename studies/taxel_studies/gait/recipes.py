@@ -146,54 +146,47 @@ PRINTED: dict[str, dict[str, Point]] = {
 _CONTACT, _HEEL, _LIFTED = RECIPE["plate"].values()
 _RESET = {"after_spike": "reset", "theta_plus": 0.2}
 
+
+def _tried(point: Point, *changes: dict[str, Any]) -> list[Point]:
+    """Return a point, and the same with each of the changes."""
+    return [point, *(changed(point, **one) for one in changes)]
+
+
 #: What may be chosen inside the training folds, 24 points an event at most.
 SEARCH: dict[str, dict[str, list[Point]]] = {
     "plate": {
-        "contact": [
+        "contact": _tried(
             _CONTACT,
-            changed(_CONTACT, tau=20.0),
-            changed(_CONTACT, tau=20.0, kappa=1.3),
-            changed(_CONTACT, kappa=1.3),
-            changed(_CONTACT, tau=10.0, delay_ms=8.0),
-            changed(_CONTACT, encoder=izhikevich(1), tau=10.0, bound=0.3, delay_ms=4.0),
-        ],
-        "heel_off": [
+            {"tau": 20.0},
+            {"tau": 20.0, "kappa": 1.3},
+            {"kappa": 1.3},
+            {"tau": 10.0, "delay_ms": 8.0},
+            {"encoder": izhikevich(1), "tau": 10.0, "bound": 0.3, "delay_ms": 4.0},
+        ),
+        "heel_off": _tried(
             _HEEL,
-            changed(_HEEL, tau=50.0),
-            changed(_HEEL, tau=100.0),
-            changed(_HEEL, kappa=1.3),
-            changed(_HEEL, tau=50.0, kappa=1.3),
-            changed(_HEEL, lambdas=[0.0, 4.0, 300.0, 100.0, 80.0]),
-        ],
-        "foot_off": [
+            *({"tau": 50.0}, {"tau": 100.0}, {"kappa": 1.3}, {"tau": 50.0, "kappa": 1.3}),
+            {"lambdas": [0.0, 4.0, 300.0, 100.0, 80.0]},
+        ),
+        "foot_off": _tried(
             _LIFTED,
-            changed(_LIFTED, tau=160.0),
-            changed(_LIFTED, kappa=1.2),
-            changed(_LIFTED, kappa=1.4),
-            changed(_LIFTED, tau=160.0, kappa=1.4),
-            changed(_LIFTED, delay_ms=12.0),
-        ],
+            *({"tau": 160.0}, {"kappa": 1.2}, {"kappa": 1.4}, {"tau": 160.0, "kappa": 1.4}, {"delay_ms": 12.0}),
+        ),
     },
     "gaitpdb": {
-        event: [
+        event: _tried(
             point,
-            changed(point, theta_plus=1.0),
-            changed(point, kappa=1.5),
-            changed(point, tau=20.0),
-            changed(point, tau=45.0 if event == "contact" else 25.0),
-            changed(point, **_RESET, refractory=250.0 if event == "contact" else 120.0),
-        ]
+            *({"theta_plus": 1.0}, {"kappa": 1.5}, {"tau": 20.0}, {"tau": 45.0 if event == "contact" else 25.0}),
+            _RESET | {"refractory": 250.0 if event == "contact" else 120.0},
+        )
         for event, point in RECIPE["gaitpdb"].items()
     },
     "gaitndd": {
-        event: [
+        event: _tried(
             point,
-            changed(point, theta_plus=1.0),
-            changed(point, kappa=1.5),
-            changed(point, delay_ms=12.0),
-            changed(point, delay_ms=6.0),
-            changed(point, **_RESET, refractory=250.0),
-        ]
+            *({"theta_plus": 1.0}, {"kappa": 1.5}, {"delay_ms": 12.0}, {"delay_ms": 6.0}),
+            _RESET | {"refractory": 250.0},
+        )
         for event, point in RECIPE["gaitndd"].items()
     },
 }

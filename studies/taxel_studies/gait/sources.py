@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,12 @@ from taxel.frames import Frames
 from taxel.spikes import to_ms
 from taxel_studies.datasets import Trial, data_set, plate
 from taxel_studies.datasets import files as files_of
+from taxel_studies.datasets import trials as trials_of
 from taxel_studies.gait import insole
 from taxel_studies.gait.pieces import Piece
 from taxel_studies.gait.recipes import RULE_ENCODERS
-from taxel_studies.study import refuse
 
-__all__ = ["SOURCES", "Cut", "Source", "cuts", "encoded", "fingerprint", "readable", "readings", "unread"]
+__all__ = ["SOURCES", "Cut", "Encoded", "Source", "cuts", "encoded", "fingerprint", "present"]
 
 #: Silence before each footfall of the plate, ms: random, so that its length does not reveal when events come.
 SILENCE_MS = (300, 900)
@@ -101,117 +101,57 @@ SOURCES = {
 }
 
 
-def _present(folder: Path, wanted: Sequence[str]) -> dict[str, Path]:
-    """Return those of the wanted sources of which a folder holds files, each with its own folder."""
-    if not folder.is_dir():
-        raise FileNotFoundError(2, "No such folder", str(folder))
-    folders = {}
-    for name in [one_of("sources", name, SOURCES) for name in wanted]:
-        place = folder / SOURCES[name].folder
-        if place.is_dir() and files_of(data_set(name), place):
-            folders[name] = place
-    return folders
-
-
-@dataclass(frozen=True)
-class Readings:
-    """The trials that a source's files hold.
-
-    Attributes
-    ----------
-    trials : tuple of Trial
-    files : tuple of Path
-        That were read.
-    unread : mapping from file (its folder before it) to why it could not be read
-    """
-
-    trials: tuple[Trial, ...]
-    files: tuple[Path, ...]
-    unread: Mapping[str, str]
-
-
-@lru_cache(maxsize=8)
-def readings(folder: Path, name: str) -> Readings:
-    """Read all of a source's files, once; what cannot be read, or is too short to be encoded, is left out."""
-    source, least_s = data_set(name), _least_s(name)
-    trials: list[Trial] = []
-    read, unread = [], {}
-    for file in files_of(source, folder):
-        try:
-            own = list(source.trials(file))
-        except (FormatError, OSError) as error:
-            why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-            unread[f"{folder.name}/{file.name}"] = why.removeprefix(str(file)).removeprefix(file.name).lstrip(":, ")
-        else:
-            long = [trial for trial in own if _lasts_s(trial) >= least_s]
-            short = [trial for trial in own if _lasts_s(trial) < least_s]
-            for trial in short if long else short[:1]:
-                which = trial.name if long else file.name
-                unread[f"{folder.name}/{which}"] = (
-                    f"lasts {_lasts_s(trial):g} s, and levels in shares of the running range want {least_s:g} s"
-                )
-            trials += map(_boxed, long) if name == "plate" else long
-            if long:
-                read.append(file)
-    return Readings(tuple(trials), tuple(read), unread)
-
-
-def _lasts_s(trial: Trial) -> float:
-    return (int(trial.frames.t[-1]) - int(trial.frames.t[0])) / 1e6
-
-
-def _least_s(name: str) -> float:
-    """Return how long a source's recordings must last at least: until its encoders' running ranges are full, s."""
-    ranges = [encoder["running_range"] for encoder in RULE_ENCODERS[name].values() if "running_range" in encoder]
-    return max((one.get("window_s", RunningRange().window_s) for one in ranges), default=0.0)
-
-
-def readable(folder: Path, wanted: Sequence[str]) -> dict[str, Path]:
-    """Return those of the wanted sources of which a folder holds files that can be read, each with its own folder."""
-    return {name: place for name, place in _present(folder, wanted).items() if readings(place, name).trials}
-
-
-def unread(folder: Path, wanted: Sequence[str]) -> dict[str, str]:
-    """Return which files of the wanted sources cannot be read, and why.
+def present(data: Path, wanted: Sequence[str]) -> dict[str, Path]:
+    """Return those of the wanted sources of which a folder holds files, each with its own folder.
 
     Raises
     ------
-    FormatError : none of the sources is there; or there are files, and none can be read (says why, of the first)
     ProblemError : a source that is none
     """
-    here = _present(folder, wanted)
-    if not here:
-        names = ", ".join(SOURCES[name].folder for name in wanted)
-        raise FormatError(f"{folder}: holds no recordings; must have one or more of the folders {names}")
-    files = {file: why for name, place in here.items() for file, why in readings(place, name).unread.items()}
-    refuse(files, strict=not readable(folder, wanted))
-    return files
+    if unknown := [name for name in wanted if name not in SOURCES]:
+        raise ProblemError(f"sources is {unknown[0]!r}: must be one of {', '.join(map(repr, SOURCES))}")
+    folders = {name: data / SOURCES[name].folder for name in wanted}
+    return {name: at for name, at in folders.items() if at.is_dir() and files_of(data_set(name), at)}
+
+
+@lru_cache(maxsize=8)
+def _trials(folder: Path, name: str) -> tuple[Trial, ...]:
+    """Read all of a source's files, once.
+
+    Raises
+    ------
+    FormatError : a file that breaks its format, or a recording too short to be encoded (names it)
+    """
+    ranges = [encoder["running_range"] for encoder in RULE_ENCODERS[name].values() if "running_range" in encoder]
+    least_s = max((one.get("window_s", RunningRange().window_s) for one in ranges), default=0.0)
+    read = []
+    for trial in trials_of(data_set(name), folder):
+        lasts_s = (int(trial.frames.t[-1]) - int(trial.frames.t[0])) / 1e6
+        if lasts_s < least_s:
+            raise FormatError(
+                f"{folder.name}/{trial.name}: lasts {lasts_s:g} s, and levels in shares of the running range want "
+                f"{least_s:g} s"
+            )
+        read.append(_boxed(trial) if name == "plate" else trial)
+    return tuple(read)
 
 
 def fingerprint(folder: Path, name: str) -> str:
-    """Return a short digest of a source's files that can be read: names, sizes and contents."""
+    """Return a short digest of a source's files: names and contents."""
     digest = hashlib.sha256()
     beside = [f for f in sorted(folder.iterdir()) if f.suffix in {".csv", ".let", ".ts"}]
-    for file in [*readings(folder, name).files, *beside]:
+    for file in [*files_of(data_set(name), folder), *beside]:
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()[:16]
 
 
-@dataclass(frozen=True)
-class Encoded:
-    """Pieces of a source, and what the encoder costs.
+class Encoded(NamedTuple):
+    """The pieces of a source, and what the encoder costs."""
 
-    Attributes
-    ----------
-    pieces : dict of Piece by name
-    latency_ms : float
-    levels : int
-        How many levels a sensor has, so that trains can be told apart; 1 where the encoder has none.
-    """
-
-    pieces: dict[str, Piece]
+    pieces: list[Piece]
     latency_ms: float
     levels: int
+    """How many levels a sensor has, so that trains can be told apart; 1 where the encoder has none."""
 
 
 def encoded(folder: Path, name: str, encoder: Mapping[str, Any]) -> Encoded:
@@ -231,14 +171,13 @@ def encoded(folder: Path, name: str, encoder: Mapping[str, Any]) -> Encoded:
 @lru_cache(maxsize=12)
 def _encoded(folder: Path, name: str, encoder: str) -> Encoded:
     built = Encoder.from_json(encoder)
-    make = _footfalls if name == "plate" else _walks
-    pieces = {p.name: p for p in make(folder, name, built)}
+    pieces = (_footfalls if name == "plate" else _walks)(folder, name, built)
     return Encoded(pieces, float(built.latency_ms), len(json.loads(encoder).get("levels", [0])))
 
 
 def _walks(folder: Path, name: str, encoder: Encoder) -> list[Piece]:
     pieces = []
-    for trial in readings(folder, name).trials:
+    for trial in _trials(folder, name):
         if not any(len(times) for times in trial.truth.values()):
             continue
         start, stop = (to_ms(float(t)) for t in (trial.frames.t[0], trial.frames.t[-1]))
@@ -318,7 +257,7 @@ class Cut:
 @lru_cache(maxsize=4)
 def cuts(folder: Path, name: str) -> tuple[Cut, ...]:
     """Cut every footfall, once all footprints are known."""
-    feet = readings(folder, name).trials
+    feet = _trials(folder, name)
     prints = [insole.footprint(t) for t in feet]
     footfalls = []
     for k, trial in enumerate(feet):
@@ -339,15 +278,3 @@ def _boxed(trial: Trial) -> Trial:
 
 def _moved(spikes: Any, by: float, stop: float) -> Any:
     return type(spikes)(np.clip(spikes.times + by, 0.0, stop), spikes.offsets, 0.0, stop)
-
-
-def one_of(name: str, value: object, allowed: Collection[str]) -> str:
-    """Return a word of a closed list.
-
-    Raises
-    ------
-    ProblemError : any other value (names the parameter and the list)
-    """
-    if not isinstance(value, str) or value not in allowed:
-        raise ProblemError(f"{name} is {value!r}: must be one of {', '.join(map(repr, allowed))}")
-    return value
