@@ -132,45 +132,30 @@ def test_topics_fields_and_parts_of_lists_become_sources(tmp_path: Path) -> None
     assert np.array_equal(taxel.open(bag, topic="/skin", field="patches.1.taxels").frames().values[0, 0], [3, 4])
 
 
-@pytest.mark.parametrize("sizes", [(24, 32), (768,), ()])
-def test_a_multi_array_is_its_data_and_says_its_rows_and_columns(
-    sizes: tuple[int, ...], tmp_path: Path, capsys
-) -> None:
-    kind = "std_msgs/msg/Int16MultiArray"
-    sent = [("/raw", kind, 10 * k, None, bags.multi_array(PALMS[k], sizes)) for k in range(3)]
-    sent.append(("/status", "std_msgs/msg/Float64", 40, None, lambda types, _: types["std_msgs/msg/Float64"](1.0)))
-    bag = bags.write(tmp_path / "palm.mcap", sent)
-    [topic] = ros.topics(bag)
-    assert (topic.field, topic.shape) == ("data", sizes if len(sizes) == 2 else (768,))
-    assert "--topic /raw --field data" in call(capsys, "info", bag)[1]
-    frames = taxel.open(bag, topic="/raw").frames()
-    assert frames.array.shape == ((24, 32) if len(sizes) == 2 else (1, 768))
-    assert np.array_equal(frames.values.reshape(3, 24, 32), PALMS[:3])
-    with pytest.raises(FormatError, match="topic /status: no field has more than one number"):
-        taxel.open(bag, topic="/status")
-
-
-@pytest.mark.parametrize(("begins", "name"), mixed([0, 2], ["grasp.bag", "grasp.db3"]))
-def test_multi_arrays_of_every_number_are_listed_and_read_also_after_empty_ones(
-    begins: int, name: str, tmp_path: Path
+@pytest.mark.parametrize(("begins", "sizes", "name"), mixed([0, 2], [(2, 3), (6,), ()], ["grasp.bag", "grasp.db3"]))
+def test_multi_arrays_of_every_number_say_their_rows_and_columns_also_after_empty_ones(
+    begins: int, sizes: tuple[int, ...], name: str, tmp_path: Path
 ) -> None:
     dtypes = (np.int8, np.uint8, np.int16, np.uint16, np.int32, np.uint32, np.int64, np.uint64, np.float32, np.float64)
-    values = RNG.integers(0, 100, (5, 2, 3))
+    values, shape = RNG.integers(0, 100, (5, 2, 3)), (2, 3) if len(sizes) == 2 else (1, 6)
     sent = [
         (f"/{np.dtype(d).name}", bags.array_of(d), 10 * k, None,
-         bags.multi_array(values[k] if k >= begins else [], (2, 3) if k >= begins else (0, 0), d))
+         bags.multi_array(values[k] if k >= begins else [], sizes if k >= begins else (0, 0), d))
         for k in range(5) for d in dtypes
     ]  # fmt: skip
     sent.append(("/never", bags.array_of(np.float64), 60, None, bags.multi_array([], (0,), np.float64)))
     sent.append(("/one", bags.array_of(np.float64), 61, None, bags.multi_array([1], (1,), np.float64)))
     bag = bags.write(tmp_path / name, sent)
     listed = {one.topic: (one.field, one.shape, one.dtype, one.messages) for one in ros.topics(bag)}
-    assert listed == {f"/{(n := np.dtype(d).name)}": ("data", (2, 3), n, 5) for d in dtypes}
+    stated = shape if len(sizes) == 2 else (6,)
+    assert listed == {f"/{(n := np.dtype(d).name)}": ("data", stated, n, 5) for d in dtypes}
     for d in dtypes:
         opened = taxel.open(bag, topic=f"/{np.dtype(d).name}")
-        assert np.array_equal(opened.frames().values, values[begins:])
+        assert np.array_equal(opened.frames().values, values[begins:].reshape(-1, *shape))
         assert opened.frames().unit == ("as sent" if np.dtype(d).kind == "f" else "counts")
         assert opened.counts["messages_of_another_length"] == begins
+    with pytest.raises(FormatError, match="topic /one: no field has more than one number"):
+        taxel.open(bag, topic="/one")
 
 
 def test_messages_of_another_length_are_left_out_and_counted(tmp_path: Path) -> None:

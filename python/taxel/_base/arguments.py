@@ -215,13 +215,13 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str = "") -> N
     return array
 
 
-def refuse_changed(name: str, received: NDArray[Any], array: NDArray[Any], unit: str = "", *, begin: int = 0) -> None:
-    """Refuse values that a conversion of `received` to `array` changed; `begin` is the place of the first in errors."""
+def refuse_changed(name: str, received: NDArray[Any], array: NDArray[Any], unit: str = "") -> None:
+    """Refuse values that a conversion of `received` to `array` changed."""
     if received.dtype == array.dtype:
         return
     index = _first_changed(np.atleast_1d(received), np.atleast_1d(array))
     if index is not None:
-        where = f"[{', '.join(map(str, (begin + index[0], *index[1:])))}]" if received.ndim else ""
+        where = f"[{', '.join(map(str, index))}]" if received.ndim else ""
         found = np.atleast_1d(received)[index]
         value = shown(found.item() if isinstance(found, np.generic) else found)
         expected = {"b": "True or False", "f": "a number that fits"}.get(array.dtype.kind, "a whole number that fits")
