@@ -337,11 +337,11 @@ class Detections(FrozenColumns):
         if header != (*_CSV, *more):
             raise unreadable(f"contains {','.join(table.header) or 'nothing'}; must be {','.join(_CSV)}", file, line=1)
         rows: list[tuple[str, int, int, float]] = []
-        for line, row in table.rows:
+        for line, row in table:
             try:
-                rows.append((row[0], int(row[1]), int(row[2]), float(row[3])))
-                for name, value in zip(more, row[4:], strict=True):
-                    more[name].append(int(value))
+                rows.append((row["label"], int(row["t_us"]), int(row["known_us"]), float(row["slope_mv_per_ms"])))
+                for name, values in more.items():
+                    values.append(int(row[name]))
             except ValueError as error:
                 raise unreadable(f"{error}", file, line=line) from None
         label, t, known, slope = zip(*rows, strict=True) if rows else ((), (), (), ())

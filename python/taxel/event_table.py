@@ -58,14 +58,17 @@ def with_known_columns(table: HeaderTable, separator: str) -> HeaderTable:
             line=1,
         )
     at, of = names.index(time), names.index(label)
+    time, label = header[at], header[of]
     header[at], header[of] = "t_us", "label"
-    rows = [(line, cells) for line, cells in table.rows if cells[of].strip() != _MISSING]
-    for k, (line, cells) in enumerate(rows):
-        us = _number(cells[at], separator) * _US[time]
+    rows = list[tuple[int, tuple[str, ...]]]()
+    for line, cells in table:
+        us = _number(cells[time], separator) * _US[time.lower()]
+        if cells[label].strip() == _MISSING:
+            continue
         if not math.isfinite(us):
-            raise unreadable(f"{table.header[at]} is {shown(cells[at])}; must be a number", table.location, line=line)
-        rows[k] = line, (*cells[:at], str(round(us)), *cells[at + 1 :])
-    return replace(table, header=tuple(header), lines=tuple(rows))
+            raise unreadable(f"{time} is {shown(cells[time])}; must be a number", table.location, line=line)
+        rows.append((line, tuple({**cells, time: str(round(us))}.values())))
+    return replace(table, header=tuple(filter(None, header)), lines=tuple(rows))
 
 
 def are_of_events(names: Sequence[str], *, named: bool = False) -> bool:

@@ -60,23 +60,6 @@ class HeaderTable:
             raise unreadable(f"column {shown(repeated)} appears twice", location, line=line)
         return cls(str(location), header, rows[1:])
 
-    @property
-    def rows(self) -> tuple[tuple[int, tuple[str, ...]], ...]:
-        """The line of each row and its cells, as many as there are columns.
-
-        Check the header first (`has`), so that a file of another kind is reported by its first line.
-
-        Raises
-        ------
-        FormatError : a row of another length than the header (names the line)
-        """
-        return tuple((line, self._row(line, cells)) for line, cells in self.lines)
-
-    def _row(self, line: int, cells: tuple[str, ...]) -> tuple[str, ...]:
-        if len(cells) != len(self.header):
-            raise unreadable(f"{len(cells)} cells; must have {len(self.header)}", self.location, line=line)
-        return cells
-
     def has(self, required: Sequence[str]) -> None:
         """Check that columns of these names are there; there may be others.
 
@@ -94,12 +77,16 @@ class HeaderTable:
     def __iter__(self) -> Iterator[tuple[int, dict[str, str]]]:
         """Yield the line number of each row, and its cells by the names of their columns.
 
+        Check the header first (`has`), so that a file of another kind is reported by its first line.
+
         Raises
         ------
         FormatError : a row of another length than the header, or a cell in a column without a name (names the line)
         """
         for line, cells in self.lines:
-            named = list(zip(self.header, self._row(line, cells), strict=True))
+            if len(cells) != len(self.header):
+                raise unreadable(f"{len(cells)} cells; must have {len(self.header)}", self.location, line=line)
+            named = list(zip(self.header, cells, strict=True))
             stray = next((cell for name, cell in named if not name and cell.strip()), None)
             if stray is not None:
                 raise unreadable(
