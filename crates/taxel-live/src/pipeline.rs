@@ -4,7 +4,7 @@
 //! another thread before it calls a sink (`threads`). While a recording runs, which a disk may delay, there are
 //! separate threads for receiving ([`crate::capture`]), for decoding with recording, and for reading out; reading out
 //! also has its own thread if it is slower than the events arrive. The queues between the threads are bounded, and what
-//! does not fit is counted where it was lost. Viewers receive copies ([`Live::counters`], [`Live::frame`]) and cannot
+//! does not fit is counted where it was lost. Viewers receive copies ([`Handle::counters`], [`Handle::frame`]) and cannot
 //! slow the pipeline.
 
 mod counters;
@@ -19,10 +19,8 @@ mod options;
 mod output;
 mod readout_queue;
 mod readout_stage;
-mod receive_stage;
 mod recent_frames;
 mod record_stage;
-mod recording_switch;
 mod running_readout;
 mod running_recording;
 mod sending;
@@ -36,41 +34,39 @@ mod tare_measurement;
 mod threads;
 mod viewer_queue;
 
-use std::collections::BTreeMap;
 use std::net::SocketAddr;
-use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use std::ops::Deref;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crossbeam_channel as channel;
 use taxel_core::detect::Detector;
-use taxel_core::encode::Tare;
 use taxel_core::wire;
-use taxel_core::{Marker, Stop, problem};
+use taxel_core::{Array, Stop, problem};
 
-use crate::capture::Origin;
 use crate::locked::lock;
 use crate::recording::SourceWriter;
-use crate::{Error, Result};
+use crate::{Error, Result, address};
 pub use counters::{
     Arrival, ArrivalState, BoardState, Counters, DecodingCounts, LiveSummary, ReadoutCounts, SourceCounts,
 };
 pub use frame_input::{LineCounts, ReadLines};
 pub use handle::Handle;
+use handle::verdict;
 pub use options::{LiveOptions, Record, StatedTare};
 use output::DetectionOutput;
 use readout_queue::ReadoutQueue;
-use recording_switch::RecordingSwitch;
 pub use running_readout::ReadoutSetup;
 use running_readout::RunningReadout;
-use running_recording::RunningRecording;
+use running_recording::{RunningRecording, losses};
 use sending::Sending;
 pub use sending::{Destination, Sent};
 use shared::{PipelineShared, PublishedState, RecordingSlot, frame_time, header_of};
 pub use sink::{LineSink, OutputDetection, Sink};
 pub use source::{BoardSource, FrameLayout, FrameSource, NamedSource, SourceKind};
-use sources::{NumberStream, Others, PipelineInput};
+use sources::{Named, NumberStream, PipelineInput};
 use stages::Stages;
 use threads::Threads;
 pub use viewer_queue::{Piece, TaxelChange, ViewerEvents};
@@ -83,11 +79,19 @@ const OUTPUT_WAITING: usize = 1 << 14;
 
 /// A running pipeline from datagrams to detections, from [`Live::start`] until [`Live::stop`].
 pub struct Live {
-    shared: Arc<PipelineShared>,
+    handle: Handle,
     detections: channel::Receiver<OutputDetection>,
     threads: Vec<JoinHandle<()>>,
-    others: Mutex<Others<Live>>,
-    recording_switch: Arc<RecordingSwitch>,
+    /// Other boards and sources of frames, by name, each with its own pipeline.
+    others: Named<Live>,
+}
+
+impl Deref for Live {
+    type Target = Handle;
+
+    fn deref(&self) -> &Handle {
+        &self.handle
+    }
 }
 
 impl Live {
@@ -207,29 +211,18 @@ impl Live {
             frames,
             sources,
             begun: Instant::now(),
-            expected: AtomicU8::new(0),
             ended: AtomicBool::new(false),
         });
         let (queue, detections) = channel::bounded(OUTPUT_WAITING);
         let reads_out = !matches!(readout, ReadoutSetup::None);
-        let begin = |input: PipelineInput, options: LiveOptions, part: Option<SourceWriter>| {
-            Self::begin(input, options, vec![], ReadoutSetup::None, vec![], part)
-        };
-        let others = Others::start(&shared, begin).inspect_err(|_| {
+        let (others, numbers) = Self::begin_others(&shared).inspect_err(|_| {
             // Nothing arrived: the file is removed.
             let recording = lock(&shared.recording.running).take();
             drop(recording.map(|recording| recording.finish(&Counters::default())));
         })?;
-        let pipelines = others.pipelines.iter().map(|(name, live)| (name.clone(), Arc::clone(&live.shared)));
-        let recording_switch = RecordingSwitch::new(Arc::clone(&shared), pipelines.collect(), others.numbers.clone());
-        let others = Mutex::new(others);
-        let mut live = Self {
-            shared: Arc::clone(&shared),
-            detections,
-            threads: vec![],
-            others,
-            recording_switch: Arc::new(recording_switch),
-        };
+        let pipelines = others.iter().map(|(name, live)| (name.clone(), Arc::clone(&live.shared))).collect();
+        let handle = Handle::new(Arc::clone(&shared), pipelines, numbers.into());
+        let mut live = Self { handle, detections, threads: vec![], others };
         // The destinations come first: a device that detections drive must not wait for a callback.
         let sending = sending.into_iter().map(|sending| Box::new(sending) as Box<dyn Sink>);
         let output = DetectionOutput::new(sending.chain(sinks).collect(), queue);
@@ -244,29 +237,48 @@ impl Live {
         Ok(live)
     }
 
-    fn spawn(&mut self, name: &str, job: impl FnOnce() + Send + 'static) -> Result<()> {
-        let thread = std::thread::Builder::new().name(name.to_owned()).spawn(job);
-        self.threads.push(thread.map_err(Error::socket("thread"))?);
-        Ok(())
-    }
-
-    /// The address on which the pipeline receives, with the actual port if 0 was requested; unspecified, with port 0,
-    /// for frames.
-    #[must_use]
-    pub fn address(&self) -> SocketAddr {
-        self.shared.receiver.address()
-    }
-
-    /// Where datagrams come from.
-    #[must_use]
-    pub fn origin(&self) -> &Origin {
-        self.shared.receiver.origin()
+    /// Starts the other sources of a recording: those with a pipeline of their own, and lines of numbers.
+    fn begin_others(shared: &PipelineShared) -> Result<(Named<Self>, Named<Arc<NumberStream>>)> {
+        let (mut pipelines, mut numbers, options) = (vec![], vec![], &shared.options);
+        for NamedSource { name, place, kind } in &shared.sources {
+            let part =
+                lock(&shared.recording.running).as_ref().map(|recording| recording.track_of(name)).transpose()?;
+            let of_pipeline = |array: &Array| LiveOptions {
+                name: name.clone(),
+                kernel_buffer_bytes: options.kernel_buffer_bytes,
+                queue_bytes: options.queue_bytes,
+                gro: options.gro,
+                ..LiveOptions::new(array.clone())
+            };
+            let (input, options) = match kind {
+                SourceKind::Board(board) => {
+                    let of_board = LiveOptions { registers: board.registers, ..of_pipeline(&board.array) };
+                    (PipelineInput::Board(address::of_text(&board.address)?), of_board)
+                }
+                SourceKind::Frames(layout) => {
+                    (PipelineInput::Frames(place.clone(), layout.clone()), of_pipeline(&layout.array))
+                }
+                SourceKind::Numbers(stream) => {
+                    numbers.push((name.clone(), Arc::new(NumberStream::new(name, stream.clone(), part))));
+                    continue;
+                }
+            };
+            let live = Self::begin(input, options, vec![], ReadoutSetup::None, vec![], part)?;
+            pipelines.push((name.clone(), live));
+        }
+        Ok((pipelines, numbers))
     }
 
     /// A handle with the operations that other threads may use while the pipeline runs.
     #[must_use]
     pub fn handle(&self) -> Handle {
-        Handle { shared: Arc::clone(&self.shared), recording_switch: Arc::clone(&self.recording_switch) }
+        self.handle.clone()
+    }
+
+    fn spawn(&mut self, name: &str, job: impl FnOnce() + Send + 'static) -> Result<()> {
+        let thread = std::thread::Builder::new().name(name.to_owned()).spawn(job);
+        self.threads.push(thread.map_err(Error::socket("thread"))?);
+        Ok(())
     }
 
     /// The next detection; `None` after `timeout` without one, or at once if the pipeline has ended.
@@ -311,160 +323,6 @@ impl Live {
         self.shared.published().failed.take().map_or(Ok(()), Err)
     }
 
-    /// Whether the pipeline has ended, by [`Live::end`] or by an error, and everything was processed.
-    #[must_use]
-    pub fn is_over(&self) -> bool {
-        self.shared.ended.load(Ordering::Acquire)
-    }
-
-    /// Counts of what arrived, how it was processed and what was lost, so far.
-    #[must_use]
-    pub fn counters(&self) -> Counters {
-        let others = lock(&self.others);
-        let counted = |(name, live): &(String, Live)| (name.clone(), SourceCounts::Pipeline(Box::new(live.counters())));
-        let numbers = others.numbers.iter().map(|(name, numbers)| (name.clone(), numbers.counts()));
-        Counters { sources: others.pipelines.iter().map(counted).chain(numbers).collect(), ..self.shared.counters() }
-    }
-
-    /// The address on which another board of the recording is received; `None` if there is no such source.
-    #[must_use]
-    pub fn source_address(&self, name: &str) -> Option<SocketAddr> {
-        lock(&self.others).pipelines.iter().find(|(known, _)| known == name).map(|(_, live)| live.address())
-    }
-
-    /// Passes lines of a source of numbers on, as a reader or a program has them.
-    ///
-    /// # Errors
-    ///
-    /// `Core(Problem)` if there is no such source, it has other columns, or has ended; `File` if the disk is full.
-    pub fn lines(&self, name: &str, read: &ReadLines) -> Result<()> {
-        if let Some(numbers) = self.numbers_of(name) {
-            return numbers.push(read);
-        }
-        match self.frames_of(name).as_ref().map(|shared| (shared, &shared.frames)) {
-            Some((shared, Some(frames))) => {
-                shared.record_unread(&read.unread);
-                frames.push(name, read)
-            }
-            _ => Err(problem!("source {name:?}: no source of numbers has this name").into()),
-        }
-    }
-
-    /// Ends a source of frames, of which no more lines can come.
-    pub fn end_lines(&self, name: &str) {
-        if let Some(frames) = self.frames_of(name).as_ref().and_then(|shared| shared.frames.as_ref()) {
-            frames.end();
-        }
-    }
-
-    fn numbers_of(&self, name: &str) -> Option<Arc<NumberStream>> {
-        lock(&self.others).numbers.iter().find(|(known, _)| known == name).map(|(_, n)| Arc::clone(n))
-    }
-
-    /// The pipeline of the source of this name.
-    fn frames_of(&self, name: &str) -> Option<Arc<PipelineShared>> {
-        if self.shared.options.name == name && self.shared.frames.is_some() {
-            return Some(Arc::clone(&self.shared));
-        }
-        lock(&self.others).pipelines.iter().find(|(known, _)| known == name).map(|(_, live)| Arc::clone(&live.shared))
-    }
-
-    /// The layout of the frames of numbers that it receives; `None` of a board.
-    #[must_use]
-    pub fn layout(&self) -> Option<&FrameLayout> {
-        self.shared.frames.as_ref().map(|frames| &frames.layout)
-    }
-
-    /// The options, with the sensor and the name of the source.
-    #[must_use]
-    pub fn options(&self) -> &LiveOptions {
-        &self.shared.options
-    }
-
-    /// The values of frames of numbers, by taxel index, updated ten times a second; empty before the first one.
-    #[must_use]
-    pub fn values(&self) -> Vec<f32> {
-        self.shared.published().values.clone()
-    }
-
-    /// The taxels' values, ticks, by taxel index, updated ten times a second; 0 for a taxel without any event so far.
-    #[must_use]
-    pub fn frame(&self) -> Vec<u16> {
-        self.shared.published().frame.clone()
-    }
-
-    /// The fresh tare, once it is complete.
-    #[must_use]
-    pub fn tare(&self) -> Option<Tare> {
-        self.shared.published().tare.clone()
-    }
-
-    /// The start and stop markers since the last call.
-    #[must_use]
-    pub fn take_markers(&self) -> Vec<Marker> {
-        std::mem::take(&mut self.shared.published().markers)
-    }
-
-    /// Writes a note into the recording, with the current time.
-    ///
-    /// # Errors
-    ///
-    /// `Core(Problem)` if nothing is recorded that can hold notes, `File` if the disk is full.
-    pub fn note(&self, text: &str) -> Result<()> {
-        self.shared.note(text, true)
-    }
-
-    /// Announces that the host set the board to this version of the wire (a write of REG0): datagrams of it are decoded at
-    /// once, not after a second.
-    ///
-    /// # Errors
-    ///
-    /// `Core(Problem)` if there is no such version.
-    pub fn expect_version(&self, version: u8) -> Result<()> {
-        if !(1..=2).contains(&version) {
-            return Err(problem!("wire version {version}: must be 1 or 2").into());
-        }
-        self.shared.expected.store(version, Ordering::Release);
-        Ok(())
-    }
-
-    /// Starts a recording of all sources, which begins with the registers and the taxels' values. A recording that runs
-    /// ends with what arrived before, and is returned: each datagram, and each line, belongs to one of them.
-    ///
-    /// # Errors
-    ///
-    /// `Core(Problem)` if recordings were not to begin later ([`LiveOptions::record_later`]), `File` if the file exists or
-    /// cannot be created: then the one that runs goes on. What ended that one early, or `File` if its end cannot be written.
-    pub fn record(&self, record: &Record) -> Result<Option<LiveSummary>> {
-        if !self.shared.options.record_later {
-            return Err(problem!("record: give record_later at the start to begin recordings later").into());
-        }
-        self.handle().record(record)
-    }
-
-    /// Restarts the recording that runs, where no source has given anything; returns whether it did.
-    #[must_use]
-    pub fn record_again(&self) -> bool {
-        // Read before the recording is locked: counting and recording must not wait for each other.
-        let now = self.shared.counters();
-        lock(&self.shared.recording.running).as_mut().is_some_and(|recording| recording.restart_if_empty(&now))
-    }
-
-    /// As [`Handle::end_recording`].
-    ///
-    /// # Errors
-    ///
-    /// As [`Handle::end_recording`].
-    pub fn end_recording(&self) -> Result<LiveSummary> {
-        self.handle().end_recording()
-    }
-
-    /// As [`Handle::records`].
-    #[must_use]
-    pub fn records(&self) -> bool {
-        self.handle().records()
-    }
-
     /// Requests the end: all threads end once they have processed what arrived; [`Live::stop`] waits for them.
     pub fn end(&self) {
         self.shared.receiver.stop();
@@ -476,42 +334,35 @@ impl Live {
     ///
     /// The error that ended the pipeline early, or `File` if the end of the recording cannot be written.
     pub fn stop(mut self) -> Result<LiveSummary> {
-        let others = lock(&self.others).stop(|board| Ok(board.stop()?.counters));
-        let joined = self.join();
-        let (sources, ended) = others.map_or_else(|error| (BTreeMap::new(), Err(error)), |counts| (counts, Ok(())));
-        let counters = Counters { sources, ..self.shared.counters() };
+        self.numbers.iter().for_each(|(_, numbers)| drop(numbers.record_into(None)));
+        let mut ended = Ok(());
+        for (_, other) in std::mem::take(&mut self.others) {
+            ended = ended.and(other.stop().map(drop));
+        }
+        if let Err(panic) = self.join() {
+            std::panic::resume_unwind(panic);
+        }
+        let counters = self.counters();
         let recording = lock(&self.shared.recording.running).take();
         let path = recording.map_or(Ok(None), |recording| recording.finish(&counters))?;
-        let lost = running_recording::losses(&counters, None);
-        let verdict = recording_switch::verdict(
-            &self.shared.options.name,
-            self.origin(),
-            &counters,
-            counters.nothing_came(),
-            &lost,
-        );
-        joined?;
+        let verdict = verdict(&self.shared, &counters, &losses(&counters, None));
         self.check()?;
         ended?;
         Ok(LiveSummary { counters, verdict, path, tare: self.tare() })
     }
 
-    fn join(&mut self) -> Result<()> {
+    fn join(&mut self) -> std::thread::Result<()> {
         self.end();
+        let mut joined = Ok(());
         for thread in self.threads.drain(..) {
-            if let Err(panic) = thread.join() {
-                std::panic::resume_unwind(panic);
-            }
+            joined = joined.and(thread.join());
         }
-        Ok(())
+        joined
     }
 }
 
 impl Drop for Live {
     fn drop(&mut self) {
-        self.end();
-        for thread in self.threads.drain(..) {
-            let _ = thread.join();
-        }
+        let _ = self.join();
     }
 }

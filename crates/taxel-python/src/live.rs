@@ -249,12 +249,12 @@ impl Live {
 
     /// Takes the values that taxels (column, row) hold for their rest from now on.
     fn zero(&self, py: Python<'_>, taxels: Vec<(u16, u16)>) -> PyResult<Plain<Vec<Zeroing>>> {
-        self.with(py, |pipeline| pipeline.handle().zero(&taxels).map(Plain))
+        self.with(py, |pipeline| pipeline.zero(&taxels).map(Plain))
     }
 
     /// The latest zeroing of each taxel that was zeroed.
     fn zeroed(&self, py: Python<'_>) -> PyResult<Plain<Vec<Zeroing>>> {
-        self.with(py, |pipeline| Ok(Plain(pipeline.handle().latest_zeroings().0)))
+        self.with(py, |pipeline| Ok(Plain(pipeline.latest_zeroings().0)))
     }
 
     /// Writes a note into the recording.
@@ -265,7 +265,10 @@ impl Live {
     /// Records what comes from here on; returns how a recording that ran ended.
     fn record(&self, py: Python<'_>, path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Option<Ended>> {
         let record = to_record(path, compression, overwrite)?;
-        let ended = self.with(py, |pipeline| pipeline.record(&record))?;
+        let ended = self.with(py, |pipeline| match pipeline.options().record_later {
+            true => pipeline.record(&record),
+            false => Err(problem!("record: give record_later at the start to begin recordings later").into()),
+        })?;
         Ok(ended.map(Ended::from))
     }
 
@@ -276,7 +279,7 @@ impl Live {
 
     /// Ends the recording that runs; returns how.
     fn end_recording(&self, py: Python<'_>) -> PyResult<Ended> {
-        self.with(py, Pipeline::end_recording).map(Ended::from)
+        self.with(py, |pipeline| pipeline.end_recording()).map(Ended::from)
     }
 
     /// Whether a recording that `record` began runs.

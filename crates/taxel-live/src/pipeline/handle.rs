@@ -1,36 +1,180 @@
-//! Operations on a running pipeline: receiving its events, recording, announcing what was written to the board.
+//! Operations on a running pipeline: what it counts and holds, its lines of numbers, its recordings, what was written to the board.
 
+use std::collections::BTreeMap;
 use std::net::SocketAddr;
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
 
 use crossbeam_channel as channel;
 use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::rest::ValueSteps;
 use taxel_core::wire::Registers;
+use taxel_core::{Marker, problem};
 
-use super::counters::{Counters, LiveSummary};
+use super::counters::{Counters, LiveSummary, SourceCounts};
+use super::frame_input::{FrameInput, LineCounts, ReadLines};
 use super::options::{LiveOptions, Record};
-use super::recording_switch::RecordingSwitch;
-use super::shared::{PipelineRequest, PipelineShared};
+use super::running_recording::{RunningRecording, losses};
+use super::shared::{EndedRecording, PipelineRequest, PipelineShared};
 use super::sink::OutputDetection;
+use super::source::FrameLayout;
+use super::sources::{NumberStream, losses_of_lines};
 use super::viewer_queue::ViewerEvents;
-use crate::Result;
-use crate::capture::Origin;
+use crate::capture::{FIREWALL, Origin};
 use crate::locked::lock;
+use crate::recording::{RecordingCounts, Verdict};
+use crate::{Error, Result};
 
 /// A handle to a [`Live`](super::Live), for other threads, valid while it runs and after.
 #[derive(Clone)]
 pub struct Handle {
     pub(super) shared: Arc<PipelineShared>,
-    pub(super) recording_switch: Arc<RecordingSwitch>,
+    /// The other sources of its recordings, by name: those with a pipeline of their own, and lines of numbers.
+    pub(super) pipelines: Arc<[(String, Arc<PipelineShared>)]>,
+    pub(super) numbers: Arc<[(String, Arc<NumberStream>)]>,
+    /// Locked while one recording replaces another.
+    replacing: Arc<Mutex<()>>,
 }
 
 impl Handle {
-    /// The options of the [`Live`](super::Live).
+    pub(super) fn new(
+        shared: Arc<PipelineShared>,
+        pipelines: Arc<[(String, Arc<PipelineShared>)]>,
+        numbers: Arc<[(String, Arc<NumberStream>)]>,
+    ) -> Self {
+        Self { shared, pipelines, numbers, replacing: Arc::default() }
+    }
+
+    /// The address on which the pipeline receives, with the actual port if 0 was requested; unspecified, with port 0,
+    /// for frames.
+    #[must_use]
+    pub fn address(&self) -> SocketAddr {
+        self.shared.receiver.address()
+    }
+
+    /// Where datagrams come from.
+    #[must_use]
+    pub fn origin(&self) -> &Origin {
+        self.shared.receiver.origin()
+    }
+
+    /// Whether the pipeline has ended, by [`Live::end`](super::Live::end) or by an error, and everything was processed.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        self.shared.ended.load(Ordering::Acquire)
+    }
+
+    /// Counts of what arrived, how it was processed and what was lost, so far.
+    #[must_use]
+    pub fn counters(&self) -> Counters {
+        let counted = |shared: &PipelineShared| SourceCounts::Pipeline(Box::new(shared.counters()));
+        let pipelines = self.pipelines.iter().map(|(name, shared)| (name.clone(), counted(shared)));
+        let numbers = self.numbers.iter().map(|(name, numbers)| (name.clone(), numbers.counts()));
+        Counters { sources: pipelines.chain(numbers).collect(), ..self.shared.counters() }
+    }
+
+    /// The address on which another board of the recording is received; `None` if there is no such source.
+    #[must_use]
+    pub fn source_address(&self, name: &str) -> Option<SocketAddr> {
+        self.pipelines.iter().find(|(known, _)| known == name).map(|(_, shared)| shared.receiver.address())
+    }
+
+    /// Passes lines of a source of numbers on, as a reader or a program has them.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` if there is no such source, it has other columns, or has ended; `File` if the disk is full.
+    pub fn lines(&self, name: &str, read: &ReadLines) -> Result<()> {
+        if let Some((_, numbers)) = self.numbers.iter().find(|(known, _)| known == name) {
+            return numbers.push(read);
+        }
+        let Some((shared, frames)) = self.frames_of(name) else {
+            return Err(problem!("source {name:?}: no source of numbers has this name").into());
+        };
+        shared.record_unread(&read.unread);
+        frames.push(name, read)
+    }
+
+    /// Ends a source of frames, of which no more lines can come.
+    pub fn end_lines(&self, name: &str) {
+        if let Some((_, frames)) = self.frames_of(name) {
+            frames.end();
+        }
+    }
+
+    /// The pipeline of the source of frames of this name.
+    fn frames_of(&self, name: &str) -> Option<(&PipelineShared, &FrameInput)> {
+        let main = (&self.shared.options.name, &self.shared);
+        let mut all = std::iter::once(main).chain(self.pipelines.iter().map(|(name, shared)| (name, shared)));
+        let (_, shared) = all.find(|(known, shared)| *known == name && shared.frames.is_some())?;
+        Some((shared, shared.frames.as_ref()?))
+    }
+
+    /// The layout of the frames of numbers that it receives; `None` of a board.
+    #[must_use]
+    pub fn layout(&self) -> Option<&FrameLayout> {
+        self.shared.frames.as_ref().map(|frames| &frames.layout)
+    }
+
+    /// The options, with the sensor and the name of the source.
     #[must_use]
     pub fn options(&self) -> &LiveOptions {
         &self.shared.options
+    }
+
+    /// The values of frames of numbers, by taxel index, updated ten times a second; empty before the first one.
+    #[must_use]
+    pub fn values(&self) -> Vec<f32> {
+        self.shared.published().values.clone()
+    }
+
+    /// The taxels' values, ticks, by taxel index, updated ten times a second; 0 for a taxel without any event so far.
+    #[must_use]
+    pub fn frame(&self) -> Vec<u16> {
+        self.shared.published().frame.clone()
+    }
+
+    /// The fresh tare, once it is complete.
+    #[must_use]
+    pub fn tare(&self) -> Option<Tare> {
+        self.shared.published().tare.clone()
+    }
+
+    /// The start and stop markers since the last call.
+    #[must_use]
+    pub fn take_markers(&self) -> Vec<Marker> {
+        std::mem::take(&mut self.shared.published().markers)
+    }
+
+    /// Writes a note into the recording, with the current time.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` if nothing is recorded that can hold notes, `File` if the disk is full.
+    pub fn note(&self, text: &str) -> Result<()> {
+        self.shared.note(text, true)
+    }
+
+    /// Announces that the host set the board to this version of the wire (a write of REG0): datagrams of it are decoded at
+    /// once, not after a second.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` if there is no such version.
+    pub fn expect_version(&self, version: u8) -> Result<()> {
+        if !(1..=2).contains(&version) {
+            return Err(problem!("wire version {version}: must be 1 or 2").into());
+        }
+        self.shared.request(PipelineRequest::Expect(version));
+        Ok(())
+    }
+
+    /// Restarts the recording that runs, where no source has given anything; returns whether it did.
+    #[must_use]
+    pub fn record_again(&self) -> bool {
+        // Read before the recording is locked: counting and recording must not wait for each other.
+        let now = self.shared.counters();
+        lock(&self.shared.recording.running).as_mut().is_some_and(|recording| recording.restart_if_empty(&now))
     }
 
     /// The names of its sources: first the one that is read out, then those that are only recorded.
@@ -40,24 +184,6 @@ impl Handle {
         std::iter::once(&self.shared.options.name).chain(others).cloned().collect()
     }
 
-    /// The address on which it receives; unspecified, with port 0, for frames.
-    #[must_use]
-    pub fn address(&self) -> SocketAddr {
-        self.shared.receiver.address()
-    }
-
-    /// The source of datagrams.
-    #[must_use]
-    pub fn origin(&self) -> &Origin {
-        self.shared.receiver.origin()
-    }
-
-    /// As [`Live::counters`](super::Live::counters).
-    #[must_use]
-    pub fn counters(&self) -> Counters {
-        self.shared.counters()
-    }
-
     /// Unit and steps of the frames of numbers that are received, in which viewers get their values, and the time of the
     /// first one, us; `None` of a board, and before the first frame.
     #[must_use]
@@ -65,12 +191,6 @@ impl Handle {
         let frames = self.shared.frames.as_ref()?;
         let (steps, begin_us) = self.shared.published().steps?;
         Some((frames.layout.unit.clone(), steps, begin_us))
-    }
-
-    /// As [`Live::is_over`](super::Live::is_over).
-    #[must_use]
-    pub fn is_over(&self) -> bool {
-        self.shared.ended.load(Ordering::Acquire)
     }
 
     /// The board's registers, as far as they are known.
@@ -105,14 +225,19 @@ impl Handle {
     }
 
     /// Starts a recording of all sources, which begins with the registers and the taxels' values. A recording that runs
-    /// ends with what arrived before: each datagram, and each line, belongs to one of the two.
+    /// ends with what arrived before, and is returned: each datagram, and each line, belongs to one of the two.
     ///
     /// # Errors
     ///
     /// `File` if the file exists or cannot be created: then the one that runs goes on. What ended that one early, or `File`
     /// if its end cannot be written. `Core(Problem)` if all is over.
     pub fn record(&self, record: &Record) -> Result<Option<LiveSummary>> {
-        self.recording_switch.record(record)
+        if !self.shared.recording.runs.load(Ordering::Acquire) {
+            // Returns an error that ended an earlier recording and that no call has returned yet.
+            self.take_error()?;
+        }
+        let next = RunningRecording::create(record, self.shared.header()?, &self.shared.sources, true)?;
+        self.replace(Some(next))
     }
 
     /// Ends the recording that [`Handle::record`] started; returns its summary, with the file if anything arrived.
@@ -121,13 +246,59 @@ impl Handle {
     ///
     /// What ended it early, or `File` if its end cannot be written; `Core(Problem)` if there is none.
     pub fn end_recording(&self) -> Result<LiveSummary> {
-        self.recording_switch.end()
+        self.replace(None)?.ok_or_else(|| problem!("nothing is recorded").into())
     }
 
     /// Whether a recording that [`Handle::record`] started is running, and was not ended by an error.
     #[must_use]
     pub fn records(&self) -> bool {
-        self.recording_switch.run()
+        let is_sound = |shared: &PipelineShared| lock(&shared.recording.broken).is_none();
+        self.shared.recording.runs.load(Ordering::Acquire) && self.pipelines.iter().all(|(_, shared)| is_sound(shared))
+    }
+
+    /// The error that ended a recording early, of this source or another one.
+    fn take_error(&self) -> Result<()> {
+        let all = self.pipelines.iter().map(|(_, shared)| shared).chain([&self.shared]);
+        let errors: Vec<Error> = all.filter_map(|shared| lock(&shared.recording.broken).take()).collect();
+        errors.into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Ends the running recording and starts the next one, if there is one; returns how the first ended.
+    fn replace(&self, next: Option<RunningRecording>) -> Result<Option<LiveSummary>> {
+        let replacing = lock(&self.replacing);
+        let mut sources = BTreeMap::new();
+        let mut ended = vec![];
+        for (name, board) in self.pipelines.iter() {
+            let header = board.header()?;
+            let track = next.as_ref().map(|next| next.track_of(name)).transpose()?;
+            let part = track.map(|track| RunningRecording::part(track, &header, true));
+            let (recording, counts) = replace_of(board, part)?;
+            let counters = recording
+                .as_ref()
+                .and_then(RunningRecording::since)
+                .map_or_else(Counters::default, |s| counts.since(s));
+            sources.insert(name.clone(), SourceCounts::Pipeline(Box::new(counters)));
+            ended.push((recording, counts));
+        }
+        for (name, numbers) in self.numbers.iter() {
+            let track = next.as_ref().map(|next| next.track_of(name)).transpose()?;
+            sources.insert(name.clone(), numbers.record_into(track));
+        }
+        let (recording, counters) = replace_of(&self.shared, next)?;
+        // The parts must end before the whole recording.
+        for (part, counts) in ended {
+            part.map_or(Ok(None), |part| part.finish(&counts))?;
+        }
+        drop(replacing);
+        self.take_error()?;
+        let Some(recording) = recording else { return Ok(None) };
+        let came =
+            Counters { sources, ..recording.since().map_or_else(Counters::default, |since| counters.since(since)) };
+        let lost = recording.losses(&counters);
+        let path = recording.finish(&counters)?;
+        let verdict = verdict(&self.shared, &came, &lost);
+        let tare = self.shared.published().tare.clone();
+        Ok(Some(LiveSummary { counters: came, verdict, path, tare }))
     }
 
     /// Whether any recording is running, including one from the pipeline's beginning.
@@ -136,21 +307,12 @@ impl Handle {
         lock(&self.shared.recording.running).is_some()
     }
 
-    /// As [`Live::note`](super::Live::note).
-    ///
-    /// # Errors
-    ///
-    /// As [`Live::note`](super::Live::note).
-    pub fn note(&self, text: &str) -> Result<()> {
-        self.shared.note(text, true)
-    }
-
     /// Writes a note about the whole recording, such as the name of a trial: a note without a time, which is not an
     /// event.
     ///
     /// # Errors
     ///
-    /// As [`Live::note`](super::Live::note).
+    /// As [`Handle::note`].
     pub fn entitle(&self, text: &str) -> Result<()> {
         self.shared.note(text, false)
     }
@@ -181,15 +343,57 @@ impl Handle {
         self.shared.published().rest.clone()
     }
 
-    /// The tare that was measured; `None` before the measurement ends, and where none is measured.
-    #[must_use]
-    pub fn measured_tare(&self) -> Option<Tare> {
-        self.shared.published().tare.clone()
-    }
-
     /// Number of zeroings.
     #[must_use]
     pub fn zeroings(&self) -> u64 {
         self.shared.published().zeroings
     }
+}
+
+/// Makes the decoding thread of one board record into `next`, or not at all; returns the recording that ran.
+fn replace_of(shared: &PipelineShared, next: Option<RunningRecording>) -> Result<EndedRecording> {
+    // Set before the request, so that the recording runs for callers that ask after this call.
+    shared.recording.runs.fetch_or(next.is_some(), Ordering::AcqRel);
+    let (answer, ended) = channel::bounded(1);
+    shared.request(PipelineRequest::Record(next.map(Box::new), answer));
+    let ended = shared.wait(&ended).and_then(std::convert::identity);
+    if ended.is_err() {
+        shared.recording.runs.store(lock(&shared.recording.running).is_some(), Ordering::Release);
+    }
+    ended
+}
+
+/// What was lost of each source, or that nothing arrived.
+pub(super) fn verdict(shared: &PipelineShared, counters: &Counters, lost: &RecordingCounts) -> Verdict {
+    let of_source = |counters: &Counters, lost: &RecordingCounts| match &counters.lines {
+        None => lost.verdict().doubtful(counters.decoding.totals.doubtful_after),
+        Some(lines) => Verdict::of_lines(lost).doubtful(lines.faults.doubtful_after_us),
+    };
+    let verdict = if counters.nothing_came() {
+        Verdict::nothing_arrived(nothing_arrived(shared.receiver.origin(), counters.seconds))
+    } else {
+        of_source(counters, lost)
+    };
+    let others = counters.sources.iter().map(|(name, counts)| {
+        let verdict = match counts {
+            SourceCounts::Pipeline(counts) => of_source(counts, &losses(counts, None)),
+            SourceCounts::Numbers(counts) => {
+                let LineCounts { lines, faults, .. } = &**counts;
+                Verdict::of_lines(&losses_of_lines(*lines, faults)).doubtful(faults.doubtful_after_us)
+            }
+        };
+        (name.clone(), verdict)
+    });
+    Verdict::combine(std::iter::once((shared.options.name.clone(), verdict)).chain(others).collect())
+}
+
+/// What a user should check if nothing arrived.
+fn nothing_arrived(origin: &Origin, seconds: f64) -> String {
+    let ask = match origin {
+        Origin::Udp(address) => {
+            format!("does the board send to this machine, and to port {}?{FIREWALL}", address.port())
+        }
+        Origin::Frames(_) => "is the sensor connected, and does it send lines of numbers?".to_owned(),
+    };
+    format!("nothing arrived at {origin} in {seconds:.1} s: {ask}")
 }

@@ -87,7 +87,7 @@ impl DetectionSinks {
         if let Some(recording) = &*lock(&shared.recording.running) {
             // An error that ends only the recording is found, and reported, by the decoding thread too.
             recording
-                .detection(&output)
+                .detection(output.reported_ns, &output.detection)
                 .or_else(|error| if recording.since().is_some() { Ok(()) } else { Err(error) })?;
         }
         lock(&shared.subscribers).retain(|subscriber| {

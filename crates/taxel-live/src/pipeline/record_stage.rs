@@ -67,7 +67,7 @@ impl RecordStage {
     }
 
     pub(super) fn datagrams(&self, batch: &Batch) -> Result<()> {
-        self.with(|recording| recording.datagrams(batch))
+        self.with(|recording| recording.batch(batch))
     }
 
     /// Records a change of the board that a datagram showed: a reset, or another version of the wire.
@@ -91,14 +91,14 @@ impl RecordStage {
     }
 
     pub(super) fn registers(&self, registers: &Registers) -> Result<()> {
-        self.with(|recording| recording.registers(registers))
+        self.with(|recording| recording.registers(now_ns(), registers))
     }
 
     pub(super) fn markers(&self, markers: &[Marker]) -> Result<()> {
         if markers.is_empty() {
             return Ok(());
         }
-        self.with(|recording| markers.iter().try_for_each(|marker| recording.marker(*marker)))
+        self.with(|recording| markers.iter().try_for_each(|marker| recording.marker(now_ns(), *marker)))
     }
 
     /// Whether it is not known yet where the recording begins on the board's clock.
@@ -127,7 +127,7 @@ impl RecordStage {
             *lock(&self.shared.recording.running) = Some(*next);
             // Earlier zeroings remain valid.
             let zeroed: Vec<Zeroing> = self.shared.published().zeroed.values().copied().collect();
-            self.with(|recording| zeroed.iter().try_for_each(|zeroing| recording.zeroing(zeroing)))?;
+            self.with(|recording| zeroed.iter().try_for_each(|zeroing| recording.zeroing(now_ns(), zeroing)))?;
         }
         self.awaits_origin = begins && self.shared.frames.is_none();
         self.shared.recording.runs.store(begins, Ordering::Release);
@@ -137,7 +137,7 @@ impl RecordStage {
     /// Records zeroings; on an error the caller zeroes nothing.
     pub(super) fn zeroings(&self, zeroings: &[Zeroing]) -> Result<()> {
         match &*lock(&self.shared.recording.running) {
-            Some(recording) => zeroings.iter().try_for_each(|zeroing| recording.zeroing(zeroing)),
+            Some(recording) => zeroings.iter().try_for_each(|zeroing| recording.zeroing(now_ns(), zeroing)),
             None => Ok(()),
         }
     }
@@ -151,7 +151,7 @@ impl RecordStage {
         (self.previewed, self.considered) = (Instant::now(), decoded);
         let Some(t_us) = self.shared.published().counters.board.board_us else { return Ok(()) };
         let (columns, values) = (self.shared.options.array.columns, held.frame().collect::<Vec<_>>());
-        self.with(|recording| recording.preview(t_us, columns, &values))
+        self.with(|recording| recording.preview(now_ns(), t_us, columns, &values))
     }
 
     /// Runs ten times a second: writes the tare once it is complete and, once a second, the counts.
@@ -175,7 +175,7 @@ impl RecordStage {
             if let Some(tare) = tare {
                 recording.tare(&tare);
             }
-            if due { recording.counts(&Counters { capture, lines, ..counters }) } else { Ok(()) }
+            if due { recording.write_losses(&Counters { capture, lines, ..counters }) } else { Ok(()) }
         })
     }
 }

@@ -1,31 +1,28 @@
 //! One recording of a [`Live`](super::Live): a file, or this pipeline's part of another one's.
 
+use std::ops::Deref;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use taxel_core::encode::{Tare, Zeroing};
+use taxel_core::problem;
 use taxel_core::wire::Registers;
-use taxel_core::{Marker, problem};
 
 use super::counters::{Counters, DecodingCounts};
 use super::frame_block::read_message;
 use super::options::Record;
-use super::sink::OutputDetection;
 use super::source::NamedSource;
 use crate::Result;
 use crate::capture::Batch;
 use crate::recording::{
-    self, BoardChange, BoardChangeKind, Cause, Counts, FrameEncoding, Header, SourceWriter, Writer, WriterOptions,
-    now_ns,
+    BoardChange, BoardChangeKind, Cause, Counts, FrameEncoding, Header, RecordingCounts, SourceWriter, Writer,
+    WriterOptions, now_ns,
 };
 
 /// One recording, from the beginning of its file to its end. Its times are those of the pipeline's clock.
 pub(super) struct RunningRecording {
     file: RecordingFile,
-    registers: Option<Registers>,
+    begin_registers: Option<Registers>,
     /// Whether its source sends frames.
     has_frames: bool,
-    has_notes: AtomicBool,
     /// The counters at the recording's beginning, if it began while the pipeline was running.
     since: Option<Box<Counters>>,
     /// Where it begins on the board's clock, us, if it began while the pipeline was running and that is known.
@@ -42,9 +39,8 @@ impl RunningRecording {
     fn new(file: RecordingFile, header: &Header, later: bool) -> Self {
         Self {
             file,
-            registers: header.registers,
+            begin_registers: header.registers,
             has_frames: header.frames.is_some(),
-            has_notes: AtomicBool::new(false),
             since: later.then(Box::default),
             origin_us: None,
         }
@@ -84,22 +80,14 @@ impl RunningRecording {
         }
     }
 
-    /// The writer of this pipeline's source.
-    fn track(&self) -> &SourceWriter {
-        match &self.file {
-            RecordingFile::Own(writer, _) => writer,
-            RecordingFile::Part(track) => track,
-        }
-    }
-
     /// Begins with the registers and the values that the taxels hold, at these counters.
     pub(super) fn begin(&mut self, now: &Counters, held: &[u16]) -> Result<()> {
         self.since = Some(Box::new(now.clone()));
-        if let Some(registers) = &self.registers {
-            self.registers(registers)?;
+        if let Some(registers) = &self.begin_registers {
+            self.registers(now_ns(), registers)?;
         }
         // The first frame has all values.
-        if self.has_frames { Ok(()) } else { self.track().held(now_ns(), now.board.board_us, held) }
+        if self.has_frames { Ok(()) } else { self.held(now_ns(), now.board.board_us, held) }
     }
 
     /// Restarts the recording if it is still empty; returns whether it does.
@@ -113,8 +101,7 @@ impl RunningRecording {
 
     /// Whether any source passed data, or bytes that are in no line, or a note was written.
     fn has_content(&self) -> bool {
-        let has_data = matches!(&self.file, RecordingFile::Own(writer, _) if writer.has_content());
-        has_data || self.has_notes.load(Ordering::Relaxed)
+        matches!(&self.file, RecordingFile::Own(writer, _) if writer.has_content())
     }
 
     /// The counters at the recording's beginning, if it began while the pipeline was running; an error then ends only
@@ -132,65 +119,25 @@ impl RunningRecording {
     fn state_origin(&self) -> Result<()> {
         let Some(origin_us) = self.origin_us else { return Ok(()) };
         let change = BoardChangeKind::Clock { origin_us };
-        self.track().board_change(&BoardChange { at_ns: now_ns(), t_us: None, change })
+        self.board_change(&BoardChange { at_ns: now_ns(), t_us: None, change })
     }
 
-    pub(super) fn datagrams(&self, batch: &Batch) -> Result<()> {
+    /// Writes what arrived.
+    pub(super) fn batch(&self, batch: &Batch) -> Result<()> {
         if self.has_frames {
-            return write_frames(self.track(), batch);
+            return write_frames(self, batch);
         }
-        batch.iter().try_for_each(|(d, bytes)| self.track().datagram(d.arrived_ns, d.number, bytes))
-    }
-
-    /// Writes the board's registers, valid from now on.
-    pub(super) fn registers(&self, registers: &Registers) -> Result<()> {
-        self.track().registers(now_ns(), registers)
-    }
-
-    pub(super) fn board_change(&self, change: &BoardChange) -> Result<()> {
-        self.track().board_change(change)
-    }
-
-    pub(super) fn marker(&self, marker: Marker) -> Result<()> {
-        self.track().marker(now_ns(), marker)
-    }
-
-    pub(super) fn detection(&self, output: &OutputDetection) -> Result<()> {
-        self.track().detection(output.reported_ns, &output.detection)
-    }
-
-    /// Sets the rest that is subtracted from the previews from now on.
-    pub(super) fn tare(&self, tare: &Tare) {
-        self.track().tare(tare);
-    }
-
-    pub(super) fn preview(&self, t_us: i64, columns: u16, held: &[u16]) -> Result<()> {
-        self.track().preview(now_ns(), t_us, columns, held)
+        batch.iter().try_for_each(|(d, bytes)| self.datagram(d.arrived_ns, d.number, bytes))
     }
 
     /// Writes the losses so far, which an unfinished recording then states, and once more where it begins.
-    pub(super) fn counts(&self, counters: &Counters) -> Result<()> {
+    pub(super) fn write_losses(&self, counters: &Counters) -> Result<()> {
         self.state_origin()?;
-        self.track().counts(now_ns(), &self.losses(counters))
-    }
-
-    pub(super) fn note(&self, board_us: Option<i64>, text: &str) -> Result<()> {
-        self.has_notes.store(true, Ordering::Relaxed);
-        self.track().note(now_ns(), board_us, text)
-    }
-
-    /// Writes a line of a source of frames that was not read.
-    pub(super) fn unread_line(&self, arrived_ns: i64, text: &str) -> Result<()> {
-        self.track().unread_line(arrived_ns, text)
-    }
-
-    /// Writes a taxel's zeroing by a user.
-    pub(super) fn zeroing(&self, zeroing: &Zeroing) -> Result<()> {
-        self.track().zeroing(now_ns(), zeroing)
+        self.counts(now_ns(), &self.losses(counters))
     }
 
     /// The losses, as the file states them.
-    pub(super) fn losses(&self, counters: &Counters) -> recording::RecordingCounts {
+    pub(super) fn losses(&self, counters: &Counters) -> RecordingCounts {
         losses(counters, self.since())
     }
 
@@ -209,6 +156,18 @@ impl RunningRecording {
     }
 }
 
+/// It writes this pipeline's source.
+impl Deref for RunningRecording {
+    type Target = SourceWriter;
+
+    fn deref(&self) -> &SourceWriter {
+        match &self.file {
+            RecordingFile::Own(writer, _) => writer,
+            RecordingFile::Part(track) => track,
+        }
+    }
+}
+
 /// Writes the frames of a batch of messages.
 fn write_frames(track: &SourceWriter, batch: &Batch) -> Result<()> {
     let mut frame: Vec<f32> = vec![];
@@ -221,16 +180,16 @@ fn write_frames(track: &SourceWriter, batch: &Batch) -> Result<()> {
 }
 
 /// The losses, as recordings state them; with `since`, those since a recording began.
-pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording::RecordingCounts {
+pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> RecordingCounts {
     // Datagrams that wait at the end belong to a later recording.
     let now = since.map_or_else(|| counters.clone(), |begun| counters.since(begun));
     if let Some(lines) = &now.lines {
-        return recording::RecordingCounts {
+        return RecordingCounts {
             received: now.capture.datagrams,
             recorded: now.decoding.decoded,
             dropped_by_queue: now.capture.dropped_by_queue,
             decoder: lines.faults.counts,
-            ..recording::RecordingCounts::default()
+            ..RecordingCounts::default()
         };
     }
     let DecodingCounts { wire, wire_v2, totals, .. } = &now.decoding;
@@ -243,7 +202,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
     let missing = (wire_v2.datagrams > 0).then_some(wire_v2.missing);
     // Version 1 does not number datagrams: a recording with any of it cannot state that none is missing.
     let knows = now.decoding.wire_v2.intact > 0 && now.decoding.wire.bytes == 0;
-    recording::RecordingCounts {
+    RecordingCounts {
         received: now.capture.datagrams,
         recorded: now.decoding.decoded,
         dropped_by_kernel: now.capture.dropped_by_kernel,
@@ -252,7 +211,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
         decoder,
         steps_back: now.decoding.wire_steps.clone(),
         missing: missing.filter(|n| *n > 0 || knows),
-        ..recording::RecordingCounts::default()
+        ..RecordingCounts::default()
     }
 }
 

@@ -1,7 +1,7 @@
 //! State that the threads of a pipeline share: what they publish, and what is requested of them.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
@@ -83,8 +83,6 @@ pub(super) struct PipelineShared {
     pub(super) sending: Vec<Arc<SendingLine>>,
     /// The current registers.
     pub(super) registers: Mutex<Registers>,
-    /// The version of the wire to which the board was newly set; 0 if it was not.
-    pub(super) expected: AtomicU8,
     pub(super) ended: AtomicBool,
 }
 
@@ -97,6 +95,8 @@ pub(super) enum PipelineRequest {
     Record(Option<Box<RunningRecording>>, channel::Sender<Result<EndedRecording>>),
     /// Copies the events for a viewer.
     View(channel::Sender<ViewerEvents>),
+    /// Notes that the board was set to this version of the wire.
+    Expect(u8),
     /// Notes a write of the registers.
     Registers(Registers),
     /// Zeroes these taxels, and returns the zeroings.
@@ -172,7 +172,7 @@ impl PipelineShared {
     pub(super) fn note(&self, text: &str, timed: bool) -> Result<()> {
         let board_us = self.published().counters.board.board_us.filter(|_| timed);
         match &*lock(&self.recording.running) {
-            Some(recording) => recording.note(board_us, text),
+            Some(recording) => recording.note(now_ns(), board_us, text),
             None => Err(taxel_core::problem!("a note is saved only in a recording: record to a .mcap file").into()),
         }
     }

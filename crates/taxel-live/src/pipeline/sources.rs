@@ -2,24 +2,24 @@
 //!
 //! Each source has its own clock, in addition to the host's arrival times, and its own counts.
 
-use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use taxel_core::{Array, problem};
+use taxel_core::problem;
 
-use super::counters::{Counters, SourceCounts};
+use super::counters::SourceCounts;
 use super::frame_input::{FrameInput, LineCounts, ReadLines};
-use super::options::LiveOptions;
 use super::record_stage::COUNTS_EVERY;
-use super::shared::PipelineShared;
-use super::source::{FrameLayout, NamedSource, SourceKind};
+use super::source::FrameLayout;
+use crate::Result;
 use crate::capture::{Receiver, ReceiverOptions};
 use crate::locked::lock;
 use crate::recording::{self, Found, SourceWriter, StreamColumns, StreamFaults, now_ns};
 use crate::text_lines::LeftOut;
-use crate::{Result, address};
+
+/// Sources by their names.
+pub(super) type Named<T> = Vec<(String, T)>;
 
 /// A running stream of numbers.
 pub(super) struct NumberStream {
@@ -162,69 +162,5 @@ impl PipelineInput {
                 (receiver, Some(frames))
             }
         })
-    }
-}
-
-/// The running other sources of a pipeline.
-pub(super) struct Others<Pipeline> {
-    /// Other boards and sources of frames, each with its own pipeline.
-    pub(super) pipelines: Vec<(String, Pipeline)>,
-    pub(super) numbers: Vec<(String, Arc<NumberStream>)>,
-}
-
-impl<Pipeline> Others<Pipeline> {
-    /// Starts the other sources of a pipeline; `begin` starts the pipeline of one.
-    pub(super) fn start(
-        shared: &Arc<PipelineShared>,
-        begin: impl Fn(PipelineInput, LiveOptions, Option<SourceWriter>) -> Result<Pipeline>,
-    ) -> Result<Self> {
-        let (mut others, options) = (Self { pipelines: vec![], numbers: vec![] }, &shared.options);
-        for NamedSource { name, place, kind } in &shared.sources {
-            let part =
-                lock(&shared.recording.running).as_ref().map(|recording| recording.track_of(name)).transpose()?;
-            let of_pipeline = |array: &Array| LiveOptions {
-                name: name.clone(),
-                kernel_buffer_bytes: options.kernel_buffer_bytes,
-                queue_bytes: options.queue_bytes,
-                gro: options.gro,
-                ..LiveOptions::new(array.clone())
-            };
-            let (input, options) = match kind {
-                SourceKind::Board(board) => {
-                    let of_board = LiveOptions { registers: board.registers, ..of_pipeline(&board.array) };
-                    (PipelineInput::Board(address::of_text(&board.address)?), of_board)
-                }
-                SourceKind::Frames(layout) => {
-                    (PipelineInput::Frames(place.clone(), layout.clone()), of_pipeline(&layout.array))
-                }
-                SourceKind::Numbers(stream) => {
-                    let numbers = NumberStream::new(name, stream.clone(), part);
-                    others.numbers.push((name.clone(), Arc::new(numbers)));
-                    continue;
-                }
-            };
-            others.pipelines.push((name.clone(), begin(input, options, part)?));
-        }
-        Ok(others)
-    }
-
-    /// Ends all sources, and returns their counts.
-    pub(super) fn stop(
-        &mut self,
-        end: impl Fn(Pipeline) -> Result<Counters>,
-    ) -> Result<BTreeMap<String, SourceCounts>> {
-        let mut counts = BTreeMap::new();
-        for (name, numbers) in &self.numbers {
-            numbers.record_into(None);
-            counts.insert(name.clone(), numbers.counts());
-        }
-        let mut ended = Ok(());
-        for (name, pipeline) in self.pipelines.drain(..) {
-            match end(pipeline) {
-                Ok(counters) => drop(counts.insert(name, SourceCounts::Pipeline(Box::new(counters)))),
-                Err(error) => ended = ended.and(Err(error)),
-            }
-        }
-        ended.map(|()| counts)
     }
 }

@@ -14,7 +14,6 @@ use super::frame_stage::FrameStage;
 use super::observers::Observers;
 use super::readout_queue::QuietUntil;
 use super::readout_stage::ReadoutStage;
-use super::receive_stage::ReceiveStage;
 use super::record_stage::RecordStage;
 use super::running_readout::RunningReadout;
 use super::running_recording::RunningRecording;
@@ -26,6 +25,9 @@ use crate::recording::now_ns;
 
 /// Longest wait for datagrams when the readout's time does not depend on silence.
 const IDLE: Duration = Duration::from_millis(20);
+
+/// Time for which datagrams are gathered during a recording without a readout: this costs half the CPU.
+const GATHER: Duration = Duration::from_millis(1);
 
 /// Number of events after which they are passed on, even in the middle of a large batch.
 const FLUSH_AFTER: usize = 1 << 14;
@@ -88,7 +90,8 @@ impl SourceStage {
 
 pub(super) struct Stages {
     shared: Arc<PipelineShared>,
-    receive: ReceiveStage,
+    /// The memory of the last batch.
+    batch: Batch,
     source: SourceStage,
     record: RecordStage,
     readout: ReadoutStage,
@@ -105,7 +108,7 @@ impl Stages {
         };
         Self {
             shared: Arc::clone(shared),
-            receive: ReceiveStage::new(Arc::clone(shared)),
+            batch: Batch::new(),
             source,
             record: RecordStage::new(Arc::clone(shared)),
             readout: ReadoutStage::new(readout),
@@ -143,7 +146,7 @@ impl Stages {
             if !self.pending_detections().is_empty() {
                 return Ok(StagesOutcome::Output);
             }
-            if self.receive.is_done() {
+            if self.shared.receiver.is_done() {
                 self.finish()?;
                 return Ok(StagesOutcome::Finished);
             }
@@ -153,28 +156,24 @@ impl Stages {
 
     /// Moves receiving and reading out to separate threads, because a disk may delay this one.
     fn move_to_threads(&mut self) -> Result<()> {
-        self.receive.move_to_thread(self.readout.is_on())?;
+        self.shared.receiver.receive_in_thread(if self.readout.is_on() { Duration::ZERO } else { GATHER })?;
         self.readout.move_to_thread();
         Ok(())
     }
 
     fn step(&mut self) -> Result<()> {
-        let version = self.shared.expected.swap(0, Ordering::AcqRel);
-        if version != 0 {
-            self.expect_version(version)?;
-        }
         let tick = if self.readout.is_on() { self.source.tick() } else { None };
-        let (batch, received) = self.receive.next(tick.unwrap_or(IDLE))?;
-        if received {
+        let mut batch = std::mem::take(&mut self.batch);
+        if self.shared.receiver.receive(&mut batch, tick.unwrap_or(IDLE))? {
             self.process(&batch)?;
             self.record.datagrams(&batch)?;
         } else {
-            let until = self.receive.silent_until();
+            let until = self.shared.receiver.silent_until();
             if let (true, Some(quiet)) = (self.readout.is_on(), self.source.quiet_until(until)) {
                 self.readout.process_silence(&self.shared, quiet);
             }
         }
-        self.receive.reuse(batch);
+        self.batch = batch;
         self.observers.tick(self.source.held());
         self.record.previews(self.source.count(), self.source.held(), false)?;
         if self.observers.frame(self.source.held()) {
@@ -220,7 +219,7 @@ impl Stages {
             SourceStage::Board(decode) => {
                 decode.finish();
                 EventFlow { shared, decode, record, readout, observers }.flush()?;
-                decode.quiet_until(self.receive.silent_until())
+                decode.quiet_until(shared.receiver.silent_until())
             }
             SourceStage::Frames(_) => Some(QuietUntil::Ended),
         };
@@ -238,6 +237,7 @@ impl Stages {
                 PipelineRequest::Record(next, answer) => drop(answer.send(self.switch_recording(next))),
                 PipelineRequest::View(answer) => self.observers.add_viewer(&answer, self.source.held()),
                 PipelineRequest::Zero(taxels, answer) => drop(answer.send(self.zero(&taxels))),
+                PipelineRequest::Expect(version) => self.expect_version(version)?,
                 PipelineRequest::Registers(registers) => {
                     if let SourceStage::Board(decode) = &mut self.source {
                         decode.set_frame_us(registers.frame_us());

@@ -103,10 +103,10 @@ impl Writer {
         Ok(SourceWriter::new(Arc::clone(&self.track.queue), k, source))
     }
 
-    /// Whether any source has passed data, or bytes that are in no line.
+    /// Whether any source has passed data, bytes that are in no line, or a note.
     #[must_use]
     pub fn has_content(&self) -> bool {
-        self.track.queue.lock().written.iter().any(|written| written.data > 0 || written.left_out)
+        self.track.queue.lock().written.iter().any(|written| written.data > 0 || written.is_kept)
     }
 
     /// Ends the recording with the counts of the first source and the verdict; returns the final counts. The other
@@ -226,7 +226,7 @@ impl SourceWriter {
 
     /// States that bytes arrived that are in no line; a recording with nothing else is kept, for their count.
     pub fn note_left_out(&self) {
-        self.queue.lock().written[self.source].left_out = true;
+        self.queue.lock().written[self.source].is_kept = true;
     }
 
     /// Ends this source with the counts of what was received and lost; it must not be used afterwards.
@@ -301,6 +301,7 @@ impl SourceWriter {
     ///
     /// As [`SourceWriter::datagram`].
     pub fn note(&self, at_ns: i64, t_us: Option<i64>, text: &str) -> Result<()> {
+        self.queue.lock().written[self.source].is_kept = true;
         self.push_json(Topic::Notes, at_ns, &log(at_ns, t_us, text))
     }
 

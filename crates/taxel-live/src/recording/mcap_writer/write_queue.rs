@@ -58,8 +58,8 @@ pub(super) struct Written {
     pub(super) data: u64,
     /// Number of other messages whose loss a verdict tells.
     others: BTreeMap<Topic, u64>,
-    /// Whether bytes arrived that are in no line.
-    pub(super) left_out: bool,
+    /// Whether a recording with nothing else is kept, for a note or for bytes that are in no line.
+    pub(super) is_kept: bool,
 }
 
 impl Written {
