@@ -205,7 +205,7 @@ impl Live {
             requests: Mutex::default(),
             requested: AtomicBool::new(false),
             subscribers: Mutex::default(),
-            sending: sending.iter().map(Sending::line).collect(),
+            sending: sending.iter().map(Sending::counts).collect(),
             registers: Mutex::new(options.registers),
             options: options.clone(),
             frames,

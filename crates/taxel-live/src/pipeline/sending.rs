@@ -1,18 +1,19 @@
 //! Sends detections to other programs and machines: each as a line of JSON, by UDP, into a pipe or over a serial line.
 //!
-//! The thread that made a line writes it if the destination has room; other lines wait in a bounded queue for a
-//! separate thread. If a reader is too slow, or absent, lines are lost and counted; the pipeline never waits for it.
+//! The thread that made a line sends it by UDP; other lines wait in a bounded queue for a thread of their destination. If a
+//! reader is too slow, or absent, lines are lost and counted; the pipeline never waits for it.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 use std::fs::File;
 use std::io::{self, ErrorKind, Write};
 use std::net::{SocketAddr, UdpSocket};
 use std::str::FromStr;
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use crossbeam_channel as channel;
 use serde::Serialize;
 use taxel_core::problem;
 
@@ -26,7 +27,7 @@ use crate::{Error, Result};
 /// Capacity of the queue of lines.
 const WAITING: usize = 1024;
 
-/// Interval at which a failed destination is opened again, and the end is checked.
+/// Interval at which a failed destination is opened again.
 const AGAIN: Duration = Duration::from_millis(250);
 
 /// Interval between attempts to write where there was no room.
@@ -75,32 +76,14 @@ pub struct Sent {
     pub trouble: Option<String>,
 }
 
-/// Sends each detection to one destination.
+/// Sends each detection to one destination: a datagram at once, anything else by a thread, which waits for room.
 pub(super) struct Sending {
-    line: Arc<SendingLine>,
+    counts: Arc<Mutex<Sent>>,
+    udp: Option<(UdpSocket, SocketAddr)>,
+    lines: Option<channel::Sender<Vec<u8>>>,
+    /// When the pipeline ended.
+    ended: Arc<OnceLock<Instant>>,
     thread: Option<JoinHandle<()>>,
-}
-
-/// State shared by the thread that makes detections and the one that sends waiting lines.
-pub(super) struct SendingLine {
-    to: Destination,
-    state: Mutex<SendingState>,
-    came: Condvar,
-}
-
-struct SendingState {
-    device: Option<Device>,
-    waiting: VecDeque<Vec<u8>>,
-    /// Number of bytes of the first line that were already written.
-    gone: usize,
-    counts: Sent,
-    closed: bool,
-}
-
-enum Device {
-    Udp(UdpSocket, SocketAddr),
-    File(File),
-    Serial(SerialLine),
 }
 
 impl Sending {
@@ -110,38 +93,47 @@ impl Sending {
     ///
     /// `File` or `Socket` if it cannot be opened, `Core(Problem)` if it is no pipe. A pipe without a reader is no error.
     pub(super) fn open(to: &Destination) -> Result<Self> {
-        let device = Device::open(to)?;
-        let counts = Sent { to: to.to_string(), ..Sent::default() };
-        let state = SendingState { device, waiting: VecDeque::new(), gone: 0, counts, closed: false };
-        let line = Arc::new(SendingLine { to: to.clone(), state: Mutex::new(state), came: Condvar::new() });
-        let sender = Arc::clone(&line);
-        let thread = std::thread::Builder::new().name("taxel-send".to_owned()).spawn(move || sender.send_what_waits());
-        Ok(Self { line, thread: Some(thread.map_err(Error::socket("thread"))?) })
+        let counts = Arc::new(Mutex::new(Sent { to: to.to_string(), ..Sent::default() }));
+        let mut sending = Self { counts, udp: None, lines: None, ended: Arc::default(), thread: None };
+        if let LinePlace::Udp(address) = to.0 {
+            let any = if address.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
+            let socket = UdpSocket::bind(any).and_then(|socket| socket.set_nonblocking(true).map(|()| socket));
+            sending.udp = Some((socket.map_err(Error::socket(to))?, address));
+            return Ok(sending);
+        }
+        let (lines, waiting) = channel::bounded(WAITING);
+        let (counts, ended) = (Arc::clone(&sending.counts), Arc::clone(&sending.ended));
+        let line = WaitingLines { place: to.0.clone(), device: Device::open(&to.0)?, lines: waiting, counts, ended };
+        let thread = std::thread::Builder::new().name("taxel-send".to_owned()).spawn(move || line.send());
+        (sending.lines, sending.thread) = (Some(lines), Some(thread.map_err(Error::socket("thread"))?));
+        Ok(sending)
     }
 
     /// The counts, readable while it runs and afterwards.
-    pub(super) fn line(&self) -> Arc<SendingLine> {
-        Arc::clone(&self.line)
+    pub(super) fn counts(&self) -> Arc<Mutex<Sent>> {
+        Arc::clone(&self.counts)
     }
 }
 
 impl Sink for Sending {
     fn output(&mut self, detection: &OutputDetection) -> io::Result<()> {
-        let mut state = lock(&self.line.state);
-        if state.device.is_none() && matches!(self.line.to.0, LinePlace::File(_)) {
-            // A pipe may have a reader by now; a serial line takes longer to open, which is left to the other thread.
-            state.set_device(Device::open(&self.line.to));
+        let line = detection.line()?;
+        let mut counts = lock(&self.counts);
+        if let Some((socket, address)) = &self.udp {
+            match socket.send_to(&line, *address) {
+                Ok(_) => counts.sent += 1,
+                // The system may refuse one datagram and send the next.
+                Err(error) => {
+                    counts.lost += 1;
+                    counts.trouble = Some(error.to_string());
+                }
+            }
         }
-        if state.device.is_none() || state.waiting.len() >= WAITING {
-            state.counts.lost += 1;
-            return Ok(());
-        }
-        state.waiting.push_back(detection.line()?);
-        if state.waiting.len() == 1 {
-            state.write();
-        }
-        if !state.waiting.is_empty() {
-            self.line.came.notify_one();
+        if let Some(lines) = &self.lines {
+            match lines.try_send(line) {
+                Ok(()) => counts.waiting += 1,
+                Err(_) => counts.lost += 1,
+            }
         }
         Ok(())
     }
@@ -149,118 +141,106 @@ impl Sink for Sending {
 
 impl Drop for Sending {
     fn drop(&mut self) {
-        lock(&self.line.state).closed = true;
-        self.line.came.notify_one();
+        self.ended.get_or_init(Instant::now);
+        self.lines = None;
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
     }
 }
 
-impl SendingLine {
-    /// The counts of the destination so far.
-    pub(super) fn counts(&self) -> Sent {
-        let state = lock(&self.state);
-        Sent { waiting: state.waiting.len() as u64, ..state.counts.clone() }
-    }
-
-    /// The sending thread: writes the lines that wait until there was room for all.
-    fn send_what_waits(&self) {
-        let mut closed_at = None;
-        let mut state = lock(&self.state);
-        loop {
-            if state.closed {
-                let since = *closed_at.get_or_insert_with(Instant::now);
-                if state.waiting.is_empty() || since.elapsed() >= LAST {
-                    state.lose(None);
-                    return;
-                }
-            }
-            let writes = state.device.is_some() && !state.waiting.is_empty();
-            let most = if writes { WRITE_EVERY } else { AGAIN };
-            state = self.came.wait_timeout(state, most).unwrap_or_else(PoisonError::into_inner).0;
-            if state.device.is_none() && !state.closed {
-                // Opening a serial line may take long: the lock is released meanwhile.
-                drop(state);
-                let opened = Device::open(&self.to);
-                state = lock(&self.state);
-                state.set_device(opened);
-            }
-            state.write();
-        }
-    }
+/// The lines that wait for a destination, and the thread's end of it.
+struct WaitingLines {
+    place: LinePlace,
+    device: Option<Device>,
+    lines: channel::Receiver<Vec<u8>>,
+    counts: Arc<Mutex<Sent>>,
+    ended: Arc<OnceLock<Instant>>,
 }
 
-impl SendingState {
-    /// Handles the result of another attempt to open the destination.
-    fn set_device(&mut self, tried: Result<Option<Device>>) {
-        match tried {
-            Ok(Some(device)) => self.device = Some(device),
-            Ok(None) => self.counts.trouble = Some("no reader".to_owned()),
-            Err(error) => self.counts.trouble = Some(error.to_string()),
-        }
-    }
+enum Device {
+    File(File),
+    Serial(SerialLine),
+}
 
-    /// Writes as many lines as fit.
-    fn write(&mut self) {
-        while let (Some(device), Some(line)) = (&mut self.device, self.waiting.front()) {
-            match device.write(&line[self.gone..]) {
-                Ok(0) => return,
-                Ok(n) if self.gone + n < line.len() => self.gone += n,
-                Ok(_) => {
-                    self.waiting.pop_front();
-                    self.gone = 0;
-                    self.counts.sent += 1;
-                }
-                Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => return,
-                Err(error) if matches!(device, Device::Udp(..)) => {
-                    // The system may refuse one datagram and send the next.
-                    self.waiting.pop_front();
-                    self.counts.lost += 1;
-                    self.counts.trouble = Some(error.to_string());
-                }
-                Err(error) => {
-                    let why = if error.kind() == ErrorKind::BrokenPipe {
-                        "the reader has closed the pipe".to_owned()
-                    } else {
-                        error.to_string()
-                    };
-                    self.device = None;
-                    self.lose(Some(why));
-                }
+impl WaitingLines {
+    /// The sending thread, until the end.
+    fn send(mut self) {
+        let mut tried = Instant::now();
+        loop {
+            let line = match self.lines.recv_timeout(AGAIN) {
+                Ok(line) => Some(line),
+                Err(channel::RecvTimeoutError::Timeout) => None,
+                Err(channel::RecvTimeoutError::Disconnected) => return,
+            };
+            // A pipe may have a reader by now; a serial line takes longer to open.
+            let is_pipe = matches!(self.place, LinePlace::File(_));
+            if self.device.is_none() && (is_pipe || tried.elapsed() >= AGAIN) {
+                self.open();
+                tried = Instant::now();
+            }
+            if let Some(line) = line {
+                self.write(&line);
             }
         }
     }
 
-    /// Discards waiting lines: late detections would mislead.
-    fn lose(&mut self, why: Option<String>) {
-        self.counts.lost += self.waiting.len() as u64;
-        self.counts.trouble = why.or(self.counts.trouble.take());
-        self.waiting.clear();
-        self.gone = 0;
+    /// Tries to open the destination again.
+    fn open(&mut self) {
+        match Device::open(&self.place) {
+            Ok(Some(device)) => self.device = Some(device),
+            Ok(None) => lock(&self.counts).trouble = Some("no reader".to_owned()),
+            Err(error) => lock(&self.counts).trouble = Some(error.to_string()),
+        }
+    }
+
+    /// Writes a line, as soon as there is room for it.
+    fn write(&mut self, mut line: &[u8]) {
+        while let Some(device) = &mut self.device {
+            if self.ended.get().is_some_and(|ended| ended.elapsed() >= LAST) {
+                break;
+            }
+            match device.write(line) {
+                Ok(n) if n == line.len() => {
+                    let mut counts = lock(&self.counts);
+                    (counts.sent, counts.waiting) = (counts.sent + 1, counts.waiting - 1);
+                    return;
+                }
+                Ok(n) if n > 0 => line = &line[n..],
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Ok(_) => std::thread::sleep(WRITE_EVERY),
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                    std::thread::sleep(WRITE_EVERY);
+                }
+                Err(error) => {
+                    let closed = error.kind() == ErrorKind::BrokenPipe;
+                    let why = if closed { "the reader has closed the pipe".to_owned() } else { error.to_string() };
+                    (self.device, lock(&self.counts).trouble) = (None, Some(why));
+                }
+            }
+        }
+        // Late detections would mislead: those that wait are lost with this one.
+        let lost = 1 + self.lines.try_iter().count() as u64;
+        let mut counts = lock(&self.counts);
+        (counts.lost, counts.waiting) = (counts.lost + lost, counts.waiting - lost);
     }
 }
 
 impl Device {
     /// Opens a destination; `None` for a pipe without a reader.
-    fn open(to: &Destination) -> Result<Option<Self>> {
-        match &to.0 {
-            LinePlace::Udp(address) => {
-                let any = if address.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
-                let socket = UdpSocket::bind(any).and_then(|s| s.set_nonblocking(true).map(|()| s));
-                Ok(Some(Self::Udp(socket.map_err(Error::socket(to))?, *address)))
-            }
+    fn open(place: &LinePlace) -> Result<Option<Self>> {
+        match place {
             LinePlace::File(path) => Ok(open_to_write(path)?.map(Self::File)),
             LinePlace::Serial(place) | LinePlace::Tcp(place) => {
                 Ok(Some(Self::Serial(SerialLine::open(place, CONNECT)?)))
             }
+            // A datagram is sent at once.
+            LinePlace::Udp(_) => Ok(None),
         }
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self {
-            Self::Udp(socket, address) => socket.send_to(bytes, *address),
             Self::File(file) => file.write(bytes),
             Self::Serial(line) => line.write(bytes),
         }

@@ -17,7 +17,7 @@ use super::frame_input::FrameInput;
 use super::options::LiveOptions;
 use super::readout_queue::ReadoutQueue;
 use super::running_recording::RunningRecording;
-use super::sending::SendingLine;
+use super::sending::Sent;
 use super::sink::OutputDetection;
 use super::source::{FrameLayout, NamedSource};
 use super::viewer_queue::ViewerEvents;
@@ -79,8 +79,8 @@ pub(super) struct PipelineShared {
     pub(super) requested: AtomicBool,
     /// Further queues that get each detection; a slow one misses some.
     pub(super) subscribers: Mutex<Vec<channel::Sender<OutputDetection>>>,
-    /// The destinations of detections.
-    pub(super) sending: Vec<Arc<SendingLine>>,
+    /// The counts of each destination of detections.
+    pub(super) sending: Vec<Arc<Mutex<Sent>>>,
     /// The current registers.
     pub(super) registers: Mutex<Registers>,
     pub(super) ended: AtomicBool,
@@ -147,7 +147,7 @@ impl PipelineShared {
             lines: self.frames.as_ref().map(|frames| frames.counts()),
             decode_latency: decoding,
             report_latency: published.report_latency.quantiles(),
-            sent: self.sending.iter().map(|line| line.counts()).collect(),
+            sent: self.sending.iter().map(|counts| lock(counts).clone()).collect(),
             seconds: self.begun.elapsed().as_secs_f64(),
             ..published.counters.clone()
         }
