@@ -2,7 +2,6 @@
 
 #[cfg(target_os = "linux")]
 mod linux;
-mod portable;
 
 use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
@@ -16,6 +15,10 @@ use crate::{Error, Result};
 
 /// Largest datagram or train, bytes: it must fit in one IPv4 packet with its headers.
 const LARGEST: usize = 65_507;
+
+/// Largest train that the kernel accepts (`UDP_MAX_SEGMENTS` of linux/udp.h before 6.9; later kernels accept twice
+/// that).
+const TRAIN_DATAGRAMS: usize = 64;
 
 /// Counts of what was sent, whether it was received or not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -76,7 +79,12 @@ impl Sender {
         // The socket is not connected: a connected socket returns errors while there is no receiver, and a board sends
         // regardless.
         let calls = SystemCalls::selected()?;
-        let segmenting = segment && calls.split_trains(&socket);
+        let segmenting = segment
+            && match calls {
+                #[cfg(target_os = "linux")]
+                SystemCalls::Linux => linux::splits_trains(&socket),
+                SystemCalls::Portable => false,
+            };
         let counts = SendCounts { segmenting, ..SendCounts::default() };
         Ok(Self { calls, socket, to, train: Vec::with_capacity(LARGEST), segment: 0, datagrams: 0, counts })
     }
@@ -95,7 +103,7 @@ impl Sender {
     pub fn push(&mut self, datagram: &[u8]) -> Result<()> {
         let joins = self.counts.segmenting
             && self.datagrams > 0
-            && self.datagrams < self.calls.train_datagrams()
+            && self.datagrams < TRAIN_DATAGRAMS
             && !datagram.is_empty()
             && datagram.len() <= self.segment
             && self.train.len() == self.datagrams * self.segment
@@ -158,30 +166,13 @@ impl Sender {
         if self.datagrams == 0 {
             return Ok(());
         }
-        self.send().map_err(|error| Error::socket(format!("UDP to {}", self.to))(self.explain(error)))?;
+        self.send().map_err(Error::socket(format!("UDP to {}", self.to)))?;
         self.counts.messages += 1;
         self.counts.datagrams += self.datagrams as u64;
         self.counts.bytes += self.train.len() as u64;
         self.train.clear();
         self.datagrams = 0;
         Ok(())
-    }
-
-    /// Adds to an error that the datagram is too long, if that is its cause.
-    fn explain(&self, error: io::Error) -> io::Error {
-        let bytes = self.segment;
-        if bytes <= LARGEST && !self.calls.refuse_length(&error, self.datagrams > 1) {
-            return error;
-        }
-        let headers = if self.to.is_ipv4() { 28 } else { 48 };
-        let text = match self.calls.path_mtu(self.to) {
-            _ if bytes > LARGEST => format!("a datagram of {bytes} bytes: UDP carries at most {LARGEST}"),
-            Some(mtu) if bytes + headers > mtu => {
-                format!("a datagram of {bytes} bytes, and {headers} of headers, is larger than the path's MTU, {mtu}")
-            }
-            _ => return error,
-        };
-        io::Error::new(io::ErrorKind::InvalidInput, text)
     }
 
     fn send(&mut self) -> io::Result<()> {
@@ -191,44 +182,6 @@ impl Sender {
                 linux::send_train(&self.socket, &mut self.train, self.segment, self.to)
             }
             _ => self.socket.send_to(&self.train, self.to).map(drop),
-        }
-    }
-}
-
-/// What sending by these calls can do; the portable ones send one datagram in a call.
-impl SystemCalls {
-    fn split_trains(self, socket: &UdpSocket) -> bool {
-        match self {
-            #[cfg(target_os = "linux")]
-            Self::Linux => linux::splits_trains(socket),
-            Self::Portable => portable::splits_trains(socket),
-        }
-    }
-
-    /// The largest number of datagrams in a train.
-    fn train_datagrams(self) -> usize {
-        match self {
-            #[cfg(target_os = "linux")]
-            Self::Linux => linux::TRAIN_DATAGRAMS,
-            Self::Portable => portable::TRAIN_DATAGRAMS,
-        }
-    }
-
-    /// Whether an error says that a datagram is too long for its path.
-    fn refuse_length(self, error: &io::Error, is_train: bool) -> bool {
-        match self {
-            #[cfg(target_os = "linux")]
-            Self::Linux => linux::is_too_long(error, is_train),
-            Self::Portable => portable::is_too_long(error, is_train),
-        }
-    }
-
-    /// The path MTU as far as the system tells it, bytes.
-    fn path_mtu(self, to: SocketAddr) -> Option<usize> {
-        match self {
-            #[cfg(target_os = "linux")]
-            Self::Linux => linux::path_mtu(unspecified(to), to),
-            Self::Portable => portable::path_mtu(unspecified(to), to),
         }
     }
 }

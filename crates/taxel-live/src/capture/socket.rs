@@ -10,7 +10,7 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 #[cfg(target_os = "linux")]
-pub(super) use linux::{number, set};
+pub(super) use linux::set;
 
 use super::counts::Totals;
 use super::options::ReceiverOptions;

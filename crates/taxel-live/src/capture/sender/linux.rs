@@ -9,11 +9,7 @@ use std::ptr::from_mut;
 use libc::c_void;
 use socket2::SockAddr;
 
-use crate::capture::socket::{number, set};
-
-/// Largest train that the kernel accepts (`UDP_MAX_SEGMENTS` of linux/udp.h before 6.9; later kernels accept twice
-/// that).
-pub(super) const TRAIN_DATAGRAMS: usize = 64;
+use crate::capture::socket::set;
 
 #[repr(C, align(8))]
 struct Control([u8; 64]);
@@ -47,23 +43,4 @@ pub(super) fn send_train(socket: &UdpSocket, train: &mut [u8], segment: usize, t
         libc::sendmsg(socket.as_raw_fd(), &raw const message, 0)
     };
     if sent < 0 { Err(io::Error::last_os_error()) } else { Ok(()) }
-}
-
-/// Whether the kernel refused a datagram for its length: "message too long", or "invalid argument" for a train on older
-/// kernels.
-pub(super) fn is_too_long(error: &io::Error, is_train: bool) -> bool {
-    match error.raw_os_error() {
-        Some(libc::EMSGSIZE) => true,
-        Some(libc::EINVAL) => is_train,
-        _ => false,
-    }
-}
-
-/// The path MTU as far as the kernel knows it, bytes; the kernel knows it only for connected sockets.
-pub(super) fn path_mtu(from: SocketAddr, to: SocketAddr) -> Option<usize> {
-    let ask = UdpSocket::bind(from).ok()?;
-    ask.connect(to).ok()?;
-    let (level, name) =
-        if to.is_ipv4() { (libc::IPPROTO_IP, libc::IP_MTU) } else { (libc::IPPROTO_IPV6, libc::IPV6_MTU) };
-    usize::try_from(number(ask.as_raw_fd(), level, name).ok()?).ok()
 }

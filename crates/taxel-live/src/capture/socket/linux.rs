@@ -179,15 +179,6 @@ pub(crate) fn set(fd: RawFd, level: c_int, name: c_int, value: &c_int) -> io::Re
     if done == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
 }
 
-/// Reads one of the socket's numbers from the kernel.
-pub(crate) fn number(fd: RawFd, level: c_int, name: c_int) -> io::Result<c_int> {
-    let mut value: c_int = 0;
-    let mut length = size_of::<c_int>() as libc::socklen_t;
-    // SAFETY: `value` and `length` live through the call, and `length` is the size of `value` in bytes.
-    let done = unsafe { libc::getsockopt(fd, level, name, from_mut(&mut value).cast::<c_void>(), &raw mut length) };
-    if done == 0 { Ok(value) } else { Err(io::Error::last_os_error()) }
-}
-
 fn get(fd: RawFd, name: c_int, numbers: &mut [u32]) -> io::Result<()> {
     let mut length = size_of_val(numbers) as libc::socklen_t;
     // SAFETY: `numbers` lives through the call and `length` is its size in bytes; any bytes are valid u32.
