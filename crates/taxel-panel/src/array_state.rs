@@ -228,7 +228,11 @@ impl ArrayState {
     }
 
     /// Updates the sums for a taxel that was `before` ticks above rest and is `now`.
+    #[inline(always)]
     fn change_above_rest(&mut self, taxel: usize, before: u16, now: u16) {
+        if before == now {
+            return;
+        }
         self.load.change(taxel, (before, now), self.floor, &self.centre, &self.weights);
         if let Some(&source) = self.source_of.get(usize::from(self.positions[taxel].0)) {
             self.loads[source].change(taxel, (before, now), self.floor, &self.centre, &self.weights);

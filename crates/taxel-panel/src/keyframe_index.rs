@@ -17,8 +17,7 @@ use taxel_core::Array;
 use taxel_live::Result;
 use taxel_live::pipeline::TaxelChange;
 
-use super::array_state::{Keyframe, RestSource};
-use super::load::Weights;
+use super::array_state::{ArrayState, Keyframe};
 use super::time_columns::TimeColumns;
 
 pub use activity::Activity;
@@ -44,21 +43,6 @@ pub trait FrameSources: Send + Sync {
     /// Whether the frames are numbered, as their times are not known.
     fn numbered(&self) -> bool;
 
-    /// Where the rest of the sources comes from; none where they differ.
-    fn rest_source(&self) -> RestSource;
-
-    /// Steps above rest that count as none in the sums.
-    fn sum_floor(&self) -> u16;
-
-    /// How much each taxel counts in the sum.
-    fn weights(&self) -> &Weights;
-
-    /// Number of the source of each column of the array; empty where there is one, or more than have a curve each.
-    fn source_of(&self) -> Arc<[usize]>;
-
-    /// The most that noise adds up to, ticks above rest: of all sources, and of each.
-    fn noise(&self) -> (u32, Vec<u32>);
-
     /// The sensor of each source.
     fn sensors(&self) -> Vec<Array>;
 
@@ -80,8 +64,13 @@ pub trait KeyframeIndex: Send + Sync {
 
     /// The frames, if it holds such: then the rest is that of the keyframe and of [`Block::rest`], and a change without a
     /// value is a value that is missing from then on.
-    fn frames(&self) -> Option<Arc<dyn FrameSources>> {
+    fn frames(self: Arc<Self>) -> Option<Arc<dyn FrameSources>> {
         None
+    }
+
+    /// The state of the array that begins with a keyframe, in columns of time of this width (us) that take so many bytes.
+    fn state(&self, from: &Keyframe, column_us: i64, time_column_bytes: usize) -> ArrayState {
+        ArrayState::new(self.array(), self.noise_floor(), from, column_us, time_column_bytes)
     }
 
     /// First and last time with events, us; `None` without events.

@@ -1,7 +1,6 @@
 //! A live source: copies of a board's events from the pipeline, and the state and the keyframe index made of them.
 
 use std::collections::VecDeque;
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, Instant};
@@ -18,8 +17,8 @@ use taxel_core::wire::Registers;
 use taxel_live::capture::{FIREWALL, Origin};
 use taxel_live::clock::Offset;
 use taxel_live::locked::lock;
-use taxel_live::pipeline::{Counters, Handle, LiveOptions, OutputDetection, Record, StatedTare, ViewerEvents};
-use taxel_live::recording::{Compression, now_ns};
+use taxel_live::pipeline::{Counters, Handle, LiveOptions, OutputDetection, StatedTare, ViewerEvents};
+use taxel_live::recording::now_ns;
 use taxel_live::{Error, Result};
 
 use crate::array_state::{ArrayState, Keyframe};
@@ -60,7 +59,8 @@ pub struct News {
 
 /// A live source with the state and the keyframe index that its events make, in a thread of its own until it is dropped.
 pub struct LiveSource {
-    handle: Handle,
+    /// What else can be done with the pipeline.
+    pub handle: Handle,
     events: Mutex<ViewerEvents>,
     detections: channel::Receiver<OutputDetection>,
     /// The latest of them, oldest first, for clients that connect later.
@@ -210,11 +210,6 @@ impl LiveSource {
         self.watched.store(watched, Ordering::Relaxed);
     }
 
-    /// The board's registers, as far as the pipeline knows them.
-    pub fn registers(&self) -> Registers {
-        self.handle.registers()
-    }
-
     /// The board holds these registers.
     pub fn announce(&self, registers: Registers) {
         self.handle.announce_registers(registers);
@@ -244,29 +239,6 @@ impl LiveSource {
         Ok(())
     }
 
-    /// Begins to record all sources into a new file.
-    ///
-    /// # Errors
-    ///
-    /// As [`Handle::record`].
-    pub fn record(&self, path: PathBuf) -> Result<()> {
-        self.handle.record(&Record { path, compression: Compression::None, overwrite: false }).map(drop)
-    }
-
-    /// Names the whole recording that runs.
-    ///
-    /// # Errors
-    ///
-    /// As [`Handle::entitle`].
-    pub fn entitle(&self, text: &str) -> Result<()> {
-        self.handle.entitle(text)
-    }
-
-    /// Whether any recording runs.
-    pub fn is_recording(&self) -> bool {
-        self.handle.is_recording()
-    }
-
     /// The `overview` message of the past that can be viewed.
     pub fn overview(&self) -> Value {
         let (start_us, step_us, events) = self.index.event_rate();
@@ -290,7 +262,7 @@ impl LiveSource {
 
     /// The encoders of the readout that runs, with its tare where that is known.
     pub(crate) fn encoders(&self) -> ReadoutEncoders {
-        match self.handle.measured_tare() {
+        match self.handle.tare() {
             Some(tare) => self.encoders.with_tare(&tare),
             None => self.encoders.clone(),
         }

@@ -26,8 +26,8 @@ pub enum Shown {
 impl Shown {
     pub(crate) fn index(&self) -> Arc<dyn KeyframeIndex> {
         match self {
-            Self::Events(index) => Arc::new(Arc::clone(index)),
-            Self::Frames(index) => Arc::new(Arc::clone(index)),
+            Self::Events(index) => index.clone(),
+            Self::Frames(index) => index.clone(),
         }
     }
 
@@ -35,8 +35,8 @@ impl Shown {
     #[must_use]
     pub fn array(&self) -> &Array {
         match self {
-            Self::Events(index) => KeyframeIndex::array(index),
-            Self::Frames(index) => KeyframeIndex::array(index),
+            Self::Events(index) => KeyframeIndex::array(&**index),
+            Self::Frames(index) => KeyframeIndex::array(&**index),
         }
     }
 

@@ -224,12 +224,6 @@ impl TimeColumns {
         self.shape.rows
     }
 
-    /// Number of channels that have a curve each; 0 of any other sensor.
-    #[must_use]
-    pub fn channel_count(&self) -> usize {
-        self.shape.channels
-    }
-
     /// The curves of no time.
     #[must_use]
     pub fn no_curves(&self) -> Curves {

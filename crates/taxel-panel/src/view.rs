@@ -348,7 +348,7 @@ impl View {
             Some(live) => ViewEncoder::requested(&request, &live.encoders())?,
             None => ViewEncoder::requested(&request, &self.recording_encoders)?,
         };
-        let stream = match index.frames() {
+        let stream = match Arc::clone(index).frames() {
             Some(frames) => EncodedSpikes::of_frames(&encoder, &frames, COLUMN_US, None)?.check(),
             None => encoder.encoder.stream(index.array()).map(drop).map_err(Into::into),
         };

@@ -13,7 +13,8 @@ use taxel_core::held::UNKNOWN;
 use taxel_core::rest::Value as _;
 use taxel_core::wire::Registers;
 use taxel_live::clock::BoardClock;
-use taxel_live::recording::Condition;
+use taxel_live::pipeline::Record;
+use taxel_live::recording::{Compression, Condition};
 use taxel_panel::{
     Activity, EventIndex, FrameArea, FrameIndex, FrameRest, FrameSource, Kept, LiveSource, RestSource, Shown, View,
 };
@@ -108,7 +109,7 @@ impl PanelLive {
 
     /// The registers as far as the pipeline knows them.
     fn registers(&self) -> Plain<Registers> {
-        Plain(self.0.registers())
+        Plain(self.0.handle.registers())
     }
 
     /// The board holds these registers (JSON).
@@ -125,17 +126,18 @@ impl PanelLive {
 
     /// Begins to record into a new .mcap.
     fn record(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        enter(py, |_| self.0.record(path))
+        let record = Record { path, compression: Compression::None, overwrite: false };
+        enter(py, |_| self.0.handle.record(&record).map(drop))
     }
 
     /// Names the whole recording that runs.
     fn entitle(&self, py: Python<'_>, text: &str) -> PyResult<()> {
-        enter(py, |_| self.0.entitle(text))
+        enter(py, |_| self.0.handle.entitle(text))
     }
 
     /// Whether any recording runs.
     fn is_recording(&self, py: Python<'_>) -> bool {
-        py.detach(|| self.0.is_recording())
+        py.detach(|| self.0.handle.is_recording())
     }
 
     /// Counts by which unhealthy taxels are found.

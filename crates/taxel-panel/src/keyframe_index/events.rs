@@ -1,7 +1,6 @@
 //! The keyframe index of a recording's events: decoded once, and read on from what the array held before some of them.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use crossbeam_channel as channel;
 use taxel_core::held::UNKNOWN;
@@ -240,7 +239,7 @@ impl Indexing {
     }
 }
 
-impl KeyframeIndex for Arc<EventIndex> {
+impl KeyframeIndex for EventIndex {
     fn array(&self) -> &Array {
         &self.array
     }

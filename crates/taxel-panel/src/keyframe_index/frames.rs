@@ -15,11 +15,9 @@ use taxel_live::pipeline::TaxelChange;
 use super::stepped_frames::SteppedFrames;
 pub use super::stepped_frames::{FrameArea, FrameRest, FrameSource};
 use super::{Block, FrameSources, KeyframeIndex};
-use crate::array_state::{Keyframe, RestSource};
-use crate::load::Coordinates;
-use crate::load::Load;
+use crate::array_state::{ArrayState, Keyframe, RestSource};
 use crate::load::Weights;
-use crate::time_columns::{COLUMN_US, Curves, TimeColumns, column_of};
+use crate::time_columns::{COLUMN_US, TimeColumns, column_of};
 
 /// Memory that the curves may take, bytes.
 const TIME_COLUMN_BYTES: usize = 256 << 20;
@@ -134,15 +132,13 @@ impl FrameIndex {
 
     /// The most that noise adds up to, of each source.
     fn measure_noise(&self) -> Vec<u32> {
-        let at = Coordinates::new(&self.array);
         // Noise is what is above a rest that was found: above a given one any value is load.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let most = |source: &SteppedFrames| match source.rest_source {
             RestSource::Quiet => {
                 let mut noise = FrameNoise::default();
                 for (k, &t) in source.t.iter().enumerate().filter(|&(k, _)| source.knows(k)) {
-                    let curve = self.load(source, k, &at).curve(&at, &self.weights, 0);
-                    noise.take(t, curve.sum.into());
+                    noise.take(t, self.sum(source, k).into());
                 }
                 noise.most(self.floor.into()) as u32
             }
@@ -154,51 +150,54 @@ impl FrameIndex {
     /// The curves of the whole recording; `None` where they take too much memory.
     fn measure(&self) -> Option<TimeColumns> {
         let (first, _) = self.range?;
-        let mut columns = TimeColumns::new(&self.array, TIME_COLUMN_BYTES).with_sources(self.curves());
-        let mut channels = vec![0; columns.channel_count()];
-        let mut loads: Vec<Option<Load>> = vec![None; self.sources.len()];
-        let mut latest = None;
-        let mut during = columns.no_curves();
-        let at = Coordinates::new(&self.array);
-        for &(source, k) in &self.order {
-            let t = self.sources[source].t[k];
-            if let Some(before) = latest.filter(|&before| t > before) {
-                self.extend(&mut during, &loads, &channels, &at);
-                let (now, next) = (column_of(before, COLUMN_US), column_of(t, COLUMN_US));
-                if next > now {
-                    let mut after = columns.no_curves();
-                    self.extend(&mut after, &loads, &channels, &at);
-                    columns.set_curves(now, &during, &after);
-                    during = if t > next * COLUMN_US { after } else { columns.no_curves() };
-                }
-            }
-            latest = Some(t);
-            columns.extend_to(column_of(t, COLUMN_US));
-            loads[source] = self.sources[source].knows(k).then(|| self.load(&self.sources[source], k, &at));
-            if !channels.is_empty() {
-                self.above(&self.sources[source], k).for_each(|(taxel, above)| channels[taxel] = above);
-            }
+        let (keyframe, mut next) = self.keyframe(first.saturating_sub(1));
+        let mut state = self.state(&keyframe, COLUMN_US, TIME_COLUMN_BYTES);
+        while let Some(Block { next: later, changes, rest, .. }) = self.changes(next) {
+            state.apply(&changes);
+            rest.into_iter().for_each(|rest| state.set_rest(rest));
+            next = later;
         }
-        if let Some(last) = latest {
-            self.extend(&mut during, &loads, &channels, &at);
-            columns.set_curves(column_of(last, COLUMN_US), &during, &during);
-        }
-        columns.reach().is_none_or(|(begin, _)| begin <= column_of(first, COLUMN_US)).then_some(columns)
+        state.update_curve();
+        let columns = state.time_columns().clone();
+        let is_whole = columns.reach().is_none_or(|(begin, _)| begin <= column_of(first, COLUMN_US));
+        is_whole.then_some(columns)
     }
 
-    /// Extends curves to a time with these loads of the sources, of which those without values have none.
-    fn extend(&self, curves: &mut Curves, loads: &[Option<Load>], channels: &[u16], at: &Coordinates) {
-        let (noise, each) = FrameSources::noise(self);
-        let curve = |load: &Load, noise: u32| load.curve(at, &self.weights, noise);
-        let (all, of_sources) = curves.sums.split_at_mut(1);
-        if let Some(load) = loads.iter().flatten().copied().reduce(|sum, load| sum.plus(&load)) {
-            all[0].extend(&curve(&load, noise));
+    /// What is shown at a time, us, and the number of the next frame.
+    fn keyframe(&self, t: i64) -> (Keyframe, u64) {
+        let mut held = vec![UNKNOWN; self.array.len()];
+        for source in &self.sources {
+            if let Some(last) = source.until(t).checked_sub(1) {
+                source.taxels(self.array.columns).zip(source.frame(last)).for_each(|(k, &ticks)| held[k] = ticks);
+            }
         }
-        for ((extent, load), &noise) in of_sources.iter_mut().zip(loads).zip(&each) {
-            load.iter().for_each(|load| extent.extend(&curve(load, noise)));
+        let next = self.order.partition_point(|&(source, k)| self.sources[source].t[k] <= t) as u64;
+        let latest = self.keyframe_before(t.saturating_add(1));
+        (Keyframe { latest, events: next, held, rest: self.rest(t), tracked: None }, next)
+    }
+
+    /// A frame; the changes are the cells that differ from the one before.
+    fn changes(&self, number: u64) -> Option<Block> {
+        let frame = usize::try_from(number).ok().and_then(|number| self.order.get(number));
+        let &(source, k) = frame?;
+        let source = &self.sources[source];
+        let before = k.checked_sub(1).map(|before| source.frame(before));
+        let t = source.t[k];
+        let change = |(cell, (taxel, &ticks)): (usize, (usize, &u16))| {
+            let held = before.map_or(UNKNOWN, |before| before[cell]);
+            // A sensor has 2^22 taxels at most (the limits of recordings).
+            #[allow(clippy::cast_possible_truncation)]
+            let change = TaxelChange { t, taxel: taxel as u32, ticks, up: ticks >= held, repaired: false };
+            (change, held != ticks)
+        };
+        let all = || source.taxels(self.array.columns).zip(source.frame(k)).enumerate().map(change);
+        let mut changes: Vec<TaxelChange> = all().filter(|&(_, differs)| differs).map(|(change, _)| change).collect();
+        if changes.is_empty() {
+            // A frame equal to the one before has a time of its own.
+            changes.extend(all().next().map(|(change, _)| change));
         }
-        let widen = |(all, above): (&mut (u16, u16), &u16)| *all = (all.0.min(*above), all.1.max(*above));
-        curves.channels.iter_mut().zip(channels).for_each(widen);
+        let rest = source.rest_moves(k).then(|| self.rest(t));
+        Some(Block { next: number + 1, held: None, changes, rest })
     }
 
     /// The number of sources that have a curve each.
@@ -224,13 +223,37 @@ impl FrameIndex {
         rest
     }
 
-    /// The load of a source's frame.
-    fn load(&self, source: &SteppedFrames, k: usize, at: &Coordinates) -> Load {
-        let mut load = Load::default();
-        for (taxel, above) in self.above(source, k) {
-            load.change(taxel, (0, above), self.floor, at, &self.weights);
+    /// Where the rest of the sources comes from; none where they differ.
+    fn rest_source(&self) -> RestSource {
+        let mut found = self.sources.iter().map(|source| source.rest_source);
+        let first = found.next().unwrap_or(RestSource::None);
+        if found.all(|rest_source| rest_source == first) { first } else { RestSource::None }
+    }
+
+    /// Steps above rest that count as none in the sums. Forces and pressures are summed over all taxels; of others, above a rest that was found, the noise is no load.
+    fn sum_floor(&self) -> u16 {
+        let found = self.sources.iter().any(|source| source.rest_source == RestSource::Quiet);
+        if found { self.floor } else { 0 }
+    }
+
+    /// Number of the source of each column of the array; empty where there is one, or more than have a curve each.
+    fn source_of(&self) -> Arc<[usize]> {
+        if self.curves() == 0 {
+            return Arc::default();
         }
-        load
+        // An empty column between two sources counts as of the one before.
+        let source = |x| self.sources.partition_point(|source| source.area.left <= x).saturating_sub(1);
+        (0..self.array.columns).map(source).collect()
+    }
+
+    /// The sum of a source's frame above rest.
+    fn sum(&self, source: &SteppedFrames, k: usize) -> u32 {
+        let (mut plain, mut weighted) = (0_u64, 0_u64);
+        for (taxel, above) in self.above(source, k) {
+            plain += u64::from(above);
+            weighted = weighted.wrapping_add(self.weights.weighed(taxel, above.into()));
+        }
+        self.weights.sum(plain, weighted)
     }
 }
 
@@ -241,35 +264,6 @@ impl FrameSources for FrameIndex {
 
     fn numbered(&self) -> bool {
         self.number_us.is_some()
-    }
-
-    fn rest_source(&self) -> RestSource {
-        let mut found = self.sources.iter().map(|source| source.rest_source);
-        let first = found.next().unwrap_or(RestSource::None);
-        if found.all(|rest_source| rest_source == first) { first } else { RestSource::None }
-    }
-
-    /// Forces and pressures are summed over all taxels; of others, above a rest that was found, the noise is no load.
-    fn sum_floor(&self) -> u16 {
-        let found = self.sources.iter().any(|source| source.rest_source == RestSource::Quiet);
-        if found { self.floor } else { 0 }
-    }
-
-    fn weights(&self) -> &Weights {
-        &self.weights
-    }
-
-    fn source_of(&self) -> Arc<[usize]> {
-        if self.curves() == 0 {
-            return Arc::default();
-        }
-        // An empty column between two sources counts as of the one before.
-        let source = |x| self.sources.partition_point(|source| source.area.left <= x).saturating_sub(1);
-        (0..self.array.columns).map(source).collect()
-    }
-
-    fn noise(&self) -> (u32, Vec<u32>) {
-        (self.noise.iter().fold(0, |sum: u32, &noise| sum.saturating_add(noise)), self.noise.clone())
     }
 
     fn sensors(&self) -> Vec<Array> {
@@ -314,7 +308,7 @@ impl FrameSources for FrameIndex {
     }
 }
 
-impl KeyframeIndex for Arc<FrameIndex> {
+impl KeyframeIndex for FrameIndex {
     fn array(&self) -> &Array {
         &self.array
     }
@@ -323,8 +317,15 @@ impl KeyframeIndex for Arc<FrameIndex> {
         self.floor
     }
 
-    fn frames(&self) -> Option<Arc<dyn FrameSources>> {
-        Some(Arc::clone(self) as Arc<dyn FrameSources>)
+    fn frames(self: Arc<Self>) -> Option<Arc<dyn FrameSources>> {
+        Some(self)
+    }
+
+    fn state(&self, from: &Keyframe, column_us: i64, time_column_bytes: usize) -> ArrayState {
+        let all = self.noise.iter().fold(0, |sum: u32, &noise| sum.saturating_add(noise));
+        let (floor, noise) = (self.sum_floor(), (all, self.noise.clone()));
+        let state = ArrayState::new(&self.array, self.floor, from, column_us, time_column_bytes);
+        state.of_frames(from, self.rest_source(), floor, &self.weights, self.source_of(), noise)
     }
 
     fn range(&self) -> Option<(i64, i64)> {
@@ -332,39 +333,11 @@ impl KeyframeIndex for Arc<FrameIndex> {
     }
 
     fn open(&self, t: i64) -> Result<(Keyframe, u64)> {
-        let mut held = vec![UNKNOWN; self.array.len()];
-        for source in &self.sources {
-            if let Some(last) = source.until(t).checked_sub(1) {
-                source.taxels(self.array.columns).zip(source.frame(last)).for_each(|(k, &ticks)| held[k] = ticks);
-            }
-        }
-        let next = self.order.partition_point(|&(source, k)| self.sources[source].t[k] <= t) as u64;
-        let latest = self.keyframe_before(t.saturating_add(1));
-        Ok((Keyframe { latest, events: next, held, rest: self.rest(t), tracked: None }, next))
+        Ok(self.keyframe(t))
     }
 
-    /// A frame; the changes are the cells that differ from the one before.
     fn block(&self, number: u64) -> Result<Option<Block>> {
-        let frame = usize::try_from(number).ok().and_then(|number| self.order.get(number));
-        let Some(&(source, k)) = frame else { return Ok(None) };
-        let source = &self.sources[source];
-        let before = k.checked_sub(1).map(|before| source.frame(before));
-        let t = source.t[k];
-        let change = |(cell, (taxel, &ticks)): (usize, (usize, &u16))| {
-            let held = before.map_or(UNKNOWN, |before| before[cell]);
-            // A sensor has 2^22 taxels at most (the limits of recordings).
-            #[allow(clippy::cast_possible_truncation)]
-            let change = TaxelChange { t, taxel: taxel as u32, ticks, up: ticks >= held, repaired: false };
-            (change, held != ticks)
-        };
-        let all = || source.taxels(self.array.columns).zip(source.frame(k)).enumerate().map(change);
-        let mut changes: Vec<TaxelChange> = all().filter(|&(_, differs)| differs).map(|(change, _)| change).collect();
-        if changes.is_empty() {
-            // A frame equal to the one before has a time of its own.
-            changes.extend(all().next().map(|(change, _)| change));
-        }
-        let rest = source.rest_moves(k).then(|| self.rest(t));
-        Ok(Some(Block { next: number + 1, held: None, changes, rest }))
+        Ok(self.changes(number))
     }
 
     fn keyframe_before(&self, t: i64) -> Option<i64> {
@@ -439,7 +412,7 @@ mod tests {
         for round in 0..40 {
             let (left, right) = (drawn(&mut random, round % 2 == 0), drawn(&mut random, round % 2 == 0));
             let index = index(&left, &right);
-            let shared: Arc<dyn KeyframeIndex> = Arc::new(Arc::clone(&index));
+            let shared: Arc<dyn KeyframeIndex> = index.clone();
             let (first, last) = shared.range().unwrap();
             let mut player = Player::open(Arc::clone(&shared), first, ViewOptions::plain(COLUMN_US)).unwrap();
             for _ in 0..10 {
@@ -535,11 +508,9 @@ mod tests {
             });
             let array = Array::new(4, 9, 1.0, "feet").unwrap();
             let index = FrameIndex::new(array, String::new(), None, sources.collect());
-            let at = Coordinates::new(&index.array);
             for k in 0..600 {
-                let load = |foot: usize| index.load(&index.sources[foot], k, &at);
-                let sum = load(0).plus(&load(1)).curve(&at, &index.weights, 0).sum;
-                let (touches, (noise, _)) = (stands(0, k) || stands(1, k), FrameSources::noise(&index));
+                let sum: u32 = index.sources.iter().map(|foot| index.sum(foot, k)).sum();
+                let (touches, noise) = (stands(0, k) || stands(1, k), index.noise.iter().sum::<u32>());
                 assert_eq!(sum > noise, touches, "spread {spread}, frame {k}: {sum} of {noise}");
             }
         }
@@ -576,7 +547,7 @@ mod tests {
     fn steps_go_from_frame_to_frame_both_ways() {
         let left = ((0..9).map(|k| 10_000 * k).collect::<Vec<i64>>(), vec![1.0; 54]);
         let index = index(&left, &(vec![], vec![]));
-        let shared: Arc<dyn KeyframeIndex> = Arc::new(index);
+        let shared: Arc<dyn KeyframeIndex> = index;
         let mut player = Player::open(Arc::clone(&shared), 30_000, ViewOptions::plain(COLUMN_US)).unwrap();
         assert_eq!((player.last_stamp().unwrap(), player.next_stamp().unwrap()), (Some(20_000), Some(40_000)));
         assert_eq!(player.state().events(), 4);

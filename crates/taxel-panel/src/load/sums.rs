@@ -41,18 +41,6 @@ impl Load {
         self.area = self.area + u32::from(now > 0) - u32::from(before > 0);
     }
 
-    /// Both loads together.
-    pub(crate) fn plus(self, more: &Self) -> Self {
-        Self {
-            sum: self.sum + more.sum,
-            weighted: self.weighted + more.weighted,
-            loaded: self.loaded + more.loaded,
-            loaded_x: self.loaded_x + more.loaded_x,
-            loaded_y: self.loaded_y + more.loaded_y,
-            area: self.area + more.area,
-        }
-    }
-
     /// Its curve: the sum, the area and the centre of the loaded taxels; up to a sum of `noise` there is noise alone, and no
     /// centre.
     pub(crate) fn curve(&self, at: &Coordinates, weights: &Weights, noise: u32) -> Curve {

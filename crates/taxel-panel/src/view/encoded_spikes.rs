@@ -1,6 +1,5 @@
 //! Spikes that an encoder makes of the changes or the frames in a view: one by one, and counted by column of time.
 
-use std::collections::VecDeque;
 use std::ops::Range;
 use std::slice;
 use std::sync::Arc;
@@ -11,7 +10,7 @@ use taxel_core::{Array, Error, Events, Hint, Intensities, Spike, SpikeKind, prob
 
 use crate::keyframe_index::FrameSources;
 use crate::readout_encoders::ViewEncoder;
-use crate::time_columns::{SPAN, column_of};
+use crate::time_columns::{TimeColumns, column_of};
 use taxel_core::held::{UNKNOWN, as_events};
 use taxel_live::Result;
 use taxel_live::pipeline::TaxelChange;
@@ -33,8 +32,8 @@ pub(crate) struct EncodedSpikes {
     frames: Option<Arc<dyn FrameSources>>,
     array: Array,
     column_us: i64,
-    /// Spike counts of each row by column of time, ascending by number.
-    columns: VecDeque<(i64, Vec<u8>)>,
+    /// Spike counts of each row by column of time.
+    raster: TimeColumns,
     /// Spikes that no message has had yet.
     pending: Vec<Spike>,
     left_out: usize,
@@ -70,7 +69,7 @@ impl EncodedSpikes {
             frames: None,
             array: array.clone(),
             column_us,
-            columns: VecDeque::new(),
+            raster: TimeColumns::new(array, 0),
             pending: vec![],
             left_out: 0,
             failed: None,
@@ -143,7 +142,7 @@ impl EncodedSpikes {
     /// Drops the spikes of what the encoder begins with, which are none of the view.
     fn forget(&mut self) {
         self.pending.clear();
-        self.columns.clear();
+        self.raster = TimeColumns::new(&self.array, 0);
     }
 
     /// Encodes the next changes; frames are read from their index as time advances.
@@ -207,28 +206,14 @@ impl EncodedSpikes {
         self.pending[from..].sort_by(|a, b| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
         for spike in &self.pending[from..] {
             let column = column_of((spike.t * 1000.0).floor() as i64, self.column_us);
-            let index = match self.columns.back() {
-                Some((last, _)) if *last == column => self.columns.len() - 1,
-                _ => match self.columns.binary_search_by_key(&column, |&(number, _)| number) {
-                    Ok(index) => index,
-                    Err(index) => {
-                        self.columns.insert(index, (column, vec![0; rows]));
-                        index
-                    }
-                },
-            };
             // The trains of a source are assigned to its rows evenly: with one train per taxel that is the row of the taxel.
             let next = self.encoders.partition_point(|encoder| encoder.first <= spike.train);
             let encoder = &self.encoders[next.saturating_sub(1)];
             let row = (spike.train - encoder.first) as usize * encoder.rows / encoder.stream.trains().max(1);
-            let row = row.min(rows - 1);
-            let cell = &mut self.columns[index].1[row];
-            let (ups, downs) = (*cell & 15, *cell >> 4);
-            *cell = if spike.value < 0.0 { ups | (downs + 1).min(15) << 4 } else { (ups + 1).min(15) | downs << 4 };
-        }
-        let last = self.columns.back().map_or(0, |&(number, _)| number);
-        while self.columns.front().is_some_and(|&(number, _)| number <= last - SPAN) {
-            self.columns.pop_front();
+            // A row of the sensor, whose sides fit.
+            let row = row.min(rows - 1) as u16;
+            self.raster.extend_to(column);
+            self.raster.count(column, std::iter::once((row, spike.value >= 0.0)));
         }
         let more = self.pending.len().saturating_sub(MOST);
         self.pending.drain(..more);
@@ -237,15 +222,10 @@ impl EncodedSpikes {
 
     /// Appends these columns of time, one byte per row.
     pub(crate) fn write(&self, columns: Range<i64>, out: &mut Vec<u8>) {
-        let mut index = self.columns.partition_point(|&(number, _)| number < columns.start);
         for column in columns {
-            match self.columns.get(index) {
-                Some((number, rows)) if *number == column => {
-                    out.extend_from_slice(rows);
-                    index += 1;
-                }
-                _ => out.resize(out.len() + usize::from(self.array.rows), 0),
-            }
+            let begin = out.len();
+            out.resize(begin + usize::from(self.array.rows), 0);
+            self.raster.add_raster(column..column + 1, &mut out[begin..]);
         }
     }
 

@@ -77,17 +77,13 @@ impl Player {
         let (keyframe, next) = index.open(t.saturating_sub(before.max(FORGET * COLUMN_US) + LATE_US))?;
         let unit_us = options.column_us.min(COLUMN_US);
         let bytes = TimeColumns::bytes_for(index.array(), span / unit_us);
-        let mut state = ArrayState::new(index.array(), index.noise_floor(), &keyframe, unit_us, bytes);
-        if let Some(frames) = index.frames() {
-            let (rest, floor) = (frames.rest_source(), frames.sum_floor());
-            state = state.of_frames(&keyframe, rest, floor, frames.weights(), frames.source_of(), frames.noise());
-        }
+        let state = index.state(&keyframe, unit_us, bytes);
         let first_of_view = keyframe.latest.map_or(i64::MIN, |latest| column_of(latest + LATE_US, unit_us));
         let history = options.watched.map(|taxel| {
             let held = keyframe.held.get(taxel as usize).copied().unwrap_or(UNKNOWN);
             TaxelHistory::new(taxel, held, keyframe.latest, options.column_us)
         });
-        let spikes = options.encoder.as_ref().map(|encoder| match index.frames() {
+        let spikes = options.encoder.as_ref().map(|encoder| match Arc::clone(&index).frames() {
             Some(frames) => EncodedSpikes::of_frames(encoder, &frames, options.column_us, keyframe.latest),
             None => EncodedSpikes::new(encoder, index.array(), options.column_us, &keyframe.held, keyframe.latest),
         });

@@ -1,6 +1,7 @@
 //! The view of any time of a recording equals that of a full decode.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use taxel_core::board::Board;
@@ -118,7 +119,7 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
             let spiking = ViewEncoder::from(Encoder::ChangeEvents(spiking));
             let options =
                 ViewOptions { watched: Some(WATCHED), encoder: Some(spiking.clone()), ..ViewOptions::plain(us) };
-            let mut player = Player::open(Arc::new(Arc::clone(&index)), t, options).unwrap();
+            let mut player = Player::open(index.clone(), t, options).unwrap();
             let (held, events) = held_at(&changes, t, index.array.len());
             assert_eq!((player.state().held(), player.state().events()), (&held[..], events), "{seed} at {t} us");
             let (columns, raster, curves) = shown(&mut player, us);
@@ -187,7 +188,7 @@ fn steps_go_from_stamp_to_stamp_both_ways_and_through_silence() {
     let mut random = StdRng::seed_from_u64(8);
     for _ in 0..20 {
         let n = random.random_range(1..stamps.len() - 1);
-        let mut player = Player::open(Arc::new(Arc::clone(&index)), stamps[n], ViewOptions::plain(COLUMN_US)).unwrap();
+        let mut player = Player::open(index.clone(), stamps[n], ViewOptions::plain(COLUMN_US)).unwrap();
         assert_eq!(player.last_stamp().unwrap(), Some(stamps[n - 1]));
         assert_eq!(player.next_stamp().unwrap(), Some(stamps[n + 1]));
     }
