@@ -20,7 +20,7 @@ use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
-use super::frames::{FrameEncoding, write_message};
+use super::frames::{FrameEncoding, message};
 use super::grey_preview::GreyScale;
 use super::{BoardChange, Header, OutputFile, RecordingCounts, StreamColumns, Topic, WriterOptions};
 use crate::Result;
@@ -56,7 +56,7 @@ pub struct SourceWriter {
     name: String,
     stream: Option<StreamColumns>,
     /// Number of columns of the array.
-    columns: usize,
+    columns: u16,
     /// Number of cells in the array.
     taxels: usize,
     grey_scale: Mutex<GreyScale>,
@@ -140,7 +140,7 @@ impl SourceWriter {
             source,
             name: header.name.clone(),
             stream: header.stream.clone(),
-            columns: header.array.columns.into(),
+            columns: header.array.columns,
             taxels: header.array.len(),
             grey_scale: Mutex::new(GreyScale::new(header.array.len())),
         }
@@ -160,8 +160,7 @@ impl SourceWriter {
         values: &[f32],
         encoding: FrameEncoding,
     ) -> Result<()> {
-        let mut message = vec![];
-        write_message(&mut message, &self.name, t_us, self.columns, values, encoding);
+        let message = message(&self.name, t_us, self.columns, values, encoding);
         self.queue.push(self.source, Topic::Frames, (arrived_ns, number), &message, QUEUE_BYTES)
     }
 
@@ -183,10 +182,9 @@ impl SourceWriter {
             let (n, taxels) = (values.len(), self.taxels);
             return Err(problem!("{} frames of {taxels} taxels: {n} values", t_us.len()).into());
         }
-        let mut message = vec![];
         let frames = values.chunks_exact(self.taxels).zip(at_ns.iter().zip(t_us)).zip(first..);
         for ((frame, (&at_ns, &t_us)), number) in frames {
-            write_message(&mut message, &self.name, t_us, self.columns, frame, encoding);
+            let message = message(&self.name, t_us, self.columns, frame, encoding);
             self.queue.push(self.source, Topic::Frames, (at_ns, number), &message, BULK_BYTES)?;
         }
         Ok(())
@@ -316,7 +314,7 @@ impl SourceWriter {
         let text = format!("zeroed row {y}, column {x}: its rest was {before_text} and is now {rest:.1} ticks");
         let mut note = log(at_ns, Some(t), &text);
         note["zeroed"] = json!({ "x": x, "y": y, "rest": rest, "before": before });
-        self.grey_scale().zero(usize::from(y) * self.columns + usize::from(x), rest);
+        self.grey_scale().zero(usize::from(y) * usize::from(self.columns) + usize::from(x), rest);
         self.push_json(Topic::Notes, at_ns, &note)
     }
 
@@ -391,7 +389,7 @@ impl SourceWriter {
         }
         let above: Vec<f64> = above.iter().map(|&v| if v.is_finite() { f64::from(v).max(0.0) } else { 0.0 }).collect();
         let (bytes, full) = self.grey_scale().white().grey(at.1, &above, least);
-        self.push_grey(at, self.columns, &bytes, json!({ "rest": rest, "full": full, "unit": unit }))
+        self.push_grey(at, self.columns.into(), &bytes, json!({ "rest": rest, "full": full, "unit": unit }))
     }
 
     /// Adds a preview to the channel; `at` is its time in the file, ns, and the board's, us.
