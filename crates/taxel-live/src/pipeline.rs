@@ -14,7 +14,6 @@ mod frame_input;
 mod frame_stage;
 mod frame_times;
 mod handle;
-mod observers;
 mod options;
 mod output;
 mod readout_queue;

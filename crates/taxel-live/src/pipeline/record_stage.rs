@@ -8,13 +8,12 @@ use std::time::{Duration, Instant};
 use taxel_core::Marker;
 use taxel_core::encode::Zeroing;
 use taxel_core::held::Held;
-use taxel_core::wire::{DatagramInfo, Registers};
+use taxel_core::wire::DatagramInfo;
 
 use super::counters::Counters;
 use super::running_recording::RunningRecording;
 use super::shared::{EndedRecording, PipelineShared};
 use crate::Result;
-use crate::capture::Batch;
 use crate::locked::lock;
 use crate::recording::{BoardChange, BoardChangeKind, LOW_RATE_EVERY, now_ns};
 
@@ -52,7 +51,7 @@ impl RecordStage {
 
     /// Calls `work` with the running recording. An error ends the pipeline if the recording was requested at its start,
     /// and only the recording if it began later.
-    fn with(&self, work: impl FnOnce(&mut RunningRecording) -> Result<()>) -> Result<()> {
+    pub(super) fn with(&self, work: impl FnOnce(&mut RunningRecording) -> Result<()>) -> Result<()> {
         let mut slot = lock(&self.shared.recording.running);
         let Some(recording) = &mut *slot else { return Ok(()) };
         match work(recording) {
@@ -64,10 +63,6 @@ impl RecordStage {
             }
             outcome => outcome,
         }
-    }
-
-    pub(super) fn datagrams(&self, batch: &Batch) -> Result<()> {
-        self.with(|recording| recording.batch(batch))
     }
 
     /// Records a change of the board that a datagram showed: a reset, or another version of the wire.
@@ -82,16 +77,6 @@ impl RecordStage {
             }
             Ok(())
         })
-    }
-
-    /// Records that the board was set to another version of the wire; `t_us` is its latest time.
-    pub(super) fn asked_for_version(&self, version: u8, t_us: Option<i64>) -> Result<()> {
-        let change = BoardChangeKind::Wire { version, asked: true };
-        self.with(|recording| recording.board_change(&BoardChange { at_ns: now_ns(), t_us, change }))
-    }
-
-    pub(super) fn registers(&self, registers: &Registers) -> Result<()> {
-        self.with(|recording| recording.registers(now_ns(), registers))
     }
 
     pub(super) fn markers(&self, markers: &[Marker]) -> Result<()> {

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use crossbeam_channel as channel;
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
 use taxel_core::held::{Held, UNKNOWN};
@@ -11,17 +12,17 @@ use taxel_core::problem;
 
 use super::decode_stage::DecodeStage;
 use super::frame_stage::FrameStage;
-use super::observers::Observers;
 use super::readout_queue::QuietUntil;
 use super::readout_stage::ReadoutStage;
 use super::record_stage::RecordStage;
 use super::running_readout::RunningReadout;
 use super::running_recording::RunningRecording;
 use super::shared::{EndedRecording, PipelineRequest, PipelineShared};
+use super::viewer_queue::{ViewerEvents, ViewerQueue, viewer_queue};
 use crate::Result;
 use crate::capture::Batch;
 use crate::locked::lock;
-use crate::recording::now_ns;
+use crate::recording::{BoardChange, BoardChangeKind, LOW_RATE_EVERY, now_ns};
 
 /// Longest wait for datagrams when the readout's time does not depend on silence.
 const IDLE: Duration = Duration::from_millis(20);
@@ -95,7 +96,8 @@ pub(super) struct Stages {
     source: SourceStage,
     record: RecordStage,
     readout: ReadoutStage,
-    observers: Observers,
+    viewers: Vec<ViewerQueue>,
+    published_frame: Instant,
     begun: bool,
 }
 
@@ -112,7 +114,8 @@ impl Stages {
             source,
             record: RecordStage::new(Arc::clone(shared)),
             readout: ReadoutStage::new(readout),
-            observers: Observers::new(Arc::clone(shared)),
+            viewers: vec![],
+            published_frame: Instant::now(),
             begun: false,
         }
     }
@@ -166,7 +169,7 @@ impl Stages {
         let mut batch = std::mem::take(&mut self.batch);
         if self.shared.receiver.receive(&mut batch, tick.unwrap_or(IDLE))? {
             self.process(&batch)?;
-            self.record.datagrams(&batch)?;
+            self.record.with(|recording| recording.batch(&batch))?;
         } else {
             let until = self.shared.receiver.silent_until();
             if let (true, Some(quiet)) = (self.readout.is_on(), self.source.quiet_until(until)) {
@@ -174,13 +177,11 @@ impl Stages {
             }
         }
         self.batch = batch;
-        self.observers.tick(self.source.held());
+        self.viewers.retain_mut(|queue| queue.tick(self.source.held()));
         self.record.previews(self.source.count(), self.source.held(), false)?;
-        if self.observers.frame(self.source.held()) {
-            if let SourceStage::Frames(frames) = &self.source {
-                let mut published = self.shared.published();
-                frames.last().clone_into(&mut published.values);
-            }
+        if self.published_frame.elapsed() >= LOW_RATE_EVERY {
+            self.published_frame = Instant::now();
+            self.publish_frame();
             self.record.progress()?;
         }
         if self.shared.requested.swap(false, Ordering::Acquire) {
@@ -189,13 +190,21 @@ impl Stages {
         Ok(())
     }
 
+    fn publish_frame(&self) {
+        let mut published = self.shared.published();
+        published.frame.iter_mut().zip(self.source.held().frame()).for_each(|(shown, value)| *shown = value);
+        if let SourceStage::Frames(frames) = &self.source {
+            frames.last().clone_into(&mut published.values);
+        }
+    }
+
     fn process(&mut self, batch: &Batch) -> Result<()> {
-        let Self { shared, source, record, readout, observers, .. } = self;
+        let Self { shared, source, record, readout, viewers, .. } = self;
         match source {
-            SourceStage::Board(decode) => EventFlow { shared, decode, record, readout, observers }.decode(batch),
+            SourceStage::Board(decode) => EventFlow { shared, decode, record, readout, viewers }.decode(batch),
             SourceStage::Frames(stage) => {
                 if stage.push(batch) {
-                    observers.reset(stage.held());
+                    viewers.iter_mut().for_each(|queue| queue.reset(stage.held()));
                 }
                 {
                     let (now, mut published) = (now_ns(), shared.published());
@@ -204,7 +213,7 @@ impl Stages {
                     published.steps = stage.steps();
                 }
                 let (frames, changes, held) = stage.parts();
-                observers.events(changes, held);
+                viewers.iter_mut().for_each(|queue| queue.push(changes, held));
                 readout.push_frames(shared, frames);
                 stage.clear();
                 Ok(())
@@ -214,17 +223,17 @@ impl Stages {
 
     /// Ends the input: passes on what waits in each stage.
     fn finish(&mut self) -> Result<()> {
-        let Self { shared, source, record, readout, observers, .. } = self;
+        let Self { shared, source, record, readout, viewers, .. } = self;
         let quiet = match source {
             SourceStage::Board(decode) => {
                 decode.finish();
-                EventFlow { shared, decode, record, readout, observers }.flush()?;
+                EventFlow { shared, decode, record, readout, viewers }.flush()?;
                 decode.quiet_until(shared.receiver.silent_until())
             }
             SourceStage::Frames(_) => Some(QuietUntil::Ended),
         };
         self.record.previews(self.source.count(), self.source.held(), true)?;
-        self.observers.tick(self.source.held());
+        self.viewers.retain_mut(|queue| queue.tick(self.source.held()));
         self.readout.close(&self.shared, quiet.filter(|_| self.readout.is_on()));
         self.answer()
     }
@@ -235,7 +244,7 @@ impl Stages {
         for request in requests {
             match request {
                 PipelineRequest::Record(next, answer) => drop(answer.send(self.switch_recording(next))),
-                PipelineRequest::View(answer) => self.observers.add_viewer(&answer, self.source.held()),
+                PipelineRequest::View(answer) => self.add_viewer(&answer),
                 PipelineRequest::Zero(taxels, answer) => drop(answer.send(self.zero(&taxels))),
                 PipelineRequest::Expect(version) => self.expect_version(version)?,
                 PipelineRequest::Registers(registers) => {
@@ -243,11 +252,21 @@ impl Stages {
                         decode.set_frame_us(registers.frame_us());
                     }
                     self.expect_version(registers.wire_version)?;
-                    self.record.registers(&registers)?;
+                    self.record.with(|recording| recording.registers(now_ns(), &registers))?;
                 }
             }
         }
         Ok(())
+    }
+
+    /// Adds a viewer of the events, if it is still there.
+    fn add_viewer(&mut self, answer: &channel::Sender<ViewerEvents>) {
+        let counters = &self.shared.published().counters;
+        let (latest, events) = (counters.board.board_us, counters.decoding.events);
+        let (queue, events) = viewer_queue(&self.shared.options.array, self.source.held(), latest, events);
+        if answer.send(events).is_ok() {
+            self.viewers.push(queue);
+        }
     }
 
     fn switch_recording(&mut self, next: Option<Box<RunningRecording>>) -> Result<EndedRecording> {
@@ -268,7 +287,8 @@ impl Stages {
         if let SourceStage::Board(decode) = &mut self.source
             && decode.expect(version)
         {
-            self.record.asked_for_version(version, decode.latest())?;
+            let (change, t_us) = (BoardChangeKind::Wire { version, asked: true }, decode.latest());
+            self.record.with(|recording| recording.board_change(&BoardChange { at_ns: now_ns(), t_us, change }))?;
         }
         Ok(())
     }
@@ -318,7 +338,7 @@ struct EventFlow<'a> {
     decode: &'a mut DecodeStage,
     record: &'a mut RecordStage,
     readout: &'a mut ReadoutStage,
-    observers: &'a mut Observers,
+    viewers: &'a mut Vec<ViewerQueue>,
 }
 
 impl EventFlow<'_> {
@@ -329,7 +349,7 @@ impl EventFlow<'_> {
                 let later = self.decode.split_at_reset(&mut decoded);
                 self.flush()?;
                 self.decode.reset(&later);
-                self.observers.reset(self.decode.held());
+                self.viewers.iter_mut().for_each(|queue| queue.reset(self.decode.held()));
                 if decoded.info.version == 2 {
                     self.readout.reset();
                 }
@@ -355,7 +375,7 @@ impl EventFlow<'_> {
     /// Passes the decoded events to the other stages.
     fn flush(&mut self) -> Result<()> {
         self.decode.update_held();
-        self.observers.events(self.decode.events(), self.decode.held());
+        self.viewers.iter_mut().for_each(|queue| queue.push(self.decode.events(), self.decode.held()));
         self.record.markers(&self.decode.events().markers)?;
         {
             let mut published = self.shared.published();
