@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
 from numpy.typing import NDArray
 
-from taxel._base.arguments import instance
+from taxel._base.arguments import instance, number
 from taxel._base.messages import escaped
 from taxel._base.times import beginning_us, begun
 from taxel.frames import Frames
@@ -132,7 +132,7 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
     ['contact area (mm2)', 'peak (kPa)', 'sum (kPa)', 'centre (mm)']
     """
     nowhere = np.full(instance("frames", frames, Frames).array.rows * frames.array.columns, np.nan)
-    series = Series.from_frames(frames, above, Rest("none", nowhere))
+    series = Series.from_frames(frames, number("above", above), Rest("none", nowhere))
     if figure is None:
         figure = plt.figure(figsize=(11, 6), layout="constrained")
     begin_us = beginning_us(frames.t)
