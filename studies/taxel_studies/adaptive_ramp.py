@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.simulate.circuit import AdaptiveRamp, Converter, Fabric, VirtualGround
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, grid, logarithmic, results
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, grid, logarithmic, results, subplots
 
 WHERE = "thesis 4.3.2"
 PROTOCOL = (
@@ -189,9 +189,8 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     ]
 
 
-def tables(p: Parameters, summary: Summary) -> list[Table]:
+def tables(_p: Parameters, summary: Summary) -> list[Table]:
     """List all converters."""
-    del p
     return [
         Table(
             "By ramp",
@@ -219,8 +218,7 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw the two errors against each other, and a tap as the adaptive ramp and the gentlest read it."""
-    figure = Figure(figsize=(11, 3.8), layout="constrained")
-    left, middle, right = figure.subplots(1, 3)
+    figure, (left, middle, right) = subplots(11, 3.8, 1, 3)
     for name, one in summary["ramps"].items():
         own = name == "adaptive"
         at = (one["rms_mv"]["fine"], one["rms_mv"]["gross"])

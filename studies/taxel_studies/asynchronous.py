@@ -13,7 +13,7 @@ from taxel.simulate import Act, Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains, to_ms
 from taxel_studies import spike_codes
 from taxel_studies.spike_codes import drop_tasks, kinds_of
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, logarithmic, subplots
 
 WHERE = "thesis 4.5, 7.2 and Table 7.1"
 PROTOCOL = (
@@ -181,9 +181,8 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     ]
 
 
-def tables(p: Parameters, summary: Summary) -> list[Table]:
+def tables(_p: Parameters, summary: Summary) -> list[Table]:
     """List bits by window, and costs."""
-    del p
     shown = {"first": "first-spike latency", "relative": "relative latency"}
     rows = [
         [
@@ -210,11 +209,9 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
     ]
 
 
-def draw(p: Parameters, summary: Summary) -> Figure:
+def draw(_p: Parameters, summary: Summary) -> Figure:
     """Draw the bits over time since contact, of both arrays."""
-    del p
-    figure = Figure(figsize=(9, 3.8), layout="constrained")
-    axes = figure.subplots(1, 2, sharey=True)
+    figure, axes = subplots(9, 3.8, 1, 2, sharey=True)
     for ax, (code, title) in zip(
         axes, (("first", "first-spike latency"), ("relative", "relative latency")), strict=True
     ):

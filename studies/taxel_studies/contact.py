@@ -16,7 +16,7 @@ from taxel.frames import Frames
 from taxel_studies import indented
 from taxel_studies.fem import Course, SamplingGrid, Yeoh, bodies
 from taxel_studies.fem.solids import Solids
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, subplots
 
 WHERE = "thesis 5.4.1 and 5.4.2, figures 5.1 to 5.4, tables 5.1 and 5.2"
 PROTOCOL = (
@@ -50,9 +50,8 @@ COLOURS = ("C3", "C1", "C9")
 tasks = indented.tasks
 
 
-def realise(params: dict[str, Any], seed: int, kept: Kept) -> dict[str, Any]:
+def realise(params: dict[str, Any], _seed: int, kept: Kept) -> dict[str, Any]:
     """Press once, and return how well the forces balance."""
-    del seed
     course = indented.make(params, kept)
     assert course is not None  # every realisation of this study makes a course
     most = max(float(np.abs(course.reaction).max()), 1e-300)
@@ -227,16 +226,13 @@ def _draw_model(p: Parameters, model: dict[str, Any]) -> Figure:
     figure.colorbar(pressed, ax=list(axes), label="pressure, kPa")
     for ax in axes:
         ax.set_aspect("equal")
-        ax.set_xlim(-5, 5)
-        ax.set_ylim(-0.2, top + 0.3)
-        ax.set_ylabel("mm")
+        ax.set(xlim=(-5, 5), ylim=(-0.2, top + 0.3), ylabel="mm")
     axes[1].set_xlabel("mm")
     return figure
 
 
 def _draw_spikes(sampled: dict[str, Any], p: Parameters) -> Figure:
-    figure = Figure(figsize=(9, 4), layout="constrained")
-    ax = figure.subplots()
+    figure, ax = subplots(9, 4)
     rho, period = np.array(sampled["rho"]), p["period_ms"]
     shown = ax.imshow(
         rho.T, aspect="auto", origin="lower", extent=(0, len(rho) * period, -0.5, rho.shape[1] - 0.5), cmap="viridis"
@@ -244,16 +240,17 @@ def _draw_spikes(sampled: dict[str, Any], p: Parameters) -> Figure:
     for k, (times, signs) in enumerate(zip(sampled["times"], sampled["signs"], strict=True)):
         for t, sign in zip(times, signs, strict=True):
             ax.plot([t, t], [k - 0.4, k + 0.4], color="k" if sign > 0 else "w", lw=0.9)
-    ax.set_xlabel("ms since contact")
-    ax.set_ylabel("afferent (0.2 mm apart)")
-    ax.set_title("spikes (black: rise, white: fall) on the pressure to the power alpha; the order is the pattern (5.1)")
+    ax.set(
+        xlabel="ms since contact",
+        ylabel="afferent (0.2 mm apart)",
+        title="spikes (black: rise, white: fall) on the pressure to the power alpha; the order is the pattern (5.1)",
+    )
     figure.colorbar(shown, ax=ax, label="rho")
     return figure
 
 
 def _draw_grid(sampled: dict[str, Any]) -> Figure:
-    figure = Figure(figsize=(9, 4), layout="constrained")
-    ax = figure.subplots()
+    figure, ax = subplots(9, 4)
     picture = np.array(sampled["picture"])
     reach = (picture.shape[1] - 1) / 2 * PICTURE_MM
     ax.imshow(
@@ -262,7 +259,9 @@ def _draw_grid(sampled: dict[str, Any]) -> Figure:
     for (late, aside), colour in zip(sampled["grids"], COLOURS, strict=False):
         t, x = np.meshgrid(np.arange(late, 100, 5.0), np.array(sampled["places_mm"]) + aside)
         ax.plot(t.ravel(), x.ravel(), ".", ms=3, color=colour, alpha=0.8)
-    ax.set_xlabel("ms since contact")
-    ax.set_ylabel("place at the base, mm")
-    ax.set_title("three draws of the sub-sampling grid (here every 5 ms) over one course")
+    ax.set(
+        xlabel="ms since contact",
+        ylabel="place at the base, mm",
+        title="three draws of the sub-sampling grid (here every 5 ms) over one course",
+    )
     return figure

@@ -13,7 +13,7 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.capacity import DURATION_MS, patterns, satisfied, weakest
 from taxel_studies.mapping import LEARN, TABLE
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task, subplots
 
 WHERE = "ours; the thesis has no delays"
 PROTOCOL = (
@@ -203,8 +203,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw loads by inputs, and patterns a weight by load."""
-    figure = Figure(figsize=(10, 3.8), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = subplots(10, 3.8, 1, 2)
     for line in summary["lines"]:
         left.plot(line["inputs"], line["load"], ".-", lw=1.2, label=line["arm"])
         some = [s for s in line["selected"] if s["inputs"] == p["inputs"][-1] and s["by_weight"] is not None]

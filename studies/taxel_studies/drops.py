@@ -12,7 +12,7 @@ from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 from taxel_studies import dropped
 from taxel_studies.dropped import FRAMES, REGION, Condition
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, subplots
 
 WHERE = "thesis 5.6.2 and 5.7, figures 5.10 and 5.14"
 PROTOCOL = (
@@ -68,9 +68,8 @@ def _frames_kbit_s(bits: int) -> float:
     return bits * REGION**2 / to_ms(FRAME_US)
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(_p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 5.7 says."""
-    del p
     rates = np.array(summary["rates_kbit_s"])
     intensity, change = _frames_kbit_s(INTENSITY_BITS), _frames_kbit_s(CHANGE_BITS)
     low, middle, high = summary["events"]
@@ -118,8 +117,7 @@ def _draw_one(p: Parameters, one: dict[str, Any]) -> Figure:
             ax.plot(x + aside, y + aside, ".", ms=3, color=colour)
         ax.set_title(f"{begin:g} to {end:g} ms: {int(here.sum())} events", fontsize="medium")
         ax.set_aspect("equal")
-        ax.set_xlim(-0.7, REGION - 0.3)
-        ax.set_ylim(REGION - 0.3, -0.7)
+        ax.set(xlim=(-0.7, REGION - 0.3), ylim=(REGION - 0.3, -0.7))
     ball, height, slant = p["drawn"]
     figure.suptitle(
         f"figure 5.10: a {ball / 10:g} cm sphere from {height / 10:g} cm, {slant:g} degrees (red: rise, blue: fall)"
@@ -130,8 +128,7 @@ def _draw_one(p: Parameters, one: dict[str, Any]) -> Figure:
 
 
 def _draw_rates(summary: Summary) -> Figure:
-    figure = Figure(figsize=(7, 3.5), layout="constrained")
-    ax = figure.subplots()
+    figure, ax = subplots(7, 3.5)
     rates = np.array(summary["rates_kbit_s"])
     edges = np.geomspace(rates.min() * 0.9, rates.max() * 1.1, 25)
     ax.hist(rates, edges.tolist(), color="C0", label="events (EC)")
@@ -139,8 +136,6 @@ def _draw_rates(summary: Summary) -> Figure:
     ax.axvline(_frames_kbit_s(CHANGE_BITS), color="C1", label="frames of change (FC)")
     ax.axvline(_frames_kbit_s(INTENSITY_BITS), color="C3", label="frames of intensity (FI)")
     ax.set_xscale("log")
-    ax.set_xlabel("data rate, kbit/s")
-    ax.set_ylabel("drops")
-    ax.set_title(f"figure 5.14: {len(rates)} drops")
+    ax.set(xlabel="data rate, kbit/s", ylabel="drops", title=f"figure 5.14: {len(rates)} drops")
     ax.legend(fontsize="small")
     return figure

@@ -17,7 +17,7 @@ from taxel.frames import Frames
 from taxel.spikes import SpikeTrains
 from taxel_studies import spike_codes
 from taxel_studies.spike_codes import PERIOD_US, SIDE, drop, drop_tasks, kinds_of, since_contact
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, subplots
 
 WHERE = "thesis 7.2, which asks it"
 PROTOCOL = (
@@ -128,9 +128,8 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     return judged
 
 
-def tables(p: Parameters, summary: Summary) -> list[Table]:
+def tables(_p: Parameters, summary: Summary) -> list[Table]:
     """List bits, events and bits an event by window."""
-    del p
     rows = []
     for without, name in VARIANTS.items():
         cells = []
@@ -144,11 +143,9 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
     return [Table("what each property of FA-1 is worth", head, rows, f"of {summary['most']:.2f} bits; 95 % intervals")]
 
 
-def draw(p: Parameters, summary: Summary) -> Figure:
+def draw(_p: Parameters, summary: Summary) -> Figure:
     """Draw bits over events."""
-    del p
-    figure = Figure(figsize=(6.5, 4), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = subplots(6.5, 4)
     for without, name in VARIANTS.items():
         values = np.array(list(summary["bits"][without].values()))
         ends = [values[:, 0] - values[:, 1], values[:, 2] - values[:, 0]]

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from taxel.encode import ThresholdIzhikevich
 from taxel_studies.fabric_array import ARRAY, PERIOD_US, SENSOR, depth_of, pressed, read
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, subplots
 
 WHERE = "thesis 3.4.3, figure 3.3"
 PROTOCOL = (
@@ -91,9 +91,8 @@ def _lasting(digital: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     return out
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
+def summarise(_p: Parameters, rows: Sequence[Row]) -> Summary:
     """Sum up over places."""
-    del p
     results = [r.result for r in rows]
     return {
         "steps": np.sum([r["steps"] for r in results], axis=0).tolist(),
@@ -121,8 +120,7 @@ def statements(_p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 3.3: analog, digital, spikes, of the twelve taxels that are on for longest."""
-    figure = Figure(figsize=(11, 3.6), layout="constrained")
-    left, middle, right = figure.subplots(1, 3, sharey=True)
+    figure, (left, middle, right) = subplots(11, 3.6, 1, 3, sharey=True)
     shown = summary["drawn"]
     t = np.array(shown["t_ms"])
     for row, (volts, digital, spikes) in enumerate(zip(shown["volts"], shown["digital"], shown["spikes"], strict=True)):

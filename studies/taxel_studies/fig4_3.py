@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from taxel.simulate.circuit import Converter
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, subplots
 
 WHERE = "thesis 4.3.2, figure 4.3"
 PROTOCOL = (
@@ -34,9 +34,8 @@ TICKS_A_US = 300.0
 tasks = partial(grid, shape="shapes")
 
 
-def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+def realise(params: dict[str, Any], _seed: int) -> dict[str, Any]:
     """Convert a row of inputs, each settled, and trace one conversion."""
-    del seed
     converter = Converter(shape=params["shape"], ramp=params["ramp"], steps=1)
     volts = np.linspace(params["least_v"], params["most_v"], params["points"])
     ticks = np.array([converter.ticks([[v]]) for v in volts]).ravel()
@@ -101,8 +100,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(_p: Parameters, summary: Summary) -> Figure:
     """Draw one conversion as 4.3 does, and the time against the input for both ramps."""
-    figure = Figure(figsize=(9, 3.8), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = subplots(9, 3.8, 1, 2)
     trace = next(iter(summary["shapes"].values()))["trace"]
     left.plot(trace["t_us"], trace["ramp_v"], color="C3", label="V_ramp")
     left.plot(trace["t_us"], trace["input_v"], color="C2", label="V_in")

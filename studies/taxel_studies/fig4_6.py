@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from taxel.simulate.circuit import Converter, Fabric, VirtualGround
 from taxel.wire import Registers
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results, subplots
 
 WHERE = "thesis 4.4.1, figure 4.6"
 PROTOCOL = (
@@ -143,8 +143,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 4.6: V_in over load, semi-log; 90 % of taxels in the band."""
-    figure = Figure(figsize=(6.5, 4.2), layout="constrained")
-    ax = figure.subplots()
+    figure, ax = subplots(6.5, 4.2)
     for line, colour in zip(summary["lines"], ("C0", "C3", "C2", "C1"), strict=False):
         ax.semilogx(line["loads"][1:], line["volts"][1:], color=colour, label=f"V_trans = {line['v_trans']:g} V")
         ax.fill_between(line["loads"][1:], *(edge[1:] for edge in line["between"]), color=colour, alpha=0.2, lw=0)

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from taxel.simulate.circuit import Converter, Fabric, VirtualGround
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task, subplots
 
 WHERE = "thesis 4.4.1, figure 4.7"
 PROTOCOL = (
@@ -39,9 +39,8 @@ def tasks(p: Parameters) -> list[Task]:
     return [Task(impact, 0), *(Task({**scan, "amplifier_us": tau}, 0) for tau in p["amplifiers_us"])]
 
 
-def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+def realise(params: dict[str, Any], _seed: int) -> dict[str, Any]:
     """Simulate the impact, or trace a comparator over a column."""
-    del seed
     return _impact(params) if "impact_n" in params else _scan(params)
 
 
@@ -129,8 +128,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(_p: Parameters, summary: Summary) -> Figure:
     """Draw 4.7: the impact, and one comparator's input, ramp and output over a column."""
-    figure = Figure(figsize=(10, 3.8), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=[1, 1.6])
+    figure, (left, right) = subplots(10, 3.8, 1, 2, width_ratios=[1, 1.6])
     left.plot(summary["impact"]["t_us"], summary["impact"]["volts"], color="C2")
     left.axvline(0.0, color="k", ls=":", lw=0.9)
     left.set(xlabel="time since the impact, us", ylabel="V_in, V", title="(a)")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from taxel.information import confusion_matrix, nested_predictions, panzeri_treves
 from taxel_studies import dropped
 from taxel_studies.dropped import TENNIS, Condition
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, logarithmic
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, logarithmic, subplots
 
 WHERE = "thesis 4.4.2, figures 4.8 and 4.10"
 PROTOCOL = (
@@ -50,9 +50,8 @@ PHASES = 410
 tasks = dropped.tasks
 
 
-def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
+def then(p: Parameters, _rows: Sequence[Row]) -> list[Task]:
     """List one realisation a period: sampled from the impact on, and from any phase on."""
-    del rows
     return [
         Task({**dropped.named(p), "period_ms": period, "aligned": aligned}, p["seed"])
         for period in sorted(p["periods_ms"])
@@ -193,17 +192,13 @@ def _draw_frames(p: Parameters, summary: Summary) -> Figure:
 
 
 def _draw_bits(summary: Summary) -> Figure:
-    figure = Figure(figsize=(6, 4), layout="constrained")
-    ax = figure.subplots()
+    figure, ax = subplots(6, 4)
     rates = [1000 / line["period_ms"] for line in summary["lines"]]
     ax.plot(rates, [line["bits"] for line in summary["lines"]], "o-", label="sampled from the impact on")
     ax.plot(rates, [line["any_phase_bits"] for line in summary["lines"]], "s--", mfc="w", label="at any phase")
     ax.axhline(np.log2(summary["conditions"]), color="0.6", ls=":", label="ceiling")
     ax.axvline(1000 / SLOW_MS, color="0.8")
     logarithmic(ax, x=rates)
-    ax.set_ylim(0, None)
-    ax.set_xlabel("frames a second")
-    ax.set_ylabel("bits")
-    ax.set_title("figure 4.10")
+    ax.set(ylim=(0, None), xlabel="frames a second", ylabel="bits", title="figure 4.10")
     ax.legend(fontsize="small")
     return figure

@@ -41,9 +41,8 @@ NEIGHBOURS, CLEAR = 10, 0.95
 tasks = dropped.tasks
 
 
-def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
+def then(p: Parameters, _rows: Sequence[Row]) -> list[Task]:
     """List one map a rate."""
-    del rows
     return [
         Task({**dropped.named(p), "rate_hz": rate, "perplexity": p["perplexity"]}, p["seed"])
         for rate in sorted(p["rates_hz"])
@@ -105,9 +104,8 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     ]
 
 
-def draw(p: Parameters, summary: Summary) -> Figure:
+def draw(_p: Parameters, summary: Summary) -> Figure:
     """Draw a map a rate."""
-    del p
     lines = summary["lines"]
     columns = min(3, len(lines))
     figure = Figure(figsize=(3 * columns, 3 * -(-len(lines) // columns) + 0.5), layout="constrained")

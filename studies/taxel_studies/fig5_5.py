@@ -73,18 +73,8 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
         if ask == "part":
             until = p["part_until_ms"]
             more = {"times_ms": [t for t in p["times_ms"] if t <= until], "until_ms": until}
-        return Task(
-            {
-                **shared,
-                **more,
-                "ask": ask,
-                "period_ms": period,
-                "alpha": alpha,
-                "even_ms": even,
-                "samples": p["samples"],
-            },
-            p["seed"],
-        )
+        more |= {"ask": ask, "period_ms": period, "alpha": alpha, "even_ms": even, "samples": p["samples"]}
+        return Task(shared | more, p["seed"])
 
     periods = sorted(p["periods_ms"])
     long = [period for period in periods if period >= p["search_from_ms"]]
@@ -109,27 +99,12 @@ def realise(params: dict[str, Any], seed: int, kept: Kept) -> dict[str, Any]:
     course = indented.make(params, kept)
     if course is not None:
         return indented.course_summary(course)
-    conditions = indented.reached(params)
-    grid, period, samples = SamplingGrid(), params["period_ms"], params["samples"]
-    encoder = FA1(alpha=params["alpha"], range=params["range_kpa"], period_ms=period)
+    conditions, samples, grid, period = indented.reached(params), params["samples"], SamplingGrid(), params["period_ms"]
+    settings = {"alpha": params["alpha"], "range": params["range_kpa"], "period_ms": period}
+    encoder = FA1(**settings)
     if params["even_ms"]:
-        encoder = FA1(
-            alpha=params["alpha"],
-            range=params["range_kpa"],
-            period_ms=period,
-            a=encoder.a * params["even_ms"] / period,
-        )
-    x = indented.rasters(
-        conditions,
-        indented.courses_of(params),
-        kept,
-        grid=grid,
-        encoder=encoder,
-        samples=samples,
-        seed=seed,
-        until_ms=params.get("until_ms"),
-    )
-    sums = indented.summed(x, len(conditions), samples, seed)
+        encoder = FA1(**settings, a=encoder.a * params["even_ms"] / period)
+    x, sums = indented.sampled(params, kept, encoder, seed)
     if params["ask"] == "bits":
         return indented.bits_of(sums, samples)
     varies = indented.varying(x, sums.folds)
@@ -278,9 +253,8 @@ def _finer(short: dict[str, Any], part: dict[str, Any], until_ms: float, size: s
     )
 
 
-def tables(p: Parameters, summary: Summary) -> list[Table]:
+def tables(_p: Parameters, summary: Summary) -> list[Table]:
     """Return the search over alpha, as a table."""
-    del p
     alphas = sorted({a for line in summary["lines"] for a, _ in line["searched"]})
     known = [dict(map(tuple, line["searched"])) for line in summary["lines"]]
     rows = [[f"{a:g}", *(f"{bits[a]:.2f}" if a in bits else "-" for bits in known)] for a in alphas]

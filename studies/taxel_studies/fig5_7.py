@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 from taxel.encode import FA1
 from taxel_studies import indented
-from taxel_studies.fem import SamplingGrid
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, logarithmic
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, logarithmic, subplots
 
 WHERE = "thesis 5.5.2, figure 5.7"
 PROTOCOL = (
@@ -53,23 +52,9 @@ def realise(params: dict[str, Any], seed: int, kept: Kept) -> dict[str, Any]:
     course = indented.make(params, kept)
     if course is not None:
         return indented.course_summary(course)
-    conditions, samples = indented.reached(params), params["samples"]
-    encoder = FA1(
-        alpha=params["alpha"],
-        range=params["range_kpa"],
-        period_ms=params["period_ms"],
-        bits=params["event_bits"],
-    )
-    x = indented.rasters(
-        conditions,
-        indented.courses_of(params),
-        kept,
-        grid=SamplingGrid(),
-        encoder=encoder,
-        samples=samples,
-        seed=seed,
-    )
-    return indented.bits_of(indented.summed(x, len(conditions), samples, seed), samples)
+    settings = {"alpha": params["alpha"], "range": params["range_kpa"], "period_ms": params["period_ms"]}
+    _, sums = indented.sampled(params, kept, FA1(**settings, bits=params["event_bits"]), seed)
+    return indented.bits_of(sums, params["samples"])
 
 
 def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
@@ -120,18 +105,15 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     return judged
 
 
-def draw(p: Parameters, summary: Summary) -> Figure:
+def draw(_p: Parameters, summary: Summary) -> Figure:
     """Draw 5.7: a line a number of bits."""
-    del p
-    figure = Figure(figsize=(6, 4), layout="constrained")
-    ax = figure.subplots()
+    figure, ax = subplots(6, 4)
     for line in summary["lines"]:
         ax.plot(
             summary["periods_ms"], line["bits"], ".-", label=f"{line['event_bits']} bit{'s' * (line['event_bits'] > 1)}"
         )
     ax.axhline(np.log2(summary["conditions"]), color="0.6", ls=":")
     logarithmic(ax, x=summary["periods_ms"])
-    ax.set_xlabel("sampling period, ms")
-    ax.set_ylabel("bits")
+    ax.set(xlabel="sampling period, ms", ylabel="bits")
     ax.legend(title="an event", fontsize="small")
     return figure

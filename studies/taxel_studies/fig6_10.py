@@ -123,8 +123,7 @@ def draw(p: Parameters, summary: Summary) -> Figure:
                 for k, ratio in enumerate(p["ratios"]):
                     label = f"{ratio[0]:g} : {ratio[1]:g}"
                     axes[row, column].errorbar(curve["levels"], curve["mean"][k], curve["sem"][k], label=label, lw=1.2)
-                axes[row, column].set_xlabel(f"{noise}, {NOISES[noise]}")
-                axes[row, column].set_ylabel("VP distance")
+                axes[row, column].set(xlabel=f"{noise}, {NOISES[noise]}", ylabel="VP distance")
                 axes[row, column].set_ylim(bottom=0)
         axes[0, 0].set_title("trained without noise")
         axes[0, 1].set_title("trained with noise")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import waves
 from taxel_studies.mapping import LEARN
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results, subplots
 from taxel_studies.waves import READINGS
 
 WHERE = "thesis 6.4.7, figure 6.11"
@@ -116,8 +116,9 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.11: a row a training, a column a reading."""
-    figure = Figure(figsize=(5 * len(p["readings"]), 8), layout="constrained")
-    axes = figure.subplots(len(p["trainings"]), len(p["readings"]), sharex=True, squeeze=False)
+    figure, axes = subplots(
+        5 * len(p["readings"]), 8, len(p["trainings"]), len(p["readings"]), sharex=True, squeeze=False
+    )
     for column, reading in enumerate(p["readings"]):
         axes[0, column].set_title(READINGS[reading])
         for row, training in enumerate(p["trainings"]):

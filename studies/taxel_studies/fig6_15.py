@@ -14,7 +14,7 @@ from taxel_studies.gait.judgement import STANDS_FOR
 from taxel_studies.gait.outcomes import EVENTS
 from taxel_studies.gait.recipes import PRINTED, RECIPE
 from taxel_studies.gait.sources import SOURCES
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task, subplots
 
 WHERE = "thesis 6.5.4, figure 6.15"
 PROTOCOL = (
@@ -150,8 +150,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.15: top what was found, below it what was false, bottom the error; a column a recipe."""
-    figure = Figure(figsize=(6.5 * len(p["recipes"]), 7.5), layout="constrained")
-    axes = figure.subplots(3, len(p["recipes"]), sharex="col", squeeze=False)
+    figure, axes = subplots(6.5 * len(p["recipes"]), 7.5, 3, len(p["recipes"]), sharex="col", squeeze=False)
     for column, recipe in enumerate(p["recipes"]):
         rows = [r for r in summary["rows"] if r["recipe"] == recipe]
         groups = list(dict.fromkeys((r["source"], r["event"]) for r in rows))

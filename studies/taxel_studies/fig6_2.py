@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results, subplots
 
 WHERE = "thesis 6.3.2, figure 6.2"
 PROTOCOL = (
@@ -110,8 +110,7 @@ def _by_kappa(p: Parameters, values: Sequence[float], form: str) -> str:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.2: the potential around the target, without and with kappa."""
-    figure = Figure(figsize=(7.5, 4.2), layout="constrained")
-    ax = figure.subplots()
+    figure, ax = subplots(7.5, 4.2)
     theta, target = TABLE["theta_0"], p["target"]
     for number, c in enumerate(summary["kappas"]):
         ax.plot(summary["times"], c["potential"], color=f"C{number}", lw=1.6, label=f"kappa = {c['kappa']:g}")

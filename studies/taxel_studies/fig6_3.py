@@ -42,9 +42,8 @@ def tasks(p: Parameters) -> list[Task]:
     return grid({**p, "learners": ["cone_x", "cone_r"]}, learner="learners")
 
 
-def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+def realise(params: dict[str, Any], _seed: int) -> dict[str, Any]:
     """State the objective over a grid of weights with NumPy, and let the learner find its optimum."""
-    del seed  # nothing is drawn
     hard = params["learner"] == "cone_x"
     trains = SpikeTrains.from_lists([[t] for t in params["inputs_at"]], 0.0, params["target"])
     options = {
@@ -135,9 +134,8 @@ class _Rows:
         }
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
+def summarise(_p: Parameters, rows: Sequence[Row]) -> Summary:
     """Return both surfaces."""
-    del p
     return {row.params["learner"]: row.result for row in rows}
 
 

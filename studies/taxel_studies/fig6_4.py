@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results, subplots
 from taxel_studies.waves import READINGS
 
 WHERE = "thesis 6.4.1, figure 6.4"
@@ -127,8 +127,7 @@ def _by_kappa(p: Parameters, values: Sequence[float | None], form: str) -> str:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.4 once a reading: left potential without spiking, right weights by spike time."""
-    figure = Figure(figsize=(11, 3.6 * len(p["readings"])), layout="constrained")
-    axes = figure.subplots(len(p["readings"]), 2, squeeze=False)
+    figure, axes = subplots(11, 3.6 * len(p["readings"]), len(p["readings"]), 2, squeeze=False)
     weighed = f"lambda ({', '.join(f'{v:g}' for v in p['lambdas'])})"
     for row, (reading, all_) in enumerate(summary["readings"].items()):
         left, right = axes[row]

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from taxel_studies import mapping
 from taxel_studies.mapping import TABLE
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results, subplots
 
 WHERE = "thesis 6.4.2, figure 6.5"
 PROTOCOL = (
@@ -116,8 +116,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.5: left potential without spiking, right weights by spike time."""
-    figure = Figure(figsize=(11, 4), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = subplots(11, 4, 1, 2)
     for c in summary["ratios"]:
         label = f"{c['ratio'][0]:g} : {c['ratio'][1]:g}"
         left.plot(summary["times"], c["potential"], label=label, lw=1.3)

@@ -84,9 +84,8 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(_p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.3 says."""
-    del p
     judged = []
     for reading, norms in summary["readings"].items():
         why = f"after a spike “{reading}”"

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from taxel_studies import capacity
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task, grid, results
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task, grid, results, subplots
 
 WHERE = "thesis 6.4.4, figure 6.7"
 PROTOCOL = (
@@ -144,8 +144,7 @@ def _price(p: Parameters, summary: Summary) -> list[Statement]:
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.7: load by inputs, a line a number of classes; a panel a time and reading."""
     shape = len(p["readings"]), len(p["times"])
-    figure = Figure(figsize=(5.5 * shape[1], 3.6 * shape[0]), layout="constrained")
-    axes = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False)
+    figure, axes = subplots(5.5 * shape[1], 3.6 * shape[0], *shape, sharex=True, sharey=True, squeeze=False)
     for line in summary["lines"]:
         ax = axes[p["readings"].index(line["after_spike"]), p["times"].index(line["time"])]
         ax.plot(line["inputs"], line["load"], ".-", lw=1.2, label=f"C = {line['classes']}")

@@ -13,7 +13,7 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies import waves
 from taxel_studies.mapping import LEARN
-from taxel_studies.study import Parameters, Statement, Summary, one_task, only_result
+from taxel_studies.study import Parameters, Statement, Summary, one_task, only_result, subplots
 
 WHERE = "thesis 6.4.5, figure 6.8"
 PROTOCOL = (
@@ -139,9 +139,8 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.8: a panel a noise, and the target with the output spikes of the neuron."""
-    figure = Figure(figsize=(11, 9), layout="constrained")
-    axes = figure.subplots(
-        len(summary["noises"]) + 1, 1, sharex=True, height_ratios=[*(3 for _ in summary["noises"]), 1.2]
+    figure, axes = subplots(
+        11, 9, len(summary["noises"]) + 1, 1, sharex=True, height_ratios=[*(3 for _ in summary["noises"]), 1.2]
     )
     clean = summary["clean"]
     for ax, (noise, shown) in zip(axes, summary["noises"].items(), strict=False):

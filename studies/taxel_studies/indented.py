@@ -28,6 +28,7 @@ __all__ = [
     "pressed",
     "rasters",
     "reached",
+    "sampled",
     "shared",
     "summed",
     "table_of",
@@ -138,6 +139,22 @@ def summed(x: NDArray[Any], conditions: int, samples: int, seed: int) -> FoldSum
     """Assign the samples to ten folds, and sum them by fold and condition."""
     y = np.repeat(np.arange(conditions), samples)
     return FoldSums(x, y, folds(y, count=10, seed=seed))
+
+
+def sampled(params: Mapping[str, Any], kept: Kept, encoder: FA1, seed: int) -> tuple[NDArray[Any], FoldSums]:
+    """Return the rasters of a realisation on samples (of `shared` parameters), and their sums by fold and condition."""
+    conditions, samples = reached(params), params["samples"]
+    x = rasters(
+        conditions,
+        courses_of(params),
+        kept,
+        grid=SamplingGrid(),
+        encoder=encoder,
+        samples=samples,
+        seed=seed,
+        until_ms=params.get("until_ms"),
+    )
+    return x, summed(x, len(conditions), samples, seed)
 
 
 def bits_of(

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.information import confusion_matrix, panzeri_treves, plug_in
-from taxel_studies.study import Summary, logarithmic
+from taxel_studies.study import Summary, logarithmic, subplots
 
 __all__ = ["by_period_parameter_and_time", "information", "listed", "lost", "shares"]
 
@@ -70,8 +70,7 @@ def by_period_parameter_and_time(
     labels = ("bits", "share of the largest possible bits", "bits")
     drawn_figures = []
     for k, (title, label) in enumerate(zip(figures, labels, strict=True)):
-        figure = Figure(figsize=(6, 4), layout="constrained")
-        ax = figure.subplots()
+        figure, ax = subplots(6, 4)
         if k == 0:
             for (name, called), (style, filled) in zip(curves.items(), (("o-", None), ("s--", "w")), strict=True):
                 ax.plot(periods, [line[name] for line in lines], style, mfc=filled, label=called)
@@ -83,9 +82,7 @@ def by_period_parameter_and_time(
             for line in (*([summary["part"]] if "part" in summary else []), *lines):
                 ax.plot(*zip(*line["times"], strict=True), ".-", label=f"{line['period_ms']:g} ms")
         logarithmic(ax, x=times_ms if k == 2 else periods)
-        ax.set_xlabel(f"ms since {since}" if k == 2 else "sampling period, ms")
-        ax.set_ylabel(label)
-        ax.set_title(f"figure {title}")
+        ax.set(xlabel=f"ms since {since}" if k == 2 else "sampling period, ms", ylabel=label, title=f"figure {title}")
         # Curves over time fill the axes, so the legend stands beside them.
         beside: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if k == 2 else {}
         ax.legend(fontsize="small", **beside)

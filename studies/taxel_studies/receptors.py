@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from taxel.encode import FA1, FA2, SA1, SA2, Encoder
 from taxel.frames import Frames
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, grid
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, grid, subplots
 
 WHERE = "thesis 2.1.5, 3.3 and 7.2, which asks for the types beside FA-1"
 PROTOCOL = (
@@ -88,9 +88,8 @@ def phases(kind: str, ramp_ms: float, period_ms: float) -> list[int]:
 tasks = partial(grid, kind="kinds")
 
 
-def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+def realise(params: dict[str, Any], _seed: int) -> dict[str, Any]:
     """Press one type of afferent with ramps and sines."""
-    del seed
     kind, period = params["kind"], params["period_ms"]
     return {
         "phases": {f"{ramp:g}": phases(kind, ramp, period) for ramp in params["ramps_ms"]},
@@ -167,8 +166,7 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw thresholds over frequency."""
-    figure = Figure(figsize=(6.5, 4), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = subplots(6.5, 4)
     for kind, one in summary.items():
         known = [(f, a) for f, a in zip(p["frequencies_hz"], one["thresholds"], strict=True) if a is not None]
         if known:

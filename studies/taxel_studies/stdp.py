@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from taxel.spikes import SpikeTrains
 from taxel_rules import STDP
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, grid
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, grid, subplots
 
 WHERE = "thesis 3.6.2, which calls for it; Masquelier, Guyonneau and Thorpe 2008, PLoS ONE 3:e1377"
 PROTOCOL = (
@@ -164,9 +164,8 @@ def succeeded(result: dict[str, Any]) -> bool:
     )
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
+def summarise(_p: Parameters, rows: Sequence[Row]) -> Summary:
     """Count successes."""
-    del p
     good = [row.result for row in rows if succeeded(row.result)]
     middle = {
         name: float(np.median([one[name] for one in good])) if good else None
@@ -214,9 +213,8 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     return judged
 
 
-def tables(p: Parameters, summary: Summary) -> list[Table]:
+def tables(_p: Parameters, summary: Summary) -> list[Table]:
     """List the medians of the runs that succeed."""
-    del p
     rows = [[name, "-" if value is None else f"{value:g}"] for name, value in summary["median"].items()]
     return [
         Table("runs that succeed, medians", ["what", "value"], rows, f"{summary['good']} of {summary['runs']} runs")
@@ -225,8 +223,7 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw latencies of the first spikes of one run: 0 for those outside the pattern."""
-    figure = Figure(figsize=(6.5, 3.6), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = subplots(6.5, 3.6)
     if summary["course"]:
         seconds, since = np.transpose(summary["course"])
         axes.plot(seconds, since, ".", markersize=2)

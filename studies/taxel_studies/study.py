@@ -45,6 +45,7 @@ __all__ = [
     "only_result",
     "read_section",
     "results",
+    "subplots",
     "svg",
 ]
 
@@ -405,6 +406,12 @@ def svg(figure: Figure) -> bytes:
     with rc_context({"svg.hashsalt": "taxel", "svg.fonttype": "none"}):
         figure.savefig(buffer, format="svg", metadata={"Date": None}, bbox_inches="tight", facecolor="white")
     return buffer.getvalue()
+
+
+def subplots(width: float, height: float, *shape: int, **options: Any) -> tuple[Figure, Any]:
+    """Return a picture of this size, inches, and its axes, as `Figure.subplots` gives them."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.subplots(*shape, **options)
 
 
 def logarithmic(axes: Axes, *, x: Sequence[float] = (), y: Sequence[float] = ()) -> None:

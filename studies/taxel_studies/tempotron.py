@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from taxel.spikes import SpikeTrains
 from taxel_rules import Tempotron
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results, subplots
 
 WHERE = "Gütig and Sompolinsky 2006; thesis 3.3"
 PROTOCOL = (
@@ -100,13 +100,11 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw the share of tasks solved, and the epochs that they needed, by load."""
-    figure = Figure(figsize=(9, 3.4), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = subplots(9, 3.4, 1, 2)
     left.plot(
         [line["load"] for line in summary["lines"]], [line["solved"] / line["runs"] for line in summary["lines"]], ".-"
     )
-    left.set_ylim(-0.05, 1.05)
-    left.set_ylabel(f"share solved in {p['epochs']} epochs")
+    left.set(ylim=(-0.05, 1.05), ylabel=f"share solved in {p['epochs']} epochs")
     for line in summary["lines"]:
         right.plot([line["load"]] * len(line["epochs"]), line["epochs"], ".", color="C0")
     right.set_yscale("log")

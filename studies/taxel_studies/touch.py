@@ -21,7 +21,7 @@ from taxel.frames import Frames
 from taxel.simulate import Act, Contact, Scene, Silence, play, truth
 from taxel.spikes import to_ms, to_us
 from taxel.tare import Tare
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, subplots
 from taxel_studies.touch_rivals import around, best_rule, lda, numbers
 
 WHERE = "after 5.6.2"
@@ -236,8 +236,7 @@ def tables(_p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(_p: Parameters, summary: Summary) -> Figure:
     """Draw the shares by time since contact."""
-    figure = Figure(figsize=(6.5, 4.2), layout="constrained")
-    ax = figure.subplots()
+    figure, ax = subplots(6.5, 4.2)
     for way, words in WAYS.items():
         shares = [100 * share for share in summary["kinds"][way]]
         ax.plot(summary["times_ms"], shares, "o-", color=COLOURS[way], label=words, markersize=4)

@@ -45,9 +45,8 @@ def stand_for(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(_p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.5.1 to 6.5.3 say, with chosen parameters and with those printed."""
-    del p
     judged = [
         Statement(
             "The insole has 92 taxels and makes 184 input neurons: each signal and its inverse.",
@@ -112,9 +111,8 @@ _FLATTERED = (
 )
 
 
-def tables(p: Parameters, summary: Summary) -> list[Table]:
+def tables(_p: Parameters, summary: Summary) -> list[Table]:
     """List every row by event, and people where parameters were chosen inside."""
-    del p
     listed = [Table("What was run", ("", ""), _about(summary))]
     for source in summary["sources"]:
         for protocol in source["protocols"]:

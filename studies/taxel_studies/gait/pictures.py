@@ -11,22 +11,20 @@ from matplotlib.figure import Figure
 from taxel_studies.gait import insole
 from taxel_studies.gait.judgement import STAND, stand_for
 from taxel_studies.gait.outcomes import EVENTS
-from taxel_studies.study import Parameters, Summary
+from taxel_studies.study import Parameters, Summary, subplots
 
 __all__ = ["draw"]
 
 
-def draw(p: Parameters, summary: Summary) -> list[Figure]:
+def draw(_p: Parameters, summary: Summary) -> list[Figure]:
     """Draw 6.12 and 6.13, where there are footfalls of the plate, and 6.14, where what stands for 6.5 was run."""
-    del p
     conversion, rows = summary["conversion"], stand_for(summary)
     return [*([_conversion(conversion)] if conversion else []), *([_bars(rows)] if rows else [])]
 
 
 def _bars(rows: Sequence[Mapping[str, Any]]) -> Figure:
     """Draw 6.14: top found, bottom error, a group a source and event."""
-    figure = Figure(figsize=(11, 6.5), layout="constrained")
-    top, bottom = figure.subplots(2, 1, sharex=True)
+    figure, (top, bottom) = subplots(11, 6.5, 2, 1, sharex=True)
     groups = list(dict.fromkeys((r["source"], r["event"]) for r in rows))
     for number, (name, label) in enumerate(STAND.items()):
         for at, (source, event) in enumerate(groups):
@@ -51,8 +49,7 @@ def _bars(rows: Sequence[Mapping[str, Any]]) -> Figure:
 
 def _conversion(summary: Mapping[str, Any]) -> Figure:
     """Draw 6.12 and 6.13: the insole, the readings of three taxels, and the spikes of all inputs over one footfall."""
-    figure = Figure(figsize=(13, 4.6), layout="constrained")
-    foot, analog, raster = figure.subplots(1, 3, width_ratios=[1, 2, 3])
+    figure, (foot, analog, raster) = subplots(13, 4.6, 1, 3, width_ratios=[1, 2, 3])
     at = [(c - (n - 1) / 2, r) for r, n in enumerate(insole.CELLS) for c in range(n)]
     foot.scatter(*zip(*at, strict=True), c=summary["peak"], norm=Normalize(0), cmap="viridis", marker="s", s=90)
     foot.set(
