@@ -36,10 +36,4 @@ impl KernelDrops {
     pub fn since(self, earlier: Self) -> Self {
         Self(self.0.zip(earlier.0).map(|(now, before)| now.saturating_sub(before)))
     }
-
-    /// The sum of both.
-    #[must_use]
-    pub fn plus(self, more: Self) -> Self {
-        Self(self.0.zip(more.0).map(|(sum, more)| sum + more))
-    }
 }

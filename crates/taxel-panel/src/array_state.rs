@@ -9,6 +9,7 @@ use super::load::Coordinates;
 use super::load::Load;
 use super::load::Weights;
 use super::time_columns::{COLUMN_US, Curve, Curves, Extent, MISSING, TimeColumns, column_of};
+use serde::{Deserialize, Serialize};
 use taxel_core::Array;
 use taxel_core::held::{Held, UNKNOWN};
 use taxel_core::rest::{NOISE_FLOOR, Rest, TrackedRest, Value};
@@ -42,7 +43,8 @@ pub struct Keyframe {
 }
 
 /// Where the rest comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum RestSource {
     /// A tare, or the values held at a moment; 0 of frames of force or pressure.
     Given,
@@ -50,24 +52,6 @@ pub enum RestSource {
     Quiet,
     /// There was no quiet stretch so far: the taxels' first values, from which it is tracked; 0 of frames.
     None,
-}
-
-impl RestSource {
-    /// Its name in messages.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Given => "given",
-            Self::Quiet => "quiet",
-            Self::None => "none",
-        }
-    }
-
-    /// The one of a name.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        [Self::Given, Self::Quiet, Self::None].into_iter().find(|source| source.name() == name)
-    }
 }
 
 impl Keyframe {

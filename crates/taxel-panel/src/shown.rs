@@ -122,7 +122,7 @@ fn about_frames(index: &FrameIndex) -> Value {
     let source = |(area, rest, falls, preload_at): (&FrameArea, RestSource, bool, &str)| {
         json!({
             "name": area.name, "left": area.left, "rows": area.rows, "columns": area.columns,
-            "rest": rest.name(), "falls": falls, "preload_at": preload_at,
+            "rest": rest, "falls": falls, "preload_at": preload_at,
         })
     };
     json!({

@@ -15,9 +15,7 @@ use taxel_core::wire::Registers;
 use taxel_live::clock::BoardClock;
 use taxel_live::pipeline::Record;
 use taxel_live::recording::{Compression, Condition};
-use taxel_panel::{
-    Activity, EventIndex, FrameArea, FrameIndex, FrameRest, FrameSource, Kept, LiveSource, RestSource, Shown, View,
-};
+use taxel_panel::{Activity, EventIndex, FrameArea, FrameIndex, FrameRest, FrameSource, Kept, LiveSource, Shown, View};
 
 use crate::held::{TouchesOut, from_touches};
 use crate::live::Live;
@@ -415,8 +413,8 @@ fn to_index(py: Python<'_>, frames: ReadFrames<'_>) -> PyResult<FrameIndex> {
         }
         let known = |&rest: &f64| if rest.is_nan() { f64::NO_REST } else { rest };
         let rest = FrameRest {
-            source: RestSource::named(&rest.source)
-                .ok_or_else(|| ProblemError::new_err(format!("source {name}: rest {:?} is not known", rest.source)))?,
+            source: serde_json::from_value(json!(rest.source))
+                .map_err(|error| ProblemError::new_err(format!("source {name}: rest {:?}: {error}", rest.source)))?,
             values: rests.iter().map(known).collect(),
             ticks_by_unit: rest.ticks_by_unit,
             loaded_from: rest.loaded_from,

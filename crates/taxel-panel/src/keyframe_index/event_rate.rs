@@ -1,5 +1,7 @@
 //! Number of events over time.
 
+use taxel_live::pipeline::TaxelChange;
+
 use crate::time_columns::COLUMN_US;
 
 /// Maximum number of bins; beyond it pairs of bins are merged.
@@ -9,13 +11,21 @@ const BINS: usize = 1000;
 #[derive(Debug, Default)]
 pub(super) struct EventRate {
     first: Option<i64>,
+    /// The earliest time, us, which may come later.
+    pub(super) earliest: Option<i64>,
     step: i64,
     bins: Vec<u64>,
 }
 
 impl EventRate {
-    /// Adds `count` events at a time.
-    pub(super) fn add(&mut self, t: i64, count: u64) {
+    /// Adds events.
+    pub(super) fn add(&mut self, changes: &[TaxelChange]) {
+        let together = changes.chunk_by(|change, next| change.t == next.t);
+        together.for_each(|together| self.add_at(together[0].t, together.len() as u64));
+    }
+
+    fn add_at(&mut self, t: i64, count: u64) {
+        self.earliest = self.earliest.into_iter().chain([t]).min();
         let first = *self.first.get_or_insert(t);
         self.step = self.step.max(COLUMN_US);
         loop {

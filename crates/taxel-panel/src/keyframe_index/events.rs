@@ -64,7 +64,7 @@ impl EventIndex {
         let noise_floor = header.registers.map_or(0, |registers| registers.noise_floor.into());
         let mut indexing = Indexing::new(&header.array, noise_floor, kept);
         let (decoded, pieces) = channel::bounded(AHEAD);
-        let (remarks, rest) = std::thread::scope(|scope| {
+        let (remarks, rest, rate) = std::thread::scope(|scope| {
             let decoding = scope.spawn(move || decode(reader, &decoded));
             pieces.into_iter().try_for_each(|piece| match piece {
                 Piece::Held(held) => {
@@ -75,7 +75,7 @@ impl EventIndex {
             })?;
             decoding.join().unwrap_or_else(|_| Err(problem!("indexing failed within taxel; please report it").into()))
         })?;
-        Ok((indexing.finish(), remarks, rest))
+        Ok((indexing.finish(rate), remarks, rest))
     }
 
     /// Indexes events, before which the taxels held these values, if that is known.
@@ -87,8 +87,13 @@ impl EventIndex {
         events.check()?;
         let mut indexing = Indexing::new(events.array, noise_floor, kept);
         indexing.begin_with(held.unwrap_or_default());
-        events.pieces(EVENTS).try_for_each(|piece| indexing.push(changes(piece)))?;
-        Ok(indexing.finish())
+        let mut rate = EventRate::default();
+        events.pieces(EVENTS).try_for_each(|piece| {
+            let changes = changes(piece);
+            rate.add(&changes);
+            indexing.push(changes)
+        })?;
+        Ok(indexing.finish(rate))
     }
 
     /// Number of events.
@@ -126,15 +131,16 @@ enum Piece {
     Changes(Vec<TaxelChange>),
 }
 
-/// Decodes a recording, and passes its events on in blocks.
-fn decode(reader: &Reader, to: &channel::Sender<Piece>) -> Result<(Remarks, DecodedRecording)> {
+/// Decodes a recording, and passes its events on in blocks; counts them over time.
+fn decode(reader: &Reader, to: &channel::Sender<Piece>) -> Result<(Remarks, DecodedRecording, EventRate)> {
     let send = |piece| -> Result<()> { to.send(piece).map_err(|_| problem!("indexing ended early").into()) };
-    let flush = |events: &mut Events| {
-        let block = Piece::Changes(changes(events.view()));
+    let (mut remarks, mut begun, mut rate) = (Remarks::default(), false, EventRate::default());
+    let mut flush = |events: &mut Events| {
+        let changes = changes(events.view());
+        rate.add(&changes);
         events.clear();
-        send(block)
+        send(Piece::Changes(changes))
     };
-    let (mut remarks, mut begun) = (Remarks::default(), false);
     let mut decoded = reader.decode_each(Stop::never(), |message, events| {
         remarks.add(message);
         if message.topic == Topic::Held && !begun && events.is_empty() {
@@ -147,7 +153,7 @@ fn decode(reader: &Reader, to: &channel::Sender<Piece>) -> Result<(Remarks, Deco
         Ok(())
     })?;
     flush(&mut decoded.events)?;
-    Ok((remarks, decoded))
+    Ok((remarks, decoded, rate))
 }
 
 fn changes(events: EventsView<'_>) -> Vec<TaxelChange> {
@@ -176,8 +182,6 @@ struct Indexing {
     /// Blocks from one keyframe to the next.
     spacing: usize,
     state: ArrayState,
-    rate: EventRate,
-    first: Option<i64>,
 }
 
 impl Indexing {
@@ -190,8 +194,6 @@ impl Indexing {
             keys: vec![],
             spacing: 1,
             state: ArrayState::new(array, noise_floor, &blank, COLUMN_US, TIME_COLUMN_BYTES),
-            rate: EventRate::default(),
-            first: None,
         }
     }
 
@@ -211,17 +213,12 @@ impl Indexing {
                 self.keys.retain(|(block, _)| block.is_multiple_of(self.spacing));
             }
         }
-        for together in changes.chunk_by(|change, next| change.t == next.t) {
-            let t = together[0].t;
-            self.first = Some(self.first.map_or(t, |first| first.min(t)));
-            self.rate.add(t, together.len() as u64);
-        }
         self.state.apply(&changes);
         self.blocks.push(changes)
     }
 
-    fn finish(self) -> EventIndex {
-        let Self { array, noise_floor, blocks, keys, mut state, rate, first, .. } = self;
+    fn finish(self, rate: EventRate) -> EventIndex {
+        let (Self { array, noise_floor, blocks, keys, mut state, .. }, first) = (self, rate.earliest);
         let columns = usize::from(array.columns);
         state.update_curve();
         let stored = state.time_columns().clone();

@@ -147,7 +147,7 @@ impl LiveIndex {
     pub fn event_rate(&self) -> (i64, i64, Vec<u64>) {
         let mut rate = EventRate::default();
         let first = self.ring().first;
-        self.changes_from(first, |changes| changes.iter().for_each(|change| rate.add(change.t, 1)));
+        self.changes_from(first, |changes| rate.add(changes));
         rate.into_bins()
     }
 }
