@@ -1,4 +1,4 @@
-"""A client of the panel's server, by docs/panel-protocol.md alone, and what the tests of the server share."""
+"""A client of the panel's server, without the page's code, and what the tests of the server share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The panel's server, by a client that is written from docs/panel-protocol.md alone."""
+"""The panel's server, by a client of its own (`protocol.py`), as docs/panel-protocol.md has it."""
 
 from __future__ import annotations
 
