@@ -60,15 +60,13 @@ pub struct Flawed {
     loose: Vec<Loose>,
     contact: StdRng,
     noise: StdRng,
-    columns: usize,
     begun: bool,
 }
 
-#[derive(Debug, Clone, Copy)]
+/// A line with a loose contact.
+#[derive(Debug, Clone)]
 struct Loose {
-    /// Whether the line is a driven line (a column); otherwise it is a sense line (a row).
-    driven: bool,
-    line: usize,
+    taxels: Vec<usize>,
     holds: bool,
     until_us: f64,
 }
@@ -110,11 +108,11 @@ impl Flawed {
         let fixed = share(flaws.stuck).into_iter().zip(dead).map(|(stuck, dead)| dead.map(|_| 0).or(stuck)).collect();
         let mut way = StdRng::seed_from_u64(flaws.hysteresis.seed);
         let mut contact = StdRng::seed_from_u64(flaws.loose.seed);
-        let mut loose: Vec<Loose> = (0..array.columns)
-            .map(|line| (true, line))
-            .chain((0..array.rows).map(|line| (false, line)))
-            .map(|(driven, line)| Loose { driven, line: line.into(), holds: true, until_us: 0.0 })
-            .collect();
+        let columns = usize::from(array.columns);
+        let driven = (0..columns).map(|x| (x..n).step_by(columns).collect());
+        let sensed = (0..usize::from(array.rows)).map(|y| (y * columns..(y + 1) * columns).collect());
+        let of_line = |taxels| Loose { taxels, holds: true, until_us: 0.0 };
+        let mut loose: Vec<Loose> = driven.chain(sensed).map(of_line).collect();
         rand::seq::SliceRandom::shuffle(&mut loose[..], &mut contact);
         loose.truncate(flaws.loose.size as usize);
         Ok(Self {
@@ -128,7 +126,6 @@ impl Flawed {
             loose,
             contact,
             noise: StdRng::seed_from_u64(flaws.noise.seed),
-            columns: array.columns.into(),
             begun: false,
         })
     }
@@ -169,12 +166,7 @@ impl Flawed {
                 line.until_us += -mean_us * (1.0 - self.contact.random::<f64>()).ln();
             }
             if !line.holds {
-                let taxels = if line.driven {
-                    (line.line..ticks.len()).step_by(self.columns)
-                } else {
-                    (line.line * self.columns..(line.line + 1) * self.columns).step_by(1)
-                };
-                taxels.for_each(|taxel| ticks[taxel] = 0);
+                line.taxels.iter().for_each(|&taxel| ticks[taxel] = 0);
             }
         }
     }

@@ -48,8 +48,8 @@ impl Board {
         {
             return Err(problem!("accepted has {} entries: the array has {} taxels", accepted.len(), self.array.len()));
         }
+        self.take_over();
         self.link.offer(&mut self.counts, &mut sink);
-        self.take_over(&mut sink);
         let registers = self.active;
         let of_ball = self.ball.frame(&self.array, registers.pattern, registers.ramp);
         let ticks = of_ball.as_deref().unwrap_or(ticks);
@@ -75,19 +75,20 @@ impl Board {
     }
 
     /// Applies the written registers, between two frames.
-    fn take_over(&mut self, sink: &mut impl FnMut(&[u8]) -> bool) {
+    fn take_over(&mut self) {
         if self.active == self.written {
             return;
         }
         if self.active.wire_version != self.written.wire_version {
-            self.link.flush_words(&mut self.counts, sink);
+            self.link.flush_words();
         }
         if self.active.mechanoreceptor != self.written.mechanoreceptor {
             self.afferents.forget();
             self.asynchronous = self.asynchronous.take().map(|_| Asynchronous::default());
         }
         self.active = self.written;
-        self.link.flush(self.now(), &mut self.counts, sink);
+        let now = self.now();
+        self.link.with_packer(|packer| packer.flush(now));
         self.link.follow(self.settings());
     }
 
@@ -178,10 +179,14 @@ impl Board {
             return false;
         }
         if self.active.wire_version == 2 {
-            return self.link.pack(found, &mut self.counts, sink);
+            let packed = self.link.pack(found, &mut self.counts);
+            self.link.offer(&mut self.counts, sink);
+            return packed;
         }
         let valued = self.active.mechanoreceptor || self.intensity != IntensityWord::Nothing;
-        self.link.words(found, valued, &mut self.counts, sink)
+        let queued = self.link.words(found, valued, &mut self.counts);
+        self.link.offer(&mut self.counts, sink);
+        queued
     }
 
     /// Sends what is due at the end of a frame: all words of version 1; for version 2 events, promises, states and
@@ -192,32 +197,35 @@ impl Board {
             self.refresh.frame(&self.active, period);
         }
         if self.active.wire_version == 1 {
-            self.link.flush_words(&mut self.counts, sink);
-            return;
+            self.link.flush_words();
+        } else {
+            let (now, next) = (self.now(), self.now() + self.active.frame_10ns() / 100);
+            self.link.with_packer(|packer| packer.over(now, next));
+            if let Some(x) = self.refresh.line(&self.active) {
+                self.repeat(x, now);
+            }
+            // The totals count what the sink accepted before them.
+            self.link.offer(&mut self.counts, sink);
+            if self.refresh.totals() {
+                let status = self.totals();
+                self.link.with_packer(|packer| packer.status(now, &status));
+            }
         }
-        let (now, next) = (self.now(), self.now() + self.active.frame_10ns() / 100);
-        self.link.end_frame((now, next), &mut self.counts, sink);
-        if let Some(x) = self.refresh.line(&self.active) {
-            self.repeat(x, now, sink);
-        }
-        if self.refresh.totals() {
-            let status = self.totals();
-            self.link.status(now, &status, &mut self.counts, sink);
-        }
+        self.link.offer(&mut self.counts, sink);
     }
 
     /// Sends the values of a driven line again as states, with the comparators' reference values.
-    fn repeat(&mut self, x: u16, now: u64, sink: &mut impl FnMut(&[u8]) -> bool) {
+    fn repeat(&mut self, x: u16, now: u64) {
         if self.active.mechanoreceptor || self.intensity == IntensityWord::Nothing {
             return;
         }
-        let Self { link, counts, array, comparators, .. } = self;
+        let Self { link, array, comparators, .. } = self;
         let exists = |taxel: usize| array.exists.as_ref().is_none_or(|exists| exists[taxel]);
         let taxels = (0..array.rows)
             .map(|y| ((x, y), array.index(x, y)))
             .filter(|&(_, taxel)| exists(taxel))
             .map(|(position, taxel)| (position, comparators.values[taxel]));
-        link.states(now, taxels, counts, sink);
+        link.with_packer(|packer| packer.states(now, taxels));
     }
 
     fn exists(&self, taxel: usize) -> bool {

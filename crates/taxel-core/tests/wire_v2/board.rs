@@ -172,13 +172,13 @@ fn a_datagram_of_one_event_is_one_word_wherever_it_lies_in_the_first_128_lines()
     for x in 0..256 {
         for y in 0..64 {
             let t = 1000 * (u64::from(x) * 64 + u64::from(y));
-            let mut sink = |datagram: &[u8], n| {
+            packer.event(t, (x, y), true, y);
+            packer.over(t + 192, t + 384);
+            for (datagram, n) in packer.take() {
                 let far = x > 127 && (x - 127) * 64 + y >= 127;
                 assert_eq!((datagram.len(), n), (if far { 28 } else { 26 }, 1), "line {x}, row {y}");
-                decoder.push(datagram, None, &mut events);
-            };
-            packer.event(t, (x, y), true, y, &mut sink);
-            packer.over(t + 192, t + 384, &mut sink);
+                decoder.push(&datagram, None, &mut events);
+            }
             expected.push((t as i64, x, y));
         }
     }

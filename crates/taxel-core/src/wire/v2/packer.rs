@@ -28,7 +28,7 @@ pub struct Settings {
     pub heartbeat_us: u64,
 }
 
-/// Gathers events into datagrams and passes each datagram to a sink, with its number of events.
+/// Gathers events into datagrams; [`Packer::take`] takes those that are complete, each with its number of events.
 ///
 /// Times are us since reset and never decrease; within one time and line, rows ascend.
 #[derive(Debug, Clone)]
@@ -51,7 +51,7 @@ pub struct Packer {
     /// No later event is before this time, us.
     promised: u64,
     last_event: Option<u64>,
-    datagram: Vec<u8>,
+    complete: Vec<(Vec<u8>, usize)>,
 }
 
 impl Packer {
@@ -78,7 +78,7 @@ impl Packer {
             position: -1,
             promised: 0,
             last_event: None,
-            datagram: Vec::with_capacity(DATAGRAM_BYTES),
+            complete: vec![],
         })
     }
 
@@ -96,17 +96,22 @@ impl Packer {
         self.events
     }
 
+    /// Takes the datagrams that are complete, in the order of their numbers, each with its number of events.
+    pub fn take(&mut self) -> impl Iterator<Item = (Vec<u8>, usize)> {
+        self.complete.drain(..)
+    }
+
     /// Notes that an event was dropped; the next datagram that is begun carries the flag.
     pub fn dropped(&mut self) {
         self.dropped = true;
     }
 
     /// Adds an event.
-    pub fn event(&mut self, t: u64, (x, y): (u16, u16), p: bool, value: u16, sink: &mut impl FnMut(&[u8], usize)) {
+    pub fn event(&mut self, t: u64, (x, y): (u16, u16), p: bool, value: u16) {
         let position = i64::from(x) << self.stride | i64::from(y);
         if self.events > 0 && (t - self.base > LATEST_OFFSET || self.body.len() + self.bytes(t, position) > BODY_BYTES)
         {
-            self.send(t, sink);
+            self.send(t);
         }
         if self.events == 0 {
             (self.base, self.at, self.line) = (t, t, first_line(x));
@@ -128,54 +133,49 @@ impl Packer {
 
     /// Ends a frame: every event before `now` was added, and the next frame ends at `next`. Sends what is due: events,
     /// or a heartbeat. Without a hold time no event waits, even where two frames end within a microsecond.
-    pub fn over(&mut self, now: u64, next: u64, sink: &mut impl FnMut(&[u8], usize)) {
+    pub fn over(&mut self, now: u64, next: u64) {
         if self.events > 0 {
             if self.settings.hold_us == 0 || next - self.base > self.settings.hold_us {
-                self.send(now, sink);
+                self.send(now);
             }
             return;
         }
         let restless = self.last_event.is_some_and(|t| now - t <= RESTLESS_US);
         if now > self.promised && (restless || now - self.promised >= self.settings.heartbeat_us) {
             self.base = now.saturating_sub(u64::from(u16::MAX)).max(self.promised);
-            self.send(now, sink);
+            self.send(now);
         }
     }
 
     /// Sends the events that wait, regardless of the hold time.
-    pub fn flush(&mut self, now: u64, sink: &mut impl FnMut(&[u8], usize)) {
+    pub fn flush(&mut self, now: u64) {
         if self.events > 0 {
-            self.send(now, sink);
+            self.send(now);
         }
     }
 
     /// Sends the start or stop of a recording, after the events that wait.
-    pub fn marker(&mut self, t: u64, start: bool, sink: &mut impl FnMut(&[u8], usize)) {
-        self.flush(t, sink);
+    pub fn marker(&mut self, t: u64, start: bool) {
+        self.flush(t);
         let mut body = vec![0; 4];
         body.extend((if start { START } else { STOP }).to_le_bytes());
         body.extend([0, 0]);
         self.base = t;
-        self.write(BodyKind::Markers, &body, (0, 0), 0, sink);
+        self.write(BodyKind::Markers, &body, (0, 0), 0);
     }
 
     /// Sends the board's totals; the packer itself fills in the number of datagrams.
-    pub fn status(&mut self, t: u64, status: &BoardTotals, sink: &mut impl FnMut(&[u8], usize)) {
-        self.flush(t, sink);
+    pub fn status(&mut self, t: u64, status: &BoardTotals) {
+        self.flush(t);
         let totals = [status.frames, status.events, status.dropped, self.sequence.into(), status.faults];
         let body: Vec<u8> = totals.iter().flat_map(|total| total.to_le_bytes()).collect();
         self.base = t;
-        self.write(BodyKind::Status, &body, (0, 0), 0, sink);
+        self.write(BodyKind::Status, &body, (0, 0), 0);
     }
 
     /// Sends values again as states: taxels by ascending position, each with the value that the board compares with.
-    pub fn states(
-        &mut self,
-        t: u64,
-        taxels: impl Iterator<Item = ((u16, u16), u16)>,
-        sink: &mut impl FnMut(&[u8], usize),
-    ) {
-        self.flush(t, sink);
+    pub fn states(&mut self, t: u64, taxels: impl Iterator<Item = ((u16, u16), u16)>) {
+        self.flush(t);
         let (kind, word) = match self.settings.kind {
             BodyKind::Small => (BodyKind::SmallStates, Layout { bytes: 2, skip: 7, value: 8 }),
             _ => (BodyKind::LargeStates, Layout { bytes: 4, skip: 15, value: 16 }),
@@ -185,7 +185,7 @@ impl Packer {
         for ((x, y), value) in taxels {
             let position = i64::from(x) << self.stride | i64::from(y);
             if body.len() + steps(word, position - last - 1) * word.bytes > BODY_BYTES {
-                self.write(kind, &body, (line, 0), 0, sink);
+                self.write(kind, &body, (line, 0), 0);
                 body.clear();
             }
             if body.is_empty() {
@@ -196,7 +196,7 @@ impl Packer {
             last = position;
         }
         if !body.is_empty() {
-            self.write(kind, &body, (line, 0), 0, sink);
+            self.write(kind, &body, (line, 0), 0);
         }
     }
 
@@ -208,11 +208,11 @@ impl Packer {
     }
 
     /// Sends the body, with the promise that no later event is before `now`.
-    fn send(&mut self, now: u64, sink: &mut impl FnMut(&[u8], usize)) {
+    fn send(&mut self, now: u64) {
         let body = std::mem::take(&mut self.body);
         let span = now - self.base;
         let line = if self.events > 0 { self.line } else { 0 };
-        self.write(self.settings.kind, &body, (line, span.min(u64::from(u16::MAX)) as u16), self.events, sink);
+        self.write(self.settings.kind, &body, (line, span.min(u64::from(u16::MAX)) as u16), self.events);
         self.promised = self.promised.max(self.base + span.min(u64::from(u16::MAX)));
         self.body = body;
         self.body.clear();
@@ -220,20 +220,13 @@ impl Packer {
         if span > u64::from(u16::MAX) {
             // A promise that exceeds 16 bits is sent as an empty datagram with a later base.
             self.base = now - u64::from(u16::MAX);
-            self.write(self.settings.kind, &[], (0, u16::MAX), 0, sink);
+            self.write(self.settings.kind, &[], (0, u16::MAX), 0);
             self.promised = now;
         }
     }
 
     /// Sends a body whose positions count from a line, with its span.
-    fn write(
-        &mut self,
-        kind: BodyKind,
-        body: &[u8],
-        (line, span): (u8, u16),
-        events: usize,
-        sink: &mut impl FnMut(&[u8], usize),
-    ) {
+    fn write(&mut self, kind: BodyKind, body: &[u8], (line, span): (u8, u16), events: usize) {
         let Settings { board, session, frame_sync, differences, .. } = self.settings;
         let flag = |set: bool, bit: u8| if set { bit } else { 0 };
         let after_loss = if events > 0 { self.after_loss } else { std::mem::take(&mut self.dropped) };
@@ -250,8 +243,9 @@ impl Packer {
             span,
         };
         self.sequence = self.sequence.wrapping_add(1);
-        header.write(body, &mut self.datagram);
-        sink(&self.datagram, events);
+        let mut datagram = Vec::with_capacity(DATAGRAM_BYTES);
+        header.write(body, &mut datagram);
+        self.complete.push((datagram, events));
     }
 }
 
