@@ -9,11 +9,11 @@ mod fit;
 mod online;
 mod statement;
 
-pub use cone::{ConeR, ConeRFit, ConeRProblem, ConeX, ConeXFit, ConeXProblem, GapMultipliers, Horizon, Shares};
+pub use cone::{ConeR, ConeRFit, ConeRProblem, ConeX, ConeXFit, ConeXProblem, GapMultipliers, Shares};
 pub use engines::{DualActiveSet, Multipliers, Ray, RowId, SolveOutcome};
 pub use fit::{Fit, Left, Round, Status};
 pub use online::OnlineConeR;
 pub use statement::{
-    Bound, Bounds, Certificate, Divisor, DivisorC, DivisorD, Margin, Norm, Parts, Row, Sides, StatedRow,
+    Bounds, Certificate, Divisor, DivisorC, DivisorD, Margin, Norm, OneOrEach, Parts, Row, Sides, StatedRow,
 };
 pub use statement::{check_examples, check_pattern, check_some_target, check_trains};

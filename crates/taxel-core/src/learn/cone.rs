@@ -9,4 +9,4 @@ mod shortest;
 
 pub(crate) use cone_r::PatternDemand;
 pub use cone_r::{ConeR, ConeRFit, ConeRProblem, GapMultipliers, Shares};
-pub use cone_x::{ConeX, ConeXFit, ConeXProblem, Horizon};
+pub use cone_x::{ConeX, ConeXFit, ConeXProblem};

@@ -17,7 +17,7 @@ mod rows;
 mod silence;
 mod targets;
 
-pub use bounds::{Bound, Bounds};
+pub use bounds::{Bounds, OneOrEach};
 pub(crate) use bounds::{bounds_of, check_bounds};
 pub use certificate::Certificate;
 pub(crate) use examples::{check_example, check_silence};

@@ -6,7 +6,7 @@ use crate::allowed::{Range, one_weight_a_train};
 use crate::learn::engines::WarmStart;
 use crate::learn::fit::{Fit, Left, Round, Status};
 use crate::learn::statement::{
-    Bound, Choice, Divisor, DivisorC, DivisorD, Margin, Norm, Objective, Proof, Relaxed, Row, Sides, Statement,
+    Choice, Divisor, DivisorC, DivisorD, Margin, Norm, Objective, OneOrEach, Proof, Relaxed, Row, Sides, Statement,
     bounds_of, check_bounds, check_examples, check_silence, check_trains, end_of,
 };
 use crate::metrics::matching::{WINDOW_MS, match_spikes};
@@ -29,9 +29,9 @@ parameters! {
         /// `lambda_1` to `lambda_5`: the factors of l1, l2, B, C and D.
         pub lambdas: [f64; 5] = [2.8, 1.2, 100.0, 100.0, 80.0], "", Range::FROM_0;
         /// Least weight, mV.
-        pub lb: Bound = Bound::All(-0.3), "mV", Range::FINITE;
+        pub lb: OneOrEach = OneOrEach::All(-0.3), "mV", Range::FINITE;
         /// Largest weight, mV.
-        pub ub: Bound = Bound::All(0.3), "mV", Range::FINITE;
+        pub ub: OneOrEach = OneOrEach::All(0.3), "mV", Range::FINITE;
         /// The normaliser of B.
         pub divide_b_by: Divisor = Divisor::Largest;
         /// The normaliser of C.

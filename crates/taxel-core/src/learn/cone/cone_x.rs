@@ -10,10 +10,10 @@ use serde::{Deserialize, Serialize};
 use super::cone_r::GapMultipliers;
 use super::exact::{BestWeights, Exact};
 use super::shortest::{RowGenerationEnd, Shortest};
-use crate::allowed::{ParameterNumbers, Range};
+use crate::allowed::Range;
 use crate::learn::fit::{Fit, Round, Status};
 use crate::learn::statement::{
-    Bound, Bounds, Certificate, Choice, Divisor, DivisorC, DivisorD, Margin, NOTHING, Norm, Objective, Parts, Row,
+    Bounds, Certificate, Choice, Divisor, DivisorC, DivisorD, Margin, NOTHING, Norm, Objective, OneOrEach, Parts, Row,
     Sides, StatedRow, Statement, bounds_of, check_bounds, check_examples, check_some_target, end_of, largest,
     relative_gap,
 };
@@ -43,9 +43,9 @@ parameters! {
         /// satisfy the rows.
         pub lambdas: [f64; 3] = [0.0, 1.0, 0.0], "", Range::FROM_0;
         /// Least weight, mV, one for all or one per synapse.
-        pub lb: Bound = Bound::All(-0.3), "mV", Range::FINITE;
+        pub lb: OneOrEach = OneOrEach::All(-0.3), "mV", Range::FINITE;
         /// Largest weight, mV, one for all or one per synapse.
-        pub ub: Bound = Bound::All(0.3), "mV", Range::FINITE;
+        pub ub: OneOrEach = OneOrEach::All(0.3), "mV", Range::FINITE;
         /// The normaliser of B.
         pub divide_b_by: Divisor = Divisor::Largest;
         /// Whether the l2 term is the norm or its square.
@@ -58,50 +58,11 @@ parameters! {
         pub slope: Option<f64> = None, "mV/ms", Range::FROM_0;
         /// The end of silence, ms, one for all or one per pattern; by default the later of a pattern's end and its last
         /// target + `tau`.
-        pub horizon: Option<Horizon> = None, "ms", Range::FINITE;
+        pub horizon: Option<OneOrEach> = None, "ms", Range::FINITE;
         /// The relative gap between objective and proven bound at which a fit counts as solved.
         pub tolerance: f64 = 1e-8, "", Range::within(1e-12, 0.1);
         /// The time after which the caller requests the best weights so far, s; this crate reads no clock.
         pub max_seconds: Option<f64> = None, "s", Range::ABOVE_0;
-    }
-}
-
-/// The end of silence, ms.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "must be a number of ms, or one number per pattern")]
-pub enum Horizon {
-    /// The same in all patterns.
-    All(f64),
-    /// One per pattern.
-    Each(Vec<f64>),
-}
-
-impl ParameterNumbers for Horizon {
-    fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
-        match self {
-            Self::All(value) => value.each(look),
-            Self::Each(values) => values.each(look),
-        }
-    }
-}
-
-impl Horizon {
-    /// The horizon of pattern `p`.
-    fn at(&self, p: usize) -> f64 {
-        match self {
-            Self::All(value) => *value,
-            Self::Each(values) => values[p],
-        }
-    }
-
-    fn check(&self, patterns: usize) -> Result<()> {
-        match self {
-            Self::Each(values) if values.len() != patterns => Err(problem!(
-                "horizon"; ": {} values; must be one number for all patterns, or one per pattern, {patterns}",
-                values.len()
-            )),
-            _ => Ok(()),
-        }
     }
 }
 
@@ -214,8 +175,10 @@ impl ConeXProblem {
         let neuron = &parameters.neuron;
         let trains = patterns[0].len();
         let bounds = bounds_of(&parameters.lb, &parameters.ub, trains)?;
-        if let Some(horizon) = &parameters.horizon {
-            horizon.check(patterns.len())?;
+        if let Some(count) = parameters.horizon.as_ref().and_then(OneOrEach::count).filter(|&n| n != patterns.len()) {
+            return Err(problem!(
+                "horizon"; ": {count} values; must be one number for all patterns, or one per pattern, {}", patterns.len()
+            ));
         }
         let examples = || patterns.iter().zip(targets).enumerate();
         let horizon = |p| parameters.horizon.as_ref().map(|horizon| horizon.at(p));

@@ -5,17 +5,17 @@ use serde::{Deserialize, Serialize};
 use crate::allowed::{ParameterNumbers, is_weight};
 use crate::{Result, problem};
 
-/// A lower or an upper bound on the weights, mV.
+/// A number that is the same for all synapses or patterns, or one for each.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "must be a number of mV, or one number per synapse")]
-pub enum Bound {
-    /// The same for all synapses.
+#[serde(untagged, expecting = "must be a number, or a list of one number each")]
+pub enum OneOrEach {
+    /// The same for all.
     All(f64),
-    /// One per synapse.
+    /// One for each.
     Each(Vec<f64>),
 }
 
-impl ParameterNumbers for Bound {
+impl ParameterNumbers for OneOrEach {
     fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
         match self {
             Self::All(value) => value.each(look),
@@ -24,8 +24,8 @@ impl ParameterNumbers for Bound {
     }
 }
 
-impl Bound {
-    /// The bound on the weight of synapse `n`, mV.
+impl OneOrEach {
+    /// That of synapse or pattern `n`.
     #[must_use]
     pub fn at(&self, n: usize) -> f64 {
         match self {
@@ -34,7 +34,7 @@ impl Bound {
         }
     }
 
-    /// The bound multiplied by `factor`.
+    /// All multiplied by `factor`.
     #[must_use]
     pub fn times(&self, factor: f64) -> Self {
         match self {
@@ -43,7 +43,8 @@ impl Bound {
         }
     }
 
-    fn len(&self) -> Option<usize> {
+    /// How many there are; `None` for one that is the same for all.
+    pub(crate) fn count(&self) -> Option<usize> {
         match self {
             Self::All(_) => None,
             Self::Each(values) => Some(values.len()),
@@ -73,13 +74,13 @@ impl Bounds {
 /// # Errors
 ///
 /// `Problem`, naming the synapse.
-pub(crate) fn check_bounds(lb: &Bound, ub: &Bound) -> Result<()> {
-    if let (Some(a), Some(b)) = (lb.len(), ub.len())
+pub(crate) fn check_bounds(lb: &OneOrEach, ub: &OneOrEach) -> Result<()> {
+    if let (Some(a), Some(b)) = (lb.count(), ub.count())
         && a != b
     {
         return Err(problem!("lb"; " has {a} bounds, ub has {b}: must be one per synapse, or one for all"));
     }
-    let each = lb.len().or(ub.len());
+    let each = lb.count().or(ub.count());
     if each == Some(0) {
         return Err(problem!("bounds: the list is empty; must be one per synapse, or one for all"));
     }
@@ -100,10 +101,10 @@ pub(crate) fn check_bounds(lb: &Bound, ub: &Bound) -> Result<()> {
 /// # Errors
 ///
 /// `Problem` if a list of bounds has another length.
-pub(crate) fn bounds_of(lb: &Bound, ub: &Bound, trains: usize) -> Result<Bounds> {
+pub(crate) fn bounds_of(lb: &OneOrEach, ub: &OneOrEach, trains: usize) -> Result<Bounds> {
     check_bounds(lb, ub)?;
     for (name, bound) in [("lb", lb), ("ub", ub)] {
-        if let Some(count) = bound.len().filter(|&count| count != trains) {
+        if let Some(count) = bound.count().filter(|&count| count != trains) {
             return Err(problem!("{name}: {count} bounds for {trains} trains; must be one per train, or one for all"));
         }
     }

@@ -110,20 +110,12 @@ fn explain(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: 
             let stated = statement.state(*row)?;
             let (least, most) = bounds.range(&stated.coefficients);
             let t = statement.time(*row);
+            let (which, give) = if most < stated.limit { ("largest", most) } else { ("smallest", least) };
             let why = if stated.coefficients.iter().all(|&a| a == 0.0) {
                 "no input before this time has an effect".to_owned()
-            } else if most < stated.limit {
-                format!(
-                    "the largest allowed weights give {} mV at this time, but the threshold is {} mV",
-                    mv(most),
-                    mv(stated.limit)
-                )
             } else {
-                format!(
-                    "the smallest allowed weights give {} mV at this time, but the threshold is {} mV",
-                    mv(least),
-                    mv(stated.limit)
-                )
+                let (give, threshold) = (mv(give), mv(stated.limit));
+                format!("the {which} allowed weights give {give} mV at this time, but the threshold is {threshold} mV")
             };
             format!(
                 "with weights within the bounds, the neuron cannot fire in pattern {pattern} at target {target} ({} \
@@ -145,13 +137,11 @@ fn explain(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: 
     let Margin { height, slope } = statement.margin.times(statement.unit);
     if at_all {
         text += ". Without a margin this is impossible too";
-    } else if slope > 0.0 {
-        text += &format!(
-            ". This is proven for silence {height} mV below the threshold and a slope of {slope} mV/ms or more at \
-             targets"
-        );
     } else {
         text += &format!(". This is proven for silence {height} mV below the threshold");
+        if slope > 0.0 {
+            text += &format!(" and a slope of {slope} mV/ms or more at targets");
+        }
     }
     Ok(text)
 }
@@ -165,33 +155,18 @@ fn list(statement: &Statement, rows: &[(Row, f64)]) -> Result<String> {
         weighed.push((multiplier.abs() * length.max(stated.limit.abs()), row));
     }
     weighed.sort_by(|a, b| b.0.total_cmp(&a.0));
-    // By pattern: texts of targets that must be reached, and times of silence.
-    let mut by_pattern: BTreeMap<usize, (Vec<String>, Vec<f64>)> = BTreeMap::new();
+    let mut by_pattern: BTreeMap<usize, Vec<String>> = BTreeMap::new();
     for &(_, row) in weighed.iter().take(NAMED) {
-        let t = statement.time(row);
-        match row {
-            Row::Target { pattern, target } => {
-                by_pattern.entry(pattern).or_default().0.push(format!("fire at target {target} ({} ms)", short(t)));
-            }
-            Row::Slope { pattern, target } => {
-                by_pattern
-                    .entry(pattern)
-                    .or_default()
-                    .0
-                    .push(format!("reach target {target} ({} ms) from below", short(t)));
-            }
-            Row::Silence { pattern, t } => by_pattern.entry(pattern).or_default().1.push(t),
-        }
+        let t = short(statement.time(row));
+        let (pattern, asked) = match row {
+            Row::Target { pattern, target } => (pattern, format!("fire at target {target} ({t} ms)")),
+            Row::Slope { pattern, target } => (pattern, format!("reach target {target} ({t} ms) from below")),
+            Row::Silence { pattern, .. } => (pattern, format!("be silent at {t} ms")),
+        };
+        by_pattern.entry(pattern).or_default().push(asked);
     }
-    let mut parts = Vec::new();
-    for (pattern, (mut asked, mut silent)) in by_pattern {
-        silent.sort_by(f64::total_cmp);
-        if !silent.is_empty() {
-            let times: Vec<String> = silent.iter().map(|&t| short(t)).collect();
-            asked.push(format!("be silent at {} ms", times.join(", ")));
-        }
-        parts.push(format!("pattern {pattern} must {}", asked.join(", ")));
-    }
+    let parts: Vec<String> =
+        by_pattern.iter().map(|(pattern, asked)| format!("pattern {pattern} must {}", asked.join(", "))).collect();
     let more = rows.len().saturating_sub(NAMED);
     Ok(if more > 0 { format!("{}; and {more} rows of less weight", parts.join("; ")) } else { parts.join("; ") })
 }
