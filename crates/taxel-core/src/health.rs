@@ -7,7 +7,7 @@
 
 use crate::Array;
 use crate::held::UNKNOWN;
-use crate::rest::{NOISE_FLOOR, TaxelGrid, TrackedRest, Value};
+use crate::rest::{NOISE_FLOOR, TaxelGrid, TrackedRest};
 
 /// Width of a bin, us.
 pub const BIN_US: i64 = 50_000;
@@ -55,17 +55,9 @@ struct PresentTouch {
 }
 
 /// Counts the touches and changes of each taxel while events or frames arrive.
-///
-/// Only taxels that had a value, and their neighbours, take memory and time: an array may be large, and few of its
-/// taxels active.
 #[derive(Debug, Clone)]
 pub struct TouchCounts {
     grid: TaxelGrid,
-    exists: Option<Vec<bool>>,
-    /// By taxel index: 1 + its slot in the vectors below; 0 for a taxel that is not counted.
-    slots: Vec<u32>,
-    /// The indices of the counted taxels.
-    taxels: Vec<u32>,
     /// Number of each taxel's neighbours that exist.
     neighbours: Vec<u8>,
     rest: TrackedRest,
@@ -81,33 +73,22 @@ impl TouchCounts {
     /// values on.
     #[must_use]
     pub fn new(array: &Array, rest: f64) -> Self {
-        let grid = TaxelGrid { taxels: array.len(), columns: usize::from(array.columns) };
-        let mut counts = Self {
+        let n = array.len();
+        let grid = TaxelGrid { taxels: n, columns: usize::from(array.columns) };
+        let others =
+            |taxel: usize| grid.around(taxel, 1).filter(|&near| near != taxel && array.has(near)).count() as u8;
+        Self {
             grid,
-            exists: array.exists.clone(),
-            slots: vec![0; grid.taxels],
-            taxels: vec![],
-            neighbours: vec![],
-            rest: TrackedRest::sparse(grid.taxels, grid.columns, NOISE_FLOOR),
-            bins: vec![],
-            counts: vec![],
-            touch: vec![],
+            neighbours: (0..n).map(|taxel| if array.has(taxel) { others(taxel) } else { 0 }).collect(),
+            rest: TrackedRest::new(grid.columns, NOISE_FLOOR, vec![rest; n]),
+            bins: vec![Bin { held: f32::NAN, greatest: f32::NAN, changes: 0 }; n],
+            counts: vec![TaxelCounts::default(); n],
+            touch: vec![PresentTouch::default(); n],
             end: None,
-        };
-        if rest != f64::NO_REST {
-            (0..grid.taxels).for_each(|taxel| counts.add(taxel));
-            counts.rest = TrackedRest::new(grid.columns, NOISE_FLOOR, vec![rest; grid.taxels]);
         }
-        counts
     }
 
-    /// The indices of the taxels that are counted: those that had a value, and their neighbours.
-    #[must_use]
-    pub fn taxels(&self) -> &[u32] {
-        &self.taxels
-    }
-
-    /// The counts of the [`TouchCounts::taxels`], up to the last whole bin; all others have none.
+    /// The counts of each taxel, by index, up to the last whole bin.
     #[must_use]
     pub fn counts(&self) -> &[TaxelCounts] {
         &self.counts
@@ -117,7 +98,7 @@ impl TouchCounts {
     /// whether the taxel itself changed, not what a state of version 2 says of it.
     pub fn event(&mut self, t: i64, taxel: usize, ticks: u16, up: bool, changed: bool) {
         let value = if ticks == UNKNOWN {
-            let held = self.slot(taxel).map_or(f32::NAN, |slot| self.bins[slot].held);
+            let held = self.bins[taxel].held;
             (if held.is_nan() { 0.0 } else { held }) + if up { 4.0 } else { -4.0 }
         } else {
             ticks.into()
@@ -131,11 +112,7 @@ impl TouchCounts {
         if self.end.is_none_or(|end| t >= end) {
             self.advance(t);
         }
-        let slot = match self.slot(taxel) {
-            Some(slot) if !self.bins[slot].held.is_nan() => slot,
-            _ => self.begin(taxel),
-        };
-        let bin = &mut self.bins[slot];
+        let bin = &mut self.bins[taxel];
         bin.held = value;
         bin.greatest = bin.greatest.max(value);
         bin.changes += u32::from(changed);
@@ -152,66 +129,35 @@ impl TouchCounts {
         self.end = Some(self.end.unwrap_or_else(|| next(t)));
     }
 
-    /// The slot of a taxel's counts, if it is counted.
-    #[inline]
-    fn slot(&self, taxel: usize) -> Option<usize> {
-        (self.slots[taxel] as usize).checked_sub(1)
-    }
-
-    /// Counts a taxel and its neighbours from its first value on; returns its slot.
-    #[cold]
-    fn begin(&mut self, taxel: usize) -> usize {
-        for near in self.grid.around(taxel, 1) {
-            if self.slots[near] == 0 {
-                self.add(near);
-                self.rest.add(near as u32);
-            }
-        }
-        self.slots[taxel] as usize - 1
-    }
-
-    /// Counts a taxel that was not counted so far.
-    fn add(&mut self, taxel: usize) {
-        let exists = |taxel: usize| self.exists.as_ref().is_none_or(|exists| exists[taxel]);
-        let neighbours = self.grid.around(taxel, 1).filter(|&near| near != taxel && exists(near)).count() as u8;
-        self.neighbours.push(if exists(taxel) { neighbours } else { 0 });
-        self.taxels.push(taxel as u32);
-        self.bins.push(Bin { held: f32::NAN, greatest: f32::NAN, changes: 0 });
-        self.counts.push(TaxelCounts::default());
-        self.touch.push(PresentTouch::default());
-        self.slots[taxel] = self.taxels.len() as u32;
-    }
-
-    /// The slots of the counted taxels up to `reach` rows and columns around that at `slot`.
-    fn around(&self, slot: usize, reach: usize) -> impl Iterator<Item = usize> {
-        let others = self.grid.around(self.taxels[slot] as usize, reach);
-        others.filter_map(|neighbour| self.slot(neighbour)).filter(move |&neighbour| neighbour != slot)
+    /// The taxels up to `reach` rows and columns around one.
+    fn around(&self, taxel: usize, reach: usize) -> impl Iterator<Item = usize> + use<> {
+        self.grid.around(taxel, reach).filter(move |&neighbour| neighbour != taxel)
     }
 
     fn end_bin(&mut self, t: i64) {
         self.count_changes();
         let (mut near, mut down) = (vec![0_u8; self.bins.len()], vec![0_u8; self.bins.len()]);
-        for (slot, rest) in self.rest.rests().enumerate() {
-            let bin = self.bins[slot];
+        for (taxel, rest) in self.rest.rests().enumerate() {
+            let bin = self.bins[taxel];
             // A taxel's first value is its rest.
             let Some(rest) = rest.map(|rest| rest as f32) else { continue };
             if bin.greatest.is_nan() || bin.greatest - rest < TOUCH {
                 continue;
             }
-            self.counts[slot].pressed += 1;
-            for neighbour in self.around(slot, 1) {
+            self.counts[taxel].pressed += 1;
+            for neighbour in self.around(taxel, 1) {
                 near[neighbour] += 1;
                 down[neighbour] += u8::from(bin.held - rest >= TOUCH);
             }
         }
-        for (slot, &neighbours) in self.neighbours.iter().enumerate() {
-            let (touch, counts) = (&mut self.touch[slot], &mut self.counts[slot]);
-            let begins = !touch.present && neighbours >= 3 && 4 * near[slot] >= 3 * neighbours;
+        for (taxel, &neighbours) in self.neighbours.iter().enumerate() {
+            let (touch, counts) = (&mut self.touch[taxel], &mut self.counts[taxel]);
+            let begins = !touch.present && neighbours >= 3 && 4 * near[taxel] >= 3 * neighbours;
             if begins {
                 *touch = PresentTouch { present: true, changed: false };
             }
-            touch.changed |= self.bins[slot].changes > 0;
-            if touch.present && 4 * down[slot] <= neighbours {
+            touch.changed |= self.bins[taxel].changes > 0;
+            if touch.present && 4 * down[taxel] <= neighbours {
                 counts.touches += 1;
                 counts.missed += u32::from(!touch.changed);
                 touch.present = false;
@@ -224,18 +170,18 @@ impl TouchCounts {
     }
 
     fn count_changes(&mut self) {
-        for slot in 0..self.bins.len() {
-            let changes = self.bins[slot].changes;
+        for taxel in 0..self.bins.len() {
+            let changes = self.bins[taxel].changes;
             if changes == 0 {
                 continue;
             }
             let (mut most, mut second) = (0, 0);
-            for neighbour in self.around(slot, 2) {
+            for neighbour in self.around(taxel, 2) {
                 let nearby = self.bins[neighbour].changes;
                 (most, second) = if nearby > most { (nearby, most) } else { (most, second.max(nearby)) };
             }
-            self.counts[slot].changed += 1;
-            self.counts[slot].by_itself += u32::from(changes >= OFTEN && changes > BY_ITSELF * second);
+            self.counts[taxel].changed += 1;
+            self.counts[taxel].by_itself += u32::from(changes >= OFTEN && changes > BY_ITSELF * second);
         }
     }
 }

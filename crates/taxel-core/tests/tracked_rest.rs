@@ -124,30 +124,3 @@ fn a_clock_that_steps_back_begins_a_new_stretch() {
     sampled(&mut rest, 10, 1, |_, _| 50.0);
     assert_eq!(rest.quiet(), Some((0, QUIET_US)));
 }
-
-#[test]
-fn a_sparse_rest_is_that_of_all_taxels_of_which_most_have_no_value() {
-    let mut random = StdRng::seed_from_u64(11);
-    for active in [5_usize, 30, 64] {
-        let (mut dense, mut sparse) = (unknown(), TrackedRest::sparse(64, 8, 3.0));
-        let (mut places, mut held) = (vec![], [f32::NAN; 64]);
-        for k in 0..200 {
-            for _ in 0..4 {
-                let taxel = random.random_range(0..active) * 37 % 64;
-                let loaded = k / 30 % 2 == 1 && touched(taxel);
-                held[taxel] = 50.0 + random.random_range(-2.0..2.0_f32) + if loaded { 40.0 } else { 0.0 };
-                if !places.contains(&taxel) {
-                    places.push(taxel);
-                    sparse.add(taxel as u32);
-                }
-            }
-            let all = dense.take(k * 50_000, held).to_vec();
-            let some = sparse.take(k * 50_000, places.iter().map(|&taxel| held[taxel])).to_vec();
-            assert_eq!(some, places.iter().map(|&taxel| all[taxel]).collect::<Vec<_>>(), "{active} active, sample {k}");
-        }
-        assert_eq!(sparse.quiet(), dense.quiet(), "{active} active");
-        assert!(dense.quiet().is_some());
-        let begins: Vec<f64> = places.iter().map(|&taxel| dense.begins()[taxel]).collect();
-        assert_eq!(sparse.begins(), begins, "{active} active");
-    }
-}

@@ -158,13 +158,13 @@ impl PyTrackedRest {
     }
 }
 
-/// The indices of counted taxels, and their counts of touches in rows of five: touches, missed, pressed, changed, by itself.
-pub(crate) type TouchesOut<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>);
+/// The taxels' counts of touches in rows of five: touches, missed, pressed, changed, by itself.
+pub(crate) type TouchesOut<'py> = Bound<'py, PyArray1<u32>>;
 
-/// Counts of touches for Python; taxels that are not among them have none.
+/// Counts of touches for Python.
 pub(crate) fn from_touches<'py>(py: Python<'py>, touches: &TouchCounts) -> TouchesOut<'py> {
     let counts = touches.counts().iter().flat_map(|c| [c.touches, c.missed, c.pressed, c.changed, c.by_itself]);
-    (array(py, touches.taxels().to_vec()), array(py, counts.collect()))
+    array(py, counts.collect())
 }
 
 /// The counts of touches of events.

@@ -129,14 +129,6 @@ impl Baseline {
         (self.baselines[taxel], self.above[taxel]) = (value, 0.0);
     }
 
-    /// Adds a taxel after the others, with a baseline and the difference from it from which a value is far.
-    pub fn add(&mut self, baseline: f64, far: f32) {
-        self.baselines.push(baseline);
-        self.above.push(0.0);
-        self.far.push(far);
-        self.held.push(false);
-    }
-
     /// Sets the difference from the baseline from which a taxel's value is far.
     pub fn set_far(&mut self, taxel: usize, far: f32) {
         self.far[taxel] = far;

@@ -52,14 +52,6 @@ impl RestStretch {
         }
     }
 
-    /// Adds a taxel after the others, without a value so far.
-    fn add(&mut self) {
-        self.first.push(0.0);
-        for statistics in [&mut self.least, &mut self.greatest, &mut self.sums, &mut self.squares] {
-            statistics.push(0.0);
-        }
-    }
-
     /// A taxel that has no value before this one had it throughout.
     fn begin(&mut self, taxel: usize, value: f32) {
         self.first[taxel] = value;
@@ -71,8 +63,7 @@ impl RestStretch {
     }
 
     /// The median of the taxels' standard deviations on a grid, where a touch moves few of them; 0 for channels, each of
-    /// which a load may move. A taxel without a value so far, or that is not tracked, did
-    /// not move.
+    /// which a load may move. A taxel without a value so far did not move.
     #[allow(clippy::cast_precision_loss)]
     fn noise(&self, grid: TaxelGrid) -> f64 {
         let n = self.samples as f32;
@@ -81,14 +72,11 @@ impl RestStretch {
         if grid.is_channels() {
             return 0.0;
         }
-        match (grid.taxels / 2).checked_sub(grid.taxels - all.len()) {
-            Some(middle) => f64::from(*all.select_nth_unstable_by(middle, f32::total_cmp).1).sqrt(),
-            None => 0.0,
-        }
+        f64::from(*all.select_nth_unstable_by(grid.taxels / 2, f32::total_cmp).1).sqrt()
     }
 
-    /// Whether it was quiet: see the module. `index` is that of a tracked taxel.
-    fn is_quiet(&self, far: f64, known: &[bool], grid: TaxelGrid, index: impl Fn(usize) -> usize) -> bool {
+    /// Whether it was quiet: see the module.
+    fn is_quiet(&self, far: f64, known: &[bool], grid: TaxelGrid) -> bool {
         let moved = |taxel: usize| {
             let mean = self.mean(taxel) - f64::from(self.first[taxel]);
             known[taxel] && (f64::from(self.greatest[taxel]) - mean).max(mean - f64::from(self.least[taxel])) >= far
@@ -99,7 +87,7 @@ impl RestStretch {
         }
         let mut near = HashMap::new();
         for taxel in moved {
-            for neighbour in grid.around(index(taxel), 1) {
+            for neighbour in grid.around(taxel, 1) {
                 let together = near.entry(neighbour).or_insert(0);
                 *together += 1;
                 if *together >= TOUCHED_TOGETHER {
@@ -138,8 +126,6 @@ impl TaxelGrid {
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackedRest {
     grid: TaxelGrid,
-    /// The indices of the tracked taxels in the order of their values; `None` if all are tracked, by index.
-    tracked: Option<Vec<u32>>,
     noise_floor: f64,
     /// Whether values fall from their rest with pressure.
     falls: bool,
@@ -172,37 +158,16 @@ impl TrackedRest {
         (0..n).filter(|&taxel| known[taxel]).for_each(|taxel| baseline.freeze(taxel));
         let rest_given = known.contains(&true);
         let (grid, begins) = (TaxelGrid { taxels: n, columns: columns.max(1) }, vec![f64::NO_REST; n]);
-        let (values, tracked) = (vec![0.0; n], None);
+        let values = vec![0.0; n];
         let falls = false;
         let (stretch, quiet) = (None, None);
-        Self { grid, tracked, noise_floor, falls, baseline, values, known, rest_given, stretch, far, quiet, begins }
+        Self { grid, noise_floor, falls, baseline, values, known, rest_given, stretch, far, quiet, begins }
     }
 
     /// The same of values that fall from their rest with pressure: what lies far above it was loaded before.
     #[must_use]
     pub fn falling(self) -> Self {
         Self { falls: true, ..self }
-    }
-
-    /// Tracks only those of an array's `taxels` that [`TrackedRest::add`] names; none at first. All other taxels have no
-    /// value.
-    #[must_use]
-    pub fn sparse(taxels: usize, columns: usize, noise_floor: f64) -> Self {
-        let grid = TaxelGrid { taxels, columns: columns.max(1) };
-        Self { grid, tracked: Some(vec![]), ..Self::new(columns, noise_floor, vec![]) }
-    }
-
-    /// Tracks one more taxel, by index, whose values come after those of the taxels so far; its rest is unknown.
-    pub fn add(&mut self, taxel: u32) {
-        self.tracked.get_or_insert_default().push(taxel);
-        #[allow(clippy::cast_possible_truncation)]
-        self.baseline.add(0.0, self.far as f32);
-        self.values.push(0.0);
-        self.known.push(false);
-        self.begins.push(f64::NO_REST);
-        if let Some(stretch) = &mut self.stretch {
-            stretch.add();
-        }
     }
 
     /// Reads the next values, at `t` us, NaN for a taxel without one; returns them above the rest (negative below it).
@@ -247,8 +212,7 @@ impl TrackedRest {
         let noise = stretch.noise(self.grid).min(self.noise_floor);
         let far = stands_out_from(FAR_NOISE, noise, self.noise_floor);
         let any = self.known.contains(&true);
-        let index = |taxel: usize| self.tracked.as_ref().map_or(taxel, |tracked| tracked[taxel] as usize);
-        if stretch.samples < LEAST_SAMPLES || !any || !stretch.is_quiet(far, &self.known, self.grid, index) {
+        if stretch.samples < LEAST_SAMPLES || !any || !stretch.is_quiet(far, &self.known, self.grid) {
             return;
         }
         let first = self.quiet.is_none();

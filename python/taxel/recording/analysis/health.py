@@ -34,8 +34,8 @@ NOISY_FROM, NOISY_SHARE, NOISY_ON = 10, 0.5, 0.45
 #: A taxel that was not touched enough works if it had at least this number of events, or was once pressed itself.
 WORKS_FROM = 10
 
-#: The indices of taxels, and rows of five counts of touches of each, as the core gives them.
-TouchCounts = tuple[NDArray[np.uint32], NDArray[np.uint32]]
+#: Rows of five counts of touches of each taxel, as the core gives them.
+TouchCounts = NDArray[np.uint32]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -176,15 +176,13 @@ def judge(
     array : Array
     activity, moved : int64, shape (rows, columns)
         Number of events of each taxel, and of those in the direction of the one before.
-    touches : two arrays
-        As the core counts them.
+    touches : uint32
+        As the core counts them, five numbers per taxel.
     above : bool, shape (rows, columns)
         Whether the taxel is known to have read more than the least value.
     """
     exists = np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists).reshape(array.shape)
-    counts = np.zeros((array.rows * array.columns, 5), np.uint32)
-    counts[touches[0]] = touches[1].reshape(-1, 5)
-    touched, missed, pressed, changed, by_itself = counts.T.reshape(5, *array.shape)
+    touched, missed, pressed, changed, by_itself = touches.reshape(-1, 5).T.reshape(5, *array.shape)
     enough = exists & (touched >= TOUCHED_FROM) & (_neighbours(exists) >= NEIGHBOURS_FROM)
     still = enough & (missed == touched)
     noisy = exists & (by_itself >= NOISY_FROM) & (by_itself >= NOISY_SHARE * changed) & (moved <= NOISY_ON * activity)
