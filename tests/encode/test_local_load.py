@@ -55,7 +55,7 @@ def mean(times, rows, k, start_ms, stop_ms):
 
 
 class Oracle:
-    """The quantities of frames, with the number of places whose sum is above `bound`, nearly 4."""
+    """The quantities of frames, with thresholds as far off as `bound` is from 4: at them rounding decides."""
 
     def __init__(self, encoder, t, readings, exists, bound):
         self.encoder, self.t, self.tare, self.bound = encoder, t, encoder.tare, bound
@@ -71,8 +71,8 @@ class Oracle:
         known, s = self.known, self.s
         value = np.where(known, value, 0.0)
         sums = around(np.clip(value, -3 * s, 3 * s)) / np.sqrt(np.where(known, around(s**2), np.inf))
-        least = np.maximum(self.encoder.noise_floor + 0.5, times * self.sigma)
-        large = known & (value >= (5 * self.sigma).astype(np.float32))
+        least = np.maximum(self.encoder.noise_floor + 0.5, times * self.sigma) * self.bound / 4
+        large = known & (value >= 5 * self.sigma * self.bound / 4)
         return [
             area(value, np.where(known, least, np.inf)),
             max(0.0, sums.max()),

@@ -257,7 +257,7 @@ class Scene:
         --------
         >>> motion = Scene.draw(seed=1).motion(step_us=100.0)
         >>> round(float(motion.force_n.max()), 1), len(motion.contacts)
-        (20.3, 5)
+        (19.0, 5)
         """
         step = number("step_us", step_us)
         tracks, contacts, narrow = _core.motion(Array._of(array)._parts(), self._part(), step)
