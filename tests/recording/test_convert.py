@@ -51,9 +51,10 @@ def frames_of_any_bits(draw: st.DrawFn) -> Frames:
 
 
 def columns_of(table: taxel.Events | Frames) -> list[bytes]:
-    """Return the columns of a table to the last bit; of frames the taxels that exist."""
+    """Return the columns of a table to the last bit, missing values alike; of frames the taxels that exist."""
     if isinstance(table, Frames):
-        return [table.t.tobytes(), table.values[:, table.array._there()].tobytes()]
+        values = table.values[:, table.array._there()]
+        return [table.t.tobytes(), np.where(np.isnan(values), np.float32(np.nan), values).tobytes()]
     columns = table.t, table.x, table.y, table.p, table.intensity, table.present, table.repaired
     return [np.asarray(column).tobytes() for column in columns if column is not None]
 
