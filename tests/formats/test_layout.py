@@ -258,7 +258,7 @@ def test_a_layout_says_what_our_own_files_lack(tmp_path: Path) -> None:
         ("[table]\nseparator = ', '", "separator is ', ': must be one character"),
         ("[table]\nskip_lines = 40", "no line of numbers"),
         ("[table]\ntime_column = 'when'", "column 'when' of time_column is missing"),
-        ("[table]\ntime_column = 9", "time_column is 9, but the table has 6 columns"),
+        ("[table]\ntime_column = 9", "time_column is 9, but there are 6 columns"),
         ("rows = [", "not TOML"),
     ],
 )

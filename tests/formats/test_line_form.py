@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from refusal import refused
 
 import taxel
+from taxel.formats.form import Form
 from taxel.formats.layout import PrintedFrames
-from taxel.formats.line_form import LineForm, form_of_lines
+from taxel.formats.line_form import form_of_lines
 
 
 def row(count: int) -> str:
@@ -24,7 +25,7 @@ def repeated(line: Callable[[int], str], count: int = 20) -> list[str]:
 
 def form(
     lines: Sequence[str], size: int | None = None, unit: str = "", *, are_frames: bool = True, **stated: object
-) -> LineForm | None:
+) -> Form | None:
     def unit_of(stamps: NDArray[np.float64], numbers: Sequence[int]) -> str:
         assert len(stamps) == len(numbers)
         return unit
@@ -96,7 +97,7 @@ def test_what_lines_do_not_show_is_refused(lines: list[str], keys: dict[str, obj
 def test_columns_of_quantities_are_all_kept_but_for_texts() -> None:
     found = form(["t_us,acc_x,battery,mode", "0,1,2,walk", "10,2,3,walk"], are_frames=False)
     assert found is not None
-    assert (found.columns, found.clocks, found.taxels) == (
+    assert (found.names, found.clocks, found.taxels) == (
         ("t_us", "acc_x", "battery", "mode"),
         ((0, 1.0),),
         (1, 2),

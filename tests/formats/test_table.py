@@ -145,6 +145,30 @@ ROWS: dict[str, tuple[str, list[int], list[list[float]]]] = {
         [[3, 4], [3, 5]] + [[3, 6]] * 7,
     ),
     "a unit names the time": ("ms,fsr,battery\n0,1,87\n20,2,87\n40,3,86\n", [0, 20_000, 40_000], [[1], [2], [3]]),
+    "seconds and nanoseconds": (
+        '{"stamp": {"sec": 1700000000, "nanosec": 900000000}, "p": [3, 4]}\n'
+        '{"stamp": {"sec": 1700000001, "nanosec": 0}, "p": [3, 5]}\n',
+        [1_700_000_000_900_000, 1_700_000_001_000_000],
+        [[3, 4], [3, 5]],
+    ),
+    "a unit of time in any language": ("時間(ms),指1\n0,3\n20,4\n", [0, 20_000], [[3], [4]]),
+    "a mark of a comment": ("% time  F1  a\n% s  N  m/s2\n0.0  1  9\n0.1  2  9\n", [0, 100_000], [[1], [2]]),
+    "a counter of any name": (
+        "campione|tempo_s|a\n" + "".join(f"{k}|{k / 10}|{k % 3}\n" for k in range(20)),
+        [*range(0, 2_000_000, 100_000)],
+        [[k % 3] for k in range(20)],
+    ),
+    "a tick that is full": ("tick,a\n65500,1\n65520,2\n4,3\n", [65_500_000, 65_520_000, 65_540_000], [[1], [2], [3]]),
+    "a reading a line": (
+        "t_s,sensor,value\n0,heel,3\n0,toe,4\n0.1,toe,6\n0.1,heel,5\n",
+        [0, 100_000],
+        [[3, 4], [5, 6]],
+    ),
+    "a reading a line, taxel by taxel": (
+        "t_s,sensor,value\n0,heel,3\n0.1,heel,5\n0,toe,4\n0.1,toe,6\n",
+        [0, 100_000],
+        [[3, 4], [5, 6]],
+    ),
     "separators at the end": ("t_s,a,b\n0,1,2,\n1,3,4,\n", [0, 1_000_000], [[1, 2], [3, 4]]),
 }
 
@@ -247,6 +271,17 @@ def test_columns_of_a_pattern_are_kept(tmp_path: Path) -> None:
     found = opened(tmp_path, "t,l0_x,l0_z,l1_z\n0,1,30,60\n", '[table]\ntime_column = "t"\nkeep = "l*_z"\n')
     assert frames(found) == ([0], [[30, 60]])
     assert found.lost == ("columns that are not taxels: l0_x",)
+
+
+def test_a_column_that_is_one_sensor_s_at_first_and_another_s_below_is_asked(tmp_path: Path) -> None:
+    lines = [f"{k / 100},{name},{k % 7}\n" for name in ("heel", "toe") for k in range(9000)]
+    by, taxel, _ = layouts(tmp_path, "t_s,sensor,value\n" + "".join(lines))
+    assert 'by = "sensor"' in by
+    found = opened(tmp_path, "t_s,sensor,value\n" + "".join(lines), taxel)
+    assert found.sources[""].array.names == ("heel", "toe")
+    assert frames(found)[1] == [[k % 7] * 2 for k in range(9000)]
+    with refused(FormatError, place=Place("a.csv")):
+        opened(tmp_path, "t_s,sensor,value\n0,heel,3\n0,heel,4\n", taxel)
 
 
 def test_a_column_splits_lines_into_sources(tmp_path: Path) -> None:

@@ -12,20 +12,24 @@ _UNITS_OF_TIME = {
     "s": ("s", "sec", "secs", "second", "seconds", "sek", "sekunden"),
     "ms": ("ms", "msec", "millis", "milliseconds", "millisekunden"),
     "us": ("us", "µs", "μs", "usec", "micros", "microseconds"),
-    "ns": ("ns", "nsec", "nanos", "nanoseconds", "nsecs"),
+    "ns": ("ns", "nsec", "nanos", "nanosec", "nanosecs", "nanoseconds", "nsecs"),
 }
 _UNIT_OF_TIME = "|".join(word for words in _UNITS_OF_TIME.values() for word in words)
 #: What people call times, in some languages.
 _TIME = (
     r"t|ts|(?:%|rel|abs|host|device|sample|frame|recv|unix|epoch|system|header)?[ ._]*(?:time|stamp|time[ _]?stamp)s?"
     r"|elapsed(?:[ _]time)?|(?:mess|uhr|system)?zeit(?:stempel|punkt)?|temps|tiempo|tempo|tijd|tid"
-    r"|datetime|date[ _]time|clock|millis|micros|ms|msec|us|usec|secs?|seconds|sekunden"
+    r"|datetime|date[ _]time|clock|ticks?|millis|micros|ms|msec|us|usec|n(?:ano)?secs?|secs?|seconds|sekunden"
 )
 #: Names of columns that hold times, with or without a unit: time, timestamp_us, Time (ms), t [s].
 _TIMES = re.compile(
     rf"(?:{_TIME})"
     rf"(?:[ _.]*[\[(/] *(?P<within>{_UNIT_OF_TIME}) *[\])]?|(?:, *(?:in )?| in |[ _.]+)(?P<after>{_UNIT_OF_TIME}))?",
     re.IGNORECASE,
+)
+#: A name of any language with a unit of time: 時間(ms), Czas [s]; but not Sensor(s).
+_WITH_UNIT_OF_TIME = re.compile(
+    rf".*?(?:\[ *(?P<square>{_UNIT_OF_TIME}) *\]|(?<![a-z])\( *(?P<round>{_UNIT_OF_TIME}) *\))", re.IGNORECASE
 )
 
 _COUNTERS = re.compile(
@@ -73,14 +77,30 @@ def time_unit(name: str) -> str | None:
 
     Examples
     --------
-    >>> time_unit("Time (ms)"), time_unit("run1/time"), time_unit("Time[secs]"), time_unit("palm"), time_unit("%time")
-    ('ms', '', 's', None, '')
+    >>> time_unit("Time (ms)"), time_unit("run1/time"), time_unit("Time[secs]"), time_unit("palm"), time_unit("stamp.sec")
+    ('ms', '', 's', None, 's')
     """
-    found = _TIMES.fullmatch(last_part(name))
-    if found is None:
-        return None
-    word = (found["within"] or found["after"] or name.strip("\"' ")).lower()
+    last = last_part(name)
+    found = _TIMES.fullmatch(last)
+    if found is not None:
+        word = (found["within"] or found["after"] or last).lower()
+    else:
+        of_any = _WITH_UNIT_OF_TIME.fullmatch(name)
+        if of_any is None:
+            return None
+        word = (of_any["square"] or of_any["round"]).lower()
     return next((unit for unit, words in _UNITS_OF_TIME.items() if word in words), "")
+
+
+def is_time(name: str) -> bool:
+    """Return whether a column is called a time; a duration may have a unit of time too.
+
+    Examples
+    --------
+    >>> is_time("Time (ms)"), is_time("Kontakt [ms]"), time_unit("Kontakt [ms]"), time_unit("Sensor(s)")
+    (True, False, 'ms', None)
+    """
+    return _TIMES.fullmatch(last_part(name)) is not None
 
 
 def last_part(name: str) -> str:

@@ -41,7 +41,8 @@ class Table:
     columns : list of str, optional
         The names of the columns, for a table without names.
     time_column : str or int, optional
-        The column of times, by its name or its number from 1; default: none.
+        The column of times, by its name or its number from 1; "A+B" is the sum of seconds and of nanoseconds within
+        them; default: none.
     time_unit : {"s", "ms", "us", "ns", "iso"}
         "iso": texts as of ISO 8601, dates with times, of UTC where they state no zone, or times of a day;
         days with points (01.05.2024 10:15:02,010) too.
@@ -55,6 +56,9 @@ class Table:
         A column whose value becomes a label where it changes; it is no taxel.
     by : str or int, optional
         A column that says which sensor a line is of: each of its values is a source; it is no taxel.
+    taxel_column : str or int, optional
+        A column that says which taxel a line is of, whose reading is in the only other column: the lines of one time
+        are a frame.
     lines : {"plain", "marked", "json", "hex"}
         "marked": brackets, quotes, arrows and ``NAME:`` are between cells too; "json": a line is an object or a list
         of JSON, whose columns have the names of its keys; "hex": cells are hexadecimal numbers.
@@ -85,6 +89,7 @@ class Table:
     keep: str | None = None
     label_column: str | int | None = None
     by: str | int | None = None
+    taxel_column: str | int | None = None
     lines: str = "plain"
     frame_lines: int | None = None
     frame_end: str | None = None
@@ -99,7 +104,7 @@ class Table:
         text("lines", self.lines, KINDS)
         text("time_unit", self.time_unit, (*UNITS_US, ISO))
         integer("skip_lines", self.skip_lines, 0)
-        _check_columns(self, "time_column", "label_column", "by", "leave_out")
+        _check_columns(self, "time_column", "label_column", "by", "taxel_column", "leave_out")
         for name in ("keep", "missing", "frame_begin"):
             if getattr(self, name) is not None:
                 text(name, getattr(self, name))

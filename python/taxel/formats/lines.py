@@ -7,16 +7,12 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 import re
 from collections import Counter
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from taxel._base.limits import VALUE
 from taxel._base.messages import counted
-from taxel.formats.times import is_time, seconds_of
 
 #: How the cells of a line are found: between separators; where marks and names are between them too; JSON; hex.
 KINDS = ("plain", "marked", "json", "hex")
@@ -157,92 +153,6 @@ def read_line(line: str, kind: str = "marked", separator: str = ",", decimal: st
         cells += found
         names += [f"{name}[{k}]" if name and len(found) > 1 else name for k in range(len(found))]
     return Line(tuple(cells), tuple(names))
-
-
-@dataclass(frozen=True)
-class LineShape:
-    """Say what the cells of lines are; each line is read by itself.
-
-    Parameters
-    ----------
-    count : int
-        Number of cells.
-    numbers, times : frozenset of int
-        The columns that hold numbers, and texts that are times; others may hold anything.
-    kind, separator, decimal : str
-        As of `read_line`.
-    clock : int, optional
-        The column of numbers of which none may be missing.
-    missing : frozenset of str
-        Cells without a value.
-    names : tuple of str
-        The names of the cells that lines have themselves, in whose order they are put; empty if they have none.
-    """
-
-    count: int
-    numbers: frozenset[int]
-    times: frozenset[int] = frozenset()
-    kind: str = "plain"
-    separator: str = ","
-    decimal: str = "."
-    clock: int | None = None
-    missing: frozenset[str] = frozenset(MISSING)
-    names: tuple[str, ...] = ()
-
-    def cells(self, line: str) -> tuple[list[str], str]:
-        """Return the cells of a line, and what is odd about it; "" if nothing is.
-
-        Examples
-        --------
-        >>> shape = LineShape(2, frozenset((0, 1)))
-        >>> shape.cells("1,2")[1], shape.cells("1")[1], shape.cells("1,b")[1], shape.cells("Ready")[1]
-        ('', 'with too few cells', 'with a cell that is no number', 'of text')
-        """
-        parsed = read_line(line, self.kind, self.separator, self.decimal)
-        parsed = parsed.in_order(self.names) if parsed is not None and self.names else parsed
-        cells = list(parsed.cells) if parsed is not None else []
-        while len(cells) > self.count and not cells[-1]:
-            cells.pop()
-        return cells, self._odd(cells)
-
-    def values(self, line: str) -> tuple[list[float], str]:
-        """Return the numbers of a line, times of texts in s, NaN for other cells, and what is odd about it.
-
-        Examples
-        --------
-        >>> LineShape(3, frozenset((1, 2)), frozenset((0,)), decimal=",", separator=";").values("00:00:01;2,5;-")
-        ([1.0, 2.5, nan], '')
-        """
-        if len(self.numbers) == self.count and self.decimal == "." and line.isascii() and "_" not in line:
-            parsed = read_line(line, self.kind, self.separator, self.decimal)
-            if parsed is not None and len(parsed.cells) == self.count and not self.names:
-                with suppress(ValueError):
-                    found = list(map(float, parsed.cells))
-                    if max(found) <= VALUE and min(found) >= -VALUE and not math.isnan(sum(found)):
-                        return found, ""
-        cells, odd = self.cells(line)
-        if odd:
-            return [], odd
-        found = list(map(self._value, range(self.count), cells))
-        return (found, "") if all(not abs(value) > VALUE for value in found) else ([], "with a number out of range")
-
-    def _value(self, column: int, cell: str) -> float:
-        if column in self.times:
-            return seconds_of(cell.strip("\"'"))
-        if column not in self.numbers or cell in self.missing:
-            return math.nan
-        return float(cell.replace(",", ".") if self.decimal == "," else cell)
-
-    def _odd(self, cells: Sequence[str]) -> str:
-        """Return what is odd about the cells of a line; "" if nothing is."""
-        if not any(is_number(cell, self.decimal) or is_time(cell) for cell in cells):
-            return "of text"
-        if len(cells) != self.count:
-            return "with too few cells" if len(cells) < self.count else "with too many cells"
-        for k in self.numbers:
-            if not is_number(cells[k], self.decimal) and (cells[k] not in self.missing or k == self.clock):
-                return "with a cell that is no number"
-        return "" if all(is_time(cells[k]) for k in self.times) else "without a time"
 
 
 def _split(line: str, separator: str) -> tuple[str, ...]:

@@ -23,11 +23,12 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import around
 from taxel.formats.column_names import AXES, axes_of
+from taxel.formats.form import Form
 from taxel.formats.layout import Layout
 from taxel.formats.lines import MISSING, OddLines, is_number
 from taxel.formats.opened import Opened, size_of, sources_of
 from taxel.formats.table_columns import EVENT_COLUMNS
-from taxel.formats.table_form import Form, form_of
+from taxel.formats.table_form import form_of
 from taxel.formats.times import FEW_ODD, ISO, ODD, in_order, us_of
 from taxel.frames import Frames
 
@@ -69,9 +70,9 @@ class Rows:
         """Return the cells of labels or of keys; none without such a column."""
         return self.beside[name].fillna("").tolist() if name in self.beside else []
 
-    def line(self, row: int, form: Form) -> int:
-        """Return the number of the line of a row, from 1."""
-        below = ((n, line) for n, line in enumerate(Text(form.path).lines(), 1) if n > form.first and line.strip())
+    def line(self, row: int, path: Path, first: int) -> int:
+        """Return the number of the line of a row, from 1; the `first` line of numbers is counted from 0."""
+        below = ((n, line) for n, line in enumerate(Text(path).lines(), 1) if n > first and line.strip())
         return self.numbers[row] if self.numbers else next(islice(below, row, None))[0]
 
     def chosen(self, rows: NDArray[np.intp]) -> None:
@@ -98,30 +99,31 @@ def read_table(path: Path, layout: Layout, array: Array | None = None, label_col
     ImportError : the extra ``tables`` is not installed
     """
     text = Text(path)
-    form = form_of(text, layout, label_column)
+    form, full = form_of(text, layout, label_column)
     how, columns = form.table, form.columns
     rows = read_rows(text, form)
-    read = {columns.time, columns.label, columns.by, *columns.taxels}
+    read = {*columns.times, columns.label, columns.by, columns.taxel, *columns.taxels}
     left = [form.called(k) for k in range(len(form.names)) if k not in read]
     lost = [*([f"columns that are not taxels: {', '.join(left)}"] if left else []), *rows.odd.said()]
-    said, full, labels = [*form.said, *rows.odd.said()], form.layout, tuple[tuple[str, int], ...]()
+    said, labels = [*form.said, *rows.odd.said()], tuple[tuple[str, int], ...]()
     if how.events:
-        sources: dict[str, Frames | Events] = {"": _events(form, rows, array)}
+        sources: dict[str, Frames | Events] = {"": _events(path, full, form, rows, array)}
     else:
-        values, taxels = _frames_of_lines(form, rows, said), columns.taxels
+        values, names = _frames_of_lines(path, full, form, rows, said), [form.names[k] for k in columns.taxels]
         empty = np.isnan(values).all(axis=(0, 1)) if form.said and values.shape[1] == 1 else np.zeros(1, bool)
         if empty.any() and not empty.all():
-            places = [taxels[k] for k in np.flatnonzero(empty)]
+            places = [columns.taxels[k] for k in np.flatnonzero(empty)]
             said.append(f"{', '.join(map(form.called, places))} left out: empty")
             full = replace(full, table=replace(how, leave_out=[*how.leave_out, *(k + 1 for k in places)]))
-            values, taxels = values[:, :, ~empty], tuple(k for k in taxels if k not in places)
+            values, names = values[:, :, ~empty], [form.names[k] for k in columns.taxels if k not in places]
+        if columns.taxel is not None:
+            values, names = _one_line_a_time(path, form, rows, values)
         t = np.arange(len(values), dtype=np.int64)
         if rows.times is not None:
-            t, order = in_order(path, rows.times, how.frame_time or how.time_unit, said)
+            t, order = in_order(path, rows.times, form.unit_of_times, said)
             if order is not None:
                 values = values[order]
                 rows.chosen(order)
-        names = [form.names[k] for k in taxels]
         sources = dict(_sources(path, full, names, values, t, rows.texts("by")))
         labels = _labels(form, rows.texts("label"), t)
     line = f"{path.name}: read as {size_of(sources)}: {'; '.join(said)}" if form.said else ""
@@ -160,7 +162,7 @@ def read_rows(text: Text, form: Form, *, ends_empty: bool = False) -> Rows:
     large = np.argwhere(np.isinf(rows.values))
     if len(large):
         row, column = large[0].tolist()
-        name = form.called(form.columns.taxels[column])
+        name = form.called(form.taxels[column])
         raise unreadable(f"column {name} has a value that does not fit 32 bits", text.path, line=kept.numbers[row])
     found = replace(kept, values=rows.values, beside=rows.beside)
     total = len(found.values) + found.odd.total
@@ -193,11 +195,12 @@ def _parsed(source: Any, form: Form, *, whole: bool = False, ends_empty: bool = 
     """Return what pandas reads; if the text is `whole`, a line may have another number of cells, which is refused."""
     import pandas as pd  # noqa: PLC0415  takes long
 
-    how, count, taxels = form.table, len(form.names), list(form.columns.taxels)
-    beside = {name: k for name in ("time", "label", "by") if (k := getattr(form.columns, name)) is not None}
-    time = beside.get("time")
+    how, count, taxels = form.table, len(form.names), list(form.taxels)
+    times = list(form.columns.times)
+    beside = dict(zip(("time", "nanoseconds"), times, strict=False))
+    beside |= {name: k for name in ("label", "by", "taxel") if (k := getattr(form.columns, name)) is not None}
     # Kinds of numbers that are stated, not found, take pandas half as long again.
-    kinds: dict[int, Any] = {k: str for name, k in beside.items() if name != "time" or how.time_unit == ISO}
+    kinds: dict[int, Any] = {k: str for k in beside.values() if k not in times or how.time_unit == ISO}
     missing = [*MISSING, *([] if how.missing is None else [how.missing])]
     cells = dict.fromkeys(range(count + 1), missing)
     if whole and not ends_empty:
@@ -229,7 +232,7 @@ def _parsed(source: Any, form: Form, *, whole: bool = False, ends_empty: bool = 
             if is_odd or any(kind.kind not in "iuf" for kind in part.dtypes):
                 raise _OddError
             block = part.to_numpy(np.float32)
-            if whole and (np.isinf(block).any() or (time is not None and bool(chunk[time].isna().any()))):
+            if whole and (np.isinf(block).any() or bool(chunk[times].isna().any(axis=None))):
                 raise _OddError
             values.append(block)
             others.append(chunk[list(beside.values())].set_axis(list(beside), axis=1))
@@ -237,14 +240,17 @@ def _parsed(source: Any, form: Form, *, whole: bool = False, ends_empty: bool = 
         raise _OddError
     together = np.concatenate(values, out=np.empty((sum(map(len, values)), len(taxels)), np.float32))
     rows = Rows(together, pd.concat(others, ignore_index=True))
-    if whole and time is not None and how.time_unit != ISO and rows.times.dtype.kind not in "iuf":
+    of_times = rows.beside.iloc[:, : len(times)]
+    if whole and how.time_unit != ISO and any(kind.kind not in "iuf" for kind in of_times.dtypes):
         raise _OddError
+    if "nanoseconds" in beside:
+        rows.beside["time"] = rows.beside["time"] * 10**9 + rows.beside.pop("nanoseconds")
     return rows
 
 
 def _good_lines(text: Text, form: Form, kept: Rows) -> Iterator[tuple[int, Sequence[str]]]:
     """Yield the number and the cells of each line that is not odd; count the others, and note where frames begin."""
-    how, shape = form.table, form.shape
+    how = form.table
     waiting, row, last, number = True, 0, 0, 0
     for number, line in enumerate(text.lines(), 1):
         is_begin = how.frame_begin is not None and line.lstrip().startswith(how.frame_begin)
@@ -256,7 +262,7 @@ def _good_lines(text: Text, form: Form, kept: Rows) -> Iterator[tuple[int, Seque
                 found = _NUMBER.findall(line)
                 kept.frame_times.append(float(found[-1].replace(",", ".")) if found else np.nan)
             continue
-        cells, odd = shape.cells(line)
+        cells, odd = form.cells(line)
         if waiting and how.has_lines:
             kept.begins.append(row)
             waiting = False
@@ -270,9 +276,9 @@ def _good_lines(text: Text, form: Form, kept: Rows) -> Iterator[tuple[int, Seque
         kept.odd.rename_last("with too few cells", "cut off at the end", last)
 
 
-def _frames_of_lines(form: Form, rows: Rows, said: list[str]) -> NDArray[np.float32]:
+def _frames_of_lines(path: Path, layout: Layout, form: Form, rows: Rows, said: list[str]) -> NDArray[np.float32]:
     """Return values of shape (frames, lines, columns); of the rows, times, keys and labels of frames stay."""
-    path, how, layout = form.path, form.table, form.layout
+    how = form.table
     width, count = rows.values.shape[1], len(rows.values)
     if not how.has_lines:
         return rows.values.reshape(count, 1, width)
@@ -310,6 +316,27 @@ def _frames_of_lines(form: Form, rows: Rows, said: list[str]) -> NDArray[np.floa
     return values
 
 
+def _one_line_a_time(
+    path: Path, form: Form, rows: Rows, values: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], list[str]]:
+    """Return the readings of one time in one line, and the names of the taxels, which lines of the table state."""
+    import pandas as pd  # noqa: PLC0415  takes long
+
+    if values.shape[1:] != (1, 1) or rows.times is None:
+        right = "a table with taxel_column must have a time_column and one column of readings"
+        raise unreadable(f"{right}; its readings are {', '.join(map(form.called, form.taxels))}", path)
+    frame, times = pd.factorize(rows.times)
+    taxel, names = pd.factorize(rows.beside["taxel"])
+    twice = np.flatnonzero(pd.Series(frame * len(names) + taxel).duplicated())
+    if len(twice):
+        at = rows.beside.iloc[twice[0]]
+        raise unreadable(f"{at['taxel']} has two readings at the time {at['time']}", path)
+    wide = np.full((len(times), 1, len(names)), np.nan, np.float32)
+    wide[frame, 0, taxel] = values[:, 0, 0]
+    rows.chosen(np.flatnonzero(~pd.Series(frame).duplicated()))
+    return wide, list(names)
+
+
 def _sources(
     path: Path,
     layout: Layout,
@@ -337,24 +364,26 @@ def _labels(form: Form, cells: list[str], t: NDArray[np.int64]) -> tuple[tuple[s
     return tuple((f"{name} {cells[k]}" if is_number(cells[k]) else cells[k], int(t[k])) for k in changes)
 
 
-def _events(form: Form, rows: Rows, array: Array | None) -> Events:
+def _events(path: Path, layout: Layout, form: Form, rows: Rows, array: Array | None) -> Events:
     """Return the events of a table with a line each."""
-    path, layout = form.path, form.layout
-    names = [form.names[k].lower() for k in form.columns.taxels]
+    names = [form.names[k].lower() for k in form.taxels]
     names = [EVENT_COLUMNS.get(name, name) for name in names]
     if sorted(names) != ["p", "x", "y"]:
         raise unreadable(f"the columns other than the time are {', '.join(names)}; must be x, y, p for events", path)
     try:
-        return events_of(form, names, rows, array if layout.rows is None else layout.array(1))
+        return events_of(path, form, names, rows, array if layout.rows is None else layout.array(1))
     except ProblemError as error:
         raise FormatError(f"{layout.path}: {path.name}: {first_line(error)}") from None
 
 
-def events_of(form: Form, names: Sequence[str], rows: Rows, array: Array | None, *, ascending: bool = True) -> Events:
+def events_of(
+    path: Path, form: Form, names: Sequence[str], rows: Rows, array: Array | None, *, ascending: bool = True
+) -> Events:
     """Return the events of a table with a line each; several may have the same time.
 
     Parameters
     ----------
+    path : Path
     form : Form
     names : sequence of str
         Of the columns but the time: x, y, p, and perhaps intensity and repaired.
@@ -377,13 +406,13 @@ def events_of(form: Form, names: Sequence[str], rows: Rows, array: Array | None,
         wrong = np.flatnonzero(wrong & present if name == "intensity" and present is not None else wrong)
         if len(wrong):
             right = "0 or 1, or -1 or 1" if name == "p" else f"a whole number from {least} to {most}"
-            line = rows.line(int(wrong[0]), form)
-            raise unreadable(f"{name} is {column[wrong[0]]:g}; must be {right}", form.path, line=line)
-    us = us_of(rows.times, form.table.time_unit)
+            line = rows.line(int(wrong[0]), path, form.first)
+            raise unreadable(f"{name} is {column[wrong[0]]:g}; must be {right}", path, line=line)
+    us = us_of(rows.times, form.unit_of_times)
     back = np.flatnonzero(~(np.diff(us, prepend=us[:1]) >= 0) if ascending else np.isnan(us))
     if len(back):
-        line = rows.line(int(back[0]), form)
-        raise unreadable("the time is before that of the line above, or is none", form.path, line=line)
+        line = rows.line(int(back[0]), path, form.first)
+        raise unreadable("the time is before that of the line above, or is none", path, line=line)
     x, y = by_name["x"].astype(np.uint16), by_name["y"].astype(np.uint16)
     more: dict[str, Any] = {"repaired": by_name["repaired"] > 0} if "repaired" in by_name else {}
     if present is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice, pairwise
 from typing import Any, TypeAlias
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from taxel.formats import column_names
 from taxel.formats.column_names import time_unit
+from taxel.formats.form import places_of_time
 from taxel.formats.layout import Table
 from taxel.formats.line_fits import Fit
 from taxel.formats.lines import MISSING
@@ -40,11 +41,21 @@ class Draft:
     said: list[str] = field(default_factory=list)
     #: What two layouts differ in, and how, with a comment for each.
     asked: list[tuple[str, Mapping[str, Changes]]] = field(default_factory=list)
+    #: The column that names the sensor or the taxel of each line.
+    key: int | None = None
 
     def called(self, column: int) -> str | int:
         """Return how a layout names a column: by its name, or, without a name of its own, by its number from 1."""
         name = self.names[column]
         return name if name and self.names.count(name) == 1 else column + 1
+
+    def ask(self, why: str, choices: Mapping[str, Changes], *, first: bool = False) -> None:
+        """Add a question: what is open, and what each answer changes; the `first` one is printed with its layouts."""
+        self.asked.insert(0 if first else len(self.asked), (why, choices))
+
+    def answer(self, why: str) -> None:
+        """Remove the questions that begin so, as something else answers them."""
+        self.asked = [each for each in self.asked if not each[0].startswith(why)]
 
     def set(self, **keys: Any) -> None:
         """Set keys of the table."""
@@ -62,7 +73,8 @@ def time_of(draft: Draft, *, is_stated: bool) -> int | None:
         if fit.types[k] not in ("number", "time"):
             continue
         # A letter may be the name of a taxel too: it is the time where it comes first, or ascends.
-        if time_unit(names[k]) is not None and (k == 0 or len(names[k]) > 1 or fit.ascends(k)):
+        is_called = column_names.is_time(names[k]) and (k == 0 or len(names[k]) > 1)
+        if is_called or (time_unit(names[k]) is not None and fit.ascends(k)):
             scores[k] = 4 + 2 * fit.ascends(k)
         elif fit.types[k] == "time":
             scores[k] = 3
@@ -76,13 +88,34 @@ def time_of(draft: Draft, *, is_stated: bool) -> int | None:
         return None
     unit = ISO if fit.types[column] == "time" else _unit_of_time(draft, column)
     draft.set(time_column=draft.called(column), time_unit=unit)
-    cells = fit.cells(column)
+    seconds = next((k for k in (column, column - 1) if _has_nanoseconds(draft, k)), None)
+    if seconds is None:
+        return column
+    draft.set(time_column=f"{draft.called(seconds)}+{draft.called(seconds + 1)}", time_unit="s")
+    draft.left.pop(seconds, None)
+    draft.left.pop(seconds + 1, None)
+    draft.answer("the unit of the time")
+    return seconds
+
+
+def _has_nanoseconds(draft: Draft, column: int) -> bool:
+    """Return whether the column after one of whole seconds has the nanoseconds within them, as stamps of ROS have."""
+    names, fit = draft.names, draft.fit
+    if not 0 <= column < len(names) - 1 or {*fit.types[column : column + 2]} != {"number"}:
+        return False
+    seconds, rest = fit.numbers(column), fit.numbers(column + 1)
+    is_part = bool((rest >= 0).all() and (rest < 1e9).all() and (rest % 1 == 0).all() and (seconds % 1 == 0).all())
+    return is_part and time_unit(names[column]) in ("s", "") and time_unit(names[column + 1]) == "ns"
+
+
+def ask_for_lines_of_one_time(draft: Draft, time: int) -> None:
+    """Ask whether lines that have the same time are those of one frame."""
+    cells = draft.fit.cells(time)
     begins = [k for k in range(len(cells)) if k == 0 or cells[k] != cells[k - 1]]
     sizes = set(np.diff(begins).tolist())
     if len(begins) > 2 and len(sizes) == 1 and (size := sizes.pop()) > 1 and not draft.table.has_lines:
         frames: dict[str, Changes] = {"rounded times": {}, "lines of one frame": {"frame_lines": size}}
-        draft.asked.append((f"{size} lines have the same time", frames))
-    return column
+        draft.ask(f"{size} lines have the same time", frames)
 
 
 def _rises(fit: Fit, column: int) -> bool:
@@ -92,23 +125,26 @@ def _rises(fit: Fit, column: int) -> bool:
 
 
 def _unnamed_time(draft: Draft) -> int | None:
-    """Return a column of times that no name says: the only one that ascends in like steps; in few lines, ask."""
-    fit = draft.fit
+    """Return a column of times that no name says: the only one that ascends in like steps; in few lines, ask.
+
+    Of columns with names it can be the first, whose name may be of any language, which is asked.
+    """
+    fit, names = draft.fit, draft.names
     if len(fit.body) < 3 or fit.count < 2:
         return None
-    even = [k for k in range(len(draft.names)) if not draft.names[k] and _rises(fit, k) and _is_even(fit.numbers(k))]
+    even = [k for k in range(len(names)) if not (k and names[k]) and _rises(fit, k) and _is_even(fit.numbers(k))]
+    even = [k for k in even if not names[k] or (len(fit.body) >= _ASCENDS and not column_names.is_counter(names[k]))]
     times = [k for k in even if not fit.counts(k)]
     few = len(fit.body) < _ASCENDS
-    if len(times) == len(even) == 1 and not few:
+    if len(times) == len(even) == 1 and not few and not names[times[0]]:
         draft.said.append(f"column {times[0] + 1} ascends")
         return times[0]
     if not even or len(even) > 2 or (few and fit.count < 3):
         return None
     column = (times or even)[0]
-    no_time = {"time_column": None, "time_unit": "s", "left": [column + 1]}
-    draft.asked.append(
-        (f"column {column + 1} may be the time", {"the time": {}, "not the time, and not a taxel": no_time})
-    )
+    no_time = {"time_column": None, "time_unit": "s", "left": [draft.called(column)]}
+    called = names[column] or column + 1
+    draft.ask(f"column {called} may be the time", {"the time": {}, "not the time, and not a taxel": no_time})
     return column
 
 
@@ -125,14 +161,19 @@ def _unit_of_time(draft: Draft, column: int) -> str:
     unit, possible = unit_of_times(draft.fit.numbers(column))
     if possible:
         choices = {f"{each}: {hz:.4g} frames/s": {"time_unit": each} for each, hz in possible.items()}
-        draft.asked.append(("the unit of the time", choices))
+        draft.ask("the unit of the time", choices)
     return unit
 
 
 def taxels_of(draft: Draft, time: int | None) -> list[int]:
     """Return the columns of readings, and say why the others are none."""
-    fit, names, left, label = draft.fit, draft.names, draft.left, draft.table.label_column
-    known = {time, names.index(label) if label in names else label - 1 if isinstance(label, int) else None}
+    fit, names, left, table = draft.fit, draft.names, draft.left, draft.table
+    known = {
+        place
+        for column in (table.time_column, table.label_column)
+        if column is not None
+        for place in places_of_time(names, "label_column", column)
+    }
     for k in range(len(names)):
         why = "" if k in known or k in left else next(filter(None, _reasons(draft, k, first=int(time == 0))), "")
         if why:
@@ -156,18 +197,19 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[str]:
         yield "a date"
     if kind == "text":
         in_turn = 3 * sum(a != b for a, b in pairwise(cells)) > len(cells)
-        is_key = 1 < len(set(cells)) <= _KEYS and len(cells) == len(fit.body) and not column_names.is_label(name)
+        is_whole = len(cells) == len(fit.body) and not column_names.is_label(name)
+        is_key = is_whole and few and (column_names.is_key(name) or (in_turn and len(set(cells)) > 1))
         yield "times in a form that taxel does not read" * is_time
-        yield _key(draft, column) if is_key and (column_names.is_key(name) or in_turn) else ""
+        yield _key(draft, column) if is_key else ""
         yield f"texts{reads * (len(set(cells)) > 1)}"
     yield "times in a form that taxel does not read" * column_names.is_slow_time(name)
     if kind == "time" or is_time or (name and fit.ascends(column) and fit.epoch(column)):
         yield "another time"
     numbers = fit.numbers(column)
     whole = bool((numbers[np.isfinite(numbers)] % 1 == 0).all())
-    # An unnamed column that counts lines, among columns with names or in many lines.
-    is_sure = len(fit.body) >= (2 if any(draft.names) else _COUNTS)
-    counts = not name and column == first and is_sure and kind == "number" and fit.counts(column)
+    # A column that counts lines, which no reading does: unnamed among columns with names, or in many lines.
+    is_sure = len(fit.body) >= (2 if any(draft.names) and not name else _COUNTS)
+    counts = column == first and is_sure and kind == "number" and fit.counts(column)
     if counts or (column_names.is_counter(name) and whole):
         yield "a counter"
     yield f"labels{reads}" * (column_names.is_label(name) and few)
@@ -177,20 +219,46 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[str]:
 
 
 def _key(draft: Draft, column: int) -> str:
-    """Ask whether a column names the sensor of each line; return why it is no taxel."""
-    fit, called = draft.fit, draft.called(column)
-    keys = sorted(set(fit.cells(column)))
+    """Note that a column names the sensor or the taxel of each line; return why it is no taxel."""
+    fit = draft.fit
+    keys = set(fit.cells(column))
     before = column - 1
     if before >= 0 and fit.types[before] == "number" and not draft.names[before]:
         pairs = set(zip(fit.cells(before), fit.cells(column), strict=True))
         if len(pairs) == len(keys) == len(set(fit.cells(before))) > 1:
             draft.left[before] = "the same as the column that names the sensor"
-    if len(keys) == 1:
-        return f"always {keys[0]}"
-    shown = ", ".join(keys[:4]) + ", ..." * (len(keys) > 4)
-    each: dict[str, Changes] = {f"a source for each: by = {called!r}": {"by": called, "read": [called]}}
-    draft.asked.insert(0, (f"column {called} is {shown} in turn", {**each, "all lines are of one sensor": {}}))
-    return "by"
+    if len(keys) > 1 or draft.key is None:
+        draft.key = column
+    return f"always {next(iter(keys))}" if len(keys) == 1 else "by"
+
+
+def ask_for_key(draft: Draft, time: int | None, taxels: Sequence[int], all_lines: Callable[[], Iterable[str]]) -> None:
+    """Say what the column that names the sensor of each line is, or ask it: the taxels of an array, or several sensors.
+
+    If each time has one reading of each key, these are taxels.
+    """
+    fit, key = draft.fit, draft.key
+    if key is None:
+        return
+    called, keys = draft.called(key), sorted(set(fit.cells(key)))
+    if len(keys) == 1 and all(keys[0] in line or not any(map(str.isdigit, line)) for line in all_lines()):
+        return
+    is_one = len(taxels) == 1 and time is not None
+    times = set(fit.cells(time)) if time is not None else set()
+    pairs = len(set(zip(fit.cells(time), fit.cells(key), strict=True))) if time is not None else 0
+    # The last frame may be a part.
+    missing = len(times) * len(keys) - pairs
+    if is_one and len(keys) > 1 and pairs == len(fit.body) and missing < len(keys):
+        del draft.left[key]
+        draft.set(taxel_column=called)
+        draft.said.append(f"a taxel for each {called}")
+        return
+    choices: dict[str, Changes] = {f"a source for each: by = {called!r}": {"by": called, "read": [called]}}
+    if is_one and (len(keys) == 1 or pairs > len(times)):
+        choices[f"a taxel for each: taxel_column = {called!r}"] = {"taxel_column": called, "read": [called]}
+    shown = ", ".join(keys[:4]) + ", ..." * (len(keys) > 4 or len(keys) == 1)
+    draft.left[key] = "by"
+    draft.ask(f"column {called} is {shown} in turn", {**choices, "all lines are of one sensor": {}}, first=True)
 
 
 def _of_one_unit(draft: Draft, taxels: list[int]) -> list[int]:
@@ -204,7 +272,7 @@ def _of_one_unit(draft: Draft, taxels: list[int]) -> list[int]:
         other = others[0][0]
         moved, kept = ([draft.called(k) for k in taxels if draft.units[k] == each] for each in (unit, other))
         choices: dict[str, Changes] = {unit: {}, other: {"unit": other, "left": moved, "read": kept}}
-        draft.asked.append((f"readings in {unit} or in {other}", choices))
+        draft.ask(f"readings in {unit} or in {other}", choices)
     draft.left.update({k: f"in {draft.units[k]}" for k in taxels if draft.units[k] not in ("", unit)})
     return [k for k in taxels if k not in draft.left]
 
@@ -232,18 +300,18 @@ def ask_for_events(draft: Draft) -> None:
         t, (x, y, p) = fit.numbers(order.index("t")), (order.index(name) for name in "xyp")
         if _are_places(fit, x, y, p) and len(set(fit.numbers(p).tolist())) == 2 and bool((np.diff(t) >= 0).all()):
             events = {"columns": list(order), "time_column": "t", "time_unit": "us", "leave_out": [], "events": True}
-            draft.asked.insert(0, ("frames or events", {"frames of taxels": {}, "events, in us": events}))
+            draft.ask("frames or events", {"frames of taxels": {}, "events, in us": events}, first=True)
             return
 
 
 def ask_for_unit_of_events(draft: Draft, time: int | None) -> None:
     """Ask for the unit of times of events that no name says: their rate says nothing, as that of frames does."""
-    draft.asked = [each for each in draft.asked if not each[0].startswith("the unit of the time")]
+    draft.answer("the unit of the time")
     fit = draft.fit
     if time is None or time_unit(draft.names[time]) or fit.types[time] == "time" or fit.epoch(time):
         return
     units = ("us", "ms") if bool((fit.numbers(time) % 1 == 0).all()) else ("s", "ms")
-    draft.asked.append(("the unit of the time of the events", {unit: {"time_unit": unit} for unit in units}))
+    draft.ask("the unit of the time of the events", {unit: {"time_unit": unit} for unit in units})
 
 
 def said_of(draft: Draft, time: int | None) -> Iterator[str]:
@@ -255,7 +323,7 @@ def said_of(draft: Draft, time: int | None) -> Iterator[str]:
     if table.decimal == ",":
         yield "decimal commas"
     if time is not None:
-        yield f"time {draft.called(time)!r} in {table.time_unit}"
+        yield f"time {table.time_column!r} in {table.time_unit}"
     else:
         yield "no times" if table.frame_time is None else f"time in {table.frame_time} above each frame"
     if table.label_column is not None:

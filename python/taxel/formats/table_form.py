@@ -7,36 +7,37 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from fnmatch import fnmatchcase
-from functools import cached_property
-from pathlib import Path
-from typing import NamedTuple, NoReturn
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, replace
+from typing import NoReturn
 
 import numpy as np
 
 from taxel._base.arguments import shown
 from taxel._base.errors import unreadable
 from taxel._base.limits import COLUMNS
-from taxel._base.messages import counted
+from taxel._base.messages import counted, first_line
 from taxel._base.table_text import Text
+from taxel._core import ProblemError
 from taxel.formats import column_names
+from taxel.formats.form import Form
 from taxel.formats.layout import Layout, Table
 from taxel.formats.layout_text import refuse_to_choose
 from taxel.formats.line_fits import FITS, Fit, fits_in, fits_of
-from taxel.formats.lines import MISSING, LineShape, is_number, read_line
+from taxel.formats.lines import is_number, read_line
 from taxel.formats.table_columns import (
     Changes,
     Draft,
     are_events,
     ask_for_events,
+    ask_for_key,
+    ask_for_lines_of_one_time,
     ask_for_unit_of_events,
     said_of,
     taxels_of,
     time_of,
 )
-from taxel.formats.times import FEW_ODD, ISO, ODD
+from taxel.formats.times import FEW_ODD, ODD
 
 #: Two readings fit about equally if one fits this share of the other.
 _EQUALLY = 0.999
@@ -47,118 +48,12 @@ _ABOVE_FRAME = re.compile(
     re.IGNORECASE,
 )
 _PLACE_IN_LIST = re.compile(r"\[\d+\]")
+#: The mark of a comment before names.
+_COMMENT = re.compile(r"(?:#+|(?:[%;!*]|//)+(?=\s|$))\s*")
 
 
-class Columns(NamedTuple):
-    """Say which column is what, by its place."""
-
-    time: int | None
-    label: int | None
-    by: int | None
-    taxels: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Form:
-    """Hold how a table is read.
-
-    Parameters
-    ----------
-    path : Path
-        The table, for errors.
-    layout : Layout
-        Complete.
-    names : tuple of str
-        Of all columns; "" for one without a name.
-    is_named : bool
-        Whether the lines of the table have these names.
-    first : int
-        The number of the first line of numbers, from 0.
-    said : tuple of str
-        What was understood beyond the given layout, a text each.
-    """
-
-    path: Path
-    layout: Layout
-    names: tuple[str, ...]
-    is_named: bool
-    first: int
-    said: tuple[str, ...] = ()
-
-    @property
-    def table(self) -> Table:
-        """How the lines are read."""
-        return self.layout.table or Table()
-
-    def called(self, column: int) -> str:
-        """Return the name of a column, or its number if it has none."""
-        return self.names[column] or f"column {column + 1}"
-
-    @cached_property
-    def columns(self) -> Columns:
-        """Which column is what, by the layout.
-
-        Raises
-        ------
-        FormatError : columns that differ from the layout, or a column of times that it does not name
-        """
-        how, names, path = self.table, self.names, self.path
-        time, label, by = (
-            None if getattr(how, key) is None else self._place(key, getattr(how, key))
-            for key in ("time_column", "label_column", "by")
-        )
-        left = {self._place("leave_out", column) for column in how.leave_out}
-        if time in left:
-            raise unreadable(f"column {shown(names[time or 0])} is the time_column, but is also in leave_out", path)
-        kept = [k for k in range(len(names)) if k not in {*left, time, label, by}]
-        kept = [k for k in kept if how.keep is None or fnmatchcase(names[k], how.keep)]
-        if not kept:
-            raise unreadable("the layout leaves no column that is a taxel", path)
-        timed = next((k for k in kept if time is None and column_names.time_unit(names[k]) is not None), None)
-        if timed is not None and (timed == 0 or len(names[timed]) > 1) and how.frame_time is None:
-            raise unreadable(
-                f"column {shown(names[timed])} contains times, as its name shows; write time_column, or leave_out, in "
-                "[table] of the layout file",
-                path,
-                line=self.first,
-            )
-        return Columns(time, label, by, tuple(kept))
-
-    def _place(self, key: str, column: str | int) -> int:
-        """Return the place of a column of a name or number."""
-        names = self.names
-        if isinstance(column, int):
-            if column > len(names):
-                raise unreadable(f"{key} is {column}, but the table has {counted(len(names), 'column')}", self.path)
-            return column - 1
-        if names.count(column) != 1:
-            problem = "is missing" if column not in names else "appears twice; name it by its number"
-            there = ", ".join(name or str(k) for k, name in enumerate(names[:20], 1)) + ", ..." * (len(names) > 20)
-            raise unreadable(f"column {shown(column)} of {key} {problem}; the columns are {there}", self.path)
-        return names.index(column)
-
-    @property
-    def shape(self) -> LineShape:
-        """What the cells of a line are."""
-        how, columns = self.table, self.columns
-        is_text = how.time_unit == ISO and columns.time is not None
-        numbers = {*columns.taxels, *([] if columns.time is None or is_text else [columns.time])}
-        has_own_names = how.lines in ("marked", "json") and self.is_named and not how.columns
-        return LineShape(
-            len(self.names),
-            frozenset(numbers),
-            frozenset([columns.time] if columns.time is not None and is_text else []),
-            how.lines,
-            how.separator,
-            how.decimal,
-            None if is_text else columns.time,
-            frozenset((*MISSING, *([] if how.missing is None else [how.missing]))),
-            self.names if has_own_names else (),
-        )
-
-
-def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -> Form:
-    """Return how a table is read: as its layout says, or, if it says nothing of the table, as its first lines look.
+def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -> tuple[Form, Layout]:
+    """Return how a table is read, as its layout says, or, if it says nothing of the table, as its first lines look.
 
     Parameters
     ----------
@@ -167,37 +62,86 @@ def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -
     label_column : str or int, optional
         As of `taxel.formats.layout.Table`.
 
+    Returns
+    -------
+    form : Form
+    layout : Layout
+        Complete.
+
     Raises
     ------
     FormatError : no table of numbers, one that the layout does not fit, or two readings that fit about equally (prints
         the layout of each)
     """
-    if layout.table is not None:
-        how = layout.table if label_column is None else replace(layout.table, label_column=label_column)
-        return _stated(text, replace(layout, table=how), how)
+    try:
+        if layout.table is None:
+            form, full = _as_it_looks(text, layout, label_column)
+        else:
+            how = layout.table if label_column is None else replace(layout.table, label_column=label_column)
+            form, full = _stated(text, how), replace(layout, table=how)
+        if not form.taxels:
+            raise unreadable("the layout leaves no column that is a taxel", text.path)
+    except ProblemError as error:
+        raise unreadable(first_line(error), text.path) from None
+    return form, full
+
+
+def _stated(text: Text, how: Table) -> Form:
+    """Return the form of a table that a layout describes."""
+    shown_lines = ["" if k < how.skip_lines or how.is_between(line) else line for k, line in enumerate(text.head)]
+    missing = () if how.missing is None else (how.missing,)
+    fit = next(fits_of(shown_lines, [(how.lines, how.separator, how.decimal)], missing), None)
+    line = how.skip_lines + 1
+    if fit is None:
+        why = f"no line of numbers between separators {how.separator!r}; write what is right in [table] of the layout"
+        raise unreadable(why, text.path, line=line if any(shown_lines) else None)
+    draft = draft_of(fit, shown_lines)
+    names = tuple(how.columns) or draft.names
+    if fit.count > COLUMNS:
+        raise unreadable(f"{fit.count} columns; must have at most {COLUMNS}", text.path, line=line)
+    if how.columns and not len(draft.names) <= len(names) <= fit.count:
+        wrong = f"{counted(len(names), 'name')} for {counted(len(draft.names), 'column')}"
+        raise unreadable(wrong, text.path, line=line)
+    form = Form(how, names, fit.first, own=_own(how, names))
+    is_timed = how.time_column is not None
+    timed = next((k for k in form.taxels if not is_timed and column_names.is_time(names[k])), None)
+    if timed is not None and (timed == 0 or len(names[timed]) > 1) and how.frame_time is None:
+        raise unreadable(
+            f"column {shown(names[timed])} contains times, as its name shows; write time_column, or leave_out, in "
+            "[table] of the layout file",
+            text.path,
+            line=fit.first,
+        )
+    return form
+
+
+def _own(how: Table, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names that lines of a table have themselves."""
+    return names if how.lines in ("marked", "json") and not how.columns and any(names) else ()
+
+
+def _as_it_looks(text: Text, layout: Layout, label_column: str | int | None) -> tuple[Form, Layout]:
+    """Return the form of a table that fits its first lines best, and the layout that states it."""
     lines = text.head
     if text.path.suffix.lower() == ".json" and not any(read_line(line, "json") for line in lines[:3]):
         raise unreadable("is one document of JSON; save a line of JSON per frame, or a .csv", text.path)
     begin, time_of_begin = _begin_of_frames(lines)
     is_begin = [bool(begin) and line.lstrip().startswith(begin) for line in lines]
-    shown = ["" if above else line for line, above in zip(lines, is_begin, strict=True)]
+    shown_lines = ["" if above else line for line, above in zip(lines, is_begin, strict=True)]
     size = (layout.rows or 0) * (layout.columns or 0)
-    found, may_be_hex = fits_in(shown, text.lines)
+    found, may_be_hex = fits_in(shown_lines, text.lines)
     fits = [fit for fit in found if fit.purity >= FITS]
     fits.sort(key=lambda fit: (-fit.score, bool(size) and fit.count != size))
     if not fits:
         why = "contains no table of numbers; if it has one, describe it in [table] of a layout file (docs/files.md)"
         raise unreadable(why, text.path)
     _refuse_lines_above(text, fits[0])
-    draft = draft_of(fits[0], shown)
+    draft = draft_of(fits[0], shown_lines)
     other = next((fit for fit in fits[1:] if _fits_as_well(fit, fits[0], size)), None)
     if other is not None:
-        draft = _decided(draft, draft_of(other, shown))
-    fit = draft.fit
+        draft = _decided(draft, draft_of(other, shown_lines))
     if may_be_hex:
-        draft.asked.append(
-            ("decimal or hexadecimal numbers", {"decimal numbers": {}, "hexadecimal numbers": {"lines": "hex"}})
-        )
+        draft.ask("decimal or hexadecimal numbers", {"decimal numbers": {}, "hexadecimal numbers": {"lines": "hex"}})
     _frames(draft, lines, is_begin, begin, time_of_begin)
     stated = layout.rows is not None or layout.rate_hz is not None or layout.path != text.path
     draft.set(label_column=label_column)
@@ -207,6 +151,9 @@ def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -
     taxels = taxels_of(draft, time)
     if not taxels:
         raise unreadable("contains no column of readings", text.path)
+    ask_for_key(draft, time, taxels, text.lines)
+    if time is not None and draft.table.taxel_column is None:
+        ask_for_lines_of_one_time(draft, time)
     draft.set(leave_out=[draft.called(k) for k in sorted(draft.left)])
     if are_events(draft, taxels):
         draft.set(events=True)
@@ -217,7 +164,8 @@ def form_of(text: Text, layout: Layout, label_column: str | int | None = None) -
         full = _with_size(replace(layout, table=draft.table), draft, taxels)
     if draft.asked and not (stated and draft.asked[0][0].startswith("the first line")):
         _refuse(text, full, draft)
-    return Form(text.path, full, draft.names, any(draft.names), fit.first, (*said_of(draft, time), *draft.said))
+    how = full.table or draft.table
+    return Form(how, draft.names, draft.fit.first, (*said_of(draft, time), *draft.said), _own(how, draft.names)), full
 
 
 def _refuse_lines_above(text: Text, fit: Fit) -> None:
@@ -227,25 +175,6 @@ def _refuse_lines_above(text: Text, fit: Fit) -> None:
     if odd > max(FEW_ODD, ODD * len(fit.body)):
         why = f"{odd} lines above have numbers in another number of columns than the {len(fit.body)} from here on"
         raise unreadable(why, text.path, line=fit.first + 1)
-
-
-def _stated(text: Text, layout: Layout, how: Table) -> Form:
-    """Return the names of the columns of a table that a layout describes, and its first line of numbers."""
-    shown = ["" if k < how.skip_lines or how.is_between(line) else line for k, line in enumerate(text.head)]
-    missing = () if how.missing is None else (how.missing,)
-    fit = next(fits_of(shown, [(how.lines, how.separator, how.decimal)], missing), None)
-    line = how.skip_lines + 1
-    if fit is None:
-        why = f"no line of numbers between separators {how.separator!r}; write what is right in [table] of the layout"
-        raise unreadable(why, text.path, line=line if any(shown) else None)
-    draft = draft_of(fit, shown)
-    names = tuple(how.columns) or draft.names
-    if fit.count > COLUMNS:
-        raise unreadable(f"{fit.count} columns; must have at most {COLUMNS}", text.path, line=line)
-    if how.columns and not len(draft.names) <= len(names) <= fit.count:
-        wrong = f"{counted(len(names), 'name')} for {counted(len(draft.names), 'column')}"
-        raise unreadable(wrong, text.path, line=line)
-    return Form(text.path, layout, names, any(names), fit.first)
 
 
 def _fits_as_well(other: Fit, fit: Fit, size: int) -> bool:
@@ -263,7 +192,7 @@ def _decided(draft: Draft, other: Draft) -> Draft:
     first, second = (counted(each.fit.count, "column") for each in (draft, other))
     keys = ("separator", "decimal", "skip_lines", "lines")
     changes = {key: getattr(other.table, key) for key in keys} | {"time_column": None, "leave_out": []}
-    draft.asked.append((f"{first} or {second}", {first: {}, second: changes}))
+    draft.ask(f"{first} or {second}", {first: {}, second: changes})
     return draft
 
 
@@ -283,32 +212,39 @@ def draft_of(fit: Fit, lines: Sequence[str]) -> Draft:
     real = fit.count
     while real > 1 and fit.types[real - 1] == "empty":
         real -= 1
-    head = [
-        (
-            k,
-            tuple(
-                cell.strip("\"'# " if not n else "\"'") for n, cell in enumerate([*cells, *[""] * real][: fit.count])
-            ),
-        )
-        for k, cells in above[-3:]
-        if _width(cells) == real or len(cells) == fit.count
-    ]
+    head = [(k, row) for k, cells in above[-3:] if (row := _names_in(cells, fit.count, real))]
     unnamed = Draft(fit, table, ("",) * real, ("",) * real)
     if not head or head[-1][0] < above[-1][0]:
         return _numbered(unnamed)
-    has_units = len(head) > 1 and column_names.are_units(head[-2][1], head[-1][1]) and head[-1][0] > head[-2][0]
-    units = head[-1][1] if has_units else ()
-    at_names, names = head[-2 if has_units else -1]
-    upper = head[-3 if has_units else -2][1] if len(head) > 1 + has_units else ()
+    has_units = len(head) > 1 and column_names.are_units(head[-2][1], head[-1][1])
+    units = head.pop()[1] if has_units else ()
+    at_names, names = head[-1]
     if all(not name or is_number(name, fit.decimal) for name in names):
         return _numbered(unnamed)
     names = names[: max(real, _width(names))]
     named = [name for name in names if name]
-    if len(set(named)) < len(named) and any(upper):
-        names = tuple(f"{a} {b}".strip() for a, b in zip(upper, names, strict=False))
+    if len(set(named)) < len(named) and len(head) > 1 and any(head[-2][1]):
+        names = tuple(_below(head[-2][1], names))
         return Draft(fit, replace(table, columns=list(names)), names, tuple(map(column_names.unit_of, names)))
     stripped = tuple(unit.strip("[]()") for unit in units[: len(names)]) or tuple(map(column_names.unit_of, names))
     return Draft(fit, replace(table, skip_lines=at_names), names, stripped)
+
+
+def _names_in(cells: Sequence[str], count: int, real: int) -> tuple[str, ...]:
+    """Return the cells of a line above a table without quotes and the mark of a comment; none of another width."""
+    first = _COMMENT.sub("", cells[0].strip("\"'"), count=1)
+    cells = cells[1:] if not first and len(cells) == count + 1 else [first, *cells[1:]]
+    if _width(cells) != real and len(cells) != count:
+        return ()
+    return tuple(cell.strip("\"'") for cell in [*cells, *[""] * real][:count])
+
+
+def _below(upper: Sequence[str], names: Sequence[str]) -> Iterator[str]:
+    """Yield names with those of a line above, of which one may be above several."""
+    last = ""
+    for above, name in zip(upper, names, strict=False):
+        last = above or (last if name and column_names.time_unit(name) is None else "")
+        yield f"{last} {name}".strip()
 
 
 def _numbered(draft: Draft) -> Draft:
@@ -318,7 +254,7 @@ def _numbered(draft: Draft) -> Draft:
     counts = len(first) == fit.count >= 4 and bool(np.all(np.diff(first) == 1)) and first[0] in (0.0, 1.0)
     if counts and len(fit.body) > 1:
         below = {"skip_lines": fit.lines[fit.body[1]][0]}
-        draft.asked.append(("the first line is 1, 2, 3 ...", {"a frame": {}, "numbers of columns": below}))
+        draft.ask("the first line is 1, 2, 3 ...", {"a frame": {}, "numbers of columns": below})
     return draft
 
 
@@ -384,10 +320,10 @@ def _without_times(draft: Draft, text: Text) -> None:
     odd = len(fit.lines) - len(fit.body)
     count = sum(1 for line in text.lines() if line.strip(" \t\r,;")) - odd
     if draft.table.has_lines or count < 2:
-        draft.asked.append(("it has no times", {"frames without times": {}}))
+        draft.ask("it has no times", {"frames without times": {}})
         return
     together = {f"rows of one frame: frame_lines = {count}": {"frame_lines": count, "frame_end": None}}
-    draft.asked.append((f"{counted(count, 'line')}, no times", {"a frame per line, without times": {}, **together}))
+    draft.ask(f"{counted(count, 'line')}, no times", {"a frame per line, without times": {}, **together})
 
 
 def _with_size(layout: Layout, draft: Draft, taxels: Sequence[int]) -> Layout:
@@ -402,7 +338,7 @@ def _with_size(layout: Layout, draft: Draft, taxels: Sequence[int]) -> Layout:
                 'axis = "all": each axis a source': {"axis": "all"},
                 'axis = "shear": the length of x and y': {"axis": "shear"},
             }
-            draft.asked.append(("taxels with the axes x, y and z", choices))
+            draft.ask("taxels with the axes x, y and z", choices)
         return full
     places = column_names.places_of(names) if any(names) and not layout.rows else None
     if places is not None and min(places) > 1:

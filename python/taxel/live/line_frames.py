@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.formats.line_form import LineForm
+from taxel.formats.form import Form
 from taxel.formats.lines import is_number
 
 __all__ = ["ArrivedLine", "LineFrames", "PassedLines", "array_of"]
@@ -71,7 +71,7 @@ class LineFrames:
 
     Parameters
     ----------
-    form : LineForm
+    form : Form
     size : int
         Number of values of a frame.
     are_frames : bool
@@ -85,13 +85,13 @@ class LineFrames:
         By kind the number of lines that are in no frame, and the beginning of the first.
     """
 
-    def __init__(self, form: LineForm, size: int, *, are_frames: bool, stamp_us: float = 1.0) -> None:
+    def __init__(self, form: Form, size: int, *, are_frames: bool, stamp_us: float = 1.0) -> None:
         self.form = form
         # A counter that wraps is known by its whole numbers: in its own unit they stay as they are.
         self._clocks = tuple((k, unit / stamp_us) for k, unit in form.clocks)
         self._size, self._are_frames = size, are_frames
         self._columns = form.taxels if are_frames else tuple(sorted({*form.taxels, *(k for k, _ in form.clocks)}))
-        self._takes_all = self._columns == tuple(range(form.shape.count))
+        self._takes_all = self._columns == tuple(range(len(form.names)))
         self.passed = PassedLines()
         self.unread: dict[str, dict[str, Any]] = {}
         #: The lines of the frame so far, their values, its stamp.
@@ -112,18 +112,18 @@ class LineFrames:
 
     def fits(self, text: str) -> bool:
         """Return whether a line has the numbers of a frame's."""
-        return not self.form.shape.values(text)[1]
+        return not self.form.values(text)[1]
 
     def push(self, line: ArrivedLine) -> None:
         """Take the next line."""
         text = line.text.strip()
         if not text:
-            if self.form.ends_blank:
+            if self.form.table.frame_end:
                 self._end_at_blank()
             return
         if text.startswith("#") and self._are_frames:
             return
-        values, odd = self.form.shape.values(text)
+        values, odd = self.form.values(text)
         if odd and not self._open and self._names_columns(text):
             return
         self.passed.lines += 1
@@ -140,14 +140,14 @@ class LineFrames:
         ------
         ProblemError : another number of them
         """
-        if len(values) != self.form.shape.count:
-            raise ProblemError(f"{counted(len(values), 'value')}: must be {self.form.shape.count}")
+        if len(values) != len(self.form.names):
+            raise ProblemError(f"{counted(len(values), 'value')}: must be {len(self.form.names)}")
         self.passed.lines += 1
         self._push(values, ArrivedLine("", at_ns))
 
     def end(self) -> None:
         """End the last frame, which no empty line may follow."""
-        if self.form.ends_blank:
+        if self.form.table.frame_end:
             self._end_at_blank()
 
     def restart(self) -> None:
@@ -166,7 +166,7 @@ class LineFrames:
             self._stamp = sum(values[k] * scale for k, scale in self._clocks)
         self._open.append(line)
         self._values += row
-        if self.form.ends_blank:
+        if self.form.table.frame_end:
             if len(self._values) > self._size:
                 self._discard()
         elif len(self._open) == self.form.lines:
@@ -211,8 +211,8 @@ class LineFrames:
 
     def _count_odd(self, line: ArrivedLine, text: str) -> None:
         """Count a line that is no part of a frame."""
-        cells, _ = self.form.shape.cells(text)
-        numbers = bool(cells) and all(is_number(cell, self.form.shape.decimal) for cell in cells)
+        cells, _ = self.form.cells(text)
+        numbers = bool(cells) and all(is_number(cell, self.form.table.decimal) for cell in cells)
         self._count("no_text" if not line.is_text else "other_length" if numbers else "text", text)
         # A stream states each of its lines; of frames, text before the first numbers is no fault.
         self.passed.strange += self._has_begun or numbers
@@ -223,13 +223,11 @@ class LineFrames:
         found["lines"] += lines
 
     def _names_columns(self, text: str) -> bool:
-        cells, odd = self.form.shape.cells(text)
-        return odd == "of text" and tuple(cells) == self.form.columns
+        cells, odd = self.form.cells(text)
+        return odd == "of text" and tuple(cells) == self.form.names
 
 
-def array_of(
-    form: LineForm, stated: Array | None, readout: Array | None, name: str
-) -> tuple[Array, tuple[str, ...], str]:
+def array_of(form: Form, stated: Array | None, readout: Array | None, name: str) -> tuple[Array, tuple[str, ...], str]:
     """Return the sensor of frames: the stated one, that of the readout if lines fill it, or one that is guessed.
 
     Returns
@@ -254,22 +252,22 @@ def array_of(
         return readout, (), ""
     if lines > 1:
         rows, columns = lines, count
-    elif all(names := tuple(form.columns[k] for k in form.taxels)):
+    elif all(names := tuple(form.names[k] for k in form.taxels)):
         return Array(1, count, name=name), names, f"array=1x{count}, a column each"
     else:
         rows, columns = _sides(count)
     return Array(rows, columns, name=name), (), f"array={rows}x{columns} is guessed"
 
 
-def _check_filled(form: LineForm, array: Array) -> None:
+def _check_filled(form: Form, array: Array) -> None:
     """Refuse lines that do not fill an array: with whole rows, or even parts of one."""
     n, frame, row = len(form.taxels), array.taxels, array.columns
     size = f"array={array.rows}x{array.columns}: lines have {counted(n, 'value')}"
     if form.lines > 1:
         size += f", {form.lines} lines per frame"
-    if form.ends_blank:
+    if form.table.frame_end:
         size += ", an empty line after each frame"
-    fits = frame % n == 0 if form.ends_blank else form.lines * n == frame
+    fits = frame % n == 0 if form.table.frame_end else form.lines * n == frame
     if not fits:
         several = frame // n
         advice = ""

@@ -16,7 +16,8 @@ from taxel._base.limits import VALUE
 from taxel._base.messages import counted, first_line
 from taxel._core import Error, ProblemError
 from taxel.array import Array
-from taxel.formats.line_form import LineForm, form_of_lines, stated_count
+from taxel.formats.form import Form
+from taxel.formats.line_form import form_of_lines, stated_count
 from taxel.formats.lines import is_number
 from taxel.formats.times import ISO, UNITS_US
 from taxel.live.line_frames import ArrivedLine, LineFrames, array_of
@@ -70,7 +71,7 @@ class Lines:
             if wrong is not None:
                 raise ProblemError(f"source {stated.text!r}: {wrong} is only for frames: add array=ROWSxCOLUMNS")
         self.waited = self._input is not None and self._input.is_file
-        self.form: LineForm | None = None
+        self.form: Form | None = None
         #: How the lines are read, for people.
         self.read_as = ""
         self._frames: LineFrames | None = None
@@ -201,7 +202,7 @@ class Lines:
         texts = [line.text for line in self._waiting if line.text.strip()]
         return f"{counted(len(texts), 'line')} arrived ({texts[0][:60]!r} ...)" if texts else "bytes arrived"
 
-    def _form_of(self, texts: Sequence[str], lines: Sequence[ArrivedLine] | None) -> LineForm | None:
+    def _form_of(self, texts: Sequence[str], lines: Sequence[ArrivedLine] | None) -> Form | None:
         """Return what lines are; those of a program have no arrivals."""
         at = [] if lines is None else [line.at_ns for line in lines]
 
@@ -222,7 +223,7 @@ class Lines:
         except ProblemError as error:
             raise ProblemError(f"source {self.stated.text!r}: {first_line(error)}") from None
 
-    def _set(self, form: LineForm | None) -> LineFrames:
+    def _set(self, form: Form | None) -> LineFrames:
         """Take a form; return what makes frames by it."""
         if form is None:
             raise ProblemError(f"source {self.stated.text!r}: what it states makes no line of numbers")
@@ -260,7 +261,7 @@ class Lines:
         """Return the source as the compiled part knows it."""
         if not self.are_frames:
             assert self.form is not None
-            columns = [name or f"column_{k}" for k, name in enumerate(self.form.columns)]
+            columns = [name or f"column_{k}" for k, name in enumerate(self.form.names)]
             clock = next(iter(self.form.clocks), None)
             kept = sorted({*self.form.taxels, *(k for k, _ in self.form.clocks)})
             stream: dict[str, Any] = {"columns": [columns[k] for k in kept], "waited": self.waited}

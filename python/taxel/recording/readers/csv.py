@@ -25,9 +25,9 @@ from taxel._base.table_text import Text, beginning
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.formats.layout import Layout, Table
+from taxel.formats.form import Form
+from taxel.formats.layout import Table
 from taxel.formats.table import Rows, events_of, read_rows
-from taxel.formats.table_form import Form
 from taxel.formats.times import in_order
 from taxel.frames import Frames
 from taxel.reading import Facts, InMemory
@@ -52,7 +52,7 @@ def read_csv(path: Path, array: Array | None = None) -> InMemory:
     names, separator = _head(path, text)
     is_comma = separator != "," and any("," in line for line in text.head[1:])
     how = Table(separator=separator, decimal="," if is_comma else ".", time_column=1, time_unit="us")
-    form = Form(path, Layout(path, table=how), tuple(names), True, 1)
+    form = Form(how, tuple(names), 1)
     if any(line.strip() for line in text.head[1:]):
         rows = read_rows(text, form, ends_empty=names[-1] == "intensity")
     else:
@@ -60,7 +60,7 @@ def read_csv(path: Path, array: Array | None = None) -> InMemory:
     lost = rows.odd.said()
     try:
         if tuple(names[:4]) == EVENTS:
-            table: Events | Frames = events_of(form, names[1:], rows, array, ascending=False)
+            table: Events | Frames = events_of(path, form, names[1:], rows, array, ascending=False)
         else:
             table = _frames(path, names[1:], rows, array, lost)
     except ProblemError as error:

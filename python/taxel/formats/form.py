@@ -1,0 +1,205 @@
+"""How lines of numbers are read, of a table or of a live source: their cells, and what each column is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from functools import cached_property
+from typing import NamedTuple
+
+from taxel._base.arguments import shown
+from taxel._base.limits import VALUE
+from taxel._base.messages import counted
+from taxel._core import ProblemError
+from taxel.formats.layout import Table
+from taxel.formats.lines import MISSING, is_number, read_line
+from taxel.formats.times import ISO, UNITS_US, is_time, seconds_of
+
+
+class Columns(NamedTuple):
+    """Say which column is what, by its place; times are two columns where they are seconds and nanoseconds."""
+
+    times: tuple[int, ...]
+    label: int | None
+    by: int | None
+    taxel: int | None
+    taxels: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Form:
+    """Hold how lines are read; each is read by itself.
+
+    Parameters
+    ----------
+    table : Table
+        Complete.
+    names : tuple of str
+        Of all columns; "" for one without a name.
+    first : int
+        The number of the first line of numbers, from 0.
+    said : tuple of str
+        What was understood beyond what is stated, a text each, for people.
+    own : tuple of str
+        The names of the cells that lines have themselves, in whose order they are put; empty if they have none.
+    lines : int
+        Number of lines of a frame of a live source, 0 if only an empty line shows it.
+    keys : mapping
+        What was understood beyond what is stated of a live source, as its keys.
+    """
+
+    table: Table
+    names: tuple[str, ...]
+    first: int = 0
+    said: tuple[str, ...] = ()
+    own: tuple[str, ...] = ()
+    lines: int = 1
+    keys: Mapping[str, str] = field(default_factory=dict)
+
+    def called(self, column: int) -> str:
+        """Return the name of a column, or its number if it has none."""
+        return self.names[column] or f"column {column + 1}"
+
+    @cached_property
+    def columns(self) -> Columns:
+        """Which column is what.
+
+        Raises
+        ------
+        ProblemError : columns that are not there, or one that is two things
+        """
+        how, names = self.table, self.names
+        times = () if how.time_column is None else places_of_time(names, "time_column", how.time_column)
+        label, by, taxel = (
+            None if getattr(how, key) is None else place_of(names, key, getattr(how, key))
+            for key in ("label_column", "by", "taxel_column")
+        )
+        left = {place_of(names, "leave_out", column) for column in how.leave_out}
+        twice = next((k for k in times if k in left), None)
+        if twice is not None:
+            raise ProblemError(f"column {shown(names[twice])} is the time_column, but is also in leave_out")
+        others = {*left, *times, label, by, taxel}
+        taxels = (k for k in range(len(names)) if k not in others)
+        return Columns(
+            times, label, by, taxel, tuple(k for k in taxels if how.keep is None or fnmatchcase(names[k], how.keep))
+        )
+
+    @property
+    def taxels(self) -> tuple[int, ...]:
+        """The columns with values."""
+        return self.columns.taxels
+
+    @property
+    def clocks(self) -> tuple[tuple[int, float], ...]:
+        """The columns whose sum is the time, each with its unit, us; texts of times are read as seconds."""
+        times = self.columns.times
+        if len(times) > 1:
+            return tuple(zip(times, (UNITS_US["s"], UNITS_US["ns"]), strict=True))
+        return tuple((k, UNITS_US["s" if self.table.time_unit == ISO else self.table.time_unit]) for k in times)
+
+    @property
+    def unit_of_times(self) -> str:
+        """The unit of times as they are read."""
+        of_sum = "ns" if len(self.columns.times) > 1 else self.table.time_unit
+        return self.table.frame_time or of_sum
+
+    @cached_property
+    def missing(self) -> frozenset[str]:
+        """Cells without a value."""
+        return frozenset((*MISSING, *([] if self.table.missing is None else [self.table.missing])))
+
+    @cached_property
+    def _texts(self) -> frozenset[int]:
+        """The columns whose texts are times."""
+        return frozenset(self.columns.times if self.table.time_unit == ISO else ())
+
+    @cached_property
+    def _numbers(self) -> frozenset[int]:
+        """The columns of numbers, those of times included; others may hold anything."""
+        return frozenset((*self.columns.taxels, *self.columns.times)) - self._texts
+
+    def cells(self, line: str) -> tuple[list[str], str]:
+        """Return the cells of a line, and what is odd about it; "" if nothing is.
+
+        Examples
+        --------
+        >>> form = Form(Table(), ("a", "b"))
+        >>> form.cells("1,2")[1], form.cells("1")[1], form.cells("1,b")[1], form.cells("Ready")[1]
+        ('', 'with too few cells', 'with a cell that is no number', 'of text')
+        """
+        parsed = read_line(line, self.table.lines, self.table.separator, self.table.decimal)
+        parsed = parsed.in_order(self.own) if parsed is not None and self.own else parsed
+        cells = list(parsed.cells) if parsed is not None else []
+        while len(cells) > len(self.names) and not cells[-1]:
+            cells.pop()
+        return cells, self._odd(cells)
+
+    def values(self, line: str) -> tuple[list[float], str]:
+        """Return the numbers of a line, times of texts in s, NaN for other cells, and what is odd about it.
+
+        Examples
+        --------
+        >>> table = Table(separator=";", decimal=",", time_column=1, time_unit="iso")
+        >>> Form(table, ("t", "a", "b")).values("00:00:01;2,5;-")
+        ([1.0, 2.5, nan], '')
+        """
+        count = len(self.names)
+        if len(self._numbers) == count and self.table.decimal == "." and line.isascii() and "_" not in line:
+            parsed = read_line(line, self.table.lines, self.table.separator)
+            if parsed is not None and len(parsed.cells) == count and not self.own:
+                with suppress(ValueError):
+                    found = list(map(float, parsed.cells))
+                    if max(found) <= VALUE and min(found) >= -VALUE and not math.isnan(sum(found)):
+                        return found, ""
+        cells, odd = self.cells(line)
+        if odd:
+            return [], odd
+        found = list(map(self._value, range(count), cells))
+        return (found, "") if all(not abs(value) > VALUE for value in found) else ([], "with a number out of range")
+
+    def _value(self, column: int, cell: str) -> float:
+        if column in self._texts:
+            return seconds_of(cell.strip("\"'"))
+        if column not in self._numbers or cell in self.missing:
+            return math.nan
+        return float(cell.replace(",", ".") if self.table.decimal == "," else cell)
+
+    def _odd(self, cells: Sequence[str]) -> str:
+        """Return what is odd about the cells of a line; "" if nothing is."""
+        decimal = self.table.decimal
+        if not any(is_number(cell, decimal) or is_time(cell) for cell in cells):
+            return "of text"
+        if len(cells) != len(self.names):
+            return "with too few cells" if len(cells) < len(self.names) else "with too many cells"
+        for k in self._numbers:
+            # A reading may be missing, a time may not.
+            if not is_number(cells[k], decimal) and (cells[k] not in self.missing or k in self.columns.times):
+                return "with a cell that is no number"
+        return "" if all(is_time(cells[k]) for k in self._texts) else "without a time"
+
+
+def place_of(names: Sequence[str], key: str, column: str | int) -> int:
+    """Return the place of a column that a key states by its name, or by its number from 1.
+
+    Raises
+    ------
+    ProblemError : there is no such column
+    """
+    if names.count(str(column)) == 1 and isinstance(column, str):
+        return names.index(column)
+    if isinstance(column, int) or column.isdecimal():
+        if not 1 <= int(column) <= len(names):
+            raise ProblemError(f"{key} is {column}, but there are {counted(len(names), 'column')}")
+        return int(column) - 1
+    problem = "is missing" if column not in names else "appears twice; name it by its number"
+    there = ", ".join(name or str(k) for k, name in enumerate(names[:20], 1)) + ", ..." * (len(names) > 20)
+    raise ProblemError(f"column {shown(column)} of {key} {problem}; the columns are {there}")
+
+
+def places_of_time(names: Sequence[str], key: str, column: str | int) -> tuple[int, ...]:
+    """Return the place of a column of times, or of two of "A+B"."""
+    is_one = isinstance(column, int) or column in names or "+" not in column
+    return tuple(place_of(names, key, part) for part in ([column] if is_one else str(column).split("+", 1)))
