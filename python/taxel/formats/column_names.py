@@ -77,8 +77,8 @@ def time_unit(name: str) -> str | None:
 
     Examples
     --------
-    >>> time_unit("Time (ms)"), time_unit("run1/time"), time_unit("Time[secs]"), time_unit("palm"), time_unit("stamp.sec")
-    ('ms', '', 's', None, 's')
+    >>> time_unit("Time (ms)"), time_unit("run1/time"), time_unit("stamp.sec"), time_unit("palm")
+    ('ms', '', 's', None)
     """
     last = last_part(name)
     found = _TIMES.fullmatch(last)
