@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import taxel
+from taxel.formats.layout import Layout
+from taxel.reading import InMemory
 
 VALUES = np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [6.5, 0.0, 1.0, 2.0, 3.0, 4.0], [9.0, 8.0, 7.0, 6.0, 5.0, 4.0]])
 
@@ -20,3 +25,31 @@ def table(folder: Path, text: str, layout: str, name: str = "step.txt") -> Any:
 
 def lines(values: np.ndarray, separator: str = ",") -> str:
     return "".join(separator.join(f"{v:g}" for v in row) + "\n" for row in values)
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What a file of another program holds, and the line that says how it was read."""
+
+    sources: dict[str, taxel.Frames | taxel.Events]
+    timed: bool
+    layout: Layout
+    said: str
+    labels: tuple[tuple[str, int | None], ...]
+    lost: tuple[str, ...]
+
+
+def opened_by(read: Callable[[Path, Layout], list[InMemory]], path: Path, layout: str | None) -> Opened:
+    beside = path.parent / "a.layout.toml"
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        readers = read(path, Layout(path) if layout is None else Layout.of_text(beside, layout))
+    facts = readers[0].facts
+    return Opened(
+        {each.facts.label.replace("board", ""): each.data for each in readers},
+        facts.timed,
+        Layout.of_text(beside, facts.layout),
+        "".join(str(warning.message) for warning in caught),
+        tuple((note.text, note.t) for note in readers[0].marked.notes),
+        facts.lost,
+    )

@@ -17,14 +17,13 @@ from taxel._base.errors import Place
 from taxel.formats.array_file import read_array_file
 from taxel.formats.layout import Layout
 from taxel.formats.layout_text import of_layout
-from taxel.formats.table import Opened
+
+from .tables import Opened, opened_by
 
 
 def opened(path: Path, layout: str | None = None) -> Opened:
-    found = read_array_file(
-        path, Layout(path) if layout is None else Layout.of_text(path.with_suffix(".layout.toml"), layout)
-    )
-    again = read_array_file(path, Layout.of_text(path.with_suffix(".layout.toml"), of_layout(found.layout)))
+    found = opened_by(read_array_file, path, layout)
+    again = opened_by(read_array_file, path, of_layout(found.layout))
     assert again.sources == found.sources
     return found
 
@@ -91,7 +90,7 @@ def test_each_trial_is_a_source_and_each_axis_too(tmp_path: Path) -> None:
     assert list(found.sources) == ["trial1", "trial2"]
     np.testing.assert_array_equal(values(found, "trial2")[:, 0], numbers[1, :, :, 2])
     found = opened(tmp_path / "a.npy", 'axis = "all"\n[data]\naxes = "trial time taxel axis"\n')
-    assert list(found.sources) == [f"trial{k} {axis}" for k in (1, 2) for axis in "xyz"]
+    assert list(found.sources) == [f"trial{k}_{axis}" for k in (1, 2) for axis in "xyz"]
 
 
 def test_three_axes_at_the_end_are_asked(tmp_path: Path) -> None:

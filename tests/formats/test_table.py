@@ -21,12 +21,13 @@ from refusal import refused
 import taxel
 from taxel import Array, Events, FormatError, Frames
 from taxel._base.errors import Place
-from taxel.formats.foreign import read_foreign
 from taxel.formats.layout import Layout
 from taxel.formats.layout_text import of_layout
 from taxel.formats.lines import KINDS, read_line
-from taxel.formats.table import Opened, read_table
+from taxel.formats.table import read_table
 from taxel.formats.times import repaired
+
+from .tables import Opened, opened_by
 
 
 def opened(folder: Path, text: str | bytes, layout: str | None = None, name: str = "a.csv") -> Opened:
@@ -34,11 +35,11 @@ def opened(folder: Path, text: str | bytes, layout: str | None = None, name: str
     path = folder / name
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     if layout is not None:
-        return read_table(path, Layout.of_text(folder / "a.layout.toml", layout))
-    found = read_table(path, Layout(path))
+        return opened_by(read_table, path, layout)
+    found = opened_by(read_table, path, None)
     assert found.said.startswith(f"{name}: read as ")
     assert "\n" not in found.said
-    again = read_table(path, Layout.of_text(folder / "a.layout.toml", of_layout(found.layout)))
+    again = opened_by(read_table, path, of_layout(found.layout))
     assert again.sources == found.sources
     assert (again.timed, again.said) == (found.timed, "")
     return found
@@ -356,11 +357,11 @@ def test_a_file_that_changes_while_it_is_read_is_refused(tmp_path: Path, monkeyp
     path.write_text("t_ms,a\n0,1\n10,2\n")
 
     def grows(*given: Any) -> Any:
-        found = read_foreign(*given)
+        found = read_table(*given)
         path.write_text(path.read_text() + "20,3\n")
         return found
 
-    monkeypatch.setattr("taxel.recording.kinds.read_foreign", grows)
+    monkeypatch.setattr("taxel.recording.kinds.read_table", grows)
     with pytest.raises(FormatError, match=r"a\.csv: the file changed while it was read"):
         taxel.open(path)
     monkeypatch.undo()
@@ -417,13 +418,13 @@ def test_spreadsheets_and_parquet_open(tmp_path: Path, ending: str, dates: bool)
     pytest.importorskip({".xlsx": "openpyxl", ".parquet": "pyarrow"}[ending])
     path = tmp_path / f"a{ending}"
     table.to_excel(path, index=False) if ending == ".xlsx" else table.to_parquet(path)
-    found = read_table(path, Layout(path))
+    found = opened_by(read_table, path, None)
     t, values = frames(found)
     assert np.diff(t).tolist() == [10_000] * 11
     assert t[0] == (1_714_557_600_000_000 if dates else 0)
     assert values == [[k / 4, k] for k in range(12)]
     assert "note left out: texts" in found.said
-    again = read_table(path, Layout.of_text(tmp_path / "a.layout.toml", of_layout(found.layout)))
+    again = opened_by(read_table, path, of_layout(found.layout))
     assert again.sources == found.sources
 
 

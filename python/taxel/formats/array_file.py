@@ -18,16 +18,17 @@ from taxel.events import Events
 from taxel.formats.column_names import AXES, time_unit
 from taxel.formats.layout import Data, Layout, advice
 from taxel.formats.layout_text import refuse_to_choose
-from taxel.formats.opened import Opened, size_of, sources_of
+from taxel.formats.opened import readers_of, sources_of
 from taxel.formats.times import in_order, unit_of_times
 from taxel.frames import Frames
+from taxel.reading import InMemory
 
 #: The endings of files of arrays.
 ARRAYS = (".npy", ".npz", ".h5", ".hdf5", ".mat")
 
 
-def read_array_file(path: Path, layout: Layout) -> Opened:
-    """Read the frames of a file of arrays.
+def read_array_file(path: Path, layout: Layout) -> list[InMemory]:
+    """Return a reader of the frames of a file of arrays, of each trial and each axis.
 
     Raises
     ------
@@ -63,8 +64,7 @@ def read_array_file(path: Path, layout: Layout) -> Opened:
         sources.update(sources_of(path, full, f"trial{k}" if len(values) > 1 else "", trial, t))
     unread = ", ".join(name for name in stored if name not in wanted)
     lost = (f"other arrays of the file: {unread}",) if unread else ()
-    line = f"{path.name}: read as {size_of(sources)}: {'; '.join(said)}" if said else ""
-    return Opened(sources, how.time is not None, full, line, lost=lost)
+    return readers_of(path, "arrays", sources, full, said, timed=how.time is not None, lost=lost)
 
 
 def look(path: Path, layout: Layout) -> tuple[Data, list[str], dict[str, tuple[int, ...]]]:

@@ -58,13 +58,13 @@ def read(path: Path, _layout: Layout | None = None) -> list[InMemory]:
             keep=f"{foot} pressure *",
             label_column=steps,
         )
-        found = read_table(path, Layout(path, unit="N/cm2", table=how))
-        both = found.sources[""]
+        [found] = read_table(path, Layout(path, unit="N/cm2", table=how))
+        both = found.data
         assert isinstance(both, Frames)  # the layout says so
         there = ~np.isnan(both.values).any(axis=(1, 2))
         array = Array(1, len(pressures), name="Moticon insole")
         frames = Frames(both.values[there], both.t[there], unit=both.unit, array=array)
-        codes = [(text.rpartition(" ")[2].partition(".")[0], t) for text, t in found.labels]
+        codes = [(note.text.rpartition(" ")[2].partition(".")[0], note.t) for note in found.marked.notes]
         notes = tuple(Note(markers[code], t) for code, t in codes if code in markers)
         own = ", ".join(name for name in names if name.startswith(f"{foot} ") and name not in (*pressures, steps))
         facts = Facts(
@@ -74,7 +74,7 @@ def read(path: Path, _layout: Layout | None = None) -> list[InMemory]:
             label=foot,
             source="steps found by the maker's program" if notes else "",
             side=foot,
-            lost=(f"columns that are not taxels: {own}", *found.lost[1:]),
+            lost=(f"columns that are not taxels: {own}", *found.facts.lost[1:]),
         )
         readers.append(InMemory(facts, frames, Marks(notes=notes)))
     return readers

@@ -1,53 +1,69 @@
-"""What a table or a file of arrays holds, as sources of frames or events, and how it was read."""
+"""The sources of a table or a file of arrays: frames or events, each as a reader, and the line that says how."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.columns import frozen_whole
-from taxel._base.messages import counted, first_line
+from taxel._base.messages import counted, first_line, warn
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.column_names import AXES
 from taxel.formats.layout import Layout
+from taxel.formats.layout_text import of_layout
 from taxel.frames import Frames
+from taxel.labels import Note, source_of
+from taxel.reading import Facts, InMemory, Marks
 
 
-@dataclass(frozen=True, eq=False)
-class Opened:
-    """Hold what a file of another program says.
+def readers_of(
+    path: Path,
+    kind: str,
+    sources: Mapping[str, Frames | Events],
+    layout: Layout,
+    said: Sequence[str],
+    *,
+    timed: bool,
+    lost: Sequence[str] = (),
+    notes: Sequence[Note] = (),
+) -> list[InMemory]:
+    """Return a reader of each source of a file of another program.
 
     Parameters
     ----------
+    path : Path
+    kind : {"table", "arrays"}
     sources : mapping from str to Frames or Events
         By name, "" for the only one.
+    layout : Layout
+        By which it was read, complete.
+    said : sequence of str
+        What was understood beyond the given layout, which is warned of in one line.
     timed : bool
         Whether the file has times; else frames are numbered: frame k has the time k us.
-    layout : Layout
-        The layout by which it was read, complete.
-    said : str
-        How it was read, in one line; "" if the layout says all.
-    labels : tuple of (str, int)
-        Labels and their times in us, of the column of labels.
-    lost : tuple of str
+    lost : sequence of str
         What was left out, one line each.
+    notes : sequence of Note
+        Of the column of labels.
     """
+    if said:
+        warn(f"{path.name}: read as {_size_of(sources)}: {'; '.join(said)}", stacklevel=6)
+    facts = Facts(path=path, array=Array(1, 1), kind=kind, timed=timed, lost=tuple(lost), layout=of_layout(layout))
 
-    sources: dict[str, Frames | Events]
-    timed: bool
-    layout: Layout
-    said: str = ""
-    labels: tuple[tuple[str, int], ...] = ()
-    lost: tuple[str, ...] = ()
+    def named(name: str) -> Facts:
+        side = name if name in ("left", "right") else ""
+        return replace(facts, label=source_of(name) if name else facts.label, side=side)
+
+    return [InMemory(named(name), table, Marks(notes=tuple(notes))) for name, table in sources.items()]
 
 
-def size_of(sources: dict[str, Frames | Events]) -> str:
+def _size_of(sources: Mapping[str, Frames | Events]) -> str:
     """Return the number of frames or events of each source, and their sensors."""
     sizes = []
     for table in sources.values():

@@ -39,13 +39,13 @@ def read(path: Path, _layout: Layout | None = None) -> list[InMemory]:
     unit = re.search(r"pressure values in\s+(\S+)", "\n".join(head[:first]))
     columns = [f"sensor {k}" for k in range(1, len(names))]
     how = Table(separator=" ", skip_lines=first + 1, columns=["time", *columns], time_column=1)
-    found = read_table(path, Layout(path, unit=unit[1] if unit else "kPa", table=how))
-    both = found.sources[""]
+    [found] = read_table(path, Layout(path, unit=unit[1] if unit else "kPa", table=how))
+    both = found.data
     assert isinstance(both, Frames)  # the layout says so
     readers = list[InMemory]()
     for foot, part in (("left", slice(0, begins[1] - 1)), ("right", slice(begins[1] - 1, len(columns)))):
         values = both.values[:, :, part]
         array = Array(1, values.shape[2], name="pedar insole")
-        facts = Facts(path=path, array=array, kind="pedar", label=foot, side=foot, lost=found.lost)
+        facts = Facts(path=path, array=array, kind="pedar", label=foot, side=foot, lost=found.facts.lost)
         readers.append(InMemory(facts, Frames(values, both.t, unit=both.unit, array=array)))
     return readers

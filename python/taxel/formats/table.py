@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+import warnings
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,11 +27,13 @@ from taxel.formats.column_names import AXES, axes_of
 from taxel.formats.form import Form
 from taxel.formats.layout import Layout
 from taxel.formats.lines import MISSING, OddLines, is_number
-from taxel.formats.opened import Opened, size_of, sources_of
+from taxel.formats.opened import readers_of, sources_of
 from taxel.formats.table_columns import EVENT_COLUMNS
 from taxel.formats.table_form import form_of
 from taxel.formats.times import FEW_ODD, ISO, ODD, in_order, us_of
 from taxel.frames import Frames
+from taxel.labels import Note
+from taxel.reading import InMemory
 
 ENDINGS = (*TEXTS, *SHEETS)
 #: Cells that pandas converts at once.
@@ -80,8 +83,10 @@ class Rows:
         self.beside = self.beside.iloc[rows].reset_index(drop=True)
 
 
-def read_table(path: Path, layout: Layout, array: Array | None = None, label_column: str | int | None = None) -> Opened:
-    """Read a table of frames or of events.
+def read_table(
+    path: Path, layout: Layout, array: Array | None = None, label_column: str | int | None = None
+) -> list[InMemory]:
+    """Return a reader of each source of a table of frames, or of events.
 
     Parameters
     ----------
@@ -105,7 +110,7 @@ def read_table(path: Path, layout: Layout, array: Array | None = None, label_col
     read = {*columns.times, columns.label, columns.by, columns.taxel, *columns.taxels}
     left = [form.called(k) for k in range(len(form.names)) if k not in read]
     lost = [*([f"columns that are not taxels: {', '.join(left)}"] if left else []), *rows.odd.said()]
-    said, labels = [*form.said, *rows.odd.said()], tuple[tuple[str, int], ...]()
+    said, notes = [*form.said, *rows.odd.said()], list[Note]()
     if how.events:
         sources: dict[str, Frames | Events] = {"": _events(path, full, form, rows, array)}
     else:
@@ -125,9 +130,9 @@ def read_table(path: Path, layout: Layout, array: Array | None = None, label_col
                 values = values[order]
                 rows.chosen(order)
         sources = dict(_sources(path, full, names, values, t, rows.texts("by")))
-        labels = _labels(form, rows.texts("label"), t)
-    line = f"{path.name}: read as {size_of(sources)}: {'; '.join(said)}" if form.said else ""
-    return Opened(sources, rows.times is not None, full, line, labels, tuple(lost))
+        notes = _labels(form, rows.texts("label"), t)
+    said = said if form.said else []
+    return readers_of(path, "table", sources, full, said, timed=rows.times is not None, lost=lost, notes=notes)
 
 
 def read_rows(text: Text, form: Form, *, ends_empty: bool = False) -> Rows:
@@ -174,15 +179,20 @@ def read_rows(text: Text, form: Form, *, ends_empty: bool = False) -> Rows:
 
 def _at_once(text: Text, form: Form, ends_empty: bool) -> Rows | None:
     """Return the rows of a table; None if a line may be odd."""
+    import pandas as pd  # noqa: PLC0415  takes long
+
     separator = form.table.separator
     options = {"sep": r"\s+" if separator == " " else separator, "skiprows": form.first}
     for _ in range(2):
         encoding = {"encoding": text.encoding} if text.is_file else {}
         try:
-            return _parsed(text.source, form, whole=True, ends_empty=ends_empty, **options, **encoding)
+            with warnings.catch_warnings():
+                # A line with two cells more.
+                warnings.simplefilter("error", pd.errors.ParserWarning)
+                return _parsed(text.source, form, whole=True, ends_empty=ends_empty, **options, **encoding)
         except UnicodeDecodeError:
             text.as_latin_1()
-        except (ValueError, OverflowError):  # of pandas' parser too
+        except (ValueError, OverflowError, pd.errors.ParserWarning):  # of pandas' parser too
             return None
     return None
 
@@ -357,11 +367,11 @@ def _sources(
         yield from sources_of(path, layout, key, values[chosen], t[chosen], names if any(names) else None)
 
 
-def _labels(form: Form, cells: list[str], t: NDArray[np.int64]) -> tuple[tuple[str, int], ...]:
+def _labels(form: Form, cells: list[str], t: NDArray[np.int64]) -> list[Note]:
     """Return a label where the value of its column changes: the text, or the name of the column and the number."""
     name = form.called(form.columns.label or 0)
     changes = (k for k in range(1, len(cells)) if cells[k] != cells[k - 1] and cells[k] not in MISSING)
-    return tuple((f"{name} {cells[k]}" if is_number(cells[k]) else cells[k], int(t[k])) for k in changes)
+    return [Note(f"{name} {cells[k]}" if is_number(cells[k]) else cells[k], int(t[k])) for k in changes]
 
 
 def _events(path: Path, layout: Layout, form: Form, rows: Rows, array: Array | None) -> Events:

@@ -19,13 +19,14 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats import emed, event_camera, moticon, pedar, tekscan, xdf
-from taxel.formats.array_file import ARRAYS
+from taxel.formats.array_file import ARRAYS, read_array_file
 from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction
-from taxel.formats.foreign import check_foreign, read_foreign, refuse_container
+from taxel.formats.foreign import check_foreign, refuse_container
 from taxel.formats.layout import Layout, advice
 from taxel.formats.ros import is_bag, read_ros
 from taxel.formats.table import ENDINGS as TABLES
+from taxel.formats.table import read_table
 from taxel.reading import ENDINGS, Facts, InMemory, Reader
 from taxel.recording.beside import LABELS, is_label_table
 from taxel.recording.layout import check_size
@@ -109,7 +110,11 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
     array = None if how.array is None or of_topics else Array._given(how.array)
 
     def read_arrays(path: Path, layout: Layout | None) -> Sequence[Reader]:
-        return [_on_given(each, array) for each in read_foreign(path, layout, array, how.label_column)]
+        return [_on_given(each, array) for each in read_array_file(path, layout or Layout(path))]
+
+    def read_rows(path: Path, layout: Layout | None) -> Sequence[Reader]:
+        readers = read_table(path, layout or Layout(path), array, how.label_column)
+        return [_on_given(each, array) for each in readers]
 
     def read_camera(path: Path, layout: Layout | None) -> Sequence[Reader]:
         size = layout.grid() if array is None and layout is not None else array
@@ -145,7 +150,7 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
         "event_camera": Kind(event_camera.knows, read_camera),
         "npz": Kind(_is_npz, read_npz),
         "arrays": Kind(lambda path: _ending(*ARRAYS)(path) and not are_spike_trains(path), read_arrays),
-        "table": Kind(_is_table, read_arrays),
+        "table": Kind(_is_table, read_rows),
     }.items()
 
 
