@@ -170,6 +170,27 @@ ROWS: dict[str, tuple[str, list[int], list[list[float]]]] = {
         [0, 100_000],
         [[3, 4], [5, 6]],
     ),
+    "a reading a line by row and column": (
+        "t_ms,row,col,value\n"
+        + "".join(f"{10 * k},{i},{j},{6 * k + 3 * i + j}\n" for k in range(2) for j in range(3) for i in range(2)),
+        [0, 10_000],
+        [[*range(6)], [*range(6, 12)]],
+    ),
+    "taxels by number": (
+        "t_ms,taxel_id,force_mN\n" + "".join(f"{10 * k},{j},{k + j}\n" for k in range(4) for j in range(20)),
+        [0, 10_000, 20_000, 30_000],
+        [[k + j for j in range(20)] for k in range(4)],
+    ),
+    "t = T": (
+        "".join(f"t = {k / 25:.2f}\n1 2\n3 {k}\n" for k in range(3)),
+        [0, 40_000, 80_000],
+        [[1, 2, 3, 0], [1, 2, 3, 1], [1, 2, 3, 2]],
+    ),
+    "milliseconds behind a colon": (
+        "time,a\n10:00:00:900,1\n10:00:01:000,2\n",
+        [36_000_900_000, 36_001_000_000],
+        [[1], [2]],
+    ),
     "separators at the end": ("t_s,a,b\n0,1,2,\n1,3,4,\n", [0, 1_000_000], [[1, 2], [3, 4]]),
 }
 
@@ -212,6 +233,7 @@ def test_one_line_says_how_it_was_read_and_what_was_left_out(tmp_path: Path, tex
         ("0,5\n0,7\n0,9\n", ["", 'decimal = ","']),
         ("x,y,p,t\n1,2,1,100\n3,4,0,230\n5,6,1,400\n", ['time_unit = "us"', 'time_unit = "ms"']),
         ("7,5,1\n2,9,4\n4,4,2\n", ["", "frame_lines = 3"]),
+        (",0,1\n" + "".join(f"{k},{k % 3},{k % 4}\n" for k in range(9)), ["skip_lines = 1", "skip_lines = 1"]),
         ("01 10 20\n02 11 21\n", ["", 'lines = "hex"']),
         ("0,0,left,1,2\n5,1,right,8,9\n10,0,left,1,2\n", ["by = 3", "leave_out = [2, 3]"]),
         ("t_ms,hand,a\n0,1,5\n10,2,7\n20,1,5\n", ['by = "hand"', 'leave_out = ["hand"]']),
@@ -506,6 +528,8 @@ TIMES: dict[str, tuple[str, int, Callable[[int], str]]] = {
     "s": ("Zeit [s]", 0, lambda us: f"{us / 1e6:.3f}"),
     "ms": ("time_ms", 0, lambda us: f"{us / 1e3:g}"),
     "us": ("micros", 0, str),
+    "min": ("Zeit [min]", 0, lambda us: f"{us / 60e6:.9f}"),
+    "minutes and seconds": ("Elapsed", 0, lambda us: f"{us // 60_000_000:02}:{us / 1e6 % 60:06.3f}"),
     "epoch": ("t", EPOCH_US, lambda us: f"{(EPOCH_US + us) / 1e6:.3f}"),
     "iso": ("timestamp", EPOCH_US, lambda us: (BEGIN + timedelta(microseconds=us)).isoformat(timespec="milliseconds")),
     "day": ("Uhrzeit", 36_000_000_000, lambda us: (BEGIN + timedelta(microseconds=us)).strftime("%H:%M:%S.%f")),
@@ -526,7 +550,10 @@ def whole_tables(draw: st.DrawFn) -> tuple[str, list[int], list[list[float]]]:
         rows = [[*row[:k], float(f"{row[k]:g}"), *row[k + 1 :]] for row in rows]
     beside = [BESIDE[kind] for kind in draw(st.sets(st.sampled_from([*BESIDE]), max_size=3))]
     columns += [(called, list(map(cell, range(count)))) for called, cell in beside]
-    columns[0] = name, [cell.replace(".", decimal) if name in ("Zeit [s]", "t") else cell for cell in columns[0][1]]
+    columns[0] = (
+        name,
+        [cell.replace(".", decimal) if name in ("Zeit [s]", "Zeit [min]", "t") else cell for cell in columns[0][1]],
+    )
     at = draw(st.permutations(range(len(columns))))
     order = [k for k in at if not 1 <= k <= taxels]
     place = draw(st.integers(0, len(order)))

@@ -13,8 +13,12 @@ _UNITS_OF_TIME = {
     "ms": ("ms", "msec", "millis", "milliseconds", "millisekunden"),
     "us": ("us", "µs", "μs", "usec", "micros", "microseconds"),
     "ns": ("ns", "nsec", "nanos", "nanosec", "nanosecs", "nanoseconds", "nsecs"),
+    "min": ("min", "minute", "minutes", "minuten"),
+    "h": ("h", "hour", "hours", "stunden"),
 }
 _UNIT_OF_TIME = "|".join(word for words in _UNITS_OF_TIME.values() for word in words)
+#: Those that are nothing else: a name may end in [min] for the least value.
+_SHORT_UNIT_OF_TIME = "|".join(_UNITS_OF_TIME[unit][k] for unit in ("s", "ms", "us", "ns") for k in (0, 1))
 #: What people call times, in some languages.
 _TIME = (
     r"t|ts|(?:%|rel|abs|host|device|sample|frame|recv|unix|epoch|system|header)?[ ._]*(?:time|stamp|time[ _]?stamp)s?"
@@ -29,7 +33,8 @@ _TIMES = re.compile(
 )
 #: A name of any language with a unit of time: 時間(ms), Czas [s]; but not Sensor(s).
 _WITH_UNIT_OF_TIME = re.compile(
-    rf".*?(?:\[ *(?P<square>{_UNIT_OF_TIME}) *\]|(?<![a-z])\( *(?P<round>{_UNIT_OF_TIME}) *\))", re.IGNORECASE
+    rf".*?(?:\[ *(?P<square>{_SHORT_UNIT_OF_TIME}) *\]|(?<![a-z])\( *(?P<round>{_SHORT_UNIT_OF_TIME}) *\))",
+    re.IGNORECASE,
 )
 
 _COUNTERS = re.compile(
@@ -45,7 +50,7 @@ _LABELS = re.compile(
     re.IGNORECASE,
 )
 _KEYS = re.compile(
-    r"(?:hand|foot|side|finger|sensor|device|board|insole|limb|topic|channel|source|node|module"
+    r"(?:hand|foot|side|finger|sensor|device|board|insole|limb|topic|channel|source|node|module|taxel|cell|electrode"
     r"|trial|session|run|subject|person|participant|versuch|proband)"
     r"(?:[ ._]?(?:id|name|no|nr))?",
     re.IGNORECASE,
@@ -56,10 +61,6 @@ _OTHERS = re.compile(
     r"batt?(?:ery)?|akku|vbat|hum(?:idity)?|lat(?:itude)?|lon(?:gitude)?|quat(?:ernion)?|roll|pitch|yaw|crc|checksum|cop|total|sum|summe)"
     r"(?:[ ._\[(]*(?:x|y|z|w|\d+)[\])]?)?(?:[ ._]?[\[(][^\])]*[\])])?",
     re.IGNORECASE,
-)
-#: Times in units that taxel does not read.
-_SLOW_TIMES = re.compile(
-    r"(?:elapsed|time|zeit|t)[ _.]*[\[(/_ ] *(?:min|minutes?|minuten|h|hours?|stunden|days?)[\])]?", re.IGNORECASE
 )
 #: A cell that says a unit, as N, [kPa] or (m/s^2).
 _UNITS = re.compile(r"[\[(]?[^\d\s\[\]()]{0,8}[²³2]?[\])]?")
@@ -121,11 +122,6 @@ def is_label(name: str) -> bool:
 def is_key(name: str) -> bool:
     """Return whether a column says which sensor a line is of: hand, sensor_id."""
     return _KEYS.fullmatch(last_part(name)) is not None
-
-
-def is_slow_time(name: str) -> bool:
-    """Return whether a column holds times in minutes, hours or days: Time [min]."""
-    return _SLOW_TIMES.fullmatch(last_part(name)) is not None
 
 
 def is_other(name: str) -> bool:

@@ -20,12 +20,16 @@ from taxel.formats.times import ISO, UNITS_US, is_time, seconds_of
 
 
 class Columns(NamedTuple):
-    """Say which column is what, by its place; times are two columns where they are seconds and nanoseconds."""
+    """Say which column is what, by its place.
+
+    Times are two columns where they are seconds and nanoseconds, and a taxel is named by two where they are its row and
+    its column.
+    """
 
     times: tuple[int, ...]
+    taxel: tuple[int, ...]
     label: int | None
     by: int | None
-    taxel: int | None
     taxels: tuple[int, ...]
 
 
@@ -72,20 +76,22 @@ class Form:
         ProblemError : columns that are not there, or one that is two things
         """
         how, names = self.table, self.names
-        times = () if how.time_column is None else places_of_time(names, "time_column", how.time_column)
-        label, by, taxel = (
+        times, taxel = (
+            () if getattr(how, key) is None else places_of(names, key, getattr(how, key))
+            for key in ("time_column", "taxel_column")
+        )
+        label, by = (
             None if getattr(how, key) is None else place_of(names, key, getattr(how, key))
-            for key in ("label_column", "by", "taxel_column")
+            for key in ("label_column", "by")
         )
         left = {place_of(names, "leave_out", column) for column in how.leave_out}
         twice = next((k for k in times if k in left), None)
         if twice is not None:
             raise ProblemError(f"column {shown(names[twice])} is the time_column, but is also in leave_out")
-        others = {*left, *times, label, by, taxel}
+        others = {*left, *times, *taxel, label, by}
         taxels = (k for k in range(len(names)) if k not in others)
-        return Columns(
-            times, label, by, taxel, tuple(k for k in taxels if how.keep is None or fnmatchcase(names[k], how.keep))
-        )
+        kept = tuple(k for k in taxels if how.keep is None or fnmatchcase(names[k], how.keep))
+        return Columns(times, taxel, label, by, kept)
 
     @property
     def taxels(self) -> tuple[int, ...]:
@@ -199,7 +205,7 @@ def place_of(names: Sequence[str], key: str, column: str | int) -> int:
     raise ProblemError(f"column {shown(column)} of {key} {problem}; the columns are {there}")
 
 
-def places_of_time(names: Sequence[str], key: str, column: str | int) -> tuple[int, ...]:
-    """Return the place of a column of times, or of two of "A+B"."""
+def places_of(names: Sequence[str], key: str, column: str | int) -> tuple[int, ...]:
+    """Return the place of a column, or of the two of "A+B"."""
     is_one = isinstance(column, int) or column in names or "+" not in column
     return tuple(place_of(names, key, part) for part in ([column] if is_one else str(column).split("+", 1)))

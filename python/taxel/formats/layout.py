@@ -43,7 +43,7 @@ class Table:
     time_column : str or int, optional
         The column of times, by its name or its number from 1; "A+B" is the sum of seconds and of nanoseconds within
         them; default: none.
-    time_unit : {"s", "ms", "us", "ns", "iso"}
+    time_unit : {"s", "ms", "us", "ns", "min", "h", "iso"}
         "iso": texts as of ISO 8601, dates with times, of UTC where they state no zone, or times of a day;
         days with points (01.05.2024 10:15:02,010) too.
     missing : str, optional
@@ -58,7 +58,7 @@ class Table:
         A column that says which sensor a line is of: each of its values is a source; it is no taxel.
     taxel_column : str or int, optional
         A column that says which taxel a line is of, whose reading is in the only other column: the lines of one time
-        are a frame.
+        are a frame. "A+B": two columns, the row and the column of the taxel.
     lines : {"plain", "marked", "json", "hex"}
         "marked": brackets, quotes, arrows and ``NAME:`` are between cells too; "json": a line is an object or a list
         of JSON, whose columns have the names of its keys; "hex": cells are hexadecimal numbers.
@@ -68,7 +68,7 @@ class Table:
         An empty line ends a frame.
     frame_begin : str, optional
         Beginning of the line of text above each frame, for example "Frame"; empty lines may then be between frames too.
-    frame_time : {"s", "ms", "us", "ns"}, optional
+    frame_time : {"s", "ms", "us", "ns", "min", "h"}, optional
         The last number in the line above each frame is its time, in this unit.
     events : bool
         Whether each line is an event, in the columns x, y and p (the polarity: 1 for more pressure, 0 or -1 for less).
@@ -160,7 +160,7 @@ class Data:
         Of shape (frames, rows, columns) or (frames, taxels); in a group of a .h5 by its path, "run1/pressure".
     time : str, optional
         An array with a time for each frame; default: none.
-    time_unit : {"s", "ms", "us", "ns"}
+    time_unit : {"s", "ms", "us", "ns", "min", "h"}
     axes : str, optional
         What each axis counts, in their order: "time", and of "trial", "row", "column", "taxel" and "axis" (x, y, z)
         those that there are, as "row time column"; default: the first counts frames.

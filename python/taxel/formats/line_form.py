@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.formats.column_names import time_unit
-from taxel.formats.form import Form, place_of, places_of_time
+from taxel.formats.form import Form, place_of, places_of
 from taxel.formats.layout import PrintedFrames
 from taxel.formats.line_fits import FITS, fits_in
-from taxel.formats.table_columns import Draft, ask_for_key, ask_for_lines_of_one_time, said_of, taxels_of, time_of
+from taxel.formats.table_columns import Draft, ask_for_lines_of_one_time, by_key, said_of, taxels_of, time_of
 from taxel.formats.table_form import draft_of, lines_between_blanks
 from taxel.formats.times import ISO, UNITS_US
 
@@ -53,7 +53,7 @@ def form_of_lines(
     names = (*draft.names, *[""] * (draft.fit.count - len(draft.names)))
     own = fit.lines[fit.body[0]][1].names if fit.kind in ("marked", "json") else ()
     left = {place_of(names, "leave_out", column) for column in stated.leave_out}
-    times = () if stated.time is None else places_of_time(names, "time", stated.time.partition(":")[0])
+    times = () if stated.time is None else places_of(names, "time", stated.time.partition(":")[0])
     per_frame = 0 if stated.frame_end is not None else stated.frame_lines or 1
     of_line = None if size is None else size // (stated.frame_lines or 1)
     is_whole = fit.count - len({*left, *times}) == of_line and not any(map(time_unit, names))
@@ -72,7 +72,7 @@ def form_of_lines(
     elif not is_whole:
         time = time_of(draft, is_stated=not are_frames)
         if time is not None and time not in left:
-            times = places_of_time(names, "time", draft.table.time_column or 0)
+            times = places_of(names, "time", draft.table.time_column or 0)
             ask_for_lines_of_one_time(draft, time)
             if len(times) == 1:
                 _set_found_unit(draft, time, unit_of, is_sure=not are_frames)
@@ -86,7 +86,7 @@ def form_of_lines(
         taxels = [k for k in range(len(draft.names)) if k not in {*left, *times, *draft.left}]
     else:
         taxels = [k for k in taxels_of(draft, time) if k not in left]
-        ask_for_key(draft, time, taxels, lambda: lines)
+        taxels = by_key(draft, time, taxels, lambda: lines)
     if not taxels:
         raise ProblemError("lines have no column of values, only times and columns that are left out")
     if draft.asked or draft.table.taxel_column is not None:

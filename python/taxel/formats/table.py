@@ -107,7 +107,7 @@ def read_table(
     form, full = form_of(text, layout, label_column)
     how, columns = form.table, form.columns
     rows = read_rows(text, form)
-    read = {*columns.times, columns.label, columns.by, columns.taxel, *columns.taxels}
+    read = {*columns.times, columns.label, columns.by, *columns.taxel, *columns.taxels}
     left = [form.called(k) for k in range(len(form.names)) if k not in read]
     lost = [*([f"columns that are not taxels: {', '.join(left)}"] if left else []), *rows.odd.said()]
     said, notes = [*form.said, *rows.odd.said()], list[Note]()
@@ -121,7 +121,7 @@ def read_table(
             said.append(f"{', '.join(map(form.called, places))} left out: empty")
             full = replace(full, table=replace(how, leave_out=[*how.leave_out, *(k + 1 for k in places)]))
             values, names = values[:, :, ~empty], [form.names[k] for k in columns.taxels if k not in places]
-        if columns.taxel is not None:
+        if columns.taxel:
             values, names = _one_line_a_time(path, form, rows, values)
         t = np.arange(len(values), dtype=np.int64)
         if rows.times is not None:
@@ -208,7 +208,8 @@ def _parsed(source: Any, form: Form, *, whole: bool = False, ends_empty: bool = 
     how, count, taxels = form.table, len(form.names), list(form.taxels)
     times = list(form.columns.times)
     beside = dict(zip(("time", "nanoseconds"), times, strict=False))
-    beside |= {name: k for name in ("label", "by", "taxel") if (k := getattr(form.columns, name)) is not None}
+    beside |= dict(zip(("taxel", "column"), form.columns.taxel, strict=False))
+    beside |= {name: k for name in ("label", "by") if (k := getattr(form.columns, name)) is not None}
     # Kinds of numbers that are stated, not found, take pandas half as long again.
     kinds: dict[int, Any] = {k: str for k in beside.values() if k not in times or how.time_unit == ISO}
     missing = [*MISSING, *([] if how.missing is None else [how.missing])]
@@ -255,6 +256,8 @@ def _parsed(source: Any, form: Form, *, whole: bool = False, ends_empty: bool = 
         raise _OddError
     if "nanoseconds" in beside:
         rows.beside["time"] = rows.beside["time"] * 10**9 + rows.beside.pop("nanoseconds")
+    if "column" in beside:
+        rows.beside["taxel"] += " " + rows.beside.pop("column")
     return rows
 
 
@@ -336,7 +339,11 @@ def _one_line_a_time(
         right = "a table with taxel_column must have a time_column and one column of readings"
         raise unreadable(f"{right}; its readings are {', '.join(map(form.called, form.taxels))}", path)
     frame, times = pd.factorize(rows.times)
-    taxel, names = pd.factorize(rows.beside["taxel"])
+    taxel, names = pd.factorize(rows.beside["taxel"], sort=False)
+    if len(form.columns.taxel) > 1:
+        # Row by row, in whatever order the lines are.
+        order = sorted(range(len(names)), key=lambda k: [*map(float, names[k].split())])
+        taxel, names = np.argsort(order)[taxel], names[order]
     twice = np.flatnonzero(pd.Series(frame * len(names) + taxel).duplicated())
     if len(twice):
         at = rows.beside.iloc[twice[0]]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from taxel.formats import column_names
 from taxel.formats.column_names import time_unit
-from taxel.formats.form import places_of_time
+from taxel.formats.form import places_of
 from taxel.formats.layout import Table
 from taxel.formats.line_fits import Fit
 from taxel.formats.lines import MISSING
@@ -41,8 +41,9 @@ class Draft:
     said: list[str] = field(default_factory=list)
     #: What two layouts differ in, and how, with a comment for each.
     asked: list[tuple[str, Mapping[str, Changes]]] = field(default_factory=list)
-    #: The column that names the sensor or the taxel of each line.
+    #: The column that names the sensor or the taxel of each line; rows and columns of taxels that two columns name.
     key: int | None = None
+    size: tuple[int, int] | None = None
 
     def called(self, column: int) -> str | int:
         """Return how a layout names a column: by its name, or, without a name of its own, by its number from 1."""
@@ -172,7 +173,7 @@ def taxels_of(draft: Draft, time: int | None) -> list[int]:
         place
         for column in (table.time_column, table.label_column)
         if column is not None
-        for place in places_of_time(names, "label_column", column)
+        for place in places_of(names, "label_column", column)
     }
     for k in range(len(names)):
         why = "" if k in known or k in left else next(filter(None, _reasons(draft, k, first=int(time == 0))), "")
@@ -202,7 +203,6 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[str]:
         yield "times in a form that taxel does not read" * is_time
         yield _key(draft, column) if is_key else ""
         yield f"texts{reads * (len(set(cells)) > 1)}"
-    yield "times in a form that taxel does not read" * column_names.is_slow_time(name)
     if kind == "time" or is_time or (name and fit.ascends(column) and fit.epoch(column)):
         yield "another time"
     numbers = fit.numbers(column)
@@ -214,7 +214,8 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[str]:
         yield "a counter"
     yield f"labels{reads}" * (column_names.is_label(name) and few)
     if column_names.is_key(name) and whole:
-        yield _key(draft, column) if few else "a counter"
+        # Lines of one time may be of many taxels.
+        yield _key(draft, column) if few or 2 * len(set(cells)) <= len(cells) else "a counter"
     yield "another quantity" * column_names.is_other(name)
 
 
@@ -232,33 +233,48 @@ def _key(draft: Draft, column: int) -> str:
     return f"always {next(iter(keys))}" if len(keys) == 1 else "by"
 
 
-def ask_for_key(draft: Draft, time: int | None, taxels: Sequence[int], all_lines: Callable[[], Iterable[str]]) -> None:
-    """Say what the column that names the sensor of each line is, or ask it: the taxels of an array, or several sensors.
+def by_key(draft: Draft, time: int | None, taxels: list[int], all_lines: Callable[[], Iterable[str]]) -> list[int]:
+    """Return the columns of readings where another names the taxel or the sensor of each line; if it is open, ask.
 
-    If each time has one reading of each key, these are taxels.
+    If each time has one reading of each key, these are the taxels of an array.
     """
-    fit, key = draft.fit, draft.key
-    if key is None:
-        return
-    called, keys = draft.called(key), sorted(set(fit.cells(key)))
-    if len(keys) == 1 and all(keys[0] in line or not any(map(str.isdigit, line)) for line in all_lines()):
-        return
-    is_one = len(taxels) == 1 and time is not None
-    times = set(fit.cells(time)) if time is not None else set()
-    pairs = len(set(zip(fit.cells(time), fit.cells(key), strict=True))) if time is not None else 0
+    fit, called = draft.fit, draft.called
+    grid = _grid(draft, taxels)
+    keys = [] if draft.key is None and not grid else grid or [draft.key or 0]
+    if not keys:
+        return taxels
+    values = [k for k in taxels if k not in keys]
+    texts = [" ".join(cells) for cells in zip(*map(fit.cells, keys), strict=True)]
+    known = sorted(set(texts))
+    times = fit.cells(time) if time is not None else []
+    pairs = len(set(zip(times, texts, strict=False)))
     # The last frame may be a part.
-    missing = len(times) * len(keys) - pairs
-    if is_one and len(keys) > 1 and pairs == len(fit.body) and missing < len(keys):
-        del draft.left[key]
-        draft.set(taxel_column=called)
-        draft.said.append(f"a taxel for each {called}")
-        return
-    choices: dict[str, Changes] = {f"a source for each: by = {called!r}": {"by": called, "read": [called]}}
-    if is_one and (len(keys) == 1 or pairs > len(times)):
-        choices[f"a taxel for each: taxel_column = {called!r}"] = {"taxel_column": called, "read": [called]}
-    shown = ", ".join(keys[:4]) + ", ..." * (len(keys) > 4 or len(keys) == 1)
-    draft.left[key] = "by"
-    draft.ask(f"column {called} is {shown} in turn", {**choices, "all lines are of one sensor": {}}, first=True)
+    is_whole = pairs == len(texts) and len(set(times)) * len(known) - pairs < len(known)
+    if len(values) == 1 and len(known) > 1 and is_whole:
+        sizes = [len(set(fit.cells(k))) for k in keys]
+        draft.size = (sizes[0], sizes[1]) if len(keys) > 1 and sizes[0] * sizes[1] == len(known) else None
+        draft.left = {k: why for k, why in draft.left.items() if k not in keys}
+        name = "+".join(str(called(k)) for k in keys)
+        draft.set(taxel_column=name if len(keys) > 1 else called(keys[0]))
+        draft.said.append(f"a taxel for each {name}")
+        return values
+    if grid or (len(known) == 1 and all(known[0] in line or not any(map(str.isdigit, line)) for line in all_lines())):
+        return taxels
+    key = called(keys[0])
+    choices: dict[str, Changes] = {f"a source for each: by = {key!r}": {"by": key, "read": [key]}}
+    if len(taxels) == 1 and times and (len(known) == 1 or pairs > len(set(times))):
+        choices[f"a taxel for each: taxel_column = {key!r}"] = {"taxel_column": key, "read": [key]}
+    shown = ", ".join(known[:4]) + ", ..." * (len(known) > 4 or len(known) == 1)
+    draft.left[keys[0]] = "by"
+    draft.ask(f"column {key} is {shown} in turn", {**choices, "all lines are of one sensor": {}}, first=True)
+    return taxels
+
+
+def _grid(draft: Draft, taxels: Sequence[int]) -> list[int]:
+    """Return the columns of the row and the column of the taxel that a line is of, beside its reading; else none."""
+    by_name = {draft.names[k].lower(): k for k in taxels}
+    pairs = (("row", "col"), ("row", "column"), ("y", "x"))
+    return next(([by_name[a], by_name[b]] for a, b in pairs if len(taxels) == 3 and {a, b} < set(by_name)), [])
 
 
 def _of_one_unit(draft: Draft, taxels: list[int]) -> list[int]:

@@ -30,20 +30,20 @@ from taxel.formats.table_columns import (
     Draft,
     are_events,
     ask_for_events,
-    ask_for_key,
     ask_for_lines_of_one_time,
     ask_for_unit_of_events,
+    by_key,
     said_of,
     taxels_of,
     time_of,
 )
-from taxel.formats.times import FEW_ODD, ODD
+from taxel.formats.times import FEW_ODD, ODD, unit_of_times
 
 #: Two readings fit about equally if one fits this share of the other.
 _EQUALLY = 0.999
 #: A line above a frame: a word and the frame's number, or its time, or both.
 _ABOVE_FRAME = re.compile(
-    r"\s*(?P<word>[^\W\d_]+)[ \t:=#.]*\d+(?:[.,]\d+)?[ \t]*(?P<unit>[mun]?s)?"
+    r"\s*(?P<word>[^\W\d_]+)[ \t:=#.]*(?P<number>\d+(?:[.,]\d+)?)[ \t]*(?P<unit>[mun]?s)?"
     r"(?:[ \t,;:@(\[]+(?:t|time)?[ \t=:]*(?P<time>\d+(?:[.,]\d+)?)[ \t]*(?P<time_unit>[mun]?s)?[)\]]?)?[ \t,;]*",
     re.IGNORECASE,
 )
@@ -125,7 +125,7 @@ def _as_it_looks(text: Text, layout: Layout, label_column: str | int | None) -> 
     lines = text.head
     if text.path.suffix.lower() == ".json" and not any(read_line(line, "json") for line in lines[:3]):
         raise unreadable("is one document of JSON; save a line of JSON per frame, or a .csv", text.path)
-    begin, time_of_begin = _begin_of_frames(lines)
+    begin, units = _begin_of_frames(lines)
     is_begin = [bool(begin) and line.lstrip().startswith(begin) for line in lines]
     shown_lines = ["" if above else line for line, above in zip(lines, is_begin, strict=True)]
     size = (layout.rows or 0) * (layout.columns or 0)
@@ -142,7 +142,7 @@ def _as_it_looks(text: Text, layout: Layout, label_column: str | int | None) -> 
         draft = _decided(draft, draft_of(other, shown_lines))
     if may_be_hex:
         draft.ask("decimal or hexadecimal numbers", {"decimal numbers": {}, "hexadecimal numbers": {"lines": "hex"}})
-    _frames(draft, lines, is_begin, begin, time_of_begin)
+    _frames(draft, lines, is_begin, begin, units)
     stated = layout.rows is not None or layout.rate_hz is not None or layout.path != text.path
     draft.set(label_column=label_column)
     time = time_of(draft, is_stated=stated)
@@ -151,7 +151,7 @@ def _as_it_looks(text: Text, layout: Layout, label_column: str | int | None) -> 
     taxels = taxels_of(draft, time)
     if not taxels:
         raise unreadable("contains no column of readings", text.path)
-    ask_for_key(draft, time, taxels, text.lines)
+    taxels = by_key(draft, time, taxels, text.lines)
     if time is not None and draft.table.taxel_column is None:
         ask_for_lines_of_one_time(draft, time)
     draft.set(leave_out=[draft.called(k) for k in sorted(draft.left)])
@@ -248,13 +248,21 @@ def _below(upper: Sequence[str], names: Sequence[str]) -> Iterator[str]:
 
 
 def _numbered(draft: Draft) -> Draft:
-    """Return a table without names; whether a first line that numbers the columns is a frame is asked."""
+    """Return a table without names; whether a first line that numbers the columns is a frame is asked.
+
+    Those of pandas are none: nothing is above the numbers of its lines.
+    """
     fit = draft.fit
-    first = [float(cell) for cell in fit.lines[fit.body[0]][1].cells if is_number(cell)]
-    counts = len(first) == fit.count >= 4 and bool(np.all(np.diff(first) == 1)) and first[0] in (0.0, 1.0)
-    if counts and len(fit.body) > 1:
-        below = {"skip_lines": fit.lines[fit.body[1]][0]}
-        draft.ask("the first line is 1, 2, 3 ...", {"a frame": {}, "numbers of columns": below})
+    cells = fit.lines[fit.body[0]][1].cells
+    first = [float(cell) for cell in cells if is_number(cell)]
+    counts = len(first) > 1 and bool(np.all(np.diff(first) == 1)) and first[0] in (0.0, 1.0)
+    if not counts or len(fit.body) < 2:
+        return draft
+    below = fit.lines[fit.body[1]][0]
+    if not cells[0] and len(first) == fit.count - 1 and fit.types[0] == "number":
+        return replace(draft, fit=replace(fit, body=fit.body[1:]), table=replace(draft.table, skip_lines=below))
+    if len(first) == fit.count >= 4:
+        draft.ask("the first line is 1, 2, 3 ...", {"a frame": {}, "numbers of columns": {"skip_lines": below}})
     return draft
 
 
@@ -277,8 +285,8 @@ def _width(cells: Sequence[str]) -> int:
     return max((k for k, cell in enumerate(cells, 1) if cell), default=0)
 
 
-def _begin_of_frames(lines: Sequence[str]) -> tuple[str, str | None]:
-    """Return the word that begins a line above every few lines, and the unit of the time in it, None without one."""
+def _begin_of_frames(lines: Sequence[str]) -> tuple[str, Sequence[str]]:
+    """Return the word that begins a line above every few lines, and the units in which the time in it may be."""
     found: dict[str, list[tuple[int, re.Match[str]]]] = {}
     for k, line in enumerate(line for line in lines if line.strip(" \t,;")):
         if above := _ABOVE_FRAME.fullmatch(line):
@@ -288,8 +296,12 @@ def _begin_of_frames(lines: Sequence[str]) -> tuple[str, str | None]:
         if len(steps) and steps[0] > 1 and Counter(steps.tolist()).most_common(1)[0][1] > 0.5 * len(steps):
             units = {above["time_unit"] or (above["unit"] if above["time"] is None else None) for _, above in places}
             unit = units.pop() if len(units) == 1 else None
-            return word, None if unit is None else unit.lower()
-    return "", None
+            if unit is None and column_names.is_time(word) and all(above["time"] is None for _, above in places):
+                times = np.array([float(above["number"].replace(",", ".")) for _, above in places])
+                one, several = unit_of_times(times)
+                return word, [*several] or [one]
+            return word, [] if unit is None else [unit.lower()]
+    return "", []
 
 
 def lines_between_blanks(fit: Fit, lines: Sequence[str], *, from_begin: bool) -> int:
@@ -304,11 +316,14 @@ def lines_between_blanks(fit: Fit, lines: Sequence[str], *, from_begin: bool) ->
     return sizes.pop() if len(ends) > 1 and len(sizes) == 1 else 0
 
 
-def _frames(draft: Draft, lines: Sequence[str], is_begin: Sequence[bool], begin: str, time: str | None) -> None:
+def _frames(draft: Draft, lines: Sequence[str], is_begin: Sequence[bool], begin: str, units: Sequence[str]) -> None:
     """Say how many lines a frame has: those between lines of text, or between empty lines."""
     if begin:
-        draft.set(frame_begin=begin, frame_time=time, skip_lines=min(is_begin.index(True), draft.fit.first))
+        first = min(is_begin.index(True), draft.fit.first)
+        draft.set(frame_begin=begin, frame_time=next(iter(units), None), skip_lines=first)
         draft.said.append(f"frames begin at lines {begin!r}")
+        if len(units) > 1:
+            draft.ask("the unit of the time", {f"{unit}": {"frame_time": unit} for unit in units})
     elif (size := lines_between_blanks(draft.fit, lines, from_begin=True)) > 1:
         draft.set(frame_end="blank")
         draft.said.append(f"{size} lines per frame, between empty lines")
@@ -340,7 +355,7 @@ def _with_size(layout: Layout, draft: Draft, taxels: Sequence[int]) -> Layout:
             }
             draft.ask("taxels with the axes x, y and z", choices)
         return full
-    places = column_names.places_of(names) if any(names) and not layout.rows else None
+    places = column_names.places_of(names) if any(names) and not layout.rows else draft.size
     if places is not None and min(places) > 1:
         full = replace(full, rows=places[0], columns=places[1])
     # Lines that are parts of a frame whose size is known; a line with a time of its own is a frame.

@@ -25,18 +25,21 @@ FEW_ODD, ODD = 2, 0.1
 _USUAL_HZ, _POSSIBLE_HZ = (5.0, 500.0), (0.5, 20_000.0)
 #: Years 2001 to 2065 since 1970, in s.
 _EPOCH = (1e9, 3e9)
-#: Times in units of these, us.
-UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
+#: Times in units of these, us: those in which they may be found to be, and others that a name states.
+FOUND_US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
+UNITS_US = {**FOUND_US, "min": 60e6, "h": 3600e6}
 #: The unit of times that are texts: dates with times, or times of a day.
 ISO = "iso"
 
-_CLOCK = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?"
+_CLOCK = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+|:\d{3})?|[.,]\d+)?"
 _DATE = r"(?:\d{4}-\d\d-\d\d|\d{1,2}\.\d{1,2}\.\d{4})"
 _IS_TIME = re.compile(rf"(?:{_DATE}[T ])?{_CLOCK}(?:Z|[+-]\d\d:?\d\d)?")
 _IS_DAY = re.compile(_DATE)
 _DAY_US = 86_400_000_000
 _DAY_WITH_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?:[ T]+(\S+))?", re.ASCII)
 _TIME_OF_DAY = re.compile(r"\d?\d:.*|\d{6}(?:[.,+Z-].*)?", re.ASCII)
+#: Minutes and seconds with a fraction, and hours to seconds with milliseconds behind a colon.
+_MINUTES, _COLON_MS = re.compile(r"(?=\d?\d:\d\d[.,])"), re.compile(r"(?<=:\d\d:\d\d):(?=\d{3})")
 #: Characters of a date without separators.
 _SHORTEST_DATE = 8
 #: A counter of times that is full begins at 0 again: its values, in the unit of the file.
@@ -73,9 +76,12 @@ def seconds_of(cell: str) -> float:
     --------
     >>> seconds_of("1970-01-02T00:00:00.5"), seconds_of("1970-01-01 01:00:00+01:00"), seconds_of("00:01:00.25")
     (86400.5, 0.0, 60.25)
-    >>> seconds_of("02.01.1970 00:00:00,5"), seconds_of("01/02/1970 00:00")
-    (86400.5, nan)
+    >>> seconds_of("02.01.1970 00:00:00,5"), seconds_of("1:02.5"), seconds_of("01/02/1970 00:00")
+    (86400.5, 62.5, nan)
     """
+    cell = _COLON_MS.sub(".", cell)
+    if _MINUTES.match(cell):
+        cell = f"00:{'0' * (cell[1] == ':')}{cell}"
     found = _DAY_WITH_POINTS.fullmatch(cell)
     if found is not None:
         day, month, year, rest = found.groups()
@@ -94,7 +100,7 @@ def seconds_of(cell: str) -> float:
 def epoch_of(numbers: NDArray[np.float64]) -> str:
     """Return the unit in which numbers are times since 1970; "" if none."""
     first, last = (1e6 * edge for edge in _EPOCH)
-    return next((u for u, us in UNITS_US.items() if ((numbers * us > first) & (numbers * us < last)).all()), "")
+    return next((u for u, us in FOUND_US.items() if ((numbers * us > first) & (numbers * us < last)).all()), "")
 
 
 def unit_of_times(times: NDArray[np.float64]) -> tuple[str, dict[str, float]]:
@@ -105,7 +111,7 @@ def unit_of_times(times: NDArray[np.float64]) -> tuple[str, dict[str, float]]:
     steps = steps[steps > 0]
     if not len(steps):
         return "s", {}
-    rates = {unit: 1e6 / (us * float(np.median(steps))) for unit, us in UNITS_US.items()}
+    rates = {unit: 1e6 / (us * float(np.median(steps))) for unit, us in FOUND_US.items()}
     usual, possible = (
         [unit for unit, hz in rates.items() if least <= hz <= most] for least, most in (_USUAL_HZ, _POSSIBLE_HZ)
     )

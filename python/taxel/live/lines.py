@@ -19,7 +19,7 @@ from taxel.array import Array
 from taxel.formats.form import Form
 from taxel.formats.line_form import form_of_lines, stated_count
 from taxel.formats.lines import is_number
-from taxel.formats.times import ISO, UNITS_US
+from taxel.formats.times import FOUND_US, ISO, UNITS_US
 from taxel.live.line_frames import ArrivedLine, LineFrames, array_of
 from taxel.live.stated_source import StatedSource
 
@@ -215,7 +215,7 @@ class Lines:
                 return ""
             passed_s = (at[numbers[-1]] - at[numbers[0]]) * 1e-9
             by_second = (stamps[-1] - stamps[0]) / passed_s if passed_s > 0 else 0.0
-            return next((unit for unit, us in UNITS_US.items() if 0.5 <= by_second * us * 1e-6 < 2.0), "")
+            return next((unit for unit, us in FOUND_US.items() if 0.5 <= by_second * us * 1e-6 < 2.0), "")
 
         size = self.array.taxels if self.array is not None and self.are_frames else None
         try:
