@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 import warnings
+from array import array
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -78,6 +77,15 @@ class Rows:
         below = ((n, line) for n, line in enumerate(Text(path).lines(), 1) if n > first and line.strip())
         return self.numbers[row] if self.numbers else next(islice(below, row, None))[0]
 
+    def joined(self) -> Rows:
+        """Return the same with seconds and nanoseconds as one time, and row and column as one name of a taxel."""
+        beside = self.beside
+        if "nanoseconds" in beside:
+            beside["time"] = beside["time"].astype("int64") * 10**9 + beside.pop("nanoseconds").astype("int64")
+        if "column" in beside:
+            beside["taxel"] += " " + beside.pop("column")
+        return self
+
     def chosen(self, rows: NDArray[np.intp]) -> None:
         """Take only these rows' times, labels and keys."""
         self.beside = self.beside.iloc[rows].reset_index(drop=True)
@@ -138,7 +146,7 @@ def read_table(
 def read_rows(text: Text, form: Form, *, ends_empty: bool = False) -> Rows:
     """Read all rows of a table whose layout is complete; lines that are none are left out and counted.
 
-    At once by pandas, or, where a line is odd or has marks, after each line was looked at.
+    At once by pandas, or, where a line is odd or has marks, one by one.
 
     Parameters
     ----------
@@ -153,43 +161,20 @@ def read_rows(text: Text, form: Form, *, ends_empty: bool = False) -> Rows:
     """
     how = form.table
     fits = how.lines == "plain" and how.frame_end is None and how.frame_begin is None
-    if fits and (rows := _at_once(text, form, ends_empty)) is not None:
-        return rows
-    kept, source = Rows(np.empty((0, 0), np.float32), None), io.StringIO()
-    for number, cells in _good_lines(text, form, kept):
-        source.write("\t".join(cells) + "\n")
-        kept.numbers.append(number)
-    if not kept.numbers:
-        kinds = "; ".join(kept.odd.said())
-        raise unreadable(f"contains no line of numbers{': ' * bool(kinds)}{kinds}", text.path)
-    source.seek(0)
-    rows = _parsed(source, form, sep="\t", quoting=csv.QUOTE_NONE)
-    large = np.argwhere(np.isinf(rows.values))
-    if len(large):
-        row, column = large[0].tolist()
-        name = form.called(form.taxels[column])
-        raise unreadable(f"column {name} has a value that does not fit 32 bits", text.path, line=kept.numbers[row])
-    found = replace(kept, values=rows.values, beside=rows.beside)
-    total = len(found.values) + found.odd.total
-    if found.odd.total > max(FEW_ODD, ODD * total) or found.odd.total >= max(1, len(found.values)):
-        first, kinds = min(found.odd.first.values()), "; ".join(found.odd.said())
-        raise unreadable(f"{found.odd.total} of {total} lines are no frames: {kinds}", text.path, line=first)
-    return found
+    rows = _at_once(text, form, ends_empty) if fits else None
+    return _line_by_line(text, form) if rows is None else rows
 
 
 def _at_once(text: Text, form: Form, ends_empty: bool) -> Rows | None:
     """Return the rows of a table; None if a line may be odd."""
     import pandas as pd  # noqa: PLC0415  takes long
 
-    separator = form.table.separator
-    options = {"sep": r"\s+" if separator == " " else separator, "skiprows": form.first}
     for _ in range(2):
-        encoding = {"encoding": text.encoding} if text.is_file else {}
         try:
             with warnings.catch_warnings():
                 # A line with two cells more.
                 warnings.simplefilter("error", pd.errors.ParserWarning)
-                return _parsed(text.source, form, whole=True, ends_empty=ends_empty, **options, **encoding)
+                return _parsed(text, form, ends_empty)
         except UnicodeDecodeError:
             text.as_latin_1()
         except (ValueError, OverflowError, pd.errors.ParserWarning):  # of pandas' parser too
@@ -197,29 +182,25 @@ def _at_once(text: Text, form: Form, ends_empty: bool) -> Rows | None:
     return None
 
 
-class _OddError(ValueError):
-    """A line may be odd."""
-
-
-def _parsed(source: Any, form: Form, *, whole: bool = False, ends_empty: bool = False, **options: Any) -> Rows:
-    """Return what pandas reads; if the text is `whole`, a line may have another number of cells, which is refused."""
+def _parsed(text: Text, form: Form, ends_empty: bool) -> Rows | None:
+    """Return what pandas reads; None if a line may have another number of cells, or a cell that is no number."""
     import pandas as pd  # noqa: PLC0415  takes long
 
-    how, count, taxels = form.table, len(form.names), list(form.taxels)
-    times = list(form.columns.times)
-    beside = dict(zip(("time", "nanoseconds"), times, strict=False))
-    beside |= dict(zip(("taxel", "column"), form.columns.taxel, strict=False))
-    beside |= {name: k for name in ("label", "by") if (k := getattr(form.columns, name)) is not None}
+    how, count, taxels, times = form.table, len(form.names), list(form.taxels), list(form.columns.times)
+    beside = _beside(form)
     # Kinds of numbers that are stated, not found, take pandas half as long again.
     kinds: dict[int, Any] = {k: str for k in beside.values() if k not in times or how.time_unit == ISO}
-    missing = [*MISSING, *([] if how.missing is None else [how.missing])]
+    missing = list(form.missing)
     cells = dict.fromkeys(range(count + 1), missing)
-    if whole and not ends_empty:
+    if not ends_empty:
         # A cell that is not there is as an empty one to pandas, which then is no number.
         cells[count - 1] = [cell for cell in missing if cell]
     places: Any = slice(taxels[0], taxels[-1] + 1) if taxels[-1] - taxels[0] + 1 == len(taxels) else taxels
     chunks = pd.read_csv(
-        source,
+        text.source,
+        sep=r"\s+" if how.separator == " " else how.separator,
+        skiprows=form.first,
+        encoding=text.encoding if text.is_file else None,
         header=None,
         names=range(count + 1),
         index_col=False,
@@ -232,39 +213,52 @@ def _parsed(source: Any, form: Form, *, whole: bool = False, ends_empty: bool = 
         skip_blank_lines=how.frame_lines is None,
         chunksize=max(1, _CELLS // (count + 1)),
         low_memory=False,
-        **options,
     )
     values, others = list[NDArray[np.float32]](), list[Any]()
-    # A value that 32 bits do not hold is infinite, which is refused below.
+    # A value that 32 bits do not hold is infinite.
     with chunks, np.errstate(over="ignore"):
         for chunk in chunks:
             part = chunk.iloc[:, places]
-            is_odd = whole and bool(chunk[count].notna().any() or (chunk[count - 1] == "").any())
+            is_odd = bool(chunk[count].notna().any() or (chunk[count - 1] == "").any())
             if is_odd or any(kind.kind not in "iuf" for kind in part.dtypes):
-                raise _OddError
+                return None
             block = part.to_numpy(np.float32)
-            if whole and (np.isinf(block).any() or bool(chunk[times].isna().any(axis=None))):
-                raise _OddError
+            if np.isinf(block).any() or bool(chunk[times].isna().any(axis=None)):
+                return None
             values.append(block)
             others.append(chunk[list(beside.values())].set_axis(list(beside), axis=1))
     if not values:
-        raise _OddError
+        return None
     together = np.concatenate(values, out=np.empty((sum(map(len, values)), len(taxels)), np.float32))
     rows = Rows(together, pd.concat(others, ignore_index=True))
     of_times = rows.beside.iloc[:, : len(times)]
-    if whole and how.time_unit != ISO and any(kind.kind not in "iuf" for kind in of_times.dtypes):
-        raise _OddError
-    if "nanoseconds" in beside:
-        rows.beside["time"] = rows.beside["time"] * 10**9 + rows.beside.pop("nanoseconds")
-    if "column" in beside:
-        rows.beside["taxel"] += " " + rows.beside.pop("column")
-    return rows
+    if how.time_unit != ISO and any(kind.kind not in "iuf" for kind in of_times.dtypes):
+        return None
+    return rows.joined()
 
 
-def _good_lines(text: Text, form: Form, kept: Rows) -> Iterator[tuple[int, Sequence[str]]]:
-    """Yield the number and the cells of each line that is not odd; count the others, and note where frames begin."""
-    how = form.table
-    waiting, row, last, number = True, 0, 0, 0
+def _beside(form: Form) -> dict[str, int]:
+    """Return the columns that count beside the taxels, by what they are."""
+    columns = form.columns
+    found = dict(zip(("time", "nanoseconds"), columns.times, strict=False))
+    found |= dict(zip(("taxel", "column"), columns.taxel, strict=False))
+    return found | {name: k for name in ("label", "by") if (k := getattr(columns, name)) is not None}
+
+
+def _line_by_line(text: Text, form: Form) -> Rows:
+    """Return the rows of a table of which lines are odd, or have marks, or whose frames begin or end at a line.
+
+    Raises
+    ------
+    FormatError : more odd lines than may be left out, or no line of numbers
+    """
+    import pandas as pd  # noqa: PLC0415  takes long
+
+    how, taxels, beside = form.table, form.taxels, _beside(form)
+    are_texts = {name: not name.startswith(("time", "nano")) or how.time_unit == ISO for name in beside}
+    rows, values = Rows.none(len(taxels)), array("f")
+    cells: dict[str, list[Any]] = {name: [] for name in beside}
+    waiting, last, number = True, 0, 0
     for number, line in enumerate(text.lines(), 1):
         is_begin = how.frame_begin is not None and line.lstrip().startswith(how.frame_begin)
         if number <= form.first and not is_begin:
@@ -273,20 +267,33 @@ def _good_lines(text: Text, form: Form, kept: Rows) -> Iterator[tuple[int, Seque
             waiting = True
             if is_begin and how.frame_time is not None:
                 found = _NUMBER.findall(line)
-                kept.frame_times.append(float(found[-1].replace(",", ".")) if found else np.nan)
+                rows.frame_times.append(float(found[-1].replace(",", ".")) if found else np.nan)
             continue
-        cells, odd = form.cells(line)
+        read, odd = form.values(line)
         if waiting and how.has_lines:
-            kept.begins.append(row)
+            rows.begins.append(len(rows.numbers))
             waiting = False
         if odd:
-            kept.odd.add(odd, number)
+            rows.odd.add(odd, number)
             last = number
             continue
-        row += 1
-        yield number, cells
+        values.extend([read[k] for k in taxels] if len(taxels) < len(read) else read)
+        rows.numbers.append(number)
+        own = form.cells(line)[0] if any(are_texts.values()) else []
+        for name, k in beside.items():
+            cells[name].append(own[k] if are_texts[name] else read[k])
     if last and last == number and not text.ends_in_line:
-        kept.odd.rename_last("with too few cells", "cut off at the end", last)
+        rows.odd.rename_last("with too few cells", "cut off at the end", last)
+    kinds = "; ".join(rows.odd.said())
+    if not rows.numbers:
+        raise unreadable(f"contains no line of numbers{': ' * bool(kinds)}{kinds}", text.path)
+    total = len(rows.numbers) + rows.odd.total
+    if rows.odd.total > max(FEW_ODD, ODD * total) or rows.odd.total >= len(rows.numbers):
+        first = min(rows.odd.first.values())
+        raise unreadable(f"{rows.odd.total} of {total} lines are no frames: {kinds}", text.path, line=first)
+    rows.values = np.array(values, np.float32).reshape(-1, len(taxels))
+    rows.beside = pd.DataFrame(cells, index=range(len(rows.numbers)))
+    return rows.joined()
 
 
 def _frames_of_lines(path: Path, layout: Layout, form: Form, rows: Rows, said: list[str]) -> NDArray[np.float32]:
@@ -296,29 +303,27 @@ def _frames_of_lines(path: Path, layout: Layout, form: Form, rows: Rows, said: l
     if not how.has_lines:
         return rows.values.reshape(count, 1, width)
     if how.frame_lines is not None:
-        lines, begins = how.frame_lines, np.arange(0, count - how.frame_lines + 1, how.frame_lines)
+        lines, begins = how.frame_lines, np.arange(0, count, how.frame_lines)
         within = next((row for row in rows.begins if row % lines and row < count), None)
         odd = rows.odd.counts.total() - rows.odd.counts["of text"] - rows.odd.counts["cut off at the end"]
         if within is not None or odd:
             number = min(rows.odd.first.values()) if within is None else rows.numbers[within]
             raise unreadable(f"an empty or odd line is within a frame of {lines} lines", path, line=number)
-        if count < lines:
-            raise unreadable(f"contains {counted(count, 'line')}; a frame has {lines}", path)
-        if count % lines:
-            said.append(f"{counted(count % lines, 'line')} at the end left out: not a whole frame")
+        sizes = np.diff([*begins, count])
     else:
-        sizes = np.diff([*rows.begins, count])
+        begins = np.array(rows.begins)
+        sizes = np.diff([*begins, count])
         usual = Counter(sizes[sizes > 0].tolist()).most_common(1)[0][0]
         lines = max(1, layout.rows * layout.columns // width) if layout.rows and layout.columns else usual
-        fits = sizes == lines
-        wrong = int(np.count_nonzero(~fits[:-1] & (sizes[:-1] > 0)))
-        if wrong > max(FEW_ODD, ODD * len(sizes)) or not fits.any():
-            bad = int(np.flatnonzero(~fits)[0])
-            at = rows.numbers[min(rows.begins[bad], count - 1)]
-            raise unreadable(f"the frame has {counted(int(sizes[bad]), 'line')}; must have {lines}", path, line=at)
-        if not fits.all():
-            said.append(f"{counted(int((~fits).sum()), 'frame')} left out: not {counted(lines, 'line')}")
-        begins = np.array(rows.begins)[fits]
+    fits = sizes == lines
+    wrong = int(np.count_nonzero(~fits[:-1] & (sizes[:-1] > 0)))
+    if wrong > max(FEW_ODD, ODD * len(sizes)) or not fits.any():
+        bad = int(np.flatnonzero(~fits)[0])
+        at = rows.line(min(int(begins[bad]), count - 1), path, form.first)
+        raise unreadable(f"the frame has {counted(int(sizes[bad]), 'line')}; must have {lines}", path, line=at)
+    if not fits.all():
+        said.append(f"{counted(int((~fits).sum()), 'frame')} left out: not {counted(lines, 'line')}")
+    begins = begins[fits]
     if how.frame_time is not None:
         import pandas as pd  # noqa: PLC0415  takes long
 

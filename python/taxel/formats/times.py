@@ -139,7 +139,7 @@ def us_of(column: Any, unit: str) -> NDArray[Any]:
     values = column.to_numpy()
     if values.dtype.kind in "iu" and unit in ("us", "ns"):
         exact: NDArray[np.int64] = values.astype(np.int64)
-        return exact if unit == "us" else exact // 1000
+        return exact if unit == "us" else (exact + 500) // 1000
     times = pd.to_numeric(column, errors="coerce").to_numpy(np.float64) * UNITS_US[unit]
     sound = np.abs(times) <= TIME_US
     return np.rint(times).astype(np.int64) if sound.all() else np.where(sound, np.rint(times), np.nan)
