@@ -260,23 +260,6 @@ def test_frames_of_unknown_unit_are_above_the_rest_of_a_quiet_stretch_as_info_ha
         assert force == pytest.approx(np.where(over.values >= floor, over.values, 0).sum(axis=(1, 2)).max(), rel=0.02)
 
 
-@pytest.mark.parametrize("unit", ["raw", "kPa"])
-def test_a_taxel_that_flickers_is_in_no_sum_and_not_the_first_touch(tmp_path, unit):
-    rng, t = np.random.default_rng(12), np.arange(600) * 20_000
-    values = rng.integers(0, 3, (600, 8, 8)).astype(float)
-    values[200:240, 2:5, 2:5] += 60
-    values[7::30, 6, 5] = 4000
-    taxel.convert(Frames(values, t, unit=unit, array=Array(8, 8)), tmp_path / "mat.npz")
-    with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:
-        about = opened(page, "mat.npz")
-        assert about["frames"]["flickering"] == [[5, 6]]
-        assert 4_000_000 <= about["touch_us"] < 4_800_000
-        assert max_and_column(page, about)[0] < 700
-        flickers, _ = values_at(page, about, int(t[7]))
-        assert flickers[6, 5] == 4000, "its value is shown as it is"
-        assert above_rest_of(page, about, int(t[7]))[6 * 8 + 5] == 0
-
-
 def max_and_column(page, about):
     """Return the greatest sum of the overview, in the unit of the file, and its column."""
     page.send(type="overview")

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 import taxel
 from taxel import _core
 from taxel._core import ProblemError
-from taxel.recording.analysis.rest import flickering, ticks_by_unit
 from taxel.simulate import Board
 
 NOTHING = {"dead": [], "stuck": [], "noisy": []}
@@ -205,31 +204,6 @@ def test_frames_tell_too() -> None:
     values[:, 2, 3] = 99
     found = taxel.health(taxel.Frames(values, np.arange(80) * 50_000))
     assert found.named() == {"dead": [(4, 7)], "stuck": [(3, 2)], "noisy": []}
-
-
-def test_a_taxel_that_flickers_is_noisy_and_leaves_the_range_of_others_alone() -> None:
-    random = np.random.default_rng(5)
-    values = random.normal(300, 2, (1200, 12, 16)).astype(np.float32)
-    y, x = np.mgrid[:12, :16]
-    for k in range(12):
-        values[100 * k + 40 : 100 * k + 70] += 120 * np.exp(-((y - 6) ** 2 + (x - 8) ** 2) / 18)
-    values[:, 7, 7] = 320
-    quiet = taxel.Frames(values.copy(), np.arange(1200) * 50_000)
-    values[random.random(1200) < 0.02, 3, 12] = 4095
-    one = taxel.Frames(values, quiet.t)
-    assert taxel.health(one).named() == {"dead": [], "stuck": [(7, 7)], "noisy": [(12, 3)]}
-    # The range of the values is that of all others, so that the same taxels count as loaded.
-    assert ticks_by_unit(one) == pytest.approx(ticks_by_unit(quiet), rel=1e-3)
-    # Short touches of the same height are none: neighbours move with them.
-    touched = values.copy()
-    touched[:, 3, 12] = 300
-    touched[np.arange(5, 1200, 60), 2:5, 11:14] = 4095
-    assert not flickering(taxel.Frames(touched, one.t)).any()
-    # Nor are channels, few frames, or a taxel that misses values.
-    assert not flickering(taxel.Frames(values.reshape(1200, 1, -1), one.t)).any()
-    assert not flickering(one.between(0, 4_000_000)).any()
-    values[3, 3, 12] = np.nan
-    assert not flickering(taxel.Frames(values, one.t)).any()
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -27,7 +27,7 @@ from taxel.labels import Labels, beside, by_clock
 from taxel.options import FullReading
 from taxel.recording import Recording
 from taxel.recording.analysis.health import health, judge
-from taxel.recording.analysis.rest import flickering, loaded_from, of_frames, ticks_by_unit
+from taxel.recording.analysis.rest import loaded_from, of_frames, ticks_by_unit
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
 from taxel.recording.kinds import is_recording
@@ -62,7 +62,7 @@ class ReadRest:
     falls : bool
         Whether values fall under load.
     flickering : list of int
-        Indices of taxels.
+        Indices of taxels that count as 0; none.
     preload_at : str
         What lay on the sensor, in words.
     """
@@ -428,9 +428,8 @@ def _in_its_unit(recording: Recording) -> Frames:
 
 def _rest(frames: Frames) -> ReadRest:
     rest = of_frames(frames)
-    source, flickers = {"unit": "given"}.get(rest.source, rest.source), np.flatnonzero(flickering(frames)).tolist()
-    loaded = loaded_from(frames, rest)
-    return ReadRest(source, rest.values, ticks_by_unit(frames), loaded, rest.falls, flickers, rest.preload_at)
+    source, loaded = {"unit": "given"}.get(rest.source, rest.source), loaded_from(frames, rest)
+    return ReadRest(source, rest.values, ticks_by_unit(frames), loaded, rest.falls, [], rest.preload_at)
 
 
 def _times(t: NDArray[np.int64], us: int) -> NDArray[np.int64]:

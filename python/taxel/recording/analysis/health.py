@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +19,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded
 from taxel.recorded import recorded as held_by
-from taxel.recording.analysis.rest import FORCE_UNITS, NOISE_FLOOR, extremes, flickering, ticks_by_unit
+from taxel.recording.analysis.rest import FORCE_UNITS, NOISE_FLOOR, extremes, ticks_by_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,9 +112,8 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     values. Dead: three touches or more and no change in any of them, with 5 neighbours or more, and no value above the
     least of the array, of frames by more than 3 ticks, is known. Stuck: the same, at another value. Noisy: in 10 bins
     of 50 ms or more, half of all in which it changes, it has 3 changes or more, and more than 8 times those of all but
-    one of the 24 taxels around it; and at most 45 % of its changes go on in the direction of the one before. Of frames,
-    too, one that jumps for less than two frames at a time, 10 times or more, more than half as far from its median as
-    ever, while all but one of its neighbours move less than an eighth as much.
+    one of the 24 taxels around it; and at most 45 % of its changes go on in the direction of the one before. Frames of
+    less than 60 Hz show no noise.
 
     Examples
     --------
@@ -143,11 +142,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
             ticks = Frames(frozen(np.multiply(values, scale, out=values)), table.t, array=table.array)
         above = np.multiply(most - least, scale) > NOISE_FLOOR
     touches = _core.touches_of_frames(ticks._parts(), 0.0 if table.unit in FORCE_UNITS else np.nan)
-    found = judge(table.array, activity, moved, touches, above)
-    # What jumps alone for single frames is left out of pressures too, and so is named.
-    noisy = found.noisy | flickering(table)
-    masks = {name: getattr(found, name) & ~noisy for name in ("dead", "stuck", "untested")}
-    return replace(found, noisy=noisy, **masks)
+    return judge(table.array, activity, moved, touches, above)
 
 
 def _of_events(events: Events) -> Health:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.columns import frozen_whole
 from taxel._core import ProblemError
 from taxel.calibration._curves import N_PER_KPA_MM2
 from taxel.encode import ContactArea
@@ -18,7 +17,6 @@ from taxel.recording.analysis.rest import (
     FrameBlock,
     Rest,
     find_rest,
-    flickering,
     frames_above,
     loaded_from,
     of_frames,
@@ -101,21 +99,9 @@ def force_n(frames: Frames) -> NDArray[np.float64] | None:
 
 
 def series(recording: Recording, tare: Tare | None = None) -> Series | None:
-    """Return area, peak, sum and centre of a recording's frames above rest (`above_rest`); None without intensities.
-
-    Taxels of frames that flicker (`flickering`) count as 0.
-    """
+    """Return area, peak, sum and centre of a recording's frames above rest (`above_rest`); None without intensities."""
     result = above_rest(recording, tare)
-    if result is None:
-        return None
-    frames, above, rest = result
-    if not recording.has_events and recording.calibration is None:
-        # As on the page, a taxel that jumps alone for single frames is no load.
-        flickers = flickering(recording.frames())
-        if flickers.any():
-            values = frozen_whole(np.where(flickers, np.float32(0), frames.values))
-            frames = Frames(values, frames.t, unit=frames.unit, array=frames.array)
-    return Series.from_frames(frames, above, rest)
+    return None if result is None else Series.from_frames(*result)
 
 
 def _held(recording: Recording) -> _core.HeldValues:

@@ -42,10 +42,6 @@ LOADED_SHARE, LOADED_TICKS = 0.1, _core.LOADED_TICKS
 _FALLS, _THIRD = 3.0, 3
 #: ... a smaller array the first counts.
 _SMALL = 9
-#: Reading: a taxel of frames flickers if it is more than half as far from its median as it ever is so many times or
-#: more, for less than two frames at a time, while all but one of its neighbours move less than this share of it.
-#: At most one in so many taxels is taken for one.
-_FLICKERS, _ALONE, _FEW = 10, 1 / 8, 16
 #: So many frames or fewer give a taxel's median, and what it reads in all but this share of them.
 _MEDIAN_OF, _LOWEST = 2000, 0.05
 
@@ -183,46 +179,14 @@ def rest_scale(frames: Frames) -> float:
 
 @_once
 def ticks_by_unit(frames: Frames) -> float:
-    """Return the ticks by the unit of frames: the range of their values counts as that of a board's ramp.
-
-    The values of taxels that flicker (`flickering`) are left out.
-    """
+    """Return the ticks by the unit of frames: the range of their values counts as that of a board's ramp."""
     if frames.unit == "ticks":
         return 1.0
-    least, most = (np.where(flickering(frames), np.nan, each) for each in extremes(frames))
+    least, most = extremes(frames)
     span = float(np.fmax.reduce(most, axis=None, initial=np.nan)) - float(
         np.fmin.reduce(least, axis=None, initial=np.nan)
     )
     return RANGE_TICKS / span if span > 0 else 1.0
-
-
-@_once
-def flickering(frames: Frames) -> NDArray[np.bool_]:
-    """Return which taxels of frames jump again and again for one frame, alone, shape (rows, columns)."""
-    values, found = frames.values, np.zeros(frames.array.shape, bool)
-    if min(found.shape) == 1 or found.size < _SMALL:
-        return found
-    least, most = extremes(frames)
-    spans = np.nan_to_num(most.astype(np.float64) - least)
-    for _ in range(found.size // _FEW):
-        y, x = np.unravel_index(np.argmax(spans), found.shape)
-        series = values[:, y, x]
-        if not spans[y, x] or not np.isfinite(series).all():
-            return found
-        apart = np.abs(series - np.median(series))
-        far = apart > apart.max() / 2
-        times = np.count_nonzero(far[1:] & ~far[:-1])
-        if times < _FLICKERS or np.count_nonzero(far) >= 2 * times:
-            return found
-        rows, columns = (slice(max(0, at - 1), at + 2) for at in (y, x))
-        around = values[:, rows, columns].reshape(len(values), -1)
-        around = around[:, np.isfinite(around).all(axis=0)]
-        moves = np.sort(np.median(np.abs(around[far] - np.median(around, axis=0)), axis=0))
-        # The last is the taxel's own.
-        if len(moves) < _THIRD or moves[-_THIRD] >= _ALONE * moves[-1]:
-            return found
-        found[y, x], spans[y, x] = True, 0
-    return found
 
 
 @_once
