@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from taxel.frames import Frames
 from taxel_studies import indented
 from taxel_studies.fem import Course, SamplingGrid, Yeoh, bodies
 from taxel_studies.fem.solids import Solids
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, subplots
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, subplots
 
 WHERE = "thesis 5.4.1 and 5.4.2, figures 5.1 to 5.4, tables 5.1 and 5.2"
 PROTOCOL = (
@@ -26,7 +27,6 @@ PROTOCOL = (
     "Pressure is the normal traction at the base. What the thesis leaves open stands on the page Readings. Courses are "
     "kept beside the report and shared by figures 5.5 to 5.8."
 )
-KEEPS = True
 
 PARAMETERS: dict[str, Any] = {
     **indented.TABLE,
@@ -47,17 +47,23 @@ PICTURE_MS, PICTURE_MM, GRIDS = 0.4, 0.1, 3
 COLOURS = ("C3", "C1", "C9")
 
 
-tasks = indented.tasks
+shared = indented.shared
+
+
+def tasks(p: Parameters) -> list[Task]:
+    """List one realisation a course."""
+    return [Task({"course": one}) for _, one in shared(p)]
 
 
 def realise(params: dict[str, Any], _seed: int, kept: Kept) -> dict[str, Any]:
     """Press once, and return how well the forces balance."""
-    course = indented.make(params, kept)
-    assert course is not None  # every realisation of this study makes a course
+    course = indented.pressed(params["course"], kept)
     most = max(float(np.abs(course.reaction).max()), 1e-300)
     mirrored = course.pressure_kpa - course.pressure_kpa[:, ::-1]
     return {
-        **indented.course_summary(course),
+        "reached_mm": float(course.path_mm[-1]),
+        "fault": course.fault,
+        "most_kpa": round(SamplingGrid().most_kpa(course), 4),
         "force": [round(f, 4) for f in course.reaction[-1]],
         "unbalanced": float(np.abs(course.reaction - course.base).max()) / most,
         "asymmetry": round(float(np.abs(mirrored[-1]).max() / course.pressure_kpa[-1].max()), 9),
@@ -68,7 +74,7 @@ def realise(params: dict[str, Any], _seed: int, kept: Kept) -> dict[str, Any]:
 
 def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     """List the courses, and what the pictures show of one of them."""
-    paths = [{**row.params["course"], **row.result} for row in rows]
+    paths = [{**asdict(row.params["course"]), **row.result} for row in rows]
     wanted = p["drawn"]
     asked = indented.courses_of(p)
     shown = asked[wanted["diameter_mm"], wanted["modulus_kpa"], wanted["angle_deg"]]

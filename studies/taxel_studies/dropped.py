@@ -17,7 +17,7 @@ from taxel.frames import Frames
 from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US, Registers
-from taxel_studies.study import Kept, Task
+from taxel_studies.study import Kept
 
 __all__ = [
     "ANSWERED",
@@ -35,13 +35,12 @@ __all__ = [
     "conditions",
     "distances_of",
     "frames_of",
-    "named",
     "named_by_neighbours",
     "played",
     "sampled",
+    "shared",
     "smoothed",
     "spatial_grams",
-    "tasks",
 ]
 
 #: The experiment of 5.6.2: two spheres, three heights, three slants, 100 trials each; how trials differ is a guess.
@@ -56,6 +55,8 @@ TABLE: dict[str, Any] = {
     "place_sd_mm": 5.0,
     "board": 56,
 }
+#: Those parameters, beside the condition and a seed, that the drops depend on.
+_DRAWN = ("drops", "mass_g", "mass_by_g", "height_sd_mm", "place_sd_mm", "board")
 #: The experiment of 5.6.2 at a size that takes seconds.
 TOY: dict[str, Any] = {"heights_mm": [100.0, 200.0], "slants_deg": [0.0], "drops": 8}
 #: The experiment of 4.4.2: a tennis ball from two heights at two slants, 100 trials each; how trials differ is a guess.
@@ -139,33 +140,24 @@ class Drops(NamedTuple):
     """Time from the first of these events to the last, by drop."""
 
 
-def named(p: Mapping[str, Any]) -> dict[str, Any]:
-    """Return those of a study's parameters that the drops depend on."""
-    return {name: p[name] for name in TABLE}
-
-
 def conditions(p: Mapping[str, Any]) -> list[Condition]:
     """Return all combinations."""
     return [Condition(*one) for one in product(p["balls_mm"], p["heights_mm"], p["slants_deg"])]
 
 
-def tasks(p: Mapping[str, Any]) -> list[Task]:
-    """List one realisation a condition: all its drops."""
-    return [Task({**named(p), "condition": list(one)}, p["seed"]) for one in conditions(p)]
+def shared(p: Mapping[str, Any], rig: Rig = IMPACTS) -> list[tuple[Any, ...]]:
+    """List the calls that drop each condition's balls, which studies share."""
+    return [_call(p, one, rig) for one in conditions(p)]
 
 
-def played_summary(params: Mapping[str, Any], seed: int, kept: Kept, rig: Rig = IMPACTS) -> dict[str, Any] | None:
-    """Return the events and contact times of the drops of a realisation of `tasks`; None for another one."""
-    if "condition" not in params:
-        return None
-    drops = played(params, Condition(*params["condition"]), seed, kept, rig)
-    return {"events": drops.events.tolist(), "lasted_ms": to_ms(drops.lasted_us).round(3).tolist()}
-
-
-def played(p: Mapping[str, Any], condition: Condition, seed: int, kept: Kept, rig: Rig = IMPACTS) -> Drops:
-    """Return a condition's drops computed once for all studies of a report."""
-    drops: Drops = kept.made(_drop, named(p), condition, seed, rig)
+def played(p: Mapping[str, Any], condition: Condition, kept: Kept, rig: Rig = IMPACTS) -> Drops:
+    """Return a condition's drops, computed once for all studies of a report."""
+    drops: Drops = kept.made(*_call(p, condition, rig))
     return drops
+
+
+def _call(p: Mapping[str, Any], condition: Condition, rig: Rig) -> tuple[Any, ...]:
+    return _drop, {name: p[name] for name in _DRAWN}, condition, p["seed"], rig
 
 
 def _drop(p: Mapping[str, Any], condition: Condition, seed: int, rig: Rig) -> Drops:

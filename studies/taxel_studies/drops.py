@@ -12,7 +12,7 @@ from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 from taxel_studies import dropped
 from taxel_studies.dropped import FRAMES, REGION, Condition
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, subplots
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, subplots
 
 WHERE = "thesis 5.6.2 and 5.7, figures 5.10 and 5.14"
 PROTOCOL = (
@@ -25,7 +25,6 @@ PROTOCOL = (
     "tilted by 0, 15 or 30 degrees, always the same way: the ball meets it by v cos(slant), keeps the rest of its "
     "speed, and friction (0.6 of the force, a guess) makes it roll. The foam is a layer bonded to the board."
 )
-KEEPS = True
 
 PARAMETERS: dict[str, Any] = {**dropped.TABLE, "drawn": [50.0, 100.0, 0.0], "seed": 1}
 SIZES = {"toy": {**dropped.TOY, "drawn": [50.0, 100.0, 0.0]}}
@@ -37,17 +36,23 @@ PRINTED_KBIT_S, PRINTED_LESS = 659.0, 20.0
 PICTURES_MS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 
 
-tasks = dropped.tasks
+shared = dropped.shared
 
 
-def realise(params: dict[str, Any], seed: int, kept: Kept) -> dict[str, Any] | None:
+def tasks(p: Parameters) -> list[Task]:
+    """List one realisation a condition."""
+    return [Task({**p, "condition": list(one)}) for one in dropped.conditions(p)]
+
+
+def realise(params: dict[str, Any], _seed: int, kept: Kept) -> dict[str, Any]:
     """Drop a ball so many times, and count."""
-    return dropped.played_summary(params, seed, kept)
+    drops = dropped.played(params, Condition(*params["condition"]), kept)
+    return {"events": drops.events.tolist(), "lasted_ms": to_ms(drops.lasted_us).round(3).tolist()}
 
 
 def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     """Return each drop's data rate, and the events of one."""
-    shown = dropped.played(p, Condition(*p["drawn"]), p["seed"], kept)
+    shown = dropped.played(p, Condition(*p["drawn"]), kept)
     spikes = dropped.sampled(shown.ticks[:1], to_ms(FRAME_US), np.zeros(1))[0]
     sample, sign, taxel = np.nonzero(spikes)
     events = [n for row in rows for n in row.result["events"]]

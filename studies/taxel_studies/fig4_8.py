@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from taxel.information import confusion_matrix, nested_predictions, panzeri_treves
 from taxel_studies import dropped
 from taxel_studies.dropped import TENNIS, Condition
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, logarithmic, subplots
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, grid, logarithmic, results, subplots
 
 WHERE = "thesis 4.4.2, figures 4.8 and 4.10"
 PROTOCOL = (
@@ -25,7 +26,6 @@ PROTOCOL = (
     "discriminants of the frames, 10 folds, the ridge chosen inside them; bits of the answers (4.1), corrected "
     "by Panzeri and Treves."
 )
-KEEPS = True
 
 PARAMETERS: dict[str, Any] = {
     **dropped.TENNIS_TABLE,
@@ -47,26 +47,19 @@ AROUND = 3.0
 PHASES = 410
 
 
-tasks = dropped.tasks
+shared = partial(dropped.shared, rig=TENNIS)
 
 
-def then(p: Parameters, _rows: Sequence[Row]) -> list[Task]:
-    """List one realisation a period: sampled from the impact on, and from any phase on."""
-    return [
-        Task({**dropped.named(p), "period_ms": period, "aligned": aligned}, p["seed"])
-        for period in sorted(p["periods_ms"])
-        for aligned in (True, False)
-    ]
+def tasks(p: Parameters) -> list[Task]:
+    """List one realisation a period, sampled from the impact on, and from any phase on."""
+    return grid({**p, "aligned": [True, False]}, period_ms="periods_ms", aligned="aligned")
 
 
-def realise(params: dict[str, Any], seed: int, kept: Kept) -> dict[str, Any]:
-    """Drop the ball as often as asked; or return the bits of discriminants on all drops at a period."""
-    drops = dropped.played_summary(params, seed, kept, TENNIS)
-    if drops is not None:
-        return drops
-    x, y = sampled_drops(params, seed, kept, params["period_ms"], TENNIS.length_ms, aligned=params["aligned"])
+def realise(params: dict[str, Any], _seed: int, kept: Kept) -> dict[str, Any]:
+    """Return the bits of discriminants on all drops at a period."""
+    x, y = sampled_drops(params, kept, params["period_ms"], TENNIS.length_ms, aligned=params["aligned"])
     x -= x.mean(0)
-    named = nested_predictions([x @ x.T], [int(x.any(0).sum())], y, count=10, seed=seed)
+    named = nested_predictions([x @ x.T], [int(x.any(0).sum())], y, count=10, seed=params["seed"])
     return {
         "bits": round(float(panzeri_treves(confusion_matrix(y, named.responses)[0])), 4),
         "right": round(float(np.mean(named.responses == y)), 4),
@@ -74,13 +67,13 @@ def realise(params: dict[str, Any], seed: int, kept: Kept) -> dict[str, Any]:
 
 
 def sampled_drops(
-    p: Parameters, seed: int, kept: Kept, period_ms: float, length_ms: float, *, aligned: bool = True
+    p: Parameters, kept: Kept, period_ms: float, length_ms: float, *, aligned: bool = True
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return the frames of all drops at a period, one drop a row, and the number of each drop's condition."""
-    rng = np.random.default_rng([seed, PHASES])
+    rng = np.random.default_rng([p["seed"], PHASES])
     parts = []
     for condition in dropped.conditions(p):
-        ticks = dropped.played(p, condition, seed, kept, TENNIS).ticks
+        ticks = dropped.played(p, condition, kept, TENNIS).ticks
         late = np.zeros(len(ticks)) if aligned else rng.uniform(0, period_ms, len(ticks))
         shown = dropped.frames_of(ticks, period_ms, late, TENNIS, length_ms)
         parts.append(shown.reshape(len(ticks), -1))
@@ -89,8 +82,7 @@ def sampled_drops(
 
 def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     """List the bits by period, and one drop's frames."""
-    asked = {(row.params["period_ms"], row.params["aligned"]): row for row in rows if "period_ms" in row.params}
-    one = dropped.played(p, Condition(*p["drawn"]), p["seed"], kept, TENNIS).ticks[:1]
+    one = dropped.played(p, Condition(*p["drawn"]), kept, TENNIS).ticks[:1]
     frame_ms = TENNIS.frame_us / 1000
     whole = dropped.frames_of(one, frame_ms, np.zeros(1), TENNIS, TENNIS.length_ms)[0]
     shown = dropped.frames_of(one, FRAME_MS, np.zeros(1), TENNIS, (FRAMES + 1) * FRAME_MS)[0]
@@ -101,8 +93,8 @@ def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
         "lines": [
             {
                 "period_ms": period,
-                **asked[period, True].result,
-                "any_phase_bits": asked[period, False].result["bits"],
+                **results(rows, period_ms=period, aligned=True)[0],
+                "any_phase_bits": results(rows, period_ms=period, aligned=False)[0]["bits"],
             }
             for period in sorted(p["periods_ms"])
         ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import dropped, fig4_8
 from taxel_studies.dropped import TENNIS
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, grid
 
 WHERE = "thesis 4.4.2, figure 4.9"
 PROTOCOL = (
@@ -19,7 +20,6 @@ PROTOCOL = (
     "t-SNE of scikit-learn on all frames of a drop, begun at its principal components; beside each map, how many "
     "of a drop's 10 nearest neighbours in it are of its own class; and the same of drops sampled from any phase on."
 )
-KEEPS = True
 NEEDS = ("sklearn",)
 
 PARAMETERS: dict[str, Any] = {
@@ -38,28 +38,18 @@ CLEAR_HZ = 500.0
 NEIGHBOURS, CLEAR = 10, 0.95
 
 
-tasks = dropped.tasks
+shared = partial(dropped.shared, rig=TENNIS)
+tasks = partial(grid, rate_hz="rates_hz")
 
 
-def then(p: Parameters, _rows: Sequence[Row]) -> list[Task]:
-    """List one map a rate."""
-    return [
-        Task({**dropped.named(p), "rate_hz": rate, "perplexity": p["perplexity"]}, p["seed"])
-        for rate in sorted(p["rates_hz"])
-    ]
-
-
-def realise(params: dict[str, Any], seed: int, kept: Kept) -> dict[str, Any]:
-    """Drop the ball as often as asked; or map all drops at a rate onto a plane, and classify each by its neighbours."""
-    drops = dropped.played_summary(params, seed, kept, TENNIS)
-    if drops is not None:
-        return drops
+def realise(params: dict[str, Any], _seed: int, kept: Kept) -> dict[str, Any]:
+    """Map all drops at a rate onto a plane, and classify each by its neighbours."""
     from sklearn.manifold import TSNE  # noqa: PLC0415  an extra
 
     result: dict[str, Any] = {}
     for how, aligned in (("", True), ("any_phase_", False)):
-        x, y = fig4_8.sampled_drops(params, seed, kept, 1000 / params["rate_hz"], LENGTH_MS, aligned=aligned)
-        laid = TSNE(perplexity=params["perplexity"], init="pca", random_state=seed).fit_transform(x)
+        x, y = fig4_8.sampled_drops(params, kept, 1000 / params["rate_hz"], LENGTH_MS, aligned=aligned)
+        laid = TSNE(perplexity=params["perplexity"], init="pca", random_state=params["seed"]).fit_transform(x)
         result[f"{how}own"] = round(own_neighbours(np.asarray(laid, np.float64), y), 4)
         if aligned:
             result["map"] = [[round(float(a), 1), round(float(b), 1)] for a, b in laid]
@@ -75,10 +65,9 @@ def own_neighbours(places: NDArray[np.float64], y: NDArray[np.int64]) -> float:
     return float(np.mean(y[near] == y[:, None]))
 
 
-def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """List the maps by rate."""
-    del kept
-    maps = {row.params["rate_hz"]: row.result for row in rows if "rate_hz" in row.params}
+    maps = {row.params["rate_hz"]: row.result for row in rows}
     names = [f"{c.height_mm / 10:g} cm, {c.slant_deg:g} degrees" for c in dropped.conditions(p)]
     return {"lines": [{"rate_hz": rate, **maps[rate]} for rate in sorted(maps)], "classes": names}
 

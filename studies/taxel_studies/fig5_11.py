@@ -15,7 +15,7 @@ from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 from taxel_studies import dropped, kept_bits
 from taxel_studies.dropped import LENGTH_MS, REGION, distances_of
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Table, Task
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Table, Task, grid
 
 WHERE = "thesis 5.6.3 and 5.6.4, figures 5.11 to 5.13"
 PROTOCOL = (
@@ -27,7 +27,6 @@ PROTOCOL = (
     "Panzeri and Treves. Tau and sigma are searched at each period on the same drops, as in the thesis. Beside "
     "it: sampling begun at any phase, and the absolute differences of 5.10 as printed, at the best tau and sigma."
 )
-KEEPS = True
 
 PARAMETERS: dict[str, Any] = {
     **dropped.TABLE,
@@ -68,65 +67,43 @@ MARKED_MS = 5.0
 ALIKE = 0.02
 
 
-tasks = dropped.tasks
+shared = dropped.shared
 
 
-def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
-    """List the search, one realisation a period and tau; then details at each period's best."""
-    shared = {**dropped.named(p), "neighbours": p["neighbours"]}
-    listed: dict[float, dict[tuple[float, float], float]] = {}
-    for row in rows:
-        if row.params.get("ask") == "search":
-            for sigma, bits in zip(row.params["sigmas_mm"], row.result, strict=True):
-                listed.setdefault(row.params["period_ms"], {})[row.params["tau_ms"], sigma] = bits
-    periods = sorted(p["periods_ms"])
-    first = [
-        Task({**shared, "ask": "search", "period_ms": t, "tau_ms": tau, "sigmas_mm": p["sigmas_mm"]}, p["seed"])
-        for t in periods
-        for tau in p["taus_ms"]
-    ]
-    if any(len(listed.get(t, {})) < len(p["taus_ms"]) * len(p["sigmas_mm"]) for t in periods):
-        return first
-    last = []
-    for t in periods:
-        tau, sigma = max(listed[t], key=lambda at: listed[t][at])
-        at = {**shared, "period_ms": t, "tau_ms": tau, "sigma_mm": sigma}
-        last.append(Task({**at, "ask": "detail", "times_ms": p["times_ms"]}, p["seed"]))
-        last.append(Task({**at, "ask": "any phase"}, p["seed"]))
-        if t in p["absolute_ms"]:
-            last.append(Task({**at, "ask": "absolute"}, p["seed"]))
-    return first + last
+def tasks(p: Parameters) -> list[Task]:
+    """List the search, one realisation a period and tau; then one a period, which looks at the best of them closely."""
+    return grid(p, period_ms="periods_ms", tau_ms="taus_ms") + grid(p, period_ms="periods_ms")
 
 
-def realise(params: dict[str, Any], seed: int, kept: Kept) -> Any:
-    """Drop a ball as often as asked; or compare all drops at a period, and return the bits of neighbours' answers."""
-    drops = dropped.played_summary(params, seed, kept)
-    if drops is not None:
-        return drops
-    spikes, y = _spikes(params, seed, kept, aligned=params["ask"] != "any phase")
-    period, tau, pitch = params["period_ms"], params["tau_ms"], Array.thesis().column_mm
-    if params["ask"] == "search":
-        kernels = [dropped.smoothed(REGION, pitch, sigma) for sigma in params["sigmas_mm"]]
-        grams = dropped.spatial_grams(spikes, period, tau, kernels, [spikes.shape[1]])
+def realise(params: dict[str, Any], _seed: int, kept: Kept) -> Any:
+    """Compare all drops at a period: return the bits of neighbours' answers by sigma; without a tau, of the best."""
+    period, sigmas, pitch = params["period_ms"], params["sigmas_mm"], Array.thesis().column_mm
+    spikes, y = _spikes(params, kept, aligned=True)
+    whole = spikes.shape[1]
+    if "tau_ms" in params:
+        kernels = [dropped.smoothed(REGION, pitch, sigma) for sigma in sigmas]
+        grams = dropped.spatial_grams(spikes, period, params["tau_ms"], kernels, [whole])
         return [_bits(distances_of(gram[0]), y, params)["bits"] for gram in grams]
-    kernel = dropped.smoothed(REGION, pitch, params["sigma_mm"])
-    if params["ask"] == "absolute":
-        return _bits(absolute_distances(spikes, period, tau, kernel), y, params)
-    if params["ask"] == "any phase":
-        gram = dropped.spatial_grams(spikes, period, tau, [kernel], [spikes.shape[1]])[0][0]
-        return _bits(distances_of(gram), y, params)
-    ends = [_samples_before(t, period, spikes.shape[1]) for t in params["times_ms"]]
-    by_end = dict(
-        zip(
-            sorted({*ends, spikes.shape[1]}),
-            dropped.spatial_grams(spikes, period, tau, [kernel], sorted({*ends, spikes.shape[1]}))[0],
-            strict=True,
-        )
-    )
-    whole = _bits(distances_of(by_end[spikes.shape[1]]), y, params, by=True)
+    search = {task.params["tau_ms"]: task for task in grid(params, tau_ms="taus_ms")}
+    searched = {tau: kept.row(realise, {"kept": kept}, task).result for tau, task in search.items()}
+    bits = {(tau, sigma): b for tau, by_sigma in searched.items() for sigma, b in zip(sigmas, by_sigma, strict=True)}
+    tau, sigma = max(bits, key=lambda at: bits[at])
+    kernel = dropped.smoothed(REGION, pitch, sigma)
+    late = _spikes(params, kept, aligned=False)[0]
+    any_phase = dropped.spatial_grams(late, period, tau, [kernel], [whole])[0][0]
+    absolute = absolute_distances(spikes, period, tau, kernel) if period in params["absolute_ms"] else None
+    ends = [_samples_before(t, period, whole) for t in params["times_ms"]]
+    every = sorted({*ends, whole})
+    by_end = dict(zip(every, dropped.spatial_grams(spikes, period, tau, [kernel], every)[0], strict=True))
     times = {end: _bits(distances_of(gram), y, params)["bits"] for end, gram in by_end.items()}
     return {
-        **whole,
+        "period_ms": period,
+        "tau_ms": tau,
+        "sigma_mm": sigma,
+        "searched": sorted([tau, by_sigma] for tau, by_sigma in searched.items()),
+        "any_phase_bits": _bits(distances_of(any_phase), y, params)["bits"],
+        "absolute_bits": None if absolute is None else _bits(absolute, y, params)["bits"],
+        **_bits(distances_of(by_end[whole]), y, params, by=True),
         "events": round(float(spikes.sum()) / len(spikes), 1),
         "times": [[t, times[end]] for t, end in zip(params["times_ms"], ends, strict=True)],
     }
@@ -156,14 +133,12 @@ def _samples_before(time_ms: float, period_ms: float, most: int) -> int:
     return min(max(1, int(np.ceil(time_ms / period_ms - 1e-9))), most)
 
 
-def _spikes(
-    params: dict[str, Any], seed: int, kept: Kept, *, aligned: bool
-) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+def _spikes(params: dict[str, Any], kept: Kept, *, aligned: bool) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
     """Return all drops' change events at a period, and the number of each one's condition."""
     parts = []
-    rng = np.random.default_rng([seed, 511])
+    rng = np.random.default_rng([params["seed"], 511])
     for condition in dropped.conditions(params):
-        ticks = dropped.played(params, condition, seed, kept).ticks
+        ticks = dropped.played(params, condition, kept).ticks
         late = np.zeros(len(ticks)) if aligned else rng.uniform(0, params["period_ms"], len(ticks))
         parts.append(dropped.sampled(ticks, params["period_ms"], late))
     return np.concatenate(parts), np.repeat(np.arange(len(parts)), [len(part) for part in parts])
@@ -185,27 +160,10 @@ def _bits(
     return bits
 
 
-def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """List the bits by period."""
-    del kept
-    lines = []
-    for period in sorted(p["periods_ms"]):
-        here = [row for row in rows if row.params.get("period_ms") == period]
-        asked = {row.params["ask"]: row for row in here}
-        searched = sorted((row.params["tau_ms"], row.result) for row in here if row.params["ask"] == "search")
-        detail = asked["detail"]
-        lines.append(
-            {
-                "period_ms": period,
-                "tau_ms": detail.params["tau_ms"],
-                "sigma_mm": detail.params["sigma_mm"],
-                "searched": [[tau, bits] for tau, bits in searched],
-                "any_phase_bits": asked["any phase"].result["bits"],
-                "absolute_bits": asked["absolute"].result["bits"] if "absolute" in asked else None,
-                **detail.result,
-            }
-        )
-    return {"lines": lines, "conditions": len(dropped.conditions(p))}
+    lines = [row.result for row in rows if "tau_ms" not in row.params]
+    return {"lines": sorted(lines, key=lambda line: line["period_ms"]), "conditions": len(dropped.conditions(p))}
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:

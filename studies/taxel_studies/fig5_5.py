@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from taxel.encode import FA1
 from taxel_studies import indented, kept_bits
+from taxel_studies.discriminants import FoldSums
 from taxel_studies.fem import SamplingGrid
 from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Table, Task
 
@@ -23,7 +25,6 @@ PROTOCOL = (
     "at 2 ms and longer, below that around the best of those. A sample of rest comes before the first. At .2 ms "
     "(the thesis' own step) only the first 20 ms are sampled, at the alpha of the shortest period."
 )
-KEEPS = True
 
 PARAMETERS: dict[str, Any] = {
     **indented.TABLE,
@@ -57,105 +58,97 @@ BITS_AT_10_MS = 6.0
 AROUND_100_HZ = (50.0, 200.0)
 
 
-tasks = indented.tasks
+shared = indented.shared
 
 
-def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
-    """List every alpha at the longer periods; then the best of those and its neighbours; then details at the best."""
-    shared = indented.shared(p, rows)
-    listed: dict[float, dict[float, float]] = {}
-    for row in rows:
-        if row.params.get("ask") == "bits" and not row.params["even_ms"]:
-            listed.setdefault(row.params["period_ms"], {})[row.params["alpha"]] = row.result["bits"]
-
-    def asked(ask: str, period: float, alpha: float, even: float = 0.0) -> Task:
-        more: dict[str, Any] = {"times_ms": p["times_ms"]} if ask == "detail" else {}
-        if ask == "part":
-            until = p["part_until_ms"]
-            more = {"times_ms": [t for t in p["times_ms"] if t <= until], "until_ms": until}
-        more |= {"ask": ask, "period_ms": period, "alpha": alpha, "even_ms": even, "samples": p["samples"]}
-        return Task(shared | more, p["seed"])
-
-    periods = sorted(p["periods_ms"])
-    long = [period for period in periods if period >= p["search_from_ms"]]
-    first = [asked("bits", period, alpha) for period in long for alpha in p["alphas"]]
-    if any(period not in listed for period in long):
-        return first
-    mean = {alpha: np.mean([listed[period][alpha] for period in long]) for alpha in p["alphas"]}
-    best = max(mean, key=lambda alpha: mean[alpha])
-    beside = min(np.diff(sorted(p["alphas"])), default=0.0)
-    near = {PRINTED_ALPHA, *(alpha for alpha in p["alphas"] if abs(alpha - best) < 1.5 * beside)}
-    second = [asked("bits", period, alpha) for period in periods if period not in long for alpha in sorted(near)]
-    if any(period not in listed for period in periods):
-        return first + second
-    chosen = {period: max(listed[period], key=lambda alpha: listed[period][alpha]) for period in periods}
-    last = [asked("detail", period, alpha) for period, alpha in chosen.items()]
-    last.append(asked("part", p["part_period_ms"], chosen[periods[0]]))
-    return first + second + last + [asked("bits", period, a, p["even_ms"]) for period, a in chosen.items()]
+def _one(p: Parameters, period_ms: float, alpha: float | None = None, *, part: bool = False) -> Task:
+    """Name the realisation of a period and alpha; without alpha, of the best; or of the beginning, in part."""
+    return Task({**p, "period_ms": period_ms, "alpha": alpha, "part": part})
 
 
-def realise(params: dict[str, Any], seed: int, kept: Kept) -> dict[str, Any]:
-    """Press once; or sample all contacts at a period, and return the bits of the discriminants' answers."""
-    course = indented.make(params, kept)
-    if course is not None:
-        return indented.course_summary(course)
-    conditions, samples, grid, period = indented.reached(params), params["samples"], SamplingGrid(), params["period_ms"]
-    settings = {"alpha": params["alpha"], "range": params["range_kpa"], "period_ms": period}
-    encoder = FA1(**settings)
-    if params["even_ms"]:
-        encoder = FA1(**settings, a=encoder.a * params["even_ms"] / period)
-    x, sums = indented.sampled(params, kept, encoder, seed)
-    if params["ask"] == "bits":
-        return indented.bits_of(sums, samples)
-    varies = indented.varying(x, sums.folds)
-    times = [
-        [t, indented.bits_of(sums, samples, features=k)["bits"] if varies[:k].any() else 0.0]
-        for t in params["times_ms"]
-        if (k := round(t / period) * grid.taxels) and abs(k * period - t * grid.taxels) < 1e-6
-    ]
-    if params["ask"] == "part":
-        return {"times": times}
-    whole: dict[str, Any] = indented.bits_of(sums, samples)
-    spikes = np.count_nonzero(x.reshape(len(x), -1, grid.taxels), axis=1)
+def tasks(p: Parameters) -> list[Task]:
+    """List the search over alpha at the longer periods; then one realisation a period; then the part."""
+    search = [_one(p, period, alpha) for period in _long(p) for alpha in p["alphas"]]
+    return [*search, *(_one(p, period) for period in sorted(p["periods_ms"])), _one(p, p["part_period_ms"], part=True)]
+
+
+def _long(p: Parameters) -> list[float]:
+    return [period for period in sorted(p["periods_ms"]) if period >= p["search_from_ms"]]
+
+
+def searched(p: Parameters, period_ms: float, bits: Callable[[float, float], float]) -> dict[float, float]:
+    """Return the bits by alpha: by every one at the longer periods, below that by the best of those and its neighbours.
+
+    `bits` gives them by period and alpha.
+    """
+    asked = p["alphas"]
+    if period_ms not in _long(p):
+        mean = {alpha: np.mean([bits(period, alpha) for period in _long(p)]) for alpha in asked}
+        best = max(mean, key=lambda alpha: mean[alpha])
+        beside = min(np.diff(sorted(asked)), default=0.0)
+        asked = sorted({PRINTED_ALPHA, *(alpha for alpha in asked if abs(alpha - best) < 1.5 * beside)})
+    return {alpha: bits(period_ms, alpha) for alpha in asked}
+
+
+def realise(params: dict[str, Any], _seed: int, kept: Kept) -> dict[str, Any]:
+    """Return the bits of the discriminants' answers at a period and alpha; without alpha, look at the best closely."""
+    p, period = params, params["period_ms"]
+    contacts = indented.contacts(p, kept)
+    settings = {"range": contacts.range_kpa, "period_ms": period}
+
+    def result(period_ms: float, alpha: float | None = None) -> dict[str, Any]:
+        known: dict[str, Any] = kept.row(realise, {"kept": kept}, _one(p, period_ms, alpha)).result
+        return known
+
+    if p["alpha"] is not None:
+        return indented.bits_of(indented.sampled(contacts, FA1(alpha=p["alpha"], **settings), p)[1], p["samples"])
+    if p["part"]:
+        alpha, until = result(min(p["periods_ms"]))["alpha"], p["part_until_ms"]
+        x, sums = indented.sampled(contacts, FA1(alpha=alpha, **settings), p, until)
+        return {"period_ms": period, "alpha": alpha, "times": _by_time(x, sums, p, until)}
+    by_alpha = searched(p, period, lambda *at: float(result(*at)["bits"]))
+    alpha = max(by_alpha, key=lambda one: by_alpha[one])
+    encoder = FA1(alpha=alpha, **settings)
+    even = FA1(alpha=alpha, a=encoder.a * p["even_ms"] / period, **settings)
+    x, sums = indented.sampled(contacts, encoder, p)
+    conditions, duration_ms = contacts.conditions, SamplingGrid().duration_ms
+    spikes = np.count_nonzero(x.reshape(len(x), -1, SamplingGrid().taxels), axis=1)
     return {
-        **whole,
-        "rate_hz": round(float(spikes.mean()) / grid.duration_ms * 1000, 2),
-        "most_rate_hz": round(float(spikes.reshape(len(conditions), -1).mean(1).max()) / grid.duration_ms * 1000, 2),
+        "period_ms": period,
+        "alpha": alpha,
+        "searched": sorted([a, b] for a, b in by_alpha.items()),
+        "even_bits": indented.bits_of(indented.sampled(contacts, even, p)[1], p["samples"])["bits"],
+        **indented.bits_of(sums, p["samples"]),
+        "rate_hz": round(float(spikes.mean()) / duration_ms * 1000, 2),
+        "most_rate_hz": round(float(spikes.reshape(len(conditions), -1).mean(1).max()) / duration_ms * 1000, 2),
         "by": {
-            name: indented.bits_of(sums, samples, {k: f"{getattr(c, name):g}" for k, c in enumerate(conditions)})
+            name: indented.bits_of(sums, p["samples"], {k: f"{getattr(c, name):g}" for k, c in enumerate(conditions)})
             for name in VARIED
             if len({getattr(c, name) for c in conditions}) > 1
         },
-        "times": times,
+        "times": _by_time(x, sums, p, max(p["times_ms"])),
     }
+
+
+def _by_time(x: NDArray[Any], sums: FoldSums, p: Parameters, until_ms: float) -> list[list[float]]:
+    """Return the bits of what was there by each time."""
+    varies, taxels, period = indented.varying(x, sums.folds), SamplingGrid().taxels, p["period_ms"]
+    return [
+        [t, indented.bits_of(sums, p["samples"], features=k)["bits"] if varies[:k].any() else 0.0]
+        for t in p["times_ms"]
+        if t <= until_ms and (k := round(t / period) * taxels) and abs(k * period - t * taxels) < 1e-6
+    ]
 
 
 def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     """List the bits by period, alpha and question."""
-    del kept
-    lines = []
-    for period in sorted(p["periods_ms"]):
-        here = [row for row in rows if row.params.get("period_ms") == period and row.params["ask"] != "part"]
-        detail = next(row for row in here if row.params["ask"] == "detail")
-        even = next(row for row in here if row.params["even_ms"])
-        searched = {row.params["alpha"]: row.result["bits"] for row in here if not row.params["even_ms"]}
-        lines.append(
-            {
-                "period_ms": period,
-                "alpha": detail.params["alpha"],
-                "searched": sorted([a, b] for a, b in searched.items()),
-                "even_bits": even.result["bits"],
-                **detail.result,
-                "by": {name: detail.result["by"][name] for name in VARIED if name in detail.result["by"]},
-            }
-        )
-    part = next(row for row in rows if row.params.get("ask") == "part")
-    conditions = len(indented.reached(rows[-1].params))
+    *lines, part = (row.result for row in rows if row.params["alpha"] is None)
+    contacts = indented.contacts(p, kept)
     return {
         "lines": lines,
-        "part": {"period_ms": part.params["period_ms"], "alpha": part.params["alpha"], **part.result},
-        "conditions": conditions,
-        "left_out": indented.shared(p, rows)["left_out"],
+        "part": part,
+        "conditions": len(contacts.conditions),
+        "left_out": [[c.diameter_mm, c.modulus_kpa, c.depth_mm, c.angle_deg] for c in contacts.left_out],
     }
 
 
@@ -192,7 +185,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             "it falls with the period, as one spike raises the threshold by A T theta_0",
         ),
     ]
-    judged += _by_parameter(short, long, size) + _by_time(lines, size)
+    judged += _by_parameter(short, long, size) + _judged_by_time(lines, size)
     return [*judged, _finer(short, summary["part"], p["part_until_ms"], size)]
 
 
@@ -212,7 +205,7 @@ def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> lis
     ]
 
 
-def _by_time(lines: list[dict[str, Any]], size: str) -> list[Statement]:
+def _judged_by_time(lines: list[dict[str, Any]], size: str) -> list[Statement]:
     by = {line["period_ms"]: dict(map(tuple, line["times"])) for line in lines}
     judged = []
     if 10.0 in by.get(0.5, {}):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,14 +11,13 @@ from matplotlib.figure import Figure
 
 from taxel.encode import FA1
 from taxel_studies import indented
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, logarithmic, subplots
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, grid, logarithmic, subplots
 
 WHERE = "thesis 5.5.2, figure 5.7"
 PROTOCOL = (
     "As fig5.5, with Table 5.3's alpha; a spike's value is the change since the last one in units of theta_0 "
     "(5.7), towards zero, saturating at 2^bits - 1. When a spike is fired stays that of 5.4."
 )
-KEEPS = True
 
 PARAMETERS: dict[str, Any] = {
     **indented.TABLE,
@@ -31,45 +31,26 @@ TOY: dict[str, Any] = {**indented.TOY, "samples": 12, "periods_ms": [10.0, 20.0]
 SIZES = {"coarse": {**indented.COARSE, "samples": 100}, "toy": TOY}
 
 
-tasks = indented.tasks
+shared = indented.shared
+tasks = partial(grid, period_ms="periods_ms", event_bits="event_bits")
 
 
-def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
-    """List one realisation a period and number of bits; the shortest period first."""
-    shared = indented.shared(p, rows)
-    return [
-        Task(
-            {**shared, "period_ms": period, "event_bits": bits, "alpha": p["alpha"], "samples": p["samples"]},
-            p["seed"],
-        )
-        for period in sorted(p["periods_ms"])
-        for bits in p["event_bits"]
-    ]
+def realise(params: dict[str, Any], _seed: int, kept: Kept) -> dict[str, Any]:
+    """Sample all contacts, and return the bits of discriminants on spikes with so many bits."""
+    contacts = indented.contacts(params, kept)
+    settings = {"alpha": params["alpha"], "range": contacts.range_kpa, "period_ms": params["period_ms"]}
+    _, sums = indented.sampled(contacts, FA1(**settings, bits=params["event_bits"]), params)
+    return indented.bits_of(sums, params["samples"]) | {"conditions": len(contacts.conditions)}
 
 
-def realise(params: dict[str, Any], seed: int, kept: Kept) -> dict[str, Any]:
-    """Press once; or sample all contacts, and return the bits of discriminants on spikes with so many bits."""
-    course = indented.make(params, kept)
-    if course is not None:
-        return indented.course_summary(course)
-    settings = {"alpha": params["alpha"], "range": params["range_kpa"], "period_ms": params["period_ms"]}
-    _, sums = indented.sampled(params, kept, FA1(**settings, bits=params["event_bits"]), seed)
-    return indented.bits_of(sums, params["samples"])
-
-
-def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """List the bits by period and bits an event."""
-    del kept
-    bits = {
-        (row.params["period_ms"], row.params["event_bits"]): row.result["bits"]
-        for row in rows
-        if "event_bits" in row.params
-    }
+    bits = {(row.params["period_ms"], row.params["event_bits"]): row.result["bits"] for row in rows}
     periods = sorted(p["periods_ms"])
     return {
         "periods_ms": periods,
         "lines": [{"event_bits": b, "bits": [bits[period, b] for period in periods]} for b in p["event_bits"]],
-        "conditions": len(indented.reached(rows[-1].params)),
+        "conditions": rows[-1].result["conditions"],
     }
 
 

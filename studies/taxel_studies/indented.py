@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,28 +14,26 @@ from taxel.information import folds
 from taxel_studies.discriminants import FoldSums
 from taxel_studies.fem import TABLE_5_1, Condition, Course, Indentation, SamplingGrid, Table, paths, press
 from taxel_studies.kept_bits import information
-from taxel_studies.study import Kept, Row, Task
+from taxel_studies.study import Kept
 
 __all__ = [
     "COARSE",
     "TABLE",
     "TOY",
+    "Contacts",
     "bits_of",
-    "course_tasks",
+    "contacts",
     "courses_of",
-    "largest_kpa",
-    "make",
     "pressed",
     "rasters",
-    "reached",
     "sampled",
     "shared",
-    "summed",
     "table_of",
-    "tasks",
     "varying",
 ]
 
+#: A course by diameter, modulus and angle of its indentation.
+_Way = tuple[float, float, float]
 #: Table 5.1 as a study's parameters; elements and steps that serve it.
 TABLE: dict[str, Any] = {
     "diameters_mm": list(TABLE_5_1.diameters_mm),
@@ -58,8 +56,6 @@ TOY: dict[str, Any] = {
     "base_mesh_mm": 0.4,
     "step_um": 25.0,
 }
-#: The parameter that marks the realisations of `course_tasks`.
-_COURSE = "course"
 
 
 def table_of(p: Mapping[str, Any]) -> Table:
@@ -67,28 +63,15 @@ def table_of(p: Mapping[str, Any]) -> Table:
     return Table(*(tuple(p[name]) for name in ("diameters_mm", "moduli_kpa", "depths_mm", "angles_deg")))
 
 
-def courses_of(p: Mapping[str, Any], **settings: Any) -> dict[tuple[float, float, float], Indentation]:
+def courses_of(p: Mapping[str, Any]) -> dict[_Way, Indentation]:
     """Return the indentations that serve a study's conditions, by diameter, modulus and angle."""
     meshed = {name: p[name] for name in ("mesh_mm", "base_mesh_mm", "step_um")}
-    asked = paths(table_of(p).conditions(), **{**meshed, **settings})
-    return {(i.diameter_mm, i.modulus_kpa, i.angle_deg): i for i in asked}
+    return {_way(asked): asked for asked in paths(table_of(p).conditions(), **meshed)}
 
 
-def course_tasks(asked: Sequence[Indentation]) -> list[Task]:
-    """List one realisation a course, the largest first."""
-    return [Task({_COURSE: i.to_dict()}) for i in sorted(asked, key=lambda i: -i.diameter_mm)]
-
-
-def tasks(p: Mapping[str, Any]) -> list[Task]:
-    """List one realisation a path of a table of contacts."""
-    return course_tasks(list(courses_of(p).values()))
-
-
-def make(params: Mapping[str, Any], kept: Kept) -> Course | None:
-    """Return the course that a realisation is to make, from the folder or anew; None where it makes none."""
-    if _COURSE not in params:
-        return None
-    return pressed(Indentation.from_dict(params[_COURSE]), kept)
+def shared(p: Mapping[str, Any]) -> list[tuple[Any, ...]]:
+    """List the calls that make the courses, which studies share, the largest first."""
+    return [(press, one) for one in sorted(courses_of(p).values(), key=lambda one: -one.diameter_mm)]
 
 
 def pressed(asked: Indentation, kept: Kept) -> Course:
@@ -97,64 +80,62 @@ def pressed(asked: Indentation, kept: Kept) -> Course:
     return course
 
 
-def largest_kpa(asked: Sequence[Indentation], kept: Kept, grid: SamplingGrid) -> float:
-    """Return the largest pressure on any taxel of a grid on any course: Table 5.3's range."""
-    return max(grid.most_kpa(pressed(one, kept)) for one in asked)
+class Contacts(NamedTuple):
+    """The contacts of a table. A condition that its course did not reach is left out, never filled in."""
+
+    courses: dict[_Way, Course]
+    conditions: list[Condition]
+    left_out: list[Condition]
+
+    @property
+    def range_kpa(self) -> float:
+        """The largest pressure on any taxel on any course: Table 5.3's range."""
+        return max(round(SamplingGrid().most_kpa(course), 4) for course in self.courses.values())
+
+
+def contacts(p: Mapping[str, Any], kept: Kept) -> Contacts:
+    """Return the contacts of a study's table."""
+    courses = {way: pressed(asked, kept) for way, asked in courses_of(p).items()}
+    reached: dict[bool, list[Condition]] = {True: [], False: []}
+    for one in table_of(p).conditions():
+        course = courses[_way(one)]
+        reached[not course.fault or bool(course.path_mm[-1] >= one.depth_mm)].append(one)
+    return Contacts(courses, reached[True], reached[False])
+
+
+def _way(one: Condition | Indentation) -> _Way:
+    return one.diameter_mm, one.modulus_kpa, one.angle_deg
 
 
 def rasters(
-    conditions: Sequence[Condition],
-    asked: Mapping[tuple[float, float, float], Indentation],
-    kept: Kept,
-    *,
-    grid: SamplingGrid,
-    encoder: FA1,
-    samples: int,
-    seed: int,
-    until_ms: float | None = None,
+    of: Contacts, encoder: FA1, *, samples: int, seed: int, until_ms: float | None = None
 ) -> NDArray[np.int8] | NDArray[np.int16]:
     """Return the spikes of the afferents in each condition's samples, (conditions * samples, steps * taxels), by step.
 
     Of the whole contact, or of its beginning until a time.
     """
+    grid = SamplingGrid()
     steps = grid.steps(encoder.period_ms) if until_ms is None else round(until_ms / encoder.period_ms)
-    raster = np.zeros((len(conditions), samples, steps, grid.taxels), np.int8 if encoder.bits < 8 else np.int16)
+    raster = np.zeros((len(of.conditions), samples, steps, grid.taxels), np.int8 if encoder.bits < 8 else np.int16)
     t = np.round(np.arange(steps + 1) * encoder.period_ms * 1000).astype(np.int64)
-    loaded: dict[tuple[float, float, float], Course] = {}
-    for k, c in enumerate(conditions):
-        way = (c.diameter_mm, c.modulus_kpa, c.angle_deg)
-        if way not in loaded:
-            loaded[way] = pressed(asked[way], kept)
-        values = grid.draw(loaded[way], c.depth_mm, encoder.period_ms, samples, seed=seed * len(conditions) + k)
-        values = values[:, : steps + 1]
+    for k, c in enumerate(of.conditions):
+        drawn = seed * len(of.conditions) + k
+        values = grid.draw(of.courses[_way(c)], c.depth_mm, encoder.period_ms, samples, seed=drawn)[:, : steps + 1]
         spikes = encoder.encode(Frames(values.transpose(1, 0, 2), t, unit="kPa"))
         assert spikes.values is not None  # FA-1's spikes have signs
         train = np.repeat(np.arange(len(spikes)), np.diff(spikes.offsets))
         step = np.round(spikes.times / encoder.period_ms).astype(np.int64) - 1
         raster[k, train // grid.taxels, step, train % grid.taxels] = spikes.values
-    return raster.reshape(len(conditions) * samples, -1)
+    return raster.reshape(len(of.conditions) * samples, -1)
 
 
-def summed(x: NDArray[Any], conditions: int, samples: int, seed: int) -> FoldSums:
-    """Assign the samples to ten folds, and sum them by fold and condition."""
-    y = np.repeat(np.arange(conditions), samples)
-    return FoldSums(x, y, folds(y, count=10, seed=seed))
-
-
-def sampled(params: Mapping[str, Any], kept: Kept, encoder: FA1, seed: int) -> tuple[NDArray[Any], FoldSums]:
-    """Return the rasters of a realisation on samples (of `shared` parameters), and their sums by fold and condition."""
-    conditions, samples = reached(params), params["samples"]
-    x = rasters(
-        conditions,
-        courses_of(params),
-        kept,
-        grid=SamplingGrid(),
-        encoder=encoder,
-        samples=samples,
-        seed=seed,
-        until_ms=params.get("until_ms"),
-    )
-    return x, summed(x, len(conditions), samples, seed)
+def sampled(
+    of: Contacts, encoder: FA1, p: Mapping[str, Any], until_ms: float | None = None
+) -> tuple[NDArray[Any], FoldSums]:
+    """Return the rasters of a study's samples, and their sums by condition and by one of ten folds."""
+    x = rasters(of, encoder, samples=p["samples"], seed=p["seed"], until_ms=until_ms)
+    y = np.repeat(np.arange(len(of.conditions)), p["samples"])
+    return x, FoldSums(x, y, folds(y, count=10, seed=p["seed"]))
 
 
 def bits_of(
@@ -174,41 +155,3 @@ def varying(x: NDArray[Any], folds: NDArray[np.int64]) -> NDArray[np.bool_]:
     least, most = (np.stack([way(x[folds == k], 0) for k in np.unique(folds)]) for way in (np.min, np.max))
     others = [np.arange(len(least)) != k for k in range(len(least))]
     return np.asarray(np.all([least[o].min(0) < most[o].max(0) for o in others], axis=0))
-
-
-def course_summary(course: Course) -> dict[str, Any]:
-    """Return the properties of a course that the studies of bits need."""
-    return {
-        "reached_mm": float(course.path_mm[-1]),
-        "fault": course.fault,
-        "most_kpa": round(SamplingGrid().most_kpa(course), 4),
-    }
-
-
-def shared(p: Mapping[str, Any], rows: Sequence[Row]) -> dict[str, Any]:
-    """Return the parameters that all realisations on samples share: the largest pressure, conditions left out and more.
-
-    A condition that its course did not reach is left out, never filled in.
-    """
-    made = [row for row in rows if _COURSE in row.params]
-    short = {
-        (row.params[_COURSE]["diameter_mm"], row.params[_COURSE]["modulus_kpa"], row.params[_COURSE]["angle_deg"]): row
-        for row in made
-        if row.result["fault"]
-    }
-    left_out = [
-        [c.diameter_mm, c.modulus_kpa, c.depth_mm, c.angle_deg]
-        for c in table_of(p).conditions()
-        if (row := short.get((c.diameter_mm, c.modulus_kpa, c.angle_deg))) and row.result["reached_mm"] < c.depth_mm
-    ]
-    return {
-        **{name: p[name] for name in TABLE},
-        "range_kpa": max(row.result["most_kpa"] for row in made),
-        "left_out": left_out,
-    }
-
-
-def reached(params: Mapping[str, Any]) -> list[Condition]:
-    """Return the conditions of a realisation on samples."""
-    left_out = {Condition(*one) for one in params["left_out"]}
-    return [c for c in table_of(params).conditions() if c not in left_out]

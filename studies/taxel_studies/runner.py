@@ -20,7 +20,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from taxel.tasks import Workers
 
-__all__ = ["Kept", "Row", "Task", "Workers", "grid", "run"]
+__all__ = ["Kept", "Row", "Task", "Workers", "grid", "make", "run"]
 
 
 @dataclass(frozen=True)
@@ -100,6 +100,11 @@ class Kept:
     @property
     def _memory(self) -> Any:
         return joblib.Memory(self.folder, verbose=0, compress=True)
+
+
+def make(params: dict[str, Any], _seed: int, kept: Kept) -> None:
+    """Make what realisations share: a realisation whose parameter ``call`` has the arguments of `Kept.made`."""
+    kept.made(*params["call"])
 
 
 def run(

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from importlib import metadata
 from importlib.util import find_spec
+from inspect import signature
 from pathlib import Path
 from types import ModuleType
 from typing import Any, BinaryIO
@@ -24,7 +25,7 @@ from matplotlib.figure import Figure
 from taxel import FormatError, ProblemError, __version__
 from taxel.report import write_whole
 from taxel_studies.commit import code_version
-from taxel_studies.runner import Kept, Row, Task, Workers, grid, run
+from taxel_studies.runner import Kept, Row, Task, Workers, grid, make, run
 
 __all__ = [
     "Kept",
@@ -144,7 +145,7 @@ class Table:
 
 #: What a module must define to be a study, and what it may define.
 _REQUIRED = ("WHERE", "PROTOCOL", "PARAMETERS", "SIZES", "tasks", "realise", "summarise", "statements", "draw")
-_OPTIONAL = ("then", "tables", "DATA", "KEEPS", "NEEDS")
+_OPTIONAL = ("shared", "tables", "DATA", "NEEDS")
 
 
 @dataclass(frozen=True)
@@ -154,8 +155,8 @@ class Study:
     A study is a module: `of` reads the attributes below from its constants, whose names are in capital letters
     (``WHERE``, ``PROTOCOL`` ...), and from its functions (``tasks``, ``realise`` ...).
 
-    Of studies on recordings `tasks`, `then`, `realise` and `summarise` are also given ``data``, the folder of them; of
-    studies that share what takes long `realise` and `summarise` are also given ``kept``, a `Kept` of the report.
+    Of these functions those that name them are also given ``data``, the folder of recordings, and ``kept``, a `Kept` of
+    the report, by which studies share what takes long.
 
     Attributes
     ----------
@@ -178,14 +179,12 @@ class Study:
     statements : function of (parameters, summary)
     draw : function of (parameters, summary)
         The picture, as the source draws it; or several.
-    then : function of (parameters, rows), optional
-        The realisations that depend on the results of others: asked again until it lists nothing new.
+    shared : function of parameters, optional
+        What `Kept.made` makes for many realisations, a function and its arguments each: made first, side by side.
     tables : function of (parameters, summary), optional
         Tables below the picture.
     data : tuple of str
         Folders of recordings that it needs.
-    keeps : bool
-        Whether it shares with other studies what takes long.
     needs : tuple of str
         Modules of the extra ``studies`` that it needs.
     """
@@ -201,10 +200,9 @@ class Study:
     summarise: Callable[..., Summary]
     statements: Callable[[Parameters, Summary], Sequence[Statement]]
     draw: Callable[[Parameters, Summary], Figure | Sequence[Figure]]
-    then: Callable[..., Sequence[Task]] | None = None
+    shared: Callable[[Parameters], Sequence[tuple[Any, ...]]] | None = None
     tables: Callable[[Parameters, Summary], Sequence[Table]] | None = None
     data: tuple[str, ...] = ()
-    keeps: bool = False
     needs: tuple[str, ...] = ()
 
     @classmethod
@@ -296,24 +294,21 @@ class Study:
         parameters = self.set(size, **(changes or {}))
         if self.lacks is not None:
             raise ProblemError(f"{self.name}: {self.lacks}")
-        begun, given = time.time(), dict[str, Any]()
+        begun = time.time()
+        kept = Kept(report / "cache", code_version("taxel", "taxel_rules", "taxel_studies"))
+        given: dict[str, Any] = {"kept": kept}
         if self.data:
             given["data"] = self._recordings(data)
             _say(quiet, f"{self.name}: reading the recordings in {data}; hundreds of them take minutes")
-        kept = Kept(report / "cache", code_version("taxel", "taxel_rules", "taxel_studies"))
-        tasks = self.tasks(parameters, **given)
+        tasks = self.tasks(parameters, **_named(self.tasks, given))
         if text := forecast([self.name], size, workers.jobs):
             left = sum(not kept.has(self.realise, task) for task in tasks) / max(1, len(tasks))
             _say(quiet, f"{self.name}: {text}, and {100 * left:.0f} % of it is to be computed")
-        more = given | ({"kept": kept} if self.keeps else {})
-        rows = run(self.realise, tasks, kept, given=more, workers=workers, title=self.name, quiet=quiet)
-        while self.then is not None:
-            done = [(row.params, row.seed) for row in rows]
-            wanted = [t for t in self.then(parameters, rows, **given) if (t.params, t.seed) not in done]
-            if not wanted:
-                break
-            rows += run(self.realise, wanted, kept, given=more, workers=workers, title=self.name, quiet=quiet)
-        summary = self.summarise(parameters, rows, **more)
+        options: dict[str, Any] = {"kept": kept, "workers": workers, "quiet": quiet}
+        first = [Task({"call": call}) for call in (self.shared(parameters) if self.shared else ())]
+        made = run(make, first, given=given, title=f"{self.name}, what is shared", **options) if first else []
+        rows = run(self.realise, tasks, given=_named(self.realise, given), title=self.name, **options)
+        summary = self.summarise(parameters, rows, **_named(self.summarise, given))
         section = {
             "name": self.name,
             "title": self.title,
@@ -326,7 +321,7 @@ class Study:
             "statements": [asdict(s) for s in self.statements(parameters, summary)],
             "tables": [asdict(t) for t in self.tables(parameters, summary)] if self.tables is not None else [],
             "said": summary,
-            "cpu_seconds": round(sum(row.seconds for row in rows), 1),
+            "cpu_seconds": round(sum(row.seconds for row in [*made, *rows]), 1),
             "wall_seconds": round(time.time() - begun, 1),
             "commit": kept.code,
             **machine(),
@@ -343,6 +338,12 @@ class Study:
                 "--data (taxel's documentation says on the page Files where you get them)"
             )
         return data
+
+
+def _named(function: Callable[..., Any], offered: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those of the arguments on offer that a function names."""
+    wanted = signature(function).parameters
+    return {name: value for name, value in offered.items() if name in wanted}
 
 
 def _say(quiet: bool, text: str) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
@@ -9,9 +12,8 @@ from scipy.interpolate import CubicSpline
 from taxel import Frames
 from taxel.encode import FA1
 from taxel_studies import contact, fig5_5, fig5_7, indented, load
-from taxel_studies.fem import Course, Indentation, SamplingGrid, press
-from taxel_studies.runner import Kept, Task
-from taxel_studies.study import Row
+from taxel_studies.fem import Condition, Course, Indentation, SamplingGrid, press
+from taxel_studies.runner import Kept
 
 ASKED = Indentation(
     diameter_mm=3, modulus_kpa=50, angle_deg=10, depth_mm=0.5, mesh_mm=0.4, step_um=10, base_mesh_mm=0.4
@@ -59,14 +61,12 @@ def test_deeper_is_faster_along_one_course(course):
 
 def test_rasters_are_the_encoders_spikes(tmp_path, course):
     p = {**indented.TOY, "diameters_mm": [3.0], "angles_deg": [10.0], "step_um": 10.0}
-    conditions = indented.table_of(p).conditions()
-    asked = indented.courses_of(p)
-    assert list(asked.values()) == [ASKED]
-    grid, encoder = SamplingGrid(), FA1(range=5.0, period_ms=2.0, bits=3)
-    kept = Kept(tmp_path, "0123abc")
-    x = indented.rasters(conditions, asked, kept, grid=grid, encoder=encoder, samples=4, seed=7)
+    contacts = indented.contacts(p, Kept(tmp_path, "0123abc"))
+    assert [course.indentation for course in contacts.courses.values()] == [ASKED]
+    encoder = FA1(range=5.0, period_ms=2.0, bits=3)
+    x = indented.rasters(contacts, encoder, samples=4, seed=7)
     assert x.shape == (8, 50 * 25)
-    values = grid.draw(course, conditions[1].depth_mm, 2.0, 4, seed=15)
+    values = SamplingGrid().draw(course, contacts.conditions[1].depth_mm, 2.0, 4, seed=15)
     t = np.arange(51) * 2000
     for sample in range(4):
         spikes = encoder.encode(Frames(values[sample][:, None, :], t, unit="kPa"))
@@ -78,16 +78,13 @@ def test_rasters_are_the_encoders_spikes(tmp_path, course):
     assert np.abs(x).max() > 1
 
 
-def test_a_condition_that_was_not_reached_is_left_out_and_named(tmp_path):
+def test_a_condition_that_was_not_reached_is_left_out_and_named(monkeypatch, course):
     p = load("fig5.5").set("toy")
-    rows = []
-    for k, task in enumerate(fig5_5.tasks(p)):
-        result = {"reached_mm": 0.3 if k == 0 else 0.5, "fault": "stopped at 0.3 mm" if k == 0 else "", "most_kpa": 4.0}
-        rows.append(Row(task.params, task.seed, result))
-    shared = indented.shared(p, rows)
-    short = rows[0].params["course"]
-    assert shared["left_out"] == [[short["diameter_mm"], short["modulus_kpa"], 0.5, short["angle_deg"]]]
-    assert len(indented.reached(shared)) == 7
+    courses = [replace(course, fault="stopped at 0.3 mm", path_mm=np.array([0.0, 0.3])), *[course] * 3]
+    monkeypatch.setattr(indented, "pressed", lambda *_: courses.pop(0))
+    contacts = indented.contacts(p, Kept(Path(), ""))
+    assert contacts.left_out == [Condition(2.0, 50.0, 0.5, 0.0)]
+    assert len(contacts.conditions) == 7
 
 
 def test_a_course_without_equilibrium_is_said(tmp_path):
@@ -102,22 +99,12 @@ def test_a_course_without_equilibrium_is_said(tmp_path):
 
 
 def test_alpha_is_searched_at_long_periods_then_around_the_best_at_short_ones():
-    """`then` is asked until it lists nothing new; here with results that put the best alpha at 0.4."""
+    """Here the best alpha is 0.4."""
     p = load("fig5.5").set()
-    rows = [Row(t.params, t.seed, {"reached_mm": 2.0, "fault": "", "most_kpa": 9.0}) for t in fig5_5.tasks(p)]
-    phases: list[list[Task]] = []
-    known = [(r.params, r.seed) for r in rows]
-    while wanted := [t for t in fig5_5.then(p, rows) if (t.params, t.seed) not in known]:
-        phases.append(wanted)
-        for t in wanted:
-            known.append((t.params, t.seed))
-            rows.append(Row(t.params, t.seed, {"bits": 5 - abs(t.params["alpha"] - 0.4)}))
-    search, short, last = phases
-    assert len(search) == 13 * 4
-    assert {t.params["alpha"] for t in short} == {0.3, 0.4, 0.5, 0.7}
-    assert {t.params["period_ms"] for t in short} == {0.5, 1.0}
-    assert sorted(t.params["ask"] for t in last) == ["bits"] * 6 + ["detail"] * 6 + ["part"]
-    assert {t.params["alpha"] for t in last} == {0.4}
+    assert len([t for t in fig5_5.tasks(p) if t.params["alpha"] is not None]) == 13 * 4
+    by_period = {period: fig5_5.searched(p, period, lambda _, alpha: 5 - abs(alpha - 0.4)) for period in (0.5, 2.0)}
+    assert list(by_period[0.5]) == [0.3, 0.4, 0.5, 0.7]
+    assert list(by_period[2.0]) == p["alphas"]
 
 
 @pytest.fixture(scope="module")
@@ -125,27 +112,17 @@ def courses(tmp_path_factory):
     return Kept(tmp_path_factory.mktemp("courses"), "0123abc")
 
 
-def rows_of(study, p, courses) -> list[Row]:
-    return [Row(t.params, t.seed, study.realise(t.params, t.seed, courses)) for t in study.tasks(p)]
-
-
 def test_fig5_7_with_one_bit_an_event_is_fig5_5(courses):
     p, q = load("fig5.7").set("toy"), load("fig5.5").set("toy")
-    rows = rows_of(load("fig5.7"), p, courses)
-    mine = {t.params["period_ms"]: t for t in fig5_7.then(p, rows) if t.params["event_bits"] == 1}
-    theirs = {t.params["period_ms"]: t for t in fig5_5.then(q, rows) if t.params["alpha"] == p["alpha"]}
-    assert sorted(mine) == sorted(theirs) == [10.0, 20.0]
-    for period, task in mine.items():
-        other = theirs[period]
-        assert fig5_7.realise(task.params, task.seed, courses) == fig5_5.realise(other.params, other.seed, courses)
+    for task in fig5_7.tasks(p | {"event_bits": [1]}):
+        asked = q | {"period_ms": task.params["period_ms"], "alpha": p["alpha"], "part": False}
+        theirs = fig5_5.realise(asked, 0, courses)
+        assert fig5_7.realise(task.params, task.seed, courses) == theirs | {"conditions": 8}
 
 
 def test_the_beginning_of_a_contact_is_told_as_of_the_whole_one(courses):
     """Bits until 20 ms are the same whether samples end there or go on."""
-    p = load("fig5.5").set("toy")
-    shared = indented.shared(p, rows_of(load("fig5.5"), p, courses))
-    asked = {**shared, "period_ms": 5.0, "alpha": 0.7, "even_ms": 0.0, "samples": 12, "times_ms": [10.0, 20.0]}
-    whole = fig5_5.realise({**asked, "ask": "detail"}, 1, courses)
-    part = fig5_5.realise({**asked, "ask": "part", "until_ms": 20.0}, 1, courses)
+    p = load("fig5.5").set("toy", times_ms=[10.0, 20.0], periods_ms=[5.0, 10.0], alphas=[0.7], part_period_ms=5.0)
+    *_, whole, _, part = (fig5_5.realise(task.params, 0, courses) for task in fig5_5.tasks(p))
     assert part["times"] == whole["times"]
     assert part["times"][-1][1] > 0.5

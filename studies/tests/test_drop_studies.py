@@ -14,9 +14,8 @@ from taxel.wire import FRAME_US
 from taxel_studies import dropped, drops, fig4_9, fig5_11, load
 from taxel_studies.dropped import FRAMES, REGION, TENNIS, Condition
 from taxel_studies.runner import Kept
-from taxel_studies.study import Row
 
-FEW, TENNIS_FEW = {**dropped.TABLE, "drops": 4}, {**dropped.TENNIS_TABLE, "drops": 3}
+FEW, TENNIS_FEW = {**dropped.TABLE, "drops": 4, "seed": 1}, {**dropped.TENNIS_TABLE, "drops": 3, "seed": 1}
 SIDE, PERIOD_MS = 4, 0.5
 
 
@@ -27,7 +26,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def fallen(folder):
-    return dropped.played(FEW, Condition(50.0, 100.0, 0.0), 1, folder)
+    return dropped.played(FEW, Condition(50.0, 100.0, 0.0), folder)
 
 
 def patterns(seed=1, count=7, samples=12, layers=2):
@@ -90,10 +89,10 @@ def test_drops_are_kept_and_belong_to_what_made_them(folder, fallen):
         return len(list(folder.folder.rglob("output.pkl")))
 
     before = kept()
-    again = dropped.played(FEW, Condition(50.0, 100.0, 0.0), 1, folder)
+    again = dropped.played(FEW, Condition(50.0, 100.0, 0.0), folder)
     np.testing.assert_array_equal(again.ticks, fallen.ticks)
     assert kept() == before
-    other = dropped.played({**FEW, "drops": 2}, Condition(50.0, 100.0, 0.0), 2, folder)
+    other = dropped.played({**FEW, "drops": 2, "seed": 2}, Condition(50.0, 100.0, 0.0), folder)
     assert kept() == before + 1
     assert len(other.ticks) == 2
     assert not np.array_equal(other.ticks, fallen.ticks[:2])
@@ -101,7 +100,7 @@ def test_drops_are_kept_and_belong_to_what_made_them(folder, fallen):
 
 def test_a_ball_glances_off_along_the_rows_of_a_tilted_array_and_off_a_level_one_straight_up(folder, fallen):
     """By some 13 mm, 5 taxels, in a contact of 18 ms: friction leaves five sevenths of 1 m/s."""
-    slanted = dropped.played(FEW, Condition(50.0, 200.0, 30.0), 1, folder)
+    slanted = dropped.played(FEW, Condition(50.0, 200.0, 30.0), folder)
     column, row = np.arange(REGION * REGION) % REGION, np.arange(REGION * REGION) // REGION
 
     def moved(drops, places):
@@ -114,15 +113,17 @@ def test_a_ball_glances_off_along_the_rows_of_a_tilted_array_and_off_a_level_one
     assert max(np.abs(moved(fallen, column))) < 0.7
 
 
-def test_search_first_then_details_at_each_periods_best():
+def test_search_first_then_a_look_at_each_periods_best(tmp_path):
     p = load("fig5.11").set("toy")
-    rows = [Row(t.params, t.seed, {}) for t in fig5_11.tasks(p)]
-    search = fig5_11.then(p, rows)
-    assert [t.params["ask"] for t in search] == ["search"] * 4
-    rows += [Row(t.params, t.seed, [2 - abs(t.params["tau_ms"] - 1.0)]) for t in search]
-    last = [t for t in fig5_11.then(p, rows) if t.params["ask"] != "search"]
-    assert [t.params["ask"] for t in last] == ["detail", "any phase", "detail", "any phase", "absolute"]
-    assert {(t.params["tau_ms"], t.params["sigma_mm"]) for t in last} == {(1.0, 2.0)}
+    tasks = fig5_11.tasks(p)
+    assert [t.params.get("tau_ms") for t in tasks] == [0.4, 1.0, 0.4, 1.0, None, None]
+    kept = Kept(tmp_path, "0123abc")
+    for task in tasks[-2:]:
+        found = fig5_11.realise(task.params, task.seed, kept)
+        bits = {tau: by_sigma[0] for tau, by_sigma in found["searched"]}
+        assert list(bits) == [0.4, 1.0]
+        assert found["bits"] == bits[found["tau_ms"]] == max(bits.values())
+        assert (found["absolute_bits"] is None) == (found["period_ms"] not in p["absolute_ms"])
 
 
 def test_frames_cost_what_the_thesis_says():
@@ -132,7 +133,7 @@ def test_frames_cost_what_the_thesis_says():
 
 @pytest.fixture(scope="module")
 def tennis(folder):
-    return dropped.played(TENNIS_FEW, Condition(65.0, 400.0, 0.0), 1, folder, TENNIS)
+    return dropped.played(TENNIS_FEW, Condition(65.0, 400.0, 0.0), folder, TENNIS)
 
 
 def test_a_tennis_ball_is_filmed_at_2_khz_around_the_first_taxel_that_answered(folder, tennis):

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,15 +85,6 @@ class Indentation:
         ):
             if wrong:
                 raise ProblemError(message)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values, as JSON holds them."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> Indentation:
-        """Build an indentation from the values that `to_dict` returned."""
-        return cls(**{**values, "silicone": Yeoh(**values["silicone"])})
 
 
 @dataclass(frozen=True, eq=False)
