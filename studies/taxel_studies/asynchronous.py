@@ -10,9 +10,8 @@ from matplotlib.figure import Figure
 
 from taxel.events import Events
 from taxel.simulate import Act, Scene, Silence, play, truth
-from taxel.spikes import SpikeTrains, to_ms
-from taxel_studies import spike_codes
-from taxel_studies.spike_codes import drop_tasks, kinds_of
+from taxel.spikes import to_ms
+from taxel_studies.spike_codes import bits, drop_tasks, firsts, kinds_of, latency, relative_latency
 from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, logarithmic, subplots
 
 WHERE = "thesis 4.5, 7.2 and Table 7.1"
@@ -54,7 +53,7 @@ def tasks(p: Parameters) -> list[Task]:
     return drop_tasks(p, apart=1000, preset=p["preset"], place_mm=p["place_mm"])
 
 
-def firsts(events: Events, contact_us: float, listen_ms: float) -> list[list[float]]:
+def first_rises(events: Events, contact_us: float, listen_ms: float) -> list[list[float]]:
     """Return when each taxel under the impact first sent a rise after contact, ms; taxels by their index there."""
     low = events.array.columns // 2 - SIDE // 2
     x, y = events.x.astype(int) - low, events.y.astype(int) - low
@@ -92,7 +91,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         for c in contacts:
             touched |= (played.events.t >= c.start_us - 200) & (played.events.t < c.stop_us + 1000)
         result[array] = {
-            "first_ms": firsts(played.events, contact, params["listen_ms"]),
+            "first_ms": first_rises(played.events, contact, params["listen_ms"]),
             "events": int(touched.sum()),
             "rest_kbit_s": 8e3 * rest / length_us,
             "touched_kbit_s": 8e3 * (rest / length_us + (played.bytes - rest) / lasted),
@@ -104,17 +103,13 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Estimate the bits of first-spike and relative latencies by window, and the costs of both arrays."""
     labels = kinds_of(rows)
     summary: Summary = {"most": float(np.log2(len(set(labels)))), "bits": {}, "costs": {}}
-    longest = max(p["windows_ms"])
     for array in ARRAYS:
-        trials = [SpikeTrains.from_lists(r.result[array]["first_ms"], start=0.0, stop=longest + 1.0) for r in rows]
-        summary["bits"][array] = {}
+        first_ms = firsts([r.result[array]["first_ms"] for r in rows])
+        summary["bits"][array] = {f"{window:g}": {} for window in p["windows_ms"]}
         for window in p["windows_ms"]:
-            codes: dict[str, spike_codes.Code] = {
-                "first": spike_codes.FirstSpikeLatency(window_ms=window),
-                "relative": spike_codes.RelativeLatency(window_ms=window),
-            }
-            bits = spike_codes.compare_codes(trials, labels, codes, folds=min(10, p["trials"]), seed=p["seed"])
-            summary["bits"][array][f"{window:g}"] = {code: [one.bits, *one.interval] for code, one in bits.items()}
+            for name, code in (("first", latency), ("relative", relative_latency)):
+                one = bits(code(first_ms, window), labels, folds=min(10, p["trials"]), seed=p["seed"])
+                summary["bits"][array][f"{window:g}"][name] = [one.bits, *one.interval]
         results = [r.result[array] for r in rows]
         touched_s = np.array([1e-3 * r.result["touched_ms"] for r in rows])
         events = np.array([one["events"] for one in results])
@@ -131,23 +126,22 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 4.5 and Table 7.1 expect of an asynchronous array."""
-    bits, costs = summary["bits"], summary["costs"]
+    known, costs = summary["bits"], summary["costs"]
     scanned, alone = (costs[array] for array in ARRAYS)
     soon, late = (f"{w:g}" for w in (min(p["windows_ms"]), max(p["windows_ms"])))
 
     def bits_of(window: str, code: str) -> str:
-        return ", ".join(
-            f"{bits[array][window][code][0]:.2f} ({bits[array][window][code][1]:.2f} to "
-            f"{bits[array][window][code][2]:.2f}) {array}"
-            for array in ARRAYS
-        )
+        shown = [(*known[array][window][code], array) for array in ARRAYS]
+        return ", ".join(f"{middle:.2f} ({low:.2f} to {high:.2f}) {array}" for middle, low, high, array in shown)
 
     gains = {
-        window: bits["asynchronous"][window]["relative"][0] - bits["scanned"][window]["relative"][0]
-        for window in bits["scanned"]
+        window: known["asynchronous"][window]["relative"][0] - known["scanned"][window]["relative"][0]
+        for window in known["scanned"]
     }
     most = max(gains, key=gains.__getitem__)
-    apart = all(bits["asynchronous"][soon][code][1] > bits["scanned"][soon][code][2] for code in ("first", "relative"))
+    apart = all(
+        known["asynchronous"][soon][code][1] > known["scanned"][soon][code][2] for code in ("first", "relative")
+    )
     return [
         Statement(
             "Asynchronous logic at the transducers gives even higher temporal precision.",
@@ -217,10 +211,10 @@ def draw(_p: Parameters, summary: Summary) -> Figure:
     ):
         for array, colour, beside in zip(ARRAYS, ("C0", "C3"), (0.98, 1.02), strict=True):
             windows = [float(w) for w in summary["bits"][array]]
-            bits = np.array([one[code] for one in summary["bits"][array].values()])
-            off = np.abs(bits[:, 1:] - bits[:, :1]).T
+            shown = np.array([one[code] for one in summary["bits"][array].values()])
+            off = np.abs(shown[:, 1:] - shown[:, :1]).T
             # The two curves are drawn a little apart, so that neither interval hides the other.
-            ax.errorbar(np.multiply(windows, beside), bits[:, 0], off, color=colour, label=array, fmt="o-", capsize=3)
+            ax.errorbar(np.multiply(windows, beside), shown[:, 0], off, color=colour, label=array, fmt="o-", capsize=3)
         ax.axhline(summary["most"], color="0.6", ls=":", label="ceiling")
         ax.set(xlabel="time since contact, ms", title=title)
         logarithmic(ax, x=windows)
