@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -141,7 +141,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 4.3.2 says."""
     ramps = dict(summary["ramps"])
     own = ramps.pop("adaptive")
@@ -155,65 +155,61 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         return max(wrong(one, phase) / min(wrong(other, phase) for other in ramps.values()) for phase in PHASES)
 
     best = min(ramps, key=lambda name: whole(ramps[name]))
-    return [
-        Statement(
-            "A gentle ramp gives high intensity resolution during fine control.",
-            "high resolution",
-            f"wrong by {wrong(own, 'fine'):.1f} mV with the adaptive ramp, {wrong(gentle, 'fine'):.1f} with the "
-            f"gentlest, {wrong(steep, 'fine'):.1f} with the steepest",
-            wrong(own, "fine") <= 1.1 * wrong(gentle, "fine"),
-        ),
-        Statement(
-            "A steep ramp gives responsive feedback during gross movements.",
-            "responsive",
-            f"during taps wrong by {wrong(own, 'gross'):.0f} mV with the adaptive ramp, {wrong(gentle, 'gross'):.0f} "
-            f"with the gentlest, {wrong(steep, 'gross'):.0f} with the steepest",
-            wrong(own, "gross") <= 0.7 * wrong(gentle, "gross"),
-            "the host holds the last reading: what moved since is its error",
-        ),
-        Statement(
-            "One ramp that adapts does both.",
-            "held to be possible, not tried",
-            f"at most {whole(own):.2f} times as wrong as the best fixed ramp of each phase; the best single fixed one, "
-            f"{best} ticks, {whole(ramps[best]):.2f} times",
-            whole(own) < whole(ramps[best]),
-        ),
-        Statement(
-            "The first tap after rest is seen as late as a gentle ramp sees it.",
-            "not stated",
-            f"{own['late_us']:.0f} us after it begins (median), {gentle['late_us']:.0f} with the gentlest, "
-            f"{steep['late_us']:.0f} with the steepest ramp",
-            None,
-            "it turns steep by what a gentle frame has shown",
-        ),
-    ]
+    yield Statement(
+        "A gentle ramp gives high intensity resolution during fine control.",
+        "high resolution",
+        f"wrong by {wrong(own, 'fine'):.1f} mV with the adaptive ramp, {wrong(gentle, 'fine'):.1f} with the "
+        f"gentlest, {wrong(steep, 'fine'):.1f} with the steepest",
+        wrong(own, "fine") <= 1.1 * wrong(gentle, "fine"),
+    )
+    yield Statement(
+        "A steep ramp gives responsive feedback during gross movements.",
+        "responsive",
+        f"during taps wrong by {wrong(own, 'gross'):.0f} mV with the adaptive ramp, {wrong(gentle, 'gross'):.0f} "
+        f"with the gentlest, {wrong(steep, 'gross'):.0f} with the steepest",
+        wrong(own, "gross") <= 0.7 * wrong(gentle, "gross"),
+        "the host holds the last reading: what moved since is its error",
+    )
+    yield Statement(
+        "One ramp that adapts does both.",
+        "held to be possible, not tried",
+        f"at most {whole(own):.2f} times as wrong as the best fixed ramp of each phase; the best single fixed one, "
+        f"{best} ticks, {whole(ramps[best]):.2f} times",
+        whole(own) < whole(ramps[best]),
+    )
+    yield Statement(
+        "The first tap after rest is seen as late as a gentle ramp sees it.",
+        "not stated",
+        f"{own['late_us']:.0f} us after it begins (median), {gentle['late_us']:.0f} with the gentlest, "
+        f"{steep['late_us']:.0f} with the steepest ramp",
+        None,
+        "it turns steep by what a gentle frame has shown",
+    )
 
 
-def tables(_p: Parameters, summary: Summary) -> list[Table]:
+def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
     """List all converters."""
-    return [
-        Table(
-            "By ramp",
+    yield Table(
+        "By ramp",
+        [
+            "ramp, ticks",
+            "fine control, mV rms",
+            "taps, mV rms",
+            "a tap is seen after, us",
+            "frames/s, fine and tap",
+        ],
+        [
             [
-                "ramp, ticks",
-                "fine control, mV rms",
-                "taps, mV rms",
-                "a tap is seen after, us",
-                "frames/s, fine and tap",
-            ],
-            [
-                [
-                    name,
-                    f"{one['rms_mv']['fine']:.2f}",
-                    f"{one['rms_mv']['gross']:.1f}",
-                    f"{one['late_us']:.0f}",
-                    f"{one['frames_a_s']['fine']:.0f}, {one['frames_a_s']['gross']:.0f}",
-                ]
-                for name, one in summary["ramps"].items()
-            ],
-            "What a host that holds the last reading of each taxel is wrong by, while pressed and while tapped.",
-        )
-    ]
+                name,
+                f"{one['rms_mv']['fine']:.2f}",
+                f"{one['rms_mv']['gross']:.1f}",
+                f"{one['late_us']:.0f}",
+                f"{one['frames_a_s']['fine']:.0f}, {one['frames_a_s']['gross']:.0f}",
+            ]
+            for name, one in summary["ramps"].items()
+        ],
+        "What a host that holds the last reading of each taxel is wrong by, while pressed and while tapped.",
+    )
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

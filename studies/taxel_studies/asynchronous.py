@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -124,7 +124,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 4.5 and Table 7.1 expect of an asynchronous array."""
     known, costs = summary["bits"], summary["costs"]
     scanned, alone = (costs[array] for array in ARRAYS)
@@ -142,40 +142,38 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     apart = all(
         known["asynchronous"][soon][code][1] > known["scanned"][soon][code][2] for code in ("first", "relative")
     )
-    return [
-        Statement(
-            "Asynchronous logic at the transducers gives even higher temporal precision.",
-            "higher precision",
-            f"first rises of a touch fall on {alone['moments']:.0f} different times of 1 us instead of "
-            f"{scanned['moments']:.0f} frames (median)",
-            alone["moments"] > 2 * scanned["moments"],
-            "what the foam, the fabric and the taxels' spread let through; taxels of one frame in between lie on "
-            "straight lines",
-        ),
-        Statement(
-            "Finer times tell more of ball and height.",
-            "not stated",
-            f"first-spike latency in {soon} ms: {bits_of(soon, 'first')} bits of {summary['most']:.2f}; relative "
-            f"latency: {bits_of(soon, 'relative')}; in {late} ms: {bits_of(late, 'relative')}; the largest gain is "
-            f"{gains[most]:+.2f} in {most} ms (relative)",
-            apart if p["trials"] >= PARAMETERS["trials"] else None,
-            "" if apart else "the intervals overlap in the shortest window, in one code or both",
-        ),
-        Statement(
-            "A fully asynchronous architecture is more efficient.",
-            "even better power and computational efficiencies",
-            f"while touched {alone['events_a_s']:.0f} events/s instead of {scanned['events_a_s']:.0f}; with address "
-            f"and sign alone {alone['address_kbit_s']:.0f} instead of {scanned['address_kbit_s']:.0f} kbit/s; on "
-            f"version 2 of the wire {alone['touched_kbit_s']:.0f} instead of {scanned['touched_kbit_s']:.0f}, of which "
-            f"{alone['rest_kbit_s']:.0f} and {scanned['rest_kbit_s']:.0f} are sent at rest too",
-            None,
-            "power is not simulated; a taxel by itself sends each step on the way, a scanned one only where a frame "
-            "finds it",
-        ),
-    ]
+    yield Statement(
+        "Asynchronous logic at the transducers gives even higher temporal precision.",
+        "higher precision",
+        f"first rises of a touch fall on {alone['moments']:.0f} different times of 1 us instead of "
+        f"{scanned['moments']:.0f} frames (median)",
+        alone["moments"] > 2 * scanned["moments"],
+        "what the foam, the fabric and the taxels' spread let through; taxels of one frame in between lie on "
+        "straight lines",
+    )
+    yield Statement(
+        "Finer times tell more of ball and height.",
+        "not stated",
+        f"first-spike latency in {soon} ms: {bits_of(soon, 'first')} bits of {summary['most']:.2f}; relative "
+        f"latency: {bits_of(soon, 'relative')}; in {late} ms: {bits_of(late, 'relative')}; the largest gain is "
+        f"{gains[most]:+.2f} in {most} ms (relative)",
+        apart if p["trials"] >= PARAMETERS["trials"] else None,
+        "" if apart else "the intervals overlap in the shortest window, in one code or both",
+    )
+    yield Statement(
+        "A fully asynchronous architecture is more efficient.",
+        "even better power and computational efficiencies",
+        f"while touched {alone['events_a_s']:.0f} events/s instead of {scanned['events_a_s']:.0f}; with address "
+        f"and sign alone {alone['address_kbit_s']:.0f} instead of {scanned['address_kbit_s']:.0f} kbit/s; on "
+        f"version 2 of the wire {alone['touched_kbit_s']:.0f} instead of {scanned['touched_kbit_s']:.0f}, of which "
+        f"{alone['rest_kbit_s']:.0f} and {scanned['rest_kbit_s']:.0f} are sent at rest too",
+        None,
+        "power is not simulated; a taxel by itself sends each step on the way, a scanned one only where a frame "
+        "finds it",
+    )
 
 
-def tables(_p: Parameters, summary: Summary) -> list[Table]:
+def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
     """List bits by window, and costs."""
     shown = {"first": "first-spike latency", "relative": "relative latency"}
     rows = [
@@ -191,16 +189,14 @@ def tables(_p: Parameters, summary: Summary) -> list[Table]:
     ]
     head = ["bits", *(f"{window} ms" for window in summary["bits"]["scanned"])]
     costs = [[array, *(f"{one[name]:.0f}" for name in COSTS)] for array, one in summary["costs"].items()]
-    return [
-        Table("Bits by time since contact", head, rows, f"Of {summary['most']:.2f}; intervals from trials redrawn."),
-        Table(
-            "While touched",
-            ["array", *COSTS.values()],
-            costs,
-            "Medians over trials. At rest: the same board untouched for as long (noise, headers, promises). While "
-            "touched: that, and what a scene's bytes have above it, over the time that the ball touches.",
-        ),
-    ]
+    yield Table("Bits by time since contact", head, rows, f"Of {summary['most']:.2f}; intervals from trials redrawn.")
+    yield Table(
+        "While touched",
+        ["array", *COSTS.values()],
+        costs,
+        "Medians over trials. At rest: the same board untouched for as long (noise, headers, promises). While "
+        "touched: that, and what a scene's bytes have above it, over the time that the ball touches.",
+    )
 
 
 def draw(_p: Parameters, summary: Summary) -> Figure:

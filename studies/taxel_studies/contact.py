@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -146,54 +146,47 @@ def _least_change(rho: NDArray[np.float64], spikes: Any, period: float) -> float
     return least
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 5.4.1 and the captions say."""
     paths = summary["paths"]
     short = [one for one in paths if one["fault"]]
     slanted = [one["asymmetry"] for one in paths if one["angle_deg"]]
     straight = [one["asymmetry"] for one in paths if not one["angle_deg"]]
-    judged = [
-        Statement(
-            "Table 5.1: every combination of diameter, modulus, depth and angle is simulated.",
-            "300 conditions",
-            f"{summary['conditions']} conditions of {len(paths)} paths; {len(paths) - len(short)} reach their depth, "
-            f"{sum(one['factorisations'] for one in paths)} matrices solved, {sum(one['cuts'] for one in paths)} steps "
-            "halved",
-            False if short else True if summary["conditions"] == 300 else None,
-            "; ".join(f"{one['diameter_mm']:g} mm, {one['modulus_kpa']:g} kPa: {one['fault']}" for one in short)
-            or f"mesh {p['mesh_mm']:g} mm, steps of {p['step_um']:g} um",
-        ),
-        Statement(
-            "The base gives back what presses, sideways and down (ours, not the thesis').",
-            "to rounding",
-            f"within {max(one['unbalanced'] for one in paths):.1e} of the force, over all steps of all paths",
-            all(one["unbalanced"] < ROUNDING for one in paths),
-            "the sum of the base's reactions against the force on the half disc",
-        ),
-    ]
+    yield Statement(
+        "Table 5.1: every combination of diameter, modulus, depth and angle is simulated.",
+        "300 conditions",
+        f"{summary['conditions']} conditions of {len(paths)} paths; {len(paths) - len(short)} reach their depth, "
+        f"{sum(one['factorisations'] for one in paths)} matrices solved, {sum(one['cuts'] for one in paths)} steps "
+        "halved",
+        False if short else True if summary["conditions"] == 300 else None,
+        "; ".join(f"{one['diameter_mm']:g} mm, {one['modulus_kpa']:g} kPa: {one['fault']}" for one in short)
+        or f"mesh {p['mesh_mm']:g} mm, steps of {p['step_um']:g} um",
+    )
+    yield Statement(
+        "The base gives back what presses, sideways and down (ours, not the thesis').",
+        "to rounding",
+        f"within {max(one['unbalanced'] for one in paths):.1e} of the force, over all steps of all paths",
+        all(one["unbalanced"] < ROUNDING for one in paths),
+        "the sum of the base's reactions against the force on the half disc",
+    )
     if slanted and straight:
-        judged.append(
-            Statement(
-                "Figure 5.2b: a contact under a slant deforms the sensor asymmetrically.",
-                "the picture, 10 degrees",
-                f"left and right differ by {min(slanted):.3f} to {max(slanted):.3f} of the peak under a slant, by "
-                f"{max(straight):.0e} straight down",
-                min(slanted) > 0.01 > max(straight),
-                "pressure at the base, at full depth",
-            )
+        yield Statement(
+            "Figure 5.2b: a contact under a slant deforms the sensor asymmetrically.",
+            "the picture, 10 degrees",
+            f"left and right differ by {min(slanted):.3f} to {max(slanted):.3f} of the peak under a slant, by "
+            f"{max(straight):.0e} straight down",
+            min(slanted) > 0.01 > max(straight),
+            "pressure at the base, at full depth",
         )
     drawn = summary["sampled"]
     count = sum(map(len, drawn["times"]))
-    judged.append(
-        Statement(
-            "Figure 5.4: spikes are discharged only when a pressure change above the threshold is sensed.",
-            "the picture",
-            f"{count} spikes; the smallest change since the last one is {drawn['least_change']:.3f} theta_0",
-            count > 0 and drawn["least_change"] > 0.95,  # 5.5 as printed lets it sink below theta_0 by B theta_0
-            f"one sample path at {p['period_ms']:g} ms",
-        )
+    yield Statement(
+        "Figure 5.4: spikes are discharged only when a pressure change above the threshold is sensed.",
+        "the picture",
+        f"{count} spikes; the smallest change since the last one is {drawn['least_change']:.3f} theta_0",
+        count > 0 and drawn["least_change"] > 0.95,  # 5.5 as printed lets it sink below theta_0 by B theta_0
+        f"one sample path at {p['period_ms']:g} ms",
     )
-    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:

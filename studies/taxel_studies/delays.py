@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -137,7 +137,7 @@ def _of(row: Row, inputs: int, asks: str) -> bool:
     return bool(row.params["inputs"] == inputs and row.params["asks"] == asks)
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what is asked of delays; none of it stands in the thesis, which has no delays."""
     lines = {line["arm"]: line for line in summary["lines"]}
     most = f"{max(p['copies'])} copies"
@@ -145,23 +145,21 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     plain, random, copied = (lines[arm]["load"][last] for arm in ("none", "random", most))
     loads = ", ".join(f"{arm} {line['load'][last]:g}" for arm, line in lines.items())
     at = f"N = {p['inputs'][last]}"
-    judged = [
-        Statement(
-            "Copies at several delays let a neuron learn more patterns an input.",
-            "not in the thesis",
-            f"largest load p / N at {at}: {loads}",
-            bool(copied > plain),
-            f"{max(p['copies'])} times as many weights: a weight bears {copied / max(p['copies']):.2f} patterns with "
-            f"them and {plain:g} without",
-        ),
-        Statement(
-            "One fixed random delay an input buys nothing where the inputs' times are random already.",
-            "not in the thesis",
-            f"{random:g} beside {plain:g} at {at}",
-            bool(random <= plain + p["classes"] / p["inputs"][last]),
-            "it costs: fewer inputs arrive before an early target, and what is put off beyond the last one is lost",
-        ),
-    ]
+    yield Statement(
+        "Copies at several delays let a neuron learn more patterns an input.",
+        "not in the thesis",
+        f"largest load p / N at {at}: {loads}",
+        bool(copied > plain),
+        f"{max(p['copies'])} times as many weights: a weight bears {copied / max(p['copies']):.2f} patterns with "
+        f"them and {plain:g} without",
+    )
+    yield Statement(
+        "One fixed random delay an input buys nothing where the inputs' times are random already.",
+        "not in the thesis",
+        f"{random:g} beside {plain:g} at {at}",
+        bool(random <= plain + p["classes"] / p["inputs"][last]),
+        "it costs: fewer inputs arrive before an early target, and what is put off beyond the last one is lost",
+    )
     chosen = {
         arm: [s for s in line["selected"] if s["inputs"] == p["inputs"][last] and s["by_weight"] is not None]
         for arm, line in lines.items()
@@ -171,34 +169,27 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         known = {arm: s for arm, s in here.items() if s is not None}
         if {"none", most} <= set(known):
             by_arm = ", ".join(f"{arm} {s['by_weight']:.2f} ({s['weights']:.0f} weights)" for arm, s in known.items())
-            judged.append(
-                Statement(
-                    f"At a load of {share:g}, l1 over all copies learns with fewer weights than over the inputs alone.",
-                    "not in the thesis",
-                    f"patterns a weight at {at}: {by_arm}",
-                    bool(known[most]["by_weight"] > known["none"]["by_weight"]),
-                    "so what the copies buy is the choice of delays, and not the number of weights alone",
-                )
+            yield Statement(
+                f"At a load of {share:g}, l1 over all copies learns with fewer weights than over the inputs alone.",
+                "not in the thesis",
+                f"patterns a weight at {at}: {by_arm}",
+                bool(known[most]["by_weight"] > known["none"]["by_weight"]),
+                "so what the copies buy is the choice of delays, and not the number of weights alone",
             )
-    judged.append(
-        Statement(
-            "Delays found by a linear programme are not new.",
-            "Rostro-Gonzalez, Vasquez, Cessac and Viéville 2010 (hal inria-00455415): weights at each delay, "
-            "in discrete time, for a whole network",
-            "here with silence at every instant, bounds, and a least l1 norm that selects",
-            None,
-        )
+    yield Statement(
+        "Delays found by a linear programme are not new.",
+        "Rostro-Gonzalez, Vasquez, Cessac and Viéville 2010 (hal inria-00455415): weights at each delay, "
+        "in discrete time, for a whole network",
+        "here with silence at every instant, bounds, and a least l1 norm that selects",
+        None,
     )
-    judged.append(
-        Statement(
-            "Copies without selection hurt on recordings.",
-            "not in the thesis",
-            "gaitndd, foot-off within 10 ms: " + ", ".join(f"{value} % {name}" for name, value in GAIT.items()),
-            None,
-            "measured once with CONE-R and l2 when the gait recipes were sought; not rerun here",
-        )
+    yield Statement(
+        "Copies without selection hurt on recordings.",
+        "not in the thesis",
+        "gaitndd, foot-off within 10 ms: " + ", ".join(f"{value} % {name}" for name, value in GAIT.items()),
+        None,
+        "measured once with CONE-R and l2 when the gait recipes were sought; not rerun here",
     )
-    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

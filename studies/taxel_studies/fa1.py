@@ -6,7 +6,7 @@ everything: adapting threshold, polarity, power law, and a spread of their thres
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -102,29 +102,25 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Say of each property what it is worth at the longest window."""
     late = f"{max(p['windows_ms']):g}"
     whole, bottom, top = summary["bits"]["all"][late]
     events = summary["events"]["all"][late]
-    judged = []
     for without, name in list(VARIANTS.items())[1:]:
         bits, low, high = summary["bits"][without][late]
         cost = summary["events"][without][late] / max(events, 1e-9)
-        judged.append(
-            Statement(
-                f"It is to be found out whether FA-1's {name} is worth keeping.",
-                "asked in 7.2, not answered",
-                f"without it {bits - whole:+.2f} bits of {whole:.2f} and {cost:.2f} times the events, {late} ms",
-                None,
-                ("intervals lie apart" if high < bottom or low > top else "intervals overlap")
-                + "; of two codes, counts and first spikes, the one with more bits",
-            )
+        yield Statement(
+            f"It is to be found out whether FA-1's {name} is worth keeping.",
+            "asked in 7.2, not answered",
+            f"without it {bits - whole:+.2f} bits of {whole:.2f} and {cost:.2f} times the events, {late} ms",
+            None,
+            ("intervals lie apart" if high < bottom or low > top else "intervals overlap")
+            + "; of two codes, counts and first spikes, the one with more bits",
         )
-    return judged
 
 
-def tables(_p: Parameters, summary: Summary) -> list[Table]:
+def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
     """List bits, events and bits an event by window."""
     rows = []
     for without, name in VARIANTS.items():
@@ -136,7 +132,7 @@ def tables(_p: Parameters, summary: Summary) -> list[Table]:
     head = ["taken away"]
     for window in summary["bits"]["all"]:
         head += [f"bits in {window} ms", "events"]
-    return [Table("what each property of FA-1 is worth", head, rows, f"of {summary['most']:.2f} bits; 95 % intervals")]
+    yield Table("what each property of FA-1 is worth", head, rows, f"of {summary['most']:.2f} bits; 95 % intervals")
 
 
 def draw(_p: Parameters, summary: Summary) -> Figure:

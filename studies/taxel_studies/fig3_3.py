@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -103,19 +103,17 @@ def summarise(_p: Parameters, rows: Sequence[Row]) -> Summary:
     }
 
 
-def statements(_p: Parameters, summary: Summary) -> list[Statement]:
+def statements(_p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 3.4.3 says."""
     (rises, falls), (ups, downs) = summary["steps"], summary["spikes"]
-    return [
-        Statement(
-            "A single spike is fired for each change from low to high, and by the other neuron from high to low.",
-            "one spike a rise, one a fall",
-            f"{rises} rises and {falls} falls that last {STEADY_MS:g} ms; {ups} and {downs} spikes; "
-            f"{summary['wrong']} of {summary['active']} taxels differ",
-            summary["wrong"] == 0,
-            "a state shorter than some 20 ms may be lost, and behind a short gap a spike comes late",
-        )
-    ]
+    yield Statement(
+        "A single spike is fired for each change from low to high, and by the other neuron from high to low.",
+        "one spike a rise, one a fall",
+        f"{rises} rises and {falls} falls that last {STEADY_MS:g} ms; {ups} and {downs} spikes; "
+        f"{summary['wrong']} of {summary['active']} taxels differ",
+        summary["wrong"] == 0,
+        "a state shorter than some 20 ms may be lost, and behind a short gap a spike comes late",
+    )
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Any
 
@@ -148,39 +148,34 @@ def _line(rows: Sequence[Row], force: float) -> dict[str, Any]:
     }
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 3.6.1 says."""
     full = p["realisations"] >= PARAMETERS["realisations"] and p["trials"] >= PARAMETERS["trials"]
-    judged = []
     for line in summary["forces"]:
         force = line["force_n"]
         if force not in PUBLISHED:
             continue
         mean, sd = PUBLISHED[force]
-        judged.append(
-            Statement(
-                f"Two spheres are told apart at {force:g} N.",
-                f"{mean:g} +- {sd:g} %",
-                f"{line['accuracy']:.2f} +- {line['sd']:.2f} %; {line['counts'][0]:g} and {line['counts'][1]:g} spikes "
-                "a trial",
-                line["accuracy"] >= mean - 2 * sd if full else None,
-                "speed and foam are not stated, and decide it (the table); these were chosen before anything ran",
-            )
+        yield Statement(
+            f"Two spheres are told apart at {force:g} N.",
+            f"{mean:g} +- {sd:g} %",
+            f"{line['accuracy']:.2f} +- {line['sd']:.2f} %; {line['counts'][0]:g} and {line['counts'][1]:g} spikes "
+            "a trial",
+            line["accuracy"] >= mean - 2 * sd if full else None,
+            "speed and foam are not stated, and decide it (the table); these were chosen before anything ran",
         )
     for line in _best(summary["others"]):
         if line["force_n"] in PUBLISHED:
             mean, sd = PUBLISHED[line["force_n"]]
-            judged.append(
-                Statement(
-                    f"The same at {line['force_n']:g} N with other values: {line['reading']}.",
-                    f"{mean:g} +- {sd:g} %; below 5 % of error in training within tens of epochs",
-                    f"{line['accuracy']:.2f} +- {line['sd']:.2f} %; {_after(line)}",
-                    bool(line["accuracy"] >= mean - 2 * sd and (line["below"] or TENS + 1) <= TENS) if full else None,
-                    "chosen after it was seen what helps: of a slow press the spikes lie further apart than the "
-                    "neuron's 25 ms, and on hard foam 1 N touches few taxels",
-                )
+            yield Statement(
+                f"The same at {line['force_n']:g} N with other values: {line['reading']}.",
+                f"{mean:g} +- {sd:g} %; below 5 % of error in training within tens of epochs",
+                f"{line['accuracy']:.2f} +- {line['sd']:.2f} %; {_after(line)}",
+                bool(line["accuracy"] >= mean - 2 * sd and (line["below"] or TENS + 1) <= TENS) if full else None,
+                "chosen after it was seen what helps: of a slow press the spikes lie further apart than the "
+                "neuron's 25 ms, and on hard foam 1 N touches few taxels",
             )
-    judged += [
+    yield from (
         Statement(
             f"Training error falls below 5 % within tens of epochs ({line['force_n']:g} N).",
             "tens of epochs",
@@ -189,8 +184,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             "the threshold and the first weights are not stated: 1, and normal with a spread of 0.001",
         )
         for line in summary["forces"]
-    ]
-    return judged
+    )
 
 
 def _best(others: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -205,25 +199,23 @@ def _after(line: dict[str, Any]) -> str:
     return "never" if line["below"] is None else f"after {line['below']} epochs"
 
 
-def tables(_p: Parameters, summary: Summary) -> list[Table]:
+def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
     """Return the accuracy with each of the other values."""
     lines = [{**line, "reading": "as above"} for line in summary["forces"]] + summary["others"]
-    return [
-        Table(
-            "accuracy with other values of what the thesis leaves open",
-            ["changed", "force", "accuracy", "error below 5 %", "spikes"],
+    yield Table(
+        "accuracy with other values of what the thesis leaves open",
+        ["changed", "force", "accuracy", "error below 5 %", "spikes"],
+        [
             [
-                [
-                    line["reading"],
-                    f"{line['force_n']:g} N",
-                    f"{line['accuracy']:.2f} +- {line['sd']:.2f} %",
-                    _after(line),
-                    f"{line['counts'][0]:g} and {line['counts'][1]:g}",
-                ]
-                for line in lines
-            ],
-        )
-    ]
+                line["reading"],
+                f"{line['force_n']:g} N",
+                f"{line['accuracy']:.2f} +- {line['sd']:.2f} %",
+                _after(line),
+                f"{line['counts'][0]:g} and {line['counts'][1]:g}",
+            ]
+            for line in lines
+        ],
+    )
 
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -69,33 +69,27 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 4.3.2 says."""
-    judged = []
     for shape, one in summary["shapes"].items():
         name = "the board's RC ramp" if shape == "rc" else "a linear ramp"
-        judged.append(
-            Statement(
-                f"t_elapsed grows with V_in ({name}).",
-                "grows",
-                f"grows up to {one['ends_v']:g} V; above that it is the ramp's {p['ramp'] / TICKS_A_US:g} us",
-                one["grows"],
-            )
+        yield Statement(
+            f"t_elapsed grows with V_in ({name}).",
+            "grows",
+            f"grows up to {one['ends_v']:g} V; above that it is the ramp's {p['ramp'] / TICKS_A_US:g} us",
+            one["grows"],
         )
     for shape, one in summary["shapes"].items():
         straight = one["bent_us"] < 1e-3
-        judged.append(
-            Statement(
-                f"The duration of t_elapsed is proportional to the magnitude of V_in ({shape} ramp).",
-                "proportional",
-                f"within {1e3 * one['bent_us']:.1f} ns of a straight line",
-                straight,
-                ""
-                if straight
-                else "an RC ramp flattens: later voltages are resolved more finely (Appendix 1, 2.2.3 has the RC)",
-            )
+        yield Statement(
+            f"The duration of t_elapsed is proportional to the magnitude of V_in ({shape} ramp).",
+            "proportional",
+            f"within {1e3 * one['bent_us']:.1f} ns of a straight line",
+            straight,
+            ""
+            if straight
+            else "an RC ramp flattens: later voltages are resolved more finely (Appendix 1, 2.2.3 has the RC)",
         )
-    return judged
 
 
 def draw(_p: Parameters, summary: Summary) -> Figure:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -88,42 +88,35 @@ def _of(rows: Sequence[Row], tau: float) -> list[Row]:
     return [r for r in rows if r.params.get("amplifier_us") == tau]
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 4.4.1 says."""
-    judged = [
-        Statement(
-            "The sensor responds at approximately 50 us.",
-            "50 us",
-            f"V_in begins to move {summary['impact']['moved_us']:g} us after the impact",
-            None,
-            "the fabric's delay is taken over from here, so it is no test; on the board the scan adds 0 to 192 us",
-        )
-    ]
+    yield Statement(
+        "The sensor responds at approximately 50 us.",
+        "50 us",
+        f"V_in begins to move {summary['impact']['moved_us']:g} us after the impact",
+        None,
+        "the fabric's delay is taken over from here, so it is no test; on the board the scan adds 0 to 192 us",
+    )
     for scan in summary["scans"]:
         worst = max(scan["settles_us"])
         if scan["amplifier_us"] == 0:
-            judged.append(
-                Statement(
-                    "V_in settles within 0.2 us while 4 channels are multiplexed at 3 us a column.",
-                    f"{SETTLED_US:g} us",
-                    f"to {100 * p['settled']:g} % of the step within {worst:.3f} us, in each of the four steps",
-                    None if worst <= SETTLED_US + p["every_us"] else False,
-                    "the multiplexer's time constant, 0.05 us, is chosen for it, so it is no test; no part states one",
-                )
+            yield Statement(
+                "V_in settles within 0.2 us while 4 channels are multiplexed at 3 us a column.",
+                f"{SETTLED_US:g} us",
+                f"to {100 * p['settled']:g} % of the step within {worst:.3f} us, in each of the four steps",
+                None if worst <= SETTLED_US + p["every_us"] else False,
+                "the multiplexer's time constant, 0.05 us, is chosen for it, so it is no test; no part states one",
             )
         else:
-            judged.append(
-                Statement(
-                    f"The same, were the board's 15 pF to lie across R_f ({scan['amplifier_us']:g} us).",
-                    "no word of a column's traces in the next",
-                    "an unpressed column behind a pressed one reads "
-                    + ", ".join(f"{t:.1f}" for t in scan["left_ticks"])
-                    + " ticks too many in its four steps",
-                    None,
-                    "what a lab can measure: none if the capacitors lie elsewhere",
-                )
+            yield Statement(
+                f"The same, were the board's 15 pF to lie across R_f ({scan['amplifier_us']:g} us).",
+                "no word of a column's traces in the next",
+                "an unpressed column behind a pressed one reads "
+                + ", ".join(f"{t:.1f}" for t in scan["left_ticks"])
+                + " ticks too many in its four steps",
+                None,
+                "what a lab can measure: none if the capacitors lie elsewhere",
             )
-    return judged
 
 
 def draw(_p: Parameters, summary: Summary) -> Figure:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -106,7 +106,7 @@ def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     }
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 4.4.2 says."""
     lines, most = summary["lines"], float(np.log2(summary["conditions"]))
     size = f"{summary['conditions']} conditions, {p['drops']} drops each"
@@ -116,38 +116,33 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     at, over = float(total[total[:, 1].argmax(), 0]), total[:, 1] < 0.1 * total[:, 1].max()
     ended = next((t for (t, _), low in zip(summary["sum"], over, strict=True) if low and t > at), float("inf"))
     apart = float(np.hypot(*summary["middle"]))
-    judged = [
-        Statement(
-            "Figure 4.8: pressure grows and decays around the taxel that answered first.",
-            "the picture, 8 ms",
-            f"largest after {at:.1f} ms, below a tenth of that after {ended:.1f} ms, its middle {apart:.1f} taxels off "
-            "the first",
-            bool(0 < at < ended < TENNIS.length_ms and apart < AROUND),
-            f"around: within {AROUND:g} taxels; taxels under the ball reach the ramp's end ({summary['full']} ticks)",
-        )
-    ]
+    yield Statement(
+        "Figure 4.8: pressure grows and decays around the taxel that answered first.",
+        "the picture, 8 ms",
+        f"largest after {at:.1f} ms, below a tenth of that after {ended:.1f} ms, its middle {apart:.1f} taxels off "
+        "the first",
+        bool(0 < at < ended < TENNIS.length_ms and apart < AROUND),
+        f"around: within {AROUND:g} taxels; taxels under the ball reach the ramp's end ({summary['full']} ticks)",
+    )
     slow = [line for line in lines if line["period_ms"] > SLOW_MS]
     fast = [line for line in lines if line["period_ms"] < SLOW_MS]
     if slow and fast:
         least, best = max(line["bits"] for line in slow), max(line["bits"] for line in fast)
         phased = max(line["any_phase_bits"] for line in slow)
-        judged += [
-            Statement(
-                "Figure 4.10: below 100 Hz little is known of the impact.",
-                "insufficient",
-                f"{listed} bits; begun at any phase {any_phase}",
-                least < LITTLE * most,
-                f"little: less than half of {most:.0f} bits; at any phase at most {phased:.2f} below 100 Hz; {size}",
-            ),
-            Statement(
-                "Figure 4.10: a marked gain above 100 Hz, towards 2 bits.",
-                "the picture; ceiling 2 bits",
-                f"{best - least:+.2f} bits, to {best:.2f} of {most:.0f}{_from_100_hz(lines, best)}",
-                best - least > MARKED,
-                f"marked: half a bit or more; simulated drops vary as we guess; {size}",
-            ),
-        ]
-    return judged
+        yield Statement(
+            "Figure 4.10: below 100 Hz little is known of the impact.",
+            "insufficient",
+            f"{listed} bits; begun at any phase {any_phase}",
+            least < LITTLE * most,
+            f"little: less than half of {most:.0f} bits; at any phase at most {phased:.2f} below 100 Hz; {size}",
+        )
+        yield Statement(
+            "Figure 4.10: a marked gain above 100 Hz, towards 2 bits.",
+            "the picture; ceiling 2 bits",
+            f"{best - least:+.2f} bits, to {best:.2f} of {most:.0f}{_from_100_hz(lines, best)}",
+            best - least > MARKED,
+            f"marked: half a bit or more; simulated drops vary as we guess; {size}",
+        )
 
 
 def _from_100_hz(lines: list[dict[str, Any]], best: float) -> str:

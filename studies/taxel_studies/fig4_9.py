@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -72,25 +72,23 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return {"lines": [{"rate_hz": rate, **maps[rate]} for rate in sorted(maps)], "classes": names}
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 4.4.2 says of the maps."""
     lines = summary["lines"]
     fast = [line["own"] for line in lines if line["rate_hz"] >= CLEAR_HZ]
     slow = [line["own"] for line in lines if line["rate_hz"] < CLEAR_HZ]
     if not (fast and slow):
-        return []
+        return
     listed = ", ".join(f"{line['own']:.2f} at {line['rate_hz']:g} Hz" for line in lines)
     any_phase = ", ".join(f"{line['any_phase_own']:.2f}" for line in lines)
-    return [
-        Statement(
-            "Figure 4.9: classes lie clearly apart at 500 Hz and above, less so below.",
-            "the picture",
-            f"of the {NEIGHBOURS} nearest in the map are of one's own class: {listed}",
-            bool(min(fast) >= CLEAR and max(slow) < min(fast)),
-            f"clearly: {CLEAR:.0%} or more; by chance {1 / len(summary['classes']):.2f}; sampling begun at any "
-            f"phase instead of at the impact: {any_phase}; {p['drops']} drops a class, perplexity {p['perplexity']:g}",
-        )
-    ]
+    yield Statement(
+        "Figure 4.9: classes lie clearly apart at 500 Hz and above, less so below.",
+        "the picture",
+        f"of the {NEIGHBOURS} nearest in the map are of one's own class: {listed}",
+        bool(min(fast) >= CLEAR and max(slow) < min(fast)),
+        f"clearly: {CLEAR:.0%} or more; by chance {1 / len(summary['classes']):.2f}; sampling begun at any "
+        f"phase instead of at the impact: {any_phase}; {p['drops']} drops a class, perplexity {p['perplexity']:g}",
+    )
 
 
 def draw(_p: Parameters, summary: Summary) -> Figure:

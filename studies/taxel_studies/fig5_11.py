@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -166,7 +166,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return {"lines": sorted(lines, key=lambda line: line["period_ms"]), "conditions": len(dropped.conditions(p))}
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 5.6.4 says."""
     lines, most = summary["lines"], float(np.log2(summary["conditions"]))
     by = {line["period_ms"]: line for line in lines}
@@ -174,63 +174,56 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     best = max(lines, key=lambda line: line["bits"])
     shorter = [line for line in lines if line["period_ms"] < PRINTED["period_ms"]]
     less = best["bits"] - max((line["bits"] for line in shorter), default=float("nan"))
-    judged = [
-        Statement(
-            "Figure 5.11: most information at a period of 1 ms, a little less below it.",
-            "1 ms; ceiling 4.17 bits",
-            f"most at {_ms(best['period_ms'])}: {kept_bits.listed(lines)} bits; ceiling {most:.2f}; "
-            + (f"{less:.3f} less at a shorter period" if shorter else "no shorter period was asked"),
-            bool(best["period_ms"] == PRINTED["period_ms"] and less >= ALIKE) if shorter else None,
-            f"below {ALIKE:g} bits are no loss; {size}; simulated drops vary less than drops by hand, which the thesis "
-            "takes as the reason for its loss below 1 ms",
-        )
-    ]
+    yield Statement(
+        "Figure 5.11: most information at a period of 1 ms, a little less below it.",
+        "1 ms; ceiling 4.17 bits",
+        f"most at {_ms(best['period_ms'])}: {kept_bits.listed(lines)} bits; ceiling {most:.2f}; "
+        + (f"{less:.3f} less at a shorter period" if shorter else "no shorter period was asked"),
+        bool(best["period_ms"] == PRINTED["period_ms"] and less >= ALIKE) if shorter else None,
+        f"below {ALIKE:g} bits are no loss; {size}; simulated drops vary less than drops by hand, which the thesis "
+        "takes as the reason for its loss below 1 ms",
+    )
     long = [line for line in lines if line["period_ms"] > MARKED_MS]
     if MARKED_MS in by and long:
         before, after = best["bits"] - by[MARKED_MS]["bits"], by[MARKED_MS]["bits"] - long[-1]["bits"]
-        judged.append(
-            Statement(
-                "Figure 5.11: a marked loss above 5 ms.",
-                "the picture",
-                f"{before:.2f} bits lost from the best period to 5 ms, {after:.2f} more from there to "
-                f"{_ms(long[-1]['period_ms'])}",
-                bool(after > before and after > 0.5),
-                f"marked: half a bit or more, and more than up to 5 ms; {size}",
-            )
+        yield Statement(
+            "Figure 5.11: a marked loss above 5 ms.",
+            "the picture",
+            f"{before:.2f} bits lost from the best period to 5 ms, {after:.2f} more from there to "
+            f"{_ms(long[-1]['period_ms'])}",
+            bool(after > before and after > 0.5),
+            f"marked: half a bit or more, and more than up to 5 ms; {size}",
         )
-    judged += [
-        Statement(
-            "5.6.3: tau .4 ms and sigma 2 mm give most.",
-            "0.4 ms, 2 mm",
-            f"{best['tau_ms']:g} ms, {best['sigma_mm']:g} mm at {_ms(best['period_ms'])}; "
-            + _at_printed(p, by.get(PRINTED["period_ms"])),
-            (best["tau_ms"], best["sigma_mm"]) == (PRINTED["tau_ms"], PRINTED["sigma_mm"]),
-            ("the best sigma is the widest that was searched; " if best["sigma_mm"] == max(p["sigmas_mm"]) else "")
-            + "searched on the same drops, as in the thesis; our places and noise are not its",
-        ),
-        Statement(
-            "5.8: bits at long periods are too many, as sampling begins at the impact.",
-            "likely",
-            ", ".join(f"{line['bits'] - line['any_phase_bits']:+.2f} at {_ms(line['period_ms'])}" for line in lines)
-            + " bits more than with sampling begun at any time",
-            bool(lines[-1]["bits"] > lines[-1]["any_phase_bits"]),
-            size,
-        ),
-    ]
+    yield Statement(
+        "5.6.3: tau .4 ms and sigma 2 mm give most.",
+        "0.4 ms, 2 mm",
+        f"{best['tau_ms']:g} ms, {best['sigma_mm']:g} mm at {_ms(best['period_ms'])}; "
+        + _at_printed(p, by.get(PRINTED["period_ms"])),
+        (best["tau_ms"], best["sigma_mm"]) == (PRINTED["tau_ms"], PRINTED["sigma_mm"]),
+        ("the best sigma is the widest that was searched; " if best["sigma_mm"] == max(p["sigmas_mm"]) else "")
+        + "searched on the same drops, as in the thesis; our places and noise are not its",
+    )
+    yield Statement(
+        "5.8: bits at long periods are too many, as sampling begins at the impact.",
+        "likely",
+        ", ".join(f"{line['bits'] - line['any_phase_bits']:+.2f} at {_ms(line['period_ms'])}" for line in lines)
+        + " bits more than with sampling begun at any time",
+        bool(lines[-1]["bits"] > lines[-1]["any_phase_bits"]),
+        size,
+    )
     printed = [line for line in lines if line["absolute_bits"] is not None]
     if printed:
-        judged.append(
-            Statement(
-                "5.10 and 5.12 as printed (absolute differences) instead of the Euclidean distance (ours).",
-                "none",
-                ", ".join(
-                    f"{line['absolute_bits'] - line['bits']:+.2f} bits at {_ms(line['period_ms'])}" for line in printed
-                ),
-                None,
-                "at the Euclidean one's best tau and sigma",
-            )
+        yield Statement(
+            "5.10 and 5.12 as printed (absolute differences) instead of the Euclidean distance (ours).",
+            "none",
+            ", ".join(
+                f"{line['absolute_bits'] - line['bits']:+.2f} bits at {_ms(line['period_ms'])}" for line in printed
+            ),
+            None,
+            "at the Euclidean one's best tau and sigma",
         )
-    return judged + _by_parameter(best, lines[-1], size) + _by_time(lines, size)
+    yield from _by_parameter(best, lines[-1], size)
+    yield from _by_time(lines, size)
 
 
 def _ms(period: float) -> str:
@@ -245,48 +238,44 @@ def _at_printed(p: Parameters, line: dict[str, Any] | None) -> str:
     return f"at 1 ms the printed point has {line['bits'] - bits:.2f} bits less than the best"
 
 
-def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> list[Statement]:
+def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> Iterator[Statement]:
     lost, words = kept_bits.lost(short, long, VARIED)
     if len(lost) < len(VARIED):
-        return []
+        return
     worst, other = sorted(lost, key=lambda n: -lost[n])[:2]
     clear = lost[worst] - lost[other] >= ALIKE
-    return [
-        Statement(
-            "Figure 5.12: the ball's radius is the most sensitive to the period.",
-            "radius",
-            words,
-            bool(worst == "ball_mm" and clear),
-            f"{VARIED[worst]} loses most{'' if clear else f', {VARIED[other]} as much within {ALIKE:g}'}; {size}",
-        )
-    ]
+    yield Statement(
+        "Figure 5.12: the ball's radius is the most sensitive to the period.",
+        "radius",
+        words,
+        bool(worst == "ball_mm" and clear),
+        f"{VARIED[worst]} loses most{'' if clear else f', {VARIED[other]} as much within {ALIKE:g}'}; {size}",
+    )
 
 
-def _by_time(lines: list[dict[str, Any]], size: str) -> list[Statement]:
+def _by_time(lines: list[dict[str, Any]], size: str) -> Iterator[Statement]:
     fast = [line for line in lines if line["period_ms"] <= FAST_MS]
     slow = [line for line in lines if line["period_ms"] > FAST_MS]
     if not fast or not slow:
-        return []
+        return
     wanted = PLATEAU * max(line["bits"] for line in fast)
     never = float("inf")
     reached = {line["period_ms"]: next((t for t, bits in line["times"] if bits >= wanted), never) for line in lines}
     latest = max(reached[line["period_ms"]] for line in fast)
     holds = latest <= PLATEAU_MS and all(reached[line["period_ms"]] >= 2 * latest for line in slow)
-    return [
-        Statement(
-            "Figure 5.13: periods up to 2 ms are near the plateau in under 10 ms; longer ones need twice as long.",
-            "10 ms; twice",
-            "; ".join(f"{_ms(t)}: {'never' if at == never else f'{at:g} ms'}" for t, at in reached.items())
-            + f" for {wanted:.2f} bits",
-            bool(holds),
-            f"that is {PLATEAU:.0%} of the most that periods up to 2 ms reach in {LENGTH_MS:g} ms; {size}",
-        )
-    ]
+    yield Statement(
+        "Figure 5.13: periods up to 2 ms are near the plateau in under 10 ms; longer ones need twice as long.",
+        "10 ms; twice",
+        "; ".join(f"{_ms(t)}: {'never' if at == never else f'{at:g} ms'}" for t, at in reached.items())
+        + f" for {wanted:.2f} bits",
+        bool(holds),
+        f"that is {PLATEAU:.0%} of the most that periods up to 2 ms reach in {LENGTH_MS:g} ms; {size}",
+    )
 
 
-def tables(p: Parameters, summary: Summary) -> list[Table]:
+def tables(p: Parameters, summary: Summary) -> Iterator[Table]:
     """Return the search as a table, period by period."""
-    return [
+    yield from (
         Table(
             f"bits at a period of {_ms(line['period_ms'])} by tau and sigma",
             ["tau", *(f"{sigma:g} mm" for sigma in p["sigmas_mm"])],
@@ -294,7 +283,7 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
             folded=True,
         )
         for line in summary["lines"]
-    ]
+    )
 
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:

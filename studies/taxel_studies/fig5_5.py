@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -152,84 +152,75 @@ def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     }
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 5.5.1, 5.5.3 and Table 5.3 say."""
     lines, most = summary["lines"], np.log2(summary["conditions"])
     bits = [line["bits"] for line in lines]
     size = f"{summary['conditions']} conditions, {p['samples']} samples each, mesh {p['mesh_mm']:g} mm"
     short, long = lines[0], lines[-1]
-    judged = [
-        Statement(
-            "Figure 5.5: mutual information falls as the sampling period grows, with a large gap between .5 and 20 ms.",
-            "falls; ceiling 8.23 bits",
-            f"{kept_bits.listed(lines)}; ceiling {most:.2f} bits",
-            bool(all(b <= a + 0.02 for a, b in pairwise(bits)) and bits[0] - bits[-1] > 1),
-            f"alpha {', '.join(format(line['alpha'], 'g') for line in lines)}; {size}",
-        ),
-        Statement(
-            "Part of the loss at long periods is the jump of the threshold, A T, which grows with them (ours).",
-            "none",
-            ", ".join(f"{line['even_bits'] - line['bits']:+.2f} at {line['period_ms']:g} ms" for line in lines)
-            + f" bits with A T held at that of {p['even_ms']:g} ms",
-            None,
-            size,
-        ),
-        Statement(
-            "Table 5.3: the constants give a rate that is biologically plausible.",
-            "around 100 Hz (held to be 50 to 200)",
-            ", ".join(
-                f"{line['rate_hz']:.0f} ({line['most_rate_hz']:.0f}) Hz at {line['period_ms']:g} ms" for line in lines
-            )
-            + ": mean over all afferents (of the condition with most)",
-            bool(AROUND_100_HZ[0] < max(line["most_rate_hz"] for line in lines) < AROUND_100_HZ[1]),
-            "it falls with the period, as one spike raises the threshold by A T theta_0",
-        ),
-    ]
-    judged += _by_parameter(short, long, size) + _judged_by_time(lines, size)
-    return [*judged, _finer(short, summary["part"], p["part_until_ms"], size)]
+    yield Statement(
+        "Figure 5.5: mutual information falls as the sampling period grows, with a large gap between .5 and 20 ms.",
+        "falls; ceiling 8.23 bits",
+        f"{kept_bits.listed(lines)}; ceiling {most:.2f} bits",
+        bool(all(b <= a + 0.02 for a, b in pairwise(bits)) and bits[0] - bits[-1] > 1),
+        f"alpha {', '.join(format(line['alpha'], 'g') for line in lines)}; {size}",
+    )
+    yield Statement(
+        "Part of the loss at long periods is the jump of the threshold, A T, which grows with them (ours).",
+        "none",
+        ", ".join(f"{line['even_bits'] - line['bits']:+.2f} at {line['period_ms']:g} ms" for line in lines)
+        + f" bits with A T held at that of {p['even_ms']:g} ms",
+        None,
+        size,
+    )
+    yield Statement(
+        "Table 5.3: the constants give a rate that is biologically plausible.",
+        "around 100 Hz (held to be 50 to 200)",
+        ", ".join(
+            f"{line['rate_hz']:.0f} ({line['most_rate_hz']:.0f}) Hz at {line['period_ms']:g} ms" for line in lines
+        )
+        + ": mean over all afferents (of the condition with most)",
+        bool(AROUND_100_HZ[0] < max(line["most_rate_hz"] for line in lines) < AROUND_100_HZ[1]),
+        "it falls with the period, as one spike raises the threshold by A T theta_0",
+    )
+    yield from _by_parameter(short, long, size)
+    yield from _judged_by_time(lines, size)
+    yield _finer(short, summary["part"], p["part_until_ms"], size)
 
 
-def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> list[Statement]:
+def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> Iterator[Statement]:
     lost, words = kept_bits.lost(short, long, VARIED)
     if not {"diameter_mm", "depth_mm"} <= set(lost):
-        return []
+        return
     worst, least = max(lost, key=lambda n: lost[n]), min(lost, key=lambda n: lost[n])
-    return [
-        Statement(
-            "Figure 5.6: radius suffers most from a long period, depth least.",
-            "radius; depth",
-            words,
-            worst == "diameter_mm" and least == "depth_mm",
-            f"{VARIED[worst]} loses most, {VARIED[least]} least; {size}; 5 diameters and slants where the text says 4",
-        )
-    ]
+    yield Statement(
+        "Figure 5.6: radius suffers most from a long period, depth least.",
+        "radius; depth",
+        words,
+        worst == "diameter_mm" and least == "depth_mm",
+        f"{VARIED[worst]} loses most, {VARIED[least]} least; {size}; 5 diameters and slants where the text says 4",
+    )
 
 
-def _judged_by_time(lines: list[dict[str, Any]], size: str) -> list[Statement]:
+def _judged_by_time(lines: list[dict[str, Any]], size: str) -> Iterator[Statement]:
     by = {line["period_ms"]: dict(map(tuple, line["times"])) for line in lines}
-    judged = []
     if 10.0 in by.get(0.5, {}):
         early = by[0.5][10.0]
-        judged.append(
-            Statement(
-                "Figure 5.8: over 6 bits are there within 10 ms at a period of .5 ms.",
-                "> 6 bits",
-                f"{early:.2f} bits",
-                early > BITS_AT_10_MS,
-                f"{size}; a shallow contact has then moved by 50 um only",
-            )
+        yield Statement(
+            "Figure 5.8: over 6 bits are there within 10 ms at a period of .5 ms.",
+            "> 6 bits",
+            f"{early:.2f} bits",
+            early > BITS_AT_10_MS,
+            f"{size}; a shallow contact has then moved by 50 um only",
         )
         slow = [t for t, bits in by.get(5.0, {}).items() if bits >= early]
-        judged.append(
-            Statement(
-                "Figure 5.8: a period of 5 ms needs 80 ms for as much.",
-                "80 ms (held to be 40 or more)",
-                f"{slow[0]:g} ms" if slow else "not within 100 ms",
-                not slow or slow[0] >= 40,
-                f"for the {early:.2f} bits that .5 ms has at 10 ms; {size}",
-            )
+        yield Statement(
+            "Figure 5.8: a period of 5 ms needs 80 ms for as much.",
+            "80 ms (held to be 40 or more)",
+            f"{slow[0]:g} ms" if slow else "not within 100 ms",
+            not slow or slow[0] >= 40,
+            f"for the {early:.2f} bits that .5 ms has at 10 ms; {size}",
         )
-    return judged
 
 
 def _finer(short: dict[str, Any], part: dict[str, Any], until_ms: float, size: str) -> Statement:
@@ -246,19 +237,17 @@ def _finer(short: dict[str, Any], part: dict[str, Any], until_ms: float, size: s
     )
 
 
-def tables(_p: Parameters, summary: Summary) -> list[Table]:
+def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
     """Return the search over alpha, as a table."""
     alphas = sorted({a for line in summary["lines"] for a, _ in line["searched"]})
     known = [dict(map(tuple, line["searched"])) for line in summary["lines"]]
     rows = [[f"{a:g}", *(f"{bits[a]:.2f}" if a in bits else "-" for bits in known)] for a in alphas]
-    return [
-        Table(
-            "bits by period and alpha",
-            ["alpha", *(f"{line['period_ms']:g} ms" for line in summary["lines"])],
-            rows,
-            "below 2 ms only the best of the longer periods, its neighbours, and the printed 0.7 were tried",
-        )
-    ]
+    yield Table(
+        "bits by period and alpha",
+        ["alpha", *(f"{line['period_ms']:g} ms" for line in summary["lines"])],
+        rows,
+        "below 2 ms only the best of the longer periods, its neighbours, and the printed 0.7 were tried",
+    )
 
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:

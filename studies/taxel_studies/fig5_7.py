@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -54,7 +54,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     }
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 5.5.2 says."""
     by = {line["event_bits"]: dict(zip(summary["periods_ms"], line["bits"], strict=True)) for line in summary["lines"]}
     few, many = min(by), max(by)
@@ -62,28 +62,23 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     of_each = f"{p['samples']} samples each, alpha {p['alpha']:g}, mesh {p['mesh_mm']:g} mm"
     size = f"{summary['conditions']} conditions, {of_each}"
     gain = {period: by[many][period] - by[few][period] for period in (short, long)}
-    judged = [
-        Statement(
-            "Figure 5.7: more bits an event raise the information, and only at long periods by much.",
-            "the picture",
-            "; ".join(f"{period:g} ms: {bits:+.2f} bits" for period, bits in gain.items())
-            + f" from {few} to {many} bits an event",
-            bool(gain[long] > 0 and gain[long] > gain[short]),
-            size,
-        )
-    ]
+    yield Statement(
+        "Figure 5.7: more bits an event raise the information, and only at long periods by much.",
+        "the picture",
+        "; ".join(f"{period:g} ms: {bits:+.2f} bits" for period, bits in gain.items())
+        + f" from {few} to {many} bits an event",
+        bool(gain[long] > 0 and gain[long] > gain[short]),
+        size,
+    )
     if {1, 10} <= set(by) and {2.0, 20.0} <= set(summary["periods_ms"]):
         slow, quick = by[10][20.0], by[1][2.0]
-        judged.append(
-            Statement(
-                "20 ms with 10 bits does much worse than 2 ms with 1 bit, at the same data rate.",
-                "much lower",
-                f"{slow:.2f} against {quick:.2f} bits",
-                bool(slow < quick - 0.5),
-                f"much: by half a bit or more; {size}",
-            )
+        yield Statement(
+            "20 ms with 10 bits does much worse than 2 ms with 1 bit, at the same data rate.",
+            "much lower",
+            f"{slow:.2f} against {quick:.2f} bits",
+            bool(slow < quick - 0.5),
+            f"much: by half a bit or more; {size}",
         )
-    return judged
 
 
 def draw(_p: Parameters, summary: Summary) -> Figure:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -74,7 +75,7 @@ def _sum_of_kernels(
 summarise = only_result
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 6.3.1 and the caption say."""
     times, potential = np.array(summary["times"]), np.array(summary["potential"])
     theta = thresholds(np.array(p["targets"]), p["targets"])
@@ -82,33 +83,31 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     quiet = np.any([(times > t) & (times <= t + TABLE["refractory"]) for t in p["targets"]], axis=0)
     raised = thresholds(np.array([t + TABLE["refractory"] for t in p["targets"]]), p["targets"])
     exact = len(summary["spikes"]) == len(p["targets"])
-    return [
-        Statement(
-            "The membrane potential is the sum of all postsynaptic potentials (6.4, 6.5).",
-            "the printed sum",
-            f"neuron against the printed sum: {summary['worst_of_sum']:.0e} mV at most",
-            summary["worst_of_sum"] < 1e-12,
-        ),
-        Statement(
-            "A spike is discharged where the potential meets the threshold: U is at it at each target.",
-            "U = theta",
-            f"|U - theta| at the targets: {off:.0e} mV; fires at {', '.join(f'{t:.6f}' for t in summary['spikes'])} ms",
-            bool(off < 1e-12) and exact and bool(np.max(np.abs(np.subtract(summary["spikes"], p["targets"]))) < 1e-6),
-        ),
-        Statement(
-            "The neuron then holds its resting potential for the absolute refractory period.",
-            f"0 mV for {TABLE['refractory']:g} ms",
-            f"{np.max(np.abs(potential[quiet])):g} mV at most",
-            bool(np.all(potential[quiet] == 0)),
-        ),
-        Statement(
-            "The threshold rises from theta_0 to theta_0 + theta+ and recovers.",
-            f"{TABLE['theta_0']:g} to {TABLE['theta_0'] + TABLE['theta_plus']:g} mV",
-            f"{raised[0]:g} mV at the end of the first refractory period; the neuron fires at the second target, where "
-            f"it has come down to {theta[-1]:.4f} mV",
-            exact and bool(np.isclose(raised[0], TABLE["theta_0"] + TABLE["theta_plus"])),
-        ),
-    ]
+    yield Statement(
+        "The membrane potential is the sum of all postsynaptic potentials (6.4, 6.5).",
+        "the printed sum",
+        f"neuron against the printed sum: {summary['worst_of_sum']:.0e} mV at most",
+        summary["worst_of_sum"] < 1e-12,
+    )
+    yield Statement(
+        "A spike is discharged where the potential meets the threshold: U is at it at each target.",
+        "U = theta",
+        f"|U - theta| at the targets: {off:.0e} mV; fires at {', '.join(f'{t:.6f}' for t in summary['spikes'])} ms",
+        bool(off < 1e-12) and exact and bool(np.max(np.abs(np.subtract(summary["spikes"], p["targets"]))) < 1e-6),
+    )
+    yield Statement(
+        "The neuron then holds its resting potential for the absolute refractory period.",
+        f"0 mV for {TABLE['refractory']:g} ms",
+        f"{np.max(np.abs(potential[quiet])):g} mV at most",
+        bool(np.all(potential[quiet] == 0)),
+    )
+    yield Statement(
+        "The threshold rises from theta_0 to theta_0 + theta+ and recovers.",
+        f"{TABLE['theta_0']:g} to {TABLE['theta_0'] + TABLE['theta_plus']:g} mV",
+        f"{raised[0]:g} mV at the end of the first refractory period; the neuron fires at the second target, where "
+        f"it has come down to {theta[-1]:.4f} mV",
+        exact and bool(np.isclose(raised[0], TABLE["theta_0"] + TABLE["theta_plus"])),
+    )
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

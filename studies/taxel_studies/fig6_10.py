@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -42,9 +43,8 @@ realise = waves.realise
 summarise = waves.summarise
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 6.4.7 says, in each reading of B."""
-    judged = []
     for reading in p["readings"]:
         curves = summary["curves"][reading]
         why = waves.why(reading)
@@ -55,23 +55,20 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             ("shunting", "against weak shunting sparse is worse", True, WEAK),
             ("shunting", "against strong shunting sparse is better", False, STRONG),
         )
-        judged += [
+        yield from (
             _compared(f"Noise-free training: {says}.", clean[noise], UNITS[noise], dense_is_better, levels, why)
             for noise, says, dense_is_better, levels in claims
             if noise in clean
-        ]
-        spread = {t: _spread(c) for t, c in (("clean", clean), ("noisy", curves["noisy"]))}
-        judged.append(
-            Statement(
-                "Trained with noise, sparsity matters less.",
-                "results of sparsity were less evident",
-                "largest less smallest distance between ratios, mean over levels and noises: "
-                f"{spread['clean']:.2f} noise-free, {spread['noisy']:.2f} noisy",
-                spread["noisy"] < spread["clean"],
-                why,
-            )
         )
-    return judged
+        spread = {t: _spread(c) for t, c in (("clean", clean), ("noisy", curves["noisy"]))}
+        yield Statement(
+            "Trained with noise, sparsity matters less.",
+            "results of sparsity were less evident",
+            "largest less smallest distance between ratios, mean over levels and noises: "
+            f"{spread['clean']:.2f} noise-free, {spread['noisy']:.2f} noisy",
+            spread["noisy"] < spread["clean"],
+            why,
+        )
 
 
 def _compared(

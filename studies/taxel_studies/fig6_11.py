@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -91,9 +91,8 @@ def modes(shares: NDArray[np.float64]) -> list[int]:
     return places
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 6.4.7 says, in each reading of B."""
-    judged = []
     centres = np.array(summary["centres"])
     for reading in p["readings"]:
         why = READINGS[reading]
@@ -110,8 +109,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 behind = shares[centres > 0.5 * p["bin_mv"]]
                 back = 100 * float(np.max(behind - np.minimum.accumulate(behind)))
                 ours += f"; above zero the histogram rises again by {back:.1f} % of the weights at most"
-            judged.append(Statement(says, published, ours, holds, why))
-    return judged
+            yield Statement(says, published, ours, holds, why)
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

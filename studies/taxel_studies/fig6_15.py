@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -100,9 +100,8 @@ def _added(tested: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 6.5.4 says, in each recipe and source."""
-    judged = []
     for recipe in p["recipes"]:
         about = RECIPES[recipe][0]
         for source, event in dict.fromkeys((r["source"], r["event"]) for r in summary["rows"] if r["recipe"] == recipe):
@@ -118,34 +117,31 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             why = f"{source}, {STANDS_FOR[source][0]}; {about} for both"
             refires = "; printed, CONE's neuron keeps its potential after a spike (6.7), and fires again and again"
             low = "; targets are rare beside silence (6.6 names it), so the output hardly comes to the lowest threshold"
-            judged += [
-                Statement(
-                    f"SKIM produces significantly higher errors ({EVENTS[event]}).",
-                    "SKIM clearly worse",
-                    f"missed and false of {cone['events']}: {wrong['SKIM']} SKIM (threshold {skim['threshold']:g}), "
-                    f"{wrong['CONE']} CONE",
-                    wrong["SKIM"] > wrong["CONE"],
-                    why + (refires if recipe == "printed" and cone["false"] > cone["events"] else ""),
+            yield Statement(
+                f"SKIM produces significantly higher errors ({EVENTS[event]}).",
+                "SKIM clearly worse",
+                f"missed and false of {cone['events']}: {wrong['SKIM']} SKIM (threshold {skim['threshold']:g}), "
+                f"{wrong['CONE']} CONE",
+                wrong["SKIM"] > wrong["CONE"],
+                why + (refires if recipe == "printed" and cone["false"] > cone["events"] else ""),
+            )
+            yield Statement(
+                f"Most of SKIM's errors are false positives ({EVENTS[event]}).",
+                "most of them false positives",
+                f"{skim['false']} false, {skim['missed']} missed",
+                skim["false"] > skim["missed"] if wrong["SKIM"] else None,
+                why + (low if skim["threshold"] == LOWEST and skim["missed"] > 0.1 * skim["events"] else ""),
+            )
+            yield Statement(
+                f"SKIM's times deviate more ({EVENTS[event]}).",
+                "noticeably larger",
+                ", ".join(
+                    f"{name} found none" if r["rms_ms"] is None else f"rms error {r['rms_ms']} ms {name}"
+                    for name, r in (("SKIM", skim), ("CONE", cone))
                 ),
-                Statement(
-                    f"Most of SKIM's errors are false positives ({EVENTS[event]}).",
-                    "most of them false positives",
-                    f"{skim['false']} false, {skim['missed']} missed",
-                    skim["false"] > skim["missed"] if wrong["SKIM"] else None,
-                    why + (low if skim["threshold"] == LOWEST and skim["missed"] > 0.1 * skim["events"] else ""),
-                ),
-                Statement(
-                    f"SKIM's times deviate more ({EVENTS[event]}).",
-                    "noticeably larger",
-                    ", ".join(
-                        f"{name} found none" if r["rms_ms"] is None else f"rms error {r['rms_ms']} ms {name}"
-                        for name, r in (("SKIM", skim), ("CONE", cone))
-                    ),
-                    skim["rms_ms"] > cone["rms_ms"] if None not in (skim["rms_ms"], cone["rms_ms"]) else None,
-                    why,
-                ),
-            ]
-    return judged
+                skim["rms_ms"] > cone["rms_ms"] if None not in (skim["rms_ms"], cone["rms_ms"]) else None,
+                why,
+            )
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

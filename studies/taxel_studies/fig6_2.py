@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -78,30 +78,28 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 6.3.2 says."""
     all_ = summary["kappas"]
     slopes, rises = [c["slope"] for c in all_], [c["rise"] for c in all_]
-    return [
-        Statement(
-            "The same output spike time is maintained.",
-            "the target",
-            *mapping.exactness(all_),
-        ),
-        Statement(
-            "The potential crosses the threshold more steeply for kappa > 1.",
-            "steeper",
-            "mean slope behind the target, mV/ms: " + _by_kappa(p, slopes, ".4f"),
-            bool(np.all(np.diff(slopes) > 0)),
-        ),
-        Statement(
-            "A larger negative change is required to prevent the neuron from spiking.",
-            "robustness to false negatives",
-            f"within {DELTA_T:g} ms the potential would come above the threshold by, %: "
-            + _by_kappa(p, [100 * r for r in rises], ".1f"),
-            bool(np.all(np.diff(rises) > 0)),
-        ),
-    ]
+    yield Statement(
+        "The same output spike time is maintained.",
+        "the target",
+        *mapping.exactness(all_),
+    )
+    yield Statement(
+        "The potential crosses the threshold more steeply for kappa > 1.",
+        "steeper",
+        "mean slope behind the target, mV/ms: " + _by_kappa(p, slopes, ".4f"),
+        bool(np.all(np.diff(slopes) > 0)),
+    )
+    yield Statement(
+        "A larger negative change is required to prevent the neuron from spiking.",
+        "robustness to false negatives",
+        f"within {DELTA_T:g} ms the potential would come above the threshold by, %: "
+        + _by_kappa(p, [100 * r for r in rises], ".1f"),
+        bool(np.all(np.diff(rises) > 0)),
+    )
 
 
 def _by_kappa(p: Parameters, values: Sequence[float], form: str) -> str:

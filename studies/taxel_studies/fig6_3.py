@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -139,7 +139,7 @@ def summarise(_p: Parameters, rows: Sequence[Row]) -> Summary:
     return {row.params["learner"]: row.result for row in rows}
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 6.3.4 says."""
     x, r = summary["cone_x"], summary["cone_r"]
     surface, axis = np.array(r["objective"]), np.array(r["axis"])
@@ -152,38 +152,36 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     reach = abs(p["bound"])
     broken = float(np.median(surface[~silent])) if (~silent).any() else float("nan")
     along = float(np.median(r["line"]["objective"]))
-    return [
-        Statement(
-            "The objectives are convex surfaces.",
-            "convex",
-            f"least second difference along both axes and diagonals: {_bend(np.array(x['objective'])):.0e} (CONE-X), "
-            f"{_bend(surface):.0e} (CONE-R), rounded to 1e-6",
-            min(_bend(np.array(x["objective"])), _bend(surface)) > -5e-6,
-        ),
-        Statement(
-            "CONE-X: the optimum is the lowest point along the line of the equality that keeps silence and bounds.",
-            "lowest point of the projected line",
-            f"learner {x['optimum']:.6f}, lowest of 4001 points of the line {x['line']['least']:.6f}; "
-            f"target met to {x['missed_mv']:.0e} mV",
-            x["status"] == "solved"
-            and x["optimum"] <= x["line"]["least"] + 1e-9
-            and x["line"]["least"] - x["optimum"] < 1e-3
-            and x["missed_mv"] < 1e-9,
-        ),
-        Statement(
-            "CONE-R: the surface is smallest along the equality.",
-            "smallest along the line",
-            f"the lowest of {p['points']} x {p['points']} points misses it by {missed:.4f} mV (a cell: {cell:.4f} mV); "
-            f"learner {r['optimum']:.6f} against {surface.min():.6f}, misses it by {r['missed_mv']:.0e} mV",
-            missed <= cell and r["optimum"] <= float(surface.min()) + 1e-6,
-        ),
-        Statement(
-            "CONE-R: points that violate the inequalities incur large penalties.",
-            "steep walls",
-            f"median objective {broken:.3f} where silence is broken, {along:.3f} along the line (bounds ±{reach:g} mV)",
-            broken > 3 * along,
-        ),
-    ]
+    yield Statement(
+        "The objectives are convex surfaces.",
+        "convex",
+        f"least second difference along both axes and diagonals: {_bend(np.array(x['objective'])):.0e} (CONE-X), "
+        f"{_bend(surface):.0e} (CONE-R), rounded to 1e-6",
+        min(_bend(np.array(x["objective"])), _bend(surface)) > -5e-6,
+    )
+    yield Statement(
+        "CONE-X: the optimum is the lowest point along the line of the equality that keeps silence and bounds.",
+        "lowest point of the projected line",
+        f"learner {x['optimum']:.6f}, lowest of 4001 points of the line {x['line']['least']:.6f}; "
+        f"target met to {x['missed_mv']:.0e} mV",
+        x["status"] == "solved"
+        and x["optimum"] <= x["line"]["least"] + 1e-9
+        and x["line"]["least"] - x["optimum"] < 1e-3
+        and x["missed_mv"] < 1e-9,
+    )
+    yield Statement(
+        "CONE-R: the surface is smallest along the equality.",
+        "smallest along the line",
+        f"the lowest of {p['points']} x {p['points']} points misses it by {missed:.4f} mV (a cell: {cell:.4f} mV); "
+        f"learner {r['optimum']:.6f} against {surface.min():.6f}, misses it by {r['missed_mv']:.0e} mV",
+        missed <= cell and r["optimum"] <= float(surface.min()) + 1e-6,
+    )
+    yield Statement(
+        "CONE-R: points that violate the inequalities incur large penalties.",
+        "steep walls",
+        f"median objective {broken:.3f} where silence is broken, {along:.3f} along the line (bounds ±{reach:g} mV)",
+        broken > 3 * along,
+    )
 
 
 def _bend(surface: NDArray[np.float64]) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -87,36 +87,32 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 6.4.1 says."""
-    judged = []
     for reading, all_ in summary["readings"].items():
         behind = [c["behind"] for c in all_]
         weights = [c["near_weight"] for c in all_]
         why = READINGS[reading]
-        judged += [
-            Statement(
-                "The potential crosses the threshold at 100 ms for every kappa: all sets of solutions are feasible.",
-                "100 ms",
-                *mapping.exactness(all_),
-                why,
-            ),
-            Statement(
-                "A larger kappa lifts the potential behind the target.",
-                "higher trajectories",
-                f"U({p['target'] + DELTA_T:g} ms) in thresholds: " + _by_kappa(p, behind, ".3f"),
-                None not in behind and bool(np.all(np.diff(behind) > 0)),
-                why + ("" if reading == "targets" else ": it does, but by less than kappa asks for"),
-            ),
-            Statement(
-                "It does so by larger weights of the synapses that spike closer to the target.",
-                "increased weights of relevant synapses",
-                f"mean weight within {2 * TABLE['tau']:g} ms of it, mV: " + _by_kappa(p, weights, ".4f"),
-                None not in weights and bool(np.all(np.diff(weights) > 0)),
-                why,
-            ),
-        ]
-    return judged
+        yield Statement(
+            "The potential crosses the threshold at 100 ms for every kappa: all sets of solutions are feasible.",
+            "100 ms",
+            *mapping.exactness(all_),
+            why,
+        )
+        yield Statement(
+            "A larger kappa lifts the potential behind the target.",
+            "higher trajectories",
+            f"U({p['target'] + DELTA_T:g} ms) in thresholds: " + _by_kappa(p, behind, ".3f"),
+            None not in behind and bool(np.all(np.diff(behind) > 0)),
+            why + ("" if reading == "targets" else ": it does, but by less than kappa asks for"),
+        )
+        yield Statement(
+            "It does so by larger weights of the synapses that spike closer to the target.",
+            "increased weights of relevant synapses",
+            f"mean weight within {2 * TABLE['tau']:g} ms of it, mV: " + _by_kappa(p, weights, ".4f"),
+            None not in weights and bool(np.all(np.diff(weights) > 0)),
+            why,
+        )
 
 
 def _by_kappa(p: Parameters, values: Sequence[float | None], form: str) -> str:

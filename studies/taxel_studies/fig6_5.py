@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -77,41 +77,39 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 6.4.2 and the caption say."""
     all_ = summary["ratios"]
     zeros = [c["zeros"] for c in all_]
     listed = ", ".join(f"{z:g} at {c['ratio'][0]:g} : {c['ratio'][1]:g}" for z, c in zip(zeros, all_, strict=True))
     dense = next(c for c in all_ if c["ratio"][0] == 0)
     rising = bool(np.all(np.diff(zeros) > 0))
-    return [
-        Statement(
-            "The output spike time remains unchanged.",
-            "100 ms",
-            *mapping.exactness(all_),
-        ),
-        Statement(
-            "With l2 all synapses contribute; with l1 only the most significant ones.",
-            "sparse for l1, dense for l2",
-            f"zero weights of {p['inputs']}: {listed}",
-            rising and zeros[0] < 1 and zeros[-1] > 0.9 * p["inputs"],
-        ),
-        Statement("The ratio tunes sparsity.", "sparsity of the solution can be tuned", f"zeros: {listed}", rising),
-        Statement(
-            "Caption: sparse solutions are obtained for lambda 2 > lambda 1.",
-            "sparse where l2 weighs more",
-            f"zeros: {listed}",
-            bool(zeros[0] > zeros[-1]),
-            "the caption is the wrong way round: its own text, and the norms, say that l1 is the sparse one",
-        ),
-        Statement(
-            "Not the synapses nearest to the target are potentiated most, but the most effective ones.",
-            "most effective synapses",
-            f"the largest weight (l2) spikes {dense['largest_before_ms']:.1f} ms before the target; "
-            f"the kernel peaks at {TABLE['tau']:g} ms",
-            abs(dense["largest_before_ms"] - TABLE["tau"]) < 0.25 * TABLE["tau"],
-        ),
-    ]
+    yield Statement(
+        "The output spike time remains unchanged.",
+        "100 ms",
+        *mapping.exactness(all_),
+    )
+    yield Statement(
+        "With l2 all synapses contribute; with l1 only the most significant ones.",
+        "sparse for l1, dense for l2",
+        f"zero weights of {p['inputs']}: {listed}",
+        rising and zeros[0] < 1 and zeros[-1] > 0.9 * p["inputs"],
+    )
+    yield Statement("The ratio tunes sparsity.", "sparsity of the solution can be tuned", f"zeros: {listed}", rising)
+    yield Statement(
+        "Caption: sparse solutions are obtained for lambda 2 > lambda 1.",
+        "sparse where l2 weighs more",
+        f"zeros: {listed}",
+        bool(zeros[0] > zeros[-1]),
+        "the caption is the wrong way round: its own text, and the norms, say that l1 is the sparse one",
+    )
+    yield Statement(
+        "Not the synapses nearest to the target are potentiated most, but the most effective ones.",
+        "most effective synapses",
+        f"the largest weight (l2) spikes {dense['largest_before_ms']:.1f} ms before the target; "
+        f"the kernel peaks at {TABLE['tau']:g} ms",
+        abs(dense["largest_before_ms"] - TABLE["tau"]) < 0.25 * TABLE["tau"],
+    )
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

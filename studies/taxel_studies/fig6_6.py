@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -84,28 +84,24 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(_p: Parameters, summary: Summary) -> list[Statement]:
+def statements(_p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 6.4.3 says."""
-    judged = []
     for reading, norms in summary["readings"].items():
         why = f"after a spike “{reading}”"
         mean = {norm: c["mean_between"] for norm, c in norms.items()}
-        judged += [
-            Statement(
-                "For all realisations the weights map the trains to the targets.",
-                "100 of 100, both norms",
-                *mapping.exactness(list(norms.values())),
-                why,
-            ),
-            Statement(
-                "Between output spikes l1 gives the lower potential.",
-                "l1 below l2",
-                "mean potential, mV: " + ", ".join(f"{norm} {v}" for norm, v in mean.items()),
-                bool(mean["l1"] < mean["l2"]) if None not in mean.values() else None,
-                why,
-            ),
-        ]
-    return judged
+        yield Statement(
+            "For all realisations the weights map the trains to the targets.",
+            "100 of 100, both norms",
+            *mapping.exactness(list(norms.values())),
+            why,
+        )
+        yield Statement(
+            "Between output spikes l1 gives the lower potential.",
+            "l1 below l2",
+            "mean potential, mV: " + ", ".join(f"{norm} {v}" for norm, v in mean.items()),
+            bool(mean["l1"] < mean["l2"]) if None not in mean.values() else None,
+            why,
+        )
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -67,57 +67,53 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return {"lines": lines, "others": capacity.PUBLISHED}
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 6.4.4 says, in each reading of what remains after a spike, on the grid and in continuous time."""
-    judged = []
     for reading in p["readings"]:
         for time in p["times"]:
             lines = [line for line in summary["lines"] if (line["after_spike"], line["time"]) == (reading, time)]
-            judged += _of(
+            yield from _of(
                 p, lines, f"after a spike “{reading}”, " + ("1 ms grid" if time == "grid" else "every instant")
             )
-    judged += _price(p, summary)
-    return judged
+    yield from _price(p, summary)
 
 
-def _of(p: Parameters, lines: list[dict[str, Any]], why: str) -> list[Statement]:
+def _of(p: Parameters, lines: list[dict[str, Any]], why: str) -> Iterator[Statement]:
     inputs = np.array(p["inputs"])
     load = np.array([line["load"] for line in lines])
     late, bend = inputs >= SATURATED, inputs == BEND
     if not (late.any() and bend.any()):
         ours = ", ".join(f"{v:.3f} at N = {n}" for v, n in zip(load.mean(axis=0), inputs, strict=True))
-        return [Statement("The load factor rises and saturates.", "at about 0.3", f"{ours} (mean over C)", None, why)]
+        yield Statement("The load factor rises and saturates.", "at about 0.3", f"{ours} (mean over C)", None, why)
+        return
     saturated, at_bend = load[:, late].mean(axis=1), load[:, bend].mean()
     by_class = [f"{v:.3f} at C = {line['classes']}" for v, line in zip(saturated, lines, strict=True)]
     best = max(capacity.PUBLISHED.values())
-    return [
-        Statement(
-            f"The load factor increases rapidly until about N = {BEND}, thereafter only little.",
-            f"rapid to {BEND}, then incremental",
-            f"{load[:, 0].mean():.3f} at N = {inputs[0]}, {at_bend:.3f} at {BEND}, {load[:, -1].mean():.3f} at "
-            f"{inputs[-1]} (mean over C)",
-            bool(at_bend - load[:, 0].mean() > load[:, -1].mean() - at_bend),
-            why,
-        ),
-        Statement(
-            "It saturates at about 0.3, whatever the number of classes.",
-            "about 0.3",
-            f"mean from N = {SATURATED} on: {', '.join(by_class)}",
-            bool(np.all(np.abs(saturated - 0.3) <= 0.03) and np.ptp(saturated) <= 0.03),
-            why,
-        ),
-        Statement(
-            "It is significantly higher than what others reported.",
-            ", ".join(f"{name} {value:g}" for name, value in capacity.PUBLISHED.items()),
-            f"{load[:, -1].min():.3f} or more at N = {inputs[-1]}",
-            bool(load[:, -1].min() > best),
-            f"{why}; theirs were got under other criteria",
-        ),
-    ]
+    yield Statement(
+        f"The load factor increases rapidly until about N = {BEND}, thereafter only little.",
+        f"rapid to {BEND}, then incremental",
+        f"{load[:, 0].mean():.3f} at N = {inputs[0]}, {at_bend:.3f} at {BEND}, {load[:, -1].mean():.3f} at "
+        f"{inputs[-1]} (mean over C)",
+        bool(at_bend - load[:, 0].mean() > load[:, -1].mean() - at_bend),
+        why,
+    )
+    yield Statement(
+        "It saturates at about 0.3, whatever the number of classes.",
+        "about 0.3",
+        f"mean from N = {SATURATED} on: {', '.join(by_class)}",
+        bool(np.all(np.abs(saturated - 0.3) <= 0.03) and np.ptp(saturated) <= 0.03),
+        why,
+    )
+    yield Statement(
+        "It is significantly higher than what others reported.",
+        ", ".join(f"{name} {value:g}" for name, value in capacity.PUBLISHED.items()),
+        f"{load[:, -1].min():.3f} or more at N = {inputs[-1]}",
+        bool(load[:, -1].min() > best),
+        f"{why}; theirs were got under other criteria",
+    )
 
 
-def _price(p: Parameters, summary: Summary) -> list[Statement]:
-    judged = []
+def _price(p: Parameters, summary: Summary) -> Iterator[Statement]:
     for reading in p["readings"]:
         lines = {
             time: np.array(
@@ -129,16 +125,13 @@ def _price(p: Parameters, summary: Summary) -> list[Statement]:
             grid, exact = lines["grid"].sum(axis=0), lines["continuous"].sum(axis=0)
             large = np.array(p["inputs"]) >= min(BEND, max(p["inputs"]))
             cost = 100 * (1 - exact[large].sum() / max(grid[large].sum(), 1))
-            judged.append(
-                Statement(
-                    "Silence at every instant, not only on the grid, costs little capacity (ours, not the thesis').",
-                    "none",
-                    f"{cost:.1f} % of p over N from {min(BEND, max(p['inputs']))} on",
-                    None,
-                    f"after a spike “{reading}”; margin {p['margin']:g} mV, slope {p['slope']:g} mV/ms",
-                )
+            yield Statement(
+                "Silence at every instant, not only on the grid, costs little capacity (ours, not the thesis').",
+                "none",
+                f"{cost:.1f} % of p over N from {min(BEND, max(p['inputs']))} on",
+                None,
+                f"after a spike “{reading}”; margin {p['margin']:g} mV, slope {p['slope']:g} mV/ms",
             )
-    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -85,56 +86,46 @@ def _drawn(trains: SpikeTrains, params: dict[str, Any], end: float) -> list[list
 summarise = only_result
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 6.4.5 and the caption say."""
     noises = summary["noises"]
-    judged = []
     if "jitter" in noises:
         sd = noises["jitter"]["moved_sd_ms"]
-        judged.append(
-            Statement(
-                "Jitter: each spike is moved by a normal deviate of zero mean.",
-                f"sd {p['levels']['jitter']:g} ms",
-                f"sd {sd:.2f} ms over {noises['jitter']['count']} spikes; none lost",
-                abs(sd - p["levels"]["jitter"]) < 0.1 * p["levels"]["jitter"]
-                and noises["jitter"]["count"] == noises["jitter"]["of"],
-            )
+        yield Statement(
+            "Jitter: each spike is moved by a normal deviate of zero mean.",
+            f"sd {p['levels']['jitter']:g} ms",
+            f"sd {sd:.2f} ms over {noises['jitter']['count']} spikes; none lost",
+            abs(sd - p["levels"]["jitter"]) < 0.1 * p["levels"]["jitter"]
+            and noises["jitter"]["count"] == noises["jitter"]["of"],
         )
     if "background" in noises:
         n = noises["background"]
         rate = (n["count"] - n["of"]) / waves.INPUTS / (n["stop"] / 1000)
-        judged.append(
-            Statement(
-                "Background: Poisson spikes are added.",
-                f"{p['levels']['background']:g} Hz",
-                f"{rate:.2f} Hz an input",
-                abs(rate - p["levels"]["background"]) < 0.15 * p["levels"]["background"],
-                "the rate is read as one input's",
-            )
+        yield Statement(
+            "Background: Poisson spikes are added.",
+            f"{p['levels']['background']:g} Hz",
+            f"{rate:.2f} Hz an input",
+            abs(rate - p["levels"]["background"]) < 0.15 * p["levels"]["background"],
+            "the rate is read as one input's",
         )
     if "shunting" in noises:
         n = noises["shunting"]
         lost = 100 * (1 - n["count"] / n["of"])
-        judged.append(
-            Statement(
-                "Shunting: spikes are deleted at random.",
-                f"{p['levels']['shunting']:g} %",
-                f"{lost:.2f} %",
-                abs(lost - p["levels"]["shunting"]) < 0.1,
-            )
+        yield Statement(
+            "Shunting: spikes are deleted at random.",
+            f"{p['levels']['shunting']:g} %",
+            f"{lost:.2f} %",
+            abs(lost - p["levels"]["shunting"]) < 0.1,
         )
     listed = ", ".join(f"{n} {v['distance']:.2f}" for n, v in noises.items())
     worst = max(v["distance"] for v in noises.values())
-    judged.append(
-        Statement(
-            "A robust solution produces the target train despite noise.",
-            "the bottom panel",
-            f"distance over {len(summary['targets'])} targets: {summary['clean_distance']:.2f} without noise, {listed}",
-            worst < ROBUST * len(summary["targets"]),
-            f"kappa {p['kappa']:g}, B over the number of targets; robust: below {ROBUST:.0%} of silence",
-        )
+    yield Statement(
+        "A robust solution produces the target train despite noise.",
+        "the bottom panel",
+        f"distance over {len(summary['targets'])} targets: {summary['clean_distance']:.2f} without noise, {listed}",
+        worst < ROBUST * len(summary["targets"]),
+        f"kappa {p['kappa']:g}, B over the number of targets; robust: below {ROBUST:.0%} of silence",
     )
-    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,23 +45,21 @@ realise = waves.realise
 summarise = waves.summarise
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 6.4.5 and 6.4.6 say, in each reading of B."""
-    judged = []
     for reading in p["readings"]:
         curves = summary["curves"][reading]
         why = waves.why(reading)
         for training, source in (("clean", "6.4.5"), ("noisy", "6.4.6")):
             trained = "noise-free training" if training == "clean" else "noisy training"
-            judged += [
+            yield from (
                 _larger_is_better(p, curves[training][noise], noise, f"{source}, {trained}", why)
                 for noise in ("jitter", "shunting")
                 if noise in curves[training]
-            ]
+            )
             if "background" in curves[training]:
-                judged += _turn(p, curves[training]["background"], f"{source}, {trained}", why)
-        judged.append(_training_helps(p, curves, why))
-    return judged
+                yield from _turn(p, curves[training]["background"], f"{source}, {trained}", why)
+        yield _training_helps(p, curves, why)
 
 
 def _larger_is_better(p: Parameters, curve: dict[str, Any], noise: str, where: str, why: str) -> Statement:
@@ -76,7 +74,7 @@ def _larger_is_better(p: Parameters, curve: dict[str, Any], noise: str, where: s
     )
 
 
-def _turn(p: Parameters, curve: dict[str, Any], where: str, why: str) -> list[Statement]:
+def _turn(p: Parameters, curve: dict[str, Any], where: str, why: str) -> Iterator[Statement]:
     mean, levels = np.array(curve["mean"]), np.array(curve["levels"], float)
     gain = mean[0] - mean[-1]
     low, high = (levels > 0) & (levels < 15), levels > 15
@@ -86,22 +84,20 @@ def _turn(p: Parameters, curve: dict[str, Any], where: str, why: str) -> list[St
         if levels[k] > 0 and gain[k] > 0 >= gain[k + 1]
     ]
     turn = f"; turns at {turns[0]:.0f} Hz" if turns else ""
-    return [
-        Statement(
-            f"Below 15 Hz of background a larger kappa helps ({where}).",
-            "lower error below 15 Hz",
-            "distance, mean below 15 Hz: " + _by_kappa(p["kappas"], mean[:, low].mean(axis=1)),
-            bool(gain[low].mean() > SAME * p["repetitions"]),
-            why,
-        ),
-        Statement(
-            f"Above 15 Hz of background a larger kappa hurts ({where}).",
-            "rapid increase after 15 Hz",
-            "distance, mean above 15 Hz: " + _by_kappa(p["kappas"], mean[:, high].mean(axis=1)) + turn,
-            bool(gain[high].mean() < -SAME * p["repetitions"]),
-            why,
-        ),
-    ]
+    yield Statement(
+        f"Below 15 Hz of background a larger kappa helps ({where}).",
+        "lower error below 15 Hz",
+        "distance, mean below 15 Hz: " + _by_kappa(p["kappas"], mean[:, low].mean(axis=1)),
+        bool(gain[low].mean() > SAME * p["repetitions"]),
+        why,
+    )
+    yield Statement(
+        f"Above 15 Hz of background a larger kappa hurts ({where}).",
+        "rapid increase after 15 Hz",
+        "distance, mean above 15 Hz: " + _by_kappa(p["kappas"], mean[:, high].mean(axis=1)) + turn,
+        bool(gain[high].mean() < -SAME * p["repetitions"]),
+        why,
+    )
 
 
 def _training_helps(p: Parameters, curves: dict[str, Any], why: str) -> Statement:

@@ -6,7 +6,7 @@ cycle is least, near 5 Hz (SA-1), 34 Hz (FA-1) and 200 to 250 Hz (FA-2).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -108,9 +108,8 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge phases and frequencies."""
-    judged = []
     fast, slow = (f"{ramp:g}" for ramp in (min(p["ramps_ms"]), max(p["ramps_ms"])))
     expected: dict[str, tuple[str, Callable[[list[int], list[int]], bool]]] = {
         "SA-1": ("all through the hold, faster while it begins", lambda q, s: min(q[2], s[2]) > 0 and s[4] == 0),
@@ -121,18 +120,16 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     for kind, one in summary.items():
         quick, gentle = one["phases"][fast], one["phases"][slow]
         says, holds = expected[kind]
-        judged.append(
-            Statement(
-                f"{kind} fires in {says} of a ramp-and-hold.",
-                "Johansson and Flanagan 2009; thesis 3.3",
-                "; ".join(
-                    f"ramp of {ramp} ms: " + ", ".join(f"{name} {n}" for name, n in zip(PHASES, q, strict=True))
-                    for ramp, q in ((fast, quick), (slow, gentle))
-                ),
-                bool(holds(quick, gentle)),
-                "spikes by phase"
-                + ("; what the raised threshold held back may fire late, as it sinks" if kind == "FA-1" else ""),
-            )
+        yield Statement(
+            f"{kind} fires in {says} of a ramp-and-hold.",
+            "Johansson and Flanagan 2009; thesis 3.3",
+            "; ".join(
+                f"ramp of {ramp} ms: " + ", ".join(f"{name} {n}" for name, n in zip(PHASES, q, strict=True))
+                for ramp, q in ((fast, quick), (slow, gentle))
+            ),
+            bool(holds(quick, gentle)),
+            "spikes by phase"
+            + ("; what the raised threshold held back may fire late, as it sinks" if kind == "FA-1" else ""),
         )
     for kind, (low, high) in LEAST.items():
         if kind not in summary or summary[kind]["least_hz"] is None:
@@ -144,24 +141,21 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         if kind == "FA-1":
             why += "; FA-1 of 5.1 to 5.5 never forgets a change, so that slow ones reach it as fast ones do, and "
             why += "its threshold, raised by each spike, sinks for hundreds of ms"
-        judged.append(
-            Statement(
-                f"The threshold of {kind} is least near {np.sqrt(low * high):.0f} Hz.",
-                f"{low:g} to {high:g} Hz",
-                f"{first:g} to {last:g} Hz" if first != last else f"{first:g} Hz",
-                bool(low <= last and first <= high),
-                why,
-            )
+        yield Statement(
+            f"The threshold of {kind} is least near {np.sqrt(low * high):.0f} Hz.",
+            f"{low:g} to {high:g} Hz",
+            f"{first:g} to {last:g} Hz" if first != last else f"{first:g} Hz",
+            bool(low <= last and first <= high),
+            why,
         )
-    return judged
 
 
-def tables(p: Parameters, summary: Summary) -> list[Table]:
+def tables(p: Parameters, summary: Summary) -> Iterator[Table]:
     """List thresholds by frequency."""
     head = ["Hz", *(f"{f:g}" for f in p["frequencies_hz"])]
     rows = [[kind, *("-" if a is None else f"{a:.3g}" for a in one["thresholds"])] for kind, one in summary.items()]
     note = "shares of the range, peak to peak, at which every cycle has a spike; - where the whole range does not do"
-    return [Table("thresholds by frequency", head, rows, note)]
+    yield Table("thresholds by frequency", head, rows, note)
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

@@ -175,50 +175,41 @@ def summarise(_p: Parameters, rows: Sequence[Row]) -> Summary:
     return {"runs": len(rows), "good": len(good), "median": middle, "course": shown["course"]}
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge the rate of success and what the neuron learnt."""
     share = 100 * summary["good"] / summary["runs"]
     # Two standard deviations of a count of so many runs.
     give = 200 * np.sqrt(0.96 * 0.04 / summary["runs"])
     enough = p["parts"] * p["seconds"] >= 450 and summary["runs"] >= ENOUGH_RUNS
-    judged = [
-        Statement(
-            "A neuron finds the pattern: it meets over 98 % of the last 150 s, 10 ms from its start or sooner, and "
-            "fires at nothing else.",
-            f"{PUBLISHED:g} % of 100 runs",
-            f"{share:.0f} % of {summary['runs']} runs of {p['parts']} x {p['seconds']} s",
-            bool(abs(share - PUBLISHED) <= give + 0.5) if enough else None,
-            f"held to be within {give:.0f} %, of {ENOUGH_RUNS} runs or more; how rates wander is stated by the paper "
-            "in words",
-        )
-    ]
+    yield Statement(
+        "A neuron finds the pattern: it meets over 98 % of the last 150 s, 10 ms from its start or sooner, and "
+        "fires at nothing else.",
+        f"{PUBLISHED:g} % of 100 runs",
+        f"{share:.0f} % of {summary['runs']} runs of {p['parts']} x {p['seconds']} s",
+        bool(abs(share - PUBLISHED) <= give + 0.5) if enough else None,
+        f"held to be within {give:.0f} %, of {ENOUGH_RUNS} runs or more; how rates wander is stated by the paper "
+        "in words",
+    )
     middle = summary["median"]
     if summary["good"]:
-        judged.append(
-            Statement(
-                "It is found within seconds.",
-                "13.5 s in the paper's example",
-                f"after {middle['found_s']:.1f} s no spike is outside the pattern any more (median)",
-                middle["found_s"] < 60,
-            )
+        yield Statement(
+            "It is found within seconds.",
+            "13.5 s in the paper's example",
+            f"after {middle['found_s']:.1f} s no spike is outside the pattern any more (median)",
+            middle["found_s"] < 60,
         )
-        judged.append(
-            Statement(
-                "Strong weights are those of inputs that play the pattern.",
-                "all of them",
-                f"{middle['strong_in_pattern']:.0f} of {middle['strong']:.0f} weights above 0.5 (median)",
-                middle["strong_in_pattern"] >= 0.99 * middle["strong"],
-            )
+        yield Statement(
+            "Strong weights are those of inputs that play the pattern.",
+            "all of them",
+            f"{middle['strong_in_pattern']:.0f} of {middle['strong']:.0f} weights above 0.5 (median)",
+            middle["strong_in_pattern"] >= 0.99 * middle["strong"],
         )
-    return judged
 
 
-def tables(_p: Parameters, summary: Summary) -> list[Table]:
+def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
     """List the medians of the runs that succeed."""
     rows = [[name, "-" if value is None else f"{value:g}"] for name, value in summary["median"].items()]
-    return [
-        Table("runs that succeed, medians", ["what", "value"], rows, f"{summary['good']} of {summary['runs']} runs")
-    ]
+    yield Table("runs that succeed, medians", ["what", "value"], rows, f"{summary['good']} of {summary['runs']} runs")
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

@@ -8,7 +8,7 @@ import json
 import platform
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from importlib import metadata
@@ -198,10 +198,10 @@ class Study:
     tasks: Callable[..., Sequence[Task]]
     realise: Callable[..., Any]
     summarise: Callable[..., Summary]
-    statements: Callable[[Parameters, Summary], Sequence[Statement]]
+    statements: Callable[[Parameters, Summary], Iterable[Statement]]
     draw: Callable[[Parameters, Summary], Figure | Sequence[Figure]]
     shared: Callable[[Parameters], Sequence[tuple[Any, ...]]] | None = None
-    tables: Callable[[Parameters, Summary], Sequence[Table]] | None = None
+    tables: Callable[[Parameters, Summary], Iterable[Table]] | None = None
     data: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
 
@@ -352,18 +352,14 @@ def _say(quiet: bool, text: str) -> None:
 
 
 def _alike(value: Any, other: Any) -> bool:
-    if isinstance(other, bool) or isinstance(value, bool):
-        return isinstance(value, bool) and isinstance(other, bool)
-    if isinstance(other, int | float):
-        return isinstance(value, int | float) and (isinstance(value, int) or isinstance(other, float))
-    if isinstance(other, list | tuple):
-        return isinstance(value, list | tuple) and all(_alike(v, other[0]) for v in value if other)
-    return isinstance(value, type(other))
+    if isinstance(other, list):
+        return isinstance(value, list) and all(_alike(v, other[0]) for v in value if other)
+    return type(value) is type(other) or (type(value), type(other)) == (int, float)
 
 
 def _kind(value: Any) -> str:
     """Return the kind of value that is allowed, in words."""
-    kinds = {bool: "true or false", int: "a whole number", float: "a number", list: "a list", tuple: "a list"}
+    kinds = {bool: "true or false", int: "a whole number", float: "a number", list: "a list"}
     return kinds.get(type(value), "a text")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -71,31 +71,25 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return {"lines": lines}
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Compare the noted epochs with ours."""
     full = (p["inputs"], p["epochs"]) == (PARAMETERS["inputs"], PARAMETERS["epochs"])
-    judged = []
     for line in summary["lines"]:
         spread = f"{line['epochs'][0]} to {line['epochs'][-1]} epochs" if line["epochs"] else "none"
         ours = f"{line['solved']} of {line['runs']} solved: {spread}"
         if line["load"] in NOTED:
             low, high = NOTED[line["load"]]
-            judged.append(
-                Statement(
-                    f"At p / N = {line['load']:g} every task is solved.",
-                    f"{low} to {high} epochs (2 to 3 seeds of throw-away code)",
-                    ours,
-                    line["solved"] == line["runs"] if full else None,
-                    f"{p['realisations']} seeds spread wider",
-                )
+            yield Statement(
+                f"At p / N = {line['load']:g} every task is solved.",
+                f"{low} to {high} epochs (2 to 3 seeds of throw-away code)",
+                ours,
+                line["solved"] == line["runs"] if full else None,
+                f"{p['realisations']} seeds spread wider",
             )
         else:
-            judged.append(
-                Statement(
-                    f"At p / N = {line['load']:g} some tasks are solved.", "in part; capacity about 3", ours, None
-                )
+            yield Statement(
+                f"At p / N = {line['load']:g} some tasks are solved.", "in part; capacity about 3", ours, None
             )
-    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

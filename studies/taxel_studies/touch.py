@@ -8,7 +8,7 @@ same scenes. Contact and lift are judged by ``taxel bench training``.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -187,7 +187,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     }
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what the study is to show, and name the other method where it does better."""
     at = summary["times_ms"].index(10.0) if 10.0 in summary["times_ms"] else len(summary["times_ms"]) - 1
     shares = {way: summary["kinds"][way][at] for way in WAYS}
@@ -195,43 +195,39 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     middle = "never" if summary["said_ms"] is None else f"{summary['said_ms'][1]:.1f} ms after contact (median)"
     ways = ", ".join(f"{WAYS[way]} {shares[way]:.1%}" for way in WAYS)
     few = summary["few"]
-    return [
-        Statement(
-            f"Which of the two spheres of 5.6.2 fell is learnt from labels alone; known {BY_MS:g} ms after contact.",
-            f"{GOAL:.1%} right by then (our goal)",
-            f"{summary['in_time']} of {summary['scenes']} right by then, {summary['silent']} without a word; {middle}",
-            summary["in_time"] >= GOAL * summary["scenes"],
-            "heights, places and foams drawn; learnt from other seeds",
-        ),
-        Statement(
-            f"{p['few']} labelled touches are enough.",
-            f"{FEW_GOAL:.0%} right by then, mean of {p['draws']} draws (our goal)",
-            f"{np.mean(few):.1%} of the same scenes right by then (mean), the worst draw {min(few):.1%}",
-            bool(np.mean(few) >= FEW_GOAL),
-            "drawn from the training scenes, half of each sphere",
-        ),
-        Statement(
-            f"No rule and no LDA does better at {summary['times_ms'][at]:g} ms.",
-            "the neuron first (our goal)",
-            ways,
-            best == "neuron",
-            f"the rule looks at {summary['rules'][at]}; rule and LDA are given the time of contact, the neuron is not; "
-            "they look at one moment, and see less when the ball leaves (after 15 to 19 ms)",
-        ),
-    ]
+    yield Statement(
+        f"Which of the two spheres of 5.6.2 fell is learnt from labels alone; known {BY_MS:g} ms after contact.",
+        f"{GOAL:.1%} right by then (our goal)",
+        f"{summary['in_time']} of {summary['scenes']} right by then, {summary['silent']} without a word; {middle}",
+        summary["in_time"] >= GOAL * summary["scenes"],
+        "heights, places and foams drawn; learnt from other seeds",
+    )
+    yield Statement(
+        f"{p['few']} labelled touches are enough.",
+        f"{FEW_GOAL:.0%} right by then, mean of {p['draws']} draws (our goal)",
+        f"{np.mean(few):.1%} of the same scenes right by then (mean), the worst draw {min(few):.1%}",
+        bool(np.mean(few) >= FEW_GOAL),
+        "drawn from the training scenes, half of each sphere",
+    )
+    yield Statement(
+        f"No rule and no LDA does better at {summary['times_ms'][at]:g} ms.",
+        "the neuron first (our goal)",
+        ways,
+        best == "neuron",
+        f"the rule looks at {summary['rules'][at]}; rule and LDA are given the time of contact, the neuron is not; "
+        "they look at one moment, and see less when the ball leaves (after 15 to 19 ms)",
+    )
 
 
-def tables(_p: Parameters, summary: Summary) -> list[Table]:
+def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
     """List the shares by method."""
-    return [
-        Table(
-            "Which sphere fell: detected and right, per cent, by ms since contact",
-            ["way", *(f"{t:g}" for t in summary["times_ms"])],
-            [(WAYS[way], *(f"{100 * share:.0f}" for share in summary["kinds"][way])) for way in WAYS],
-            "The neuron's share counts what was detected by then and right; what the rule looks at at each time: "
-            + ", ".join(summary["rules"]),
-        )
-    ]
+    yield Table(
+        "Which sphere fell: detected and right, per cent, by ms since contact",
+        ["way", *(f"{t:g}" for t in summary["times_ms"])],
+        [(WAYS[way], *(f"{100 * share:.0f}" for share in summary["kinds"][way])) for way in WAYS],
+        "The neuron's share counts what was detected by then and right; what the rule looks at at each time: "
+        + ", ".join(summary["rules"]),
+    )
 
 
 def draw(_p: Parameters, summary: Summary) -> Figure:

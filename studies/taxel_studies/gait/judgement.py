@@ -45,17 +45,15 @@ def stand_for(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def statements(_p: Parameters, summary: Summary) -> list[Statement]:
+def statements(_p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 6.5.1 to 6.5.3 say, with chosen parameters and with those printed."""
-    judged = [
-        Statement(
-            "The insole has 92 taxels and makes 184 input neurons: each signal and its inverse.",
-            "92, 184",
-            f"{insole.TAXELS} taxels, {2 * insole.TAXELS} inputs with one level a taxel",
-            insole.TAXELS == 92,
-            "a plate's footfalls cut to the outline of an insole; other recordings have sensors of their own",
-        )
-    ]
+    yield Statement(
+        "The insole has 92 taxels and makes 184 input neurons: each signal and its inverse.",
+        "92, 184",
+        f"{insole.TAXELS} taxels, {2 * insole.TAXELS} inputs with one level a taxel",
+        insole.TAXELS == 92,
+        "a plate's footfalls cut to the outline of an insole; other recordings have sensors of their own",
+    )
     for row in stand_for(summary):
         source, event = row["source"], EVENTS[row["event"]]
         why = f"{source}, {STANDS_FOR[source][0]}; {STAND[row['row']]}"
@@ -67,33 +65,28 @@ def statements(_p: Parameters, summary: Summary) -> list[Statement]:
             error = row["error_ms"]
             ours = f"{error['mean']:+.1f} ± {error['sd']:.1f} ms, " if error else ""
             clean = row["missed"] == 0 and row["false"] == 0
-            judged.append(
-                Statement(
-                    f"One neuron finds {event} on a force plate, none missed, none false.",
-                    f"{mean:+.1f} ± {sd:.1f} ms",
-                    f"{ours}{counts}",
-                    bool(clean and error and abs(error["mean"]) <= abs(mean) + 1 and error["sd"] <= sd),
-                    why,
-                )
+            yield Statement(
+                f"One neuron finds {event} on a force plate, none missed, none false.",
+                f"{mean:+.1f} ± {sd:.1f} ms",
+                f"{ours}{counts}",
+                bool(clean and error and abs(error["mean"]) <= abs(mean) + 1 and error["sd"] <= sd),
+                why,
             )
             continue
-        judged += [
-            Statement(
-                f"On walking recordings it finds more than 95 % of {event}.",
-                "over 95 %",
-                f"{row['found_percent']:.1f} %; {counts}",
-                row["found_percent"] > 95 and row["false"] <= FALSE_SHARE * row["events"],
-                f"{why}; with more than {100 * FALSE_SHARE:g} % of false it would not hold",
-            ),
-            Statement(
-                f"In most cases to 10 ms ({event}).",
-                "most within 10 ms",
-                f"{row['within_10_ms_percent']:.0f} % of those found" if row["error_ms"] else "none found",
-                bool(row["error_ms"] and row["within_10_ms_percent"] > 50),
-                why,
-            ),
-        ]
-    return judged
+        yield Statement(
+            f"On walking recordings it finds more than 95 % of {event}.",
+            "over 95 %",
+            f"{row['found_percent']:.1f} %; {counts}",
+            row["found_percent"] > 95 and row["false"] <= FALSE_SHARE * row["events"],
+            f"{why}; with more than {100 * FALSE_SHARE:g} % of false it would not hold",
+        )
+        yield Statement(
+            f"In most cases to 10 ms ({event}).",
+            "most within 10 ms",
+            f"{row['within_10_ms_percent']:.0f} % of those found" if row["error_ms"] else "none found",
+            bool(row["error_ms"] and row["within_10_ms_percent"] > 50),
+            why,
+        )
 
 
 #: How a table of figures is headed; "false a minute" only where there are minutes of walking.
@@ -111,13 +104,12 @@ _FLATTERED = (
 )
 
 
-def tables(_p: Parameters, summary: Summary) -> list[Table]:
+def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
     """List every row by event, and people where parameters were chosen inside."""
-    listed = [Table("What was run", ("", ""), _about(summary))]
+    yield Table("What was run", ("", ""), _about(summary))
     for source in summary["sources"]:
         for protocol in source["protocols"]:
-            listed += _of_protocol(source, protocol)
-    return listed
+            yield from _of_protocol(source, protocol)
 
 
 def _about(summary: Summary) -> list[list[str]]:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -93,52 +93,44 @@ def _at_90(tried: Sequence[Sequence[float]], inputs: int) -> float | None:
     return None
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Compare Gardner and Grüning's figures, and the loads that the thesis names, with ours."""
-    judged = []
     a = {line["rule"]: line for line in summary["lines"] if line["protocol"] == "a"}
     full = (p["runs_a"], p["epochs_a"]) == (PARAMETERS["runs_a"], PARAMETERS["epochs_a"])
     if "INST" in a:
         ours = dict(zip(a["INST"]["inputs"], a["INST"]["p"], strict=True))
         common = [n for n in INST_PATTERNS if n in ours]
-        judged.append(
-            Statement(
-                "INST learns so many patterns within 1 ms (Gardner and Grüning 2016).",
-                ", ".join(f"{v} at N = {n}" for n, v in INST_PATTERNS.items()),
-                ", ".join(f"{v} at N = {n}" for n, v in ours.items()),
-                all(abs(ours[n] - INST_PATTERNS[n]) <= 5 for n in common) if common and full else None,
-                "in steps of 5 patterns",
-            )
+        yield Statement(
+            "INST learns so many patterns within 1 ms (Gardner and Grüning 2016).",
+            ", ".join(f"{v} at N = {n}" for n, v in INST_PATTERNS.items()),
+            ", ".join(f"{v} at N = {n}" for n, v in ours.items()),
+            all(abs(ours[n] - INST_PATTERNS[n]) <= 5 for n in common) if common and full else None,
+            "in steps of 5 patterns",
         )
     for rule, load in LOADS.items():
         crossings = [load for load in a.get(rule, {}).get("at_90", ()) if load is not None]
         if crossings:
             mean = sum(crossings) / len(crossings)
             shown = ", ".join(f"{v:.3f} at {n}" for n, v in zip(a[rule]["inputs"], a[rule]["at_90"], strict=True) if v)
-            judged.append(
-                Statement(
-                    f"The capacity of {rule} within 1 ms (Gardner and Grüning 2016).",
-                    f"{load:g}",
-                    f"{mean:.3f}: {shown}; in whole steps of 5 patterns {_loads(a[rule])}",
-                    abs(mean - load) <= 0.02 if full else None,
-                    "20 runs, 500 epochs, weights changed once an epoch; where the mean share right comes down to 90 %",
-                )
+            yield Statement(
+                f"The capacity of {rule} within 1 ms (Gardner and Grüning 2016).",
+                f"{load:g}",
+                f"{mean:.3f}: {shown}; in whole steps of 5 patterns {_loads(a[rule])}",
+                abs(mean - load) <= 0.02 if full else None,
+                "20 runs, 500 epochs, weights changed once an epoch; where the mean share right comes down to 90 %",
             )
     for protocol in p["protocols"]:
         lines = [line for line in summary["lines"] if line["protocol"] == protocol and line["load"]]
         best = max((line for line in lines if line["rule"] != "ConeX"), key=lambda line: line["load"][-1], default=None)
         cone = next((line for line in lines if line["rule"] == "ConeX"), None)
         if best is not None and cone is not None:
-            judged.append(
-                Statement(
-                    f"CONE-X learns more than any rule, in protocol {protocol}.",
-                    "0.3 against " + ", ".join(f"{name} {load:g}" for name, load in PUBLISHED.items()),
-                    f"ConeX {_loads(cone)}; the best rule, {best['rule']}, {_loads(best)}",
-                    min(cone["load"]) > max(best["load"]),
-                    "published loads were got under other criteria; a run that ConeX proves infeasible counts as 0 %",
-                )
+            yield Statement(
+                f"CONE-X learns more than any rule, in protocol {protocol}.",
+                "0.3 against " + ", ".join(f"{name} {load:g}" for name, load in PUBLISHED.items()),
+                f"ConeX {_loads(cone)}; the best rule, {best['rule']}, {_loads(best)}",
+                min(cone["load"]) > max(best["load"]),
+                "published loads were got under other criteria; a run that ConeX proves infeasible counts as 0 %",
             )
-    return judged
 
 
 def _loads(line: dict[str, Any]) -> str:
