@@ -65,7 +65,7 @@ def page(*figures):
 
 def detections(**values):
     """Return the page of some detections."""
-    empty = {"tables": [], "warnings": [], "printed": [], "nearest": [], "beside_training": [], "worst": []}
+    empty = {"tables": [], "warnings": [], "printed": [], "nearest": [], "worst": []}
     empty |= {"title": "a page", "judged": "", "readout": "none", "neurons": True, "drawn": {}}
     return render("report/listening.html.j2", **empty | values)
 
