@@ -114,18 +114,3 @@ def test_what_is_not_known_stays_unknown(tmp_path: Path) -> None:
     assert held is not None
     assert np.isnan(held[0]).all()
     assert (held[1:] == REST).all()
-
-
-def test_a_stretch_that_is_cut_out_says_what_was_held_before_all_that_came(tmp_path: Path) -> None:
-    """As a recorder does: who plays a file (the panel) reads it in its order. By the format's own library."""
-    reader = pytest.importorskip("mcap.stream_reader")
-    from mcap.records import Channel, Message
-
-    events = walk(0)
-    taxel.convert(events, tmp_path / "whole.mcap")
-    taxel.convert(taxel.open(tmp_path / "whole.mcap").between(300_000, 400_000), tmp_path / "part.mcap")
-    with (tmp_path / "part.mcap").open("rb") as file:
-        records = list(reader.StreamReader(file).records)
-    names = {record.id: record.topic for record in records if isinstance(record, Channel)}
-    came = [names[record.channel_id] for record in records if isinstance(record, Message)]
-    assert came.index("/held") < came.index("/datagrams")

@@ -62,17 +62,6 @@ def test_loads_in_a_table_have_a_residual_and_find_the_exponent(tmp_path: Path) 
     assert recording.calibrated().total()[[0, 15, 25]] == pytest.approx([0.0, 3.0, 12.0])
 
 
-def test_the_time_of_a_load_counts_from_the_beginning_where_times_count_from_1970(tmp_path: Path) -> None:
-    path, later = tmp_path / "pad.npz", tmp_path / "later.npz"
-    weighed(path)
-    frames = taxel.open(path).frames()
-    taxel.convert(taxel.Frames(frames.values, frames.t + 1_795_000_000_000_000, array=frames.array), later)
-    for place in (path, later):
-        load = ("--load", 12, "--from", 2, "--to", 3, "--exponent", 1)
-        assert run("calibrate", place, *load).returncode == 0
-        assert taxel.open(place).calibrated().total()[25] == pytest.approx(12.0)
-
-
 def test_a_table_needs_no_load(tmp_path: Path) -> None:
     path, table = tmp_path / "a.npz", tmp_path / "table.csv"
     pressed(path)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shell import run
 
 import taxel
 from taxel import _core
@@ -34,37 +33,6 @@ def recorded(path: Path, drift_ppm: float, delay_s: float) -> Path:
         writer.datagram(at, k, taxel.wire.encode(one))
     writer.finish(json.dumps({"received": len(own)}))
     return path
-
-
-@pytest.mark.parametrize(
-    ("drift_ppm", "delay_s", "said"),
-    [
-        (9_900.0, 0.0, None),
-        (-9_900.0, 0.0, None),
-        (10_100.0, 0.0, "a drift of "),
-        (-10_100.0, 0.0, "a drift of "),
-        # No fit takes such drifts, so the delays say it.
-        (-318_601.0, 0.0, "a delay of 5.9 s "),
-        (30_000.0, 0.0, "a median delay of -0.2 s "),
-        (500_000.0, 0.0, "a median delay of -4.1 s "),
-        (0.0, 0.9, None),
-        (0.0, 1.2, "a delay of 1.1 s "),
-        # A pause of more than half a turn of version 1's stamps counts as another turn.
-        (0.0, 7.0, "a delay of "),
-    ],
-)
-def test_info_says_which_clocks_cannot_be(tmp_path: Path, drift_ppm: float, delay_s: float, said: str | None) -> None:
-    file = recorded(tmp_path / "board.mcap", drift_ppm, delay_s)
-    facts = json.loads(run("info", file, "--json").stdout)
-    page = run("info", file).stdout
-    if abs(drift_ppm) < 20_000 and not delay_s:
-        assert facts["drift_ppm"] == pytest.approx(drift_ppm, abs=5)
-    if said is None:
-        assert (facts["clock_doubt"], CAUSE in page) == (None, False)
-    else:
-        assert said in facts["clock_doubt"]
-        assert facts["clock_doubt"] in page
-        assert CAUSE in page
 
 
 def test_the_border_is_between_the_worst_oscillators_and_what_cannot_be() -> None:

@@ -37,19 +37,6 @@ def test_info_says_what_is_in_a_recording(walk: Path) -> None:
         assert words in said.stdout
 
 
-@pytest.mark.parametrize(
-    ("touched", "said"), [(4, "96 not touched enough to say whether they work\n"), (8, "at (row, ")]
-)
-def test_info_gives_no_places_of_most_of_an_array(tmp_path: Path, touched: int, said: str) -> None:
-    values = np.zeros((400, 12, 12))
-    for begin in range(20, 380, 20):
-        values[begin : begin + 10, :touched] = 50 + np.arange(12) + begin % 7
-    frames = taxel.Frames(values, np.arange(400) * 10_000, unit="counts", array=taxel.Array(12, 12, pitch_mm=5.0))
-    taxel.convert(frames, tmp_path / "mat.npz")
-    untested = run("info", tmp_path / "mat.npz").stdout.partition("other taxels")[2].partition("  rate")[0]
-    assert said in untested
-
-
 def test_info_as_json_holds_rates_by_both_clocks_losses_and_taxels(walk: Path) -> None:
     said = json.loads(run("info", walk, "--json").stdout)
     seconds = said["seconds"]
@@ -91,14 +78,6 @@ def test_info_writes_its_picture_once(walk: Path, tmp_path: Path) -> None:
     assert "exists already" in again.stderr
     assert run("info", walk, "--picture", picture, "--overwrite").returncode == 0
     assert "the name of a picture must end in" in run("info", walk, "--picture", tmp_path / "a.txt").stderr
-
-
-def test_info_of_an_unfinished_file_says_so(walk: Path, tmp_path: Path) -> None:
-    path = tmp_path / "cut.mcap"
-    path.write_bytes(walk.read_bytes()[:-20_000])
-    said = run("info", path)
-    assert said.returncode == 3
-    assert "verdict             not finished" in said.stdout
 
 
 def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_path: Path) -> None:
@@ -147,17 +126,6 @@ def test_wrong_input_ends_in_one_line_and_exit_code_2(
     assert said in done.stderr
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.iterdir())
-
-
-def test_a_cut_within_a_recording_may_be_of_silence_and_reaches_its_last_event(walk: Path, tmp_path: Path) -> None:
-    for name, start, stop, events in (
-        ("silence", 0.001, 0.00101, 0),
-        ("last", 0.0635, 99, 2),
-        ("first", -1, 0.000101, 1),
-    ):
-        file = tmp_path / f"{name}.mcap"
-        assert run("cut", walk, file, "--from", start, "--to", stop).returncode == 0
-        assert len(taxel.open(file).events) == events
 
 
 def test_the_sensor_of_a_table_of_events_is_said_once_and_kept(walk: Path, tmp_path: Path) -> None:

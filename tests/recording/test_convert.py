@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +10,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import taxel
-from taxel import Frames, _core
-from taxel._core import FormatError, ProblemError
+from taxel import Frames
+from taxel._core import ProblemError
 
-from .making import HEADER, record, some_events, some_frames
+from .making import record, some_events, some_frames
 
 THESIS = taxel.Array.thesis()
 SEEDS, TIMES = st.integers(0, 2**20), st.integers(-(2**51), 2**51)
@@ -141,23 +140,6 @@ def test_a_csv_of_frames_has_a_column_a_taxel_that_exists(tmp_path: Path) -> Non
     assert np.array_equal(back.array.exists, exists)
 
 
-def test_a_csv_of_events_has_the_columns_that_the_field_knows(tmp_path: Path) -> None:
-    events = taxel.Events(
-        [0, 100], [1, 2], [3, 4], [True, False], array=THESIS, intensity=[7, 0], present=[True, False]
-    )
-    path = tmp_path / "a.csv"
-    taxel.convert(events, path)
-    assert path.read_text() == "t_us,x,y,p,intensity\n0,1,3,1,7\n100,2,4,0,\n"
-    assert taxel.open(path).events == events
-
-
-def test_frames_of_events_are_written_where_a_rate_is_asked_for(tmp_path: Path) -> None:
-    events = some_events()
-    taxel.convert(events, tmp_path / "a.csv", frames_hz=1000)
-    back = taxel.open(tmp_path / "a.csv").frames()
-    assert np.array_equal(back.values, Frames.from_events(events, 1000).values)
-
-
 def test_frames_do_not_go_into_files_of_events(tmp_path: Path) -> None:
     with pytest.raises(ProblemError, match="can contain only events"):
         taxel.convert(some_frames(), tmp_path / "a.lsa")
@@ -204,24 +186,3 @@ def test_nonsense_is_one_clear_error(tmp_path: Path, arguments: tuple, said: str
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
     assert not list(tmp_path.iterdir())
-
-
-def test_a_source_that_is_no_recording_says_so(tmp_path: Path) -> None:
-    path = tmp_path / "a.csv"
-    path.write_bytes(b"\x1f\x8b\x08\x00")
-    with pytest.raises(FormatError, match="byte 3: this byte is zero"):
-        taxel.convert(path, tmp_path / "b.npz")
-
-
-def test_what_was_received_and_dropped_is_there_again_after_any_conversions(tmp_path: Path) -> None:
-    writer = _core.RecordingWriter(tmp_path / "a.mcap", json.dumps(HEADER), "none", False)
-    for number in (0, 1, 4):
-        writer.datagram(number, number, b"\xc0\x00\x00\x03\x04")
-    writer.finish(json.dumps({"received": 5, "dropped_by_kernel": 3, "dropped_by_queue": 2}))
-    first = last = taxel.open(tmp_path / "a.mcap")
-    for k, kind in enumerate((".mcap", ".mcap", ".mcap")):
-        taxel.convert(last, tmp_path / f"{k}{kind}")
-        last = taxel.open(tmp_path / f"{k}{kind}")
-    assert {name: last.counts[name] for name in first.counts} == first.counts
-    assert (last.counts["received"], last.counts["dropped_by_kernel"], last.counts["dropped_by_queue"]) == (5, 3, 2)
-    assert last.verdict == first.verdict

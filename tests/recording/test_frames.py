@@ -107,25 +107,6 @@ def test_a_viewer_sees_ten_pictures_a_second_above_rest(tmp_path: Path) -> None:
         assert taxel.open(tmp_path / f"{unit}.mcap").frames() == frames
 
 
-def test_each_source_has_low_rate_pictures_but_where_frames_are_numbered(tmp_path: Path) -> None:
-    array = Array(2, 3)
-    left = Frames(np.ones((50, 2, 3)), np.arange(50) * 20_000 + 7, unit="N", array=array)
-    right = Frames(np.ones((500, 2, 3)), np.arange(500) * 2000 - 3000, unit="N", array=array)
-    both = (
-        InMemory(Facts(path=tmp_path / "a", array=array, kind="npz", label=name), frames)
-        for name, frames in (("left", left), ("right", right))
-    )
-    taxel.convert(taxel.Recording.of(*both), tmp_path / "both.mcap")
-    shown = low_rate(tmp_path / "both.mcap")
-    assert {topic: len(images) for topic, images in shown.items()} == {"/pressure": 10, "/right/pressure": 11}
-    for images, frames in ((shown["/pressure"], left), (shown["/right/pressure"], right)):
-        assert {one["t_us"] for one in images} <= set(frames.t.tolist())
-        assert [one["log_us"] for one in images] == [one["t_us"] + 3000 for one in images]  # the file begins at 0
-    numbered = InMemory(Facts(path=tmp_path / "n", array=array, kind="npz", timed=False), right)
-    taxel.convert(taxel.Recording.of(numbered), tmp_path / "numbered.mcap")
-    assert low_rate(tmp_path / "numbered.mcap") == {}
-
-
 def test_everything_beside_the_frames_is_kept(tmp_path: Path) -> None:
     array = Array(1, 2, name="channels")
     frames = Frames([[[1.0, 2.5]], [[3.0, 4.0]]], [0, 10_000], unit="N", array=array)
@@ -150,15 +131,6 @@ def test_everything_beside_the_frames_is_kept(tmp_path: Path) -> None:
         ("converted from a",),
     )
     assert not back.truncated
-
-
-def test_frames_of_events_say_that_the_datagrams_are_left(tmp_path: Path) -> None:
-    events = taxel.Events([0, 30_000], [1, 2], [0, 0], [True, True], array=Array(1, 4), intensity=[10, 40])
-    taxel.convert(events, tmp_path / "events.mcap")
-    lost = taxel.convert(tmp_path / "events.mcap", tmp_path / "frames.mcap", frames_hz=100)
-    assert lost == ["raw datagrams"]
-    back = taxel.open(tmp_path / "frames.mcap")
-    assert back.frames() == taxel.open(tmp_path / "events.mcap").frames(100)
 
 
 @pytest.mark.parametrize("make", [write_pedar, write_moticon])

@@ -45,24 +45,10 @@ def test_a_verdict_names_the_gaps_of_stamps(tmp_path: Path, begin_us: int) -> No
     assert (verdict.status, verdict.noted) == ("unknown", {"gaps": 1, "gaps_us": 3_500_000})
 
 
-def test_several_gaps_are_counted_and_the_longest_has_its_time(tmp_path: Path) -> None:
-    recording = opened(walk((5_000_000, 5_050_000), (20_000_000, 23_500_000), (40_000_000, 41_000_000)), tmp_path)
-    assert recording.verdict.endswith("; 3 gaps, 4.5 s together, the longest 3.5 s at 20.0 s")
-    facts = json.loads(run("info", tmp_path / "a.npz", "--json").stdout)
-    assert facts["gaps"].pop("text") in recording.verdict
-    assert facts["gaps"] == {"count": 3, "total_us": 4_550_000, "longest_us": 3_500_000, "t_us": 20_000_000}
-    assert facts["verdict_details"]["noted"] == {"gaps": 3, "gaps_us": 4_550_000}
-    assert recording.between(0, 10e6).verdict.endswith("; 1 gap of 50 ms at 5.0 s")
-
-
 def test_a_recording_that_counts_its_losses_has_its_gaps_in_a_line_of_info(tmp_path: Path) -> None:
     taxel.convert(walk((20_000_000, 23_500_000)), tmp_path / "a.mcap")
     assert taxel.open(tmp_path / "a.mcap").verdict == "nothing lost"
     assert "  gaps                1 gap of 3.5 s at 20.0 s\n" in run("info", tmp_path / "a.mcap").stdout
-
-
-def test_one_frame_that_is_missing_is_no_gap(tmp_path: Path) -> None:
-    assert opened(walk((5_000_000, 5_020_000)), tmp_path).verdict == "losses unknown: the .npz does not record them"
 
 
 def test_the_table_of_a_folder_has_gaps_and_bad_taxels_and_no_verdict_that_says_nothing(tmp_path: Path) -> None:

@@ -104,18 +104,6 @@ def test_bad_taxels_are_named_within_ten_touches_and_hardly_any_other() -> None:
     assert others <= 1
 
 
-def test_a_taxel_that_was_touched_twice_is_not_enough_to_say() -> None:
-    sensor = Sensor(3)
-    sensor.plant({"dead": 1})
-    [(x, y)] = sensor.bad["dead"]
-    sensor.play(300)
-    for touches, named in ((1, []), (2, []), (3, [(x, y)])):
-        sensor.touch(y, x)
-        found = taxel.health(sensor.events())
-        assert (found.named()["dead"], bool(found.untested[y, x])) == (named, touches < 3)
-    assert "not touched enough to say" in repr(found)
-
-
 def test_channels_and_single_footfalls_name_nothing() -> None:
     t = np.arange(400) * 10_000
     load = np.clip(np.sin(t / 5e5), 0, None)[:, None] * np.array([400, 0, 250, 30])
@@ -138,18 +126,6 @@ def touched(**bad: tuple[int, int]) -> Sensor:
     for _ in range(4):
         sensor.touch(4.5, 4.5, 20.0)
     return sensor
-
-
-def test_a_sound_array_has_no_bad_taxel() -> None:
-    found = taxel.health(touched().events())
-    assert (found.named(), bool(found.untested.any())) == (NOTHING, False)
-    assert repr(found) == "Health(100 taxels: 0 dead, 0 stuck, 0 noisy)"
-
-
-@pytest.mark.parametrize("kind", ["dead", "stuck", "noisy"])
-def test_a_bad_taxel_is_named_where_others_work(kind: str) -> None:
-    found = taxel.health(touched(**{kind: (4, 7)}).events())
-    assert found.named() == {**NOTHING, kind: [(4, 7)]}
 
 
 def test_a_taxel_that_does_not_exist_is_not_dead() -> None:

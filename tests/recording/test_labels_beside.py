@@ -92,15 +92,6 @@ def test_other_texts_beside_a_recording_are_none_of_its_labels(tmp_path: Path) -
     assert noted(place) == []
 
 
-def test_labels_are_no_recordings_of_a_folder_of_described_tables(tmp_path: Path) -> None:
-    (tmp_path / "layout.toml").write_text('rows = 1\ncolumns = 2\nrate_hz = 100\n[table]\nseparator = "\\t"\n')
-    (tmp_path / "walk.dat").write_text("1\t2\n" * 100)
-    (tmp_path / "walk_events.tsv").write_text(BIDS)
-    (tmp_path / "walk.txt").write_text(TRACK)
-    [recording] = taxel.open_all(tmp_path)
-    assert (recording.name, [(note.text, note.t) for note in recording.notes]) == ("walk.dat", EXPECTED)
-
-
 @pytest.mark.parametrize(
     ("content", "said"),
     [

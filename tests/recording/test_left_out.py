@@ -7,7 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from formats.making import write_pedar
 from shell import call
 from tests.tasks.recordings import mat
 
@@ -59,29 +58,6 @@ def test_labels_without_a_recording_are_not_given_to_the_only_one_that_is_left(t
         pytest.warns(UserWarning, match="left out"),
         pytest.raises(FormatError, match="does not state the recording of each label, but there are 2 recordings"),
     ):
-        taxel.open_all(tmp_path)
-
-
-def test_a_damaged_file_of_another_format_or_program_is_left_out(tmp_path: Path) -> None:
-    (tmp_path / "pedar").mkdir()
-    file = write_pedar(tmp_path / "pedar")
-    file.with_name("second.asc").write_bytes(file.read_bytes()[:200])
-    with pytest.warns(UserWarning, match=r"^left out, because it cannot be read: .*second\.asc"):
-        assert {each.path.stem for each in taxel.open_all(tmp_path / "pedar")} == {file.stem}
-    (tmp_path / "tables").mkdir()
-    (tmp_path / "tables/layout.toml").write_text("rows = 1\ncolumns = 2\nrate_hz = 10\n")
-    for name, content in {"a.txt": "1,2\n3,4\n", "b.txt": "1,2\n3,oh\n", "c.txt": ""}.items():
-        (tmp_path / "tables" / name).write_text(content)
-    with pytest.warns(UserWarning, match="^left out") as said:
-        assert [each.name for each in taxel.open_all(tmp_path / "tables")] == ["a.txt"]
-    left = [str(each.message) for each in said if str(each.message).startswith("left out")]
-    assert [name in line for name, line in zip(("b.txt", "c.txt"), left, strict=True)] == [True, True]
-
-
-def test_if_no_file_can_be_read_the_error_is_that_of_the_first(tmp_path: Path) -> None:
-    for stem in "ab":
-        (tmp_path / f"{stem}.npz").write_bytes(b"PK\x03\x04")
-    with pytest.raises(FormatError, match=r"a\.npz: the \.npz file is damaged"):
         taxel.open_all(tmp_path)
 
 

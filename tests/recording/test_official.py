@@ -66,29 +66,6 @@ def test_the_picture_is_a_standard_raw_image_and_a_note_a_standard_log(tmp_path:
     assert set(json.loads(message.data)) >= LOG
 
 
-def test_every_schema_is_json_and_names_what_its_messages_hold(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
-    record(path, some_events())
-    with path.open("rb") as file:
-        for schema, channel, message in make_reader(file).iter_messages():
-            if schema is None:
-                assert channel.topic == "/datagrams"
-                continue
-            assert set(json.loads(message.data)) <= set(json.loads(schema.data)["properties"]), channel.topic
-
-
-def test_a_converted_file_shows_what_was_held_where_something_came(tmp_path: Path) -> None:
-    # Two presses with an hour between: no pictures of the hour.
-    t = [0, 50_000, 3_600_000_000, 3_600_150_000]
-    events = taxel.Events(t, [1, 1, 1, 2], [0] * 4, [True] * 4, array=taxel.Array(1, 4), intensity=[10, 40, 30, 50])
-    taxel.convert(events, tmp_path / "a.mcap")
-    said = pressure(tmp_path / "a.mcap")
-    assert [p["t_us"] for p in said] == [0, 100_000, 3_600_000_000, 3_600_200_000]
-    # Above the first values; what is held for an hour is the rest.
-    assert [list(base64.b64decode(p["data"])) for p in said] == [[0] * 4, [0, 255, 0, 0], [0] * 4, [0] * 4]
-    assert [p["full_ticks"] for p in said] == [1.0, 30.0, 1.0, 1.0]
-
-
 def test_a_converted_file_shows_the_pictures_around_what_happened(tmp_path: Path) -> None:
     # A taxel that gains a tick a ms for a second, in hours of silence.
     t = [-3_600_000_000, *(1000 * np.arange(1000)).tolist(), 3_600_000_000]

@@ -64,14 +64,6 @@ def test_a_folder_is_a_list_in_the_order_of_the_names_with_its_labels_as_notes(t
         taxel.open_all(tmp_path)
 
 
-def test_a_folder_without_a_recording_names_bags_arrays_and_tables_too(tmp_path: Path) -> None:
-    (tmp_path / "notes.pdf").write_bytes(b"%PDF")
-    readable = r"taxel reads .*ROS bags .*tekscan.*arrays and tables of other programs, for example \.npy"
-    with pytest.raises(FormatError, match=readable) as said:
-        taxel.open_all(tmp_path)
-    assert "\n" not in str(said.value)
-
-
 # cut and merge
 
 
@@ -95,20 +87,6 @@ def test_a_part_beyond_the_array_is_refused(tmp_path: Path, asked: dict[str, sli
     with pytest.raises(taxel.ProblemError, match=re.escape(there)):
         taxel.cut(rec, **asked)
     assert taxel.cut(rec, columns=slice(3, 6), rows=slice(-2, None))[0].array.shape == (2, 3)
-
-
-def test_frames_are_cut_and_merged_to_the_last_bit(tmp_path: Path) -> None:
-    frames = some_frames(9)
-    rec = opened(frames, tmp_path)
-    t = int(frames.t[4])
-    parts = [taxel.cut(rec, stop_us=t)[0], taxel.cut(rec, start_us=t)[0]]
-    assert taxel.merge(parts).frames() == frames
-    with pytest.raises(ProblemError, match="not after"):
-        taxel.merge([rec, rec])
-    again = taxel.merge([rec, rec], gap_us=500).frames()
-    assert len(again) == 18
-    assert again.t[9] - again.t[8] == 500
-    assert {n.text for n in taxel.merge([rec, rec], gap_us=500).notes} == {"a.npz"}
 
 
 def test_a_label_is_cut_out_with_what_lies_around_it(tmp_path: Path) -> None:

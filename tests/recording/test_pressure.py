@@ -69,23 +69,6 @@ def test_frames_rest_at_zero_and_events_without_intensities_have_no_pressure(tmp
     )
 
 
-def test_the_noise_of_taxels_without_a_load_is_no_sum(tmp_path: Path) -> None:
-    values = np.random.default_rng(3).normal(500.0, 3.0, (300, 12, 12))
-    values[200:260, 4:6, 4:6] += 700.0
-    taxel.convert(taxel.Frames(values, np.arange(300) * 10_000, unit="counts"), tmp_path / "a.npz")
-    assert run("info", tmp_path / "a.npz", "--table", tmp_path / "a.csv").returncode == 0
-    rows = list(csv.DictReader((tmp_path / "a.csv").open()))
-    found = np.array([float(row["sum_counts"]) for row in rows])
-    assert not found[:200].any()
-    assert not found[260:].any()
-    assert found[200:260] == pytest.approx(2800.0, rel=0.02)
-    # In a unit of force nothing is cut off, and values below 0 cancel those above.
-    taxel.convert(taxel.Frames(values - 500.0, np.arange(300) * 10_000, unit="N"), tmp_path / "n.npz")
-    assert run("info", tmp_path / "n.npz", "--table", tmp_path / "n.csv").returncode == 0
-    row = list(csv.DictReader((tmp_path / "n.csv").open()))[7]
-    assert float(row["sum_N"]) == pytest.approx((values[7] - 500.0).sum(), abs=0.01)
-
-
 @pytest.mark.parametrize("spread", [0.0, 1.0, 2.0, 4.0])
 @pytest.mark.parametrize("share", [0.1, 0.5])
 def test_noise_has_no_centre_and_each_press_has_one(spread: float, share: float) -> None:
@@ -107,21 +90,3 @@ def test_noise_has_no_centre_and_each_press_has_one(spread: float, share: float)
     found = centre[during]
     assert found.min() >= 3.0
     assert (found <= (12.0, 9.0)).all()
-
-
-def test_frames_of_missing_values_alone_are_no_peak(tmp_path: Path) -> None:
-    values = np.zeros((40, 4, 4))
-    values[10:15], values[20:30] = 7.0, np.nan
-    taxel.convert(taxel.Frames(values, np.arange(40) * 10_000, unit="N"), tmp_path / "a.npz")
-    found = json.loads(run("info", tmp_path / "a.npz", "--json").stdout)["pressure"]
-    assert (found["peak"], found["sum"]["most"]) == ({"most": 7.0, "t_us": 100_000}, 112.0)
-
-
-@pytest.mark.timeout(120)
-@pytest.mark.parametrize("wrong_us", [10**11, 10**15, -(10**15)])
-def test_what_info_takes_does_not_grow_with_a_time_that_is_wrong(tmp_path: Path, wrong_us: int) -> None:
-    t = np.sort(np.append(np.arange(3000) * 1000, wrong_us))
-    x, y, p, ticks = (np.random.default_rng(2).integers(0, most, len(t)) for most in (8, 8, 2, 90))
-    events = taxel.Events(t, x, y, p.astype(bool), array=taxel.Array(8, 8), intensity=ticks)
-    taxel.convert(events, tmp_path / "wrong.npz")
-    assert run("info", tmp_path / "wrong.npz").returncode == 0

@@ -128,19 +128,6 @@ def test_a_folder_leaves_out_what_is_of_others_whatever_its_ending(tmp_path: Pat
     assert [recording.path for recording in taxel.open_all(tmp_path)] == [own]
 
 
-def test_a_folder_of_described_arrays_and_tables_opens_all_of_them(tmp_path: Path) -> None:
-    (tmp_path / "layout.toml").write_text("rows = 1\ncolumns = 3\nrate_hz = 100\n")
-    paths = [content("a.txt", TABLE)(tmp_path), arrays("b.npz", **OTHERS)(tmp_path)]
-    assert [recording.path for recording in taxel.open_all(tmp_path)] == recordings_in(tmp_path) == paths
-
-
-def test_a_layout_of_arrays_says_nothing_of_the_lines_of_texts_beside_them(tmp_path: Path) -> None:
-    (tmp_path / "layout.toml").write_text('rows = 1\ncolumns = 3\nrate_hz = 100\n[data]\narray = "press"\n')
-    content("a.txt", TABLE)(tmp_path)
-    np.savez(tmp_path / "b.npz", press=np.ones((5, 3)), others=np.ones(2))
-    assert [recording.path.name for recording in taxel.open_all(tmp_path)] == ["a.txt", "b.npz"]
-
-
 @pytest.mark.parametrize(("write", "says"), [(spikes, "spike trains"), (arrays("a.npz", **OTHERS), "is the time")])
 def test_a_folder_that_holds_nothing_else_says_what_it_is(write: Write, says: str, tmp_path: Path) -> None:
     path = write(tmp_path)

@@ -45,26 +45,6 @@ def test_a_board_with_nothing_on_it_reads_nothing(tmp_path: Path) -> None:
     assert np.median(found.columns["area_taxels"]) <= 6
 
 
-def test_a_load_that_stays_and_one_that_comes_back(tmp_path: Path) -> None:
-    # Four neighbours: 50 for a second, 90 for a second, 50 again.
-    places = [(2, 2), (3, 2), (2, 3), (3, 3)]
-    rows = [(t, x, y, ticks) for t, ticks in ((0, 50), (1_000_000, 90), (2_000_000, 50)) for x, y in places]
-    rows.append((3_000_000, 0, 0, 20))
-    t, x, y, ticks = zip(*rows, strict=True)
-    events = taxel.Events(t, x, y, [1] * len(t), array=taxel.Array(6, 6, 1.0), intensity=ticks)
-    taxel.convert(events, tmp_path / "a.npz")
-    found = series(taxel.open(tmp_path / "a.npz"))
-    assert found is not None
-    total, area = found.columns["sum_ticks"], found.columns["area_mm2"]
-    pressed = (found.t >= 1_000_000) & (found.t < 2_000_000)
-    assert found.rest.quiet_us == (0, 500_000)
-    assert total[pressed][0] == pytest.approx(160.0)
-    # Of a load that stays, a rest that is known takes a 3600th a second.
-    assert total[pressed][-1] == pytest.approx(160.0 * np.exp(-1 / 3600), rel=1e-4)
-    assert area[pressed].tolist() == [4.0] * np.count_nonzero(pressed)
-    assert not total[~pressed].any()
-
-
 def test_a_tare_comes_first_then_the_calibrations_rest_then_a_quiet_stretch(tmp_path: Path) -> None:
     t = [0, 0, 1_000_000, 1_200_000]
     events = taxel.Events(t, [0, 1, 0, 0], [0] * 4, [1] * 4, array=taxel.Array(2, 2, 1.0), intensity=[50, 40, 90, 50])
@@ -85,19 +65,6 @@ def test_a_tare_comes_first_then_the_calibrations_rest_then_a_quiet_stretch(tmp_
     other = taxel.Tare.take(taxel.Frames(np.zeros((2, 3, 2)), [0, 1]))
     other.save(tmp_path / "other.json")
     assert "the tare has 3 x 2 taxels" in run("info", path, "--tare", tmp_path / "other.json").stderr
-
-
-def test_frames_of_force_rest_at_0_and_others_where_they_are_quiet(tmp_path: Path) -> None:
-    values = np.full((40, 2, 2), 20.0)
-    values[20:30, 0, :] = 80.0
-    values[20:30, 1, :] = 60.0
-    t = np.arange(40) * 50_000
-    for unit, source, peak in (("kPa", "unit", 80.0), ("counts", "quiet", 60.0)):
-        taxel.convert(taxel.Frames(values, t, unit=unit), tmp_path / f"{unit}.npz")
-        found = above_rest(taxel.open(tmp_path / f"{unit}.npz"))
-        assert found is not None
-        frames, _, rest = found
-        assert (rest.source, float(frames.values.max())) == (source, pytest.approx(peak, rel=1e-3))
 
 
 def test_what_is_never_quiet_has_no_rest_and_the_page_says_so(tmp_path: Path) -> None:

@@ -31,16 +31,3 @@ def test_noise_is_quiet_and_no_touch_at_any_rate(shape: tuple[int, int], mean: f
         for count in (25, 115, 250):
             tare = Tare.take(frames, stop_us=window_us * count)
             assert held_by_tare([Example(frames, {}, tare)]) < TOUCH
-
-
-@pytest.mark.parametrize("mean", [0.01, 0.3])
-def test_short_touches_leave_a_quiet_stretch_and_are_seen_in_a_tare(mean: float) -> None:
-    frames = drawn((12, 16), mean, 3, 20_000)
-    values = frames.values.copy()
-    for frame in range(40, 300, 25):
-        values[frame : frame + 3, 4:8, 5:9] += np.random.default_rng(frame).poisson(12.0, (3, 4, 4))
-    touched = Frames(values, frames.t, unit=frames.unit, array=frames.array)
-    quiet = of_quiet(touched).quiet_us
-    assert quiet is not None
-    assert quiet[1] <= 40 * 20_000
-    assert held_by_tare([Example(touched, {}, Tare.take(touched, stop_us=2_300_000))]) >= TOUCH

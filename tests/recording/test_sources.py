@@ -236,20 +236,6 @@ def test_a_source_needs_a_recording_that_can_hold_it_and_its_place(tmp_path: Pat
     assert not list(tmp_path.iterdir())
 
 
-def test_columns_are_learnt_from_the_first_line_of_a_pipe(tmp_path: Path) -> None:
-    pipe = tmp_path / "imu"
-    os.mkfifo(pipe)
-    writer = os.open(pipe, os.O_RDWR)
-    os.write(writer, b"t_s,ax\n")
-    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "imu.mcap", sources={"imu": f"lines:{pipe}"}) as live:
-        os.write(writer, b"0.5,1\n0.25,2\n# no numbers\n0.75,3\n")
-        until(lambda: lines(live, "imu") == 4)
-    os.close(writer)
-    imu = taxel.open(tmp_path / "imu.mcap").sources["imu"]
-    np.testing.assert_array_equal(imu.frames().t, [250_000, 500_000, 750_000])
-    np.testing.assert_array_equal(imu.frames().values.ravel(), [2, 1, 3])
-
-
 def test_what_a_line_does_not_hold_is_counted_and_a_missing_value_too(tmp_path: Path) -> None:
     pipe = tmp_path / "imu"
     os.mkfifo(pipe)
@@ -448,88 +434,3 @@ def test_version_2_begun_in_mid_stream_says_what_the_whole_says(tmp_path: Path, 
         np.testing.assert_array_equal(mine.t, right.t)
         assert mine.present.all() == (intensity == "value")
         np.testing.assert_array_equal(mine.intensity[mine.present], right.intensity[mine.present])
-
-
-def test_a_recording_begun_in_mid_stream_begins_with_what_the_taxels_held(tmp_path: Path) -> None:
-    header = {"array": {"rows": 4, "columns": 4, "pitch_mm": 2.0, "name": "small", "exists": None}}
-    writer = _core.RecordingWriter(tmp_path / "mid.mcap", json.dumps(header), "none", True)
-    held = np.full(16, 65_535, np.uint16)
-    held[[5, 9]] = 300, 41
-    writer.held(1_700_000_000_000_000_000, None, held)
-    rises = taxel.Events([1000, 11_000], [1, 2], [2, 2], [True, True], array=SMALL, intensity=[50, 7])
-    for k, t in enumerate(rises.t):
-        writer.datagram(1_700_000_000_000_000_000 + int(t) * 1000, k, taxel.wire.encode(rises[rises.t == t]))
-    writer.finish("{}")
-    recording = taxel.open(tmp_path / "mid.mcap")
-    known = np.full(16, np.nan)
-    known[[5, 9]] = 300, 41
-    np.testing.assert_array_equal(recording.held, known.reshape(4, 4))
-    frames = recording.frames(rate_hz=100)
-    first = np.where(np.isnan(known), 0, known).reshape(4, 4)
-    first[2, 1] = 50
-    np.testing.assert_array_equal(frames.values[0], first)
-    first[2, 2] = 7
-    np.testing.assert_array_equal(frames.values[1], first)
-    np.testing.assert_array_equal(recording.between(10_000, 12_000).frames(100).values[0, 1], first[1])
-    taxel.convert(recording, tmp_path / "again.mcap")
-    again = taxel.open(tmp_path / "again.mcap")
-    np.testing.assert_array_equal(again.held, recording.held)
-    assert again.frames(100) == frames
-
-
-def test_a_silent_source_of_a_finished_recording_is_said_to_be_silent_also_by_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "quiet.mcap"
-    sources = {"imu": "given,columns=ax", "left": f"board:{LOOPBACK}:0,array=4x4"}
-    with Live(0, host=LOOPBACK, array=SMALL, record=path, name="right", sources=sources) as live:
-        play(presses(9, 1), live.address)
-        until(lambda: live.counters["decoded"] == 9)
-        summary = live.stop()
-    for name in sources:
-        told = taxel.open(path).sources[name].verdict
-        assert (told, told.status) == ("nothing arrived", "nothing arrived")
-        assert summary.verdict.parts[name].status == "nothing arrived"
-
-
-@pytest.mark.parametrize("finished", [True, False])
-@pytest.mark.parametrize(
-    ("stamps_us", "noted", "damaged", "after"),
-    [
-        # The clock begins anew after 3 s: its times go on by arrival.
-        ([20_000 * (k if k < 150 else k - 150) for k in range(200)], {"clock_began_anew": 1}, {}, None),
-        # It is set back by less than a second, so that it may as well be one line out of order.
-        (
-            [20_000 * (k if k < 30 else k - 30) for k in range(60)],
-            {},
-            {"stamps_out_of_order": 1},
-            -1,
-        ),
-        ([20_000 * k + 8_000_000 * (k == 50) for k in range(100)], {}, {"jumps_of_time": 1}, 49 * 20_000),
-        ([20_000 * k for k in range(100)], {}, {}, None),
-    ],
-)
-def test_what_a_streams_stamps_do_is_said_live_and_of_the_file(
-    stamps_us: list[int],
-    noted: dict[str, int],
-    damaged: dict[str, int],
-    after: int | None,
-    finished: bool,
-    tmp_path: Path,
-) -> None:
-    path = tmp_path / "a.mcap"
-    with Live(0, host=LOOPBACK, array=SMALL, record=path, sources={"imu": "given,columns=t_us:ax"}) as live:
-        for k, stamp in enumerate(stamps_us):
-            live.sample("imu", [stamp, k], arrived_ns=1_700_000_000_000_000_000 + k * 20_000_000)
-        live.note("done")
-        at_end = live.stop().verdict.parts["imu"]
-    if not finished:
-        path.write_bytes(path.read_bytes()[:-300])
-    imu = taxel.open(path).sources["imu"]
-    for verdict in (at_end, imu.verdict):
-        assert (verdict.noted, {k: n for k, n in verdict.damaged.items() if k in damaged}) == (noted, damaged)
-        assert ("1 restart of its clock" in verdict) == bool(noted)
-    assert at_end.damaged == damaged
-    assert imu.verdict.doubtful_after_us == after
-    assert (f"times after {after} us are doubtful" in imu.verdict) == (after is not None)
-    if not noted:
-        good = [t for t in stamps_us if after is None or t <= after]
-        np.testing.assert_array_equal(imu.frames().t[: len(good)], good)

@@ -7,7 +7,6 @@ import inspect
 import json
 import pickle
 import re
-import socket
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from loopback import until
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
@@ -26,7 +24,7 @@ from taxel.reading import Facts, InMemory
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers
 
-from .making import HEADER, at_least, record, sent_by_a_board, some_events
+from .making import HEADER, record, sent_by_a_board, some_events
 
 START_NS = HEADER["started_ns"]
 FINE = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 0, "missing": 0}})
@@ -91,16 +89,6 @@ def written_anew(
     return there
 
 
-@pytest.mark.parametrize("keeps", [lambda n: True, lambda n: n % 3 != 1, lambda n: n < 12, lambda n: n > 27])
-def test_what_another_program_left_out_of_a_finished_file_is_lost(keeps: Callable[[int], bool], tmp_path: Path) -> None:
-    """A summary that fits what is there says nothing of what was there."""
-    record(tmp_path / "a.mcap", some_events())
-    left_out, *_ = written_anew(tmp_path / "a.mcap", tmp_path / "b.mcap", lambda n: int(keeps(n)), lambda n: n)
-    verdict = taxel.open(tmp_path / "b.mcap").verdict
-    assert verdict.lost == ({"lost_in_file": left_out} if left_out else {})
-    assert verdict.status == ("lost" if left_out else "complete after arrival")
-
-
 @pytest.mark.parametrize("cut", [0, 300])
 @pytest.mark.parametrize(
     ("topic", "keeps", "cause"),
@@ -143,24 +131,6 @@ def test_datagrams_that_are_there_twice_or_without_their_numbers_are_not_lost(
     verdict = taxel.open(tmp_path / "b.mcap").verdict
     assert verdict.lost == ({"lost_in_file": left_out} if left_out else {})
     assert verdict.damaged.get("repeated_in_file", 0) == twice
-
-
-@pytest.mark.parametrize("then", [1, 2])
-def test_of_what_version_1_sent_after_the_last_counts_nothing_is_known_to_be_there(then: int, tmp_path: Path) -> None:
-    sent, path = sent_by_a_board(), tmp_path / "a.mcap"
-    events = some_events(400, intensity=False)
-    later = sent[20:40] if then == 2 else [taxel.wire.encode(events[k : k + 10]) for k in range(0, 400, 10)]
-    writer = _core.RecordingWriter(path, json.dumps(HEADER), "none", False)
-    for number, one in enumerate([*sent[:20], *later]):
-        writer.datagram(START_NS + number * 100_000_000, number, one)
-        if number == 19:
-            writer.counts(START_NS, json.dumps({"received": 20, "recorded": 20, "missing": 0}))
-    del writer
-    recording = taxel.open(path)
-    assert bool(recording.counts["decoder"]["bytes"]) == (then == 1)
-    assert ("version 1" in recording.verdict) == (then == 1)
-    # Those of the first second, in which they might have been damaged ones of version 2.
-    assert ("bytes_of_version_1_refused" in recording.verdict.damaged) == (then == 1)
 
 
 def test_datagrams_of_version_1_that_come_again_are_damage_as_their_events_are_there_twice(tmp_path: Path) -> None:
@@ -259,44 +229,6 @@ def test_times_after_a_damaged_stamp_are_doubtful(seed: int, tmp_path: Path) -> 
     assert after >= recording.events.t[10 * (wrong - 1)]
 
 
-@pytest.mark.parametrize("share", [0.05, 0.2, 0.5, 0.8, 0.99])
-@pytest.mark.parametrize("of", ["events", "lines", "frames", "two"])
-def test_a_converted_file_that_is_cut_says_what_its_source_lost(of: str, share: float, tmp_path: Path) -> None:
-    source = tmp_path / "a.mcap"
-    if of in ("events", "lines"):
-        stream = {"stream": {"columns": ["ax"]}, "array": taxel.Array(1, 1)._geometry()}
-        writer = _core.RecordingWriter(source, json.dumps(HEADER | (stream if of == "lines" else {})), "none", False)
-        at = START_NS + np.arange(3000) * 1_000_000
-        if of == "lines":
-            writer.samples(at, np.arange(3000, dtype=np.uint64), np.arange(3000.0))
-        else:
-            write_all(writer, sent_by_a_board())
-        writer.finish(json.dumps({"received": 3, "dropped_by_kernel": 7}))
-        first: taxel.Recording = taxel.open(source)
-    else:
-        frames = taxel.Frames(np.random.default_rng(2).normal(size=(300, 16, 16)).astype(np.float32), np.arange(300))
-        verdict = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 7}})
-        names = "a" if of == "frames" else "ab"
-        facts = [Facts(path=tmp_path, array=frames.array, kind="ros", label=name) for name in names]
-        first = taxel.Recording.of(*(InMemory(each, frames, lost=verdict) for each in facts))
-    lost = first.verdict.lost
-    assert lost == {"dropped_by_kernel": 14 if of == "two" else 7}
-    taxel.convert(first, tmp_path / "b.mcap")
-    assert taxel.open(tmp_path / "b.mcap").verdict.to_dict() == first.verdict.to_dict()
-    data = (tmp_path / "b.mcap").read_bytes()
-    # From behind the header on.
-    (tmp_path / "b.mcap").write_bytes(data[: 2600 + int((len(data) - 2600) * share)])
-    verdict = taxel.open(tmp_path / "b.mcap").verdict
-    assert verdict.lost == lost
-    assert verdict.status == "lost"
-    assert "not finished: " in verdict or share > 0.9, "there the summary is cut"
-
-
-def write_all(writer: _core.RecordingWriter, sent: list[bytes]) -> None:
-    for number, one in enumerate(sent):
-        writer.datagram(START_NS + number * 1_000_000, number, one)
-
-
 @pytest.mark.parametrize("converted", [False, True])
 def test_damage_of_a_file_of_two_boards_counts_once(converted: bool, tmp_path: Path) -> None:
     path, sent = tmp_path / "two.mcap", sent_by_a_board(frames=1500)
@@ -352,18 +284,6 @@ def test_a_merged_verdict_is_the_worst_and_keeps_those_of_its_parts(tmp_path: Pa
     assert taxel.merge([both.between(0, 99), both.between(99, 2**40)]).verdict.lost == {"dropped_by_kernel": 5}
 
 
-def test_a_lsa_without_its_lss_is_unfinished_and_with_damage_still(tmp_path: Path) -> None:
-    taxel.convert(some_events(100), tmp_path / "a.lsa")
-    (tmp_path / "a.lss").unlink()
-    assert taxel.open(tmp_path / "a.lsa").verdict.status == "unfinished"
-    data = (tmp_path / "a.lsa").read_bytes()
-    (tmp_path / "b.lsa").write_bytes(data[:100] + b"\x05\x06" + data[100:])
-    verdict = taxel.open(tmp_path / "b.lsa").verdict
-    assert (verdict.status, verdict.damaged) == ("unfinished", {"bytes_skipped": 2})
-    (tmp_path / "b.lss").touch()
-    assert taxel.open(tmp_path / "b.lsa").verdict.status == "damaged"
-
-
 def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
     verdict = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 2}})
     copies = (copy.deepcopy(verdict), pickle.loads(pickle.dumps(verdict)))
@@ -379,20 +299,6 @@ def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
         verdict.status = "complete"  # type: ignore[misc]
 
 
-@pytest.mark.parametrize("appended", [1, 100, "recording"])
-def test_what_stands_behind_the_end_of_a_file_is_told(tmp_path: Path, appended: int | str) -> None:
-    whole, longer = tmp_path / "whole.mcap", tmp_path / "longer.mcap"
-    record(whole, some_events(3000))
-    data = whole.read_bytes()
-    more = data if appended == "recording" else bytes(int(appended))
-    longer.write_bytes(data + more)
-    assert taxel.open(whole).verdict.damaged == {}
-    recording = taxel.open(longer)
-    assert len(recording.events) == 3000
-    assert recording.verdict.damaged == {"bytes_after_end": len(more)}
-    assert recording.verdict.status == "damaged"
-
-
 def test_a_board_that_was_reset_has_not_lost_nothing() -> None:
     counts = {"received": 5, "recorded": 5, "missing": 0, "decoder": {"resets": 2}}
     verdict = Verdict._of({"counts": counts})
@@ -403,64 +309,11 @@ def test_a_board_that_was_reset_has_not_lost_nothing() -> None:
     assert lost == "LOST, at least: 3 datagrams lost or damaged on the way; 2 resets of the board"
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_a_second_board_with_the_numbers_of_the_first_is_told(seed: int, tmp_path: Path) -> None:
-    """Two emulated boards have one session: what came under a number that another datagram has is left out."""
-    draw = np.random.default_rng(seed)
-    boards = [Board(Registers(wire_version=2), version_2=Version2(states_us=0)) for _ in range(2)]
-    sent: list[tuple[int, bytes]] = []
-    for k, board in enumerate(boards):
-        held = np.full(4096, 20, np.uint16)
-        for _ in range(30):
-            held[draw.integers(0, 4096, 20)] ^= 64 + k
-            sent += [(k, one) for one in board.frame(held)]
-    # In turn, with pauses, one behind the other: of each board in its own order.
-    which = draw.permutation([k for k, _ in sent])
-    left = [iter([one for k, one in sent if k == board]) for board in range(2)]
-    came = [next(left[k]) for k in which]
-    came = [bytes(bytearray(one)) for one in came for _ in range(1 + (draw.random() < 0.1))]
-    first: dict[bytes, bytes] = {}
-    again = [one for one in came if first.setdefault(one[4:8], one) is not one]
-    other = sum(first[one[4:8]] != one for one in again)
-    assert other > 10
-    with (
-        taxel.live.Live(0, host="127.0.0.1", record=tmp_path / "a.mcap") as live,
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
-    ):
-        for one in came:
-            link.sendto(one, live.address)
-        until(lambda: live.counters["decoded"] == len(came))
-        told = live.stop().verdict
-    data = (tmp_path / "a.mcap").read_bytes()
-    (tmp_path / "b.mcap").write_bytes(data[: data.index(b"taxel.end") - 13])
-    for verdict in (told, *(taxel.open(tmp_path / f"{name}.mcap").verdict for name in "ab")):
-        assert verdict.damaged == {"datagrams_of_another_board": other}
-        assert verdict.noted.get("datagrams_repeated", 0) == len(again) - other
-        assert at_least(verdict, "damaged")
-        assert "nothing lost;" not in verdict
-    assert told.startswith("nothing lost except datagrams of another board; ")
-
-
 def test_a_source_of_which_nothing_arrived_hides_no_loss_of_another() -> None:
     lost = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 2}})
     silent = Verdict._of({"counts": {}})
     assert (silent.status, Verdict._together([("a", silent), ("b", lost)]).status) == ("nothing arrived", "lost")
     assert Verdict._together([("a", silent), ("b", FINE)]).status == "nothing arrived"
-
-
-def test_datagrams_without_bytes_are_no_recording_of_which_nothing_is_lost(tmp_path: Path) -> None:
-    with (
-        taxel.live.Live(0, host="127.0.0.1", record=tmp_path / "a.mcap") as live,
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
-    ):
-        for _ in range(10):
-            link.sendto(b"", live.address)
-        until(lambda: live.counters["decoded"] == 10)
-        told = live.stop().verdict
-    (tmp_path / "b.mcap").write_bytes((tmp_path / "a.mcap").read_bytes()[:-300])
-    for verdict in (told, *(taxel.open(tmp_path / f"{name}.mcap").verdict for name in "ab")):
-        assert verdict.damaged["empty_datagrams"] == 10
-        assert "10 empty datagrams" in verdict
 
 
 def test_what_an_error_was_is_no_verdict() -> None:
