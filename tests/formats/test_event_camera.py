@@ -91,17 +91,6 @@ def test_counts_are_those_of_events_one_after_the_other(
     assert frames.values.sum() == len(rows) or (region, polarity or "both") != (None, "both")
 
 
-def test_a_region_and_larger_taxels_make_events_too(tmp_path: Path) -> None:
-    rows = some_rows()
-    path = write(tmp_path / "a.raw", rows)
-    events = taxel.open(path, region="3:50,7:41", bin=4, polarity="on").events
-    kept = rows[(rows[:, 1] >= 3) & (rows[:, 1] < 50) & (rows[:, 2] >= 7) & (rows[:, 2] < 41) & (rows[:, 3] == 1)]
-    assert (
-        rows_of(events) == np.stack([kept[:, 0], (kept[:, 1] - 3) // 4, (kept[:, 2] - 7) // 4, kept[:, 3]], 1)
-    ).all()
-    assert events.array.shape == (9, 12)
-
-
 def test_the_layout_and_the_command_line_say_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write(tmp_path / "a.raw", some_rows())
     given = taxel.open(path, region="0:32,0:32", bin=4, window_ms=5, polarity="on").frames()
@@ -220,14 +209,6 @@ def test_weak_bursts_are_learnt_among_hot_pixels_and_noise_that_grows(tmp_path: 
     assert found.false <= 4
 
 
-def test_strong_bursts_are_told_from_weaker_ones(tmp_path: Path) -> None:
-    """Both reach the greatest sum of 3 x 3 taxels in units of noise: each weaker one was false."""
-    begins = np.arange(300, 3900, 150)
-    frames = bursts(begins, np.full((4000, 16, 20), 0.02), np.resize([40.0, 10.0], 24), 5)
-    found = trained(frames, begins[::2], tmp_path).score["jolt"]
-    assert (found.found, found.false) == (12, 0)
-
-
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -287,37 +268,12 @@ def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, window_ms: 
         assert frames.unit == counts.unit
 
 
-@pytest.mark.parametrize(
-    ("name", "begins", "said"),
-    [
-        ("a.aedat", b"#!AER-DAT2.0\r\n", r"not a recording; taxel reads .*and of event cameras .raw, .dat, .aedat4"),
-        ("a.dat", b"", "the file is empty; must be a recording"),
-    ],
-)
-def test_what_is_no_file_of_a_camera_names_those(name: str, begins: bytes, said: str, tmp_path: Path) -> None:
-    (tmp_path / name).write_bytes(begins)
-    with pytest.raises(FormatError, match=said):
-        taxel.open(tmp_path / name)
-
-
 def test_too_many_frames_name_a_larger_window(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(limits, "available", lambda: 1 << 25)
     with refused(
         r"frames of 48 x 64 taxels \(for fewer frames, use --region, a larger --bin or a larger --count-ms", FormatError
     ):
         taxel.open(write(tmp_path / "a.raw", some_rows()), window_ms=0.001)
-
-
-@pytest.mark.parametrize("names", ["timestamp_us,col,row,polarity", "t_us,column,row,on", "time (us),X,Y,pol"])
-def test_names_of_columns_of_events_are_known(names: str, tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text(f"{names}\n100,3,4,1\n230,5,6,0\n400,3,6,1\n600,1,1,0\n".replace("t_us", "t (us)"))
-    events = taxel.open(tmp_path / "a.csv").events
-    assert (events.t.tolist(), events.x.tolist(), events.y.tolist()) == (
-        [100, 230, 400, 600],
-        [3, 5, 3, 1],
-        [4, 6, 6, 1],
-    )
-    assert events.p.tolist() == [True, False, True, False]
 
 
 def test_taxels_beyond_the_sensor_are_refused(tmp_path: Path) -> None:
@@ -327,12 +283,6 @@ def test_taxels_beyond_the_sensor_are_refused(tmp_path: Path) -> None:
     with refused(r"bin is 9: must be a whole number from 1 to 8"):
         taxel.open(file, bin=9, region="0:8,0:4")
     assert taxel.open(file, bin=64).array.shape == (1, 1)
-
-
-def test_the_pitch_of_a_camera_stays_unknown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit, match="0"):
-        main(["info", str(write(tmp_path / "a.raw", some_rows())), "--array", "48x64"])
-    assert "48 x 64 taxels, of unknown pitch" in capsys.readouterr().out
 
 
 def test_the_size_that_a_header_lacks_is_given_or_in_a_layout(tmp_path: Path) -> None:

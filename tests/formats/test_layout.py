@@ -44,17 +44,6 @@ def test_a_table_is_read_as_its_layout_says(tmp_path: Path) -> None:
     assert (recording.side, recording.heel) == ("left", "bottom")
 
 
-@pytest.mark.parametrize("separator", [",", ";", "\t", " ", "|"])
-@pytest.mark.parametrize("named", [True, False])
-def test_tables_of_any_separator_with_or_without_names(tmp_path: Path, separator: str, named: bool) -> None:
-    head = separator.join("abcdef") + "\n" if named else ""
-    layout = f"rate_hz = 50\n[table]\nseparator = {separator!r}".replace("'", '"').replace("\\t", "\\t")
-    frames = table(tmp_path, head + lines(VALUES, separator), layout).frames()
-    np.testing.assert_array_equal(frames.values[:, 0], VALUES.astype(np.float32))
-    assert frames.t.tolist() == [0, 20_000, 40_000]
-    assert frames.array.is_channels
-
-
 @pytest.mark.parametrize(
     ("time", "shape"),
     mixed([None, 1, "zeit"], ["", "rows = 2\ncolumns = 3\n", "rows = 1\ncolumns = 6\npitch_mm = 5\n"]),
@@ -87,15 +76,6 @@ def test_channels_of_our_own_table_keep_their_names(tmp_path: Path, array: Array
     assert taxel.open(tmp_path / "b.csv").array.names is None
 
 
-def test_readings_that_fall_are_turned_once(tmp_path: Path) -> None:
-    for falls, expected in (("true", -VALUES), ("10", 10 - VALUES), ("false", VALUES)):
-        recording = table(tmp_path, lines(VALUES), f"falls = {falls}\nrate_hz = 100")
-        np.testing.assert_array_equal(recording.frames().values[:, 0], expected.astype(np.float32))
-    (tmp_path / "turned").mkdir()
-    taxel.convert(recording, tmp_path / "turned" / "kept.npz")
-    assert taxel.open(tmp_path / "turned" / "kept.npz").frames() == recording.frames()
-
-
 def test_frames_that_would_come_after_the_times_of_files_are_refused(tmp_path: Path) -> None:
     table(tmp_path, lines(np.ones((5, 6))), "rate_hz = 1e-9")
     with pytest.raises(
@@ -125,10 +105,6 @@ def test_values_that_fall_as_the_layout_turns_them_name_it(tmp_path: Path, falls
         else "write falls = true in a layout file, "
     )
     assert of_it in shown
-
-
-def test_without_times_frames_are_numbered(tmp_path: Path) -> None:
-    assert table(tmp_path, lines(VALUES), "rows = 2\ncolumns = 3").frames().t.tolist() == [0, 1, 2]
 
 
 @pytest.mark.parametrize(
@@ -355,44 +331,11 @@ def test_a_layout_for_another_count_of_channels_of_a_trial_is_refused(tmp_path: 
         taxel.open_all(tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("write", "match"),
-    [
-        (
-            lambda place: np.savez(place, a=np.zeros((2, 6)), b=np.zeros((2, 3))),
-            r"contains a \(2 x 6\), b \(2 x 3\); name the array of frames in a layout",
-        ),
-        (lambda place: np.savez(place, a=np.zeros(6)), "states 2 x 3 taxels"),
-        (lambda place: np.savez(place, a=np.array([["x"] * 6])), "contains no numbers"),
-        (lambda place: np.savez(place, a=np.zeros((2, 5))), "states 2 x 3 taxels"),
-    ],
-)
-def test_arrays_that_do_not_fit_are_refused(tmp_path: Path, write: Any, match: str) -> None:
-    write(tmp_path / "one.npz")
-    (tmp_path / "layout.toml").write_text("rows = 2\ncolumns = 3\n")
-    with pytest.raises(FormatError, match=match):
-        taxel.open(tmp_path / "one.npz")
-
-
 def test_a_layout_is_found_by_the_recording_s_name_first(tmp_path: Path) -> None:
     for name in ("walk.layout.toml", "layout.toml"):
         (tmp_path / name).write_text("")
     assert Layout.beside(tmp_path / "walk.csv.gz") == tmp_path / "walk.layout.toml"
     assert Layout.beside(tmp_path / "run.csv") == tmp_path / "layout.toml"
-
-
-@pytest.mark.parametrize(
-    ("encoder", "end"),
-    [
-        ("fa1", "10 ms after the previous frame: frames must come every 1 ms; give --set period_ms=VALUE"),
-        ("level_crossing", "--set levels: missing field `levels`"),
-    ],
-)
-def test_an_error_of_an_encoder_names_the_option_that_sets_the_value(tmp_path: Path, encoder: str, end: str) -> None:
-    np.save(tmp_path / "palm.npy", VALUES.reshape(3, 2, 3))
-    (tmp_path / "palm.layout.toml").write_text("rate_hz = 100\n")
-    said = run("encode", tmp_path / "palm.npy", tmp_path / "o.npz", "--encoder", encoder)
-    assert said.stderr.rstrip().endswith(end)
 
 
 def test_arrays_that_a_layout_names_are_read_also_where_they_have_names_of_taxel(tmp_path: Path) -> None:

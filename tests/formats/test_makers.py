@@ -8,8 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import taxel
 from taxel import FormatError, Frames, Recording
@@ -43,23 +41,6 @@ def test_a_makers_file_is_known_whatever_its_line_ends_and_capitals(name: str, t
     assert [each.frames() for each in feet(path)] == plain
 
 
-@pytest.mark.parametrize("name", WRITERS)
-@given(at=st.integers(0, 30_000), byte=st.integers(0, 255), cut=st.booleans())
-def test_a_damaged_file_is_read_or_one_clear_error(
-    name: str, tmp_path_factory: pytest.TempPathFactory, at: int, byte: int, cut: bool
-) -> None:
-    path = WRITERS[name](tmp_path_factory.mktemp("damaged"))
-    data = bytearray(path.read_bytes())
-    data[at % len(data)] = byte
-    path.write_bytes(data[: at % len(data)] if cut else data)
-    said = path.name
-    try:
-        taxel.open_all(path)
-    except taxel.Error as error:
-        said = str(error)
-    assert path.name in said
-
-
 def test_pedar_insoles_are_both_feet_of_one_recording(tmp_path: Path) -> None:
     left, right = feet(write_pedar(tmp_path))
     assert [each.side for each in (left, right)] == ["left", "right"]
@@ -83,14 +64,6 @@ def test_moticon_rows_that_are_missing_for_a_foot_are_missing_not_zero(tmp_path:
         assert f"{each.side} cop Y" in line
         assert other not in line
         assert "pressure 1" not in line
-
-
-def test_a_moticon_insole_that_sent_nothing_is_an_empty_recording(tmp_path: Path) -> None:
-    def silent(rows: list[str]) -> list[str]:
-        return [*rows[:3], *("\t".join([row.split("\t")[0], *[""] * 25, *row.split("\t")[26:]]) for row in rows[3:])]
-
-    left, right = feet(write_moticon(tmp_path, silent))
-    assert (left.frames().values.shape, right.frames().values.shape) == ((0, 1, 16), (199, 1, 16))
 
 
 def test_moticon_steps_of_published_walks() -> None:

@@ -135,12 +135,6 @@ def test_presses_that_are_held_fall_too(tmp_path, capsys, seed: int, bad: float 
     assert "contact area" not in shown
 
 
-def test_a_load_that_lay_there_from_the_start_is_no_fall() -> None:
-    values = np.random.default_rng(3).normal(500, 2, (2000, 8, 8))
-    values[:1500, 2:6, 2:6] += 300
-    assert not of_frames(taxel.Frames(values, np.arange(2000) * 10_000, unit="counts")).falls
-
-
 def test_encode_train_and_detect_hold_missing_values_and_count_them(tmp_path, capsys) -> None:
     rows = [f"{label},{1_000_000 + 650_000 * k + late}\n" for k in range(12) for label, late in PRESSED]
     (tmp_path / "labels.csv").write_text("label,t_us\n" + "".join(rows))
@@ -204,40 +198,6 @@ def facts_of(frames: taxel.Frames, place: Path, capsys: pytest.CaptureFixture[st
     return json.loads(shown)
 
 
-def test_what_no_neuron_feels_of_values_that_fall_is_the_rule_s(tmp_path, capsys) -> None:
-    taxel.convert(palm(5, -1, 0.4), tmp_path / "palm.npz")
-    rows = [f"press,{1_000_000 + 650_000 * k}\n" for k in range(12)]
-    (tmp_path / "labels.csv").write_text("label,t_us\n" + "".join(rows))
-    command = ("train", tmp_path / "palm.npz", "--labels", tmp_path / "labels.csv", "--folds", 0, "-o")
-    code, *_ = call(capsys, *command, tmp_path / "a.json", "--encoder", "contact_area")
-    assert code == 0
-    found = taxel.tasks.detect(taxel.Readout.load(tmp_path / "a.json"), [taxel.open(tmp_path / "palm.npz")])
-    assert len(found.each[0].outcome.found) == 12
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-def test_a_recording_of_values_that_fall_in_which_nothing_is_detected_says_what_turns_them(tmp_path, capsys, sign):
-    """Of values that rise nothing is said where nothing is detected; nor where something is."""
-    taxel.convert(palm(5, sign, 0.4), tmp_path / "palm.npz")
-    # No press loads 700 of the 768 taxels; each loads 5.
-    for threshold, finds in ((700, False), (5, sign > 0)):
-        rule = tmp_path / f"{threshold}.json"
-        taxel.detect.PlainRule("area", threshold, noise_floor=100.0).save(rule)
-        command = ("detect", tmp_path / "palm.npz", "--readout", rule, "--tare", "0.5")
-        code, shown, _ = call(capsys, *command)
-        assert code == 0
-        code, as_json, _ = call(capsys, *command, "--json")
-        remarks, found = (json.loads(as_json)[name] for name in ("remarks", "detections"))
-        assert bool(found) == finds
-        if sign < 0:
-            assert remarks[0].startswith("rest: that of a quiet stretch")
-            assert "write falls = true in a layout file" in remarks[0]
-            assert remarks[0] in shown
-        else:
-            assert not remarks
-            assert "falls" not in shown
-
-
 def test_where_rebounds_of_values_that_fall_are_detected_what_turns_them_is_said(tmp_path, capsys) -> None:
     """A palm goes a quarter beyond its rest after each press: that is felt and detected, and is no press."""
     taxel.convert(palm(5, -1, 0.4, rebound=0.25), tmp_path / "palm.npz")
@@ -260,18 +220,3 @@ def test_where_rebounds_of_values_that_fall_are_detected_what_turns_them_is_said
     taxel.convert(palm(5, -1, 0.4, rebound=0.25), tmp_path / "palm.npz", overwrite=True)
     (tmp_path / "palm.layout.toml").write_text("falls = true\n")
     assert json.loads(call(capsys, *command, "--json")[1])["remarks"] == []
-
-
-def test_a_slope_that_all_detections_have_is_no_column(tmp_path, capsys) -> None:
-    """Levels of frames come in steps, so presses have one slope; the file has it."""
-    taxel.convert(palm(5, 1, 0.4), tmp_path / "palm.npz")
-    rows = [f"press,{1_000_000 + 650_000 * k}\n" for k in range(12)]
-    (tmp_path / "palm.notes.csv").write_text("label,t_us\n" + "".join(rows))
-    assert call(capsys, "train", tmp_path / "palm.npz", "--folds", 0, "-o", tmp_path / "a.json")[0] == 0
-    command = ("detect", tmp_path / "palm.npz", "--readout", tmp_path / "a.json", "--tare", "0.9")
-    slopes = [one["slope_mv_per_ms"] for one in json.loads(call(capsys, *command, "--json")[1])["detections"]]
-    assert len(slopes) == 12
-    assert slopes == pytest.approx([slopes[0]] * 12)
-    shown = call(capsys, *command)[1]
-    assert shown.count("press") == 13
-    assert "slope" not in shown

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import sqlite3
 import sys
 import warnings
 from pathlib import Path
@@ -171,14 +170,6 @@ def test_messages_of_another_length_are_left_out_and_counted(tmp_path: Path) -> 
         taxel.open(bag, topic="/hand", field="thumb", array=taxel.Array(2, 2))
 
 
-def without_definitions(bag: Path) -> Path:
-    """Take the definitions out of a .db3, as releases of ROS before Iron write it."""
-    with sqlite3.connect(bag) as database:
-        database.execute("DELETE FROM message_definitions")
-    database.close()
-    return bag
-
-
 @pytest.mark.parametrize(
     ("given", "error", "said"),
     [
@@ -257,19 +248,6 @@ def test_only_a_bag_has_topics_and_a_taxel_mcap_is_no_bag(tmp_path: Path) -> Non
     assert taxel.open(tmp_path / "own.mcap").events == events
     with pytest.raises(ProblemError, match=r"own\.mcap: is not a ROS bag; topic, field and ros are only for ROS bags"):
         taxel.open(tmp_path / "own.mcap", topic="/palm")
-
-
-def test_a_layout_file_says_the_topic_and_that_less_means_more(tmp_path: Path, capsys) -> None:
-    bag = bags.write(tmp_path / "grasp.db3", palms())
-    layout = tmp_path / "grasp.layout.toml"
-    layout.write_text('rows = 24\ncolumns = 32\nfalls = 4095\n[ros]\ntopic = "/palm"\nfield = "taxels"\n')
-    frames = taxel.open(bag).frames()
-    assert np.array_equal(frames.values, np.float32(4095) - PALMS.astype(np.float32))
-    assert frames.array.shape == (24, 32)
-    assert json.loads(call(capsys, "info", bag, "--json")[1])["frames"] == 6
-    layout.write_text('[ros]\ntopics = "/palm"\n')
-    with pytest.raises(FormatError, match=r"ros\.topics is not known: must be one of topic, field, ros, by"):
-        taxel.open(bag)
 
 
 def test_a_folder_of_bags_opens_as_a_folder_of_trials(tmp_path: Path) -> None:

@@ -8,7 +8,6 @@ import re
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -257,15 +256,6 @@ def test_two_readings_that_fit_about_equally_are_printed(tmp_path: Path, text: s
         assert words in layout
 
 
-def test_numbers_in_hex_are_decimals_of_no_reading(tmp_path: Path) -> None:
-    first, second = layouts(tmp_path, "01 1E 0A\n02 1F 0B\n")
-    assert frames(opened(tmp_path, "01 1E 0A\n02 1F 0B\n", first))[1] == [[1, 30, 10], [2, 31, 11]]
-    assert frames(opened(tmp_path, "01 1E 0A\n02 1F 0B\n", second))[1] == [[1, 30, 10, 2, 31, 11]]
-    # A letter far below decides for all lines.
-    late = "01 10 20\n" * 40_000 + "02 1F 0B\n"
-    assert all('lines = "hex"' in layout for layout in layouts(tmp_path, late))
-
-
 def test_rows_of_one_frame_are_asked(tmp_path: Path) -> None:
     matrix = np.random.default_rng(1).integers(0, 255, (28, 56))
     np.savetxt(tmp_path / "m.csv", matrix, "%03d", ",")
@@ -305,13 +295,6 @@ def test_a_column_that_is_one_sensor_s_at_first_and_another_s_below_is_asked(tmp
     assert frames(found)[1] == [[k % 7] * 2 for k in range(9000)]
     with refused(FormatError, place=Place("a.csv")):
         opened(tmp_path, "t_s,sensor,value\n0,heel,3\n0,heel,4\n", taxel)
-
-
-def test_a_column_splits_lines_into_sources(tmp_path: Path) -> None:
-    text = "0,0,left,1,2\n5,1,right,8,9\n10,0,left,1,3\n"
-    found = opened(tmp_path, text, '[table]\ntime_column = 1\ntime_unit = "ms"\nby = 3\nleave_out = [2]\n')
-    assert frames(found, "left") == ([0, 10_000], [[1, 2], [1, 3]])
-    assert frames(found, "right") == ([5000], [[8, 9]])
 
 
 def test_a_column_becomes_labels_where_its_value_changes(tmp_path: Path) -> None:
@@ -405,16 +388,6 @@ def test_half_a_frame_is_never_read(tmp_path: Path) -> None:
     assert "2 frames left out: not 2 lines" in found.said
     assert frames(found)[0] == [1000 * k for k in range(30) if k != 5]
     assert frames(found)[1] == [[1, 2, 3, k] for k in range(30) if k != 5]
-
-
-@pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "latin-1", "utf-16"])
-@pytest.mark.parametrize("name", ["a.csv", "a.txt.gz"])
-def test_a_table_in_any_usual_encoding(tmp_path: Path, code: str, name: str) -> None:
-    rows = "".join(f"{k / 100:.2f}\t{k % 7}\t{k % 5 / 4}\n".replace(".", ",") for k in range(30))
-    content = f"Zeit [s]\tFerse [N]\tMittelfuß [N]\n{rows}".encode(code)
-    found = opened(tmp_path, gzip.compress(content) if name.endswith(".gz") else content, name=name)
-    assert frames(found) == ([10_000 * k for k in range(30)], [[k % 7, k % 5 / 4] for k in range(30)])
-    assert (found.layout.unit, found.sources[""].array.names) == ("N", ("Ferse [N]", "Mittelfuß [N]"))
 
 
 def test_a_letter_in_latin_1_far_below(tmp_path: Path) -> None:
@@ -629,19 +602,6 @@ def test_repaired_times_ascend_and_sound_ones_stay(t: list[int]) -> None:
 def test_any_line_has_cells_with_a_name_each_or_is_none(line: str, kind: str, decimal: str) -> None:
     found = read_line(line, kind, ";", decimal)
     assert found is None or len(found.cells) == len(found.names)
-
-
-@given(st.lists(st.tuples(st.integers(-99_999, 99_999), st.integers(0, 99)), min_size=12, max_size=30))
-def test_quoted_decimal_commas_are_read_between_commas(rows: list[tuple[int, int]]) -> None:
-    def cell(hundredths: int) -> str:
-        text = f"{hundredths / 100:.2f}".replace(".", ",")
-        return f'"{text}"'
-
-    lines = [f"{cell(k)},{cell(a)},{cell(b)}" for k, (a, b) in enumerate(rows)]
-    with TemporaryDirectory() as folder:
-        found = opened(Path(folder), "\n".join(["time_s,a,b", *lines]) + "\n")
-    np.testing.assert_array_equal(found.sources[""].t, 10_000 * np.arange(len(rows)))
-    np.testing.assert_array_equal(found.sources[""].values[:, 0], (np.array(rows) / 100).astype(np.float32))
 
 
 @pytest.mark.parametrize("cells", ['"1,{0}","1.234,{1}"', '"1,200","2,10{1}.5"', '"1,200","2,10{1}"'])
