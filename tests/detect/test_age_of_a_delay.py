@@ -18,20 +18,6 @@ def test_a_delay_at_which_an_age_begins_is_trained(delay_ms: float) -> None:
     assert recipe.learner_of("large")[1] == delay_ms
 
 
-@pytest.mark.parametrize(
-    ("learner", "neurons"),
-    [
-        ({}, {"large": {"delay_ms": 5.5}}),
-        ({"delay_ms": 4.999}, {"large": {}}),
-        ({}, {"large": {"choose": [{"delay_ms": 5.0}, {"delay_ms": 7.0}]}}),
-    ],
-)
-def test_a_delay_within_an_age_is_refused(learner: dict, neurons: dict) -> None:
-    with refused():
-        Recipe(ENCODER, learner, neurons)
-    assert Recipe(Moments(), learner, neurons).encoder == Moments()
-
-
 def test_labels_that_a_recipe_does_not_name_are_refused_when_they_are_trained() -> None:
     recipe = Recipe(ENCODER, {"delay_ms": 5.5})
     two = taxel.Array(1, 2, pitch_mm=2.0)

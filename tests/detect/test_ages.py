@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from draws import seeds
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from touching import of_two_sizes
 
-from taxel import Array, Events, Frames, SpikeTrains, Tare
+from taxel import Frames, Tare
 from taxel.detect import Example, Recipe, run, score
-from taxel.detect.ages import Ages, in_frames, later_us
+from taxel.detect.ages import in_frames
 from taxel.detect.fit import Fitter
 
 KINDS = ("small", "large")
@@ -37,31 +36,6 @@ def test_kinds_are_told_at_any_rate(rate: float, jitter: float, rise_s: float, s
     assert result.missed + result.false <= 1, result
 
 
-def test_the_board_keeps_the_recipe_and_slower_events_take_whole_frames() -> None:
-    recipe = Recipe.load("touch", labels=("contact", *KINDS))
-    events = Events([0, 100], [0, 1], [0, 0], [True, True], array=Array(2, 2))
-    assert in_frames(recipe, [Example(events, {})], [(192.0, 1)]) is recipe
-    assert in_frames(recipe, [Example(events, {})], [(None, 1)]) is recipe
-    slow = in_frames(recipe, [Example(events, {})], [(10_000.0, 1)])
-    assert slow.neurons["small"]["delay_ms"] == 10.0
-    assert slow.neurons["small"]["kernel"] == "alpha"
-    assert slow.points_of("contact") == recipe.points_of("contact")
-
-
-@pytest.mark.parametrize("seed", seeds(2, quick=1))
-def test_kinds_are_told_where_a_tenth_of_the_frames_is_lost(seed: int) -> None:
-    examples = []
-    for drawn in (seed + 1, seed + 11):
-        frames, labels = of_two_sizes(drawn, 100)
-        kept = np.random.default_rng(drawn).uniform(size=len(frames)) > 0.1
-        some = Frames(frames.values[kept], frames.t[kept], unit="mV", array=frames.array)
-        examples.append(Example(some, labels, Tare.take(some, stop_us=1_200_000)))
-    readout = Fitter(examples[:1], Recipe.load("touch", labels=KINDS, noise_floor=0.012)).fit().readout
-    result = score(run(readout, examples[1].source, tare=examples[1].tare), examples[1].labels)
-    assert result.missed <= 2, result
-    assert result.false == 0, result
-
-
 @settings(max_examples=settings.default.max_examples // 6)
 @given(st.floats(0.3, 200.0))
 def test_each_delay_has_one_frame(frame_ms: float) -> None:
@@ -80,11 +54,3 @@ def test_each_delay_has_one_frame(frame_ms: float) -> None:
             begin = ages.index(delay_ms)
             reached = [k for k in range(2000) if ages[begin] <= k * period_ms < ages[begin + 1]]
             assert len(reached) == 1
-
-
-def test_the_sample_that_has_an_age_is_found_in_each_touch() -> None:
-    ages = Ages(range(2), (0.0, 5.0))
-    onsets, later = np.array([100.0, 200.0, 300.0]), np.array([0.0, 3.2, 0.0])
-    # The third touch ends before it has the age.
-    trains = SpikeTrains.from_lists([onsets, (onsets + 5.0 + later)[:2]], stop=400.0)
-    assert later_us(trains, ages, onsets, 5.0).tolist() == [0, 3200, 0]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import taxel
-from taxel.detect import Example, Fold, Part, Recipe, fit, judge, run, score
+from taxel.detect import Example, Fold, Part, fit, judge, run, score
 from taxel.detect.alignment import align
 from taxel.detect.fit import Fitter
 
@@ -57,22 +57,6 @@ def test_labels_that_are_off_come_back_to_what_was_felt(drawn) -> None:
     assert found.moved_ms == pytest.approx(moved, abs=0.0011)
     assert found.median_ms == pytest.approx(np.median(moved), abs=0.0011)
     assert abs(found.largest_ms) == pytest.approx(np.abs(moved).max(), abs=0.0011)
-
-
-@given(felt(), st.data())
-def test_a_label_for_which_nothing_was_felt_has_no_pair(drawn, data) -> None:
-    patterns, onsets, labels, place, latency_ms = drawn
-    k = data.draw(st.integers(0, len(patterns) - 1))
-    alone = round(1000 * patterns[k].stop) + 100_000
-    longer = taxel.SpikeTrains(
-        patterns[k].times, patterns[k].offsets, patterns[k].start, patterns[k].stop + 200.0, patterns[k].values
-    )
-    more = [np.append(t, alone) if n == k else t for n, t in enumerate(labels)]
-    found = align([longer if n == k else one for n, one in enumerate(patterns)], "contact", more, None, latency_ms)
-    assert found.train == place
-    assert (found.example[found.unpaired].tolist(), found.given[found.unpaired].tolist()) == ([k], [alone])
-    assert np.abs(found.felt(k) - onsets[k]).max() <= 1
-    assert found.to_dict()["unpaired"] == [[k, alone]]
 
 
 def test_of_trains_that_are_alike_the_nearest_is_taken_and_of_these_the_first() -> None:
@@ -145,16 +129,3 @@ def test_scores_are_against_the_labels_as_they_were_given() -> None:
     judged = judge(data, dataclasses.replace(recipe(), align=True), 3, window_ms=50.0)
     assert judged.together.missed == 0
     assert judged.together["contact"].error.sd > 5.0
-
-
-@pytest.mark.filterwarnings("ignore:.* (cannot be learnt|come too late)")
-def test_without_align_labels_are_learnt_as_they_are_given() -> None:
-    """And with it, exactly so where each lies where it was felt."""
-    spikes = [taxel.SpikeTrains.from_lists([[20.0, 120.0], [60.0]], stop=200.0)]
-    plain = Recipe(taxel.encode.LevelCrossing([1.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
-    aligned = dataclasses.replace(plain, align=True)
-    assert plain.align is False
-    assert Fitter([Example(spikes[0], {"a": [20_000]})], plain).fit().alignments == {}
-    exact, off = ([Example(spikes[0], {"a": times})] for times in ([20_000, 120_000], [25_000, 118_000]))
-    assert fit(exact, plain) == fit(exact, aligned) == fit(off, aligned)
-    assert fit(off, plain) != fit(off, aligned)

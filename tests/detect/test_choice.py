@@ -11,10 +11,8 @@ from plain_rules import ARRAY, FLOOR, clocks, events, tare
 from refusal import refused
 
 import taxel
-from taxel import Detections, Frames, Neuron, Readout
-from taxel.detect import Example, PlainRule, Recipe, judge, run, score
-from taxel.detect.fit import Found, better_by_rule
-from taxel.detect.judge import _chosen
+from taxel import Frames, Neuron, Readout
+from taxel.detect import Example, PlainRule, Recipe, judge, run
 from taxel.encode import ContactArea, LevelCrossing
 
 NEURON = Neuron(tau=0.5, refractory=1.0, kernel="exponential", after_spike="reset", time="grid", step_ms=0.1)
@@ -79,25 +77,6 @@ def test_its_file_holds_both_and_what_runs(tmp_path):
     for wrong in ({"by_rule": ["never"]}, {"rules": {"on": RULES["off"]}}, {"rules": {"never": RULES["off"]}}):
         with pytest.raises(taxel.ProblemError):
             Readout(LevelCrossing([1.0]), {"on": (Neuron(), [1.0, 0.0])}, **wrong)
-
-
-def scored(wrong: int, known: int):
-    """The score of ten labels of which some are missed, each known so much later."""
-    t = 1_000_000 * np.arange(1, 11)
-    found = Detections(["on"] * (10 - wrong), t[wrong:], t[wrong:] + known)
-    return score(found, {"on": t})
-
-
-def test_fewer_mistakes_are_better_and_of_as_many_what_is_known_earlier():
-    assert better_by_rule(["on"], scored(2, 10), scored(1, 900)) == ("on",)
-    assert better_by_rule(["on"], scored(1, 900), scored(2, 10)) == ()
-    assert better_by_rule(["on"], scored(1, 900), scored(1, 800)) == ("on",)
-    assert better_by_rule(["on"], scored(1, 900), scored(1, 900)) == ()
-    nothing = Detections([], [], [])
-    both = _chosen(
-        Found(Detections(["a", "b"], [1, 5], [2, 6]), Detections(["a", "b"], [3, 4], [3, 4]), nothing), ["b"]
-    )
-    assert (both.label.tolist(), both.t.tolist()) == (["a", "b"], [1, 4])
 
 
 def test_each_fold_is_scored_by_what_is_better_inside_its_training_data():

@@ -12,7 +12,6 @@ from markupsafe import escape
 from shell import call
 
 import taxel
-from taxel import _core
 from taxel.cli import main
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -128,56 +127,6 @@ def test_recordings_of_other_arrays_are_left_out_where_one_fits(
     assert [Path(name).name for name in found["left_out"]] == ["1.npz", "2.npz", "3.npz", "4.npz"]
 
 
-def test_spikes_are_written_and_read_back(folder: Path, capsys) -> None:
-    out = folder / "spikes.npz"
-    arguments = ("encode", folder / "1.npz", out, "--encoder", "level_crossing", "--set", "levels=[70.0, 80]")
-    code, said, _ = call(capsys, *arguments, "--set", "hold_ms=1", "--json")
-    assert code == 0
-    encoder = taxel.encode.LevelCrossing([70.0, 80.0], hold_ms=1.0)
-    assert taxel.SpikeTrains.load(out) == encoder.encode(taxel.open(folder / "1.npz").events)
-    result = json.loads(said)
-    assert (result["trains"], result["signed"], result["latency_ms"]) == (128, True, 1.0)
-    assert call(capsys, *arguments)[0] == 2, "an existing file stays"
-    area = ("encode", folder / "1.npz", out, "--encoder", "contact_area", "--tare", 0.05, "--overwrite")
-    assert call(capsys, *area)[0] == 0
-    assert len(taxel.SpikeTrains.load(out)) == 10
-
-
-def write_noted(seed: int, path: Path, line_10ns: int) -> dict[str, list[int]]:
-    """Write a recording whose notes say what happened when, and whose registers say how long a frame lasts."""
-    events, truth = touches(seed)
-    taxel.convert(events, path)
-    array = {"rows": 8, "columns": 8, "pitch_mm": 2.67, "name": "small"}
-    registers = {**_core.registers_preset("5.2 kHz"), "lines": 8, "line_period": line_10ns}
-    header = {"array": array, "registers": registers, "source": "test", "started_ns": 0}
-    writer = _core.RecordingWriter(path, json.dumps(header), "none", True)
-    writer.datagram(0, 0, taxel.wire.encode(events))
-    for label, times in truth.items():
-        for t in times:
-            writer.note(t * 1000, t, label)
-    writer.note(0, None, "a remark without a time is no event")
-    writer.finish("{}")
-    return truth
-
-
-def test_notes_can_be_the_labels_and_registers_give_the_frame(folder: Path, tmp_path: Path, capsys) -> None:
-    for seed in (1, 2):
-        write_noted(seed, tmp_path / f"{seed}.mcap", 2400)
-    tare = ("--tare", folder / "tare.json")
-    readout = tmp_path / "r.json"
-    plan = ("--recipe", folder / "recipe.toml", "--set", "neurons.lift.tau=3.0", "--folds", 0, "-o", readout)
-    assert call(capsys, "train", tmp_path / "1.mcap", tmp_path / "2.mcap", *plan, *tare)[0] == 0
-    for line_10ns, frame_us in ((2400, 192.0), (6248, 499.84)):
-        place = tmp_path / f"{frame_us}.mcap"
-        write_noted(9, place, line_10ns)
-        arguments = ("detect", place, "--readout", readout, *tare, "--truth", "notes", "--json")
-        code, out, _ = call(capsys, *arguments)
-        result = json.loads(out)
-        assert (code, result["score"]["found"], result["score"]["false"]) == (0, 12, 0)
-        frames = np.array([d["known_us"] for d in result["detections"]]) / frame_us
-        assert np.abs(frames - np.round(frames)).max() * frame_us < 1.0
-
-
 def walk(folder: Path, seconds: int) -> Path:
     """Leave a footfall a second on 4 sensors as ``walk.npz``; give the table of its labels."""
     values = np.zeros((100 * seconds, 1, 4))
@@ -232,23 +181,6 @@ def test_without_a_tare_the_rest_is_taken_from_before_the_first_label(folder: Pa
     assert "give --tare SECONDS or FILE" in error
 
 
-@pytest.mark.parametrize(
-    ("late_us", "how"), [(0, None), (50_000, None), (50_001, "behind"), (1_000_000, "behind"), (1_000_001, "outside")]
-)
-def test_labels_behind_the_last_event_are_named(
-    folder: Path, trained: Path, capsys, tmp_path: Path, late_us: int, how: str | None
-) -> None:
-    last = int(taxel.open(folder / "9.npz").events.t[-1])
-    late = tmp_path / "late.csv"
-    late.write_text((folder / "truth.csv").read_text() + f"contact,{last + late_us}\n")
-    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare", folder / "tare.json", "--truth")
-    code, out, error = call(capsys, *arguments, late, "--json")
-    assert (code, json.loads(out)["score"]["missed"]) == (0, 0 if how == "outside" else 1)
-    behind = f"1 of the 13 events of {late} is later than the last recorded event, at {last / 1e6:.3f} s (contact at "
-    assert (behind in error) == (how == "behind")
-    assert ("left out: outside" in error) == (how == "outside")
-
-
 def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, capsys, tmp_path: Path) -> None:
     plan = ("--recipe", folder / "recipe.toml", "--set", "neurons.lift.tau=3.0", "--tare", folder / "tare.json")
     arguments = (
@@ -296,27 +228,6 @@ def test_a_report_shows_potential_weights_and_the_worst(folder: Path, trained: P
     assert "The worst" not in page
     code, _, error = call(capsys, *arguments, tmp_path / "without")
     assert (code, "exists already" in error) == (2, True)
-
-
-def test_weights_are_drawn_by_taxel_where_trains_are_taxels() -> None:
-    from taxel.report.detections import _by_taxel
-
-    array = taxel.Array(3, 4)
-    frames = taxel.Frames(np.stack([np.zeros((3, 4)), np.eye(3, 4) * 15.0]), [0, 1000], array=array)
-    for encoder in (
-        taxel.encode.LevelCrossing([10.0, 20.0]),
-        taxel.encode.LevelCrossing([10.0, 20.0], tonic_ms=5.0),
-        taxel.encode.ChangeEvents(),
-    ):
-        heard = encoder.encode(frames).split_by_sign()
-        for delays in (1, 2):
-            # Weights of the trains that the pressed taxels have.
-            weights = np.tile(np.where(heard.counts > 0, -2.0, 1.0), delays)
-            shown = _by_taxel(weights, encoder, array)
-            assert np.array_equal(shown.reshape(3, 4) == -2.0, np.eye(3, 4, dtype=bool))
-    area = taxel.encode.ContactArea()
-    for encoder in (area, taxel.encode.Composite({"area": area, "change": taxel.encode.ChangeEvents()})):
-        assert _by_taxel(np.ones(10), encoder, array) is None
 
 
 def test_a_folder_of_trials_is_trained_on_and_heard_as_its_recordings_are(tmp_path: Path, capsys) -> None:

@@ -178,27 +178,6 @@ def recipe(**more: object) -> Recipe:
     return Recipe.from_dict(values | more)
 
 
-def test_each_neuron_is_trained_on_its_inputs_as_if_they_were_the_encoder() -> None:
-    examples = [touches(seed) for seed in range(3)]
-    readout = fit(examples, recipe())
-    assert isinstance(readout.encoder, Composite)
-    assert {label: one.inputs for label, one in readout.neurons.items()} == {
-        "contact": ("area",), "strong": ("moments",), "weak": ("moments",)
-    }  # fmt: skip
-    alone = [one._replace(labels={"contact": one.labels["contact"]}) for one in examples]
-    single = fit(alone, Recipe(ContactArea(), LEARNER, run_threshold=0.9, align=True))
-    assert single.neurons["contact"].weights.tobytes() == readout.neurons["contact"].weights.tobytes()
-    new = touches(9)
-    found = run(readout.using("neuron"), new.source, tare=REST)
-    # A spike at an age acts a step of the grid later at most, a fiftieth of a frame; `t` is the onset all the same.
-    for label in ("strong", "weak"):
-        late = found[label].t - new.labels[label]
-        assert ((late >= 0) & (late < 20)).all(), late
-    # Of one input the readout is one of that encoder, as before.
-    plain = fit(alone, recipe(neurons={"contact": {"inputs": ["area"]}}))
-    assert plain == single
-
-
 def test_inputs_are_chosen_among_the_points_and_what_none_uses_is_not_encoded() -> None:
     examples = [touches(seed) for seed in range(4)]
     alone = [one._replace(labels={"contact": one.labels["contact"]}) for one in examples]

@@ -8,8 +8,7 @@ from draws import seeds
 from refusal import refused
 
 from taxel import Array, Frames, Readout, Tare
-from taxel.detect import Example, PlainRule, Recipe, fit, recipes, run, score, tune
-from taxel.detect.floors import measured_floor
+from taxel.detect import Example, PlainRule, Recipe, fit, run, score, tune
 
 HZ = 60
 
@@ -33,65 +32,6 @@ def touches(seed: int, taps: int, presses: int, *, held: bool = False) -> Exampl
     return Example(frames, labels, Tare.take(frames, stop_us=1_900_000))
 
 
-def on_channels(seed: int, count: int, taps: int, presses: int, hz: int = HZ, unit: str = "counts") -> Example:
-    """Return taps and presses of 8 to 100 times the noise, each on one or two channels."""
-    rng = np.random.default_rng(seed)
-    at, begun = 2 * hz, []
-    for kind in rng.permutation(["tap"] * taps + ["press"] * presses):
-        last = round(rng.uniform(*((0.1, 0.2) if kind == "tap" else (1.0, 2.0))) * hz)
-        begun.append((kind, at, last))
-        at += last + int(rng.integers(hz // 2, hz))
-    values = rng.normal(20.0 if unit == "counts" else 0.0, 1.0, (at + hz, 1, count))
-    for _, begin, last in begun:
-        touched = rng.permutation(count)[: rng.integers(1, 3)]
-        values[begin : begin + last, 0, touched] += np.exp(rng.uniform(np.log(8.0), np.log(100.0)))
-    t = (np.arange(len(values)) * (1e6 / hz)).astype(np.int64)
-    frames = Frames(np.rint(values) if unit == "counts" else values, t, unit=unit, array=Array(1, count))
-    labels = {kind: t[[begin for of, begin, _ in begun if of == kind]] for kind in ("tap", "press")}
-    return Example(frames, labels, Tare.take(frames, stop_us=1_900_000))
-
-
-@pytest.mark.parametrize(
-    ("count", "hz", "unit"), [(1, 60, "kPa"), pytest.param(2, 250, "counts", marks=pytest.mark.slow), (6, 60, "N")]
-)
-def test_on_channels_each_counts_alone(count: int, hz: int, unit: str) -> None:
-    learnt, unseen = on_channels(1, count, 20, 10, hz, unit), on_channels(2, count, 20, 10, hz, unit)
-    recipe = recipes.chosen(learnt.source, ["press", "tap"])[0]
-    assert recipe == "touch"
-    readout = fit([learnt], Recipe.load(recipe, labels=["press", "tap"], noise_floor=measured_floor([learnt])))
-    found = run(readout, unseen.source, tare=unseen.tare)
-    assert score(found, unseen.labels, 50.0).rank[0] == 0
-    stream = readout.stream(unseen.source.array, frame_us=1e6 / hz, tare=unseen.tare)
-    live = []
-    for piece in np.array_split(np.arange(len(unseen.source)), 37):
-        live += list(stream.push(unseen.source[piece[0] : piece[-1] + 1]))
-    live += list(stream.advance(int(unseen.source.t[-1]) + 1_000_000))
-    assert [(d.label, d.t, d.known) for d in live] == [(d.label, d.t, d.known) for d in found]
-    rule = tune([learnt], ["press", "tap"], noise_floor=measured_floor([learnt]))["tap"]
-    assert rule is not None
-    assert rule.quantity == "duration"
-    assert score(run(rule, unseen.source, tare=unseen.tare), unseen.labels, 50.0).rank[0] == 0
-
-
-def test_one_kind_of_touch_has_a_floor_of_its_strength_so_that_a_drift_is_no_touch() -> None:
-    rng = np.random.default_rng(1)
-    begins = 250 + np.cumsum(rng.integers(175, 375, 15))
-
-    def taps(drift: float) -> Example:
-        values = 4.0 + rng.normal(0.0, 0.3, begins[-1] + 250) + np.linspace(0.0, drift, begins[-1] + 250)
-        for begin in begins:
-            values[begin : begin + 15] += rng.uniform(60.0, 100.0) * np.sin(np.linspace(0.0, np.pi, 15))
-        frames = Frames(values[:, None, None], 4000 * np.arange(len(values)), unit="V")
-        return Example(frames, {"tap": 4000 * begins}, Tare.take(frames, stop_us=1_000_000))
-
-    train, drifted = taps(0.0), taps(1.6)
-    recipe = recipes.chosen(train.source, ["tap"])[0]
-    readout = fit([train], Recipe.load(recipe, labels=["tap"], noise_floor=measured_floor([train])))
-    found = run(readout, drifted.source, tare=drifted.tare)
-    result = score(found, drifted.labels, 50.0)
-    assert (result.missed, result.false) == (0, 0)
-
-
 def trained(seed: int = 1) -> Readout:
     return fit([touches(seed, 8, 5)], Recipe.load("touch", labels=["press", "tap"], noise_floor=5.0))
 
@@ -108,13 +48,6 @@ def test_taps_and_presses_are_told_when_they_end(seed: int) -> None:
     lasted = found.known - found.t
     assert (lasted[found.label == "press"] > 1_150_000).all()
     assert (lasted[found.label == "tap"] < 300_000).all()
-
-
-def test_what_is_still_held_at_the_end_is_not_decided() -> None:
-    readout = trained()
-    for held in (False, True):
-        unseen = touches(30, 6, 4, held=held)
-        assert len(run(readout, unseen.source, tare=unseen.tare)) == 10
 
 
 def test_a_stream_detects_the_same_wherever_it_is_cut() -> None:

@@ -10,7 +10,6 @@ import pytest
 import taxel
 from taxel import Array, Frames, Readout, Tare
 from taxel.detect import Example, PlainRule, Recipe, fit, judge, recipes, run, score, tune
-from taxel.encode import LevelCrossing
 from taxel.tasks import DetectOptions, detect, train
 
 
@@ -37,15 +36,6 @@ def test_one_loaded_taxel_is_learnt_on_any_array(shape: tuple[int, int], times: 
         assert rule is not None
         assert rule.quantity == "peak"
         assert score(run(rule, learnt.source, tare=learnt.tare), {label: learnt.labels[label]}, 50.0).rank[0] <= 1
-
-
-def test_steps_of_channels_keep_their_recipes_and_kinds_need_a_rest() -> None:
-    source = single((1, 6), 1).source
-    assert recipes.chosen(source, ["contact", "foot_off"])[0] == "gait_insole"
-    assert [recipes.chosen(source, ["soft", "hard"], rests=rests)[0] for rests in (True, False)] == [
-        "touch",
-        "gait_insole",
-    ]
 
 
 def test_a_rule_by_peak_needs_no_neighbours_and_follows_its_unit() -> None:
@@ -103,16 +93,3 @@ def test_grids_of_several_sizes_are_padded_at_their_far_edges(tmp_path: Path) ->
     for example, place in zip(examples, places, strict=True):
         [detected] = detect(training.readout, taxel.open(place), options=DetectOptions(tare=1.9)).each
         assert score(detected.outcome.found, example.labels, 50.0).rank[0] == 0
-
-
-def test_a_smaller_grid_gives_what_its_padded_frames_give() -> None:
-    small, large = sized((6, 7), 1), sized((8, 8), 2)
-    levels = LevelCrossing([70.0])
-    learner = {"tau": 5.0, "ub": 3.0, "lb": -3.0, "delay_ms": 1.0}
-    readout = fit([small, large], Recipe(levels, learner, {"contact": {}, "lift": {}}), by_rule=())
-    assert readout.array.shape == (8, 8)
-    assert run(readout, small.source) == run(readout, padded(small, (8, 8)))
-    stream = readout.stream(small.source.array, frame_us=10_000)
-    pieces = [stream.push(small.source[k : k + 100]) for k in range(0, len(small.source), 100)]
-    found = [d for piece in pieces for d in piece] + list(stream.advance(int(small.source.t[-1]) + 1_000_000))
-    assert [(d.label, d.t) for d in found] == [(d.label, d.t) for d in run(readout, small.source)]

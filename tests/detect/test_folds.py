@@ -6,14 +6,10 @@ import warnings
 import numpy as np
 import pytest
 from discs import recipe, tare, touches
-from hypothesis import given
-from hypothesis import strategies as st
 
 import taxel
-from taxel import SpikeTrains
 from taxel.detect import Example, Fold, Part, Score, fit, judge, run, score
-from taxel.detect import folds as folds_module
-from taxel.detect.folds import count_of_folds, split
+from taxel.detect.folds import count_of_folds
 from taxel.detect.folds import folds_of as folds
 
 
@@ -167,19 +163,6 @@ def test_folds_that_make_no_sense_are_refused(stated: list[Fold], complaint: str
         judge(examples(1, 2), recipe(), stated)
 
 
-def test_spike_trains_are_learnt_and_judged_as_their_events_are() -> None:
-    data = examples(1, 2, 9)
-    encoder = recipe().encoder
-    spikes = [one._replace(source=encoder.with_tare(one.tare).encode(one.source), tare=None) for one in data]
-    assert (
-        fit(spikes, recipe()).neurons["lift"].weights.tolist() == fit(data, recipe()).neurons["lift"].weights.tolist()
-    )
-    both = [judge(one, recipe(), 3, window_ms=10.0).neurons for one in (data, spikes)]
-    assert both[0].found == both[1].found == both[0].events
-    # On a grid the first step is where the input begins, so a crossing differs by at most one step.
-    assert np.abs(both[0].errors_ms - both[1].errors_ms).max() <= 0.2
-
-
 def test_the_better_rank_misses_less_and_then_lies_nearer() -> None:
     def ranked(*times: int) -> Score:
         found = taxel.Detections(["a"] * len(times), list(times), list(times))
@@ -190,37 +173,3 @@ def test_the_better_rank_misses_less_and_then_lies_nearer() -> None:
     assert sorted(order, key=lambda one: one.rank) == order
     assert ranked(11_000, 20_000).rank[1] == pytest.approx(np.sqrt(0.5))
     assert ranked().rank[1] == np.inf
-
-
-def presses(seed: int, rare: int, recordings: int) -> list[Example]:
-    """One taxel is pressed at drawn times of each recording; after so many of the presses, in a row, another one is."""
-    random = np.random.default_rng(seed)
-    made, left = [], rare
-    for _ in range(recordings):
-        begins = 40 + 50 * np.arange(12) + random.integers(0, 20, 12)
-        first = int(random.integers(0, 12))
-        ends = begins[first : first + left] + 15
-        left -= len(ends)
-        values = np.zeros((700, 1, 2))
-        for x, starts in enumerate((begins, ends)):
-            for start in starts:
-                values[start : start + 10, 0, x] = 9.0
-        frames = taxel.Frames(values, 10_000 * np.arange(700), unit="N")
-        labels = {"press": 10_000 * begins} | ({"release": 10_000 * ends} if len(ends) else {})
-        made.append(Example(frames, labels))
-    return made
-
-
-@given(st.integers(0, 10_000), st.integers(2, 5), st.integers(2, 4), st.data())
-def test_what_a_fold_of_one_recording_trains_on_is_split_again_by_its_events(seed: int, k: int, inner: int, drawn):
-    times = np.cumsum(np.random.default_rng(seed).integers(1, 2_000_000, drawn.draw(st.integers(4 * k * inner, 100))))
-    data = [Example(SpikeTrains.from_lists([times / 1000.0]), {"press": times.tolist()})]
-    way = folds(data, k)[0][drawn.draw(st.integers(0, k - 1))]
-    events = folds_module._only_inside(data[0], Part(0, way.train[0].start, way.train[-1].stop))
-    events = events[[any(part.start <= t < part.stop for part in way.train) for t in events]]
-    again = split(data, way.train, inner)
-    assert len(again) == inner
-    for fold in again:
-        within = [[sum(part.start <= t < part.stop for part in parts) for t in events] for parts in fold[:2]]
-        assert np.array_equal(np.sum(within, axis=0), np.ones(len(events))), "each is trained on or tested"
-        assert sum(within[1]) >= 2

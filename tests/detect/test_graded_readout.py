@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from taxel import Array, Detections, Events, Frames, Neuron, Readout, Tare
+from taxel import Array, Detections, Frames, Neuron, Readout, Tare
 from taxel.detect import TrainedNeuron, run
 from taxel.encode import Moments
 
@@ -60,22 +60,3 @@ def test_a_readout_multiplies_weights_by_values_in_a_recording_in_trains_and_in_
             assert [(d.label, d.t) for d in detections] == list(zip(whole.label, whole.t, strict=True))
         other = Readout.from_json(found.to_json())
         same(run(other, frames, tare=REST), whole)
-
-
-def test_a_readout_on_events_is_the_readout_on_their_samples():
-    rng = np.random.default_rng(4)
-    n = 2000
-    t = np.sort(rng.integers(0, 40_000, n))
-    level = 50 + 30 * (np.sin(t / 4000) > 0) * (t < 30_000)
-    events = Events(
-        t,
-        rng.integers(0, 5, n),
-        rng.integers(0, 4, n),
-        rng.random(n) < 0.5,
-        intensity=level + rng.integers(0, 9, n) * (t < 30_000),
-        array=ARRAY,
-    )
-    found = readout(1)
-    whole = run(found, events)
-    assert len(whole) > 3
-    same(run(found, ENCODER.encode(events)), whole)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from formats import bags
 
 import taxel
 from taxel.tasks.labels import references
@@ -56,32 +55,3 @@ def test_other_labels_outside_a_recording_are_refused(tmp_path: Path, begin: int
     labels = table(tmp_path / "labels.csv", *(f"contact,{t}" for t in times))
     with pytest.warns(UserWarning, match="left out: outside"), pytest.raises(taxel.ProblemError, match="none within"):
         references(labels, [made])
-
-
-@pytest.mark.parametrize("apart_ms", [0, 40, 60])
-def test_labels_of_sources_count_from_the_first_of_them(tmp_path: Path, apart_ms: int) -> None:
-    sent = [
-        (topic, bags.array_of(np.float64), 10 * k + later, None, bags.multi_array(np.zeros((2, 2)), (2, 2), float))
-        for k in range(100)
-        for topic, later in (("/a", 0), ("/b", apart_ms))
-    ]
-    bag = bags.write(tmp_path / "a.bag", sent)
-    both = [taxel.open(bag, topic=topic) for topic in ("/a", "/b")]
-    labels = table(tmp_path / "labels.csv", "contact,500000")
-    found = references(labels, both)
-    assert [events["contact"].tolist() for events in found] == [[bags.BEGIN_NS // 1000 + 500_000]] * 2
-
-
-def test_times_of_a_board_s_own_clock_are_not_counted_anew_and_not_read(tmp_path: Path) -> None:
-    begin = 4_000_000
-    events = taxel.Events([begin, begin + 10**6], [1, 1], [2, 2], [True, False], array=taxel.Array(8, 8))
-    taxel.convert(events, tmp_path / "a.mcap")
-    table(tmp_path / "a.notes.csv", "contact,4500000")
-    recording = taxel.open(tmp_path / "a.mcap")
-    assert [note.t for note in recording.notes] == [4_500_000]
-    assert "_decoded" not in vars(recording._main.reader)
-    # A converted recording of dates is none of a board's own clock.
-    dates = taxel.Events(events.t + BEGIN, events.x, events.y, events.p, array=events.array)
-    taxel.convert(dates, tmp_path / "b.mcap")
-    table(tmp_path / "b.notes.csv", "contact,500000")
-    assert [note.t for note in taxel.open(tmp_path / "b.mcap").notes] == [BEGIN + begin + 500_000]

@@ -49,19 +49,6 @@ def test_a_readout_finds_bursts_in_more_noise_than_in_training(mean: float, more
     assert streamed.t.tolist() == found.t.tolist()
 
 
-def test_floors_are_raised_for_counts_alone_and_never_lowered() -> None:
-    frames, _ = counts(2.0, seed=4)
-    tare = Tare.take(frames, stop_us=500_000)
-    rule = PlainRule("area", 2, noise_floor=1.0, unit=UNIT)
-    assert rule._for(None, tare).noise_floor == pytest.approx(6 * np.quantile(tare.noise, 0.9))
-    assert rule._for(None, None) is rule
-    high = PlainRule("area", 2, noise_floor=100.0, unit=UNIT)
-    assert high._for(None, tare) is high
-    for unit in ("counts", None):
-        other = PlainRule("area", 2, noise_floor=1.0, unit=unit)
-        assert other._for(None, tare) is other
-
-
 def test_what_is_no_count_of_the_training_is_refused_before_its_rest(tmp_path: Path) -> None:
     rule = PlainRule("area", 2, unit="on events/5 ms")
     camera = Events([0, 10, 400_000], [1, 2, 3], [0, 1, 1], [True, False, True], array=Array(4, 5))

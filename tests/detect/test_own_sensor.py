@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from shell import call
 
 import taxel
 from taxel import Array, Frames, Tare
-from taxel.detect import Example, Recipe, fit, judge, load, recipes, run, score
-from taxel.detect.fit import Fitter
+from taxel.detect import Example, load, recipes, run, score
 from taxel.detect.floors import measured_floor
-from taxel.encode import ContactArea, LocalLoad
 
 LABELS = ("contact", "lift")
 
@@ -90,19 +85,6 @@ def test_the_floor_scales_with_the_unit_and_not_with_a_bad_taxel() -> None:
     assert measured_floor([Example(frames, labels)]) is None
 
 
-def test_a_floor_that_the_recipe_or_the_user_states_stays(tmp_path: Path, capsys) -> None:
-    plan = Recipe.load("touch", {"encoders.area.noise_floor": 30.0}, LABELS, 0.5)
-    parts = plan.encoder.parts
-    assert parts["area"] == ContactArea(noise_floor=30.0)
-    assert parts["levels"] == LocalLoad(
-        noise_floor=0.5, least_noise=0.05, levels=[3.0, 4.0, 5.0, 6.0, 8.0], release=0.8
-    )
-    assert Recipe.load("gait_plate", None, None, 0.5).encoder == Recipe.load("gait_plate").encoder
-    arguments = written(tmp_path, *touched((6, 6), 3, gain=100.0, noise=1.0))
-    assert call(capsys, *arguments, "--folds", 0, "--set", "encoders.levels.noise_floor=9")[0] == 0
-    assert taxel.Readout.load(tmp_path / "readout.json").encoder.parts["levels"].noise_floor == 9.0
-
-
 @pytest.mark.parametrize(
     ("labels", "unit", "shape", "recipe"),
     [
@@ -134,25 +116,6 @@ def test_labels_and_neighbours_choose_the_recipe(
     assert recipes.chosen(Frames(np.zeros((1, *shape)), [0], unit=unit, array=Array(*shape)), labels)[0] == recipe
 
 
-def test_a_refused_training_leaves_no_folder_of_its_report(tmp_path: Path, capsys) -> None:
-    arguments = written(tmp_path, *touched((8, 8), 4, gain=200.0, noise=1.0))
-    code, _, _ = call(capsys, *arguments, "--recipe", "./none.toml", "--report", tmp_path / "a" / "b")
-    assert (code, (tmp_path / "a").exists()) == (2, False)
-    (tmp_path / "kept").mkdir()
-    assert call(capsys, *arguments, "--recipe", "./none.toml", "--report", tmp_path / "kept")[0] == 2
-    assert (tmp_path / "kept").is_dir()
-
-
-def test_an_end_of_touches_is_learnt_by_any_name() -> None:
-    frames, labels = touched((8, 8), 5, gain=200.0, noise=1.0)
-    frames = Frames(frames.values, frames.t, unit="V", array=frames.array)
-    times = {"contact": labels["contact"], "drop": labels["lift"]}
-    example = Example(frames, times, Tare.take(frames, stop_us=900_000))
-    readout = fit([example], Recipe.load("touch", None, list(times), measured_floor([example])))
-    assert "drop" in readout.by_rule
-    assert score(run(readout, frames, tare=example.tare), times).rank[0] == 0
-
-
 @pytest.mark.parametrize("labels", [("contact", "lift"), ("contact",)])
 def test_the_rule_in_a_readout_detects_what_the_training_says(tmp_path: Path, capsys, labels: tuple[str, ...]) -> None:
     frames, truth = touched((6, 6), 1, gain=100.0, noise=1.0, offset=10.0)
@@ -168,58 +131,3 @@ def test_the_rule_in_a_readout_detects_what_the_training_says(tmp_path: Path, ca
     asked = ("detect", tmp_path / "own.npz", "--readout", tmp_path / "readout.json", "--tare", "0.5", "--use", "rule")
     code, out, _ = call(capsys, *asked)
     assert (code, "known (ms)" in out, "nan" in out, "slope" in out) == (0, True, False, False)
-
-
-@pytest.mark.parametrize(
-    "unit", ["N", "kPa", *(pytest.param(one, marks=pytest.mark.slow) for one in ("mN", "Pa", "N/cm2"))]
-)
-def test_a_noisy_mat_in_force_or_pressure_rests_at_0_for_info_train_and_detect(
-    tmp_path: Path, capsys, unit: str
-) -> None:
-    frames, labels = touched((8, 8), 4, gain=60.0, noise=1.0)
-    mat = Frames(np.abs(frames.values), frames.t, unit=unit, array=Array(8, 8, pitch_mm=10.0))
-    arguments = written(tmp_path, mat, labels)
-    code, out, error = call(capsys, "info", tmp_path / "own.npz")
-    assert (code, "rest                0, because the values are force or pressure" in out) == (0, True), error
-    (area,) = re.findall(r"contact area +at most (\d+) mm2", out)
-    assert 100 <= int(area) <= 3200, "the noise of the others is no contact"
-    code, out, error = call(capsys, *arguments, "--folds", 0)
-    assert (code, "\ntare: " in out) == (0, False), error
-    truth = ("--truth", tmp_path / "labels.csv", "--json")
-    code, out, error = call(capsys, "detect", tmp_path / "own.npz", "--readout", tmp_path / "readout.json", *truth)
-    assert code == 0, error
-    assert json.loads(out)["score"]["found"] >= 22, out[:500]
-
-
-def squares(sides: list[int]) -> tuple[Frames, dict[str, list[int]]]:
-    """Return frames at 100 Hz of touches that load squares of so many taxels at once, one per second."""
-    values = np.random.default_rng(1).normal(0, 1, (100 * (len(sides) + 2), 12, 12))
-    starts = 100 + 100 * np.arange(len(sides))
-    for start, side in zip(starts, sides, strict=True):
-        values[start : start + 40, 2 : 2 + side, 3 : 3 + side] += 300.0
-    frames = Frames(values, np.arange(len(values)) * 10_000, unit="counts")
-    return frames, {"contact": (10_000 * starts).tolist(), "lift": (10_000 * (starts + 40)).tolist()}
-
-
-@settings(max_examples=settings.default.max_examples // 5)
-@given(st.lists(st.integers(4, 8), min_size=1, max_size=6), st.integers(2, 3))
-def test_a_touch_smaller_than_all_that_were_learnt_is_found(sides: list[int], small: int) -> None:
-    frames, labels = squares(sides)
-    tare = Tare.take(frames.between(0, 900_000))
-    example = Example(frames, labels, tare)
-    plan = Recipe.load("touch", labels=LABELS, noise_floor=measured_floor([example]))
-    readout = Fitter([example], plan).fit().readout
-    others, truth = squares([small] * 3)
-    judged = score(run(readout, others, tare=tare), truth)
-    assert {label: (one.missed, one.false) for label, one in judged.by_label.items()} == dict.fromkeys(LABELS, (0, 0))
-
-
-def test_where_the_first_inputs_feel_nothing_others_are_tried() -> None:
-    """On a mat that lies full, how many taxels are loaded never changes."""
-    frames, labels = squares([4, 3, 5, 4] * 3)
-    tare = Tare.take(frames.between(0, 900_000))
-    full = Frames(frames.values + 100.0, frames.t, unit=frames.unit, array=frames.array)
-    example = Example(full, labels, tare)
-    plan = Recipe.load("touch", labels=LABELS, noise_floor=measured_floor([example]))
-    judged = judge([example], plan, 2)
-    assert {label: one.missed for label, one in judged.together.by_label.items()} == dict.fromkeys(LABELS, 0)

@@ -1,6 +1,5 @@
 """A plain rule against a loop over frames, written from its documentation; pieces, frames, files, live, tuning."""
 
-import math
 from itertools import pairwise
 from pathlib import Path
 from unittest.mock import ANY
@@ -9,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plain_rules import ARRAY, FLOOR, HOUR, as_tuples, clocks, events, expected, kinds, played, rules, tare
+from plain_rules import ARRAY, FLOOR, as_tuples, clocks, events, expected, kinds, played, rules, tare
 from refusal import refused
 
 import taxel
@@ -26,36 +25,6 @@ def test_events_give_what_a_loop_over_frames_gives(source, rule, clock):
     assert (found.t <= found.known).all()
     assert np.isnan(found.slope).all()
     assert not found.repaired.any()
-
-
-@settings(max_examples=60, deadline=None)
-@given(events(), rules(), clocks)
-def test_a_curve_has_the_begins_and_ends_that_the_rule_finds(source, rule, clock):
-    frame_us, version = clock
-    found = run(rule, source, frame_us=frame_us, wire_version=version, tare=tare())
-    how = rule.quantity, list(rule.levels), FLOOR
-    curve = taxel._core.LoadCurve.of_events(*how, source._parts(), frame_us, version, tare().to_json())
-    begins, ends = curve.edges(rule.threshold, rule.release, rule.frames, rule.dated_at, rule.of_largest)
-    for label, (t, known, _) in (("on", begins), ("off", ends)):
-        assert found[label].t.tolist() == t.tolist()
-        assert found[label].known.tolist() == known.tolist()
-
-
-@settings(max_examples=100, deadline=None)
-@given(
-    st.lists(st.tuples(st.sampled_from([1, 900, 1000, 1000, 2500, HOUR]),
-                       st.lists(st.sampled_from([0.0, 3.0, 3.75, 3.8, 9.0]), min_size=12, max_size=12)),
-             min_size=1, max_size=12),
-    st.one_of(rules(), kinds),
-)  # fmt: skip
-def test_each_frame_of_the_input_is_one(steps, rule):
-    t = np.cumsum([step for step, _ in steps])
-    source = Frames(np.reshape([values for _, values in steps], (-1, 3, 4)), t, array=ARRAY)
-    found = run(rule, source, frame_us=1000.0, tare=tare())
-    assert as_tuples(found, rule) == expected(rule, source, 1000.0)
-    stream = rule.stream(frame_us=1000.0, tare=tare())
-    one_by_one = [stream.push(source[k : k + 1]) for k in range(len(source))]
-    assert sum(one_by_one[1:], one_by_one[0]) + stream.advance(int(t[-1]) + 10_000_000) == found
 
 
 @settings(max_examples=100, deadline=None)
@@ -85,31 +54,6 @@ def press(ticks=9, start=10_000, stop=20_000, array=ARRAY):
     t = [start, start, stop, stop]
     return Events(t, [1, 2, 1, 2], [1] * 4, [True, True, False, False], array=array,
                   intensity=np.array([ticks, ticks, 0, 0]))  # fmt: skip
-
-
-def test_a_board_s_stamps_are_known_at_the_end_of_their_frames():
-    """With version 1 a stamp is floor(1.92 k) units of 100 us, and its frame k ends at 192 (k + 1) us."""
-    for k in (3, 260, 1_000, 5_207):
-        stamps = [math.floor(1.92 * n) * 100 for n in (k, k + 50)]
-        found = run(PlainRule("area", 2, noise_floor=FLOOR), press(start=stamps[0], stop=stamps[1]), tare=tare())
-        assert found.t.tolist() == stamps
-        assert found.known.tolist() == [192 * (k + 1), 192 * (k + 51)]
-
-
-def test_the_local_load_of_what_stays_fades_while_no_event_comes():
-    """Two taxels 6.75 above rest are far from it: it follows with 20 s, and their sum falls below 2 units of noise."""
-    found = run(PlainRule("local_load", 2.0, noise_floor=FLOOR), press(stop=120_000_000), tare=tare())
-    assert list(found.label) == ["contact", "lift"]
-    # 20 s x ln(6.75 / 1.5) until they are near, then fast; computed anew within an eighth of that.
-    assert 30_000_000 < found.t[1] - found.t[0] < 35_000_000
-
-
-def test_single_taxels_that_stick_or_flicker_are_no_local_load():
-    t = np.arange(10_000, 1_000_000, 200)
-    flicker = Events(t, np.ones(len(t), int), np.ones(len(t), int), t % 400 == 0, array=ARRAY,
-                     intensity=np.where(t % 400 == 0, 900, 2))  # fmt: skip
-    assert not len(run(PlainRule("local_load", 4.0, noise_floor=FLOOR), flicker, tare=tare()))
-    assert len(run(PlainRule("local_load", 0.9, noise_floor=FLOOR), flicker, tare=tare())) > 2
 
 
 def test_what_rests_on_repaired_values_is_marked():
@@ -221,32 +165,6 @@ def test_tuning_says_none_where_no_rule_is_better_than_nothing():
     assert tune([example_], ["hit", "absent"])["absent"] is None
     trains = taxel.encode.ContactArea(tare=example_.tare).encode(example_.source)
     assert tune([Example(trains, example_.labels)]) == {"gone": None, "hit": None}
-
-
-def test_tuning_tells_two_kinds_by_area_at_an_age():
-    draw = np.random.default_rng(3)
-    array, rows, labels = Array(12, 12), [], {"small": [], "large": []}
-    for k in range(30):
-        start, large = 20_000 + 100_000 * k, bool(draw.integers(2))
-        labels["large" if large else "small"].append(start - 200)
-        # Both begin with 2 x 2; the large one grows from 2.5 ms on.
-        for t, side, value in ((start, 2, 20), (start + 2_500, 5 if large else 3, 20), (start + 20_000, 5, 0)):
-            rows.extend((t, 1 + j % side, 1 + j // side, value) for j in range(side * side))
-    t, x, y, ticks = zip(*rows, strict=True)
-    events = Events(t, x, y, np.array(ticks) > 0, array=array, intensity=np.array(ticks))
-    example_ = Example(events, labels, tare(array, 0.0))
-    rules = tune([example_])
-    assert rules["small"] == rules["large"]
-    assert rules["small"].age_ms == 3.0
-    assert rules["small"].labels == ("small", "large")
-    assert 9 < rules["small"].threshold < 25
-    score = taxel.detect.score(run(rules["small"], events, tare=example_.tare), labels, 50)
-    assert (score.missed, score.false) == (0, 0)
-    # With a third label that is an end, the two are still kinds.
-    with_end = labels | {"off": [t + 20_200 for one in labels.values() for t in one]}
-    found = tune([Example(events, with_end, example_.tare)])
-    assert found["small"] == rules["small"]
-    assert found["off"].labels == ("off",)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ from touching import touched
 import taxel
 from taxel.detect import Example, Fold, Part, PlainRule, Recipe, judge, run, score, tune
 from taxel.encode import ContactArea
-from taxel.tasks import Training, TrainOptions
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -42,17 +41,6 @@ def test_rules_are_tuned_on_the_training_part_of_each_fold_and_scored_on_its_tes
     assert judged.plain.lacks == ""
 
 
-def test_a_rule_is_scored_in_the_stretch_that_its_fold_tests(examples) -> None:
-    one, middle = examples[0], float(examples[0].labels["hit"][3] - 5_000)
-    halves = [Part(0, stop=middle), Part(0, start=middle)]
-    judged = judge([one], RECIPE, [Fold([halves[0]], [halves[1]]), Fold([halves[1]], [halves[0]])])
-    assert judged.plain.together["hit"].events == 6
-    assert judged.plain.together["hit"].missed == 0
-    # What is tested in one fold only is counted there only.
-    last = judge([one], RECIPE, [Fold([halves[0]], [halves[1]])])
-    assert last.plain.together["hit"].events == 3
-
-
 def test_there_is_no_rule_where_none_finds_anything_held_out() -> None:
     frames, truth = touched(1, 6, hold_s=(0.2, 0.3))
     mixed = {"contact": np.r_[truth["contact"][:4], truth["lift"][4:]]}
@@ -76,16 +64,6 @@ def test_the_labels_own_rule_stands_apart(examples) -> None:
     assert scored["hit"].missed == scored["hit"].false == 0
     assert judged.plain.to_dict()["own"]["rules"]["hit"]["quantity"] == "area"
     assert tune(own, noise_floor=3.0) == judged.plain.rules
-
-
-def test_without_a_tare_there_is_no_rule(examples) -> None:
-    trains = [one._replace(source=ContactArea(tare=one.tare).encode(one.source)) for one in examples]
-    judged = judge([one._replace(tare=None) for one in trains], RECIPE, 3)
-    assert judged.plain.together is None
-    assert judged.plain.rules == {"gone": None, "hit": None}
-    assert judged.plain.lacks == "example 0 has no tare to measure a load from"
-    assert judged.by_rule == ()
-    assert judged.neurons.to_dict() == judged.together.to_dict()
 
 
 def test_channels_have_plain_rules_but_none_by_local_load() -> None:
@@ -116,22 +94,3 @@ def test_channels_have_plain_rules_but_none_by_local_load() -> None:
         ).label.tolist()
         == ["contact", "lift"] * 2
     )
-
-
-@pytest.fixture(scope="module")
-def of_touches(tmp_path_factory: pytest.TempPathFactory) -> tuple[taxel.Recording, Training]:
-    """Readings of less than 1, which no floor of a board fits, and what is trained on them by default."""
-    place = tmp_path_factory.mktemp("touches") / "a.npz"
-    taxel.convert(touched(1)[0], place)
-    recording = taxel.open(place)
-    return recording, taxel.train(recording, [touched(1)[1]], TrainOptions(folds=2))
-
-
-@pytest.mark.parametrize("encoder", ["peak", "contact_area", "local_load", "change_events"])
-def test_a_rule_does_not_depend_on_the_encoder(of_touches, encoder: str) -> None:
-    recording, by_default = of_touches
-    training = taxel.train(recording, [touched(1)[1]], TrainOptions(folds=2, changes={"encoder.name": encoder}))
-    plain = training.scored.plain
-    assert plain.rules == by_default.scored.plain.rules
-    assert plain.together.to_dict() == by_default.scored.plain.together.to_dict()
-    assert plain.together.missed == plain.together.false == 0

@@ -1,7 +1,6 @@
 """Readouts: what they hold, their files, and what they say, live and from recordings."""
 
 import itertools
-import json
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import taxel
-from taxel.detect import Example, Readout, TrainedNeuron, fit, run, score
+from taxel.detect import Example, Readout, fit, run
 from taxel.encode import ChangeEvents, ContactArea, LevelCrossing, ThresholdIzhikevich
 
 
@@ -42,18 +41,6 @@ def test_delayed_copies_are_heard_live_as_a_learner_saw_them(encoder: taxel.enco
     assert Readout.from_json(readout.to_json()).delays_ms.tolist() == delays_ms
 
 
-def test_events_that_were_never_seen_are_found_by_what_was_learnt(readout: Readout) -> None:
-    for seed in (11, 12):
-        events, truth = touches(seed)
-        result = score(run(readout, events, tare=tare()), truth, 10.0)
-        assert (result["contact"].found, result["contact"].false) == (6, 0)
-        assert (result["lift"].found, result["lift"].false) == (6, 0)
-        assert np.abs(result.errors_ms).max() < 2.0
-        # `known` is not corrected for delays: it is later than t by the delay and at most two frames.
-        lead = result["contact"].delays_ms - result["contact"].errors_ms
-        assert ((lead >= 2.0) & (lead <= 2.0 + 0.4)).all()
-
-
 def test_a_file_gives_the_same_readout_back(readout: Readout, tmp_path) -> None:
     path = readout.save(tmp_path / "readout.json")
     again = Readout.load(path)
@@ -67,12 +54,6 @@ def test_a_file_gives_the_same_readout_back(readout: Readout, tmp_path) -> None:
         readout.save(path)
     readout.save(path, overwrite=True)
     assert [p.name for p in tmp_path.iterdir()] == ["readout.json"]
-
-
-def test_a_file_with_the_ranges_of_inputs_which_older_ones_have_is_read(readout: Readout) -> None:
-    ranges = {label: {"most": [1.0] * len(neuron.weights)} for label, neuron in readout.neurons.items()}
-    older = json.dumps(json.loads(readout.to_json()) | {"seen": ranges})
-    assert Readout.from_json(older) == readout
 
 
 def pieces_of(events: taxel.Events, cuts: list[int]) -> list[taxel.Events]:
@@ -127,18 +108,3 @@ def test_known_is_never_before_the_crossing_and_ends_a_frame() -> None:
         assert (found.known <= crossing + frame_us + {1: 102, 2: 3}[wire_version]).all()
         frames = found.known / frame_us
         assert (found.known - np.round(frames) * frame_us < 1.0).all()
-
-
-def test_detections_in_frames_are_known_when_the_frame_ends() -> None:
-    values = np.zeros((40, 8, 8))
-    values[10:, 3, 3] = 100.0
-    frames = taxel.Frames(values, np.arange(40) * 2000 + 13, array=ARRAY)
-    weights = np.zeros(128)
-    weights[27] = 2.0
-    read = Readout(LevelCrossing([50.0]), {"contact": TrainedNeuron(taxel.Neuron(tau=1.0), weights, 0.1)})
-    found = run(read, frames)
-    assert found.known.tolist() == [13 + 11 * 2000]
-    assert run(read, frames, frame_us=500).known.tolist() == [13 + 10 * 2000 + 500]
-    stream = read.stream(frame_us=2000)
-    parts = [stream.push(frames[k : k + 3]) for k in range(0, 40, 3)]
-    assert together([*parts, stream.advance(10**6)]) == found

@@ -31,29 +31,6 @@ def test_a_shipped_recipe_is_what_it_was(file: Path) -> None:
     assert now.run_threshold == then.run_threshold == 1.0
 
 
-def test_a_recipe_file_kept_from_0_1_loads_unchanged() -> None:
-    kept = Recipe.load(KEPT / "kept.toml")
-    assert kept.encoder == ContactArea(levels=[2, 4, 8], noise_floor=3.0)
-    assert (said(kept, "contact")[1], said(kept, "lift")[1]) == (2.0, 1.0)
-    assert "1.5" in said(kept, "contact")[0]
-    assert "15" in said(kept, "lift")[0]
-    assert kept.run_threshold == 0.9
-
-
-def test_every_kind_of_recording_has_one_recipe() -> None:
-    every = {name: recipes.read(name) for name in recipes.names()}
-    kinds = [kind for one in every.values() for kind in one["fits"]]
-    assert len(kinds) == len(set(kinds))
-    assert all("other" in one for one in every.values())
-    frames = np.zeros((2, 1, 33))
-    found = {unit: recipes.chosen(Frames(frames, [0, 1000], unit=unit))[0] for unit in ("counts", "N", "kPa")}
-    assert found == {"counts": "gait_plate", "N": "gait_insole", "kPa": "gait_channel"}
-    few = Frames(np.zeros((2, 1, 32)), [0, 1000], unit="counts")
-    for rests, name in ((True, "touch"), (False, "gait_channel")):
-        assert recipes.chosen(few, ["contact", "foot_off"], rests=rests)[0] == name
-    assert recipes.chosen(Events([0], [0], [0], [True], array=Array(1, 1)))[0] in recipes.names()
-
-
 def test_counts_of_an_event_camera_have_their_recipe_whatever_window_and_label() -> None:
     for unit in ("events/2.5 ms", "on events/5 ms", "off events/5 ms"):
         frames = Frames(np.zeros((2, 3, 4)), [0, 1000], unit=unit)
@@ -90,23 +67,6 @@ def test_the_last_word_of_a_label_counts_where_one_label_alone_has_it(labels: li
     assert {recipe.inputs_of(label)[0] for label in labels} == inputs
     if labels[0] == "grasp_begin":
         assert said(recipe, "Grasp end") == said(Recipe.load("touch"), "lift")
-
-
-@pytest.mark.parametrize(
-    "labels",
-    [
-        ("Initial Contact", "Toe Off"),
-        ("Foot Strike", "Foot Off"),
-        ("touch down", "Lift-off"),
-        ("links Erstkontakt", "L Zehenablösung"),
-        ("AUFSETZEN", "Abheben"),
-        ("right heel strike", "right foot_off"),
-    ],
-)
-def test_what_gait_laboratories_call_the_ends_of_a_step_has_their_neurons(labels: tuple[str, str]) -> None:
-    for name, ends in (("touch", ("contact", "lift")), ("gait_insole", ("contact", "foot_off"))):
-        recipe, named = Recipe.load(name, labels=labels), Recipe.load(name, labels=ends)
-        assert [said(recipe, label) for label in labels] == [said(named, end) for end in ends], name
 
 
 def test_a_recipe_for_certain_labels_refuses_others(tmp_path: Path) -> None:

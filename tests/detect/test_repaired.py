@@ -1,12 +1,8 @@
 """A detection that may rest on values which states repaired is marked, the others are not: from pieces as the whole."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from discs import ARRAY, FRAME_US, plain, tare, touches
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import taxel
 from taxel.encode import ChangeEvents, ContactArea
@@ -55,25 +51,6 @@ def test_an_encoder_of_changes_says_nothing_that_rests_on_repaired_values():
     found = said(plain(ChangeEvents(), ARRAY), lossy(3, 0.3))
     assert len(found)
     assert not found.repaired.any()
-
-
-@settings(max_examples=20, deadline=None)
-@given(seed=st.integers(0, 1000), cuts=st.sets(st.integers(1, 2000), max_size=12))
-def test_the_marks_do_not_depend_on_where_the_events_are_cut(seed, cuts):
-    readout = plain(ContactArea(levels=(2, 4, 8)), ARRAY, seed=seed)
-    events = lossy(seed, 0.05)
-    whole = said(readout, events)
-    stream = readout.stream(frame_us=FRAME_US, tare=tare())
-    parts = [
-        stream.push(events[a:b]) for a, b in pairwise([0, *sorted(c for c in cuts if c < len(events)), len(events)])
-    ]
-    parts.append(stream.advance(int(events.t.max()) + 1_000_000))
-    found = sum(parts[1:], parts[0])
-
-    def known(said):
-        return sorted((d.known, d.label, d.t, d.repaired) for d in said if d.known <= events.t.max())
-
-    assert known(found) == known(whole)
 
 
 def test_marks_stay_in_tables(tmp_path):

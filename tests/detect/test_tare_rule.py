@@ -9,7 +9,7 @@ import numpy as np
 from shell import call
 
 import taxel
-from taxel import Array, Events, Frames, Tare
+from taxel import Array, Frames, Tare
 from taxel.detect import PlainRule, run
 
 
@@ -33,20 +33,3 @@ def test_nothing_is_detected_in_the_tare_of_a_recording(tmp_path: Path, capsys) 
     assert [one["t_us"] for one in found] == [t for t in whole.t.tolist() if t >= 500_000]
     Tare.take(frames, stop_us=500_000).save(tmp_path / "tare.json")
     assert len(json.loads(call(capsys, *asked, "--tare", tmp_path / "tare.json")[1])["detections"]) == 8
-
-
-def test_what_is_left_out_counts_no_input_as_outside() -> None:
-    rule = PlainRule("area", 2, noise_floor=40.0)
-    frames = Frames(pressed([20, 100]), 10_000 * np.arange(200), unit="counts", array=Array(4, 4))
-    tare = Tare.take(frames, stop_us=500_000)
-    assert run(rule, frames, tare=tare, begin_us=500_000).t.tolist() == [1_000_000, 1_100_000]
-    events = Events(
-        [0, 0, 600, 600],
-        [0, 1, 0, 1],
-        [0, 0, 0, 0],
-        [1, 1, 1, 1],
-        intensity=[50, 50, 99, 99],
-        array=Array(1, 2, pitch_mm=1),
-    )
-    assert len(run(rule, events, tare=Tare.take(events, stop_us=500), begin_us=500)) == 1
-    assert len(run(rule, events, tare=Tare.take(events, stop_us=500), begin_us=700)) == 0

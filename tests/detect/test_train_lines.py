@@ -65,21 +65,6 @@ def test_a_label_of_which_nothing_was_felt_is_counted_and_named_by_recording_and
     assert (result["held_out"], result["score"]["missed"]) == (True, 1)
 
 
-@pytest.mark.parametrize("folds", [2, 0])
-def test_labels_of_which_none_is_found_leave_no_readout(tmp_path: Path, capsys, folds: int) -> None:
-    recording, labels = recorded(tmp_path, 1, 6, late_us=7_000)
-    out = tmp_path / "r.json"
-    arguments = ("train", recording, "--labels", labels, "--folds", folds, "--overwrite", "-o", out)
-    code, said, _ = call(capsys, *arguments, "--window-ms", 1)
-    assert (code, out.exists()) == (3, False)
-    warned = said.splitlines()[-2:]
-    assert [line.split(": ")[1] for line in warned] == ["contact", "lift"]
-    result = json.loads(call(capsys, *arguments, "--window-ms", 1, "--json")[1])
-    assert (result["readout"], [f"warning: {one}" for one in result["warnings"]]) == (None, warned)
-    code, said, _ = call(capsys, *arguments, "--window-ms", 10)
-    assert (code, "warning" in said, out.exists()) == (0, False, True), "all are found"
-
-
 def test_a_fold_that_cannot_be_learnt_leaves_the_training_as_it_is(tmp_path: Path, capsys) -> None:
     """Of a second recording nothing was felt: it teaches silence, but not alone."""
     first, labels = recorded(tmp_path, 1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from functools import partial
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from refusal import refused
 from taxel import Array, Events, Frames, Readout, Tare
 from taxel.detect import Example, PlainRule, Recipe, fit, judge, run, tune
 from taxel.encode import LevelCrossing
-from taxel.live import Live
 
 #: As recordings name units; ticks are those of a board's events.
 UNITS = st.sampled_from(["ticks", "counts", "as sent", "N", "mN", "kPa", "Pa", "N/cm2"])
@@ -58,21 +56,6 @@ def test_values_in_another_unit_are_refused_by_a_file_too(own: str, other: str) 
             run(again, pressed(other), tare=tare)
         with refused():
             again.stream(tare=tare).push(pressed(other))
-
-
-@given(UNITS)
-def test_events_are_ticks(own: str) -> None:
-    tare = example(own).tare
-    for made in both(own):
-        if own == "ticks":
-            run(made, events(), tare=tare)
-            made.stream(tare=tare).push(events())
-            continue
-        for reads in (partial(run, made, tare=tare), made.stream(tare=tare).push):
-            with refused():
-                reads(events())
-        with refused():
-            Live(0, host="127.0.0.1", readout=made, tare=tare)
 
 
 @given(UNITS)
