@@ -1,6 +1,5 @@
 """The board on its serial line: commands, read-back, units, faults, and a cable that is pulled."""
 
-import errno
 import json
 import os
 import pty
@@ -8,7 +7,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,8 +14,8 @@ import pytest
 from shell import run
 
 import taxel
-from taxel import DeviceError, ProblemError
-from taxel.device import Cable, Device, Greeting, ports
+from taxel import DeviceError
+from taxel.device import Cable, Device, ports
 from taxel.simulate import Board
 from taxel.wire import Command, Registers
 
@@ -62,47 +60,6 @@ def test_the_floor_is_0_for_a_while_and_the_lines_stay(line: tuple[str, Board]) 
         assert (board.registers.noise_floor, board.registers.lines) == (3, 64)
 
 
-def test_a_port_that_another_program_has_opened_is_refused() -> None:
-    ours, theirs = pty.openpty()
-    place = os.ttyname(theirs)
-    with Cable(place):
-        with pytest.raises(OSError, match="another program has opened this port") as refused:
-            Cable(place)
-        assert (refused.value.errno, refused.value.filename) == (errno.EBUSY, place)
-        refused_command = run("device", "show", place)
-        assert refused_command.stderr == f"taxel: {place}: another program has opened this port\n"
-    Cable(place).close()
-    os.close(ours)
-    os.close(theirs)
-
-
-def test_the_board_says_what_it_is_when_it_is_asked(line: tuple[str, Board]) -> None:
-    place, _ = line
-    with Cable(place, timeout=30) as cable:
-        assert cable.greeting() == Greeting(1, 64, 64, 16)
-
-
-def test_registers_are_set_by_name_in_an_order_that_keeps_the_rules(line: tuple[str, Board]) -> None:
-    place, board = line
-    with Device(place, timeout=30) as device:
-        for preset in ("2 kHz", "5.2 kHz", "2 kHz"):
-            assert device.apply(preset) == Registers.preset(preset) == board.registers
-        held = device.set(noise_floor=7, ramp=400, wire_version=2)
-        assert (held.noise_floor, held.ramp, held.wire_version) == (7, 400, 2)
-        assert held == board.registers == device.registers
-        assert device.record(True).record
-        assert board.registers.record
-        assert device.apply("5.2 kHz").record, "a preset starts and stops nothing"
-        assert not device.set(record=False).record
-        with pytest.raises(DeviceError, match="rule 1"):
-            device.set(line_read=1e6)
-        assert device.registers == Registers(wire_version=2), "a preset leaves the version of the wire"
-        assert device.apply("2 kHz") == Registers(wire_version=2).with_preset("2 kHz")
-        assert device.apply(Registers.preset("2 kHz")).wire_version == 1, "registers say every one"
-        with pytest.raises(ProblemError, match="no_such"):
-            device.set(no_such=3)
-
-
 class Unfaithful(Board):
     """A board whose ramp cannot be set, though it says that it was."""
 
@@ -131,21 +88,6 @@ def test_a_board_of_another_size_is_refused() -> None:
     with Device(os.ttyname(theirs), timeout=30) as device:
         assert device.array.shape == (16, 8)
         assert device.apply("2 kHz").lines == 8
-    os.close(theirs)
-
-
-def test_a_greeting_that_nobody_asked_for_tells_of_a_reset() -> None:
-    ours, theirs = pty.openpty()
-    board = Board()
-    serve(board, ours, ours, greets=False)
-    with Cable(os.ttyname(theirs), timeout=30) as cable:
-        for asked in range(3):
-            assert (cable.greeting().channels, cable.resets) == (16, asked)
-            os.write(ours, board.greeting.encode())
-            until = time.monotonic() + 30
-            while cable.resets == asked:
-                cable.listen()
-                assert time.monotonic() < until
     os.close(theirs)
 
 
@@ -180,19 +122,6 @@ def test_a_pulled_cable_is_found_again_and_the_board_set_as_it_was(tmp_path: Pat
         device.patience = 0.1
         with pytest.raises(DeviceError, match=r"no board answered within 0\.1 s"):
             _ = device.registers
-
-
-def test_faults_are_counted_as_the_board_says_them() -> None:
-    ours, theirs = pty.openpty()
-    serve(Board(), ours, ours)
-    with Device(os.ttyname(theirs), timeout=30) as device:
-        os.write(ours, b"fault queue 3\nfault comparator 12\nfault queue 5\n")
-        until = time.monotonic() + 30
-        while device.faults.get("queue") != 5:
-            assert time.monotonic() < until
-        assert device.faults == {"queue": 5, "comparator": 12}
-        assert device.set(ramp=140).ramp == 140
-    os.close(theirs)
 
 
 def test_the_command_does_all_of_it_on_an_emulated_board() -> None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import socket
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -185,67 +183,6 @@ def test_a_layout_file_names_a_source(tmp_path: Path) -> None:
     layout.write_text("rows = 1\ncolumns = 2\n")
     with pytest.raises(taxel.FormatError, match=r"\[source\] place is missing"):
         Live(sources=str(layout))
-
-
-def test_a_tare_is_measured_and_the_recording_tells_the_same(tmp_path: Path) -> None:
-    rng = np.random.default_rng(11)
-    values = touches(rng, 8, 8, 400, "N") + rng.uniform(5, 9, (8, 8)).round(3)
-    values[:60] = np.round(rng.normal(0, 0.2, (60, 8, 8)) + 7.0, 3)
-    values = np.round(values, 3)
-    t = np.arange(len(values)) * PERIOD_US
-    rule = PlainRule("total", 60.0, 0.6, noise_floor=2.0, unit="N")
-    path = tmp_path / "a.mcap"
-    with served(lines_of(values, t)) as address:
-        source = f"lines+tcp:{address},array=8x8,time=1:us,unit=N"
-        found: list[Detection] = []
-        with Live(readout=rule, tare=0.5, sources=source, record=path, say=found.append) as live:
-            until(lambda: live.counters["frames"] == len(values))
-            summary = live.stop()
-    recording = taxel.open(path)
-    assert summary.tare is not None
-    tare = Tare.take(recording.frames(), start_us=0, stop_us=500_000)
-    assert np.array_equal(summary.tare.rest, tare.rest)
-    expected = run(rule, recording, tare=summary.tare, begin_us=500_000)
-    assert found
-    assert [(d.label, d.t, d.known) for d in found] == [(d.label, d.t, d.known) for d in expected]
-
-
-@pytest.mark.parametrize("shown", [[], ["--panel"]])
-def test_lines_of_the_standard_input_are_read_to_their_end(tmp_path: Path, shown: list[str]) -> None:
-    values = touches(np.random.default_rng(5), 16, 16, 200, "counts")
-    detector, path = tmp_path / "a.json", tmp_path / "a.mcap"
-    readout_of(16, 16, "counts").save(detector)
-    text = lines_of(values, np.arange(len(values)) * PERIOD_US)
-    words = ["live", "--source", "lines:-,array=16x16,time=1:us", "--readout", detector, "--record", path, "--json"]
-    words += shown
-    done = subprocess.run(
-        [sys.executable, "-m", "taxel", *map(str, words)],
-        input=text,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    # A source of a few lines may end before the page is there.
-    was_served = any(said in done.stderr for said in ("panel: http", "the page was not served: the source ended first"))
-    assert (done.returncode, was_served) == (0, bool(shown)), done.stderr
-    assert "lines:- has ended" in done.stderr
-    assert done.stderr.rstrip().endswith(f"\n{taxel.open(path).verdict}"), "what is for people is on standard error"
-    expected = run(Readout.load(detector), taxel.open(path))
-    assert len(done.stdout.splitlines()) == len(expected) > 3
-
-
-def test_numbers_that_a_program_passes_are_frames(tmp_path: Path) -> None:
-    values = touches(np.random.default_rng(5), 2, 3, 100, "N")
-    path = tmp_path / "a.mcap"
-    readout, source, found = readout_of(2, 3, "N"), "skin=given,array=2x3,rate=100,unit=N", []
-    with Live(readout=readout, sources=source, record=path, say=found.append) as live:
-        for k, frame in enumerate(values):
-            live.sample("skin", frame.reshape(-1), 1_000_000_000 + k * 10_000_000)
-        summary = live.stop()
-    assert summary.counters["frames"] == len(values)
-    assert found
-    assert [(d.t, d.known) for d in found] == [(d.t, d.known) for d in run(readout, taxel.open(path))]
 
 
 def test_a_readout_of_another_unit_or_shape_is_refused(tmp_path: Path) -> None:

@@ -37,14 +37,6 @@ def test_a_frame_that_was_under_way_when_reading_began_is_no_loss_and_a_later_on
     assert frames.unread["unfinished_frames"]["lines"] == 2
 
 
-def test_text_before_the_first_numbers_is_counted_and_is_no_fault() -> None:
-    frames = frames_of("1,2", 2)
-    assert [push(frames, text)[1] for text in ("rst:0x1 (POWERON RESET)", "\ufffd\x01", "1,2", "boot")] == [0, 0, 0, 1]
-    assert (frames.unread["text"]["lines"], frames.unread["no_text"]["lines"]) == (2, 1)
-    frames.restart()
-    assert push(frames, "rst:0x1 (POWERON RESET)")[1] == 0
-
-
 @pytest.mark.parametrize(
     ("lines", "time", "expected"),
     [

@@ -9,11 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from loopback import until
 
 import taxel
-from taxel import Array, Detection, Events, Neuron, ProblemError, Readout, Tare, wire
-from taxel.cli import main
+from taxel import Array, Detection, Events, Neuron, ProblemError, Readout, Tare
 from taxel.detect import PlainRule
 from taxel.encode import ContactArea
 from taxel.live import Live, send
@@ -58,60 +56,6 @@ def test_the_sums_close_with_the_senders_own_count(
     assert (summary.lost, summary.nothing_came) == (0, False)
 
 
-def test_what_the_kernel_does_not_count_is_unknown_in_the_file_and_after_conversions(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("TAXEL_CAPTURE", "portable")
-    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "walk.mcap") as live:
-        wait_for(live, play(presses(2), live.address[1]))
-    assert live.stop().verdict.status == "unknown"
-    taxel.convert(tmp_path / "walk.mcap", tmp_path / "again.mcap")
-    for name in ("walk.mcap", "again.mcap"):
-        recording = taxel.open(tmp_path / name)
-        assert recording.verdict.status == "unknown"
-        assert recording.counts["dropped_by_kernel"] is None
-        with pytest.raises(SystemExit, match=r"^0$"):
-            main(["info", str(tmp_path / name)])
-        assert "unknown: the system does not count them" in capsys.readouterr().out
-
-
-def test_what_is_recorded_is_what_was_sent(tmp_path: Path) -> None:
-    events = presses(5)
-    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "walk.mcap") as live:
-        wait_for(live, play(events, live.address[1]))
-    assert live.stop().lost == 0
-    recording = taxel.open(tmp_path / "walk.mcap")
-    assert recording.events == events
-    assert recording.datagrams().payload.tobytes() == wire.encode(events)
-
-
-def test_detections_come_live_and_are_those_of_the_recording(tmp_path: Path) -> None:
-    called: list[Detection] = []
-    # On a machine that stalls, datagrams are late: the guard prevents the host's clock from advancing time here.
-    options = {"array": SMALL, "readout": touch(), "guard_frames": 1e6, "say": called.append}
-    with Live(0, host=LOOPBACK, record=tmp_path / "said.mcap", **options) as live:
-        thread = threading.Thread(target=play, args=(presses(6), live.address[1]), kwargs={"pace": 0.001})
-        thread.start()
-        iterated = []
-        for said in live:
-            iterated.append(said)
-            if len(iterated) == 5:
-                break
-        thread.join()
-        wait_for(live, len(datagrams(presses(6))))
-    live.stop()
-    recorded = taxel.open(tmp_path / "said.mcap")
-    again = taxel.detect.run(touch(), recorded)
-    assert len(again) == 6
-    for found in (taxel.Detections.from_list(called), recorded.detections):
-        assert list(found.label) == ["touch"] * len(found)
-        assert len(found) >= 5
-        np.testing.assert_array_equal(found.t, again.t[: len(found)])
-        np.testing.assert_array_equal(found.known, again.known[: len(found)])
-    assert iterated == called[:5]
-    assert taxel.Detections.from_list(called).reported is not None
-
-
 @pytest.mark.parametrize("tared", [False, True])
 @pytest.mark.parametrize("stretch", [1.5, 1.0])
 def test_a_board_that_lags_its_own_clock_gives_the_detections_of_its_recording(
@@ -143,15 +87,6 @@ def test_a_board_that_lags_its_own_clock_gives_the_detections_of_its_recording(
     assert counters["detections"] == len(again) + counters["wrong"]
 
 
-def test_in_silence_what_is_owed_is_said() -> None:
-    events = presses(1)
-    with Live(0, host=LOOPBACK, array=SMALL, readout=touch()) as live:
-        play(events[:4], live.address[1])
-        said = live.next(30)
-    assert said is not None
-    assert said.t > events.t[3]
-
-
 def test_what_a_thread_keeps_for_itself_lasts_from_one_call_to_the_next() -> None:
     own, calls = threading.local(), []
 
@@ -179,49 +114,10 @@ def test_what_the_callers_function_raises_is_raised() -> None:
         assert list(live) == [], "it has ended"
 
 
-def test_a_tare_is_taken_and_can_be_kept() -> None:
-    rest = Events(
-        np.arange(64) * 1000,
-        np.tile(np.arange(4), 16),
-        np.repeat(np.tile(np.arange(4), 4), 4),
-        np.ones(64, bool),
-        array=SMALL,
-        intensity=np.full(64, 40),
-    )
-    readout = Readout(ContactArea(), {"contact": (Neuron(tau=0.5), np.ones(10))})
-    with Live(0, host=LOOPBACK, array=SMALL, readout=readout, tare=0.05) as live:
-        assert live.tare is None
-        wait_for(live, play(rest, live.address[1]))
-        tare = until(lambda: live.tare)
-    np.testing.assert_array_equal(tare.rest, np.full((4, 4), 40.0))
-    assert (tare.start_us, tare.stop_us) == (0, 50_000)
-
-
 def test_a_readout_that_needs_a_tare_and_has_none_is_refused() -> None:
     readout = Readout(ContactArea(), {"contact": (Neuron(), np.ones(10))})
     with pytest.raises(ProblemError, match="tare"):
         Live(0, host=LOOPBACK, readout=readout)
-
-
-def test_the_frame_shows_what_the_taxels_hold() -> None:
-    with Live(0, host=LOOPBACK, array=SMALL) as live:
-        play(presses(1), live.address[1])
-        until(lambda: live.frame[2, 1] != 0)
-        assert np.count_nonzero(live.frame) == 1
-
-
-def test_notes_and_markers_are_kept(tmp_path: Path) -> None:
-    marked = Events([], [], [], [], array=SMALL, markers=[(1000, True), (5000, False)])
-    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "noted.mcap") as live:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
-            link.sendto(wire.encode(marked), live.address)
-        wait_for(live, 1)
-        assert live.take_markers() == [(1000, True), (5000, False)]
-        assert live.take_markers() == []
-        live.note("the left foot")
-    recorded = taxel.open(tmp_path / "noted.mcap")
-    assert [note.text for note in recorded.notes] == ["the left foot"]
-    assert recorded.events.markers == marked.markers
 
 
 @pytest.mark.parametrize(("rows", "columns"), [(1, 65_535), (256, 256), (65_535, 1)])

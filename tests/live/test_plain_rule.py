@@ -77,13 +77,3 @@ def test_in_a_fresh_tare_nothing_is_detected_live_or_from_the_recording(tmp_path
     assert again[0] >= 50_000
     assert detections.t.tolist() == again[: len(detections)]
     assert len(detections) >= 6
-
-
-def test_in_silence_the_end_is_detected() -> None:
-    events = touches(1)
-    with Live(0, host=LOOPBACK, array=SMALL, readout=PlainRule("area", 2, frames=200), tare=TARE) as live:
-        play(events, live.address[1])
-        found = [live.next(30), live.next(30)]
-    assert [one and one.label for one in found] == ["contact", "lift"]
-    assert found[1] is not None
-    assert found[1].known > events.t[-1]

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import socket as udp
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from draws import seeds
-from loopback import free_port, until
+from loopback import until
 
 import taxel
 from taxel.live import Live
@@ -100,43 +96,3 @@ def test_over_any_restarts_each_step_back_is_in_the_verdict_live_as_in_the_file(
         assert some.verdict.steps_back == steps
     taxel.convert(recording, tmp_path / "b.mcap")
     assert taxel.open(tmp_path / "b.mcap").verdict.steps_back == recording.verdict.steps_back
-
-
-@pytest.mark.parametrize("session", [None, pytest.param(7, marks=pytest.mark.slow)])
-def test_an_emulated_board_that_is_killed_and_started_again_makes_no_step_back(
-    tmp_path: Path, session: int | None
-) -> None:
-    port, path = free_port(), tmp_path / "a.mcap"
-    same = [] if session is None else ["--session", str(session)]
-    command = [sys.executable, "-m", "taxel", "emulate", "--port", str(port), "--wire", "2", "--seed", "3", *same]
-    boards = []
-
-    def start() -> None:
-        boards.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=tmp_path))
-
-    try:
-        start()
-        # Listening later than the board began, the first datagrams are not there.
-        with udp.socket(udp.AF_INET, udp.SOCK_DGRAM) as link:
-            link.bind((LOOPBACK, port))
-            link.settimeout(60)
-            link.recv(2000)
-        with Live(port, host=LOOPBACK, record=path) as live:
-            for _ in range(2):
-                begun = live.counters["board_us"] or 0
-                until(lambda: (live.counters["board_us"] or 0) > begun + 500_000)  # noqa: B023  called at once
-                os.kill(boards[-1].pid, signal.SIGKILL)
-                boards[-1].wait()
-                resets = live.counters["wire_v2"]["resets"]
-                start()
-                until(lambda: live.counters["wire_v2"]["resets"] > resets)  # noqa: B023  called at once
-            summary = live.stop()
-    finally:
-        for board in boards:
-            board.kill()
-            board.wait()
-    recording = taxel.open(path)
-    assert recording.verdict.noted["resets"] == 2
-    assert (summary.verdict.steps_back, summary.counters["wire_steps_back"]) == ([], 0)
-    assert (np.diff(recording.events.t) >= 0).all()
-    assert recording.verdict.to_dict() == summary.verdict.to_dict()

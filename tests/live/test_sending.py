@@ -1,19 +1,16 @@
 """Detections on their way to other programs: the lines of --json, lost where there is no reader, never waited for."""
 
-import itertools
 import json
 import os
-import pty
 import socket
 import subprocess
 import time
-import tty
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from loopback import free_port, until
+from loopback import free_port
 
 import taxel
 from taxel.live import Live
@@ -96,57 +93,6 @@ def test_a_detection_goes_by_udp_and_into_a_pipe(tmp_path: Path) -> None:
     assert [line + b"\n" for line in lines] == datagrams, "one format"
     the_same(lines, record)
     assert [(one["sent"], one["lost"], one["waiting"]) for one in counts["sent"]] == [(6, 0, 0)] * 2
-
-
-def test_a_detection_drives_a_serial_line(tmp_path: Path) -> None:
-    ours, theirs = pty.openpty()
-    tty.setraw(theirs)
-    name = os.ttyname(theirs)
-    os.close(theirs)
-    with listen(f"serial:{name},baud=9600", tmp_path / "said.mcap") as live:
-        wait_for(live, play(presses(3), live.address[1]))
-        counts = live.stop().counters
-    got = b""
-    while got.count(b"\n") < 3:
-        got += os.read(ours, 4096)
-    os.close(ours)
-    the_same(got.splitlines(), tmp_path / "said.mcap")
-    assert counts["sent"] == [{"to": f"serial:{name},baud=9600", "sent": 3, "lost": 0, "waiting": 0, "trouble": None}]
-
-
-def test_an_unplugged_serial_line_loses_lines_and_is_opened_again(tmp_path: Path) -> None:
-    link, events, number = tmp_path / "line", presses(2000), itertools.count()
-
-    def plug() -> tuple[int, int]:
-        ends = pty.openpty()
-        link.symlink_to(os.ttyname(ends[1]))
-        return ends
-
-    def unplug(ends: tuple[int, int]) -> None:
-        link.unlink()
-        for end in ends:
-            os.close(end)
-
-    ends = plug()
-    with listen(f"serial:{link}", tmp_path / "said.mcap") as live:
-
-        def press() -> dict[str, Any]:
-            first = 20 * next(number)
-            play(events[first : first + 20], live.address[1])
-            counts: dict[str, Any] = live.counters["sent"][0]
-            return counts
-
-        until(lambda: press()["sent"] > 0)
-        unplug(ends)
-        until(lambda: "the line was disconnected" in str(press()["trouble"]))
-        until(lambda: "No such file" in str(press()["trouble"]))
-        ends = plug()
-        before = live.counters["sent"][0]
-        until(lambda: press()["sent"] > before["sent"])
-        counts = live.stop().counters
-    unplug(ends)
-    assert before["lost"] > 0
-    assert counts["detections"] == counts["sent"][0]["sent"] + counts["sent"][0]["lost"]
 
 
 def test_who_does_not_read_loses_lines_and_holds_nothing(tmp_path: Path) -> None:

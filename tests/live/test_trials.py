@@ -99,36 +99,6 @@ def record(port: int, *arguments: object) -> list[str]:
     return [sys.executable, "-m", "taxel", *map(str, said)]
 
 
-def test_a_trial_after_a_damaged_stamp_says_that_its_times_are_doubtful(tmp_path):
-    sent = []
-    for k in range(60):
-        # The stamp of one datagram, in the first trial, has its top bit flipped.
-        t = 10_000 * (k + 1) + 3_276_800 * (k == 20)
-        one = taxel.Events([t], [3], [4], [k % 2 > 0], array=taxel.Array.thesis(), intensity=[60 + k % 2])
-        sent.append(taxel.wire.encode(one))
-    with (
-        taxel.live.Live(0, host=LOOPBACK, record_later=True) as live,
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
-    ):
-        for trial, (first, last) in enumerate([(0, 10), (10, 40), (40, 60)]):
-            live.record(tmp_path / f"{trial}.mcap")
-            for k in range(first, last):
-                link.sendto(sent[k], live.address)
-                until(lambda: live.counters["decoded"] == k + 1)  # noqa: B023  called at once
-        live.end_recording()
-        ended = live.stop().verdict
-    verdicts = [taxel.open(tmp_path / f"{trial}.mcap").verdict for trial in range(3)]
-    assert [one.status for one in verdicts] == ["complete after arrival", "damaged", "damaged"]
-    begins = int(taxel.open(tmp_path / "2.mcap").events.t[0])
-    assert begins > 6_000_000, "a turn too late"
-    assert verdicts[2].damaged == {"jumps_of_time_before_it": 1}
-    assert (ended.status, ended.doubtful_after_us) == ("damaged", verdicts[1].doubtful_after_us)
-    after = verdicts[2].doubtful_after_us
-    assert after is not None
-    assert after < begins
-    assert "all times are doubtful" in verdicts[2]
-
-
 def test_trials_that_follow_each_other_lose_nothing_and_know_what_was_held(tmp_path: Path) -> None:
     port = free_port()
     arguments = record(port, tmp_path / "step.mcap", "--length", 0.25, "--countdown", 0, "--trials", 4, "--json")
@@ -148,23 +118,6 @@ def test_trials_that_follow_each_other_lose_nothing_and_know_what_was_held(tmp_p
         assert capture["datagrams"] == counters["decoded"] + capture["dropped_by_queue"]
         assert counters["wire"]["bytes"] == 5 * counters["wire"]["words"]
         assert line["verdict"].startswith("nothing lost after arrival")
-
-
-def test_each_datagram_belongs_to_one_recording_wherever_the_border_falls(tmp_path: Path) -> None:
-    paths = [tmp_path / f"{n}.mcap" for n in range(12)]
-    with Live(0, host=LOOPBACK, array=SMALL, record_later=True) as live, board(live.address[1]):
-        until(lambda: live.counters["decoded"] > 0)
-        for n, path in enumerate(paths):
-            before = live.record(path)
-            assert (before is None) == (n == 0)
-            came = live.counters["decoded"]
-            until(lambda: live.counters["decoded"] > came + 1 + 20 * (n % 3))  # noqa: B023
-        last = live.end_recording()
-        assert last.path == paths[-1]
-        with pytest.raises(taxel.ProblemError, match="nothing is recorded"):
-            live.end_recording()
-    assert not live.stop().lost
-    assert_follow_each_other(paths)
 
 
 def test_what_came_between_two_trials_is_in_neither_and_is_known_to_the_next(tmp_path: Path) -> None:
@@ -195,22 +148,6 @@ def test_what_came_between_two_trials_is_in_neither_and_is_known_to_the_next(tmp
     assert (steps(a), steps(b)) == ([0], [2, 3])
     np.testing.assert_array_equal(begun(a), REST)
     np.testing.assert_array_equal(begun(b), np.r_[100, 101, REST[2:]])
-
-
-def test_a_trial_to_which_nothing_came_keeps_its_number_for_the_next(tmp_path: Path) -> None:
-    port = free_port()
-    arguments = record(port, tmp_path / "step.mcap", "--length", 0.4, "--countdown", 0, "--trials", 2)
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stderr is not None
-        nothing = next(line for line in process.stderr if "nothing arrived" in line)
-        with board(port):
-            _, more = process.communicate(timeout=60)
-    assert process.returncode == 0
-    assert nothing == f"taxel: {tmp_path / 'step1.mcap'}: nothing arrived at UDP {LOOPBACK}:{port}; not saved\n"
-    assert "nothing arrived" not in more
-    trials = [tmp_path / "step1.mcap", tmp_path / "step2.mcap"]
-    assert sorted(tmp_path.iterdir()) == trials
-    assert_follow_each_other(trials)
 
 
 def test_ctrl_c_ends_the_trial_that_runs_well(tmp_path: Path) -> None:

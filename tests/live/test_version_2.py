@@ -2,7 +2,6 @@
 
 import re
 import socket as udp
-import time
 
 import numpy as np
 import pytest
@@ -10,28 +9,8 @@ from loopback import until
 from shell import call
 
 import taxel
-from taxel.encode import ChangeEvents
-from taxel.simulate import Board, Faults, Scene, Silence, Version2, emulate, play
+from taxel.simulate import Board, Faults, Scene, Silence, Version2, emulate
 from taxel.wire import Command, Registers
-
-
-def test_a_recording_of_version_2_says_that_nothing_was_lost(tmp_path):
-    acts = [Silence(80.0), Scene.draw(seed=3)]
-    with taxel.live.Live(0, host="127.0.0.1", record=tmp_path / "two.mcap") as live:
-        report = emulate("{}:{}".format(*live.address), acts, seed=1, tare_ms=20.0, wire=2)
-        summary = live.stop()
-    assert summary.counters["wire_version"] == 2
-    assert summary.counters["wire"]["bytes"] == 0
-    assert summary.counters["wire_v2"]["missing"] == 0
-    assert (summary.verdict, summary.verdict.status) == ("nothing lost", "complete")
-    recording = taxel.open(tmp_path / "two.mcap")
-    events = recording.events
-    repaired = summary.counters["wire_v2"]["repaired"]
-    assert len(events) == report.changes + repaired
-    one = play(acts, seed=1, tare_ms=20.0).events
-    # Version 1 contains the same changes, with times rounded down to 100 us.
-    assert len(one) == report.changes
-    assert [start for _, start in events.markers] == [True, False]
 
 
 def test_the_numbers_of_a_verdict_are_those_of_the_recording(tmp_path, capsys):
@@ -84,34 +63,6 @@ def test_two_boards_that_send_to_one_port_are_told(tmp_path, wire, boards):
     assert verdict.noted["changes_of_address"] == boards
     assert verdict.status == {1: "complete after arrival" if wire == 1 else "complete", 2: "damaged"}[boards]
     assert taxel.open(path).verdict.to_dict() == verdict.to_dict()
-
-
-@pytest.mark.parametrize("lost", [0, 3])
-def test_what_comes_late_from_before_a_recording_hides_no_loss_in_it(tmp_path, lost):
-    board, frames = Board(Registers(wire_version=2)), [np.full(4096, 20 + 10 * (k % 2), np.uint16) for k in range(4)]
-    sent = [one for frame in frames for one in board.frame(frame)]
-    assert len(sent) > 20
-    late = sent[4:7]
-    path = tmp_path / "two.mcap"
-    with (
-        taxel.live.Live(0, host="127.0.0.1", record_later=True) as live,
-        udp.socket(udp.AF_INET, udp.SOCK_DGRAM) as link,
-    ):
-
-        def send(some):
-            before = live.counters["decoded"]
-            for one in some:
-                link.sendto(one, live.address)
-            until(lambda: live.counters["decoded"] == before + len(some))
-
-        send([*sent[:4], *sent[7:10]])
-        live.record(path)
-        send([*late, *sent[10:14], *sent[14 + lost :]])
-        verdict = live.end_recording().verdict
-        assert live.counters["wire_v2"]["missing"] == lost
-    assert verdict.lost == ({"lost_on_the_way": lost} if lost else {})
-    assert verdict.status == ("lost" if lost else "complete")
-    assert taxel.open(path).verdict.lost == verdict.lost
 
 
 def test_raw_bytes_of_version_2_are_refused(tmp_path):
@@ -171,25 +122,3 @@ def test_resets_and_changes_of_version_are_marked_in_the_recording(tmp_path):
     taxel.convert(path, again)
     assert taxel.open(again).events == events
     assert taxel.open(again).board_changes == recording.board_changes
-
-
-def test_what_comes_after_time_went_on_is_counted_late():
-    board, decoder = Board(Registers(wire_version=2), version_2=Version2(states_us=0)), taxel.wire.Decoder(2)
-    with udp.socket(udp.AF_INET, udp.SOCK_DGRAM) as socket:
-        for gap, late in ((1.0, True), (1e7, False)):
-            readout = taxel.Readout(ChangeEvents(), {"a": (taxel.Neuron(), np.zeros(8192))})
-            with taxel.live.Live(0, host="127.0.0.1", readout=readout, gap_frames=gap) as live:
-                sent = [d for k in range(20) for d in board.frame(np.full(4096, 20 + 10 * (k % 2), np.uint16))]
-                kept = sent.pop(len(sent) // 2)
-                in_it = len(decoder.push(kept))
-                for datagram in sent[:-1]:
-                    socket.sendto(datagram, live.address)
-                until(lambda: live.counters["decoded"] == len(sent) - 1)  # noqa: B023
-                time.sleep(0.02)
-                socket.sendto(sent[-1], live.address)
-                until(lambda: live.counters["decoded"] == len(sent))  # noqa: B023
-                socket.sendto(kept, live.address)
-                until(lambda: live.counters["decoded"] == len(sent) + 1)  # noqa: B023
-                counters = live.stop().counters
-            assert counters["wire_late"] == (in_it if late else 0)
-            assert counters["wire_v2"]["missing"] == 0
