@@ -6,10 +6,8 @@ import json
 
 import numpy as np
 import pytest
-from draws import mixed, seeds
 from formats.making import write_gaitpdb, write_icub, write_pedar
 from panel.protocol import (
-    CURVE,
     EXTENT,
     UNKNOWN,
     Client,
@@ -23,11 +21,11 @@ from panel.protocol import (
 )
 
 import taxel
-from taxel import Array, Frames, Places
+from taxel import Array, Frames
 from taxel.options import FullReading
 from taxel.panel import Panel
 from taxel.reading import Facts, InMemory
-from taxel.recording.analysis.pressure import above_rest, force_n
+from taxel.recording.analysis.pressure import above_rest
 from taxel.recording.analysis.rest import ticks_by_unit
 
 
@@ -131,23 +129,6 @@ def test_spikes_of_frames_are_those_of_the_encoder(tmp_path, encoder):
             assert {*there} >= {*told} >= {one for one in there if one[0] > 2100}
 
 
-def test_spikes_of_both_feet_are_those_of_each(tmp_path):
-    file = write_pedar(tmp_path)
-    [both] = FullReading().open_trials(file)
-    encoder = taxel.encode.ChangeEvents(noise_floor=1.0)
-    expected = []
-    for n, foot in enumerate(("left", "right")):
-        frames = both.sources[foot].frames()
-        assert (frames.values == np.floor(frames.values)).all()
-        own = frames.array.rows * frames.array.columns
-        expected += [(t, n * own + train, value) for t, train, value in trains_of(encoder.encode(frames))]
-    assert {train // own for _, train, _ in expected} == {0, 1}
-    with Panel(file) as panel, Client(panel) as page:
-        about = opened(page, file.name)
-        assert page.ask("encode", encoder=json.loads(encoder.to_json()))["type"] == "done"
-        assert sorted(spikes_up_to(page, about["stop_us"])) == sorted(expected)
-
-
 def test_an_encoder_that_does_not_fit_frames_is_refused_with_the_reason(tmp_path):
     taxel.convert(frames_of(), tmp_path / "mat.mcap")
     trial = taxel.open_all(write_icub(tmp_path))[0]
@@ -202,24 +183,6 @@ def test_a_file_of_several_trials_shows_each(tmp_path):
     assert [[note.text for note in one.notes] for one in taxel.open_all(file)] == [[], ["slip"]]
 
 
-def test_events_of_a_table_are_shown_as_those_of_a_board(tmp_path):
-    events = taxel.Events([0, 30_000], [1, 2], [0, 0], [True, True], array=Array(1, 4), intensity=[10, 40])
-    taxel.convert(events, tmp_path / "events.npz")
-    with Panel(tmp_path / "events.npz") as panel, Client(panel) as page:
-        about = opened(page, "events.npz")
-        assert about["frames"] is None
-        assert about["events"] == 2
-
-
-def test_a_folder_opens_on_its_first_recording(tmp_path):
-    for name in ("step10.npz", "step2.npz"):
-        taxel.convert(frames_of(), tmp_path / name)
-    (tmp_path / "labels.csv").write_text("recording,label,t_us\n")
-    with Panel(tmp_path) as panel, Client(panel) as page:
-        assert page.until("hello")["open"] == "step2.npz"
-        assert sorted(file["name"] for file in page.until("recordings")["files"]) == ["step10.npz", "step2.npz"]
-
-
 def test_what_is_no_recording_is_refused_at_once(tmp_path):
     (tmp_path / "notes.txt").write_text("bread, milk\n")
     with pytest.raises(taxel.FormatError, match="contains no table of numbers"):
@@ -267,38 +230,6 @@ def max_and_column(page, about):
     return max(force) * about["frames"]["step"], int(np.argmax(force))
 
 
-@pytest.mark.parametrize(("unit", "sigma", "seed"), mixed(["N", "kPa", "counts"], [0.0, 0.1, 1.0], [1, 2]))
-def test_noise_is_no_area_and_moves_no_centre_and_counts_in_the_sum_of_forces(tmp_path, unit, sigma, seed):
-    random = np.random.default_rng(seed)
-    values = np.maximum(random.normal(0, sigma, (400, 14, 11)), 0)
-    presses = [(begin, random.integers(0, 10), random.integers(0, 7)) for begin in range(100, 400, 60)]
-    for begin, y, x in presses:
-        values[begin : begin + 30, y : y + 4, x : x + 4] += 60
-    frames = Frames(values.astype(np.float32), np.arange(400) * 10_000, unit=unit, array=Array(14, 11))
-    taxel.convert(frames, tmp_path / "mat.npz")
-    shown, floor, _ = above_rest(taxel.open(tmp_path / "mat.npz"))
-    with Panel(tmp_path / "mat.npz") as panel, Client(panel) as page:
-        about = opened(page, "mat.npz")
-        step = about["frames"]["step"]
-        assert about["frames"]["floor"] * step == pytest.approx(floor, abs=step)
-        for begin, y, x in presses:
-            for k, pressed in ((begin - 20, False), (begin + 10, True)):
-                _, frame = values_at(page, about, k * 10_000)
-                at = head(frame)[0]
-                total, area, *centre = section(frame, 9, CURVE)[0].item()
-                assert at["t_us"] == k * 10_000
-                of_all = unit != "counts"
-                # As taxel info has it: one in ten may have more noise than what counts as such, in counts more.
-                assert int(area) == pytest.approx(np.count_nonzero(shown.values[k] > floor), abs=1 if of_all else 3)
-                assert not of_all or int(area) == pytest.approx(16 * pressed, abs=1)
-                sum_ = frames.values[k].sum() if of_all else shown.values[k][shown.values[k] > floor].sum()
-                assert total * step == pytest.approx(sum_, abs=160 * step + (1e-3 if of_all else 3.3 * floor))
-                if pressed:
-                    assert centre == pytest.approx((x + 1.5, y + 1.5), abs=0.1 if of_all else 0.5)
-                elif area == 0:
-                    assert np.isnan(centre).all()
-
-
 @pytest.mark.parametrize("column_us", [4_000, 64_000])
 def test_each_foot_has_a_sum_and_a_centre(tmp_path, column_us):
     random = np.random.default_rng(4)
@@ -336,50 +267,6 @@ def test_each_foot_has_a_sum_and_a_centre(tmp_path, column_us):
                 for found, axis in ((own["x"][k], places.x), (own["y"][k], places.y)):
                     at = (seen @ axis.reshape(-1))[sums > 0] / sums[sums > 0]
                     assert found == pytest.approx([at.min(), at.max()], abs=1)
-
-
-def test_the_centre_is_at_the_places_and_channels_have_none(tmp_path):
-    frames = np.zeros((20, 1, 3))
-    frames[5:] = [1.0, 3.0, 0.0]
-    places = Places([-500.0, -700.0, -600.0], [40.0, -40.0, 900.0])
-    for name, array in (("placed", Array(1, 3, places=places)), ("channels", Array(1, 3))):
-        taxel.convert(Frames(frames, np.arange(20) * 10_000, unit="N", array=array), tmp_path / f"{name}.npz")
-    with Panel(tmp_path / "placed.npz") as panel, Client(panel) as page:
-        for name, expected in (("placed", (-650.0, -20.0)), ("channels", (np.nan, np.nan))):
-            about = opened(page, f"{name}.npz")
-            _, frame = values_at(page, about, 150_000)
-            *_, x, y = section(frame, 9, CURVE)[0].item()
-            assert (x, y) == pytest.approx(expected, abs=0.02, nan_ok=True)
-
-
-@pytest.mark.parametrize("seed", seeds(4, quick=1))
-def test_a_force_from_pressures_uses_each_taxel_s_area(tmp_path, seed):
-    draw = np.random.default_rng(seed)
-    rows, columns = int(draw.integers(1, 5)), int(draw.integers(2, 9))
-    x, y = draw.uniform(0, 90, (2, rows, columns))
-    area = draw.uniform(5.0, 400.0, (rows, columns))
-    exists = draw.random((rows, columns)) > 0.2
-    exists[0, 0] = True
-    values = np.where(exists, draw.uniform(0, 90, (60, rows, columns)) * (np.arange(60) > 20)[:, None, None], 0)
-    for unit, known in (("kPa", area), ("kPa", None), ("counts", area)):
-        array = Array(rows, columns, exists=exists, places=Places(x, y, known, "mm"))
-        frames = Frames(values, np.arange(60) * 10_000, unit=unit, array=array)
-        taxel.convert(frames, tmp_path / "foot.npz", overwrite=True)
-        with Panel(tmp_path / "foot.npz") as panel, Client(panel) as page:
-            about = opened(page, "foot.npz")
-            newtons = about["frames"]["newtons"]
-            force = force_n(frames)
-            assert (newtons is None) == (force is None) == (unit != "kPa" or known is None)
-            # In another unit the rest of a quiet stretch is subtracted.
-            total = values.sum(axis=(1, 2)) if force is None else force
-            if unit == "kPa":
-                step = about["frames"]["step"] if newtons is None else newtons
-                page.send(type="overview")
-                assert max(page.until("overview")["force"]) * step == pytest.approx(total.max(), rel=2e-3)
-                # What is played from a keyframe is weighed as the whole is.
-                for k in (25, 40, 59):
-                    _, frame = values_at(page, about, int(frames.t[k]))
-                    assert section(frame, 9, CURVE)[0]["sum"] * step == pytest.approx(total[k], rel=2e-3)
 
 
 @pytest.mark.parametrize("column", [False, True])

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-import multiprocessing
-import os
 import random
-import threading
 import time
 from collections import Counter
 from dataclasses import replace
@@ -64,53 +61,6 @@ def label(table: Path, name: str, seed: int, until: float, last_save) -> tuple[s
         gone |= {old: begun} if old is not None else {}
     since = last_save.value
     return {t for t, at in there.items() if at > since}, {t for t, at in gone.items() if at > since}
-
-
-def window(table: Path, names: list[str], seed: int, until: float, last_save, answers) -> None:
-    """Label in a process of its own, with a thread for each name."""
-    threads = [
-        threading.Thread(target=lambda name=name: answers.put((name, *label(table, name, seed, until, last_save))))
-        for name in names
-    ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-
-
-@pytest.mark.parametrize("saves", [0, 5])
-def test_of_windows_and_servers_none_loses_a_label_of_another_and_an_older_table_wins(saves: int, table: Path) -> None:
-    seed = random.randrange(10**6)
-    print("seed", seed)
-    fork = multiprocessing.get_context("fork")
-    answers, last_save, until = fork.Queue(), fork.Value("d", 0.0), time.monotonic() + 3.0
-    mark(table, "first", 1)
-    servers = [
-        fork.Process(target=window, args=(table, [f"{k}a", f"{k}b"], seed + k, until, last_save, answers))
-        for k in range(2)
-    ]
-    for server in servers:
-        server.start()
-    texts = [table.read_bytes()]
-    for _ in range(saves):
-        time.sleep(0.3)
-        texts.append(table.read_bytes())
-        older = table.with_name("editor")
-        older.write_bytes(random.Random(seed).choice(texts))
-        # What is acknowledged meanwhile may be lost.
-        last_save.value = math.inf
-        os.replace(older, table)
-        last_save.value = time.monotonic()
-    found = {name: times for name, *times in (answers.get(timeout=60) for _ in range(4))}
-    for server in servers:
-        server.join()
-    rows = Counter(held(table))
-    for name, (there, gone) in found.items():
-        assert all(rows[name, t] == 1 for t in there), name
-        assert not any(rows[name, t] for t in gone - there), name
-    if not saves:
-        assert rows == Counter([("first", 1), *((name, t) for name, (there, _) in found.items() for t in there)])
-    assert [place.name for place in table.parent.iterdir() if place.suffix != ".csv"] == []
 
 
 NOTES = st.builds(

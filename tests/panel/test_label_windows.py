@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import random
-import signal
-import threading
 from collections import Counter
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,11 +14,9 @@ import numpy as np
 import pytest
 from panel.protocol import Client, row
 from tests.panel.browser import running
-from websockets.exceptions import WebSocketException
 
 import taxel
 from taxel.panel import Panel
-from taxel.tasks.labels import references
 
 
 @pytest.fixture
@@ -98,27 +93,6 @@ def test_a_page_shows_what_another_window_and_a_hand_write_and_refuses_to_change
             shown_by(page, [("hand", 0)])
 
 
-def test_a_killed_server_has_lost_nothing_that_it_acknowledged(walk, table):
-    done, most = Counter(), random.randrange(11, 60)
-    with server(walk) as (process, where):
-        killer = threading.Thread(target=process.send_signal, args=(signal.SIGKILL,))
-        try:
-            with Client(where) as page:
-                opened(page)
-                for t in range(10**6):
-                    page.mark("heel", t)
-                    done["heel", t] += 1
-                    # It dies somewhere amid the next changes.
-                    if t == most:
-                        killer.start()
-        except (OSError, WebSocketException):
-            killer.join()
-    assert not done - held(table)
-    assert done.total() > 10
-    with server(walk) as (_, where), Client(where) as page:
-        assert Counter(opened(page)) == held(table)
-
-
 def test_several_changes_are_one_request_that_is_done_or_not(walk, table):
     with Panel(walk) as panel, Client(panel) as page:
         opened(page)
@@ -147,37 +121,3 @@ def test_several_changes_are_one_request_that_is_done_or_not(walk, table):
         assert held(table).total() == 524
         assert page.ask("undo")["type"] == "done"
         assert held(table).total() == 523
-
-
-def test_a_mark_in_a_table_that_counts_from_the_beginning_leaves_all_labels_to_train_on(tmp_path):
-    """The page shows times where training has them, and writes the table in its own way."""
-    begin = 1_741_947_667_480_000
-    frames = taxel.Frames(np.zeros((100, 2, 2)), begin + np.arange(100) * 10_000, unit="N", array=taxel.Array(2, 2))
-    taxel.convert(frames, tmp_path / "walk.npz")
-    table = tmp_path / "walk.notes.csv"
-    table.write_text("label,t_us\n" + "".join(f"heel,{10_000 * k}\n" for k in range(20, 72)))
-    with Panel(tmp_path / "walk.npz") as panel, Client(panel) as page:
-        assert opened(page, "walk.npz") == [("heel", begin + 10_000 * k) for k in range(20, 72)]
-        assert page.mark("heel", begin + 900_000)["type"] == "done"
-    assert held(table)["heel", 900_000] == 1
-    for source in ("notes", table):
-        (found,) = references(source, [taxel.open(tmp_path / "walk.npz")])
-        assert found["heel"].tolist() == [begin + 10_000 * k for k in (*range(20, 72), 90)]
-
-
-def test_a_link_leads_nowhere_else_for_the_page_than_for_training(walk, tmp_path):
-    """Labels are beside the link; a table that is a link stays one, also where it leads out of the folder."""
-    store, folder = tmp_path / "store", tmp_path / "folder"
-    for made in (store, folder):
-        made.mkdir()
-    walk.rename(store / "real.mcap")
-    (folder / "walk.mcap").symlink_to(store / "real.mcap")
-    (store / "labels.csv").write_text("label,t_us\nheel,5\n")
-    (folder / "walk.notes.csv").symlink_to(store / "labels.csv")
-    with Panel(folder / "walk.mcap") as panel, Client(panel) as page:
-        assert opened(page) == [("heel", 5)]
-        assert page.mark("toe", 7)["type"] == "done"
-    assert (folder / "walk.notes.csv").is_symlink()
-    (found,) = references("notes", [taxel.open(folder / "walk.mcap")])
-    assert {label: t.tolist() for label, t in found.items()} == {"heel": [5], "toe": [7]}
-    assert sorted(place.name for place in store.glob("[!.]*")) == ["labels.csv", "real.mcap"]

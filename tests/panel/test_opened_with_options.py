@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 from formats import bags
-from formats.bags import BEGIN_NS, PALM
+from formats.bags import PALM
 from formats.making import write_icub
 from panel.browser import running
 from panel.protocol import Client, opened, values_at
@@ -51,20 +51,6 @@ def viewed(folder, *words):
             yield page
 
 
-def test_a_bag_is_walked_to_the_page_by_the_options_of_its_topic(tmp_path):
-    name = "grasp.bag"
-    bag, values = palms(tmp_path, name)
-    with viewed(tmp_path, bag, "--topic", "/palm", "--array", "24x32") as page:
-        about = opened(page, name)
-        assert (about["frames"]["count"], about["array"]["rows"], about["array"]["columns"]) == (40, 24, 32)
-        t = BEGIN_NS // 1000
-        assert (about["start_us"], about["stop_us"]) == (t, t + 390_000)
-        shown, _ = values_at(page, about, t + 300_000)
-        assert np.array_equal(shown, values[30])
-        assert page.mark("touch", t + 200_000)["type"] == "done"
-    assert [note.t for note in taxel.open(bag, topic="/palm").notes] == [t + 200_000]
-
-
 def test_a_folder_of_bags_is_shown_by_options_that_hold_for_each(capsys, tmp_path):
     (tmp_path / "bags").mkdir()
     for name in KINDS:
@@ -85,41 +71,6 @@ def test_a_folder_of_bags_is_shown_by_options_that_hold_for_each(capsys, tmp_pat
     code, _, errors = call(capsys, "view", folder, "--topic", "/none", "--no-open", "--seconds", 1)
     assert (code, len(errors.strip().splitlines())) == (2, 1)
     assert "has no topic /none" in errors
-
-
-def presses(folder, names, topics=("/palm",)):
-    """Write bags of palms that are pressed five times each, elsewhere in time; return when, us."""
-    folder.mkdir()
-    times = {}
-    for number, name in enumerate(names):
-        values = np.random.default_rng(number).normal(1000, 2, (300, 24, 32))
-        begins = 40 + 3 * number + 50 * np.arange(5)
-        for begin in begins:
-            values[begin : begin + 20, 5:9, 6:12] += 400
-        made = [bags.palm(np.rint(frame)) for frame in values]
-        bags.write(
-            folder / name, [(t, PALM, 10.0 * k + 2, 10.0 * k, one) for k, one in enumerate(made) for t in topics]
-        )
-        times[name] = (BEGIN_NS // 1000 + begins * 10_000).tolist()
-    return times
-
-
-def test_labels_of_a_folder_are_of_the_bag_that_they_name(capsys, tmp_path):
-    """On the page, where each is opened alone, in a training of the folder, and in one on the page."""
-    folder = tmp_path / "grasps"
-    times = presses(folder, ("a.bag", "b.bag"))
-    rows = [f"{name},contact,{t}" for name, every in times.items() for t in every]
-    (folder / "labels.csv").write_text("\n".join(["recording,label,t_us", *rows]))
-    with shown(folder, topic="/palm", array=["24x32"]) as page:
-        for name, every in times.items():
-            assert [note["t_us"] for note in opened(page, name)["notes"]] == every
-        # One that is moved stands for that of the table.
-        assert page.mark("contact", times["b.bag"][0] + 10_000, replaces_us=times["b.bag"][0])
-        answer = page.ask("train")
-        assert answer["type"] == "done", answer
-        assert "contact, neuron: 5 of 5 found" in page.since_asked("trained")["text"]
-    opened_as = {one.name: [note.t for note in one.notes] for one in taxel.open_all(folder, topic="/palm")}
-    assert opened_as == times | {"b.bag": [times["b.bag"][0] + 10_000, *times["b.bag"][1:]]}
 
 
 def test_a_layout_and_a_rate_are_those_of_the_page(tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import threading
 import time
 
@@ -14,7 +13,6 @@ from panel.protocol import (
     head,
     heard,
     held_in,
-    marker,
     opened,
     row,
     say,
@@ -22,12 +20,9 @@ from panel.protocol import (
     spikes_of,
     word,
 )
-from refusal import refused
 
 import taxel
 import taxel.device
-from taxel import _core
-from taxel._base.errors import Place
 from taxel.live import Live, send
 from taxel.panel import Panel, shown_files
 
@@ -118,29 +113,6 @@ def test_a_recording_of_the_panel_holds_all_sources_of_the_board(tmp_path):
     assert recording.sources["imu"].frames().values.reshape(-1).tolist() == [0.5, 1.5]
 
 
-@pytest.mark.parametrize("first", ["event", "marker"])
-def test_a_recording_of_a_later_wrap_has_the_times_of_the_page(live, tmp_path, first):
-    with Panel(live, folder=tmp_path) as panel, Client(panel) as page:
-        # Version 1 has times modulo 6.5536 s: two turns pass before the recording starts.
-        for n in range(7):
-            say(live, word(2_000_000 * (n + 1), 3, 5, n + 1))
-            heard(live, n + 1)
-        assert page.ask("record", name="late")["type"] == "done"
-        page.since_asked("recorder", state="recording")
-        if first == "marker":
-            say(live, marker(14_100_000))
-            while not live.counters["markers"]:
-                time.sleep(0.01)
-        say(live, word(14_200_000, 3, 5, 9))
-        heard(live, 8)
-        assert page.ask("stop")["type"] == "done"
-        last = page.since_asked("recorder", state="idle")
-        assert last["error"] is None, last
-        found = taxel.open(tmp_path / "late.mcap").events
-        assert list(found.t) == [14_200_000]
-        assert found.markers == (((14_100_000, True),) if first == "marker" else ())
-
-
 def test_spikes_of_a_recording_and_any_width_of_its_columns_are_shown(tmp_path):
     # Row 2 rests at 50 ticks at first, rises by 20 half a second after each whole second, and falls at the next one.
     t = np.arange(0, 10_000_000, 500_000)
@@ -188,31 +160,6 @@ def test_spikes_of_a_recording_and_any_width_of_its_columns_are_shown(tmp_path):
         told = [m for m in page.said if m["type"] == "spikes"]
         assert {round(t_ms) for m in told for t_ms in m["t_ms"]} <= {int(k) // 1000 for k in t}
         assert {m["encoder"] for m in told} == {"change_events"}
-
-
-def test_a_seek_brings_the_rest_of_its_time_at_once(tmp_path):
-    # A taxel's first value is its rest: at 1 s that of the first taxel alone is known.
-    t, x, ticks = np.array([1_000_000, 2_000_000, 3_000_000]), [1, 2, 2], [50, 60, 90]
-    events = taxel.Events(t, x, 0 * t, t > 0, intensity=ticks, array=taxel.Array(4, 4))
-    taxel.convert(events, tmp_path / "begun.mcap")
-    with Panel(tmp_path / "begun.mcap") as panel, Client(panel) as page:
-        assert page.ask("open", name="begun.mcap")["type"] == "done"
-        assert page.ask("zoom", column_us=4000, end_us=3_000_000)["type"] == "done"
-        rest = np.empty(0)
-        for t_us, known in ((1_000_000, [50, 65_535]), (3_000_000, [50, 60]), (1_000_000, [50, 65_535])):
-            assert page.ask("seek", t_us=t_us)["type"] == "done"
-            page.send(type="credit", n=1)
-            while head(page.until("frame"))[0]["t_us"] != t_us:
-                pass
-            sent = section(page.frames[-1], 5, "<u2")
-            rest = sent if len(sent) else rest
-            assert rest[1:3].tolist() == known, t_us
-        # Each step is a frame that stands, faster than the rest is sent while time moves.
-        for known in ([50, 60], [50, 60]):
-            assert page.ask("step", frames=1)["type"] == "done"
-            sent = section(page.until("frame"), 5, "<u2")
-            rest = sent if len(sent) else rest
-            assert rest[1:3].tolist() == known
 
 
 def test_a_recording_alone_is_viewed_and_the_address_names_it(tmp_path):
@@ -326,18 +273,6 @@ def test_a_label_outside_the_recording_is_refused(tmp_path):
             assert page.alter(mine, label="b")["type"] == "done"
 
 
-def test_a_pipe_in_the_folder_is_left_to_whom_it_is_for(tmp_path):
-    events = taxel.Events(np.array([0, 10**6]), [1, 1], [2, 2], [True, False], array=taxel.Array(8, 8))
-    taxel.convert(events, tmp_path / "walk.mcap")
-    os.mkfifo(tmp_path / "lines")
-    pipe = os.open(tmp_path / "lines", os.O_RDWR | os.O_NONBLOCK)
-    os.write(pipe, b"1,2\n3,4\n")
-    with Panel(tmp_path) as panel, Client(panel) as page:
-        assert [file["name"] for file in page.until("recordings")["files"]] == ["walk.mcap"]
-    assert os.read(pipe, 100) == b"1,2\n3,4\n"
-    os.close(pipe)
-
-
 @pytest.mark.parametrize("available", [1 << 40, 0])
 def test_events_look_the_same_from_any_file_in_memory_or_not(tmp_path, monkeypatch, available):
     random = np.random.default_rng(5)
@@ -366,19 +301,3 @@ def test_events_look_the_same_from_any_file_in_memory_or_not(tmp_path, monkeypat
     for t_us in (2_500_000, 400_000):
         assert len({tuple(shown[name, t_us]) for name in files}) == 1
     assert {file.name for file in tmp_path.iterdir()} == files
-
-
-@pytest.mark.skipif(os.name != "posix", reason="limits the size of files")
-def test_events_that_fit_neither_memory_nor_the_disk_are_refused(tmp_path):
-    import resource
-
-    n = 5000
-    events = taxel.Events(range(n), [0] * n, [0] * n, [True] * n, array=taxel.Array(6, 8))
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (n, before[1]))
-    try:
-        with refused(place=Place(file=tmp_path.name)):
-            _core.PanelRecording.of_events(events._parts(), None, 0, tmp_path, 0)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert not list(tmp_path.iterdir())

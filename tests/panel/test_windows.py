@@ -105,20 +105,6 @@ def test_a_view_that_plays_beyond_its_window_takes_it_along(steps):
         assert [sums[column] for column in (1998, 2001, 2200)] == [0, 30, 30]
 
 
-def test_a_recording_says_where_its_first_touch_is_and_how_strong_touches_are(steps):
-    with Panel(steps) as panel, Client(panel) as page:
-        page.ask("open", name="steps.mcap")
-        opened = next(m for m in page.said if m["type"] == "opened")
-        # The end of the column in which its force is greatest.
-        assert opened["touch_us"] == 2_003_999
-        page.ask("overview")
-        overview = next(m for m in page.said if m["type"] == "overview")
-        force = np.array(overview["force"])
-        at = (np.array([2.2, 3, 5.2, 8.2]) * 1e6 - overview["start_us"]) // overview["step_us"]
-        for found, touch in zip(force[at.astype(int)].tolist(), [30, 0, 60, 90], strict=True):
-            assert near(found, touch), (found, touch)
-
-
 def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
     readout = fit([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe())
     readout.save(tmp_path / "touch.json")
@@ -162,26 +148,3 @@ def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
         assert page.ask("encode", encoder={"name": "contact_area"})["type"] == "done"
         assert panel.live is not live
         assert panel.live.address == address
-
-
-def test_the_spikes_of_a_readout_are_made_with_the_tare_that_it_measured(tmp_path):
-    readout = fit([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe())
-    array = tare().array
-    by_name = {"name": "contact_area"}
-    with (
-        Live(0, host="127.0.0.1", array=array, readout=readout, tare=0.5) as live,
-        Panel(live, folder=tmp_path) as panel,
-        Client(panel) as page,
-    ):
-        say(live, *(word(4000, x, y, 50) for x in range(8) for y in range(8)))
-        heard(live, 64)
-        reason = page.ask("encode", encoder=by_name)["reason"]
-        assert (
-            reason == "encoder contact_area: the readout is still measuring its tare; choose the encoder again after it"
-        )
-        say(live, *(word(600_000, x, 0, 50) for x in range(8)))
-        while page.until("counters")["taring"]:
-            pass
-        assert page.ask("encode", encoder=by_name)["type"] == "done"
-        # Other parameters are not the readout's, and have no tare.
-        assert "without a tare" in page.ask("encode", encoder={**by_name, "noise_floor": 20.0})["reason"]
