@@ -98,52 +98,6 @@ def test_a_certificate_that_was_touched_is_refused():
     assert not check_certificate(other.problem_, Certificate(strange, np.ones(len(strange)), 1.0, False, ""))
 
 
-@pytest.mark.parametrize("time", ["grid", "continuous"])
-@pytest.mark.parametrize("after_spike", ["keep", "reset"])
-def test_a_target_out_of_reach_is_refuted_by_one_row_and_said_so(time, after_spike):
-    trains = SpikeTrains.from_lists([[20.0], [25.0], [80.0]], stop=120.0)
-    for ub, target, said in (
-        (0.3, 10.0, "no input before this time has an effect"),
-        (0.3, 30.0, "the largest allowed weights give"),
-        (5.0, 10.0, "no input before this time has an effect"),
-    ):
-        cone = ConeX(neuron=Neuron(time=time, after_spike=after_spike), lb=-ub, ub=ub).fit([trains], [[target]])
-        assert cone.status_ == "infeasible"
-        proof = cone.certificate_
-        assert proof.rows == [Row("target", 0, 0)]
-        assert check_certificate(cone.problem_, proof)
-        assert proof.at_all
-        assert said in proof.text
-        assert f"pattern 0 at target 0 ({target:.0f} ms)" in str(proof)
-        assert "Without a margin this is impossible too" in proof.text
-    # An input at the target itself adds nothing there.
-    cone = ConeX(neuron=Neuron(time=time), lb=-9, ub=9).fit([trains], [[20.0]])
-    assert cone.certificate_.rows == [Row("target", 0, 0)]
-    # Least weights that are too much are refuted by one row as well.
-    many = SpikeTrains.from_lists([[20.0]] * 9, stop=120.0)
-    cone = ConeX(neuron=Neuron(time=time), lb=0.5, ub=0.6).fit([many], [[35.0]])
-    assert "the smallest allowed weights give" in cone.certificate_.text
-
-
-def test_a_proof_that_needs_its_margin_says_so_and_a_smaller_margin_may_solve_it():
-    trains = SpikeTrains.from_lists([[20.0], [25.0], [30.0]], stop=100.0)
-    near = SpikeTrains.from_lists([[20.0], [25.0], [30.2]], stop=100.0)
-    # Nearly the same inputs, one to fire and one to be silent: only little room between.
-    found = {}
-    for margin in (0.2, 1e-3, 1e-5):
-        cone = ConeX(lb=-9, ub=9, margin=margin, slope=1e-4).fit([trains, near], [[40.0], []])
-        found[margin] = cone.status_
-        if cone.status_ == "infeasible":
-            proof = cone.certificate_
-            assert check_certificate(cone.problem_, proof)
-            assert check_certificate(cone.problem_, proof, margin=False) == proof.at_all
-            if not proof.at_all:
-                assert f"This is proven for silence {margin} mV below the threshold" in proof.text
-                assert "Without a margin this is impossible too" not in proof.text
-    assert found[0.2] == "infeasible"
-    assert found[1e-5] == "solved"
-
-
 @pytest.mark.parametrize("options", [{}, {"after_spike": "reset"}, {"first_threshold": "printed"}])
 def test_the_same_inputs_asked_to_fire_and_to_be_silent_are_refuted_for_any_margin(options):
     by_them_alone = 0
@@ -188,19 +142,6 @@ def test_what_cancels_in_a_coefficient_is_no_proof() -> None:
         assert check_certificate(problem, proof) == proven
     plain = SpikeTrains.from_lists([[10.0], [30.0]], stop=60.0, values=[[1e-8], [1.0]], kind="graded")
     assert Neuron(tau=10.0).potential([1e9, 0.0], plain, [20.0])[0] > 0.3
-
-
-@pytest.mark.parametrize("silence", [5e-324, 1e-323, 1e-300, 1e-30, 1.0])
-@pytest.mark.parametrize("target", [0.0, 1.0, 1e30])
-@pytest.mark.parametrize("margin", [True, False])
-def test_what_a_sum_of_floats_loses_is_no_proof(silence: float, target: float, margin: bool) -> None:
-    """Of a problem that has a solution: a row of silence too small beside a target's, taken once with either sign."""
-    trains = SpikeTrains.from_lists([[5.0], [12.0], [30.0]], stop=60.0)
-    cone = ConeX(neuron=Neuron(tau=10.0), lb=-1.0, ub=1.0).fit([trains], [[20.0]])
-    assert cone.status_ == "solved"
-    rows = [Row("target", 0, 0), Row("silence", 0, 40.0), Row("target", 0, 0)]
-    proof = Certificate(rows, np.array([target, silence, -target]), 1.0, True, "")
-    assert not check_certificate(cone.problem_, proof, margin=margin)
 
 
 #: What checks the arguments of a learner, a neuron and trains; it computes nothing of a proof.

@@ -153,22 +153,6 @@ def test_a_window_of_online_cone_r_is_checked_from_its_oldest_pattern_on():
         assert gap <= online.gap_ + ROUNDING, k
 
 
-@pytest.mark.parametrize("start", [0.0, -1e4, 1e7, 2.0**33])
-def test_far_from_time_0_the_gap_is_the_same(start):
-    """Each test of a time has the rounding of the core: no row is missing, none is added."""
-    patterns, targets = stated.examples(8, first=20.0, whole_ms=True)
-    patterns = [SpikeTrains.from_lists([t + start for t in p], start=start, stop=start + p.stop) for p in patterns]
-    for options in ({"step_ms": 0.5}, {"step_ms": 0.3, "after_spike": "reset"}, {"after_spike": "ignore"}):
-        cone = made(ConeR, **options, horizon=start + 140.0).fit(patterns, [t + start for t in targets])
-        assert check_gap(cone, patterns, [t + start for t in targets]) <= cone.gap_ + ROUNDING, options
-
-
-def test_a_long_recording_is_checked_in_blocks():
-    patterns, targets = stated.examples(9, trains=40, targets=20, duration=3000.0, spikes=60, first=20.0)
-    cone = made(ConeR, after_spike="reset").fit(patterns, targets)
-    assert check_gap(cone, patterns, targets) <= cone.gap_ + ROUNDING
-
-
 def test_what_cannot_be_checked_is_one_clear_error():
     cone, (patterns, targets) = small()
     with refused(NotFittedError):

@@ -212,46 +212,6 @@ def test_a_start_from_an_earlier_fit_changes_the_way_but_not_the_result():
         ConeX().fit(patterns, targets, start=ConeX())
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        {},
-        {"lambdas": (2, 2, 200), "after_spike": "reset"},
-        {"lambdas": (1, 1, 1), "divide_b_by": "targets"},
-        {"time": "continuous", "kernel": "double_exponential"},
-        {"time": "continuous", "kernel": "double_exponential", "theta_plus": 0.0, "after_spike": "reset"},
-    ],
-    ids=lambda o: ",".join(o) or "printed",
-)
-def test_a_problem_in_another_unit_of_potential_has_the_same_answer_in_that_unit(options):
-    times, said = 50.0, set()
-    for seed in range(16):
-        patterns, targets = examples(seed, trains=24, patterns=3 + seed % 6, targets=1)
-        parameters = {"time": "grid", "lb": -2.0, "ub": 2.0, "margin": 2e-3, **options}
-        cone = made(ConeX, **parameters)
-        of = cone.get_params()
-        names = ("neuron__theta_0", "neuron__theta_plus", "lb", "ub", "margin")
-        potentials = {name.removeprefix("neuron__"): times * of[name] for name in names}
-        if of["neuron__time"] == "continuous":
-            potentials["slope"] = times * 1e-3  # the default
-        if cone.divide_b_by == "targets":  # B is then a square of potentials, and no ratio
-            potentials["lambdas"] = (1, 1, 1 / times**2)
-        cone.fit(patterns, targets)
-        other = made(ConeX, **parameters | potentials).fit(patterns, targets)
-        said.add(cone.status_)
-        assert other.status_ == cone.status_
-        if cone.status_ == "infeasible":
-            assert check_certificate(other.problem_, other.certificate_)
-            assert other.certificate_.at_all == cone.certificate_.at_all
-            continue
-        assert sum(other.lambdas) * other.objective_ == pytest.approx(sum(cone.lambdas) * cone.objective_, rel=1e-7)
-        assert other.weights_ == pytest.approx(times * cone.weights_, rel=1e-3, abs=times * 1e-4)
-        assert other.margin_.mv == pytest.approx(times * cone.margin_.mv, rel=1e-3, abs=times * 1e-9)
-        again = made(ConeX, **parameters | potentials).fit(patterns, targets, start=other)
-        assert again.weights_ == pytest.approx(other.weights_, rel=1e-4, abs=times * 1e-5)
-    assert said == {"solved", "infeasible"}
-
-
 def test_the_horizon_frees_what_lies_behind_it_in_each_pattern():
     patterns, targets = examples(12, trains=30, patterns=2, targets=1)
     ends = [float(t[-1]) + 5.0 for t in targets]

@@ -9,7 +9,7 @@ from draws import mixed
 from making import made
 from simulator import misfire
 
-from taxel import Neuron, SpikeTrains
+from taxel import SpikeTrains
 from taxel.learn import ConeR, ConeX, check_certificate
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
@@ -18,10 +18,6 @@ pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
 def wide(random, n):
     """Values of either sign over twelve decades."""
     return random.choice([-1, 1], n) * 10 ** random.uniform(-6, 6, n)
-
-
-def ones(patterns):
-    return [SpikeTrains(p.times, p.offsets, p.start, p.stop, np.ones(len(p.times)), kind="graded") for p in patterns]
 
 
 def test_a_target_that_only_negative_weights_reach_is_reachable():
@@ -64,34 +60,3 @@ def test_what_is_solved_fires_at_its_targets_and_what_is_not_is_proven(time, aft
                     assert np.allclose(coefficients, plain, rtol=1e-9, atol=1e-12 * abs(own.values).max())
     assert solved
     assert refuted
-
-
-def test_inputs_with_other_values_are_other_inputs():
-    """Two patterns with the same times and other values: one fires and one is silent, which unsigned ones cannot."""
-    times = [[10.0], [12.0]]
-    a, b = (SpikeTrains.from_lists(times, stop=80.0, values=[[v], [1.0]], kind="graded") for v in (1.0, 0.2))
-    cone = ConeX(neuron=Neuron(tau=10.0), lb=-5, ub=5)
-    assert cone.fit([a, b], [[18.0], []]).status_ == "solved"
-    same = [SpikeTrains(one.times, one.offsets, one.start, one.stop) for one in (a, b)]
-    assert cone.fit(same, [[18.0], []]).status_ == "infeasible"
-
-
-@pytest.mark.parametrize("kind", [ConeR, ConeX])
-@pytest.mark.parametrize("options", [{}, {"after_spike": "reset", "time": "grid"}, {"kernel": "double_exponential"}])
-def test_values_of_1_give_the_bits_of_unsigned_trains(kind, options):
-    for seed in range(3):
-        patterns, targets = stated.examples(seed, trains=30, patterns=3, targets=1)
-        plain, graded = (made(kind, lb=-2, ub=2, **options).fit(p, targets) for p in (patterns, ones(patterns)))
-        assert np.array_equal(plain.weights_, graded.weights_, equal_nan=True)
-        assert plain.objective_ == graded.objective_
-        if kind is ConeX and plain.certificate_ is not None:
-            assert plain.certificate_.text == graded.certificate_.text
-
-
-def test_scaling_the_values_scales_the_weights_that_are_needed():
-    patterns, targets = stated.examples(3, trains=40, patterns=2, targets=1)
-    for factor in (0.125, 8.0):
-        scaled = stated.graded(patterns, 0, lambda _, n, factor=factor: np.full(n, factor))
-        plain = ConeX(lb=-2, ub=2, neuron=Neuron(tau=10.0)).fit(patterns, targets)
-        other = ConeX(lb=-2 / factor, ub=2 / factor, neuron=Neuron(tau=10.0)).fit(scaled, targets)
-        assert np.allclose(other.weights_ * factor, plain.weights_, rtol=1e-5, atol=1e-9)

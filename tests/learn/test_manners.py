@@ -13,7 +13,7 @@ import pytest
 from refusal import refused
 
 import taxel
-from taxel import Events, Neuron, NotFittedError, SpikeTrains, learn
+from taxel import Events, Neuron, SpikeTrains, learn
 from taxel._base.parameters import Parameters, described
 from taxel.encode import ContactArea, LevelCrossing
 from taxel.learn import ConeR, ConeX, OnlineConeR
@@ -64,17 +64,6 @@ def test_a_learner_has_a_file_in_each_place_and_nothing_is_left_out():
     for name in kinds:
         assert (root / f"tests/learn/test_{name}.py").exists(), f"tests/learn/test_{name}.py"
         assert described(name)["defaults"]
-
-
-@each_learner
-def test_a_clone_has_the_same_parameters_and_nothing_learnt(name):
-    one, _ = fitted(name)
-    other = sklearn.base.clone(one)
-    assert other.get_params() == one.get_params()
-    assert repr(other) in repr(one)
-    assert not hasattr(other, "weights_")
-    with refused(NotFittedError):
-        other.predict([])
 
 
 @each_learner
@@ -165,30 +154,6 @@ def test_moved_in_time_it_learns_the_same(name, shift):
     here, _ = fitted(name)
     there, _ = fitted(name, shift)
     assert there.weights_ == pytest.approx(here.weights_, abs=2e-4 * np.abs(here.weights_).max())
-
-
-@pytest.mark.parametrize("kind", [ConeX, ConeR, OnlineConeR])
-def test_a_neuron_that_two_share_is_never_changed(kind):
-    shared = Neuron(tau=10.0)
-    one, two = kind(neuron=shared), kind(neuron=shared)
-    one.set_params(neuron__tau=12.0, neuron__after_spike="reset")
-    assert (one.neuron, two.neuron, shared) == (Neuron(tau=12.0, after_spike="reset"), Neuron(tau=10.0), shared)
-    assert two.neuron is shared
-    assert kind().neuron is None
-    assert kind().get_params()["neuron__tau"] == Neuron().tau
-    assert kind().set_params(neuron__tau=12.0).neuron == Neuron(tau=12.0)
-    assert kind(neuron=shared).set_params(neuron=None, neuron__tau=3.0).neuron == Neuron(tau=3.0)
-
-
-@pytest.mark.parametrize("kind", [ConeX, ConeR, OnlineConeR])
-def test_all_is_checked_again_in_fit(kind):
-    patterns, targets = examples()
-    learner = kind(neuron=Neuron(tau=10.0))
-    learner.neuron.tau = -1.0
-    with refused(argument="tau"):
-        learner.fit(patterns, targets)
-    with refused(argument="neuron"):
-        kind(neuron=5)
 
 
 def test_a_fit_goes_on_in_a_window_that_was_pickled():

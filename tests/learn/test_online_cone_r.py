@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import pickle
 from unittest.mock import ANY
 
 import numpy as np
 import pytest
 from making import lists, made
 from refusal import refused
-from relaxed import examples
 
 from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeR, OnlineConeR
@@ -103,26 +101,6 @@ def test_more_trains_than_memory_holds_are_refused_in_one_line(learner):
         learner.fit([many], [[10.0]])
     few = SpikeTrains.from_lists([[1.0], [4.0]], stop=20.0)
     assert learner.fit([few], [[10.0]]).weights_.shape == (2,)
-
-
-@pytest.mark.parametrize("seed", [61, 62, 63, 64])
-def test_a_window_of_patterns_fits_as_from_nothing_and_is_pickled_with_its_windows_of_silence(seed):
-    random = np.random.default_rng(seed)
-    options = {"tau": 12.0, "tolerance": 3e-7, "divide_c_by": "targets", "divide_d_by": "targets"}
-    options |= {"sides_b": "below", "sides_c": "below" if seed % 2 else "both"}
-    patterns, targets = examples(seed, 20, patterns=7, targets=2)
-    silence = [None if random.random() < 0.3 else [(10.0, 10.0 + random.uniform(1, 100))] for _ in patterns]
-    online = made(OnlineConeR, window=3, **options)
-    for k, (pattern, wanted, asked) in enumerate(zip(patterns, targets, silence, strict=True)):
-        online = pickle.loads(pickle.dumps(online)) if k == 4 else online
-        online.partial_fit(pattern, wanted, silence=asked)
-        first = max(k - 2, 0)
-        here = slice(first, k + 1)
-        cold = made(ConeR, **options).fit(patterns[here], targets[here], silence=silence[here])
-        assert online.objective_ == pytest.approx(cold.objective_, rel=1e-6, abs=1e-12)
-        assert online.silent_rows_ == cold.silent_rows_
-    once = made(OnlineConeR, window=3, **options).fit(patterns, targets, silence=silence)
-    assert once.objective_ == pytest.approx(online.objective_, rel=1e-6)
 
 
 def test_a_window_that_makes_no_sense_leaves_the_patterns_as_they_were():

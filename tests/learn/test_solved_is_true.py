@@ -13,7 +13,7 @@ from simulator import misfire
 from stated import examples, row
 
 from taxel import Neuron, SpikeTrains
-from taxel.learn import ConeR, ConeX, OnlineConeR, check_certificate, check_gap, check_solution
+from taxel.learn import ConeR, ConeX, check_certificate, check_gap, check_solution
 
 #: Further problems are tried by `pytest -m slow`. The simulator is slow: it runs so many of the quick ones.
 QUICK, ALL, SIMULATED = 30, 500, 4
@@ -123,17 +123,6 @@ def test_a_margin_below_the_resolution_of_times_is_solved_only_where_the_neuron_
 
 
 @pytest.mark.parametrize("learner", [ConeX, ConeR])
-def test_equal_bounds_freeze_a_synapse(learner):
-    frozen = [0.1, 0.0, -0.2]
-    for seed, lambdas in enumerate([(0, 1, 0), (1, 0, 0), (2, 2, 200), (0, 0, 1)]):
-        patterns, targets = examples(seed, trains=30, patterns=2, targets=1)
-        options = {"lambdas": lambdas} if learner is ConeX else {}
-        cone = learner(lb=[*frozen, *[-1.0] * 27], ub=[*frozen, *[1.0] * 27], **options).fit(patterns, targets)
-        assert cone.status_ == "solved"
-        assert cone.weights_[:3].tolist() == frozen
-
-
-@pytest.mark.parametrize("learner", [ConeX, ConeR])
 def test_a_pattern_without_a_spike_may_teach_silence_and_may_not_have_a_target(learner):
     patterns, targets = examples(1, trains=20, patterns=2, targets=1)
     empty = SpikeTrains.from_lists([[]] * 20, stop=90.0)
@@ -143,14 +132,6 @@ def test_a_pattern_without_a_spike_may_teach_silence_and_may_not_have_a_target(l
     assert beside.objective_ == pytest.approx(alone.objective_, rel=1e-6)
     with refused():
         learner().fit([*patterns, empty], [*targets, [5.0]])
-
-
-def test_a_window_without_targets_is_fitted_by_both_that_take_windows():
-    trains = SpikeTrains.from_lists([[1.0], [2.0]], stop=9.0)
-    for cone in (ConeR().fit([trains], [[]]), OnlineConeR().partial_fit(trains, [])):
-        assert cone.status_ == "solved"
-        assert cone.weights_.tolist() == [0.0, 0.0]
-        assert (cone.objective_, cone.gap_) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("after_spike", ["keep", "ignore", "reset"])
@@ -194,22 +175,6 @@ def test_a_search_that_ended_early_is_feasible_where_the_neuron_accepts_its_weig
                 assert cone.gap_ > cone.tolerance
             assert cone.reason_
     assert ended.count("feasible" if after_rounds == "feasible" else "stopped") > 3
-
-
-def test_weights_of_the_grid_fire_early_between_its_points_and_those_of_continuous_time_do_not():
-    early = exact = 0
-    for seed in range(5):
-        patterns, wanted = examples(seed, trains=80, patterns=8, targets=1)
-        for time in ("grid", "continuous"):
-            cone = ConeX(neuron=Neuron(time=time), lb=-1, ub=1).fit(patterns, wanted)
-            assert cone.status_ == "solved"
-            for pattern, (target,) in zip(patterns, wanted, strict=True):
-                spikes = Neuron().run(cone.weights_, pattern)
-                right = len(spikes) == 1 and abs(spikes[0] - target) <= 1e-6
-                early += time == "grid" and not right
-                exact += time == "continuous" and right
-    assert exact == 40
-    assert early > 10
 
 
 @pytest.mark.parametrize("target", [np.nan, -np.inf, 1e308, 60.000001, 1.99, -0.0])
