@@ -40,16 +40,3 @@ def test_change_events_are_equation_5_7(seed, floor, bits, previous, rounding, t
     spikes = spikes_of(ChangeEvents(**given_parameters).encode(frames_of(t, values)))
     assert spikes == oracles.change_events(t, values, **given_parameters)
     assert spikes
-
-
-def test_the_saturation_of_change_events_is_that_of_their_bits():
-    for bits in range(1, 11):
-        values = [[0.0], [5000.0], [0.0]]
-        spikes = ChangeEvents(noise_floor=1.0, bits=bits).encode(frames_of([0, 100, 200], values))
-        assert spikes.values.tolist() == [2**bits - 1, 1 - 2**bits]
-
-
-def test_a_slow_change_shows_only_against_the_last_sent_value():
-    t, values = np.arange(40) * 192, np.arange(40.0)[:, None]
-    assert len(ChangeEvents().encode(frames_of(t, values))[0]) == 9
-    assert len(ChangeEvents(previous="last_sample").encode(frames_of(t, values))[0]) == 0

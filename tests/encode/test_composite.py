@@ -1,13 +1,11 @@
 """Encoders side by side: the spikes of each part as `SpikeTrains.side_by_side` joins them, in the order of names."""
 
-import json
-
 import numpy as np
 import pytest
 from refusal import refused
 
 from taxel import Frames, SpikeTrains, Tare
-from taxel.encode import FA1, FA2, ChangeEvents, Composite, ContactArea, Encoder, Moments, ThresholdIzhikevich
+from taxel.encode import FA1, FA2, ChangeEvents, Composite, ContactArea, Moments, ThresholdIzhikevich
 
 from . import scenes
 from .scenes import rest, spikes_of, touch, wander
@@ -67,13 +65,3 @@ def test_a_part_s_tare_in_seconds_is_taken_at_the_beginning() -> None:
     assert Composite(parts).encode(frames) == Composite(parts).with_tare(given).encode(frames)
     with refused(argument="tare"):
         Composite({"a": ContactArea()}).encode(frames)
-
-
-def test_the_order_in_which_parts_are_given_says_nothing() -> None:
-    one, two = ContactArea(), FA1(bits=2)
-    assert Composite({"x": one, "b": two}) == Composite({"b": two, "x": one})
-    assert Composite({"x": one, "b": two}) != Composite({"b": one, "x": two})
-    again = Encoder.from_json(Composite({"x": one, "b": two}).to_json())
-    assert again == Composite({"b": two, "x": one})
-    assert json.loads(again.to_json())["parts"]["b"]["name"] == "fa1"
-    assert repr(again).startswith("Composite(parts={'b': FA1(")

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusal import refused
 
-from taxel import Array, Events, Frames, Tare
+from taxel import Array, Frames, Tare
 from taxel.encode import ContactArea
 
 from . import oracles
@@ -55,24 +55,6 @@ def test_contact_area_of_events_is_reckoned_once_a_stamp(seed):
     spikes = ContactArea(tare=rest(array)).encode(events)
     assert len(spikes) == 10
     assert spikes_of(spikes) == wanted
-
-
-def test_half_a_tick_above_the_floor_loads_a_taxel():
-    tare = rest(Array(1, 2, 1.0), 50)
-    for value, rises in ((53.4, 0), (53.5, 1), (54.0, 1)):
-        frames = Frames([[[50.0, 50.0]], [[value, value]]], [0, 192], array=tare.array)
-        assert len(ContactArea(tare=tare).encode(frames)[0]) == rises
-
-
-def test_a_lone_taxel_and_one_never_heard_of_are_no_contact():
-    array = Array(3, 3)
-    tare = Tare.take(Events([0, 0], [0, 1], [0, 0], [1, 1], array=array, intensity=[50, 50]), stop_us=1000)
-    assert np.isnan(tare.rest).sum() == 7
-    assert np.isnan(tare.rest[2, 2])
-    alone = Events([0], [0], [0], [1], array=array, intensity=[90])
-    unheard = Events([0, 0], [0, 2], [0, 2], [1, 1], array=array, intensity=[90, 90])
-    both = Events([0, 0], [0, 1], [0, 0], [1, 1], array=array, intensity=[90, 90])
-    assert [len(ContactArea(tare=tare).encode(e).times) for e in (alone, unheard, both)] == [0, 0, 1]
 
 
 def test_a_noise_floor_of_0_is_of_whole_numbers_alone():

@@ -46,14 +46,6 @@ def test_fa1_is_equations_5_1_to_5_5_and_5_7(seed, ticks, decay, theta, period, 
     assert spikes_of(encoder.encode(frames_of(t, values))) == wanted
 
 
-def test_fa1_takes_its_baseline_from_the_range_after_the_power_law():
-    rng = np.random.default_rng(3)
-    t, values = np.arange(400) * 1000, wander(rng, 400, 2)
-    wanted = oracles.fa1(t, values, largest=1000.0)
-    assert spikes_of(FA1(range=1000.0).encode(frames_of(t, values))) == wanted
-    assert spikes_of(FA1(theta_0=1000.0**0.7 / 1024).encode(frames_of(t, values))) == wanted
-
-
 def test_fa1_on_ticks_by_table_equals_fa1_on_the_same_numbers_without_it():
     """A fractional value anywhere in a block of channels sends that block past the table."""
     rng = np.random.default_rng(4)

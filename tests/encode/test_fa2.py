@@ -39,22 +39,6 @@ def test_fa2_is_its_filter_under_its_threshold(seed, period):
     assert found[found < sure] == pytest.approx(spikes)
 
 
-def test_it_tells_a_blow_and_its_end_and_no_slow_move_however_large():
-    t = np.arange(0, 1000, 0.2)
-    fast = of(FA2(), t, np.interp(t, [200, 205, 600, 605], [0, 100, 100, 0]))
-    assert len(fast)
-    assert all(200 <= s < 215 or 600 <= s < 615 for s in fast)
-    assert any(s < 215 for s in fast)
-    assert any(s >= 600 for s in fast)
-    assert len(of(FA2(), t, np.interp(t, [200, 400, 600, 800], [0, 150, 150, 0]))) == 0
-
-
-def test_a_step_of_one_tick_in_150_is_silent_and_one_of_four_is_not():
-    t = np.arange(0, 50, 0.2)
-    assert len(of(FA2(), t, 50.0 + (t > 20))) == 0
-    assert len(of(FA2(), t, 50.0 + 4 * (t > 20)))
-
-
 def test_a_value_that_a_state_repaired_is_no_change_and_later_ones_are():
     array, n = Array(1, 1), 6
     t = np.arange(n) * 20_000

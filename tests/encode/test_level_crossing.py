@@ -61,12 +61,6 @@ def test_level_crossings_are_those_of_a_scan(seed, share, hold, tonic):
     assert spikes_of(spikes) == wanted
 
 
-def test_a_release_by_a_distance_lies_that_far_below_the_level():
-    values = [[0.0], [5.0], [3.1], [3.0], [2.9], [5.0]]
-    spikes = LevelCrossing([5.0], release_by=2.0).encode(frames_of(np.arange(6) * 100, values))
-    assert spikes_of(spikes) == [(100, 0, 1), (400, 0, -1), (500, 0, 1)]
-
-
 @pytest.mark.parametrize("first_window", ["silent", "itself"])
 def test_levels_on_the_running_range_are_percentiles_of_the_past_window(first_window):
     rng = np.random.default_rng(7)

@@ -3,7 +3,6 @@
 import json
 
 import numpy as np
-import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from refusal import refused
@@ -230,32 +229,6 @@ def largest(readings, period_us=192, **parameters):
     frames = Frames(np.array(readings), np.arange(len(readings)) * period_us, unit="ticks", array=Array(8, 9))
     encoder = LocalLoad(tare=rest(Array(8, 9), 50), **parameters)
     return encoder.values(frames)[:, 1]
-
-
-@pytest.mark.parametrize("at", [((0, 0), (0, 1)), ((3, 4), (4, 5)), ((7, 8), (6, 8)), ((2, 0), (2, 1))])
-def test_a_stuck_taxel_or_a_pair_of_them_does_not_reach_4(at):
-    one, two = STILL.copy(), STILL.copy()
-    one[at[0]] = two[at[0]] = two[at[1]] = 60_000
-    found = largest([STILL, one, two, one])
-    assert found[0] == 0
-    assert (found[1:] > 0).all()
-    assert (found < 4).all()
-
-
-@pytest.mark.parametrize("touched", range(10))
-def test_each_of_nine_neighbours_that_are_touched_adds_1(touched):
-    """Each is clipped to 3 s, and nine of them have a noise of 3 s."""
-    readings = np.array([STILL, STILL])
-    for k in range(touched):
-        readings[1, 3 + k // 3, 4 + k % 3] += 10 + k
-    assert largest(readings).tolist() == [0, pytest.approx(touched)]
-
-
-def test_a_taxel_without_a_value_yet_does_not_hide_a_touch_beside_it():
-    """A board with a noise floor reports no taxel that stays at rest: its value reads 0."""
-    readings = np.zeros((3, 8, 9))
-    readings[2, 3, 4] = readings[2, 3, 5] = 90
-    assert largest(readings).tolist() == [0, 0, pytest.approx(2.0)]
 
 
 def test_without_a_tare_nothing_is_encoded():

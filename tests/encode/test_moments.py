@@ -152,73 +152,7 @@ def test_moments_of_events_are_sampled_every_period_from_the_first_stamp_on():
     assert (unsigned.kind, list(map(len, unsigned))) == ("unsigned", [2, 2])
 
 
-def bump(x, y, height=60.0, shape=(16, 24)):
-    """A round touch above a rest of 50, in whole ticks, so that sums have no rounding."""
-    rows, columns = np.mgrid[: shape[0], : shape[1]]
-    return 50 + np.rint(height * np.exp(-((columns - x) ** 2 + (rows - y) ** 2) / 3.0))
-
-
-def felt(frames, encoder=None):
-    frames = np.array(frames)
-    array = Array(*frames.shape[1:], 2.0)
-    encoder = (encoder or Moments(levels=9)).with_tare(rest(array, 50))
-    return encoder.encode(Frames(frames, np.arange(len(frames)) * 1000, unit="ticks", array=array))
-
-
 STILL = np.full((16, 24), 50.0)
-
-
-def test_what_moves_by_a_taxel_moves_by_the_pitch():
-    way = Moments(levels=2, area=None, total=None, peak=None, displacement_mm=(1.999999, 3.999999), tonic_ms=None)
-    spikes = spikes_of(felt([STILL, bump(8, 8), bump(9, 8), bump(8, 10), bump(6, 7), STILL], way))
-    right, left, down, up = (0, 1), (2, 3), (4, 5), (6, 7)
-    assert spikes == [
-        (2000, right[0], 1),  # a taxel to the right
-        (3000, down[0], 1),  # the centre's initial x, two taxels further down
-        (3000, down[1], 1),
-        (3000, 8 + right[0], 1),
-        (4000, left[0], 1),
-        (4000, left[1], 1),
-        (4000, up[0], 1),
-        (4000, 8 + down[0], 1),
-        (4000, 8 + down[1], 1),
-        (5000, 8 + left[0], 1),  # lifted: the displacement is 0
-        (5000, 8 + left[1], 1),
-        (5000, 8 + up[0], 1),
-    ]
-
-
-@settings(max_examples=30, deadline=None)
-@given(dx=st.integers(-4, 8), dy=st.integers(-3, 4), seed=st.integers(0, 1000))
-def test_the_same_touch_elsewhere_gives_the_same_spikes(dx, dy, seed):
-    # A touch that is near its middle and not high stays within the array wherever it is moved.
-    way = np.cumsum(np.random.default_rng(seed).choice([-0.25, 0.0, 0.25], (40, 2)), axis=0).clip(-1, 1)
-    heights = np.abs(np.random.default_rng(seed).normal(50, 30, 40)).clip(0, 100)
-    here = [bump(9 + x, 7 + y, h) for (x, y), h in zip(way, heights, strict=True)]
-    there = [bump(9 + x + dx, 7 + y + dy, h) for (x, y), h in zip(way, heights, strict=True)]
-    assert all(np.roll(a, (dy, dx), (0, 1)).tolist() == b.tolist() for a, b in zip(here, there, strict=True))
-    # The values are between levels, not at them: the last digit of the centre depends on the origin of the coordinates.
-    encoder = Moments(levels=9, displacement_mm=(0.1234567, 7.654321))
-    assert spikes_of(felt([STILL, *here, STILL], encoder)) == spikes_of(felt([STILL, *there, STILL], encoder))
-
-
-def test_a_mirrored_touch_swaps_left_and_right_or_up_and_down():
-    way = np.cumsum(np.random.default_rng(3).choice([-0.25, 0.0, 0.25], (60, 2)), axis=0)
-    frames = np.array([STILL, *[bump(11 + x, 7 + y) for x, y in way], STILL])
-    encoder = Moments(levels=4, displacement_mm=(0.1234567, 7.654321))
-    plain = felt(frames, encoder)
-    parts = np.arange(len(plain)).reshape(3, 7, 4)
-    for axis, (a, b) in ((2, (3, 4)), (1, (5, 6))):
-        swapped = parts.copy()
-        swapped[:, [a, b]] = parts[:, [b, a]]
-        mirrored = felt(np.flip(frames, axis), encoder)
-        assert spikes_of(mirrored) == spikes_of(plain.select(swapped.ravel()))
-
-
-def test_a_tonic_train_speaks_as_long_as_its_level_is_reached():
-    spikes = felt([STILL, *[bump(8, 8)] * 4, STILL, STILL], Moments(levels=1, area=(2, 3), total=None, peak=None,
-                  displacement_mm=None, tonic_ms=0.5))  # fmt: skip
-    assert [s.tolist() for s in spikes] == [[1.0], [5.0], (np.arange(8) / 2 + 1).tolist()]
 
 
 def test_without_a_tare_nothing_is_encoded():

@@ -5,16 +5,14 @@ from __future__ import annotations
 import json
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused
 
 from taxel import Array, Frames, Tare
 from taxel.encode import Peak
 
 from . import scenes
-from .scenes import rest, spikes_of
+from .scenes import rest
 
 REPAIRED = "read"
 #: Examples for the laws of all encoders (test_laws.py).
@@ -77,40 +75,3 @@ def test_the_peak_is_numpys(seed, shape, noise, loaded):
         moves = np.diff(np.concatenate([[0], wanted >= level]).astype(int))
         assert np.rint(rises * 1000).astype(int).tolist() == t[moves == 1].tolist()
         assert np.rint(falls * 1000).astype(int).tolist() == t[moves == -1].tolist()
-
-
-@pytest.mark.parametrize("shape", [(1, 1), (1, 5), (4, 4)])
-def test_one_loaded_taxel_is_a_touch_whatever_the_array_and_the_unit(shape):
-    rng, t = np.random.default_rng(5), np.arange(300) * 10_000
-    values = rng.normal(0, 1, (300, *shape))
-    values[100:150, 0, -1] += 12.0
-    values[200:250, 0, -1] += 12.0
-    for scale in (1e-3, 1.0, 1e3):
-        frames = Frames(values * scale, t, unit="N", array=Array(*shape))
-        encoder = Peak(levels=[6.0], release=0.5, least_noise=1e-3 * scale).with_tare(
-            Tare.take(frames, stop_us=900_000)
-        )
-        rises, falls = encoder.encode(frames)
-        assert rises.tolist() == [1000.0, 2000.0]
-        assert falls.tolist() == [1500.0, 2500.0]
-
-
-def test_several_loaded_taxels_add():
-    values = np.zeros((4, 2, 2))
-    values[1, 0, 0] = 6.0
-    values[2] = 6.0
-    frames, at_rest = Frames(values, range(0, 4000, 1000), array=Array(2, 2)), np.zeros((2, 2, 2))
-    tare = Tare.take(Frames(at_rest, [0, 1000], array=Array(2, 2)))
-    below, above = (Peak(levels=[level], least_noise=1.0, tare=tare).encode(frames)[0] for level in (11.9, 12.1))
-    assert (below.tolist(), above.tolist()) == ([2.0], [])
-
-
-def test_it_needs_a_tare_and_levels_that_ascend():
-    frames = Frames(np.zeros((2, 1, 1)), [0, 1000])
-    with refused(argument="tare"):
-        Peak().encode(frames)
-    with refused(argument="levels"):
-        Peak(levels=[3.0, 3.0])
-    with refused(argument="levels"):
-        Peak(levels=[])
-    assert spikes_of(Peak(tare=Tare.take(frames)).encode(frames)) == []

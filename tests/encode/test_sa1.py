@@ -79,29 +79,3 @@ def test_a_held_pressure_is_told_for_as_long_and_38_percent_slower_after_12_s():
     first, last = rate(spikes, 1725, 2725), rate(spikes, 12_725, 13_725)
     assert 1 - last / first == pytest.approx(0.38, abs=0.03)
     assert len(spikes[spikes < 100]) == 0
-
-
-def test_the_rate_grows_in_a_straight_line_with_pressure():
-    """Vega-Bermudez and Johnson 1999: so do SA-1's; correlation of rate and depth over the fibre's range."""
-    t = np.arange(0, 2500.0)
-    depths = np.arange(15, 151, 15.0)
-    rates = [rate(of(SA1(), t, pressed(t, depth, 100.0)), 500, 2500) for depth in depths]
-    assert np.corrcoef(depths, rates)[0, 1] > 0.995
-    assert rates == sorted(rates)
-
-
-def test_a_new_pressure_is_told_fastest_and_a_release_by_silence():
-    t = np.arange(0, 3000.0)
-    x = np.interp(t, [500, 550, 2000, 2050], [0, 75, 75, 0])
-    spikes = of(SA1(), t, x)
-    assert rate(spikes, 500, 600) > 1.5 * rate(spikes, 1500, 2000) > 0
-    assert rate(spikes, 2100, 3000) == 0
-
-
-@pytest.mark.parametrize("depth", [20.0, 75.0, 150.0])
-def test_rates_hardly_depend_on_the_sampling_period(depth):
-    counts = []
-    for period in (0.1, 0.2, 0.5, 1.0, 2.0):
-        t = np.arange(round(2000 / period)) * period
-        counts.append(len(of(SA1(period_ms=period), t, pressed(t, depth, 100.0))))
-    assert max(counts) - min(counts) <= max(1, 0.02 * max(counts))

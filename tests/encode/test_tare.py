@@ -39,32 +39,6 @@ def test_rest_and_noise_are_mean_and_deviation_by_time_of_the_held_value(seed, s
                 assert tare.noise[y, x] == pytest.approx(noise, abs=1e-9)
 
 
-def test_frames_and_events_of_the_same_values_have_the_same_rest():
-    array = Array(2, 2)
-    events = touch(np.random.default_rng(1), array, 200, absent=0.0)
-    first = max(int(events.t[(events.x == x) & (events.y == y)][0]) for x in (0, 1) for y in (0, 1))
-    stop = int(events.t[-1])
-    frames = Frames.from_events(events, 100, stop=stop)
-    by_events = Tare.take(events, start_us=first, stop_us=stop)
-    by_frames = Tare.take(frames, start_us=first, stop_us=stop)
-    assert np.allclose(by_events.rest, by_frames.rest, rtol=1e-12)
-
-
-def test_a_saved_tare_comes_back(tmp_path):
-    array = Array(4, 4, 2.67, np.eye(4, dtype=bool), "odd")
-    tare = Tare.take(touch(np.random.default_rng(2), array, 20), note="board 3, 1 May")
-    place = tare.save(tmp_path / "rest.json")
-    again = Tare.load(place)
-    assert again == tare
-    assert again.array == array
-    assert again.note == "board 3, 1 May"
-    assert np.array_equal(again.rest, tare.rest, equal_nan=True)
-    assert np.isnan(again.rest[~array.exists]).all()
-    with pytest.raises(FileExistsError):
-        tare.save(place)
-    tare.save(place, overwrite=True)
-
-
 def test_noise_is_exact_far_from_0():
     frames = 3e7 + np.array([0, 2] * 5)[:, None, None] * np.ones((1, 2))
     assert Tare.take(Frames(frames, 100 * np.arange(10))).noise == pytest.approx(np.full((1, 2), 1.0), rel=0.01)

@@ -55,28 +55,3 @@ def test_the_published_latencies_are_met(published, latency):
     # The OFF neuron received input until 50 ms; after enough time without, its latency is that of a settled one.
     assert spikes.times[1] == pytest.approx(450 + latency, abs=2.0)
     assert spikes.values.tolist() == [1, -1]
-
-
-def test_an_idle_off_neuron_fires_once_only_if_it_begins_at_rest():
-    frames = frames_of(np.arange(0, 200_000, 2000), np.zeros((100, 1)))
-    assert len(ThresholdIzhikevich([0.4]).encode(frames).times) == 0
-    for published, latency in (("3.4.3", 20.2), ("6.5.1", 15.8)):
-        spikes = ThresholdIzhikevich([0.4], published=published, begin="rest").encode(frames)
-        assert (spikes.times.tolist(), spikes.values.tolist()) == ([latency], [-1.0])
-
-
-@pytest.mark.parametrize(("published", "too_short", "enough"), [("3.4.3", 10.0, 21.0), ("6.5.1", 5.0, 16.0)])
-def test_an_input_that_goes_too_soon_makes_no_spike(published, too_short, enough):
-    encoder = ThresholdIzhikevich([0.4], published=published)
-    t = np.arange(0, 400_000, 100)
-    for length, spikes in ((too_short, 0), (enough, 1)):
-        on = (t >= 50_000) & (t < 50_000 + 1000 * length)
-        assert len(encoder.encode(frames_of(t, on[:, None])).split_by_sign()[0]) == spikes
-
-
-@pytest.mark.parametrize(("published", "latency"), [("3.4.3", 34.0), ("6.5.1", 51.0)])
-def test_a_spike_after_a_short_gap_comes_late(published, latency):
-    t = np.arange(0, 700_000, 100)
-    on = (t >= 50_000) & ~((t >= 450_000) & (t < 470_000))
-    spikes = ThresholdIzhikevich([0.4], published=published).encode(frames_of(t, on[:, None])).split_by_sign()
-    assert spikes[0][1] - 470 == pytest.approx(latency, abs=3.0)

@@ -82,18 +82,6 @@ def test_moved_in_time_it_is_the_same(name):
 
 
 @each_metric
-def test_a_wrong_or_unknown_parameter_is_refused(name):
-    a, b, _ = patterns(3)
-    for key in described(name)["ranges"]:
-        with refused(argument=key):
-            getattr(metrics, name)(a, b, **{**given(name), key: -1.0})
-    with refused(argument="nonsense"):
-        metrics.pairwise(name, [a, b], **given(name), nonsense=1)
-    with refused(argument="metric"):
-        metrics.pairwise("nonsense", [a, b])
-
-
-@each_metric
 def test_graded_trains_are_refused_by_name(name):
     plain = patterns(1)
     graded = [SpikeTrains(p.times, p.offsets, p.start, p.stop, np.ones(len(p.times)), kind="graded") for p in plain]

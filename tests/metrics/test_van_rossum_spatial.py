@@ -6,16 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from drawing import pattern, patterns
-from hypothesis import given
-from hypothesis import strategies as st
+from drawing import pattern
 from refusal import refused
 
 from taxel import Array, SpikeTrains
 from taxel.metrics import van_rossum, van_rossum_spatial
 
 ARRAY = Array(2, 3, pitch_mm=1.5)
-own = st.sampled_from(["twice", "once"])
 
 
 def smoothed(x, array, t, tau, sigma, own_train):
@@ -53,24 +50,6 @@ def test_it_is_what_5_11_and_5_12_give_in_plain_numpy(own_train, tau):
     parameters = {"array": ARRAY, "tau": tau, "sigma": 2.0, "own_train": own_train}
     assert van_rossum_spatial(a, b, normalisation="none", **parameters) == pytest.approx(math.sqrt(square), rel=1e-9)
     assert van_rossum_spatial(a, b, **parameters) == pytest.approx(math.sqrt(2 * square / tau), rel=1e-9)
-
-
-@given(a=patterns(6), b=patterns(6), c=patterns(6), tau=st.floats(0.05, 500), sigma=st.floats(0.01, 20), own_train=own)
-def test_it_is_a_metric(a, b, c, tau, sigma, own_train):
-    parameters = {"array": ARRAY, "tau": tau, "sigma": sigma, "own_train": own_train}
-    ab, bc, ac = (van_rossum_spatial(x, y, **parameters) for x, y in ((a, b), (b, c), (a, c)))
-    assert van_rossum_spatial(a, a, **parameters) == 0
-    assert van_rossum_spatial(b, a, **parameters) == pytest.approx(ab, rel=1e-9)
-    assert ac <= (ab + bc) * (1 + 1e-9) + 1e-9
-    assert (ab == 0) == (a == b)
-
-
-@given(a=patterns(6), b=patterns(6), tau=st.floats(0.5, 50))
-def test_without_neighbours_it_is_the_distance_of_trains_once_or_twice(a, b, tau):
-    far = {"array": Array(2, 3, pitch_mm=1e6), "tau": tau}
-    lone = math.sqrt(sum(van_rossum(x, y, tau=tau) ** 2 for x, y in zip(a, b, strict=True)))
-    assert van_rossum_spatial(a, b, own_train="once", **far) == pytest.approx(lone, rel=1e-9, abs=1e-9)
-    assert van_rossum_spatial(a, b, **far) == pytest.approx(2 * lone, rel=1e-9, abs=1e-9)
 
 
 def test_on_and_off_trains_are_smoothed_apart_and_missing_taxels_do_not_count():

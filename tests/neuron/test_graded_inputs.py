@@ -82,21 +82,3 @@ def test_spikes_are_those_of_the_plain_sums(problem):
             inner = inner * neuron.step_ms
         for t in inner[(inner > begin) & (inner < end)]:
             assert plain.above(t, list(fired[:k])) <= 1e-11 * (1 + np.abs(plain.w).sum())
-
-
-@settings(max_examples=60, deadline=None)
-@given(problems())
-def test_values_of_1_give_the_bits_of_unsigned_trains(problem):
-    neuron, weights, trains = problem
-    unsigned = SpikeTrains(trains.times, trains.offsets, trains.start, trains.stop)
-    ones = SpikeTrains(
-        trains.times, trains.offsets, trains.start, trains.stop, np.ones(len(trains.times)), kind="graded"
-    )
-    times = np.linspace(0, 150, 40)
-    assert np.array_equal(neuron.run(weights, ones), neuron.run(weights, unsigned))
-    assert np.array_equal(neuron.potential(weights, ones, times), neuron.potential(weights, unsigned, times))
-    # A power of two moves from the values to the weights without rounding.
-    halves = SpikeTrains(
-        trains.times, trains.offsets, trains.start, trains.stop, np.full(len(trains.times), 0.5), kind="graded"
-    )
-    assert np.array_equal(neuron.run(2 * weights, halves), neuron.run(weights, unsigned))

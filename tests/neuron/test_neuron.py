@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from draws import mixed
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from plain_neuron import Plain
 from refusal import refused
 
@@ -78,61 +76,6 @@ def test_on_a_grid_every_kernel_fires_at_the_first_point_at_or_above_the_thresho
 def test_the_exponential_kernel_is_refused_in_continuous_time():
     with refused(argument="kernel"):
         Neuron(kernel="exponential")
-
-
-@pytest.mark.parametrize("after_spike", ["keep", "ignore", "reset"])
-def test_the_potential_with_given_spikes_is_6_7(after_spike):
-    neuron = Neuron(tau=7.0, after_spike=after_spike)
-    weights, trains = random_trains(20)
-    spikes, times = [30.0, 52.5, 100.0], np.arange(0.0, 170.0, 0.7)
-    plain = Plain(neuron, weights, trains)
-    expected = []
-    for t in times:
-        earlier = [s for s in spikes if s < t]
-        masked = earlier and t <= earlier[-1] + neuron.refractory
-        expected.append(0.0 if masked else plain.potential(t, earlier))
-    assert neuron.potential(weights, trains, times, spikes=spikes) == pytest.approx(expected, abs=1e-13)
-
-
-def test_a_finer_grid_comes_to_the_exact_crossings():
-    weights, trains = random_trains(30)
-    exact = Neuron(after_spike="reset", theta_plus=0.0).run(weights, trains)[:1]
-    late = [
-        Neuron(after_spike="reset", theta_plus=0.0, time="grid", step_ms=step).run(weights, trains)[0] - exact[0]
-        for step in (1.0, 0.1, 0.01, 0.001)
-    ]
-    assert all(0 <= d <= step for d, step in zip(late, (1.0, 0.1, 0.01, 0.001), strict=True))
-
-
-@given(
-    seed=st.integers(0, 10_000),
-    shift=st.one_of(st.integers(-1000, 1000), st.integers(20, 35).map(lambda k: 2.0**k)),
-    tau=st.sampled_from([0.5, 7.0, 190.0]),
-    refractory=st.sampled_from([0.37, 3.0]),
-    after=st.sampled_from(["keep", "ignore", "reset"]),
-    first=st.sampled_from(["theta_0", "printed"]),
-    time=st.sampled_from([{}, {"time": "grid", "step_ms": 0.1}, {"time": "grid", "step_ms": 1.0}]),
-)
-@settings(max_examples=3 * settings.default.max_examples, deadline=None)
-def test_a_shift_in_time_shifts_the_spikes(seed, shift, tau, refractory, after, first, time):
-    weights, trains = random_trains(seed)
-    # In 1024ths of a ms inputs move without rounding, a year from time 0 too.
-    times = [np.round(t * 1024) / 1024 for t in trains]
-    there = SpikeTrains.from_lists([t + shift for t in times], start=trains.start + shift, stop=trains.stop + shift)
-    here = SpikeTrains.from_lists(times, start=trains.start, stop=trains.stop)
-    neuron = Neuron(tau=tau, refractory=refractory, after_spike=after, first_threshold=first, **time)
-    fired, moved = neuron.run(weights, here), neuron.run(weights, there)
-    assert len(moved) == len(fired)
-    assert moved - shift == pytest.approx(fired, abs=1e-6 + 1e-13 * abs(shift))
-
-
-@given(seed=st.integers(0, 10_000), factor=st.floats(0.1, 10.0))
-@settings(max_examples=60, deadline=None)
-def test_weights_and_thresholds_scaled_alike_fire_alike(seed, factor):
-    weights, trains = random_trains(seed)
-    one = Neuron(tau=7.0).run(weights, trains, threshold=1.0)
-    scaled = Neuron(tau=7.0).run(weights * factor, trains, threshold=factor)
-    assert scaled[:3] == pytest.approx(one[:3], abs=1e-6)
 
 
 def test_keep_fires_again_at_once_while_the_potential_stays_above_the_threshold():
