@@ -3,20 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from taxel import Array
-
-
-@given(st.integers(1, 50), st.integers(1, 50))
-def test_indices_run_row_by_row(rows: int, columns: int) -> None:
-    array = Array(rows, columns)
-    y, x = np.mgrid[:rows, :columns]
-    assert np.array_equal(array.index(x.ravel(), y.ravel()), np.arange(rows * columns))
-    assert array.taxels == rows * columns
-    assert array.shape == (rows, columns)
 
 
 def test_equality_hash_and_repr() -> None:
@@ -29,15 +19,6 @@ def test_equality_hash_and_repr() -> None:
     assert repr(a) == "Array(a: 2 rows x 3 columns, 5 taxels, 1.5 mm apart)"
     for other in (Array(2, 3, 1.5, None, "a"), Array(2, 3, 2.0, exists, "a"), Array(2, 3, 1.5, exists, "b"), 3):
         assert a != other
-
-
-def test_the_mask_is_a_copy_that_cannot_be_changed() -> None:
-    exists = np.ones((2, 2), bool)
-    array = Array(2, 2, exists=exists)
-    exists[0, 0] = False
-    assert array.taxels == 4
-    with pytest.raises(ValueError, match="read-only"):
-        array.exists[0, 0] = False
 
 
 @given(

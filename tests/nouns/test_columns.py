@@ -102,21 +102,6 @@ def test_a_callers_array_stays_his_and_what_he_does_to_it_is_not_seen(make) -> N
     assert empty.flags.writeable
 
 
-def test_what_nobody_can_change_is_not_copied_and_a_read_only_view_of_what_he_can_is() -> None:
-    mine = np.zeros((4, 2, 2), np.float32)
-    view = mine[:]
-    view.flags.writeable = False
-    assert not np.shares_memory(Frames(view, range(4)).values, mine)
-    mine.flags.writeable = False
-    assert np.shares_memory(Frames(mine[1:], range(3)).values, mine)
-    pushed = taxel.wire.Decoder(array=ARRAY).push(taxel.wire.encode(events()))
-    again = Events(pushed.t, pushed.x, pushed.y, pushed.p, array=ARRAY)
-    for name in ("t", "x", "y", "p"):
-        assert np.shares_memory(getattr(again, name), getattr(pushed, name))
-    assert np.frombuffer(bytes(16), np.int64).base is not None
-    assert np.shares_memory(Frames(mine, (t := np.frombuffer(np.arange(4).tobytes(), np.int64))).t, t)
-
-
 #: Prints how much more memory a call needed, at its peak, than the columns that it read hold.
 PEAK = """
 import sys

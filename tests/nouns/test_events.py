@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import matplotlib as mpl
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from refusal import refused
 
 from taxel import Array, Events, Frames
 
@@ -41,19 +37,6 @@ def test_records_give_the_same_events_back(events: Events) -> None:
     assert repr(back) == repr(events)
 
 
-def test_tonic_makes_the_same_pictures_of_our_events() -> None:
-    tonic = pytest.importorskip("tonic")
-    rng = np.random.default_rng(1)
-    t = np.sort(rng.integers(0, 10_000, 500))
-    events = Events(t, rng.integers(0, 12, 500), rng.integers(0, 8, 500), rng.random(500) < 0.5, array=GRID)
-    picture = tonic.transforms.ToImage(sensor_size=(12, 8, 2))(events.to_numpy())
-    expected = np.zeros((2, 8, 12))
-    np.add.at(expected, (events.p.astype(int), events.y, events.x), 1)
-    assert np.array_equal(picture, expected)
-    cropped = tonic.transforms.CenterCrop(sensor_size=(12, 8, 2), size=(4, 4))(events.to_numpy())
-    assert len(cropped) == len(events.region(slice(4, 8), slice(2, 6)))
-
-
 @given(some(), some())
 def test_what_is_repaired_stays_so_through_slices_order_and_merging(a: Events, b: Events) -> None:
     def marked(events: Events) -> list[tuple[object, ...]]:
@@ -66,14 +49,6 @@ def test_what_is_repaired_stays_so_through_slices_order_and_merging(a: Events, b
     assert marked(inside) == [e for e in marked(a) if -1000 <= e[0] < 1000]
     none = a[np.zeros(len(a), bool)]
     assert none.repaired is None
-
-
-def test_a_mask_that_marks_nothing_is_none() -> None:
-    a = Events([1], [2], [3], [True], array=GRID)
-    assert Events([1], [2], [3], [True], array=GRID, repaired=[False]) == a
-    assert Events([1], [2], [3], [True], array=GRID, repaired=[True]) != a
-    with refused():
-        Events([1], [2], [3], [True], array=GRID, repaired=[True, False])
 
 
 @given(some(), st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))
@@ -95,27 +70,6 @@ def test_a_region_holds_its_taxels_and_nothing_else(events: Events, a: int, b: i
     assert inside == events[chosen]
     assert inside.array == events.array
     assert events.region(slice(None), slice(None)) == events
-
-
-@given(some())
-def test_slices_masks_and_numbers_choose_the_same(events: Events) -> None:
-    n = len(events)
-    assert events[:] == events
-    assert events[n // 2 :] == events[np.arange(n) >= n // 2] == events[np.arange(n // 2, n)]
-    assert events[::-1][::-1] == events
-    assert events[[]] == events[:0]
-
-
-@given(some(), st.sets(st.integers(0, 40), max_size=4))
-def test_slices_of_the_whole_hold_each_marker_once_and_in_its_time(events: Events, cuts: set[int]) -> None:
-    events = events.sorted()
-    edges = [0, *sorted(cut for cut in cuts if 0 < cut < len(events)), len(events)]
-    parts = [events[a:b] for a, b in pairwise(edges)]
-    assert sum((part.markers for part in parts), ()) == events.markers
-    for part, (a, b) in zip(parts, pairwise(edges), strict=True):
-        for t, _ in part.markers:
-            assert a == 0 or t >= events.t[a]
-            assert b == len(events) or t < events.t[b]
 
 
 @given(some())

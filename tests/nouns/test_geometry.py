@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from refusal import refused
 
 import taxel
-from taxel import Array, Calibration, Events, Frames, Places, ProblemError, Readout, Tare
+from taxel import Array, Calibration, Frames, Places, ProblemError, Readout, Tare
 from taxel.calibration import Load
 
 PLATE = Array(4, 3, (7.62, 5.08), name="plate")
@@ -56,22 +56,6 @@ def test_converted_files_keep_all_of_a_sensor(
 ) -> None:
     place = tmp_path_factory.mktemp("kept") / f"one{ending}"
     taxel.convert(Frames(np.zeros((2, *array.shape)), [0, 1000], array=array), place)
-    assert taxel.open(place).array == array
-
-
-@given(arrays())
-@settings(max_examples=20, deadline=None)
-def test_tares_readouts_and_recordings_of_events_keep_all_of_a_sensor(
-    tmp_path_factory: pytest.TempPathFactory, array: Array
-) -> None:
-    tare = Tare.take(Frames(np.ones((2, *array.shape)), [0, 1000], array=array))
-    assert Tare.from_json(tare.to_json()).array == array
-    encoder = taxel.encode.LevelCrossing([10.0])
-    weights = np.zeros(2 * encoder.trains(array))
-    readout = Readout(encoder, {"contact": (taxel.Neuron(), weights, 0.0)}, array=array)
-    assert Readout.from_json(readout.to_json()).array == array
-    place = tmp_path_factory.mktemp("events") / "one.mcap"
-    taxel.convert(Events([0], [0], [0], [True], array=array, intensity=[5]), place)
     assert taxel.open(place).array == array
 
 
@@ -135,27 +119,6 @@ def _moments(array: Array, **levels: Any) -> None:
 def _encode(encoder: Any, array: Array) -> None:
     frames = Frames(np.ones((3, *array.shape)), [0, 1000, 2000], array=array)
     encoder(tare=Tare.take(frames)).encode(frames)
-
-
-def test_displacement_is_measured_along_each_axis_s_own_pitch_and_by_places() -> None:
-    """A load that moves a row, and one that moves a column, pass the levels of their own distance."""
-    values = np.zeros((3, 4, 4))
-    values[1, 1:3, 1:3], values[2, 2:4, 1:3] = 50.0, 50.0
-
-    def spikes(array: Array) -> int:
-        frames = Frames(values, [0, 1000, 2000], array=array)
-        tare = Tare.take(Frames(values[:1].repeat(2, 0), [0, 1000], array=array))
-        only = {"area": None, "total": None, "peak": None}
-        encoder = taxel.encode.Moments(displacement_mm=(5.0, 7.0), levels=2, tare=tare, **only)
-        return len(encoder.encode(frames).times)
-
-    y, x = np.indices((4, 4)) * np.array([7.62, 5.08])[:, None, None]
-    # 7.62 mm down passes both levels, 5.08 mm one, 2.67 mm none; each level makes a spike up, and one at the end.
-    many = [spikes(Array(4, 4, pitch)) for pitch in ((7.62, 5.08), (5.08, 7.62), 2.67)]
-    assert many[0] > many[1] > many[2] == 0
-    assert spikes(Array(4, 4, places=Places(x, y, unit="mm"))) == many[0]
-    with refused(argument="displacement_mm"):
-        spikes(Array(4, 4, places=Places(x, y)))
 
 
 @pytest.mark.parametrize(

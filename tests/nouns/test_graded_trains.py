@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from refusal import refused
@@ -48,23 +47,6 @@ def test_files_without_a_kind_are_signed_if_they_have_values(tmp_path: Path) -> 
     for name in ("c.npz", "d.npz", "e.npz"):
         with refused(FormatError, place=Place(name)):
             SpikeTrains.load(tmp_path / name)
-
-
-def test_neo_trains_without_a_kind_are_signed() -> None:
-    signed = SpikeTrains.from_lists([[1.0], [2.0]], stop=5.0, values=[[0.5], [-3.0]])
-    pytest.importorskip("neo")
-    assert SpikeTrains.from_neo(signed.to_neo()).kind == "signed"
-
-
-@given(some(), some())
-def test_trains_side_by_side_are_the_inputs_of_one_neuron(a: SpikeTrains, b: SpikeTrains) -> None:
-    both = SpikeTrains.side_by_side([a, b])
-    parts = [one.split_by_sign() if one.signed else one for one in (a, b)]
-    assert both.kind == ("graded" if "graded" in (a.kind, b.kind) else "unsigned")
-    assert [t.tolist() for t in both] == [t.tolist() for one in parts for t in one]
-    assert [values_of(both, n) for n in range(len(both))] == [
-        values_of(one, n) for one in parts for n in range(len(one))
-    ]
 
 
 def test_trains_side_by_side_have_a_window_that_holds_all() -> None:

@@ -1,22 +1,16 @@
 """Reference events find their recording, and its own clock."""
 
-import csv
 import json
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from refusal import refused
 
 import taxel
 from taxel import _core
 from taxel._base.errors import Place
 from taxel.labels import TURN_US
-from taxel.panel.label_file import LabelFile
-from taxel.recording.beside import is_label_table
 
 ARRAY = {"rows": 64, "columns": 64, "pitch_mm": 2.67, "name": "thesis 64x64"}
 BEGAN_NS = 1_700_000_000_000_000_000
@@ -67,14 +61,6 @@ def test_labels_find_the_recording_of_a_sender_that_did_not_keep_pace(
     found = table(tmp_path / "labels.csv", happened, host=True, pace=pace).times(recording)["tick"]
     assert found[1] == recording.events.t[0] == begins_us % TURN_US
     np.testing.assert_array_equal(np.diff(found), np.diff(happened))
-
-
-def test_without_host_time_times_are_taken_as_they_are(tmp_path: Path) -> None:
-    recording = record(tmp_path / "walk.mcap", 40_000_000)
-    assert table(tmp_path / "labels.csv", [5, 40_000_000], host=False).times(recording)["tick"].tolist() == [
-        5,
-        40_000_000,
-    ]
 
 
 def test_labels_of_another_run_are_refused(tmp_path: Path) -> None:
@@ -141,100 +127,11 @@ def test_a_label_replaces_a_note_of_the_recording_and_one_without_a_name_removes
     assert noted(tmp_path, rows) == left
 
 
-def test_labels_beside_a_table_of_one_foot_name_it_by_its_side(tmp_path: Path) -> None:
-    table = tmp_path / "walk.csv"
-    table.write_text("time_s,l1,l2,r1,r2\n" + "".join(f"{k / 100},1,2,3,4\n" for k in range(100)))
-    layout = tmp_path / "walk.layout.toml"
-    (tmp_path / "walk.notes.csv").write_text("t_us,source,label\n100000,left,heel\n200000,right,heel\n300000,,both\n")
-    (tmp_path / "labels.csv").write_text(
-        "recording,source,label,t_us\nwalk.csv,left,toe,400000\nwalk.csv,right,toe,5\n"
-    )
-    for side, leave_out, t in (("left", [4, 5], [100_000, 300_000, 400_000]), ("right", [2, 3], [5, 200_000, 300_000])):
-        layout.write_text(
-            f'rows = 1\ncolumns = 2\nunit = "N"\nside = "{side}"\n[table]\ntime_column = "time_s"\ntime_unit = "s"\n'
-            f"leave_out = {leave_out}\n"
-        )
-        assert sorted(note.t for note in taxel.open(table).notes if note.t is not None) == t
-
-
-def test_a_replaced_note_is_that_of_its_source_alone(tmp_path: Path) -> None:
-    place = tmp_path / "walk.notes.csv"
-    place.write_text("label,t_us,source,replaces_us\nheel,5,left,4\ntoe,7,,\n,9,,9\n")
-    labels = taxel.Labels(place)
-    assert [(row.text, row.t, row.replaces) for row in labels.rows] == [("heel", 5, 4), ("toe", 7, None)]
-    assert [row.replaces for row in labels.removed] == [9]
-    walk = tmp_path / "walk.mcap"
-    replaced = [labels._replaced(walk, side, "", "", lambda: 0) for side in ("left", "right")]
-    assert replaced == [{4, 9}, {9}]
-
-
 @pytest.mark.parametrize("cells", [",5,", "a,5,x"])
 def test_a_row_that_replaces_nothing_is_refused(tmp_path: Path, cells: str) -> None:
     (tmp_path / "walk.notes.csv").write_text(f"label,t_us,replaces_us\n{cells}\n")
     with refused(taxel.FormatError, place=Place("walk.notes.csv", line=2)):
         taxel.Labels(tmp_path / "walk.notes.csv")
-
-
-#: Rows of a table: label, time, source, recording and what two columns say that taxel does not know.
-ROWS = st.lists(
-    st.tuples(
-        st.sampled_from(["heel", "toe"]), st.integers(0, 20), st.sampled_from(["", "left"]),
-        st.sampled_from(["walk", "trial 2"]), st.sampled_from(["", "late", 'hit, "hard"']), st.sampled_from(["", "3"]),
-    ),
-    min_size=1, max_size=8, unique_by=lambda row: row[:4],
-)  # fmt: skip
-
-
-@given(ROWS, st.sampled_from(["none", "mark", "rename", "move", "delete"]), st.randoms(use_true_random=False))
-def test_columns_that_taxel_does_not_know_stay_with_their_labels_on_the_page(rows, change: str, random) -> None:
-    with TemporaryDirectory() as folder:
-        place = Path(folder) / "walk.notes.csv"
-        with place.open("w", newline="") as file:
-            table = csv.writer(file)
-            table.writerows([("label", "t_us", "source", "recording", "comment", "sure"), *rows])
-        handler = LabelFile(place, frozenset({"", "walk.mcap", "walk"}))
-        assert len(handler.read()) == len(rows)
-        at = random.randrange(len(rows))
-        left = [row if row[3] != "walk" else (*row[:3], "", *row[4:]) for row in rows]
-        label, t, source, trial, *said = left[at]
-        changed = {"rename": ("ball", t), "move": (label, 77)}.get(change, (label, t))
-        old = taxel.Note(label, t, 0, trial, source)
-        edit = (old, taxel.Note(*changed, 0, trial, source))
-        if change == "mark":
-            edit = (None, taxel.Note("ball", 5))
-            left.append(("ball", 5, "", "", "", ""))
-        elif change == "delete":
-            edit = (old, None)
-            del left[at]
-        else:
-            left[at] = (*changed, source, trial, *said)
-        _, written = handler.change([] if change == "none" else [edit])
-        assert sorted((row.text, row.t, row.source, row.recording) for row in written) == sorted(
-            row[:4] for row in left
-        )
-        again = taxel.Labels(place).rows
-        names = {"comment": "", "sure": ""}
-        # A row of the table's own recording may have its name, or none.
-        named = {"walk": ""}
-        found = [
-            (one.text, one.t, one.source, named.get(one.recording, one.recording), *(names | dict(one.others)).values())
-            for one in again
-        ]
-        assert sorted(found) == sorted(left)
-
-
-@pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "utf-16"])
-@pytest.mark.parametrize("separator", [",", ";", "\t"])
-def test_a_table_of_a_spreadsheet_is_the_one_with_commas(tmp_path: Path, separator: str, code: str) -> None:
-    kg = '"1,5"' if separator == "," else "1,5"
-    rows = [["recording", "label", "t_us", "Größe (kg)"], ["walk", "Fuß", "5", kg], ["", '"heel; or, toe\t"', "7", ""]]
-    place = tmp_path / "labels.csv"
-    place.write_bytes("".join(separator.join(row) + "\r\n" for row in rows).encode(code))
-    assert [(row.text, row.t, row.recording, row.others) for row in taxel.Labels(place).rows] == [
-        ("Fuß", 5, "walk", (("Größe (kg)", "1,5"),)),
-        ("heel; or, toe", 7, "", (("Größe (kg)", ""),)),
-    ]
-    assert is_label_table(place)
 
 
 @pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
@@ -286,15 +183,3 @@ def test_a_table_of_another_program_without_times_or_labels_is_refused(tmp_path:
     place.write_text(text)
     with refused(taxel.FormatError, place=Place("labels.csv", line=line)):
         taxel.Labels(place)
-
-
-def test_a_table_of_another_program_is_no_recording_of_its_folder(tmp_path: Path) -> None:
-    made = record(tmp_path / "walk.mcap", 0, 1.0)
-    (tmp_path / "Ereignisse.csv").write_text("t_s;label\n0,21;auf\n")
-    assert is_label_table(tmp_path / "Ereignisse.csv")
-    assert [each.path for each in taxel.open_all(tmp_path)] == [made.path]
-    (tmp_path / "walk.notes.csv").write_text("t_s;label\n0,21;auf\n")
-    assert [(note.text, note.t) for note in taxel.open(made.path).notes] == [("auf", 210_000)]
-    # Numbers of two channels are one.
-    (tmp_path / "two.csv").write_text("time,marker\n0.21,0\n")
-    assert not is_label_table(tmp_path / "two.csv")

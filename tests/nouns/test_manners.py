@@ -85,13 +85,6 @@ def test_events_of_both_are_merged_by_time_and_nothing_is_lost(
     assert n == 0 or a[: n // 2] + a[n // 2 :] == a
 
 
-@given(seeds, sizes, sizes, st.booleans())
-def test_detections_of_both_are_merged_by_time(seed: int, n: int, m: int, said: bool) -> None:
-    a, b = found(seed, n, said=said), found(seed + 1, m, said=said)
-    assert list(a + b) == sorted([*a, *b], key=lambda one: one.t)
-    assert a[: n // 2] + a[n // 2 :] == a
-
-
 @given(seeds, st.booleans())
 def test_trains_of_both_are_merged_train_by_train(seed: int, signed: bool) -> None:
     a, b = trains(seed, signed=signed), trains(seed + 1, signed=signed)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from taxel import Array, Frames, Tare
+from taxel import Array, Frames
 
 
 def drawn(seed: int) -> Frames:
@@ -32,14 +32,3 @@ def test_area_peak_sum_and_centre_are_scipy_s(seed: int, above: float) -> None:
         else:
             y, x = ndimage.center_of_mass(np.where(loaded, frame, 0.0))
             np.testing.assert_allclose(frames.centre(above)[k], [2.5 * x, 2.5 * y], 1e-9, 1e-9)
-
-
-@given(st.integers(0, 10**6))
-def test_a_rest_that_is_taken_off_leaves_what_is_above_it(seed: int) -> None:
-    frames = drawn(seed)
-    rest = Frames(np.abs(frames.values[:2]) / 2, [0, 9], unit="N", array=frames.array)
-    tare = Tare.take(rest)
-    off = tare.off(frames)
-    np.testing.assert_allclose(off.values, np.maximum(frames.values - tare.rest, 0), 1e-6, 1e-6)
-    assert (off.unit, off.array) == ("N", frames.array)
-    assert (off.values >= 0).all()

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from refusal import refused
 
 from taxel import SpikeTrains
-from taxel._base.arguments import column
 
 mpl.use("Agg")
 
@@ -24,23 +23,6 @@ def some(draw: st.DrawFn) -> SpikeTrains:
     if kind == "graded":
         values = [v * 10.0 ** rng.uniform(-6, 6, len(v)) for v in values]
     return SpikeTrains.from_lists(lists, -1.0, 101.0, values, kind=kind)
-
-
-@given(some())
-def test_lists_give_the_same_trains_back(trains: SpikeTrains) -> None:
-    values = None
-    if trains.values is not None:
-        values = np.split(trains.values, trains.offsets[1:-1]) if len(trains) else []
-    assert SpikeTrains.from_lists(list(trains), trains.start, trains.stop, values, kind=trains.kind) == trains
-    assert sum(trains.counts) == len(trains.times)
-
-
-@given(some())
-def test_numpy_names_the_train_of_each_spike(trains: SpikeTrains) -> None:
-    times, train = trains.to_numpy()
-    for n in range(len(trains)):
-        assert np.array_equal(times[train == n], trains[n])
-        assert np.array_equal(trains[n - len(trains)], trains[n])
 
 
 @given(some())
@@ -84,14 +66,6 @@ def test_delayed_trains_are_the_trains_later_delay_after_delay(trains: SpikeTrai
     assert trains.delayed([0.0]) == trains
 
 
-def test_elephant_measures_our_trains() -> None:
-    distance = pytest.importorskip("elephant.spike_train_dissimilarity").victor_purpura_distance
-    import quantities as pq
-
-    trains = SpikeTrains.from_lists([[10.0, 20.0], [12.0, 20.0]], stop=100.0).to_neo()
-    assert distance(trains, cost_factor=0.1 / pq.ms)[0, 1] == pytest.approx(0.2)
-
-
 @given(some(), st.floats(-1, 101), st.floats(-1, 101))
 def test_a_cut_in_time_keeps_times_and_narrows_the_window(trains: SpikeTrains, a: float, b: float) -> None:
     start, stop = sorted((a, b))
@@ -127,15 +101,3 @@ def test_splitting_by_sign_keeps_every_spike_once(trains: SpikeTrains) -> None:
         values = trains.values[trains.offsets[n] : trains.offsets[n + 1]]
         assert np.array_equal(split[n], trains[n][values > 0])
         assert np.array_equal(split[n + len(trains)], trains[n][values <= 0])
-
-
-def test_trains_are_converted_together_and_not_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    seen = []
-    for module in ("spikes.trains", "_base.columns"):
-        monkeypatch.setattr(f"taxel.{module}.column", lambda name, *rest: seen.append(name) or column(name, *rest))
-    for lists in ([[0.5]] * 1000, np.full((1000, 1), 0.5), [np.array([0.5])] * 1000, [(1,), [], [True, 2.5]] * 333):
-        trains = SpikeTrains.from_lists(lists, stop=3.0, values=[[1.0] * len(entry) for entry in lists])
-        assert list(map(list, trains)) == [list(map(float, entry)) for entry in lists]
-    assert set(seen) == {"times", "values", "offsets"}
-    with refused(argument="times"):
-        SpikeTrains.from_lists([[0.5]] * 700 + [["soon"]] + [[0.5]] * 300)
