@@ -83,14 +83,6 @@ def test_two_touches_fall_apart_as_often_as_a_drawn_phase_lets_them():
         assert abs(late.mean() - period / 2) < period / 2 * 0.1  # even over the period
 
 
-def test_a_short_window_sees_only_what_was_sampled_in_it_and_silent_trials_stay():
-    _, _, spikes = sampled(trials_of(600), 20_000)
-    assert spikes.trials == 600
-    silent = (spikes.counts(5000.0) == 0).mean()
-    assert abs(silent - 0.75) < 0.08
-    assert (spikes.counts(60_000.0) == 2).all()
-
-
 def grams_by_hand(spikes, window, tau):
     bins = spikes.bins_to(window)
     raster = np.zeros((spikes.trials, max(1, bins.max(initial=0)), spikes.taxels))
@@ -127,16 +119,6 @@ def test_inner_products_by_bins_are_those_of_whole_rasters(tau):
         assert size == max(1, len({(x, b) for k, x, b in rows if b < bins[k]}))
 
 
-def test_few_taxels_are_aligned_on_their_own_first_event():
-    trials = trials_of(10)
-    _, _, all_ = sampled(trials, 1000)
-    second = all_.select(np.array([1]))
-    assert (second.bin == 0).all()
-    assert second.taxels == 1
-    late = second.first_us - all_.first_us
-    assert set(np.rint(late)) == {0, 3000}
-
-
 def test_what_a_setting_costs_on_the_wire():
     spikes = SampledEvents(
         1000,
@@ -156,61 +138,6 @@ def test_what_a_setting_costs_on_the_wire():
         1000, 900, np.zeros(900, int), np.arange(900), np.zeros(900, int), np.ones(900, np.float32), first, end
     )
     assert kilobits_per_second(many, 10_000.0, values=False) == pytest.approx((900 * 16 + 2 * 192) / 10.0)
-
-
-def test_a_datagram_of_the_board_has_the_bytes_that_are_reckoned():
-    """24 bytes of its own, two an event; the board sends kind 1, whose words are as long as kind 0's."""
-    board = taxel.simulate.Board(taxel.wire.Registers(wire_version=2))
-    ticks = np.zeros(4096, np.uint16)
-    ticks[:100] = 40
-    sent = [datagram for datagram in board.frame(ticks) if datagram[1] & 15 == 1]
-    assert sum(map(len, sent)) == 24 * len(sent) + 2 * 100 > 0
-
-
-@pytest.fixture(scope="module")
-def answered():
-    return answer(
-        trials_of(120),
-        encoder=ENCODER,
-        window_ms=60,
-        windows_ms=[2, 10],
-        periods_ms=[1, 2, 10],
-        taxels=[1],
-        draws=2,
-        shuffles=8,
-        seed=1,
-    )
-
-
-def test_order_is_known_at_a_fast_period_and_lost_at_a_slow_one(answered):
-    bits = {(p.period_ms, p.window_ms): p.found.bits for p in answered.points}
-    assert answered.full.period_ms == 1
-    assert bits[1, 60] == bits[2, 60] == bits[1, 2] == 1.0
-    assert bits[10, 60] < 0.4  # a sample falls between in 3 of 10
-    assert {p.period_ms: p.verdict and p.verdict.says for p in answered.by_period} == {1: None, 2: "keeps", 10: "loses"}
-    assert {p.verdict for p in answered.taxels} == {p.verdict for p in answered.points if p.window_ms < 60} == {None}
-    assert answered.cheapest.found.bits > 0.9
-    assert answered.cheapest.kbps == min(p.kbps for p in answered.by_period if p.period_ms < 10)
-    assert answered.zero.level < 0.15
-    assert answered.control.found.bits < 0.2
-    assert any("no groups" in note for note in answered.notes)
-
-
-def test_progress_counts_every_step():
-    steps = []
-    answer(
-        trials_of(60),
-        encoder=ENCODER,
-        window_ms=60,
-        windows_ms=[10],
-        periods_ms=[1, 10],
-        taxels=[1],
-        draws=3,
-        shuffles=4,
-        progress=lambda what, done, of: steps.append((what, done, of)),
-    )
-    assert [done for _, done, _ in steps] == list(range(len(steps)))
-    assert {of for _, _, of in steps} == {len(steps)}
 
 
 def pulsed(touches):

@@ -190,20 +190,6 @@ def test_what_is_wrong_is_one_clear_error(tmp_path, table, arguments, text):
     assert not page.exists()
 
 
-def test_a_folder_stands_for_its_recordings(tmp_path):
-    events, rows = ordered(24)
-    (tmp_path / "monday").mkdir()
-    for k, (start, _) in enumerate(rows):
-        taxel.convert(events.between(start, start + 200_000), tmp_path / "monday" / f"{k}.npz")
-    table = [f"{k},{start},{label}" for k, (start, label) in enumerate(rows)]
-    (tmp_path / "trials.csv").write_text("\n".join(["recording,t_us,label", *table]))
-    done = run(
-        tmp_path / "monday", "--labels", tmp_path / "trials.csv", *QUICK, "--report", tmp_path / "page.html", "--json"
-    )
-    assert done.returncode == 0, done.stderr
-    assert sum(json.loads(done.stdout)["labels"].values()) == 24
-
-
 def test_groups_are_read_and_other_columns_are_not(tmp_path):
     events, _ = ordered(4)
     taxel.convert(events, tmp_path / "touches.npz")
