@@ -7,11 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from refusal import refused
 
 import taxel
-from taxel.simulate import Board, FrameSequence, Scene, Silence, Version2, play, truth
-from taxel.simulate.circuit import Circuit, VirtualGround
+from taxel.simulate import Board, FrameSequence, Silence, Version2, play
 from taxel.wire import Registers
 
 
@@ -84,46 +82,3 @@ def test_a_slow_press_is_told_between_the_frames_of_a_scan():
     assert len(alone) == pytest.approx(len(scanned), rel=0.02)
     assert (scanned.t % 192 == 0).all()
     assert len(np.unique(alone.t % 192)) > 30
-
-
-def test_an_array_by_itself_hears_the_same_touch_as_a_scanned_one():
-    acts = [Silence(60.0), Scene.draw(seed=3)]
-    contact = truth(acts)[0][0].start_us
-    scanned, alone = (play(acts, seed=3, wire=2, asynchronous=which) for which in (False, True))
-    assert [p for _, p in alone.events.markers] == [p for _, p in scanned.events.markers] == [True, False]
-    for played in (scanned, alone):
-        touched = played.events.t[(played.events.t > contact) & played.events.p]
-        # Half a frame, the fabric's 50 us and the first contact of the foam.
-        assert 0 < touched[0] - contact < 2000
-        assert played.words == 0 < played.bytes
-    assert abs(np.percentile(alone.events.t, 50) - np.percentile(scanned.events.t, 50)) < 30_000
-
-
-def test_a_board_alone_and_in_a_play_read_through_the_circuit():
-    """An ideal circuit changes nothing; a shared switch takes something from a pressed column."""
-    pressed = np.full((64, 64), 49, np.uint16)
-    pressed[:, 5] = 140
-    lines = VirtualGround(gain=None, switch_ohm=50.0)
-    plain = taxel.simulate.circuit.Converter(hysteresis_v=0.0, settle_us=0.0, discharge_us=0.0)
-    ideal = Circuit(readout=VirtualGround().ideal(), converter=plain)
-    values = {}
-    for name, circuit in (("none", None), ("ideal", ideal), ("shared", Circuit(readout=lines, converter=plain))):
-        decoder, board = taxel.wire.Decoder(2), Board(Registers(wire_version=2), circuit=circuit)
-        for datagram in [d for _ in range(2) for d in board.frame(pressed)]:
-            decoder.push(datagram)
-        values[name] = decoder.held
-    assert (values["ideal"] == values["none"]).all()
-    assert (values["shared"][:, 5] < 136).all()
-    assert (np.delete(values["shared"], 5, axis=1) == 49).all()
-    with refused():
-        Board(circuit=Circuit()).frame(np.zeros(7, np.uint16))
-
-    press = {"pressed": {"peak_n": 3.0, "speed_mm_s": 60.0, "hold_ms": 10.0}}
-    ball = {"shape": {"sphere": {"radius_mm": 8.0}}, "x_mm": 20.0, "y_mm": 22.0, "mass_g": 30.0, "motion": press}
-    acts, array = [Silence(60.0), Scene({"bodies": [ball]})], taxel.Array(16, 16, pitch_mm=2.67)
-    plays = [play(acts, seed=2, array=array, circuit=circuit) for circuit in (None, ideal, Circuit())]
-    assert len(plays[0].events) > 100
-    assert plays[0].events == plays[1].events
-    assert plays[0].events != plays[2].events
-    with refused(argument="circuit"):
-        play(acts, seed=2, circuit=Circuit(readout=VirtualGround(v_trans=0.5)))

@@ -1,21 +1,15 @@
 """Cells of the layer finer than taxels: narrow touches against a dense solution, and what is said of too few."""
 
-import json
 import re
-import subprocess
-import sys
 import warnings
-from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
 from draws import mixed
 
 from taxel import Array
-from taxel.simulate import Layer, Scene, SceneFile, Silence, play, truth
+from taxel.simulate import Layer, Scene, Silence, play
 
-ROOT = Path(__file__).parents[2]
 PITCH = 2.67
 SMALL = Array(14, 14, pitch_mm=PITCH)
 #: Foam that is linear however far it is pressed here, and loses nothing.
@@ -165,40 +159,3 @@ def test_wide_bodies_of_every_kind_do_on_finer_cells_what_they_do_on_taxels(moti
     counts = [np.bincount(e.y.astype(int) // 8 * 8 + e.x // 8, minlength=64) for e in events]
     assert counts[0].sum() > 100
     assert np.abs(counts[0] - counts[1]).sum() < 0.2 * counts[0].sum()
-
-
-NARROW = """
-cells_per_pitch = 1
-[[bodies]]
-shape.edge = { slope_deg = 45, length_mm = 30 }
-x_mm = 80
-y_mm = 80
-motion.pressed = { depth_mm = 0.6, speed_mm_s = 50, hold_ms = 5 }
-"""
-SAID = (
-    "bodies[0]: at its largest, its touch is 1.20 mm wide, less than 1.5 cells of 2.67 mm, "
-    "so the computed force is too small; cells_per_pitch = 4 is enough"
-)
-
-
-def test_a_scene_whose_cells_are_too_few_says_so_once(tmp_path):
-    place = tmp_path / "scene.toml"
-    narrow = NARROW.replace("= 80", "= 32").replace("\n", "\narray = { rows = 24, columns = 24 }\n", 1)
-    place.write_text(narrow)
-    run = [sys.executable, "-c", "from taxel.cli import main; main()"]
-    command = [*run, "simulate", str(place), "--truth", str(tmp_path / "truth.csv"), "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stderr.splitlines() == [f"taxel: warning: {SAID}"]
-    assert json.loads(done.stdout)["contacts"]
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        file = SceneFile.open(place)
-        truth(file.acts(), array=file.array)
-        play(file.acts(), seed=1, **file.options)
-    assert [str(warning.message) for warning in caught] == [SAID]
-    for one in (partial(truth, array=file.array), partial(play, seed=1, **file.options)):
-        with pytest.warns(UserWarning, match=re.escape(SAID)):
-            one([Silence(60.0), Scene(file.scene.parameters)])
-    place.write_text(narrow.replace("cells_per_pitch = 1", "cells_per_pitch = 4"))
-    done = subprocess.run([*run, "simulate", str(place)], capture_output=True, text=True, check=True)
-    assert done.stderr.strip() == ""

@@ -108,31 +108,6 @@ def test_dividers_equal_a_plain_nodal_solve(seed, rows, columns):
     assert lines.volts(g) == pytest.approx(every(g, divider=lines), rel=2e-6, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("gain", "switch_ohm", "worst"), [(None, 2.5, 0.008), (1e5, 2.5, 0.010), (None, 50.0, 0.14), (1e3, 2.5, 0.24)]
-)
-def test_the_worst_crosstalk_of_a_loaded_cross(gain, switch_ohm, worst):
-    """16 x 16 at 1 MOhm, a row and a column at 5 kOhm: error of the change above `v_trans`, as measured beforehand."""
-    g = np.full((16, 16), 1.0)
-    g[3], g[:, 5] = 200.0, 200.0
-    lines = VirtualGround(gain=gain, switch_ohm=switch_ohm, rail_v=1e3)
-    change, alone = lines.volts(g) - lines.v_trans, lines.volts_alone(g) - lines.v_trans
-    assert np.abs(change / alone - 1).max() == pytest.approx(worst, rel=0.05)
-
-
-def test_the_board_s_size_equals_a_plain_solve_to_round_off():
-    """64 x 64: all 128 lines' balances, a right-hand side a column."""
-    g_us = drawn(11, 64, 64)
-    lines = VirtualGround(rail_v=1e9)
-    g, share = 1e-6 * g_us, lines.gain / (1 + lines.gain)
-    sense, switch = (1 + lines.gain) * 1e-3 / lines.feedback_kohm, 1 / lines.switch_ohm
-    a = np.block([[np.diag(g.sum(1) + sense), -g], [-g.T, np.diag(g.sum(0) + switch)]])
-    b = np.vstack([np.full((64, 64), sense * lines.v_trans * share), switch * lines.v_trans * (1 - np.eye(64))])
-    into = sense * (lines.v_trans * share - np.linalg.solve(a, b)[:64])
-    wanted = lines.v_trans * share + (1e3 * lines.feedback_kohm - 1 / sense) * into
-    assert lines.volts(g_us) == pytest.approx(np.clip(wanted, 0, None), rel=1e-7, abs=1e-8)
-
-
 @pytest.mark.skipif(shutil.which("ngspice") is None, reason="ngspice is not installed")
 @pytest.mark.parametrize("wire_ohm", [0.0, 12.0])
 def test_ngspice_agrees_on_eight_by_eight(tmp_path: Path, wire_ohm: float):
@@ -164,13 +139,6 @@ def test_ngspice_agrees_on_eight_by_eight(tmp_path: Path, wire_ohm: float):
     said = [line.split("=")[1] for line in run.stdout.splitlines() if line.startswith("v(o")]
     assert len(said) == 8, run.stdout + run.stderr
     assert lines.volts(g)[:, read] == pytest.approx(np.array(said, float), rel=1e-5)
-
-
-def test_a_fabric_s_law_is_inverted():
-    fabric, force = Fabric(exponent=0.55), np.logspace(-6, 2, 30).reshape(5, 6)
-    assert fabric.force(fabric.conductance(force)) == pytest.approx(force, rel=1e-6)
-    assert fabric.conductance(-1.0) == fabric.conductance(0.0) == fabric.rest_us
-    assert fabric.force([0.05]) == 0.0
 
 
 def test_the_circuit_reads_what_the_simulated_sensor_reads():

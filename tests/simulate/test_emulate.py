@@ -1,13 +1,11 @@
 """The emulated board over UDP on loopback."""
 
-import itertools
 import json
 import socket
 import subprocess
 import sys
 import threading
 import time
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,11 +14,10 @@ from shell import run
 
 import taxel
 from taxel import ProblemError, wire
-from taxel.cli.emulate import _HELD_S, _TruthTable
-from taxel.demo.script import endless, script
-from taxel.simulate import Board, Faults, Flaws, Replay, Silence, Version2, emulate, play, truth
+from taxel.cli.emulate import _HELD_S
+from taxel.demo.script import script
+from taxel.simulate import Board, Flaws, Replay, Silence, Version2, emulate, play, truth
 from taxel.simulate.circuit import Circuit, Converter, VirtualGround
-from taxel.simulate.emulator_report import EmulatorReport
 from taxel.wire import Registers
 
 
@@ -61,16 +58,6 @@ def test_a_board_in_real_time_sends_what_one_without_a_clock_does(listener):
     assert report.changes == len(events) > 0, "what arming would have sent is not counted"
     assert report.frames == round(40_000 / 192)
     assert "frames/s" in report.verdict
-
-
-def test_what_a_callback_raises_ends_the_play(listener):
-    port, _, _ = listener
-
-    def complain(_):
-        raise RuntimeError("enough")
-
-    with pytest.raises(RuntimeError, match="enough"):
-        emulate(f"127.0.0.1:{port}", [Silence(60_000.0)], seed=4, watch=complain)
 
 
 def test_the_command_says_what_it_sent(listener):
@@ -116,17 +103,6 @@ def test_the_truth_is_written_as_it_happens_by_both_clocks(listener, tmp_path):
     assert str(labels) in again.stderr
 
 
-def test_the_truth_of_a_board_that_is_late_is_late_by_the_host(tmp_path):
-    contacts = [SimpleNamespace(start_us=1e6, stop_us=2e6), SimpleNamespace(start_us=5e6, stop_us=6e6)]
-    nothing = {"changes": 0, "datagrams": 0, "bytes": 0, "dropped": 0, "late_frames": 0, "late_us": {}}
-    with _TruthTable(tmp_path / "labels.csv", False) as table:
-        table.add(contacts)
-        table.write(EmulatorReport(frames=10_000, began_ns=10**18, board_seconds=2.0, seconds=2.01, **nothing))
-        table.write(EmulatorReport(frames=30_000, began_ns=10**18, board_seconds=6.0, seconds=14.0, **nothing))
-    host_s = [(row.at_ns - 10**18) / 1e9 for row in taxel.Labels(tmp_path / "labels.csv").rows]
-    np.testing.assert_allclose(host_s, [1, 2, 13, 14])
-
-
 class Heard:
     """Everything that a board sends, until it has been silent for a second."""
 
@@ -139,26 +115,6 @@ class Heard:
     def all(self):
         self.thread.join()
         return self.datagrams
-
-
-def test_scenes_without_an_end_begin_at_once(listener):
-    """Each act is made ready while those before it are played: datagrams come though the list never ends."""
-    heard, drawn = Heard(listener), itertools.count()
-
-    def stop(report):
-        if heard.datagrams and report.frames > 100:
-            raise KeyboardInterrupt
-
-    def acts():
-        for act in endless(3, tare_ms=2.0):
-            next(drawn)
-            yield act
-
-    with pytest.raises(KeyboardInterrupt):
-        emulate(heard.to, acts(), seed=3, tare_ms=2.0, watch=stop)
-    events = wire.decode(b"".join(heard.all()))
-    assert [start for _, start in events.markers] == [True, False], "stopped, it marks its stop"
-    assert next(drawn) < 30
 
 
 def test_what_an_act_is_that_comes_late_is_said(listener):
@@ -213,22 +169,6 @@ def test_frames_are_played_by_the_boards_rules(listener):
     events = wire.decode(b"".join(heard.all()))
     assert [(e.x, e.y, e.intensity) for e in events] == [(4, 3, 75), (4, 3, 150)]
     assert events.t.tolist() == pytest.approx([5000, 10_000], abs=600)
-
-
-def test_a_network_with_faults_is_noticed_by_the_host(listener):
-    heard = Heard(listener)
-    faults = Faults(lost=0.1, repeated=0.1, reordered=0.1, cut=0.1, corrupted=0.1, seed=5)
-    report = emulate(heard.to, [Silence(60.0)], seed=4, tare_ms=50.0, wire=2, faults=faults)
-    decoder = taxel.wire.Decoder(2)
-    for datagram in heard.all():
-        decoder.push(datagram)
-    network, counts = report.network, decoder.counts
-    assert network is not None
-    assert counts.repeated == network["repeated"] > 10
-    assert counts.checksum + counts.short + counts.foreign >= network["corrupted"] > 10
-    lost = network["lost"] + network["cut"] + network["corrupted"]
-    assert counts.intact == network["given"] - lost
-    assert lost - 20 <= counts.missing <= lost
 
 
 def test_resets_and_a_drifting_clock(listener):

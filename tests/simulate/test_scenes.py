@@ -3,18 +3,9 @@
 import numpy as np
 import pytest
 
-from taxel import Array
 from taxel.simulate import FrameSequence, Scene, Silence, play, truth
 
 FRAME_US = 192.0
-
-
-def high(mm):
-    return {"dropped": {"height_mm": mm}}
-
-
-def dropped(scene):
-    return scene.parameters["bodies"][0]["motion"]["dropped"]
 
 
 def test_force_leaves_and_returns_to_zero_where_truth_says():
@@ -36,43 +27,6 @@ def test_momentum_of_an_impact_is_what_the_ball_brought_and_took():
     pushed = float(motion.force_n[inside].sum()) * 6e-6 - mass * 9.81 * 1e-6 * (first.stop_us - first.start_us)
     # The ball leaves a little below the foam's face, where the dashpot frees it, and rises against gravity to it.
     assert pushed == pytest.approx(mass * (first.speed_m_s + second.speed_m_s), rel=0.02)
-
-
-def test_a_press_reaches_the_force_that_was_drawn():
-    scene = Scene.draw(7)
-    press = dropped(scene)["ending"]["caught"]["press"]
-    hand = scene.motion().contacts[-1]
-    assert hand.kind == "hand"
-    assert press["peak_n"] <= hand.peak_n < 1.3 * press["peak_n"]
-
-
-def test_a_touch_narrower_than_a_taxel_is_reckoned_too_soft_and_a_wider_one_rightly():
-    """As the page of scenes says, against taxels a quarter as far apart."""
-
-    def held(depth_mm, array):
-        motion = {"pressed": {"depth_mm": depth_mm, "speed_mm_s": 50.0, "hold_ms": 5.0}}
-        body = {"shape": {"sphere": {"radius_mm": 5.0}}, "x_mm": 13.0, "y_mm": 13.0, "motion": motion}
-        scene = Scene({"foam": {"dashpot_ms": 0.0, "damping_s_m": 0.0}, "bodies": [body]})
-        return scene.motion(array=array).force_n.max()
-
-    ours, fine = Array(12, 12, 2.67), Array(40, 40, 0.67)
-    assert held(0.5, ours) == pytest.approx(held(0.5, fine), rel=0.02)
-    assert held(0.1, ours) == pytest.approx(0.53 * held(0.1, fine), rel=0.1)
-
-
-def test_acts_follow_one_another_in_board_time():
-    """Truth of a play is each scene's own, moved to where its first frame begins."""
-    scenes = [Scene.draw(8, index) for index in range(2)]
-    contacts, force = truth([Silence(100.0), *scenes])
-    begin = round(100_000 / FRAME_US)
-    for scene in scenes:
-        motion = scene.motion(FRAME_US / 4)
-        for mine, whole in zip(motion.contacts, contacts, strict=False):
-            assert whole.start_us == pytest.approx(mine.start_us + begin * FRAME_US, abs=1e-6)
-        contacts = contacts[len(motion.contacts) :]
-        begin += -(-len(motion.force_n) // 4)
-    assert not contacts
-    assert len(force) == begin
 
 
 def test_events_come_with_a_touch_and_lie_where_it_is():

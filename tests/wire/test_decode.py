@@ -9,7 +9,6 @@ import pytest
 from draws import seeds
 from hypothesis import given
 from hypothesis import strategies as st
-from refusal import refused
 
 import taxel
 from taxel import wire
@@ -187,19 +186,3 @@ def test_an_end_of_stream_begins_anew_but_counts_on():
         assert len(decoder.push(oracle.word("change", 60_000, 1, 1))) == 0
         assert decoder.finish().t.tolist() == [6_000_000]
     assert decoder.counts.words == 2
-
-
-@given(data=st.binary(max_size=200), cuts=st.lists(st.integers(0, 200), max_size=6))
-def test_datagrams_one_behind_the_other_are_heard_each_by_itself(data, cuts):
-    """As pushed one by one, each with its end; whatever is in them, wherever one ends."""
-    edges = sorted({0, len(data), *(min(cut, len(data)) for cut in cuts)})
-    pieces = [data[start:stop] for start, stop in pairwise(edges)]
-    decoder, parts = wire.Decoder(), []
-    for piece in pieces:
-        parts += [decoder.push(piece), decoder.end_of_datagram()]
-    parts.append(decoder.finish())
-    heard = wire.decode(data, lengths=[len(piece) for piece in pieces])
-    assert rows(heard) == [row for part in parts for row in rows(part)]
-    assert heard.markers == tuple(marker for part in parts for marker in part.markers)
-    with refused(argument="lengths"):
-        wire.decode(data, lengths=[len(data) + 1])

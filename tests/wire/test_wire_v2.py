@@ -3,7 +3,6 @@
 import json
 import random
 import struct
-import threading
 from dataclasses import asdict
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from hypothesis import strategies as st
 import taxel
 from taxel import _core, wire
 from taxel.simulate import Board
-from taxel.wire import Counts, Registers, StreamReader, decode
+from taxel.wire import Registers, StreamReader, decode
 
 from .oracle_v2 import Reader, datagram, markers, words
 
@@ -213,38 +212,6 @@ def test_differences_joined_in_mid_stream_say_what_is_right_or_nothing(seed):
     assert at > 0 or unknown == 0
 
 
-def test_a_large_board_is_heard():
-    array = taxel.Array(128, 128)
-    board = Board(Registers(array=array, channels=64), array)
-    assert board.greeting.strip() == "taxel-board v2 128x128 64ch"
-    decoder, ticks = Decoder(array=array), np.random.default_rng(1).integers(30, 1000, 16_384).astype(np.uint16)
-    heard = [decoder.push(d) for d in board.frame(ticks)]
-    assert sum(len(e) for e in heard) == 16_384
-    assert (decoder.held.reshape(-1) == ticks).all()
-
-
-def test_two_threads_may_use_one_decoder():
-    board, decoder = Board(Registers(wire_version=2)), Decoder()
-    sent = [d for k in range(40) for d in board.frame(np.full(4096, 20 + 10 * (k % 2), np.uint16))]
-    failed = []
-
-    def half(part):
-        try:
-            for d in part:
-                decoder.push(d)
-        except Exception as error:
-            failed.append(error)
-
-    threads = [threading.Thread(target=half, args=(sent[k::2],)) for k in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert not failed
-    assert decoder.counts.events == 40 * 4096
-    assert decoder.counts.missing == 0
-
-
 def test_the_boards_totals_close_the_sums():
     board, decoder, lost = Board(Registers(wire_version=2)), Decoder(), 0
     draw, made, status_lost = random.Random(2), 0, 0
@@ -261,25 +228,6 @@ def test_the_boards_totals_close_the_sums():
     assert status.datagrams < made
     assert counts.intact + lost == made
     assert lost - 50 <= counts.missing <= lost
-
-
-def test_both_versions_have_one_decoder():
-    """The same counts, with 0 for causes that a version does not have, and what the last datagram was."""
-    one, two, made = wire.Decoder(), Decoder(), datagram(1, b"", span=192)
-    assert (one.last, one.status, two.last, two.status) == (None, None, None, None)
-    one.push(bytes.fromhex("c000050304 e000280304"))
-    two.push(made)
-    two.push(made)
-    assert one.counts == Counts(bytes=10, words=2, changes=1, intensities=1)
-    assert two.counts == Counts(datagrams=2, intact=1, repeated=1)
-    assert two.last == wire.Received(until=None, intact=False)
-    two.push(datagram(1, b"", sequence=1, base=1000, span=192))
-    assert two.last == wire.Received(until=1192, intact=True)
-    assert (one.held == -1).all()
-    summed = wire.Decoder(differences=True)
-    summed.push(bytes.fromhex("c000050304 e000280304"))
-    assert (summed.held[4, 3], summed.held.sum()) == (40, 40)
-    assert len(two.finish()) == len(two.end_of_datagram()) == 0
 
 
 @pytest.mark.parametrize("first", [0, 5])
