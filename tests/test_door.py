@@ -1,6 +1,5 @@
 """The boundary between Rust and Python: errors, panics, Ctrl-C, the GIL, and threads."""
 
-import json
 import os
 import signal
 import subprocess
@@ -103,25 +102,6 @@ def test_a_board_may_be_used_from_several_threads():
 
     together(scan)
     assert board.time_us > 0
-
-
-def test_a_recording_may_be_written_from_several_threads(tmp_path):
-    header = {"array": taxel.Array.thesis()._geometry(), "source": "test"}
-    writer = _core.RecordingWriter(tmp_path / "many.mcap", json.dumps(header), "none", False)
-    payload = bytes.fromhex("c000050304")
-
-    def write(number):
-        for k in range(200):
-            writer.datagram(1000 * k, 6 * k + number, payload)
-            writer.note(1000 * k, None, f"thread {number}, note {k}")
-
-    together(write)
-    writer.finish(json.dumps({"received": 1200, "recorded": 1200}))
-    with refused():
-        writer.datagram(0, 0, payload)
-    recording = taxel.open(tmp_path / "many.mcap")
-    assert len(recording.notes) == 1200
-    assert len(recording.events) == 1200
 
 
 def test_what_progress_raises_ends_a_fit_that_keeps_its_best():

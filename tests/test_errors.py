@@ -78,24 +78,6 @@ def test_errors_of_files_texts_and_bytes_have_their_place(tmp_path: Path) -> Non
         assert caught.value.argument is None
 
 
-def test_an_unknown_remedy_is_refused_with_those_that_there_are() -> None:
-    with pytest.raises(taxel.ProblemError) as caught:
-        helped(taxel.ProblemError("text"), "tare", "pray")
-    assert caught.value.argument == "hint"
-    for hint in ("give", "lay_out", "pitch", "unfelt"):
-        assert str(helped(taxel.ProblemError("text"), "THERE", hint)).count("THERE") == 1
-
-
-def test_the_compiled_part_s_errors_have_them_too() -> None:
-    with pytest.raises(taxel.ProblemError) as wrong:
-        _core.test_hook("problem")
-    assert (wrong.value.argument, wrong.value.hint) == ("tau", None)
-    assert str(wrong.value).startswith("tau: ")
-    with pytest.raises(taxel.FormatError) as lacking:
-        _core.test_hook("format")
-    assert (lacking.value.argument, lacking.value.hint, lacking.value.place) == ("array", "give", Place(byte=0))
-
-
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("errors") / "walk.npz"

@@ -35,20 +35,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("spread", SPREAD)
-def test_info_of_a_folder_lists_what_failed(folder: Path, spread: tuple[str, ...]) -> None:
-    done = run("info", folder, "--json", *spread)
-    facts = json.loads(done.stdout)
-    assert done.returncode == 2
-    assert facts == json.loads(run("info", folder, "--json").stdout)
-    assert [Path(one["file"]).name for one in facts] == [f"press{k}.npz" for k in (0, 1, 3, 4, 2)]
-    assert [one["pressure"]["peak"]["most"] for one in facts[:4]] == [150.0 + k for k in (0, 1, 3, 4)]
-    assert "press2.npz" in facts[4]["error"]
-    [line] = done.stderr.splitlines()
-    assert line.startswith("taxel: ")
-    assert "press2.npz" in line
-
-
 def test_a_command_with_processes_of_its_own_ends(folder: Path) -> None:
     asked = [sys.executable, "-P", "-m", "taxel", "info", str(folder), "--jobs", "2"]
     assert subprocess.run(asked, capture_output=True, timeout=100, check=False).returncode == 2

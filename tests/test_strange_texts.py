@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import re
@@ -102,17 +101,6 @@ def test_json_and_files_keep_the_names(places: dict[str, Path], tmp_path: Path) 
         assert (opened.array.name, opened.frames().unit) == (NAME, CELL)
         assert [note.text for note in opened.notes] == ([NAME, CELL] if ending == ".mcap" else [])
     assert list(taxel.Readout.load(places["readout"]).labels) == [NAME, CELL]
-
-
-def test_a_label_of_any_character_is_read_as_it_was_written(tmp_path: Path) -> None:
-    """Other line ends than those of a table, as U+2028, once ended its rows."""
-    controls = [chr(k) for k in (*range(1, 0x20), *range(0x7F, 0xA0), 0x2028, 0x2029, 0x202E) if chr(k) not in "\n\r"]
-    table = tmp_path / "labels.csv"
-    with table.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows([("label", "t_us"), *((f"a{one}b", 10 * k) for k, one in enumerate(controls))])
-    assert [row.text for row in taxel.Labels(table).rows] == [f"a{one}b" for one in controls]
-    found = taxel.Detections([f"a{one}b" for one in controls], range(len(controls)), range(len(controls)))
-    assert taxel.Detections.from_csv(found.to_csv(tmp_path / "found.csv")) == found
 
 
 def test_each_control_character_is_escaped_and_nothing_else() -> None:

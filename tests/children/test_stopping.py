@@ -18,7 +18,7 @@ from draws import mixed
 from loopback import free_port, until
 
 import taxel
-from taxel import Array, Frames
+from taxel import Array
 
 from .marked import ENDS, TAXEL, WITHIN_S, Marked
 
@@ -96,47 +96,6 @@ def test_workers_of_a_study_end_with_it(tmp_path: Path, end: str) -> None:
         # Two workers, and two processes that clean up behind them.
         one.until(lambda it: it.children() >= 4)
         check_end(one, end, 130)
-
-
-@pytest.fixture(scope="module")
-def pressed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A recording with labels whose training takes long."""
-    folder = tmp_path_factory.mktemp("pressed")
-    draw, count = np.random.default_rng(1), 40_000
-    values = draw.random((count, 8, 8)).astype(np.float32) * 0.5
-    labels = ["label,t_us"]
-    for k in range(200, count - 100, 295):
-        values[k : k + 60, 2:5, 2:5] += 50
-        labels += [f"contact,{10_000 * k}", f"lift,{10_000 * (k + 60)}"]
-    taxel.convert(Frames(values, np.arange(count) * 10_000, unit="kPa", array=Array(8, 8)), folder / "mat.npz")
-    (folder / "mat.notes.csv").write_text("\n".join(labels))
-    return folder
-
-
-@pytest.mark.parametrize("end", EACH)
-def test_a_training_ends_with_the_server_that_began_it(pressed: Path, tmp_path: Path, end: str) -> None:
-    client = pytest.importorskip("websockets.sync.client")
-    from panel.protocol import Client
-
-    assert client
-    folder = tmp_path / "here"
-    folder.mkdir()
-    for name in ("mat.npz", "mat.notes.csv"):
-        (folder / name).hardlink_to(pressed / name)
-    with Marked(folder, TAXEL, "view", "mat.npz", "--no-open", "--json") as one:
-        one.until(lambda it: (it.folder / "out").read_text().endswith("\n"))
-        shown = json.loads((folder / "out").read_text())
-        url = urlsplit(shown["url"])
-        with Client(SimpleNamespace(address=(url.hostname, url.port), token=shown["token"])) as page:
-            assert page.ask("open", name="mat.npz")["type"] == "done"
-            page.send(type="train", id=99)
-            one.until(lambda it: it.children())
-            # It trains by then.
-            time.sleep(2.0)
-            check_end(one, end)
-            with contextlib.suppress(Exception):
-                page.__exit__()
-    assert {path.name for path in folder.iterdir()} == {"mat.npz", "mat.notes.csv", "out", "err"}
 
 
 def test_a_request_that_takes_long_does_not_abort_a_server_that_ends(tmp_path: Path) -> None:

@@ -23,18 +23,6 @@ def outcome_of(name: str, found: list[int], labels: list[int]) -> Outcome:
     return Outcome(name, Example(frames, truth), detections, score(detections, truth, 50.0))
 
 
-def test_the_worst_moments_are_missed_and_false_ones_then_the_largest_errors() -> None:
-    first = outcome_of("a", [100_000, 300_900, 504_000, 900_000], [100_000, 300_000, 500_000, 700_000])
-    second = outcome_of("b", [1_010_000], [1_000_000])
-    moments = _moments([first, second], "contact")
-    assert [(m.outcome.name, m.t, m.what) for m in moments] == [
-        ("a", 700_000, "missed"),
-        ("a", 900_000, "false"),
-        ("b", 1_000_000, "+10.00 ms"),
-        ("a", 500_000, "+4.00 ms"),
-    ]
-
-
 def test_each_detection_of_a_board_is_a_crossing_that_can_be_seen(tmp_path: Path) -> None:
     acts = script(1, 4)
     taxel.convert(play(acts, seed=1).events, tmp_path / "a.mcap")

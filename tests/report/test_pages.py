@@ -10,7 +10,6 @@ import subprocess
 import matplotlib as mpl
 import numpy as np
 import pytest
-from draws import mixed
 from matplotlib.figure import Figure
 from tests.panel.browser import installed
 
@@ -121,24 +120,3 @@ def test_a_browser_shows_figures_as_large_as_they_were_drawn_and_no_page_is_too_
     least, room = 34 * 16, shown[1]
     assert shown[0] == min(614, max(least, room))
     assert (room == least) if width == 500 else (least < room <= 1152)
-
-
-@pytest.mark.parametrize(
-    ("name", "width"), mixed(["pick_test gripper_left_tactile", "a" * 60 + ".mcap", "s.mcap"], [1400, 1100])
-)
-def test_no_table_of_a_report_is_cut(tmp_path, name, width):
-    score = {"events": 1500, "found": 1400, "missed": 100, "false": 100}
-    score["error"] = score["delay"] = "-11.55 ± 105.4 (median -11.92, 95 % in -103.46 to 120.62)"
-    rules = [("neuron", "contact", "", score), ("the area above 12 taxels for 3 ms", "contact", "", None)]
-    text = detections(
-        tables=[("Neuron and plain rule", rules), ("", [(name, "contact", 1500, score)])],
-        worst=[(name, "contact", 123.456789, "missed")],
-        warnings=[f"{name}: rest: 4 taxels drifted above the tare by more than the noise floor"],
-        printed=["all  12  12"],
-    )
-    measured = (
-        "<p id=said></p><script>document.getElementById('said').textContent = JSON.stringify([innerWidth, "
-        "...[...document.querySelectorAll('.scroll')].map((e) => e.scrollWidth - e.clientWidth)])</script></body>"
-    )
-    seen = opened(text.replace("</body>", measured), tmp_path, width)
-    assert json.loads(re.search(r'<p id="said">(.*?)</p>', seen)[1]) == [width, 0, 0, 0]

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.recording.test_rest import preloaded
 from tests.shell import run
 from touching import pressed
 
@@ -31,20 +30,6 @@ def test_forces_rest_at_0_and_other_values_at_their_first_quiet_stretch(tmp_path
     events = rest(taxel.open(board(tmp_path)))
     assert (events.source, events.tare.stop_us - events.tare.start_us) == ("quiet", 500_000)
     assert events.tare.stop_us < 700_000
-
-
-@pytest.mark.parametrize("label_us", [None, 40_000, 250_000, 900_000])
-def test_no_label_moves_the_rest_nor_a_detection(tmp_path: Path, label_us: int | None) -> None:
-    place = mat(tmp_path)
-    rule = PlainRule("area", 2, noise_floor=20.0)
-    rule.save(tmp_path / "rule.json")
-    found = detect(rule, taxel.open(place)).to_dict()["recordings"][0]["detections"]
-    table = place.with_name("mat3.notes.csv")
-    table.write_text("label,t_us\n" + ("" if label_us is None else f"contact,{label_us}\n"))
-    assert rest(taxel.open(place)).to_dict() == {"source": "quiet", "us": [0, 500_000]}
-    truth = () if label_us is None else ("--truth", "notes")
-    shown = json.loads(run("detect", place, "--readout", tmp_path / "rule.json", "--json", *truth).stdout)
-    assert (shown["detections"], shown["rest"]) == (found, {"source": "quiet", "us": [0, 500_000]})
 
 
 @pytest.mark.parametrize("begin_us", [0, 1_795_000_000_000_000])
@@ -111,21 +96,6 @@ def test_forces_that_do_not_rest_near_0_are_said_with_the_tare_that_takes_that_o
     assert warned("shoe", standing + random.uniform(1, 4, (6, 6))) == []
 
 
-def test_the_first_stretch_counts_wherever_it_is_and_nothing_before_it_is_left_out(tmp_path: Path) -> None:
-    values = np.full((300, 4, 4), 50.0)
-    for begin in (5, 30, 55, 80, 200):
-        values[begin : begin + 10, 1:3, 1:3] = 250
-    taxel.convert(Frames(values, 10_000 * np.arange(300), unit="counts", array=Array(4, 4)), tmp_path / "a.npz")
-    rule = PlainRule("area", 2, noise_floor=40.0)
-    [each] = detect(rule, taxel.open(tmp_path / "a.npz")).each
-    assert each.rest is not None
-    assert (each.rest.tare.start_us, each.rest.tare.stop_us) == (1_000_000, 1_500_000)
-    assert each.outcome.found.t.tolist() == [10_000 * (k + at) for k in (5, 30, 55, 80, 200) for at in (0, 10)]
-    rule.save(tmp_path / "rule.json")
-    said = run("detect", tmp_path / "a.npz", "--readout", tmp_path / "rule.json").stdout
-    assert "rest taken: its first quiet stretch, 1.000 to 1.500 s; --tare sets another rest" in said
-
-
 def test_the_page_takes_the_same_rest_also_where_a_touch_begins_the_recording(tmp_path: Path) -> None:
     values = np.full((300, 4, 4), 50.0)
     for begin in (2, 120, 220):
@@ -161,18 +131,6 @@ def test_where_nothing_is_quiet_it_is_refused_with_what_to_give(tmp_path: Path) 
         taxel.encode.LevelCrossing([100.0]), {"on": (taxel.Neuron(tau=2.0), [1.0] * 16 + [0.0] * 16)}
     )
     assert detect(levels, taxel.open(tmp_path / "a.npz")).each[0].rest is None
-
-
-@pytest.mark.parametrize("events", [False, True])
-def test_what_lay_on_the_array_in_its_first_quiet_stretch_is_no_rest(tmp_path: Path, events: bool) -> None:
-    source, _ = preloaded(events=events)
-    taxel.convert(source, tmp_path / "a.npz")
-    with pytest.warns(UserWarning, match="something was on rows 2 to 4, columns 5 to 7 "):
-        taken = rest(taxel.open(tmp_path / "a.npz"))
-    assert taken.source == "quiet"
-    assert np.nanmax(np.abs(taken.tare.rest - 50)) < 2.5
-    rule = PlainRule("area", 2, noise_floor=6.0)
-    assert any("something was on" in text for text in detect(rule, taxel.open(tmp_path / "a.npz")).warnings)
 
 
 @pytest.mark.parametrize("begin_us", [0, 1_795_000_000_000_000])

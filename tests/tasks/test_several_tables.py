@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from shell import call
 from tests.tasks.recordings import mat
 
 import taxel
@@ -58,19 +57,3 @@ def test_a_table_of_no_recording_is_refused(tmp_path: Path, mats: list[Path]) ->
         taxel.ProblemError, match=r"other\.txt: does not state the recording of each label; .*mat0\.csv"
     ):
         references(tables, [taxel.open(place) for place in mats])
-
-
-def test_commands_take_several_tables(tmp_path: Path, mats: list[Path], capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "labels").mkdir()
-    tables = [labels(tmp_path / "labels", "track", place.stem) for place in mats]
-    readout = tmp_path / "readout.json"
-    given = [word for table in tables for word in ("--labels", table)]
-    code, said, warned = call(capsys, "train", *mats, *given, "-o", readout)
-    assert code == 0, warned
-    assert "24 of 24 found" in said
-    given = [word for table in tables for word in ("--truth", table)]
-    code, said, _ = call(capsys, "detect", *mats, "--readout", readout, *given)
-    assert (code, said.split("\n")[0]) == (0, f"against {', '.join(map(str, tables))} (window 50 ms):")
-    code, _, warned = call(capsys, "train", *mats, "--labels", tables[0], "-o", tmp_path / "b.json")
-    assert code == 2
-    assert f"--labels is {tables[0]}: does not state the recording of each label" in warned

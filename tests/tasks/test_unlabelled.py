@@ -32,7 +32,6 @@ def rows(frames_at: list[int], source: str, label: str = "contact") -> str:
 
 
 BEGINS = [100 + 60 * k for k in range(8)]
-ENDS = [begin + 20 for begin in BEGINS]
 
 
 def test_a_source_that_no_row_names_is_neither_trained_nor_scored(feet: Path, tmp_path: Path) -> None:
@@ -64,17 +63,6 @@ def test_where_rows_name_no_source_nothing_happened_where_no_row_is(feet: Path, 
     assert len(training.recordings) == 4
     assert training.score.events == 24
     assert training.score.false + training.score.missed >= 8
-
-
-def test_detections_of_it_are_not_scored(feet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    labels, readout = table(tmp_path / "l.csv", rows(BEGINS, "left")), tmp_path / "r.json"
-    train(taxel.open(feet), labels).readout.save(readout)
-    _, out, _ = call(capsys, "detect", feet, "--readout", readout, "--truth", labels)
-    assert f"not scored, because no row of {labels} names it: right" in out
-    found = taxel.tasks.detect(taxel.Readout.load(readout), taxel.open(feet), labels)
-    assert found.score is not None
-    assert found.score.false == 0
-    assert len(found.each[1].outcome.found) == 8
 
 
 def test_a_name_without_any_label_is_not_scored(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
