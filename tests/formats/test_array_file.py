@@ -128,3 +128,21 @@ def test_other_programs_files_are_told_what_to_save_instead(tmp_path: Path) -> N
     (tmp_path / "a.json").write_text('{\n "p": [1, 2]\n}\n')
     with refused(FormatError, place=Place("a.json")):
         taxel.open(tmp_path / "a.json")
+
+
+@pytest.mark.parametrize("begin", [0.0, 1_700_000_000.0])
+def test_times_that_are_a_column_of_the_array_are_asked(tmp_path: Path, begin: float) -> None:
+    path, readings = tmp_path / "a.npy", np.random.default_rng(1).random((300, 4)).astype(np.float32)
+    np.save(path, np.column_stack([begin + np.arange(300) / 50, readings]))
+    of_time, _ = layouts(path)
+    found = opened(path, of_time)
+    np.testing.assert_array_equal(values(found)[:, 0], readings)
+    assert found.sources[""].t.tolist() == [round(begin * 1e6) + 20_000 * k for k in range(300)]
+    with pytest.raises(FormatError, match=r"time is 9, but the array has no such taxel"):
+        opened(path, '[data]\naxes = "time taxel"\ntime = 9\n')
+
+
+def test_a_last_axis_of_one_is_none(tmp_path: Path) -> None:
+    frames = np.arange(480.0).reshape(30, 4, 4, 1)
+    np.savez(tmp_path / "a.npz", film=frames, t_ms=np.arange(30) * 20)
+    np.testing.assert_array_equal(values(opened(tmp_path / "a.npz")), frames[..., 0])

@@ -190,6 +190,12 @@ ROWS: dict[str, tuple[str, list[int], list[list[float]]]] = {
         [36_000_900_000, 36_001_000_000],
         [[1], [2]],
     ),
+    "a rule below the names": ("Time(s)  F(N)\n-------  ----\n0.0  1\n0.1  2\n", [0, 100_000], [[1], [2]]),
+    "the word time in a name": (
+        "PacketCounter\tSampleTimeFine\ta\n65534\t0\t7\n65535\t20\t8\n0\t40\t9\n",
+        [0, 20_000, 40_000],
+        [[7], [8], [9]],
+    ),
     "separators at the end": ("t_s,a,b\n0,1,2,\n1,3,4,\n", [0, 1_000_000], [[1, 2], [3, 4]]),
 }
 
@@ -295,6 +301,29 @@ def test_a_column_that_is_one_sensor_s_at_first_and_another_s_below_is_asked(tmp
     assert frames(found)[1] == [[k % 7] * 2 for k in range(9000)]
     with refused(FormatError, place=Place("a.csv")):
         opened(tmp_path, "t_s,sensor,value\n0,heel,3\n0,heel,4\n", taxel)
+
+
+def test_each_sensor_has_its_own_times(tmp_path: Path) -> None:
+    text = "t_ms,trial,a\n0,1,5\n10,1,6\n20,1,7\n0,2,8\n10,2,9\n20,2,4\n"
+    by, *_ = layouts(tmp_path, text)
+    found = opened(tmp_path, text, by)
+    assert frames(found, "1") == ([0, 10_000, 20_000], [[5], [6], [7]])
+    assert frames(found, "2") == ([0, 10_000, 20_000], [[8], [9], [4]])
+
+
+def test_times_rounded_to_seconds_are_spread_at_one_rate(tmp_path: Path) -> None:
+    text = "time,a\n" + "".join(f"12:00:{k // 10:02},{k % 7}\n" for k in range(30))
+    rounded, _ = layouts(tmp_path, text)
+    assert np.diff(frames(opened(tmp_path, text, rounded))[0]).tolist() == [100_000] * 29
+
+
+@pytest.mark.parametrize("indent", [None, 1])
+def test_a_document_of_json_that_is_a_list_is_its_lines(tmp_path: Path, indent: int | None) -> None:
+    document = json.dumps([{"t": k / 50, "p": [k, 7]} for k in range(9)], indent=indent)
+    assert frames(opened(tmp_path, document, name="a.json")) == (
+        [20_000 * k for k in range(9)],
+        [[k, 7] for k in range(9)],
+    )
 
 
 def test_a_column_becomes_labels_where_its_value_changes(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import json
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -47,7 +48,7 @@ class Text:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.is_file = path.suffix.lower() not in SHEETS
+        self.is_file = path.suffix.lower() not in SHEETS and not self._rows
         self._encoding = ""
         #: Whether the last of the lines that were read has an end.
         self.ends_in_line = True
@@ -133,8 +134,22 @@ class Text:
             raise damaged(self.path, "gzip file", first_line(error)) from None
 
     @cached_property
+    def _rows(self) -> list[Any]:
+        """The objects or lists of a document of JSON that is a list of them; none of another file."""
+        if self.path.suffix.lower() != ".json":
+            return []
+        try:
+            document = json.loads(self.path.read_bytes())
+        except ValueError:
+            return []
+        are_rows = isinstance(document, list) and all(isinstance(row, dict | list) for row in document)
+        return document if are_rows and len(document) > 1 else []
+
+    @cached_property
     def _sheet(self) -> str:
         """The first sheet with numbers of a spreadsheet, or a table of Parquet, as lines of cells between tabs."""
+        if self._rows:
+            return "".join(f"{json.dumps(row)}\n" for row in self._rows)
         import pandas as pd  # noqa: PLC0415  takes long
 
         try:

@@ -43,7 +43,7 @@ def read_array_file(path: Path, layout: Layout) -> list[InMemory]:
             f"{len(named)}: axes = {how.axes!r}",
             path,
         )
-    wanted = [how.array or "", *([how.time] if how.time is not None else [])]
+    wanted = [how.array or "", *([how.time] if isinstance(how.time, str) else [])]
     arrays = read_arrays(path, wanted, {wanted[0]: np.float32})
     values = _in_order(path, arrays[wanted[0]], named, how)
     frames = values.shape[1]
@@ -51,20 +51,31 @@ def read_array_file(path: Path, layout: Layout) -> list[InMemory]:
     if how.time is not None:
         import pandas as pd  # noqa: PLC0415  takes long
 
-        times = arrays[how.time]
+        times = arrays[how.time] if isinstance(how.time, str) else _of_column(path, how.time, named, how)
         if times.size != frames or times.dtype.kind not in "uif":
             stated = f"{counted(times.size, 'time')} ({times.dtype}) for {counted(frames, 'frame')}"
             raise unreadable(f"{how.time} contains {stated}", path)
-        t, order = in_order(path, pd.Series(times.ravel()), how.time_unit, said, how.time)
+        name = how.time if isinstance(how.time, str) else f"taxel {how.time}"
+        t, order = in_order(path, pd.Series(times.ravel()), how.time_unit, said, name)
         values = values if order is None else values[:, order]
+        values = values if isinstance(how.time, str) else np.delete(values, how.time - 1, axis=3)
     full = replace(layout, data=replace(how, array=how.array or None))
-    values = values if "axis" in named else values[..., 0]
+    values = values if values.shape[-1] > 1 else values[..., 0]
     sources: dict[str, Frames | Events] = {}
     for k, trial in enumerate(values, 1):
         sources.update(sources_of(path, full, f"trial{k}" if len(values) > 1 else "", trial, t))
     unread = ", ".join(name for name in stored if name not in wanted)
     lost = (f"other arrays of the file: {unread}",) if unread else ()
     return readers_of(path, "arrays", sources, full, said, timed=how.time is not None, lost=lost)
+
+
+def _of_column(path: Path, number: int, named: Sequence[str], how: Data) -> NDArray[Any]:
+    """Return the times that are a taxel of the array, as it is stored: frames have 32 bits."""
+    stored = read_arrays(path, [how.array or ""])[how.array or ""]
+    if sorted(named) != ["taxel", "time"] or number > stored.shape[named.index("taxel")]:
+        raise unreadable(f"[data] time is {number}, but the array has no such taxel", path)
+    times: NDArray[Any] = np.take(stored, number - 1, axis=named.index("taxel"))
+    return times
 
 
 def look(path: Path, layout: Layout) -> tuple[Data, list[str], dict[str, tuple[int, ...]]]:
@@ -107,7 +118,7 @@ def _named(path: Path, how: Data, stored: Mapping[str, tuple[int, ...]]) -> Data
     is_npy = path.suffix.lower() == ".npy"
     for key in ("array", "time"):
         name = getattr(how, key)
-        if name is None:
+        if not isinstance(name, str):
             continue
         # A path within a .h5 may begin at its root.
         found = name if name in stored else name.strip("/")
@@ -155,6 +166,8 @@ def _axes(
         full, said = with_time_at(longest), [f"axis {longest} ({shape[longest]}) is the time"]
         guesses = {f"axis {k} ({shape[k]}) is the time": with_time_at(k) for k in dict.fromkeys((longest, 0))}
         choices = {} if layout.rate_hz else {why: replace(layout, data=each) for why, each in guesses.items()}
+        if choices and len(shape) == 2 and longest == 0 and shape[1] > 1:
+            choices = {**_with_time_in_it(path, layout, full), **choices}
     else:
         axis = shape.index(counts[named])
         times = read_arrays(path, [named])[named].ravel().astype(np.float64)
@@ -173,6 +186,17 @@ def _axes(
     if choices:
         refuse_to_choose(path, f"contains {_list(stored)}", choices)
     return full, said
+
+
+def _with_time_in_it(path: Path, layout: Layout, how: Data) -> dict[str, Layout]:
+    """Return the layout of an array whose first taxel ascends in like steps, as the time does; none of others."""
+    column = read_arrays(path, [how.array or ""])[how.array or ""][:, 0]
+    steps = np.diff(column.astype(np.float64)) if column.dtype.kind in "uif" else np.empty(0)
+    if len(steps) < len(AXES) or not (steps > 0).all() or steps.max() > 2 * steps.min():
+        return {}
+    unit, several = unit_of_times(column.astype(np.float64))
+    of_time = {each: replace(layout, data=replace(how, time=1, time_unit=each)) for each in [*several] or [unit]}
+    return {f"taxel 1 is the time, in {each}": full for each, full in of_time.items()}
 
 
 def _in_order(path: Path, values: NDArray[Any], named: Sequence[str], how: Data) -> NDArray[np.float32]:

@@ -36,6 +36,8 @@ _WITH_UNIT_OF_TIME = re.compile(
     rf".*?(?:\[ *(?P<square>{_SHORT_UNIT_OF_TIME}) *\]|(?<![a-z])\( *(?P<round>{_SHORT_UNIT_OF_TIME}) *\))",
     re.IGNORECASE,
 )
+#: A name with the word: SampleTimeFine, time_of_board.
+_WITH_WORD = re.compile(r".*?(?:\b|_|(?<=[a-z]))(?:[Tt]ime|TIME|[Tt]imestamp|[Zz]eit)(?:\b|_|(?=[A-Z])).*")
 
 _COUNTERS = re.compile(
     r"(?:frame|sample|record|packet|line|row|msg|message)?[ ._]*"
@@ -49,8 +51,10 @@ _LABELS = re.compile(
     r"(?:[ ._](?:id|label|class|code))?",
     re.IGNORECASE,
 )
+_TAXEL = r"sensor|channel|taxel|cell|electrode|node|pad"
+_OF_TAXELS = re.compile(rf"(?:{_TAXEL})(?:[ ._]?(?:id|name|no|nr))?", re.IGNORECASE)
 _KEYS = re.compile(
-    r"(?:hand|foot|side|finger|sensor|device|board|insole|limb|topic|channel|source|node|module|taxel|cell|electrode"
+    rf"(?:{_TAXEL}|hand|foot|side|finger|device|board|insole|limb|topic|source|module"
     r"|trial|session|run|subject|person|participant|versuch|proband)"
     r"(?:[ ._]?(?:id|name|no|nr))?",
     re.IGNORECASE,
@@ -88,7 +92,7 @@ def time_unit(name: str) -> str | None:
     else:
         of_any = _WITH_UNIT_OF_TIME.fullmatch(name)
         if of_any is None:
-            return None
+            return None if _WITH_WORD.fullmatch(name) is None else ""
         word = (of_any["square"] or of_any["round"]).lower()
     return next((unit for unit, words in _UNITS_OF_TIME.items() if word in words), "")
 
@@ -124,6 +128,11 @@ def is_key(name: str) -> bool:
     return _KEYS.fullmatch(last_part(name)) is not None
 
 
+def names_taxels(name: str) -> bool:
+    """Return whether a column says which taxel a line is of, if each has one reading a line: sensor, taxel_id."""
+    return _OF_TAXELS.fullmatch(last_part(name)) is not None
+
+
 def is_other(name: str) -> bool:
     """Return whether a column is of another quantity than force or pressure: acc_x, Battery [%]."""
     return _OTHERS.fullmatch(last_part(name)) is not None
@@ -156,7 +165,7 @@ def are_units(names: Sequence[str], below: Sequence[str]) -> bool:
     >>> are_units(["Trial 1", ""], ["time", "thumb"])
     False
     """
-    are_texts = any(below) and all(_UNITS.fullmatch(cell) for cell in below)
+    are_texts = any(map(str.isalpha, "".join(below))) and all(_UNITS.fullmatch(cell) for cell in below)
     pairs = list(zip(names, below, strict=False))
     return are_texts and all(name for name, cell in pairs if cell) and not any(map(time_unit, below[1:]))
 

@@ -158,8 +158,9 @@ class Data:
     ----------
     array : str, optional
         Of shape (frames, rows, columns) or (frames, taxels); in a group of a .h5 by its path, "run1/pressure".
-    time : str, optional
-        An array with a time for each frame; default: none.
+    time : str or int, optional
+        An array with a time for each frame, or the number, from 1, of the taxel of the array that is the time; default:
+        none.
     time_unit : {"s", "ms", "us", "ns", "min", "h"}
     axes : str, optional
         What each axis counts, in their order: "time", and of "trial", "row", "column", "taxel" and "axis" (x, y, z)
@@ -171,14 +172,14 @@ class Data:
     """
 
     array: str | None = None
-    time: str | None = None
+    time: str | int | None = None
     time_unit: str = "s"
     axes: str | None = None
 
     def __post_init__(self) -> None:
-        for name in ("array", "time"):
-            if getattr(self, name) is not None:
-                text(name, getattr(self, name))
+        if self.array is not None:
+            text("array", self.array)
+        _check_columns(self, "time")
         text("time_unit", self.time_unit, UNITS_US)
         if self.axes is not None:
             named = text("axes", self.axes).split()

@@ -31,7 +31,7 @@ def readers_of(
     *,
     timed: bool,
     lost: Sequence[str] = (),
-    notes: Sequence[Note] = (),
+    notes: Mapping[str, Sequence[Note]] | None = None,
 ) -> list[InMemory]:
     """Return a reader of each source of a file of another program.
 
@@ -49,8 +49,8 @@ def readers_of(
         Whether the file has times; else frames are numbered: frame k has the time k us.
     lost : sequence of str
         What was left out, one line each.
-    notes : sequence of Note
-        Of the column of labels.
+    notes : mapping from str to sequence of Note, optional
+        Of the column of labels, by source.
     """
     if said:
         warn(f"{path.name}: read as {_size_of(sources)}: {'; '.join(said)}", stacklevel=6)
@@ -60,7 +60,8 @@ def readers_of(
         side = name if name in ("left", "right") else ""
         return replace(facts, label=source_of(name) if name else facts.label, side=side)
 
-    return [InMemory(named(name), table, Marks(notes=tuple(notes))) for name, table in sources.items()]
+    noted = notes or {}
+    return [InMemory(named(name), table, Marks(notes=tuple(noted.get(name, ())))) for name, table in sources.items()]
 
 
 def _size_of(sources: Mapping[str, Frames | Events]) -> str:

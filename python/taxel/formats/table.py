@@ -113,14 +113,14 @@ def read_table(
     """
     text = Text(path)
     form, full = form_of(text, layout, label_column)
-    how, columns = form.table, form.columns
+    how, columns, sources = form.table, form.columns, dict[str, Frames | Events]()
     rows = read_rows(text, form)
     read = {*columns.times, columns.label, columns.by, *columns.taxel, *columns.taxels}
     left = [form.called(k) for k in range(len(form.names)) if k not in read]
     lost = [*([f"columns that are not taxels: {', '.join(left)}"] if left else []), *rows.odd.said()]
-    said, notes = [*form.said, *rows.odd.said()], list[Note]()
+    said, notes = [*form.said, *rows.odd.said()], dict[str, list[Note]]()
     if how.events:
-        sources: dict[str, Frames | Events] = {"": _events(path, full, form, rows, array)}
+        sources = {"": _events(path, full, form, rows, array)}
     else:
         values, names = _frames_of_lines(path, full, form, rows, said), [form.names[k] for k in columns.taxels]
         empty = np.isnan(values).all(axis=(0, 1)) if form.said and values.shape[1] == 1 else np.zeros(1, bool)
@@ -131,14 +131,19 @@ def read_table(
             values, names = values[:, :, ~empty], [form.names[k] for k in columns.taxels if k not in places]
         if columns.taxel:
             values, names = _one_line_a_time(path, form, rows, values)
-        t = np.arange(len(values), dtype=np.int64)
-        if rows.times is not None:
-            t, order = in_order(path, rows.times, form.unit_of_times, said)
+        if full.axis is not None:
+            values, names = _by_axis(path, full, names, values)
+        for key, chosen in _parts(rows.texts("by")):
+            # Each sensor has a clock of its own.
+            of_part, beside = values[chosen], rows.beside.iloc[chosen]
+            t, order = np.arange(len(of_part), dtype=np.int64), None
+            if rows.times is not None:
+                t, order = in_order(path, beside["time"], form.unit_of_times, said)
             if order is not None:
-                values = values[order]
-                rows.chosen(order)
-        sources = dict(_sources(path, full, names, values, t, rows.texts("by")))
-        notes = _labels(form, rows.texts("label"), t)
+                of_part, beside = of_part[order], beside.iloc[order]
+            own = dict(sources_of(path, full, key, of_part, t, names if any(names) else None))
+            sources |= own
+            notes |= dict.fromkeys(own, _labels(form, beside, t))
     said = said if form.said else []
     return readers_of(path, "table", sources, full, said, timed=rows.times is not None, lost=lost, notes=notes)
 
@@ -359,29 +364,29 @@ def _one_line_a_time(
     return wide, list(names)
 
 
-def _sources(
-    path: Path,
-    layout: Layout,
-    names: list[str],
-    values: NDArray[np.float32],
-    t: NDArray[np.int64],
-    keys: list[str],
-) -> Iterator[tuple[str, Frames]]:
-    """Yield the frames of each source by its name."""
-    if layout.axis is not None:
-        by_taxel = axes_of(names)
-        if by_taxel is None or values.shape[1] > 1:
-            raise FormatError(f"{layout.path}: axis is {layout.axis}, but {path.name} has no columns of x, y and z")
-        values = values[:, :, [[taxel[axis] for axis in AXES] for taxel in by_taxel.values()]]
-        names = list(by_taxel)
-    parts = [("", slice(None))] if not keys else [(key, np.array(keys) == key) for key in dict.fromkeys(keys)]
-    for key, chosen in parts:
-        yield from sources_of(path, layout, key, values[chosen], t[chosen], names if any(names) else None)
+def _by_axis(
+    path: Path, layout: Layout, names: list[str], values: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], list[str]]:
+    """Return values of shape (frames, lines, taxels, 3), and the names of the taxels."""
+    by_taxel = axes_of(names)
+    if by_taxel is None or values.shape[1] > 1:
+        raise FormatError(f"{layout.path}: axis is {layout.axis}, but {path.name} has no columns of x, y and z")
+    return values[:, :, [[taxel[axis] for axis in AXES] for taxel in by_taxel.values()]], list(by_taxel)
 
 
-def _labels(form: Form, cells: list[str], t: NDArray[np.int64]) -> list[Note]:
+def _parts(keys: Sequence[str]) -> Iterator[tuple[str, Any]]:
+    """Yield the rows of each key, or all."""
+    if not keys:
+        yield "", slice(None)
+    for key in dict.fromkeys(keys):
+        yield key, np.flatnonzero(np.array(keys) == key)
+
+
+def _labels(form: Form, beside: Any, t: NDArray[np.int64]) -> list[Note]:
     """Return a label where the value of its column changes: the text, or the name of the column and the number."""
-    name = form.called(form.columns.label or 0)
+    if form.columns.label is None:
+        return []
+    cells, name = beside["label"].fillna("").tolist(), form.called(form.columns.label)
     changes = (k for k in range(1, len(cells)) if cells[k] != cells[k - 1] and cells[k] not in MISSING)
     return [Note(f"{name} {cells[k]}" if is_number(cells[k]) else cells[k], int(t[k])) for k in changes]
 

@@ -76,7 +76,7 @@ def time_of(draft: Draft, *, is_stated: bool) -> int | None:
         # A letter may be the name of a taxel too: it is the time where it comes first, or ascends.
         is_called = column_names.is_time(names[k]) and (k == 0 or len(names[k]) > 1)
         if is_called or (time_unit(names[k]) is not None and fit.ascends(k)):
-            scores[k] = 4 + 2 * fit.ascends(k)
+            scores[k] = 3 + is_called + 2 * fit.ascends(k)
         elif fit.types[k] == "time":
             scores[k] = 3
         elif draft.table.frame_time is None and fit.count > 1 and _rises(fit, k) and fit.epoch(k):
@@ -250,7 +250,8 @@ def by_key(draft: Draft, time: int | None, taxels: list[int], all_lines: Callabl
     pairs = len(set(zip(times, texts, strict=False)))
     # The last frame may be a part.
     is_whole = pairs == len(texts) and len(set(times)) * len(known) - pairs < len(known)
-    if len(values) == 1 and len(known) > 1 and is_whole:
+    of_taxels = bool(grid) or column_names.names_taxels(draft.names[keys[0]])
+    if len(values) == 1 and len(known) > 1 and is_whole and of_taxels:
         sizes = [len(set(fit.cells(k))) for k in keys]
         draft.size = (sizes[0], sizes[1]) if len(keys) > 1 and sizes[0] * sizes[1] == len(known) else None
         draft.left = {k: why for k, why in draft.left.items() if k not in keys}

@@ -198,7 +198,7 @@ def _decided(draft: Draft, other: Draft) -> Draft:
 
 def draft_of(fit: Fit, lines: Sequence[str]) -> Draft:
     """Return the names above a table, and how its lines are read."""
-    above = [(k, list(line.cells)) for k, line in fit.lines[: fit.body[0]]]
+    above = [(k, list(line.cells)) for k, line in fit.lines[: fit.body[0]] if not _is_rule(line.cells)]
     table = Table(separator=fit.separator, decimal=fit.decimal, lines=fit.kind, skip_lines=fit.first)
     if fit.kind != "plain":
         table = replace(table, separator=fit.separator if fit.kind == "hex" else ",")
@@ -228,6 +228,11 @@ def draft_of(fit: Fit, lines: Sequence[str]) -> Draft:
         return Draft(fit, replace(table, columns=list(names)), names, tuple(map(column_names.unit_of, names)))
     stripped = tuple(unit.strip("[]()") for unit in units[: len(names)]) or tuple(map(column_names.unit_of, names))
     return Draft(fit, replace(table, skip_lines=at_names), names, stripped)
+
+
+def _is_rule(cells: Sequence[str]) -> bool:
+    """Return whether a line is drawn below the names."""
+    return {*"".join(cells)} <= {*"-=_+|: "}
 
 
 def _names_in(cells: Sequence[str], count: int, real: int) -> tuple[str, ...]:

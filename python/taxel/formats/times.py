@@ -288,7 +288,7 @@ def _spread(t: NDArray[np.int64], usual: int) -> NDArray[np.int64]:
     """Return times in which those that repeat are spread evenly up to the next one."""
     begins = np.flatnonzero(np.diff(t, prepend=t[0] - 1))
     counts = np.diff(begins, append=len(t))
-    nexts = np.append(t[begins[1:]], t[-1] + usual * counts[-1])
+    nexts = np.append(t[begins[1:]], t[-1] + round(usual * counts[-1] / float(np.median(counts))))
     within = np.arange(len(t)) - np.repeat(begins, counts)
     gaps = np.repeat((nexts - t[begins]) / counts, counts)
     spread = t + np.floor(within * gaps).astype(np.int64)
