@@ -64,7 +64,7 @@ def page(*figures):
 
 def detections(**values):
     """Return the page of some detections."""
-    empty = {"tables": [], "warnings": [], "printed": [], "nearest": [], "worst": []}
+    empty = {"tables": [], "warnings": [], "printed": [], "nearest": [], "beside_training": [], "worst": []}
     empty |= {"title": "a page", "judged": "", "readout": "none", "neurons": True, "drawn": {}}
     return render("report/listening.html.j2", **empty | values)
 

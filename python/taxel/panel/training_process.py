@@ -10,7 +10,7 @@ standard output::
     {"type": "error", "kind": "ProblemError", "text": "walk.mcap: ..."}
 
 Progress comes before each step; `of` is 0 where it is not known. The result is that of `Training.to_dict`, with its
-lines for people, the command that detects by the readout, and a picture of its report. The exit code is 0, 2
+lines for people, the command that detects by the readout, and the two pictures of its report. The exit code is 0, 2
 after an error, and 130 of a training that was stopped, which writes no last line and leaves no file.
 """
 
@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -29,7 +29,7 @@ from taxel._base.progress import Progress
 from taxel._base.stopping import leave, stop_on_signals
 from taxel._core import Error, ProblemError
 from taxel.options import FullReading
-from taxel.report.detections import nearest
+from taxel.report import compared
 from taxel.report.svg import STYLE, image
 from taxel.tasks.train import train
 
@@ -58,7 +58,7 @@ def run(request: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
         training = train(FullReading(**request["open"]).open_sensors([recording]), progress=progress)
     if not training.learnt:
         raise ProblemError("; ".join(["no label is learnt, so nothing is written", *training.unreliable()]))
-    pictures = _pictures(training)
+    pictures = [*_pictures(training)]
     training.readout.save(request["out"], overwrite=True)
     found = training.to_dict()
     found["warnings"] = [*dict.fromkeys([*warnings, *found["warnings"]])]
@@ -71,12 +71,16 @@ def run(request: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
     }
 
 
-def _pictures(training: Training) -> list[dict[str, str]]:
-    """Return the picture of labels beside detections, if any was detected."""
+def _pictures(training: Training) -> Iterator[dict[str, str]]:
+    """Yield the pictures of labels beside detections, and of loads beside those of the training."""
+    readout, listened = training.readout, training.outcomes
     with mpl.rc_context(STYLE):
-        figure = nearest(training.outcomes, training.readout.labels)
-        title = "Each label minus its nearest detection, over time"
-        return [] if figure is None else [{"title": title, "svg": image(figure)}]
+        for title, figure in (
+            ("Each label minus its nearest detection, over time", compared.nearest(listened, readout.labels)),
+            ("Loads of this recording beside those of the training", compared.beside_training(readout, listened)),
+        ):
+            if figure is not None:
+                yield {"title": title, "svg": image(figure)}
 
 
 def _say(line: Mapping[str, Any]) -> None:

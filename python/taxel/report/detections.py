@@ -23,6 +23,7 @@ from taxel.detect.examples import array_of, padded_to
 from taxel.encode import Composite, Encoder
 from taxel.frames import Frames
 from taxel.recorded import recorded
+from taxel.report import compared
 from taxel.report.page import render
 from taxel.report.svg import INK, STYLE, picture
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -30,10 +31,8 @@ from taxel.spikes import SpikeTrains, to_ms, to_us
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: How many moments are drawn a label, and recordings over time; how much around each in time constants of the neuron.
+#: How many moments are drawn a label, and how much around each in time constants of the neuron.
 _MOMENTS, _AROUND = 4, 6.0
-#: How far a label and its nearest detection are drawn apart at most, ms.
-_FAR_MS = 2000.0
 #: How much more is drawn around an event that was missed and a false detection, ms: the usual window of a score.
 _MISSED_MS = 50.0
 #: A spike resets the potential so long after the time of its detection, which is rounded to whole us, ms.
@@ -103,8 +102,9 @@ def write_detections(
     target, labels = Path(folder), readout.labels
     moments = {label: _moments(listened, label) for label in labels}
     with mpl.rc_context(STYLE):
+        compared_with = [compared.nearest(listened, labels), compared.beside_training(readout, listened)]
         drawn = {label: _pictures(_of_label(readout, listened, label, moments[label])) for label in labels}
-        apart = _pictures([nearest(listened, labels)])
+        nearest, beside_training = ([*_pictures([figure])] for figure in compared_with)
     text = render(
         "report/listening.html.j2",
         title=title,
@@ -114,7 +114,8 @@ def write_detections(
         warnings=warnings,
         printed=printed,
         tables=_tables(listened, labels, held_out, scored),
-        nearest=apart,
+        nearest=nearest,
+        beside_training=beside_training,
         worst=[
             (moment.outcome.name, label, (moment.t - moment.outcome.begin_us) / 1e6, moment.what)
             for label in labels
@@ -186,34 +187,6 @@ def _of_label(
         yield figure
     if by_neuron is not None:
         yield _weights(by_neuron, listened[0], label)
-
-
-def nearest(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
-    """Draw each label minus its nearest detection over time: an offset, a jump or another rate is seen at once."""
-    shown = [outcome for outcome in listened if outcome.score is not None and outcome.score.events][:_MOMENTS]
-    if not any(len(outcome.found) for outcome in shown):
-        return None
-    figure, axes = plt.subplots(
-        len(shown), 1, figsize=(9.0, 0.6 + 1.6 * len(shown)), layout="constrained", squeeze=False
-    )
-    for axis, outcome in zip(axes[:, 0], shown, strict=True):
-        for k, label in enumerate(labels):
-            times, found = np.sort(np.asarray(outcome.example.labels.get(label, ()), np.int64)), outcome.found[label].t
-            if not len(times) or not len(found):
-                continue
-            apart_ms = (times[:, None] - found[None, :]) / 1e3
-            least_ms = apart_ms[np.arange(len(times)), np.abs(apart_ms).argmin(axis=1)]
-            near = np.abs(least_ms) <= _FAR_MS
-            seconds = (times[near] - outcome.begin_us) / 1e6
-            colour = _DETECTED if k % 2 == 0 else _TRUE
-            axis.plot(seconds, least_ms[near], "o^sD"[k % 4], markersize=3, color=colour, label=escaped(label))
-        axis.axhline(0, color=_QUIET, linewidth=0.8)
-        axis.set_title(escaped(outcome.name[-_TITLE:]), loc="left", fontsize="small")
-        axis.set_ylabel("label minus detection, ms")
-        if axis.get_legend_handles_labels()[0]:
-            axis.legend(loc="upper right", fontsize="small")
-    axes[-1, 0].set_xlabel("time, s")
-    return figure
 
 
 def _moments(listened: Sequence[Outcome], label: str) -> list[_Moment]:
