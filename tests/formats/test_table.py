@@ -303,6 +303,11 @@ def test_a_column_that_is_one_sensor_s_at_first_and_another_s_below_is_asked(tmp
         opened(tmp_path, "t_s,sensor,value\n0,heel,3\n0,heel,4\n", taxel)
 
 
+def test_taxels_by_row_and_column_are_a_grid(tmp_path: Path) -> None:
+    found = opened(tmp_path, ROWS["a reading a line by row and column"][0])
+    assert found.sources[""].array.shape == (2, 3)
+
+
 def test_each_sensor_has_its_own_times(tmp_path: Path) -> None:
     text = "t_ms,trial,a\n0,1,5\n10,1,6\n20,1,7\n0,2,8\n10,2,9\n20,2,4\n"
     by, *_ = layouts(tmp_path, text)

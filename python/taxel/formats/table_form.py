@@ -360,7 +360,7 @@ def _with_size(layout: Layout, draft: Draft, taxels: Sequence[int]) -> Layout:
             }
             draft.ask("taxels with the axes x, y and z", choices)
         return full
-    places = column_names.places_of(names) if any(names) and not layout.rows else draft.size
+    places = draft.size or (column_names.places_of(names) if any(names) and not layout.rows else None)
     if places is not None and min(places) > 1:
         full = replace(full, rows=places[0], columns=places[1])
     # Lines that are parts of a frame whose size is known; a line with a time of its own is a frame.
