@@ -294,41 +294,36 @@ def _of_one_unit(draft: Draft, taxels: list[int]) -> list[int]:
     return [k for k in taxels if k not in draft.left]
 
 
-def are_events(draft: Draft, taxels: Sequence[int]) -> bool:
-    """Return whether the columns are those of events, a line each."""
-    names = [draft.names[k].lower() for k in taxels]
-    called = [EVENT_COLUMNS.get(name, name) for name in names]
-    is_so = sorted(called) == ["p", "x", "y"] and draft.table.time_column is not None
-    return is_so and _are_places(draft.fit, *(taxels[called.index(name)] for name in "xyp"))
+def are_events(draft: Draft, time: int | None, taxels: Sequence[int]) -> bool:
+    """Return whether lines are events, by the names of the columns; where four have none and may be events, ask.
 
-
-def _are_places(fit: Fit, x: int, y: int, p: int) -> bool:
-    """Return whether columns hold places, and polarities."""
-    places = np.concatenate([fit.numbers(x), fit.numbers(y)])
-    return bool((places >= 0).all() and (places % 1 == 0).all()) and set(fit.numbers(p).tolist()) in (
-        *({0.0}, {1.0}, {-1.0}, {0.0, 1.0}, {-1.0, 1.0}),
-    )
-
-
-def ask_for_events(draft: Draft) -> None:
-    """Ask whether four columns without names are events, in one of the orders that programs write."""
-    fit = draft.fit
+    The rate of events says nothing of the unit of their times, as that of frames does: without a name it is asked.
+    """
+    fit, units = draft.fit, ("us", "ms", "s")
+    called = {EVENT_COLUMNS.get(name, name): k for k in taxels for name in [draft.names[k].lower()]}
+    named = [called[name] for name in "xyp" if name in called]
+    if time is not None and len(taxels) == len(named) == 3 and _are_places(fit, named):
+        draft.set(events=True)
+        draft.answer("the unit of the time")
+        if not (time_unit(draft.names[time]) or fit.types[time] == "time" or fit.epoch(time)):
+            likely = units[:2] if bool((fit.numbers(time) % 1 == 0).all()) else units[:0:-1]
+            draft.ask("the unit of the time of the events", {unit: {"time_unit": unit} for unit in likely})
+        return True
     for order in ("txyp", "xypt") if fit.count == 4 and not any(draft.names) else ():
-        t, (x, y, p) = fit.numbers(order.index("t")), (order.index(name) for name in "xyp")
-        if _are_places(fit, x, y, p) and len(set(fit.numbers(p).tolist())) == 2 and bool((np.diff(t) >= 0).all()):
+        ascends = bool((np.diff(fit.numbers(order.index("t"))) >= 0).all())
+        if ascends and _are_places(fit, [order.index(name) for name in "xyp"], polarities=2):
             events = {"columns": list(order), "time_column": "t", "time_unit": "us", "leave_out": [], "events": True}
             draft.ask("frames or events", {"frames of taxels": {}, "events, in us": events}, first=True)
-            return
+            break
+    return False
 
 
-def ask_for_unit_of_events(draft: Draft, time: int | None) -> None:
-    """Ask for the unit of times of events that no name says: their rate says nothing, as that of frames does."""
-    draft.answer("the unit of the time")
-    fit = draft.fit
-    if time is None or time_unit(draft.names[time]) or fit.types[time] == "time" or fit.epoch(time):
-        return
-    units = ("us", "ms") if bool((fit.numbers(time) % 1 == 0).all()) else ("s", "ms")
-    draft.ask("the unit of the time of the events", {unit: {"time_unit": unit} for unit in units})
+def _are_places(fit: Fit, columns: Sequence[int], polarities: int = 1) -> bool:
+    """Return whether columns hold places, and so many polarities or two."""
+    x, y, p = map(fit.numbers, columns)
+    places, values = np.concatenate([x, y]), set(p.tolist())
+    are_whole = bool((places >= 0).all() and (places % 1 == 0).all())
+    return are_whole and polarities <= len(values) <= 2 and values <= {1.0, -1.0 if -1.0 in values else 0.0}
 
 
 def said_of(draft: Draft, time: int | None) -> Iterator[str]:

@@ -29,9 +29,7 @@ from taxel.formats.table_columns import (
     Changes,
     Draft,
     are_events,
-    ask_for_events,
     ask_for_lines_of_one_time,
-    ask_for_unit_of_events,
     by_key,
     said_of,
     taxels_of,
@@ -155,13 +153,9 @@ def _as_it_looks(text: Text, layout: Layout, label_column: str | int | None) -> 
     if time is not None and draft.table.taxel_column is None:
         ask_for_lines_of_one_time(draft, time)
     draft.set(leave_out=[draft.called(k) for k in sorted(draft.left)])
-    if are_events(draft, taxels):
-        draft.set(events=True)
-        ask_for_unit_of_events(draft, time)
-        full = replace(layout, table=draft.table)
-    else:
-        ask_for_events(draft)
-        full = _with_size(replace(layout, table=draft.table), draft, taxels)
+    are = are_events(draft, time, taxels)
+    full = replace(layout, table=draft.table)
+    full = full if are else _with_size(full, draft, taxels)
     if draft.asked and not (stated and draft.asked[0][0].startswith("the first line")):
         _refuse(text, full, draft)
     how = full.table or draft.table
