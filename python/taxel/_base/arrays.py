@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -214,12 +214,12 @@ def _stored(path: Path) -> Iterator[dict[str, _Stored]]:
     elif is_matlab:
         yield _of_matlab(path)
     elif head.startswith(b"\x93NUMPY") or ending == ".npy":
-        with _reading(path, ".npy file"), open(path, "rb") as file:
-            yield {"": _of_numpy(file)}
+        with _reading(path, ".npy file"):
+            yield {"": _of_numpy(lambda: path.open("rb"))}
     else:
         with _reading(path, ".npz file"), zipfile.ZipFile(path) as archive:
             members = [name for name in archive.namelist() if name.endswith(".npy")]
-            yield {name.removesuffix(".npy"): _of_member(archive, name) for name in members}
+            yield {name.removesuffix(".npy"): _of_numpy(partial(archive.open, name)) for name in members}
 
 
 @contextlib.contextmanager
@@ -233,30 +233,20 @@ def _reading(path: str | os.PathLike[str], kind: str) -> Iterator[None]:
         raise damaged(path, kind, first_line(error)) from None
 
 
-def _header(file: BinaryIO | Any) -> tuple[tuple[int, ...], np.dtype[Any]]:
+def _header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
     """Read the shape and the dtype from the header of an array."""
     readers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
     shape, _, dtype = readers[np.lib.format.read_magic(file)](file)
     return shape, dtype
 
 
-def _of_numpy(file: BinaryIO | Any) -> _Stored:
-    shape, dtype = _header(file)
-
-    def read() -> NDArray[Any]:
-        file.seek(0)
-        array: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
-        return array
-
-    return _Stored(shape, dtype, read)
-
-
-def _of_member(archive: zipfile.ZipFile, name: str) -> _Stored:
-    with archive.open(name) as file:
+def _of_numpy(opened: Callable[[], IO[bytes]]) -> _Stored:
+    """Describe an array in NumPy's format: a file, or one within a .npz."""
+    with opened() as file:
         shape, dtype = _header(file)
 
     def read() -> NDArray[Any]:
-        with archive.open(name) as file:
+        with opened() as file:
             array: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
             return array
 
