@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shell import run
 
 import taxel
 from taxel import _core
@@ -33,6 +34,30 @@ def recorded(path: Path, drift_ppm: float, delay_s: float) -> Path:
         writer.datagram(at, k, taxel.wire.encode(one))
     writer.finish(json.dumps({"received": len(own)}))
     return path
+
+
+@pytest.mark.parametrize(
+    ("drift_ppm", "delay_s", "said"),
+    [
+        (9_900.0, 0.0, None),
+        (-10_100.0, 0.0, "a drift of "),
+        # No fit takes such a drift, so the delays say it.
+        (500_000.0, 0.0, "a median delay of -4.1 s "),
+        (0.0, 1.2, "a delay of 1.1 s "),
+    ],
+)
+def test_info_says_which_clocks_cannot_be(tmp_path: Path, drift_ppm: float, delay_s: float, said: str | None) -> None:
+    file = recorded(tmp_path / "board.mcap", drift_ppm, delay_s)
+    facts = json.loads(run("info", file, "--json").stdout)
+    page = run("info", file).stdout
+    if abs(drift_ppm) < 20_000 and not delay_s:
+        assert facts["drift_ppm"] == pytest.approx(drift_ppm, abs=5)
+    if said is None:
+        assert (facts["clock_doubt"], CAUSE in page) == (None, False)
+    else:
+        assert said in facts["clock_doubt"]
+        assert facts["clock_doubt"] in page
+        assert CAUSE in page
 
 
 def test_the_border_is_between_the_worst_oscillators_and_what_cannot_be() -> None:
