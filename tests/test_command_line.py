@@ -42,15 +42,6 @@ def test_an_existing_file_is_not_replaced_by_a_result(capsys) -> None:
     assert Path("there.json").read_text() == "{}"
 
 
-@pytest.mark.usefixtures("here")
-def test_o_says_where_output_goes_too(capsys) -> None:
-    for where in (("a.npz",), ("-o", "b.npz"), ("--out", "c.npz")):
-        assert call(capsys, "convert", "walk.npz", *where)[0] == 0
-    assert Path("a.npz").read_bytes() == Path("b.npz").read_bytes() == Path("c.npz").read_bytes()
-    assert call(capsys, "cut", "-o", "part.npz", "walk.npz", "--rows", "0:2")[0] == 0
-    assert taxel.open("part.npz").array.rows == 2
-
-
 def test_exit_codes_are_those_of_the_docs() -> None:
     table = (DOCS / "howto.md").read_text()
     assert set(re.findall(r"^\| (\d+) \|", table, re.MULTILINE)) == {"0", "1", "2", "3", "130"}

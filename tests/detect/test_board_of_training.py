@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 import taxel
 from taxel import Array
 from taxel.detect import Example, PlainRule, Readout, run
-from taxel.detect.board import differences, of_training, other_frames, summary
+from taxel.detect.board import of_training, other_frames
 from taxel.encode import ContactArea
 from taxel.reading import Facts, InMemory, Marks
 from taxel.simulate import Board
@@ -58,17 +58,6 @@ def test_a_higher_noise_floor_of_the_board_silences_no_lift(seed, noise_floor, d
         t = found.t[found.label == label]
         assert len(t) == TOUCHES
         assert (np.abs(t - times) < 2000).all()
-
-
-def test_a_readout_says_in_what_its_board_differs_from_that_of_the_training():
-    slow, fast = Registers.preset("2 kHz"), Registers.preset("5.2 kHz")
-    training = {"board": summary(slow)}
-    assert differences(training, slow) == differences({}, slow) == ""
-    line = differences(training, fast)
-    for name, values in {"preset": ("5.2 kHz", "2 kHz"), "noise floor": (3, 10), "frames": (192, 499.84)}.items():
-        part = next(part for part in line.split(";") if name in part)
-        assert all(str(value) in part for value in values), part
-    assert "none" in differences(training, slow.replace(noise_floor=11))
 
 
 def walked(rate_hz: int, side: str) -> taxel.Recording:

@@ -1,14 +1,11 @@
 """A readout that detects a label by its neuron or by its plain rule: what runs, its file, and what is better."""
 
-import json
 from itertools import pairwise
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain_rules import ARRAY, FLOOR, clocks, events, tare
-from refusal import refused
 
 import taxel
 from taxel import Frames, Neuron, Readout
@@ -60,23 +57,6 @@ def rows(found):
     """Return detections in their order; a slope that is unknown is None."""
     slopes = [None if np.isnan(slope) else slope for slope in found.slope.tolist()]
     return list(zip(found.label.tolist(), found.t.tolist(), found.known.tolist(), slopes, strict=True))
-
-
-def test_its_file_holds_both_and_what_runs(tmp_path):
-    chosen = readout(["on", "gone"])
-    again = Readout.load(chosen.save(tmp_path / "both.json"))
-    assert again == chosen
-    assert (again.by_rule, again.rules) == (("gone", "on"), RULES)
-    kept = json.loads((tmp_path / "both.json").read_text())
-    assert kept["rules"]["on"]["levels"] == [1.0, 2.5]
-    assert again.using("better") == again
-    assert again.using("rule").by_rule == tuple(sorted(again.labels))
-    assert again.using("neuron").by_rule == ()
-    with refused(taxel.ProblemError, argument="use"):
-        again.using("best")
-    for wrong in ({"by_rule": ["never"]}, {"rules": {"on": RULES["off"]}}, {"rules": {"never": RULES["off"]}}):
-        with pytest.raises(taxel.ProblemError):
-            Readout(LevelCrossing([1.0]), {"on": (Neuron(), [1.0, 0.0])}, **wrong)
 
 
 def test_each_fold_is_scored_by_what_is_better_inside_its_training_data():

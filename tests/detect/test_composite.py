@@ -107,17 +107,6 @@ def test_the_file_holds_encoders_and_inputs_and_one_without_them_stays_as_it_is(
     assert '"inputs"' not in json.dumps(json.loads(readout.to_json())["neurons"]["d"])
 
 
-def test_one_encoder_has_no_inputs() -> None:
-    with refused():
-        Readout(PARTS["area"], {"a": (Neuron(), [1.0] * 4, 0.0, ("area",))})
-    for call in (
-        composite(1).encoder_of,
-        lambda label: composite(1).trains_of(label, Composite(PARTS).encode(held(1))),
-    ):
-        with refused():
-            call("z")
-
-
 def test_nir_holds_what_is_not_graded_and_refuses_what_is(tmp_path: Path) -> None:
     pytest.importorskip("nir")
     encoder = Composite({name: PARTS[name] for name in ("area", "change", "late")})

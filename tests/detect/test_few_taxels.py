@@ -9,7 +9,7 @@ import pytest
 
 import taxel
 from taxel import Array, Frames, Readout, Tare
-from taxel.detect import Example, PlainRule, Recipe, fit, judge, recipes, run, score, tune
+from taxel.detect import Example, Recipe, fit, judge, recipes, run, score, tune
 from taxel.tasks import DetectOptions, detect, train
 
 
@@ -36,13 +36,6 @@ def test_one_loaded_taxel_is_learnt_on_any_array(shape: tuple[int, int], times: 
         assert rule is not None
         assert rule.quantity == "peak"
         assert score(run(rule, learnt.source, tare=learnt.tare), {label: learnt.labels[label]}, 50.0).rank[0] <= 1
-
-
-def test_a_rule_by_peak_needs_no_neighbours_and_follows_its_unit() -> None:
-    unseen = single((1, 3), 3)
-    rule = PlainRule("peak", 6.0, release=0.5, noise_floor=0.6)
-    assert PlainRule.from_json(rule.to_json()) == rule
-    assert score(run(rule, unseen.source, tare=unseen.tare), unseen.labels, 50.0).rank[0] == 0
 
 
 def sized(shape: tuple[int, int], seed: int) -> Example:

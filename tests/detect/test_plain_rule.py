@@ -1,19 +1,16 @@
 """A plain rule against a loop over frames, written from its documentation; pieces, frames, files, live, tuning."""
 
 from itertools import pairwise
-from pathlib import Path
-from unittest.mock import ANY
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain_rules import ARRAY, FLOOR, as_tuples, clocks, events, expected, kinds, played, rules, tare
-from refusal import refused
 
 import taxel
 from taxel import Array, Events, Frames
-from taxel.detect import Example, PlainRule, load, run, tune
+from taxel.detect import Example, PlainRule, run, tune
 
 
 @settings(deadline=None)
@@ -75,24 +72,6 @@ RULES = [
     PlainRule("range_count", 3, 0.5, levels=[0.1, 0.2]),
     PlainRule("total", 30.0, 0.25, of_largest=True),
 ]
-
-
-@pytest.mark.parametrize("rule", RULES, ids=repr)
-def test_a_saved_rule_is_the_rule(rule, tmp_path: Path):
-    path = rule.save(tmp_path / "rule.json")
-    for again in (PlainRule.load(path), load(path), PlainRule.from_json(rule.to_json())):
-        assert isinstance(again, PlainRule)
-        assert again == rule
-        assert again.to_json() == rule.to_json()
-        assert (again.quantity, again.threshold, again.release, again.frames, again.age_ms, again.labels) == (
-            rule.quantity, rule.threshold, rule.release, rule.frames, rule.age_ms, rule.labels
-        )  # fmt: skip
-        assert (again.levels, again.dated_at, again.of_largest) == (rule.levels, rule.dated_at, rule.of_largest)
-        assert again.tare == rule.tare
-        assert again.noise_floor == rule.noise_floor
-    with refused(taxel.FormatError, argument=ANY, place=ANY):
-        taxel.Readout.load(path)
-    assert rule != PlainRule("area", 3)
 
 
 # Counts by running range

@@ -8,7 +8,7 @@ from plain_rules import played
 from touching import touched
 
 import taxel
-from taxel.detect import Example, Fold, Part, PlainRule, Recipe, judge, run, score, tune
+from taxel.detect import Example, Fold, Part, Recipe, judge, run, score, tune
 from taxel.encode import ContactArea
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -64,33 +64,3 @@ def test_the_labels_own_rule_stands_apart(examples) -> None:
     assert scored["hit"].missed == scored["hit"].false == 0
     assert judged.plain.to_dict()["own"]["rules"]["hit"]["quantity"] == "area"
     assert tune(own, noise_floor=3.0) == judged.plain.rules
-
-
-def test_channels_have_plain_rules_but_none_by_local_load() -> None:
-    line, values = taxel.Array(1, 4), np.zeros((400, 1, 4))
-    values[100:200] = values[250:300] = 20.0
-    frames = taxel.Frames(values, np.arange(400) * 1000, unit="N", array=line)
-    tare = taxel.Tare.take(frames, stop_us=50_000)
-    example = Example(frames, {"contact": [100_000, 250_000]}, tare)
-    with pytest.raises(
-        taxel.ProblemError, match=r"a plain rule by local load needs taxels that are neighbours on a grid; .* 1 x 4"
-    ):
-        run(PlainRule("local_load", 2), frames, tare=tare)
-    for rule in (PlainRule("area", 4), PlainRule("total", 70)):
-        assert run(rule, frames, tare=tare).label.tolist() == ["contact", "lift"] * 2
-    tuned = tune([example], noise_floor=0.2)["contact"]
-    assert tuned is not None
-    assert tuned.quantity == "peak"
-    recipe = Recipe(taxel.encode.LevelCrossing([10.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
-    judged = judge([example], recipe, [Fold([Part(0, stop=225_000)], [Part(0, start=225_000)])])
-    assert judged.plain.lacks == ""
-    assert judged.plain.rules == {"contact": tuned}
-    assert judged.together.found == 1
-    assert (
-        run(
-            PlainRule("area", 2),
-            taxel.Frames(values, frames.t, array=taxel.Array(1, 4, pitch_mm=5.0)),
-            tare=taxel.Tare.take(taxel.Frames(values[:50], frames.t[:50], array=taxel.Array(1, 4, pitch_mm=5.0))),
-        ).label.tolist()
-        == ["contact", "lift"] * 2
-    )

@@ -41,21 +41,6 @@ def test_delayed_copies_are_heard_live_as_a_learner_saw_them(encoder: taxel.enco
     assert Readout.from_json(readout.to_json()).delays_ms.tolist() == delays_ms
 
 
-def test_a_file_gives_the_same_readout_back(readout: Readout, tmp_path) -> None:
-    path = readout.save(tmp_path / "readout.json")
-    again = Readout.load(path)
-    assert again == readout
-    events, _ = touches(20, count=2)
-    assert run(again, events, tare=tare()) == run(readout, events, tare=tare())
-    for label, one in again.neurons.items():
-        assert one.weights.tobytes() == readout.neurons[label].weights.tobytes()
-        assert one.neuron == readout.neurons[label].neuron
-    with pytest.raises(FileExistsError):
-        readout.save(path)
-    readout.save(path, overwrite=True)
-    assert [p.name for p in tmp_path.iterdir()] == ["readout.json"]
-
-
 def pieces_of(events: taxel.Events, cuts: list[int]) -> list[taxel.Events]:
     bounds = [0, *sorted(c % (len(events) + 1) for c in cuts), len(events)]
     return [events[a:b] for a, b in itertools.pairwise(bounds)]

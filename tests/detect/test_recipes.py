@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from taxel import Array, Events, Frames, ProblemError
+from taxel import Frames, ProblemError
 from taxel.detect import Recipe, recipes
 from taxel.encode import ContactArea
 
@@ -40,19 +40,6 @@ def test_counts_of_an_event_camera_have_their_recipe_whatever_window_and_label()
     assert recipes.chosen(Frames(np.zeros((2, 1, 4)), [0, 1000], unit="events/5 ms"))[0] == "gait_channel"
 
 
-def test_for_events_contact_and_lift_have_their_own_neurons_and_any_other_label_that_of_kinds() -> None:
-    assert recipes.chosen(Events([0], [0], [0], [True], array=Array(1, 1)))[0] == "touch"
-    assert list(Recipe.load("touch").neurons) == ["contact", "lift"]
-    recipe = Recipe.load("touch", labels=["Lift", "small", "large"])
-    assert {label: recipe.inputs_of(label) for label in recipe.neurons} == {
-        "Lift": ("area",),
-        "small": ("moments",),
-        "large": ("moments",),
-    }
-    assert said(recipe, "small") == said(recipe, "large")
-    assert said(recipe, "Lift") == said(Recipe.load("touch"), "lift")
-
-
 @pytest.mark.parametrize(
     ("labels", "inputs"),
     [
@@ -75,14 +62,6 @@ def test_a_recipe_for_certain_labels_refuses_others(tmp_path: Path) -> None:
         ProblemError, match=r"recipe: is for contact, not for 'ball': .* the recipes are event_counts, gait_channel, "
     ):
         Recipe.load(tmp_path / "certain.toml", labels=["contact", "ball"])
-
-
-def test_what_is_said_for_all_neurons_comes_before_what_one_has_and_what_is_said_for_one_before_all() -> None:
-    changes = {"learner.tau": 20.0, "neurons.step.tau": 7.0}
-    recipe = Recipe.load("gait_plate", changes, labels=["foot_off", "step"])
-    assert (recipe.learner_of("foot_off")[1], recipe.learner_of("step")[1]) == (8.0, 12.0)
-    assert ("20.0" in said(recipe, "foot_off")[0], "7.0" in said(recipe, "step")[0]) == (True, True)
-    assert "190" not in said(recipe, "foot_off")[0]
 
 
 def test_a_recipe_takes_every_option_of_its_learner_and_of_the_neuron() -> None:

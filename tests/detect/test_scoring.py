@@ -13,13 +13,6 @@ from taxel.detect import Spread, score
 TIMES = st.lists(st.integers(-(10**6), 10**6), max_size=12)
 
 
-@given(st.integers(-(10**6), 10**6), st.integers(2, 12))
-def test_equal_values_have_no_spread_at_all(us: int, count: int) -> None:
-    spread = Spread.from_values([us / 1000] * count)
-    assert (spread.mean, spread.sd) == (us / 1000, 0.0)
-    assert " ± 0 (" in repr(spread)
-
-
 def some() -> taxel.Detections:
     return taxel.Detections(["b", "a", "b"], [3000, 1000, 2000], [3400, 1200, 2100], [0.5, 1.5, None])
 

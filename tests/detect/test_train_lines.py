@@ -1,6 +1,5 @@
 """``taxel train`` judges itself: the first line says on what, the next ones how well, what was felt."""
 
-import json
 import re
 from pathlib import Path
 
@@ -44,25 +43,6 @@ def test_the_first_line_says_held_out_and_the_next_ones_how_each_label_scored(tm
     assert "recipe touch: contact and lift" in out
     before = lines[: lines.index("")]
     assert (len(before) <= 15, max(map(len, before)) <= 160) == (True, True)
-
-
-def test_a_label_of_which_nothing_was_felt_is_counted_and_named_by_recording_and_time(tmp_path: Path, capsys) -> None:
-    first, labels = recorded(tmp_path, 1)
-    second, _ = recorded(tmp_path, 2)
-    lines = ["recording,label,t_us"]
-    for seed in (1, 2):
-        lines += [f"{seed},{label},{t}" for label, times in touches(seed)[1].items() for t in times]
-    alone = touches(2)[1]["contact"][1] + 60_000
-    labels.write_text("\n".join([*lines, f"2,contact,{alone}"]) + "\n")
-    arguments = ("train", first, second, "--labels", labels, "--tare", 0.03, "--overwrite", "-o", tmp_path / "r.json")
-    code, out, _ = call(capsys, *arguments)
-    assert (code, out.splitlines()[0]) == (0, "held out: whole recordings, 2 folds (window 50 ms)")
-    assert "1 of 13 felt by none of its inputs and not learnt" in out
-    assert "contact, neuron: 12 of 13 found, 1 missed, 0 false" in out, "it counts as missed"
-    result = json.loads(call(capsys, *arguments, "--json")[1])
-    assert result["alignment"]["contact"]["unpaired"] == [{"recording": str(second), "t_us": alone}]
-    assert result["alignment"]["lift"]["unpaired"] == []
-    assert (result["held_out"], result["score"]["missed"]) == (True, 1)
 
 
 def test_a_fold_that_cannot_be_learnt_leaves_the_training_as_it_is(tmp_path: Path, capsys) -> None:

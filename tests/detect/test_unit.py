@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -56,17 +54,6 @@ def test_values_in_another_unit_are_refused_by_a_file_too(own: str, other: str) 
             run(again, pressed(other), tare=tare)
         with refused():
             again.stream(tare=tare).push(pressed(other))
-
-
-@given(UNITS)
-def test_a_file_without_a_unit_reads_values_in_any(unit: str) -> None:
-    for made in both("N"):
-        text = json.loads(made.to_json())
-        del text["unit"]
-        old = type(made).from_json(json.dumps(text))
-        assert old.unit is None
-        assert "unit" not in json.loads(old.to_json())
-        assert run(old, pressed(unit), tare=example(unit).tare) == run(made, pressed("N"), tare=example("N").tare)
 
 
 @pytest.mark.parametrize("does", [lambda x: fit(x, RECIPE), lambda x: judge(x, RECIPE, 2), tune])

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from refusal import refused
 
-from taxel import Frames, SpikeTrains, Tare
-from taxel.encode import FA1, FA2, ChangeEvents, Composite, ContactArea, Moments, ThresholdIzhikevich
+from taxel import Frames, SpikeTrains
+from taxel.encode import FA2, ChangeEvents, Composite, ContactArea, Moments, ThresholdIzhikevich
 
 from . import scenes
 from .scenes import rest, spikes_of, touch, wander
@@ -54,14 +53,3 @@ def test_some_parts_have_the_places_of_their_trains() -> None:
         own = part.encode(events)
         own = own.split_by_sign() if own.signed else own
         assert spikes_of(whole.select(encoder.places(names, ARRAY))) == spikes_of(own)
-
-
-def test_a_part_s_tare_in_seconds_is_taken_at_the_beginning() -> None:
-    values = np.full((400, 3, 4), 50.0)
-    values[200:300, :2, :2] = 90.0
-    frames = Frames(values, np.arange(400) * 200, unit="ticks", array=ARRAY)
-    parts = {"a": ContactArea(tare=0.02), "b": Moments(graded=True, tare=0.01), "c": FA1(period_ms=0.2)}
-    given = Tare.take(frames, stop_us=20_000)
-    assert Composite(parts).encode(frames) == Composite(parts).with_tare(given).encode(frames)
-    with refused(argument="tare"):
-        Composite({"a": ContactArea()}).encode(frames)

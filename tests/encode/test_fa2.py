@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusal import refused
 
-from taxel import Array, Events
+from taxel import Array
 from taxel.encode import FA2
 
 from . import oracles
@@ -37,18 +37,6 @@ def test_fa2_is_its_filter_under_its_threshold(seed, period):
     found = of(e, t, x)
     assert len(found)
     assert found[found < sure] == pytest.approx(spikes)
-
-
-def test_a_value_that_a_state_repaired_is_no_change_and_later_ones_are():
-    array, n = Array(1, 1), 6
-    t = np.arange(n) * 20_000
-    ticks = np.array([50, 150, 50, 150, 51, 149])
-    events = Events(t, np.zeros(n, int), np.zeros(n, int), np.ones(n, bool), array=array, intensity=ticks)
-    all_heard = FA2().encode(events)[0]
-    events.repaired = np.arange(n) < 4
-    heard = FA2().encode(events)[0]
-    assert len(heard)
-    assert heard.tolist() == [s for s in all_heard.tolist() if s >= 80]
 
 
 def test_periods_in_which_it_feels_nothing_are_refused():

@@ -215,13 +215,6 @@ def test_levels_are_crossed_where_the_largest_sums_of_numpy_cross_them(seed, loc
     assert (encoder.kind, graded.kind) == ("unsigned", "graded")
 
 
-def test_values_of_a_tare_in_seconds_are_those_of_one_measured_there():
-    events = touch(np.random.default_rng(4), scenes.ARRAY, n=100)
-    first = int(events.t[0])
-    tare = Tare.take(events, stop_us=first + 2000)
-    assert np.array_equal(LocalLoad(tare=0.002).values(events), LocalLoad(tare=tare).values(events))
-
-
 STILL = np.full((8, 9), 50.0)
 
 

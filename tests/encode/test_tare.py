@@ -5,10 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusal import refused
-from shell import run
 
 import taxel
-from taxel import Array, Events, Frames, Tare
+from taxel import Array, Frames, Tare
 from taxel._base.errors import Place
 from taxel.encode import SA1, SA2
 
@@ -83,34 +82,3 @@ def test_held_pressure_counts_from_rest(encoder, seed):
     stream = encoder.with_tare(tare).stream(array)
     pieces = [stream.push(events[:cut]), stream.push(events[cut:]), stream.finish()]
     assert sorted(spike for piece in pieces for spike in spikes_of(piece)) == spikes_of(of_events)
-
-
-@pytest.mark.parametrize("encoder", ["sa1", "sa2"])
-def test_the_command_takes_the_rest_from_afferents_that_feel_held_pressure(encoder, tmp_path):
-    """Two boards that differ in the rest of their taxels alone fire alike; with nothing on it, SA-1 is silent."""
-    t = np.repeat(np.arange(0, 1_000_000, 2000), 4)
-    x = np.tile([0, 1, 0, 1], 500)
-    y = np.tile([0, 0, 1, 1], 500)
-    pressed = np.where((t >= 600_000) & (t < 900_000) & (x == 0), 60, 0)
-    spikes = []
-    for name, rest in (("flat", 0), ("rest", 50)):
-        level = rest + pressed
-        events = Events(t, x, y, level > 0, array=Array(2, 2, pitch_mm=2.67), intensity=level)
-        taxel.convert(events, tmp_path / f"{name}.npz")
-        said = [
-            "encode",
-            tmp_path / f"{name}.npz",
-            tmp_path / f"{name}-spikes.npz",
-            "--encoder",
-            encoder,
-            "--tare",
-            "0.2",
-        ]
-        done = run(*said)
-        assert done.returncode == 0, done.stderr
-        spikes.append(taxel.SpikeTrains.load(tmp_path / f"{name}-spikes.npz"))
-    flat, rested = ([list(trains[k]) for k in range(len(trains))] for trains in spikes)
-    assert rested == flat
-    assert sum(map(len, flat)) > 5
-    if encoder == "sa1":
-        assert all(time >= 600 for train in flat for time in train)

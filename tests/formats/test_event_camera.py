@@ -11,7 +11,6 @@ from refusal import refused_saying as refused
 
 import taxel
 from taxel import Events, FormatError, Frames
-from taxel._base import limits
 from taxel.cli import main
 from taxel.formats import event_camera
 from taxel.formats.event_camera import Reduction
@@ -266,14 +265,6 @@ def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, window_ms: 
         assert (frames.values == counts.values).all()
         assert (frames.t == counts.t).all()
         assert frames.unit == counts.unit
-
-
-def test_too_many_frames_name_a_larger_window(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(limits, "available", lambda: 1 << 25)
-    with refused(
-        r"frames of 48 x 64 taxels \(for fewer frames, use --region, a larger --bin or a larger --count-ms", FormatError
-    ):
-        taxel.open(write(tmp_path / "a.raw", some_rows()), window_ms=0.001)
 
 
 def test_taxels_beyond_the_sensor_are_refused(tmp_path: Path) -> None:

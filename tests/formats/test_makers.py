@@ -41,14 +41,6 @@ def test_a_makers_file_is_known_whatever_its_line_ends_and_capitals(name: str, t
     assert [each.frames() for each in feet(path)] == plain
 
 
-def test_pedar_insoles_are_both_feet_of_one_recording(tmp_path: Path) -> None:
-    left, right = feet(write_pedar(tmp_path))
-    assert [each.side for each in (left, right)] == ["left", "right"]
-    assert left.frames().values.shape == (200, 1, 5)
-    assert left.frames().t[:2].tolist() == [10_000, 20_000]
-    assert (left.frames().unit, float(right.frames().values.max())) == ("kPa", 100.0)
-
-
 def test_moticon_rows_that_are_missing_for_a_foot_are_missing_not_zero(tmp_path: Path) -> None:
     left, right = feet(write_moticon(tmp_path))
     frames = left.frames()

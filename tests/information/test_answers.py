@@ -8,31 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import taxel
-from taxel.encode import ChangeEvents
 from taxel.information import LabelledTrial, answer
 from taxel.information.rasters import event_grams, features
-from taxel.information.sampling import HeldValues, SampledEvents, contacts, spikes_of
+from taxel.information.sampling import HeldValues, SampledEvents
 from taxel.information.wire_rate import kilobits_per_second
-
-from .touches import ordered
-
-ENCODER = ChangeEvents(noise_floor=3.0)
-
-
-def trials_of(count, **what):
-    events, rows = ordered(count, **what)
-    return [LabelledTrial(events, label, start) for start, label in rows]
-
-
-def sampled(trials, period_us, seed=0, **what):
-    held = [HeldValues(trials[0].source)] * len(trials)
-    at = contacts(trials, held, ENCODER, 1000, 60_000.0)
-    random = np.random.default_rng(seed)
-    return (
-        held,
-        at,
-        spikes_of(trials, held, ENCODER, period_us=period_us, contact_us=at, window_us=60_000.0, random=random, **what),
-    )
 
 
 @settings(deadline=None, max_examples=25)
@@ -66,21 +45,6 @@ def test_many_events_are_held_across_kept_states():
     frames = [taxel.Frames.from_events(events, 1, int(at), int(at) + 1).values[0].ravel() for at in times]
     assert np.array_equal(HeldValues(events).at(times), frames)
     assert np.array_equal(HeldValues(events).at(times[3:]), frames[3:])
-
-
-def test_two_touches_fall_apart_as_often_as_a_drawn_phase_lets_them():
-    """The phase is drawn evenly: a sample falls between two touches 3 ms apart with probability 3 / T."""
-    trials = trials_of(1500)
-    for period in (2000, 5000, 10_000, 20_000):
-        _, _, spikes = sampled(trials, period)
-        apart = np.zeros(1500, bool)
-        apart[spikes.trial[spikes.bin > 0]] = True
-        share = min(1.0, 3000 / period)
-        assert abs(apart.mean() - share) < 4 * np.sqrt(share * (1 - share) / 1500) + 1e-9
-        assert (np.bincount(spikes.trial, minlength=1500) == 2).all()
-        late = spikes.first_us
-        assert ((late >= 0) & (late < period)).all()
-        assert abs(late.mean() - period / 2) < period / 2 * 0.1  # even over the period
 
 
 def grams_by_hand(spikes, window, tau):

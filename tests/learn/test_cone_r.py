@@ -12,7 +12,7 @@ from refusal import refused
 from relaxed import drawn, examples, fitted, least, shares, sizes, statement, terms
 
 from taxel import Neuron, SpikeTrains
-from taxel.learn import ConeR, OnlineConeR
+from taxel.learn import ConeR
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
 
@@ -92,16 +92,6 @@ def test_max_seconds_ends_a_fit_with_the_best_so_far_and_a_warning(long_rows):
     assert cone.objective_ * (1 - cone.gap_) <= ever.objective_
 
 
-def test_divided_by_targets_a_row_weighs_the_same_however_long_the_recording():
-    (one,), (wanted,) = examples(3, trains=30, patterns=1, targets=2, duration=200.0)
-    options = {"tau": 12.0, "lambdas": (0, 0, 0, 1, 1), "divide_c_by": "targets", "divide_d_by": "targets"}
-    silent = SpikeTrains.from_lists([[0.0]] + [[]] * 29, stop=2000.0)
-    short = made(ConeR, **options).fit([one], [wanted])
-    long = made(ConeR, **options).fit([one, silent], [wanted, []])
-    assert long.silent_rows_ > 5 * short.silent_rows_
-    assert long.objective_ == pytest.approx(short.objective_, rel=1e-5)
-
-
 def test_one_layout_serves_all_divisors_and_sides_and_a_fit_of_other_sides_is_a_start():
     patterns, targets = examples(7)
     windows = [[(0.0, 60.0)], None]
@@ -143,19 +133,3 @@ def test_what_does_not_fit_together_is_one_clear_error():
         ConeR(ub=[1.0, 1.0]).fit(one, [[5.0]])
     with refused():
         ConeR(horizon=50.0).fit(one, [[60.0]])
-
-
-@pytest.mark.parametrize(
-    ("silence", "argument"),
-    [
-        ([[(20.0, 10.0)]], None),
-        ([[(0.0, 5.0), (4.0, 9.0)]], None),
-        ([[(0.0, float("nan"))]], None),
-        ([[(0.0, 5.0)], []], "silence"),
-        (5.0, "silence"),
-    ],
-)
-def test_windows_that_make_no_sense_are_refused(silence, argument):
-    for kind in (ConeR, OnlineConeR):
-        with refused(argument=argument):
-            kind().fit([lists([1.0])], [[5.0]], silence=silence)

@@ -15,7 +15,7 @@ from refusal import refused
 import taxel
 from taxel import Events, Neuron, SpikeTrains, learn
 from taxel._base.parameters import Parameters, described
-from taxel.encode import ContactArea, LevelCrossing
+from taxel.encode import ContactArea
 from taxel.learn import ConeR, ConeX, OnlineConeR
 
 sklearn = pytest.importorskip("sklearn")
@@ -94,20 +94,6 @@ def test_weights_that_are_assigned_have_no_verdict_of_the_fit_and_a_new_fit_has_
         assert copied.status_ == "assigned"
         assert copied.fit(*examples()).status_ == before["status_"]
         assert copied.gap_ <= copied.tolerance
-
-
-@each_learner
-def test_scores_lie_between_0_and_1_and_predictions_are_spikes(name):
-    one, patterns = fitted(name)
-    if name == "Tempotron":
-        assert one.score(patterns, one.predict(patterns)) == 1.0
-        return
-    spikes = one.predict(patterns)
-    assert [type(times) for times in spikes] == [np.ndarray] * 2
-    assert 0.0 <= one.score(patterns, examples()[1]) <= 1.0
-    # The learner's own prediction must agree with the score.
-    assert one.score(patterns, spikes, window_ms=0.0) == 1.0
-    assert one.score(patterns, [[1.0], [1.0]], window_ms=0.0) == 0.0
 
 
 #: The learners that read the values of graded trains; all others refuse them.
@@ -206,15 +192,6 @@ def test_a_search_over_a_pipeline_finds_touches_in_recordings():
     (spikes,) = search.predict(recordings[:1])
     assert np.abs(spikes - targets[0]).min() < 50.0
     assert search.score(recordings, targets) == 1.0
-
-
-def test_an_encoder_transforms_a_list_and_splits_signed_trains():
-    recording, _ = touches(2)
-    encoder = LevelCrossing([52.0])
-    assert encoder.fit([recording], None) is encoder
-    (trains,) = encoder.transform([recording])
-    assert not trains.signed
-    assert len(trains) == 2 * len(encoder.encode(recording))
 
 
 def test_tags_are_asked_by_scikit_learn_alone():

@@ -6,7 +6,7 @@ from unittest.mock import ANY
 
 import numpy as np
 import pytest
-from making import lists, made
+from making import made
 from refusal import refused
 
 from taxel import Neuron, SpikeTrains
@@ -83,17 +83,6 @@ def test_a_pattern_that_makes_no_sense_is_named_and_leaves_the_window_as_it_was(
     assert np.array_equal(online.weights_, same.weights_)
 
 
-def test_an_empty_window_and_a_misspelt_parameter_are_one_clear_error_each():
-    with refused(argument="window"):
-        OnlineConeR(window=0)
-    with refused():
-        OnlineConeR().set_params(**{"lambda": 1})
-    with refused(argument="targets"):
-        OnlineConeR().fit([], [])
-    with refused(argument="start"):
-        OnlineConeR().fit(*zip(*stream(0, 2), strict=True), start=[0.0])
-
-
 @pytest.mark.parametrize("learner", [ConeR(), OnlineConeR(window=2)])
 def test_more_trains_than_memory_holds_are_refused_in_one_line(learner):
     many = SpikeTrains.from_lists([[1.0]] * 10_001, stop=20.0)
@@ -101,12 +90,3 @@ def test_more_trains_than_memory_holds_are_refused_in_one_line(learner):
         learner.fit([many], [[10.0]])
     few = SpikeTrains.from_lists([[1.0], [4.0]], stop=20.0)
     assert learner.fit([few], [[10.0]]).weights_.shape == (2,)
-
-
-def test_a_window_that_makes_no_sense_leaves_the_patterns_as_they_were():
-    online = OnlineConeR(window=2).partial_fit(lists([1.0]), [5.0])
-    with refused():
-        online.partial_fit(lists([1.0]), [5.0], silence=[(9.0, 3.0)])
-    with refused(argument="silence"):
-        online.partial_fit(lists([1.0]), [5.0], silence=[3.0])
-    assert online.patterns_ == 1

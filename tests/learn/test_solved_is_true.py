@@ -71,22 +71,6 @@ def test_hundreds_that_say_solved_fire_at_their_targets_and_nowhere_else(kind):
         judged(*KINDS[kind](seed), simulated=kind not in LONG)
 
 
-@pytest.mark.parametrize("margin", [None, 1e-3])
-def test_without_a_margin_from_the_caller_a_verdict_holds_for_any(margin):
-    given = {} if margin is None else {"margin": margin, "slope": margin}
-    said = set()
-    for seed in [*range(20), 61, 93, 104, 131]:
-        patterns, targets = examples(seed, trains=30, patterns=4 + seed % 6, targets=1)
-        cone = ConeX(lb=-1, ub=1, **given)
-        judged(cone, patterns, targets, simulated=False)
-        assert cone.reason_ is None
-        assert cone.status_ == "solved" or cone.certificate_.at_all or margin is not None
-        said.add((cone.status_, cone.problem_.margin.mv))
-    assert ("solved", 1e-3) in said
-    if margin is not None:
-        assert {mv for _, mv in said} == {1e-3}
-
-
 def test_what_is_undecided_at_the_least_margin_is_stopped_and_says_why():
     # One input, and the target at the very top of its kernel: it touches the threshold, and no margin can be kept.
     trains = SpikeTrains.from_lists([[10.0]], stop=60.0)

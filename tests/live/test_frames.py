@@ -126,25 +126,6 @@ def test_a_readout_detects_the_same_live_and_in_the_recording_beside_it(
     assert [(d.label, d.t, d.known) for d in recording.detections] == [(d.label, d.t, d.known) for d in expected]
 
 
-def test_what_the_frames_are_cut_into_changes_nothing(tmp_path: Path) -> None:
-    values = touches(np.random.default_rng(3), 4, 6, 200, "kPa")
-    t = np.arange(len(values)) * PERIOD_US
-    found = []
-    for k, options in enumerate(["", "frame_lines=4", "frame_end=blank"]):
-        path, lines = tmp_path / f"{k}.mcap", 4 if options else 1
-        text = lines_of(values, t, lines, "BLANK" if "blank" in options else "")
-        with served(text, at_once=False) as address:
-            source = f"lines+tcp:{address},array=4x6,time=1:us,rate=100,unit=kPa" + f",{options}" * bool(options)
-            told: list[Detection] = []
-            with Live(readout=readout_of(4, 6, "kPa"), sources=source, record=path, say=told.append) as live:
-                # An empty line ends a frame: that of the last one came with it.
-                until(lambda live=live: live.counters["frames"] == len(values))  # type: ignore[misc]
-            found.append([(d.t, d.known) for d in told])
-        assert np.array_equal(taxel.open(path).frames().values, values.astype(np.float32))
-    assert found[0]
-    assert found == [found[0]] * 3
-
-
 def test_lines_that_are_no_frame_are_counted_and_the_next_frame_is_whole(tmp_path: Path) -> None:
     text = "Hello from the mat\n1,2\n3,4\n\n5,6\n7\n9,9\n\nnan,2\n3,4\n\n-1,-2.5\n1e3,4\n\n"
     with served(text) as address:

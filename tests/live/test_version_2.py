@@ -65,21 +65,6 @@ def test_two_boards_that_send_to_one_port_are_told(tmp_path, wire, boards):
     assert taxel.open(path).verdict.to_dict() == verdict.to_dict()
 
 
-def test_raw_bytes_of_version_2_are_refused(tmp_path):
-    path = tmp_path / "two.lsa"
-    board = Board(Registers(wire_version=2))
-    sent = board.frame(np.full(4096, 40, np.uint16))
-    for data in (b"".join(sent), b"".join(len(d).to_bytes(2, "little") + d for d in sent)):
-        path.write_bytes(data)
-        with pytest.raises(taxel.FormatError, match=r"wire version 2; a \.lsa file contains only version 1"):
-            _ = taxel.open(path).events
-    with taxel.live.Live(0, host="127.0.0.1", record=tmp_path / "two.mcap") as live:
-        taxel.live.send(sent, *live.address, seconds=0.01)
-    [lost] = taxel.convert(tmp_path / "two.mcap", tmp_path / "again.lsa")
-    assert lost.startswith("a .lsa holds the board's bytes alone: not the raw data, arrival times, ")
-    assert len(taxel.open(tmp_path / "again.lsa").events) == len(taxel.open(tmp_path / "two.mcap").events)
-
-
 def test_resets_and_changes_of_version_are_marked_in_the_recording(tmp_path):
     board, frames = (
         Board(Registers(), version_2=Version2(states_us=0)),

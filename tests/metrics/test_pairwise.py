@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import _thread
-import threading
-import time
-
 import numpy as np
 import pytest
 from drawing import pattern, poisson
@@ -86,19 +82,3 @@ def test_progress_ends_at_all_pairs_and_may_raise():
 
     with pytest.raises(LookupError, match="enough"):
         pairwise("van_rossum", several(1, 20), tau=1.0, progress=refuse)
-
-
-def test_ctrl_c_ends_a_long_matrix_at_once():
-    long = [np.sort(np.random.default_rng(n).uniform(0, 1e4, 10_000)) for n in range(40)]
-    pressed = []
-
-    def press():
-        time.sleep(0.3)
-        pressed.append(time.process_time())
-        _thread.interrupt_main()
-
-    threading.Thread(target=press).start()
-    with pytest.raises(KeyboardInterrupt):
-        pairwise("victor_purpura", long, long, q=1e-4)
-    # Of processor time, whatever else the machine has to do.
-    assert time.process_time() - pressed[0] < 5

@@ -39,15 +39,6 @@ def test_in_continuous_time_each_spike_is_the_root_that_brent_finds(kind):
     assert fired > 10
 
 
-@pytest.mark.parametrize(("kind", "step_ms"), mixed(KINDS, [1.0, 0.5, 0.192]))
-def test_on_a_grid_the_first_point_at_or_above_the_threshold_fires(kind, step_ms):
-    for seed in range(4):
-        neuron = Neuron(tau=7.0, time="grid", step_ms=step_ms, **kind)
-        weights, trains = random_trains(seed + 10, whole_ms=seed % 2 == 0)
-        expected = Plain(neuron, weights, trains).run_grid(trains.stop, step_ms)
-        assert neuron.run(weights, trains) == pytest.approx(expected, abs=1e-9)
-
-
 @pytest.mark.parametrize(("kind", "tau_s"), mixed(KINDS, [None, 0.5, 6.5]))
 def test_with_a_double_exponential_each_spike_is_the_root_that_brent_finds(kind, tau_s):
     fired = 0

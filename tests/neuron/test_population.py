@@ -20,13 +20,3 @@ def test_each_neuron_fires_as_it_does_by_itself(time: str, dtype: type) -> None:
     assert (many.counts > 0).sum() > 20
     for row, fired in zip(weights, many, strict=True):
         assert np.array_equal(fired, neuron.run(row, trains, threshold=0.9))
-
-
-@pytest.mark.parametrize("time", ["grid", "continuous"])
-def test_nothing_gives_nothing(time: str) -> None:
-    neuron = Neuron(time=time)
-    nothing = SpikeTrains.from_lists([[], []], stop=100.0)
-    assert neuron.run_many(np.ones((3, 2)), nothing).counts.tolist() == [0, 0, 0]
-    assert len(neuron.run_many(np.ones((0, 2)), nothing)) == 0
-    assert len(neuron.run_many(np.ones((5, 0)), SpikeTrains.from_lists([], stop=10.0))) == 5
-    assert len(neuron.run_many(np.ones((1, 1)), SpikeTrains.from_lists([[0.0]], 0.0, 0.0)).times) == 0

@@ -14,7 +14,7 @@ import taxel
 from taxel import Neuron, SpikeTrains
 from taxel.detect import Readout, run
 from taxel.encode import LevelCrossing
-from taxel.learn import ConeR, ConeX, OnlineConeR
+from taxel.learn import ConeX
 
 #: A potential this far below a level counts as at it, in thresholds.
 AT = 1e-11
@@ -153,22 +153,6 @@ def test_files_hold_it_and_readouts_stream_it(tmp_path) -> None:
         pieces += list(stream.push(frames[k : k + 37]).t)
     pieces += list(stream.advance(int(frames.t[-1]) + 1_100_000).t)
     assert pieces == found.t.tolist()
-
-
-def test_training_keeps_its_rows_and_the_trained_neuron_runs_with_it() -> None:
-    trains = SpikeTrains.from_lists([[20.0 + n] for n in range(20)], stop=150.0)
-    options = {"tau": 30.0, "theta_plus": 0.0, "time": "grid"}
-    learner = {"lambdas": (0, 1, 0, 1000, 0)}
-    with pytest.warns(UserWarning, match="extra spikes? within tau"):
-        free = ConeR(neuron=Neuron(**options), **learner).fit([trains], [[45.0]])
-    bound = ConeR(neuron=Neuron(**options, rearm=0.5), **learner).fit([trains], [[45.0]])
-    online = OnlineConeR(window=2, neuron=Neuron(**options, rearm=0.5), **learner).fit([trains], [[45.0]])
-    for cone in (bound, online):
-        assert cone.weights_ == pytest.approx(free.weights_, abs=1e-9)
-        assert cone.silent_rows_ == free.silent_rows_
-        assert cone.refires_ == 0
-        assert cone.predict([trains])[0].tolist() == free.predict([trains])[0][:1].tolist()
-    assert free.refires_ > 0
 
 
 def test_who_cannot_have_it_refuses_it_by_name(tmp_path) -> None:

@@ -88,24 +88,6 @@ def test_a_recording_finds_the_calibration_beside_it(tmp_path, name):
     assert recording.frames().unit == "counts"
 
 
-def test_a_calibration_of_another_array_is_one_clear_error(tmp_path):
-    other = Calibration.table(Array(4, 3, pitch_mm=6.0, name="other"), [40.0], [4.0], unit="N", date=DAY)
-    with refused():
-        other.apply(frames(1.0))
-    recording = made_beside(tmp_path, other)
-    with refused():
-        recording.calibrated()
-
-
-def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
-    exists = np.ones((1, 3), bool)
-    exists[0, 2] = False
-    array = Array(1, 3, exists=exists)
-    table = Calibration.table(array, [10.0], [1.0], unit="N", rest=[[2.0, np.nan, 0.0]], floor=1.0)
-    values = table.apply(Frames([[[7.0, 7.0, 7.0]], [[3.0, 0.0, 0.0]]], [0, 1], array=array)).values
-    assert values.tolist() == [[[0.5, 0.0, 0.0]], [[0.0, 0.0, 0.0]]]
-
-
 @pytest.mark.parametrize("entry", ["unit", "of", "curve", "array", "gain", "rest", "date", "floor", "loads", "taxel"])
 @pytest.mark.parametrize("nonsense", [None, "x", -1, [], {}, [[1]], 1e400, True])
 def test_a_spoilt_file_is_one_line(tmp_path, entry, nonsense):

@@ -62,16 +62,6 @@ def test_a_cut_in_time_gives_two_parts_that_make_the_whole(events: Events, start
     assert inside.between(start, stop) == inside
 
 
-@given(some(), st.integers(0, 12), st.integers(0, 12), st.integers(0, 8), st.integers(0, 8))
-def test_a_region_holds_its_taxels_and_nothing_else(events: Events, a: int, b: int, c: int, d: int) -> None:
-    (x0, x1), (y0, y1) = sorted((a, b)), sorted((c, d))
-    inside = events.region(slice(x0, x1), slice(y0, y1))
-    chosen = (events.x >= x0) & (events.x < x1) & (events.y >= y0) & (events.y < y1)
-    assert inside == events[chosen]
-    assert inside.array == events.array
-    assert events.region(slice(None), slice(None)) == events
-
-
 @given(some())
 def test_sorted_events_are_the_same_in_order(events: Events) -> None:
     ordered = events.sorted()

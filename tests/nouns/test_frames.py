@@ -56,16 +56,6 @@ def test_a_cut_in_time_gives_parts_that_make_the_whole(frames: Frames, start: in
 
 
 @given(some())
-def test_a_region_is_a_smaller_array_of_the_same_values(frames: Frames) -> None:
-    part = frames.region(slice(0, 1), slice(None))
-    assert part.array.shape == (frames.array.rows, 1)
-    assert np.array_equal(part.values[:, :, 0], frames.values[:, :, 0])
-    if frames.array.exists is not None:
-        assert np.array_equal(part.array.exists[:, 0], frames.array.exists[:, 0])
-    assert frames.region(slice(None), slice(None)) == frames
-
-
-@given(some())
 def test_changed_frames_are_not_equal(frames: Frames) -> None:
     assert frames != Frames(frames.values, frames.t, unit="N", array=frames.array)
     assert frames != 3

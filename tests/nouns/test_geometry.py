@@ -164,16 +164,6 @@ def test_another_pitch_is_said_and_never_refused() -> None:
             taxel.detect.run(readout, frames)
 
 
-def test_recordings_of_other_pitches_merge_and_the_loss_is_said(tmp_path: Path) -> None:
-    values = np.ones((2, 4, 3))
-    for name, array, t in (("a", PLATE, [0, 1]), ("b", Array(4, 3, 5.08), [5, 6]), ("c", Array(4, 3), [8, 9])):
-        taxel.convert(Frames(values, t, array=array), tmp_path / f"{name}.npz")
-    parts = [taxel.open(tmp_path / f"{name}.npz") for name in "abc"]
-    whole = taxel.merge(parts)
-    assert whole.array == PLATE
-    assert whole.lost == ("how b.npz describes the sensor otherwise",)
-
-
 def test_names_of_taxels_go_with_them_and_are_never_grounds_to_refuse(tmp_path: Path) -> None:
     called, other, nameless = Array(2, 2, names=["a", "b", "c", "d"]), Array(2, 2, names="efgh"), Array(2, 2)
     with refused(argument="names"):

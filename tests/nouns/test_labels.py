@@ -72,18 +72,6 @@ def test_labels_of_another_run_are_refused(tmp_path: Path) -> None:
         taxel.information.read_trials(tmp_path / "labels.csv", [recording], window_ms=5.0)
 
 
-def test_a_table_names_recordings_by_path_name_or_stem(tmp_path: Path) -> None:
-    place = tmp_path / "labels.csv"
-    place.write_text("t_us, label ,recording\n5,a,walk\n7,b,run.mcap\n9,c,/data/far.mcap\n3,a,walk\n")
-    labels = taxel.Labels(place)
-    assert labels.recordings == ("/data/far.mcap", "run.mcap", "walk")
-    assert labels.named("some/walk.mcap") == "walk"
-    assert labels.named("some/run.mcap") == "run.mcap"
-    assert labels.named("/data/far.mcap") == "/data/far.mcap"
-    assert labels.named("other.mcap") is None
-    assert labels.times(record(tmp_path / "walk.mcap", 0, 0.1))["a"].tolist() == [3, 5]
-
-
 @pytest.mark.parametrize(
     ("text", "line"),
     [

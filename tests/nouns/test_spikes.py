@@ -66,25 +66,6 @@ def test_delayed_trains_are_the_trains_later_delay_after_delay(trains: SpikeTrai
     assert trains.delayed([0.0]) == trains
 
 
-@given(some(), st.floats(-1, 101), st.floats(-1, 101))
-def test_a_cut_in_time_keeps_times_and_narrows_the_window(trains: SpikeTrains, a: float, b: float) -> None:
-    start, stop = sorted((a, b))
-    part = trains.between(start, stop)
-    assert (part.start, part.stop) == (start, stop)
-    assert len(part) == len(trains)
-    for n in range(len(trains)):
-        assert np.array_equal(part[n], trains[n][(trains[n] >= start) & (trains[n] < stop)])
-
-
-@given(some())
-def test_selected_trains_come_in_the_order_given(trains: SpikeTrains) -> None:
-    order = list(range(len(trains)))[::-1]
-    back = trains.select(order).select(order)
-    assert back == trains
-    assert trains.select(np.ones(len(trains), bool)) == trains
-    assert len(trains.select([])) == 0
-
-
 @given(some())
 def test_splitting_by_sign_keeps_every_spike_once(trains: SpikeTrains) -> None:
     if trains.kind == "graded":

@@ -129,25 +129,6 @@ def test_spikes_of_frames_are_those_of_the_encoder(tmp_path, encoder):
             assert {*there} >= {*told} >= {one for one in there if one[0] > 2100}
 
 
-def test_an_encoder_that_does_not_fit_frames_is_refused_with_the_reason(tmp_path):
-    taxel.convert(frames_of(), tmp_path / "mat.mcap")
-    trial = taxel.open_all(write_icub(tmp_path))[0]
-    taxel.convert(trial, tmp_path / "grasp.npz")
-    with Panel(tmp_path / "mat.mcap") as panel, Client(panel) as page:
-        opened(page, "mat.mcap")
-        said = page.ask("encode", encoder={"name": "fa2"})
-        assert (said["type"], said["field"]) == ("refused", "encoder")
-        assert "must come every" in said["reason"]
-        # A value is missing from the 41st frame on.
-        assert page.ask("encode", encoder={"name": "change_events"})["type"] == "done"
-        assert page.ask("seek", t_us=450_000)["type"] == "done"
-        page.send(type="credit", n=1)
-        assert "values must be finite" in page.until("warning")["text"]
-        opened(page, "grasp.npz")
-        said = page.ask("encode", encoder={"name": "change_events"})
-        assert (said["type"], "give rate_hz" in said["reason"]) == ("refused", True)
-
-
 def test_frames_without_times_are_numbered(tmp_path):
     frames = Frames(np.arange(12.0).reshape(4, 1, 3), np.arange(4), array=Array(1, 3))
     facts = Facts(path=tmp_path / "grasp.csv", array=frames.array, kind="icub", timed=False)

@@ -97,13 +97,3 @@ def test_what_is_wrong_is_one_line_and_nothing_is_written(tmp_path: Path, option
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
     assert said in done.stderr
     assert not (tmp_path / "pad.calibration.json").exists()
-
-
-def test_a_calibration_of_another_sensor_beside_a_recording_is_one_line(tmp_path: Path) -> None:
-    path = tmp_path / "pad.npz"
-    weighed(path)
-    other = taxel.Calibration.table(taxel.Array(3, 3, name="other"), [1.0], [1.0], unit="N")
-    other.save(tmp_path / "calibration.json")
-    done = run("info", path)
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "the calibration is for counts of Array(other: " in done.stderr

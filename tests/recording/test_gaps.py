@@ -12,8 +12,6 @@ from tests.shell import run
 import taxel
 from taxel import Array, Events, Frames
 
-BEGIN_US = 1_764_000_000_000_000
-
 
 def walk(*gaps: tuple[int, int], begin_us: int = 0) -> Frames:
     """Return a minute of frames at 100 Hz without those between the times of gaps, us."""
@@ -31,18 +29,6 @@ def camera(rate: float, *gaps: tuple[float, float], seconds: float = 30.0, name:
     us = (t[kept] * 1e6).astype(np.int64)
     x, y = (random.integers(0, size, len(us)) for size in (30, 20))
     return Events(us, x, y, random.random(len(us)) < 0.75, array=Array(20, 30, name=name))
-
-
-def opened(table: Events | Frames, folder: Path) -> taxel.Recording:
-    taxel.convert(table, folder / "a.npz")
-    return taxel.open(folder / "a.npz")
-
-
-@pytest.mark.parametrize("begin_us", [0, BEGIN_US])
-def test_a_verdict_names_the_gaps_of_stamps(tmp_path: Path, begin_us: int) -> None:
-    verdict = opened(walk((20_000_000, 23_500_000), begin_us=begin_us), tmp_path).verdict
-    assert verdict == "losses unknown: the .npz does not record them; 1 gap of 3.5 s at 20.0 s"
-    assert (verdict.status, verdict.noted) == ("unknown", {"gaps": 1, "gaps_us": 3_500_000})
 
 
 def test_a_recording_that_counts_its_losses_has_its_gaps_in_a_line_of_info(tmp_path: Path) -> None:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from shell import call
-from tests.tasks.recordings import mat
 
 import taxel
 from taxel import FormatError
@@ -67,27 +64,3 @@ def test_what_concerns_all_files_stays_an_error(tmp_path: Path) -> None:
     (tmp_path / "b.layout.toml").write_text("rows = 'eight'\n")
     with pytest.raises(FormatError, match=r"b\.layout\.toml"):
         taxel.open_all(tmp_path)
-
-
-def test_commands_use_the_others_and_say_what_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    rows = ["recording,label,t_us"]
-    for seed in range(3):
-        file = mat(tmp_path, seed)
-        file.rename(tmp_path / f"walk{seed}.npz")
-        rows += [f"walk{seed},contact,{10_000 * (100 + 60 * k)}" for k in range(8)]
-    cut(tmp_path / "walk1.npz")
-    (tmp_path / "labels.csv").write_text("\n".join(rows) + "\n")
-    line = f"left out, because it cannot be read: {tmp_path}/walk1.npz: the .npz file is damaged"
-    readout = tmp_path / "readout.json"
-    code, said, warned = call(capsys, "train", tmp_path, "-o", readout)
-    assert code == 0
-    assert f"\nwarning: {line}" in said
-    assert f"taxel: warning: {line}" in warned
-    for command in (("train", tmp_path, "-o", tmp_path / "b.json"), ("detect", tmp_path, "--readout", readout)):
-        code, said, _ = call(capsys, *command, "--json")
-        found = json.loads(said)
-        assert (code, len(found["recordings"])) == (0, 2)
-        assert found["warnings"][0].startswith(line)
-    code, said, warned = call(capsys, "info", tmp_path)
-    assert (code, "2 recordings" in said) == (2, True)
-    assert f"taxel: {tmp_path}/walk1.npz: the .npz file is damaged" in warned

@@ -209,19 +209,6 @@ def test_a_recording_gives_all_that_was_recorded(rec: taxel.Recording) -> None:
     assert "2 notes, 1 detection" in repr(rec)
 
 
-def test_frames_hold_what_came_and_a_slice_knows_what_came_before_it(rec: taxel.Recording) -> None:
-    frames = rec.frames(1000)
-    assert np.array_equal(np.diff(frames.t), np.full(len(frames) - 1, 1000))
-    assert frames == Frames.from_events(rec.events, 1000)
-    start = int(frames.t[10])
-    part = rec.between(start, start + 5000).frames(1000)
-    assert np.array_equal(part.values, frames.values[10:15])
-    assert len(rec.frames()) == len(Frames.from_events(rec.events, 10_000))
-    for rate in (0, -1, "fast", float("nan"), True, 2e6):
-        with pytest.raises(ProblemError, match="rate_hz is"):
-            rec.frames(rate)
-
-
 def test_frames_of_a_file_of_frames_are_its_own_or_the_last_at_each_time(tmp_path: Path) -> None:
     own = taxel.Frames(np.arange(12, dtype=np.float32).reshape(3, 2, 2), [0, 1000, 2500])
     taxel.convert(own, tmp_path / "a.npz")

@@ -161,27 +161,6 @@ def test_of_one_board_and_numbers_the_files_own_is_the_board(tmp_path: Path) -> 
     assert part.lost == ("the source imu (it has another clock)", "raw datagrams")
 
 
-def test_of_one_board_and_numbers_the_files_verdict_is_of_all(tmp_path: Path) -> None:
-    path, at = tmp_path / "one.mcap", 1_700_000_000_000_000_000
-    stream = {"name": "imu", "array": SMALL._geometry(), "stream": {"columns": ["ax"]}}
-    header = {"array": SMALL._geometry(), "sources": [stream | {"array": taxel.Array(1, 1)._geometry()}]}
-    writer = _core.RecordingWriter(path, json.dumps(header), "none", False)
-    imu = writer.track("imu")
-    for number, t in enumerate(range(0, 200_000, 20_000)):
-        writer.datagram(at + t * 1000, number, taxel.wire.encode(presses(10, 2)[number : number + 1]))
-        imu.samples(np.array([at + t * 1000]), np.array([number], np.uint64), np.array([1.0]))
-    imu.end(json.dumps({"received": 13, "dropped_by_queue": 3}))
-    writer.finish(json.dumps({"received": 10}))
-    recording = taxel.open(path)
-    for one in (recording, recording.on_clock("host"), recording.on_clock("board")):
-        assert (one.verdict.status, one.verdict.lost) == ("lost", {"dropped_by_queue": 3})
-        assert list(one.verdict.parts) == ["board", "imu"]
-    for one in (recording, recording.on_clock("host")):
-        own = {name: source.verdict for name, source in one.sources.items()}
-        assert own == recording.verdict.parts
-        assert one.sources["board"].sources["board"].verdict.status == "complete after arrival"
-
-
 def test_the_command_line_shows_and_writes_one_source(
     several: tuple[Path, dict[str, taxel.Events]], tmp_path: Path
 ) -> None:
@@ -382,24 +361,6 @@ def test_a_drift_is_not_stated_between_a_few_datagrams() -> None:
     few, enough = (Clock(board_us[:count], 5_000_000 + 1000 * board_us[:count]) for count in (3, 10))
     assert repr(few) == "Clock(3 datagrams, too few for a drift, delays 0 us median, 0 us 99 %)"
     assert "drift +" in repr(enough)
-
-
-def test_differences_begun_in_mid_stream_add_up_from_what_the_taxels_held(tmp_path: Path) -> None:
-    array = {"rows": 4, "columns": 4, "pitch_mm": 2.0, "name": "small", "exists": None}
-    writer = _core.RecordingWriter(
-        tmp_path / "mid.mcap", json.dumps({"array": array, "difference": True}), "none", True
-    )
-    held = np.full(16, 65_535, np.uint16)
-    held[9] = 41
-    writer.held(1_700_000_000_000_000_000, None, held)
-    told = taxel.Events(
-        [1000, 1000, 2000], [1, 2, 1], [2, 2, 2], [True, True, False], array=SMALL, intensity=[50, 7, 90]
-    )
-    writer.datagram(1_700_000_000_000_001_000, 0, taxel.wire.encode(told))
-    writer.finish("{}")
-    events = taxel.open(tmp_path / "mid.mcap").events
-    np.testing.assert_array_equal(events.intensity, [91, 0, 1])
-    np.testing.assert_array_equal(events.present, [True, False, True])
 
 
 @pytest.mark.parametrize("knows", [True, False])

@@ -21,13 +21,10 @@ import taxel
 from taxel import Verdict, _core
 from taxel.live.summary import summary_of
 from taxel.reading import Facts, InMemory
-from taxel.simulate import Board, Version2
-from taxel.wire import Registers
 
 from .making import HEADER, record, sent_by_a_board, some_events
 
 START_NS = HEADER["started_ns"]
-FINE = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 0, "missing": 0}})
 
 
 def documented_causes() -> list[tuple[str, str]]:
@@ -146,32 +143,6 @@ def test_datagrams_of_version_1_that_come_again_are_damage_as_their_events_are_t
     assert len(recording.events) == 450, "their events are there twice"
     assert (recording.verdict.damaged["datagrams_decoded_again"], recording.verdict.noted) == (5, {})
     assert "5 datagrams decoded again" in recording.verdict
-
-
-@pytest.mark.parametrize("reordered", [False, True])
-def test_what_version_2_lost_right_after_a_reset_is_counted(reordered: bool, tmp_path: Path) -> None:
-    board = Board(Registers(wire_version=2), version_2=Version2(states_us=0))
-    held, parts = np.full(4096, 20, np.uint16), []
-    for _ in range(2):
-        part: list[bytes] = []
-        for k in range(20):
-            held[k * 150 : k * 150 + 150] ^= 64
-            part += board.frame(held)
-        parts.append(part)
-        board.reset()
-    first, second = parts
-    lost = 3
-    came = [*first, *second[lost:]]
-    if reordered:
-        at = len(first)
-        came[at], came[at + 1] = came[at + 1], came[at]
-    writer = _core.RecordingWriter(tmp_path / "a.mcap", json.dumps(HEADER), "none", False)
-    for number, one in enumerate(came):
-        writer.datagram(START_NS + number * 1_000_000, number, one)
-    del writer
-    verdict = taxel.open(tmp_path / "a.mcap").verdict
-    assert (verdict.lost, verdict.noted["resets"]) == ({"lost_on_the_way": lost}, 1)
-    assert verdict.status == "lost"
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -299,23 +270,6 @@ def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
         verdict.status = "complete"  # type: ignore[misc]
 
 
-def test_a_board_that_was_reset_has_not_lost_nothing() -> None:
-    counts = {"received": 5, "recorded": 5, "missing": 0, "decoder": {"resets": 2}}
-    verdict = Verdict._of({"counts": counts})
-    assert verdict == "nothing lost, but losses at resets are unknown; 2 resets of the board"
-    assert verdict.status == "complete after arrival"
-    assert Verdict._of({"counts": counts | {"decoder": {}}}) == "nothing lost"
-    lost = Verdict._of({"counts": counts | {"missing": 3}})
-    assert lost == "LOST, at least: 3 datagrams lost or damaged on the way; 2 resets of the board"
-
-
-def test_a_source_of_which_nothing_arrived_hides_no_loss_of_another() -> None:
-    lost = Verdict._of({"counts": {"received": 5, "recorded": 5, "dropped_by_kernel": 2}})
-    silent = Verdict._of({"counts": {}})
-    assert (silent.status, Verdict._together([("a", silent), ("b", lost)]).status) == ("nothing arrived", "lost")
-    assert Verdict._together([("a", silent), ("b", FINE)]).status == "nothing arrived"
-
-
 def test_what_an_error_was_is_no_verdict() -> None:
     why = {"ending": {"stopped": "LOST/a.mcap (disk 3): no space left on device"}}
     stopped = Verdict._of({"file": why | {"so_far": {"received": 5, "recorded": 5}}})
@@ -342,18 +296,3 @@ def test_remarks_and_the_verdict_go_to_a_mcap_and_back(tmp_path: Path) -> None:
     # Through another kind and back, each conversion to .mcap adds its line.
     taxel.convert(back, tmp_path / "b.mcap")
     assert taxel.open(tmp_path / "b.mcap").remarks == (*said, "converted from a.bag", "converted from a.mcap")
-
-
-def test_merged_recordings_have_the_remarks_and_the_verdict_of_each(tmp_path: Path) -> None:
-    events = some_events(50)
-    for name in ("a", "b"):
-        taxel.convert(events, tmp_path / f"{name}.lsa")
-        taxel.convert(tmp_path / f"{name}.lsa", tmp_path / f"{name}.mcap")
-    one, two = (taxel.open(tmp_path / f"{name}.mcap") for name in ("a", "b"))
-    assert taxel.merge([one, one], gap_us=10).remarks == one.remarks
-    both = taxel.merge([one, two], gap_us=10)
-    assert {"converted from a.lsa", "converted from b.lsa"} <= set(both.remarks)
-    assert both.verdict == "losses unknown: the .lsa does not record them"
-    taxel.convert(both, tmp_path / "both.mcap")
-    again = taxel.open(tmp_path / "both.mcap")
-    assert (again.remarks, again.verdict) == (both.remarks, both.verdict)

@@ -13,10 +13,10 @@ from refusal import refused
 from shell import run
 
 import taxel
-from taxel import ProblemError, wire
+from taxel import wire
 from taxel.cli.emulate import _HELD_S
 from taxel.demo.script import script
-from taxel.simulate import Board, Flaws, Replay, Silence, Version2, emulate, play, truth
+from taxel.simulate import Flaws, Replay, Silence, emulate, play, truth
 from taxel.simulate.circuit import Circuit, Converter, VirtualGround
 from taxel.wire import Registers
 
@@ -171,25 +171,6 @@ def test_frames_are_played_by_the_boards_rules(listener):
     assert events.t.tolist() == pytest.approx([5000, 10_000], abs=600)
 
 
-def test_resets_and_a_drifting_clock(listener):
-    heard = Heard(listener)
-    report = emulate(
-        heard.to, [Silence(300.0)], tare_ms=2.0, wire=2, reset_every_s=0.1, drift_ppm=50_000.0,
-        version_2=Version2(board=7, seed=90, states_us=0),
-    )  # fmt: skip
-    assert report.resets == 2
-    assert report.board_seconds == pytest.approx(0.3, rel=0.01)
-    assert report.seconds >= 0.3 / 1.05 * 0.99
-    sessions = [int.from_bytes(d[14:16], "little") for d in heard.all()]
-    assert sorted(set(sessions)) == [90, 91, 92]
-    assert {int.from_bytes(d[2:4], "little") for d in heard.datagrams} == {7}
-    decoder = taxel.wire.Decoder(2)
-    for datagram in heard.datagrams:
-        decoder.push(datagram)
-    assert decoder.counts.resets == 2
-    assert decoder.counts.missing == 0
-
-
 def test_taxels_have_flaws_by_their_own_seeds(listener):
     heard = Heard(listener)
     still = taxel.Frames(np.full((3, 64, 64), 100.0), [0, 1000, 2000], unit="ticks")
@@ -226,27 +207,3 @@ def test_taxels_that_share_a_switch_pull_each_other_down(listener, switch_ohm):
         decoder.push(datagram)
     assert (decoder.held[:, 5] == wanted).all()
     assert (np.delete(decoder.held, 5, axis=1) == 49).all()
-
-
-def test_a_source_of_frames_is_heard_as_a_board_is(tmp_path):
-    array = taxel.Array(4, 6, name="small")
-    rng = np.random.default_rng(1)
-    frames = rng.integers(0, 1000, (50, 4, 6))
-    path = tmp_path / "source.mcap"
-    with taxel.live.Live(0, host="127.0.0.1", array=array, record=path) as live:
-        host, port = live.address
-        source = taxel.live.Source(array, 200.0, bits=10, noise_floor=2, to=f"{host}:{port}", board=3)
-        made = [source.push(frame) for frame in frames]
-        until = time.monotonic() + 30
-        while live.counters["events"] < sum(made):
-            assert time.monotonic() < until
-            time.sleep(0.01)
-        summary = live.stop()
-    assert summary.verdict == "nothing lost"
-    board = Board(source.registers, array)
-    expected = taxel.wire.Decoder(2, array=array)
-    straight = [expected.push(d) for frame in frames for d in board.frame(frame.astype(np.uint16))]
-    assert taxel.open(path).events == sum(straight[1:], straight[0])
-    for wrong in (np.full((4, 6), -1), np.full((4, 6), 70_000), np.zeros(23)):
-        with pytest.raises(ProblemError):
-            source.push(wrong)
