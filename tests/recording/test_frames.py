@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -75,36 +73,6 @@ def test_the_official_reader_decodes_every_frame(tmp_path: Path) -> None:
             assert image.timestamp.seconds * 1_000_000 + image.timestamp.nanos // 1000 == at
             cells = np.frombuffer(image.data, dtype).reshape(2, 3)
             assert np.array_equal(cells, values, equal_nan=True)
-
-
-def low_rate(place: Path) -> dict[str, list[dict[str, Any]]]:
-    """Return the low-rate pictures of each channel, by the official reader; `data` are bytes."""
-    found: dict[str, list[dict[str, Any]]] = {}
-    with place.open("rb") as file:
-        for schema, channel, message in make_reader(file).iter_messages():
-            if channel.topic.endswith("/pressure"):
-                image = json.loads(message.data)
-                assert schema.name == "foxglove.RawImage"
-                image["log_us"] = message.log_time // 1000
-                image["data"] = list(base64.b64decode(image["data"]))
-                found.setdefault(channel.topic, []).append(image)
-    return found
-
-
-def test_a_viewer_sees_ten_pictures_a_second_above_rest(tmp_path: Path) -> None:
-    t = np.arange(100) * 10_000
-    load = np.where(t < 600_000, 0.0, 4.0)[:, None, None] * np.array([[1.0, 0.5, 0.0]])
-    load[70, 0, 2] = np.nan
-    for unit, rest in (("kPa", "0"), ("V", "quiet stretch")):
-        frames = Frames(load + (unit == "V") * 7.5, t, unit=unit, array=Array(1, 3))
-        taxel.convert(frames, tmp_path / f"{unit}.mcap")
-        [images] = low_rate(tmp_path / f"{unit}.mcap").values()
-        assert [one["t_us"] for one in images] == list(range(0, 1_000_000, 100_000))
-        assert [one["data"] for one in images] == [[0, 0, 0]] * 6 + [[255, 128, 0]] * 4
-        assert {(one["rest"], one["unit"], one["width"], one["height"]) for one in images} == {(rest, unit, 3, 1)}
-        # The rest that is tracked rises a little below a load.
-        assert images[-1]["full"] == pytest.approx(4.0, abs=0.0 if unit == "kPa" else 0.1)
-        assert taxel.open(tmp_path / f"{unit}.mcap").frames() == frames
 
 
 def test_everything_beside_the_frames_is_kept(tmp_path: Path) -> None:

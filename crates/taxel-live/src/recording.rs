@@ -191,6 +191,8 @@ impl Header {
             Topic::Samples => stream,
             Topic::Frames => frames,
             Topic::Datagrams => !stream && !frames,
+            // Any viewer shows frames.
+            Topic::Pressure => !stream && !frames,
             Topic::Counts | Topic::Notes | Topic::Detections => true,
             _ => !stream,
         };

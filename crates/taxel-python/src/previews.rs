@@ -1,11 +1,11 @@
 //! The low-rate previews of a recording.
 
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::PyArray1;
 use pyo3::prelude::*;
 use taxel_core::Error;
 use taxel_live::recording::EventPreviews;
 
-use taxel_border::convert::{EventsIn, array, slice};
+use taxel_border::convert::{EventsIn, array};
 use taxel_border::enter::{Exclusive, enter};
 
 /// The previews that a recording of events gets, in order of time.
@@ -17,12 +17,10 @@ type PreviewOut<'py> = (i64, Bound<'py, PyArray1<u16>>);
 
 #[pymethods]
 impl RecordingPreviews {
-    /// `around` are times of interest, us.
     #[new]
-    fn new(py: Python<'_>, events: EventsIn<'_>, around: PyReadonlyArray1<'_, i64>) -> PyResult<Self> {
-        let around = slice("around", &around)?;
+    fn new(py: Python<'_>, events: EventsIn<'_>) -> PyResult<Self> {
         let events = events.view()?;
-        Ok(Self(Exclusive::new(enter(py, |_| EventPreviews::new(events, around))?)))
+        Ok(Self(Exclusive::new(enter(py, |_| EventPreviews::new(events))?)))
     }
 
     fn __iter__(slf: Py<Self>) -> Py<Self> {

@@ -339,21 +339,6 @@ impl RecordingWriter {
         self.with(py, |writer| writer.preview(at_ns, t_us, columns, ticks))
     }
 
-    /// Writes a preview of values above rest, row by row; white is at least `least`.
-    fn preview_above(
-        &self,
-        py: Python<'_>,
-        at_ns: i64,
-        t_us: i64,
-        above: PyReadonlyArray1<'_, f32>,
-        least: f64,
-        rest: &str,
-        unit: &str,
-    ) -> PyResult<()> {
-        let above = slice("above", &above)?;
-        self.with(py, |writer| writer.preview_above((at_ns, t_us), above, least, rest, unit))
-    }
-
     /// Writes the values that the taxels held when it began, ticks by index, 65 535 of a taxel without any event so far.
     fn held(&self, py: Python<'_>, at_ns: i64, t_us: Option<i64>, ticks: PyReadonlyArray1<'_, u16>) -> PyResult<()> {
         let ticks = slice("ticks", &ticks)?;

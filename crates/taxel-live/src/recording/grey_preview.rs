@@ -18,13 +18,8 @@ pub(super) struct GreyScale {
     /// The rest as it is tracked, from the first preview on, unless a tare was given.
     tracked: Option<TrackedRest>,
     tared: bool,
-    white: White,
-}
-
-/// What white is: the largest value above rest of the last 10 s.
-#[derive(Debug, Default)]
-pub(super) struct White {
-    /// Largest recent values above rest, with their times, us; they decrease, so the first is the largest.
+    /// The largest values above rest of the last 10 s, with their times, us; they decrease, so the first, which is white, is the
+    /// largest.
     peaks: VecDeque<(i64, f64)>,
 }
 
@@ -42,7 +37,7 @@ pub(super) struct GreyPreview {
 impl GreyScale {
     /// The scale of so many taxels, whose rest is tracked.
     pub(super) fn new(taxels: usize) -> Self {
-        Self { rest: Rest::measured(vec![f64::NO_REST; taxels]), tracked: None, tared: false, white: White::default() }
+        Self { rest: Rest::measured(vec![f64::NO_REST; taxels]), tracked: None, tared: false, peaks: VecDeque::new() }
     }
 
     /// Subtracts a tare's rest from now on.
@@ -50,7 +45,7 @@ impl GreyScale {
         // A taxel without any event so far reads 0 and rests there.
         self.rest = Rest::measured(tare.rest.iter().map(|rest| rest.unwrap_or(0.0)).collect());
         (self.tracked, self.tared) = (None, true);
-        self.white.peaks.clear();
+        self.peaks.clear();
     }
 
     /// Subtracts this rest from the values of a taxel from now on.
@@ -58,11 +53,6 @@ impl GreyScale {
         if taxel < self.rest.values().len() {
             self.rest.set(taxel, rest);
         }
-    }
-
-    /// What white is, for previews that are above rest already.
-    pub(super) fn white(&mut self) -> &mut White {
-        &mut self.white
     }
 
     /// The grey preview of the values at `t_us`; a value of 0 is also that of a taxel without any event so far.
@@ -85,17 +75,14 @@ impl GreyScale {
         }
         let quiet = self.tracked.as_ref().map(|tracked| tracked.quiet().is_some());
         let rest = quiet.map_or("tare", |quiet| if quiet { "quiet stretch" } else { "first values" });
-        // The scale is at least one tick, so that a sensor at rest stays black.
-        let (bytes, full) = self.white.grey(t_us, &above, 1.0);
+        let full = self.full(t_us, above.iter().copied().fold(0.0, f64::max));
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let bytes = above.iter().map(|&value| (value / full * 255.0).round().min(255.0) as u8).collect();
         GreyPreview { bytes, rest, full }
     }
-}
 
-impl White {
-    /// The grey values of a preview above rest, and the value of white, which is at least `least`.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    pub(super) fn grey(&mut self, t_us: i64, above: &[f64], least: f64) -> (Vec<u8>, f64) {
-        let peak = above.iter().copied().fold(0.0, f64::max);
+    /// The value of white of a preview with this largest value: at least one tick, so that a sensor at rest stays black.
+    fn full(&mut self, t_us: i64, peak: f64) -> f64 {
         let late = self.peaks.back().is_some_and(|&(t, _)| (1..=LATE_US).contains(&t.saturating_sub(t_us)));
         // If time steps far back, the scale starts again.
         let t_us = if late { self.peaks.back().map_or(t_us, |&(t, _)| t) } else { t_us };
@@ -106,8 +93,7 @@ impl White {
             self.peaks.pop_back();
         }
         self.peaks.push_back((t_us, peak));
-        let full = self.peaks.front().map_or(least, |&(_, largest)| largest.max(least));
-        (above.iter().map(|&value| (value / full * 255.0).round().min(255.0) as u8).collect(), full)
+        self.peaks.front().map_or(1.0, |&(_, largest)| largest.max(1.0))
     }
 }
 

@@ -17,21 +17,14 @@ from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.reading import Datagrams, Lines
-from taxel.recording.analysis.pressure import above_rest
-from taxel.recording.analysis.rest import Rest, ticks_by_unit
-from taxel.recording.recording import Recording
 from taxel.recording.source import SourceView, ticks_of
 
 __all__ = ["RecordingWriter", "encode_events", "write_mcap"]
 
 #: Number of values of a block of frames: a chunk of the file.
 _BLOCK = 1 << 18
-#: Interval between the pictures for viewers, us.
-_EVERY_US = 100_000
 #: The most numbers of repaired events in the description of a file, which is limited to 16 MiB.
 _MOST = 1_000_000
-#: What a picture for viewers states as the rest that was subtracted, by the source of the rest.
-_RESTS = {"unit": "0", "quiet": "quiet stretch"}
 
 
 def write_mcap(path: Path, sources: Mapping[str, SourceView], compression: str) -> tuple[str, ...]:
@@ -186,8 +179,6 @@ def _write_frames(path: Path, sources: Mapping[str, SourceView], compression: st
     def at_ns(t: int) -> int:
         return max(0, (t - origin_us) * 1000)
 
-    shown = {name: _low_rate(source, tables[name]) for name, source in sources.items()}
-    drawn = dict.fromkeys(shown, 0)
     for name, source in sources.items():
         if (held := ticks_of(source.marks.held)) is not None:
             tracks[name].held(0, None, held)
@@ -197,33 +188,12 @@ def _write_frames(path: Path, sources: Mapping[str, SourceView], compression: st
         t = np.ascontiguousarray(block.t)
         values = np.ascontiguousarray(block.values).reshape(-1)
         tracks[name].frames(first, (t - origin_us) * 1000, t, values, fits)
-        few, about = shown[name]
-        stop = int(np.searchsorted(few.t, t[-1], side="right"))
-        for k in range(drawn[name], stop):
-            above = np.ascontiguousarray(few.values[k]).reshape(-1)
-            tracks[name].preview_above(at_ns(int(few.t[k])), int(few.t[k]), above, *about)
-        drawn[name] = stop
     for name, source in sources.items():
         _add_small(tracks[name], source, at_ns)
     counts = {name: json.dumps(_counts(source, len(tables[name]))) for name, source in sources.items()}
     for name in [*sources][1:]:
         tracks[name].end(counts[name])
     writer.finish(counts[next(iter(sources))])
-
-
-def _low_rate(source: SourceView, frames: Frames) -> tuple[Frames, tuple[float, str, str]]:
-    """Return frames above rest, ten a second, and what white is at least, the rest that was subtracted, the unit.
-
-    There are none where frames have no times.
-    """
-    _, first = np.unique(frames.t // _EVERY_US, return_index=True)
-    first = first[: None if source.facts.timed else 0]
-    few = Frames(frames.values[first], frames.t[first], unit=frames.unit, array=frames.array)
-    if not len(few):
-        return few, (1.0, "none", few.unit)
-    recording = Recording({source.facts.label: SourceView(source.in_memory(few))})
-    above, _, rest = cast("tuple[Frames, float, Rest]", above_rest(recording))
-    return above, (1.0 / ticks_by_unit(few), _RESTS.get(rest.source, rest.source), above.unit)
 
 
 def _blocks(tables: Mapping[str, Frames]) -> Iterator[tuple[str, int, Frames, bool]]:
@@ -301,14 +271,10 @@ def _by_host(source: SourceView) -> Callable[[int], int]:
 
 
 def _add_remarks(writer: Any, events: Events, source: SourceView) -> None:
-    at_ns, marks = _by_host(source), source.marks
-    detections, noted = marks.detections, [note.t for note in marks.notes if note.t is not None]
-    around = np.concatenate(
-        [detections.t, detections.known, np.array([*(t for t, _ in events.markers), *noted], np.int64)]
-    )
+    at_ns = _by_host(source)
     for t, start in events.markers:
         writer.marker(at_ns(t), t, start)
-    for t, ticks in _core.RecordingPreviews(events._parts(), around):
+    for t, ticks in _core.RecordingPreviews(events._parts()):
         writer.preview(at_ns(t), t, events.array.columns, ticks)
     _add_small(writer, source, at_ns)
 
