@@ -33,7 +33,6 @@ mod tare_measurement;
 mod threads;
 mod viewer_queue;
 
-use std::net::SocketAddr;
 use std::ops::Deref;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
@@ -41,31 +40,32 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crossbeam_channel as channel;
-use taxel_core::detect::Detector;
 use taxel_core::wire;
-use taxel_core::{Array, Stop, problem};
+use taxel_core::wire::Registers;
+use taxel_core::{Stop, problem};
 
+use crate::capture::Receiver;
 use crate::locked::lock;
 use crate::recording::SourceWriter;
 use crate::{Error, Result, address};
 pub use counters::{
     Arrival, ArrivalState, BoardState, Counters, DecodingCounts, LiveSummary, ReadoutCounts, SourceCounts,
 };
+use frame_input::FrameInput;
 pub use frame_input::{LineCounts, ReadLines};
 pub use handle::Handle;
 use handle::verdict;
 pub use options::{LiveOptions, Record, StatedTare};
 use output::DetectionOutput;
 use readout_queue::ReadoutQueue;
-pub use running_readout::ReadoutSetup;
 use running_readout::RunningReadout;
 use running_recording::{RunningRecording, losses};
 use sending::Sending;
 pub use sending::{Destination, Sent};
-use shared::{PipelineShared, PublishedState, RecordingSlot, frame_time, header_of};
+use shared::{PipelineShared, PublishedState, RecordingSlot};
 pub use sink::{LineSink, OutputDetection, Sink};
 pub use source::{BoardSource, FrameLayout, FrameSource, NamedSource, SourceKind};
-use sources::{Named, NumberStream, PipelineInput};
+use sources::{Named, NumberStream};
 use stages::Stages;
 use threads::Threads;
 pub use viewer_queue::{Piece, TaxelChange, ViewerEvents};
@@ -98,51 +98,9 @@ impl Live {
     ///
     /// # Errors
     ///
-    /// As [`Live::start`]; those of [`ReadoutSetup::new`]; of a readout that cannot be read, or is of another unit.
-    pub fn open(options: LiveOptions, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
-        let readout = options.readout.as_deref().map(Detector::from_json).transpose()?;
-        let input = match &options.input {
-            Some(frames) => {
-                frames.layout.check()?;
-                PipelineInput::Frames(frames.place.clone(), Box::new(frames.layout.clone()))
-            }
-            None => PipelineInput::Board(options.address()?),
-        };
-        if let Some(readout) = &readout {
-            match input.layout() {
-                None => readout.check_unit("ticks")?,
-                Some(layout) => readout.check_unit(&layout.unit).map_err(|error| {
-                    let unit = readout.unit().unwrap_or_default();
-                    problem!("{error}; if the values are in {unit}, add unit={unit} in --source")
-                })?,
-            }
-        }
-        let frames = frame_time(&options, input.layout());
-        let readout = ReadoutSetup::new(readout, &options, frames)?;
-        Self::start_from(input, options, readout, sinks)
-    }
-
-    /// Opens the socket (and the file), and starts to receive a board.
-    ///
-    /// # Errors
-    ///
     /// `Socket` if the port is in use, `File` if the file exists or cannot be created, or a destination cannot be
-    /// opened, `Core(Problem)` if an option is not valid.
-    pub fn start(
-        address: SocketAddr,
-        options: LiveOptions,
-        readout: ReadoutSetup,
-        sinks: Vec<Box<dyn Sink>>,
-    ) -> Result<Self> {
-        Self::start_from(PipelineInput::Board(address), options, readout, sinks)
-    }
-
-    fn start_from(
-        input: PipelineInput,
-        mut options: LiveOptions,
-        readout: ReadoutSetup,
-        sinks: Vec<Box<dyn Sink>>,
-    ) -> Result<Self> {
+    /// opened, `Core(Problem)` if an option is not valid; of a readout that cannot be read, or is of another unit.
+    pub fn open(options: LiveOptions, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
         if options.record_later && options.record.is_some() {
             return Err(problem!("record and record_later are both given: give only one of them").into());
         }
@@ -153,19 +111,11 @@ impl Live {
             )
             .into());
         }
-        let sources = std::mem::take(&mut options.sources);
-        Self::begin(input, options, sources, readout, sinks, None)
+        Self::begin(options, sinks, None)
     }
 
     /// Starts the pipeline; `part` writes it into the recording of another one.
-    fn begin(
-        input: PipelineInput,
-        options: LiveOptions,
-        sources: Vec<NamedSource>,
-        readout: ReadoutSetup,
-        sinks: Vec<Box<dyn Sink>>,
-        part: Option<SourceWriter>,
-    ) -> Result<Self> {
+    fn begin(options: LiveOptions, sinks: Vec<Box<dyn Sink>>, part: Option<SourceWriter>) -> Result<Self> {
         for (name, frames) in [("guard_frames", options.guard_frames), ("gap_frames", options.gap_frames)] {
             if !(frames.is_finite() && frames >= 0.0) {
                 return Err(problem!(name; " is {frames}: must be 0 or more and finite").into());
@@ -174,25 +124,28 @@ impl Live {
         if options.readout_events == 0 {
             return Err(problem!("readout_events"; " is 0: must be 1 or more").into());
         }
-        if input.layout().is_none() {
-            wire::v2::checked_stride(&options.array)?;
-            options.registers.check(&options.array)?;
-        }
-        match &readout {
-            ReadoutSetup::Taring(stretch_us, _) if *stretch_us <= 0 => {
-                return Err(problem!("tare"; " of {stretch_us} us: must be above 0").into());
+        match options.layout() {
+            Some(layout) => layout.check()?,
+            None => {
+                wire::v2::checked_stride(&options.array)?;
+                options.registers.check(&options.array)?;
             }
-            ReadoutSetup::Taring(_, readout) => readout.check()?,
-            ReadoutSetup::None | ReadoutSetup::Reading(_) => {}
         }
+        let readout = RunningReadout::open(&options)?;
         let record = options.recording()?;
         let sending = options.send.iter().map(|to| Sending::open(&to.parse()?)).collect::<Result<Vec<_>>>()?;
         // The socket is opened before the file, so that a port that is in use leaves no empty file.
-        let (receiver, frames) = input.open(options.capture())?;
-        let header = header_of(&options, receiver.origin(), frames.as_ref().map(|frames| &frames.layout))?;
+        let (receiver, frames) = match &options.input {
+            None => (Receiver::bind(options.address()?, options.capture())?, None),
+            Some(source) => {
+                let (frames, receiver) = FrameInput::new(&source.place, &source.layout, options.capture());
+                (receiver, Some(frames))
+            }
+        };
+        let header = options.header(receiver.origin())?;
         let recording = match (part, &record) {
             (Some(part), _) => Some(RunningRecording::part(part, &header, false)),
-            (None, Some(record)) => Some(RunningRecording::create(record, header, &sources, false)?),
+            (None, Some(record)) => Some(RunningRecording::create(record, header, &options.sources, false)?),
             (None, None) => None,
         };
         let published = PublishedState { frame: vec![0; options.array.len()], ..PublishedState::default() };
@@ -206,14 +159,12 @@ impl Live {
             subscribers: Mutex::default(),
             sending: sending.iter().map(Sending::counts).collect(),
             registers: Mutex::new(options.registers),
-            options: options.clone(),
+            options,
             frames,
-            sources,
             begun: Instant::now(),
             ended: AtomicBool::new(false),
         });
         let (queue, detections) = channel::bounded(OUTPUT_WAITING);
-        let reads_out = !matches!(readout, ReadoutSetup::None);
         let (others, numbers) = Self::begin_others(&shared).inspect_err(|_| {
             // Nothing arrived: the file is removed.
             let recording = lock(&shared.recording.running).take();
@@ -225,45 +176,50 @@ impl Live {
         // The destinations come first: a device that detections drive must not wait for a callback.
         let sending = sending.into_iter().map(|sending| Box::new(sending) as Box<dyn Sink>);
         let output = DetectionOutput::new(sending.chain(sinks).collect(), queue);
-        let readout = reads_out.then(|| RunningReadout::new(readout, &options.array, shared.frame_time()));
+        let names: &[&str] = if readout.is_some() { &["taxel-decode", "taxel-readout"] } else { &["taxel-decode"] };
         let stages = Stages::new(&shared, readout);
-        let names: &[&str] = if reads_out { &["taxel-decode", "taxel-readout"] } else { &["taxel-decode"] };
-        let threads = Arc::new(Threads::new(stages, output, names.len()));
+        let threads = Arc::new(Threads::new(stages, output, shared));
         for name in names {
-            let (threads, shared) = (Arc::clone(&threads), Arc::clone(&shared));
-            live.spawn(name, move || threads.run(&shared))?;
+            let threads = Arc::clone(&threads);
+            live.spawn(name, move || threads.run())?;
         }
         Ok(live)
     }
 
     /// Starts the other sources of a recording: those with a pipeline of their own, and lines of numbers.
     fn begin_others(shared: &PipelineShared) -> Result<(Named<Self>, Named<Arc<NumberStream>>)> {
-        let (mut pipelines, mut numbers, options) = (vec![], vec![], &shared.options);
-        for NamedSource { name, place, kind } in &shared.sources {
+        let (mut pipelines, mut numbers) = (vec![], vec![]);
+        for NamedSource { name, place, kind } in &shared.options.sources {
             let part =
                 lock(&shared.recording.running).as_ref().map(|recording| recording.track_of(name)).transpose()?;
-            let of_pipeline = |array: &Array| LiveOptions {
-                name: name.clone(),
-                kernel_buffer_bytes: options.kernel_buffer_bytes,
-                queue_bytes: options.queue_bytes,
-                gro: options.gro,
-                ..LiveOptions::new(array.clone())
-            };
-            let (input, options) = match kind {
-                SourceKind::Board(board) => {
-                    let of_board = LiveOptions { registers: board.registers, ..of_pipeline(&board.array) };
-                    (PipelineInput::Board(address::of_text(&board.address)?), of_board)
-                }
+            let (array, board, input) = match kind {
+                SourceKind::Board(board) => (&board.array, Some(board), None),
                 SourceKind::Frames(layout) => {
-                    (PipelineInput::Frames(place.clone(), layout.clone()), of_pipeline(&layout.array))
+                    let input = FrameSource { text: String::new(), place: place.clone(), layout: (**layout).clone() };
+                    (&layout.array, None, Some(input))
                 }
                 SourceKind::Numbers(stream) => {
                     numbers.push((name.clone(), Arc::new(NumberStream::new(name, stream.clone(), part))));
                     continue;
                 }
             };
-            let live = Self::begin(input, options, vec![], ReadoutSetup::None, vec![], part)?;
-            pipelines.push((name.clone(), live));
+            let address = board.map(|board| address::of_text(&board.address)).transpose()?;
+            let options = LiveOptions {
+                name: name.clone(),
+                array: array.clone(),
+                registers: board.map_or_else(Registers::default, |board| board.registers),
+                host: address.map(|address| address.ip().to_string()),
+                port: address.map(|address| address.port()),
+                input,
+                differences: false,
+                readout: None,
+                tare: None,
+                record: None,
+                sources: vec![],
+                send: vec![],
+                ..shared.options.clone()
+            };
+            pipelines.push((name.clone(), Self::begin(options, vec![], part)?));
         }
         Ok((pipelines, numbers))
     }

@@ -1,6 +1,7 @@
 //! From the emulated board's frames to recorded datagrams and detections: nothing is lost uncounted, and the recording
 //! gives what was received live.
 
+mod defaults;
 mod ways;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,7 +19,7 @@ use taxel_core::wire::{Command, Decoder, Registers};
 use taxel_core::{Array, Events, Stop};
 use taxel_live::capture::Sender;
 use taxel_live::emulate::{self, Emulator, Report, Touch};
-use taxel_live::pipeline::{Live, LiveOptions, LiveSummary, OutputDetection, ReadoutSetup, Sink};
+use taxel_live::pipeline::{Live, LiveOptions, LiveSummary, OutputDetection, Sink, StatedTare};
 use taxel_live::recording::{FileEnding, NOTHING_LOST, Reader, RecordingStatus, Topic};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
@@ -112,14 +113,14 @@ fn readout_of(encoder: &str, cell: TrainedNeuron) -> Readout {
     }
 }
 
-fn reading(readout: &Readout) -> ReadoutSetup {
-    ReadoutSetup::Reading(Box::new(readout.stream(&Array::thesis(), 192.0, None).expect("a sound readout")))
-}
-
 fn options(record: Option<&Scratch>) -> LiveOptions {
     let record = record.map(|s| s.0.clone());
     // A machine too slow for real time holds frames back: here the host's clock moves nothing on, so no event is late.
-    LiveOptions { record, compression: "lz4".to_owned(), guard_frames: 1e9, ..LiveOptions::new(Array::thesis()) }
+    LiveOptions { record, compression: "lz4".to_owned(), guard_frames: 1e9, ..defaults::options(&Array::thesis(), ANY) }
+}
+
+fn reading(readout: &Readout, options: LiveOptions) -> LiveOptions {
+    LiveOptions { readout: defaults::stated(readout), ..options }
 }
 
 fn wait_for(live: &Live, what: impl Fn(&Live) -> bool) {
@@ -164,7 +165,7 @@ fn recorded(path: &Scratch) -> (Events, Vec<Detection>) {
 #[test]
 fn a_recording_holds_the_events_that_the_board_sent() {
     let path = Scratch::new("events.mcap");
-    let live = Live::start(ANY, options(Some(&path)), ReadoutSetup::None, vec![]).expect("a port and a file");
+    let live = Live::open(options(Some(&path)), vec![]).expect("a port and a file");
     let report = emulate(live.address(), false, presses(3000, 3000));
     let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
@@ -196,7 +197,7 @@ fn detections_live_are_those_of_the_recording() {
         sink.lock().expect("not poisoned").push(output.clone());
         Ok(())
     })];
-    let live = Live::start(ANY, options(Some(&path)), reading(&readout(2.0)), sinks).expect("a port and a file");
+    let live = Live::open(reading(&readout(2.0), options(Some(&path))), sinks).expect("a port and a file");
     let report = emulate(live.address(), true, presses(4000, 4000));
     let mut queued = vec![];
     while let Some(output) = live.next(Duration::from_millis(500)).expect("no error") {
@@ -242,7 +243,7 @@ fn preview_times(path: &Scratch) -> Vec<i64> {
 fn a_recording_has_ten_previews_a_second() {
     let path = Scratch::new("preview_times.mcap");
     let begun = Instant::now();
-    let live = Live::start(ANY, options(Some(&path)), reading(&readout(2.0)), vec![]).expect("a port and a file");
+    let live = Live::open(reading(&readout(2.0), options(Some(&path))), vec![]).expect("a port and a file");
     emulate(live.address(), true, presses(6000, 6000));
     while live.next(Duration::from_millis(200)).expect("no error").is_some() {}
     live.stop().expect("no error");
@@ -253,7 +254,7 @@ fn a_recording_has_ten_previews_a_second() {
 
 #[test]
 fn in_silence_time_moves_on_by_the_hosts_clock() {
-    let live = Live::start(ANY, LiveOptions { guard_frames: 5.0, ..options(None) }, reading(&readout(20.0)), vec![])
+    let live = Live::open(reading(&readout(20.0), LiveOptions { guard_frames: 5.0, ..options(None) }), vec![])
         .expect("a port");
     // Two frames are all that ever comes; the potential crosses some ms after them.
     let mut frames = 0;
@@ -269,7 +270,7 @@ fn in_silence_time_moves_on_by_the_hosts_clock() {
 
 #[test]
 fn damaged_and_reordered_datagrams_are_counted_and_close_the_sum_of_bytes() {
-    let live = Live::start(ANY, options(None), ReadoutSetup::None, vec![]).expect("a port");
+    let live = Live::open(options(None), vec![]).expect("a port");
     let mut datagrams: Vec<Vec<u8>> = vec![];
     let mut board = Board::new(Registers::default(), &Array::thesis()).expect("a valid preset");
     let mut touch = presses(800, 800);
@@ -325,7 +326,7 @@ fn a_slow_readout_loses_events_where_they_are_counted_and_the_recording_loses_no
         Ok(())
     });
     let options = LiveOptions { readout_events: 1000, ..options(Some(&path)) };
-    let live = Live::start(ANY, options, reading(&readout(20.0)), vec![slow]).expect("started");
+    let live = Live::open(reading(&readout(20.0), options), vec![slow]).expect("started");
     let report = emulate(live.address(), false, presses(3000, 3000));
     let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
@@ -346,7 +347,7 @@ fn a_slow_sink_delays_neither_what_comes_nor_what_is_read_out() {
         let _ = held.recv();
         Ok(())
     });
-    let live = Live::start(ANY, options(None), reading(&readout(2.0)), vec![slow]).expect("a port");
+    let live = Live::open(reading(&readout(2.0), options(None)), vec![slow]).expect("a port");
     let report = emulate(live.address(), true, presses(1500, 1500));
     let expected = sent(1500, 1500);
     wait_for(&live, |live| live.counters().readout.read_out == expected.len() as u64);
@@ -367,7 +368,7 @@ fn a_slow_sink_delays_neither_what_comes_nor_what_is_read_out() {
 fn a_file_that_exists_stays_and_its_port_is_free() {
     let path = Scratch::new("earlier.mcap");
     std::fs::write(&path.0, "mine").expect("written");
-    let error = Live::start(ANY, options(Some(&path)), ReadoutSetup::None, vec![]).err().expect("refused");
+    let error = Live::open(options(Some(&path)), vec![]).err().expect("refused");
     assert!(matches!(&error, taxel_live::Error::File { .. }), "{error}");
     assert_eq!(std::fs::read(&path.0).expect("still there"), b"mine");
 }
@@ -375,15 +376,17 @@ fn a_file_that_exists_stays_and_its_port_is_free() {
 #[test]
 fn a_port_that_is_taken_leaves_no_file_behind() {
     let path = Scratch::new("unborn.mcap");
-    let holder = Live::start(ANY, options(None), ReadoutSetup::None, vec![]).expect("a port");
-    let error = Live::start(holder.address(), options(Some(&path)), ReadoutSetup::None, vec![]).err().expect("refused");
+    let holder = Live::open(options(None), vec![]).expect("a port");
+    let error = Live::open(LiveOptions { port: Some(holder.address().port()), ..options(Some(&path)) }, vec![])
+        .err()
+        .expect("refused");
     assert!(matches!(&error, taxel_live::Error::Socket { .. }), "{error}");
     assert!(!path.0.exists());
 }
 
 #[test]
 fn a_stop_ends_also_while_datagrams_pour_in() {
-    let live = Live::start(ANY, options(None), ReadoutSetup::None, vec![]).expect("a port");
+    let live = Live::open(options(None), vec![]).expect("a port");
     let to = live.address();
     let done = Arc::new(std::sync::atomic::AtomicBool::new(false));
     let theirs = Arc::clone(&done);
@@ -409,8 +412,8 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_reads_w
     let readout =
         readout_of(r#"{"name": "contact_area"}"#, TrainedNeuron { neuron, delay_ms: 0.0, inputs: vec![], weights });
     let path = Scratch::new("tare.mcap");
-    let setup = ReadoutSetup::Taring(1_000_000, Box::new(readout.clone().into()));
-    let live = Live::start(ANY, options(Some(&path)), setup, vec![]).expect("a port");
+    let options = LiveOptions { tare: Some(StatedTare::Seconds(1.0)), ..reading(&readout, options(Some(&path))) };
+    let live = Live::open(options, vec![]).expect("a port");
     wait_for(&live, |live| live.counters().readout.taring);
     let array = Array::thesis();
     let board = Board::new(Registers::default(), &array).expect("a valid preset");
@@ -444,7 +447,7 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_reads_w
 
 #[test]
 fn the_board_takes_commands_and_answers() {
-    let live = Live::start(ANY, options(None), ReadoutSetup::None, vec![]).expect("a port");
+    let live = Live::open(options(None), vec![]).expect("a port");
     let array = Array::thesis();
     let board = Board::new(Registers::default(), &array).expect("a valid preset");
     let control = Some(ANY);

@@ -1,5 +1,6 @@
 //! A board that speaks version 2, received live: what was lost is known, and its promises say when a moment is over.
 
+mod defaults;
 mod ways;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,7 +14,7 @@ use taxel_core::encode::Encoder;
 use taxel_core::neuron::{Neuron, Time};
 use taxel_core::wire::{Registers, v2};
 use taxel_core::{Array, Events, Stop};
-use taxel_live::pipeline::{Live, LiveOptions, ReadoutSetup};
+use taxel_live::pipeline::{Live, LiveOptions};
 use taxel_live::recording::Reader;
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
@@ -35,13 +36,7 @@ impl Drop for Scratch {
 fn options(array: &Array, registers: Registers, record: Option<&Scratch>) -> LiveOptions {
     let record = record.map(|s| s.0.clone());
     // The host's clock moves nothing on.
-    LiveOptions {
-        record,
-        compression: "lz4".to_owned(),
-        registers,
-        guard_frames: 1e9,
-        ..LiveOptions::new(array.clone())
-    }
+    LiveOptions { record, compression: "lz4".to_owned(), registers, guard_frames: 1e9, ..defaults::options(array, ANY) }
 }
 
 /// The datagrams of frames in which a square comes and goes.
@@ -100,8 +95,7 @@ fn a_large_array_is_recorded_and_every_loss_is_counted() {
     let mut sent = datagrams(&array, registers, 300);
     for lossy in [false, true] {
         let path = Scratch::new(if lossy { "lossy.mcap" } else { "whole.mcap" });
-        let live =
-            Live::start(ANY, options(&array, registers, Some(&path)), ReadoutSetup::None, vec![]).expect("a port");
+        let live = Live::open(options(&array, registers, Some(&path)), vec![]).expect("a port");
         let mut lost = 0;
         if lossy {
             let whole = std::mem::take(&mut sent);
@@ -160,8 +154,8 @@ fn in_silence_time_moves_on_by_the_boards_promises() {
         seen: Default::default(),
         training: None,
     };
-    let readout = ReadoutSetup::Reading(Box::new(readout.stream(&array, 192.0, None).expect("a sound readout")));
-    let live = Live::start(ANY, options(&array, registers, None), readout, vec![]).expect("a port");
+    let options = LiveOptions { readout: defaults::stated(&readout), ..options(&array, registers, None) };
+    let live = Live::open(options, vec![]).expect("a port");
     let mut board = Board::new(registers, &array).expect("sound registers");
     let socket = UdpSocket::bind(ANY).expect("a socket");
     // Two frames with events, then nothing but heartbeats; the potential crosses some ms later.

@@ -83,7 +83,7 @@ impl LineCounts {
 
 /// The input of a pipeline of frames.
 pub(super) struct FrameInput {
-    pub(super) layout: FrameLayout,
+    taxels: usize,
     state: Mutex<InputState>,
 }
 
@@ -97,16 +97,16 @@ struct InputState {
 
 impl FrameInput {
     /// The input, and what a pipeline receives of it.
-    pub(super) fn new(place: &str, layout: FrameLayout, options: ReceiverOptions) -> (Arc<Self>, Receiver) {
+    pub(super) fn new(place: &str, layout: &FrameLayout, options: ReceiverOptions) -> (Arc<Self>, Receiver) {
         let (receiver, feed) = Receiver::of_messages(Origin::Frames(place.to_owned()), options);
-        let times = FrameTimes::new(&layout);
+        let times = FrameTimes::new(layout);
         let state = Mutex::new(InputState { times, lines: 0, feed, message: vec![], trouble: None });
-        (Arc::new(Self { layout, state }), receiver)
+        (Arc::new(Self { taxels: layout.array.len(), state }), receiver)
     }
 
     /// Passes frames on, and waits until there is room for more.
     pub(super) fn push(&self, name: &str, read: &ReadLines) -> Result<()> {
-        let taxels = self.layout.array.len();
+        let taxels = self.taxels;
         let (frames, values, stamps) = (read.arrived_ns.len(), read.values.len(), read.stamps.len());
         if values != frames * taxels || !(stamps == 0 || stamps == frames) {
             return Err(problem!("source {name}: {values} values: must be {taxels} per frame").into());

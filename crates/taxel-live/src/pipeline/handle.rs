@@ -14,8 +14,9 @@ use taxel_core::{Marker, problem};
 use super::counters::{Counters, LiveSummary, SourceCounts};
 use super::frame_input::{FrameInput, LineCounts, ReadLines};
 use super::options::{LiveOptions, Record};
+use super::record_stage::EndedRecording;
 use super::running_recording::{RunningRecording, losses};
-use super::shared::{EndedRecording, PipelineRequest, PipelineShared};
+use super::shared::PipelineShared;
 use super::sink::OutputDetection;
 use super::source::FrameLayout;
 use super::sources::{NumberStream, losses_of_lines};
@@ -113,7 +114,7 @@ impl Handle {
     /// The layout of the frames of numbers that it receives; `None` of a board.
     #[must_use]
     pub fn layout(&self) -> Option<&FrameLayout> {
-        self.shared.frames.as_ref().map(|frames| &frames.layout)
+        self.shared.options.layout()
     }
 
     /// The options, with the sensor and the name of the source.
@@ -165,7 +166,7 @@ impl Handle {
         if !(1..=2).contains(&version) {
             return Err(problem!("wire version {version}: must be 1 or 2").into());
         }
-        self.shared.request(PipelineRequest::Expect(version));
+        self.shared.request(move |stages| stages.expect_version(version));
         Ok(())
     }
 
@@ -180,7 +181,7 @@ impl Handle {
     /// The names of its sources: first the one that is read out, then those that are only recorded.
     #[must_use]
     pub fn source_names(&self) -> Vec<String> {
-        let others = self.shared.sources.iter().map(|source| &source.name);
+        let others = self.shared.options.sources.iter().map(|source| &source.name);
         std::iter::once(&self.shared.options.name).chain(others).cloned().collect()
     }
 
@@ -188,9 +189,8 @@ impl Handle {
     /// first one, us; `None` of a board, and before the first frame.
     #[must_use]
     pub fn frame_values(&self) -> Option<(String, ValueSteps, i64)> {
-        let frames = self.shared.frames.as_ref()?;
         let (steps, begin_us) = self.shared.published().steps?;
-        Some((frames.layout.unit.clone(), steps, begin_us))
+        Some((self.layout()?.unit.clone(), steps, begin_us))
     }
 
     /// The board's registers, as far as they are known.
@@ -202,7 +202,7 @@ impl Handle {
     /// Announces a write of the board's registers: it is recorded, and its version of the wire is expected.
     pub fn announce_registers(&self, registers: Registers) {
         *lock(&self.shared.registers) = registers;
-        self.shared.request(PipelineRequest::Registers(registers));
+        self.shared.request(move |stages| stages.note_registers(&registers));
     }
 
     /// Returns copies of the events from the next batch on, for a viewer.
@@ -211,9 +211,7 @@ impl Handle {
     ///
     /// `Core(Problem)` if the pipeline has ended.
     pub fn events(&self) -> Result<ViewerEvents> {
-        let (answer, events) = channel::bounded(1);
-        self.shared.request(PipelineRequest::View(answer));
-        self.shared.wait(&events)
+        self.shared.ask(|stages| Ok(stages.add_viewer()))
     }
 
     /// Returns a queue of the detections from now on with capacity `waiting`; a slow receiver misses some.
@@ -236,7 +234,7 @@ impl Handle {
             // Returns an error that ended an earlier recording and that no call has returned yet.
             self.take_error()?;
         }
-        let next = RunningRecording::create(record, self.shared.header()?, &self.shared.sources, true)?;
+        let next = RunningRecording::create(record, self.shared.header()?, &self.shared.options.sources, true)?;
         self.replace(Some(next))
     }
 
@@ -325,9 +323,8 @@ impl Handle {
     /// `Core(Problem)` where a taxel does not exist or has had no event so far, or a tare is being measured: then
     /// none is zeroed. `File` where the disk is full.
     pub fn zero(&self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
-        let (answer, zeroed) = channel::bounded(1);
-        self.shared.request(PipelineRequest::Zero(taxels.to_vec(), answer));
-        self.shared.wait(&zeroed).and_then(std::convert::identity)
+        let taxels = taxels.to_vec();
+        self.shared.ask(move |stages| stages.zero(&taxels))
     }
 
     /// The latest zeroing of each zeroed taxel, by taxel index; and the number of zeroings.
@@ -354,9 +351,7 @@ impl Handle {
 fn replace_of(shared: &PipelineShared, next: Option<RunningRecording>) -> Result<EndedRecording> {
     // Set before the request, so that the recording runs for callers that ask after this call.
     shared.recording.runs.fetch_or(next.is_some(), Ordering::AcqRel);
-    let (answer, ended) = channel::bounded(1);
-    shared.request(PipelineRequest::Record(next.map(Box::new), answer));
-    let ended = shared.wait(&ended).and_then(std::convert::identity);
+    let ended = shared.ask(|stages| stages.switch_recording(next));
     if ended.is_err() {
         shared.recording.runs.store(lock(&shared.recording.running).is_some(), Ordering::Release);
     }

@@ -8,18 +8,18 @@ use taxel_core::Array;
 use taxel_core::detect::FrameTime;
 use taxel_core::wire::Registers;
 
-use super::source::{FrameSource, NamedSource};
+use super::source::{FrameLayout, FrameSource, NamedSource};
 use crate::address::of_host;
-use crate::capture::ReceiverOptions;
-use crate::recording::Compression;
+use crate::capture::{Origin, ReceiverOptions};
+use crate::recording::{Compression, Decoding, Header, now_ns};
 
 /// Where a board is received if nothing else is stated.
 pub const PORT: u16 = 5208;
 const HOST: &str = "0.0.0.0";
 
-/// The options of a [`Live`](super::Live), which Python declares and documents (`taxel.live.LiveOptions`).
+/// The options of a [`Live`](super::Live), which Python declares and documents, with their defaults (`taxel.live.LiveOptions`).
 #[derive(Debug, Clone, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(deny_unknown_fields)]
 pub struct LiveOptions {
     /// The UDP port that the board sends to; 0 finds a free one.
     pub port: Option<u16>,
@@ -67,36 +67,6 @@ pub struct LiveOptions {
     pub gro: bool,
 }
 
-impl Default for LiveOptions {
-    fn default() -> Self {
-        let ReceiverOptions { kernel_buffer_bytes, queue_bytes, gro } = ReceiverOptions::default();
-        Self {
-            port: None,
-            host: None,
-            array: Array::thesis(),
-            registers: Registers::default(),
-            differences: false,
-            readout: None,
-            tare: None,
-            record: None,
-            record_later: false,
-            name: "board".to_owned(),
-            input: None,
-            sources: vec![],
-            compression: "none".to_owned(),
-            overwrite: false,
-            guard_frames: 5.0,
-            gap_frames: 1.0,
-            lines: false,
-            send: vec![],
-            kernel_buffer_bytes,
-            queue_bytes,
-            readout_events: 1 << 20,
-            gro,
-        }
-    }
-}
-
 /// What a user states of the taxels' rest.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(untagged)]
@@ -108,16 +78,33 @@ pub enum StatedTare {
 }
 
 impl LiveOptions {
-    /// The default options for an array.
+    /// The layout of the frames of numbers that are received; `None` of a board.
     #[must_use]
-    pub fn new(array: Array) -> Self {
-        Self { array, ..Self::default() }
+    pub fn layout(&self) -> Option<&FrameLayout> {
+        self.input.as_ref().map(|frames| &frames.layout)
     }
 
-    /// The length of the board's frames, and the unit of their stamps, by its registers.
+    /// The length of the source's frames, and the unit of their stamps: as its frames are laid out, or by its registers.
     #[must_use]
-    pub fn frames(&self) -> FrameTime {
-        FrameTime::on_wire(self.registers.frame_us(), self.registers.wire_version)
+    pub fn frame_time(&self) -> FrameTime {
+        match self.layout() {
+            Some(layout) => layout.frame_us.into(),
+            None => FrameTime::on_wire(self.registers.frame_us(), self.registers.wire_version),
+        }
+    }
+
+    /// The header of a recording of this source alone, which is received from `origin`.
+    pub(super) fn header(&self, origin: &Origin) -> taxel_core::Result<Header> {
+        let (array, name) = (self.array.clone(), self.name.clone());
+        let source = match origin {
+            Origin::Udp(address) => format!("udp {address}"),
+            Origin::Frames(place) => place.clone(),
+        };
+        if let Some(layout) = self.layout() {
+            return Header::of_frames(&name, array, layout.properties(), source, now_ns());
+        }
+        let decoding = Decoding { difference: self.differences, ..Decoding::default() };
+        Ok(Header { decoding, name, ..Header::of_board(array, Some(self.registers), source, now_ns()) })
     }
 
     /// The address to receive a board on.

@@ -1,6 +1,6 @@
-//! The queue between decoding and reading out.
+//! What the readout processes, and the queue in which it waits for a readout in a thread of its own.
 
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Condvar, Mutex, PoisonError};
 
 use taxel_core::encode::Zeroing;
 use taxel_core::events::FARTHEST_BACK_US;
@@ -8,24 +8,6 @@ use taxel_core::{Array, Events};
 
 use super::frame_block::FrameBlock;
 use crate::locked::lock;
-
-/// Events that wait for the readout, and the time up to which there are no more.
-#[derive(Debug)]
-pub(super) struct ReadoutQueue {
-    state: Mutex<WaitingEvents>,
-    came: Condvar,
-    limit: usize,
-}
-
-#[derive(Debug)]
-struct WaitingEvents {
-    events: Events,
-    frames: FrameBlock,
-    quiet: Option<QuietUntil>,
-    zeroings: Vec<Zeroing>,
-    dropped: u64,
-    closed: bool,
-}
 
 /// A time before which no data follow the queued events, us.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,101 +32,92 @@ impl QuietUntil {
     }
 }
 
-/// What follows the events that the readout processes at once.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct BatchEnd {
-    /// The time before which no more events follow.
-    pub quiet: Option<QuietUntil>,
+/// What the readout processes at once.
+#[derive(Debug)]
+pub(super) struct ReadoutInput {
+    pub(super) events: Events,
+    /// Frames, in place of events, if the source sends them.
+    pub(super) frames: FrameBlock,
+    /// Taxels that were zeroed, each at its own time.
+    pub(super) zeroings: Vec<Zeroing>,
+    /// The time before which no data follow these.
+    pub(super) quiet: Option<QuietUntil>,
     /// No more data will arrive.
-    pub last: bool,
+    pub(super) last: bool,
+}
+
+impl ReadoutInput {
+    pub(super) fn new(array: &Array) -> Self {
+        let events = Events::empty(array.clone());
+        Self { events, frames: FrameBlock::default(), zeroings: vec![], quiet: None, last: false }
+    }
+
+    /// Whether there are events, markers or frames.
+    fn has_data(&self) -> bool {
+        !(self.events.is_empty() && self.events.markers.is_empty() && self.frames.is_empty())
+    }
+
+    /// Whether there is nothing to process.
+    pub(super) fn is_empty(&self) -> bool {
+        !self.has_data() && self.zeroings.is_empty() && self.quiet.is_none() && !self.last
+    }
+
+    /// Clears all of it, and keeps its memory.
+    pub(super) fn clear(&mut self) {
+        self.events.clear();
+        self.frames.clear();
+        self.zeroings.clear();
+        (self.quiet, self.last) = (None, false);
+    }
+}
+
+/// The input that waits for a readout in a thread of its own, as one.
+#[derive(Debug)]
+pub(super) struct ReadoutQueue {
+    waiting: Mutex<ReadoutInput>,
+    came: Condvar,
+    limit: usize,
 }
 
 impl ReadoutQueue {
     pub(super) fn new(array: &Array, limit: usize) -> Self {
-        let events = Events::empty(array.clone());
-        let frames = FrameBlock::default();
-        let state = WaitingEvents { events, frames, quiet: None, zeroings: vec![], dropped: 0, closed: false };
-        Self { state: Mutex::new(state), came: Condvar::new(), limit }
+        Self { waiting: Mutex::new(ReadoutInput::new(array)), came: Condvar::new(), limit }
     }
 
-    /// Adds events, with the board's promise after them, and leaves `events` empty; those that do not fit are dropped.
-    /// Returns the number dropped so far. Wakes the reader once.
-    pub(super) fn push(&self, events: &mut Events, promised: Option<i64>) -> u64 {
-        let mut state = self.state();
-        let room = self.limit.saturating_sub(state.events.len());
-        if state.events.is_empty() && state.events.markers.is_empty() && events.len() <= room {
-            std::mem::swap(&mut state.events, events);
-        } else {
-            let dropped = events.len().saturating_sub(room);
-            state.dropped += dropped as u64;
-            state.events.append(events, room.min(events.len()));
-            events.clear();
+    /// Adds input. Returns the number of events or frames that were dropped, as they did not fit.
+    pub(super) fn push(&self, input: &mut ReadoutInput) -> usize {
+        let mut waiting = lock(&self.waiting);
+        if input.has_data() || input.quiet.is_some() {
+            // A silence counts only where nothing came after it.
+            waiting.quiet = input.quiet;
         }
-        state.quiet = promised.map(QuietUntil::ByBoard);
-        let dropped = state.dropped;
-        drop(state);
-        self.came.notify_one();
-        dropped
-    }
-
-    /// Adds frames, and leaves `frames` empty; a block that does not fit is dropped. Returns the number of frames dropped so
-    /// far.
-    pub(super) fn push_frames(&self, frames: &mut FrameBlock) -> u64 {
-        let mut state = self.state();
+        let fitting = self.limit.saturating_sub(waiting.events.len()).min(input.events.len());
+        let mut dropped = input.events.len() - fitting;
+        waiting.events.append(&input.events, fitting);
         // A frame has as many values as the array; a block that waits alone always fits.
-        if state.frames.is_empty() || state.frames.values.len() + frames.values.len() <= self.limit {
-            state.frames.append(frames);
+        if waiting.frames.is_empty() || waiting.frames.values.len() + input.frames.values.len() <= self.limit {
+            waiting.frames.append(&mut input.frames);
         } else {
-            state.dropped += frames.t.len() as u64;
-            frames.clear();
+            dropped += input.frames.t.len();
         }
-        state.quiet = None;
-        let dropped = state.dropped;
-        drop(state);
+        waiting.zeroings.append(&mut input.zeroings);
+        waiting.last |= input.last;
+        drop(waiting);
         self.came.notify_one();
         dropped
     }
 
-    /// Sets the time before which no data follow the queued events.
-    pub(super) fn set_quiet(&self, quiet: QuietUntil) {
-        self.state().quiet = Some(quiet);
+    /// Waits until there is input, and takes all of it.
+    pub(super) fn pop(&self, input: &mut ReadoutInput) {
+        input.clear();
+        let waiting = self.came.wait_while(lock(&self.waiting), |waiting| waiting.is_empty());
+        std::mem::swap(&mut *waiting.unwrap_or_else(PoisonError::into_inner), input);
+    }
+
+    /// Ends the queue early, as no more input can come.
+    pub(super) fn close(&self) {
+        lock(&self.waiting).last = true;
         self.came.notify_one();
-    }
-
-    /// Adds zeroings, each of which has its own time.
-    pub(super) fn zero(&self, zeroings: &[Zeroing]) {
-        self.state().zeroings.extend_from_slice(zeroings);
-        self.came.notify_one();
-    }
-
-    /// Ends the queue; `quiet` is the time before which nothing arrived.
-    pub(super) fn close(&self, quiet: Option<QuietUntil>) {
-        let mut state = self.state();
-        state.quiet = quiet.or(state.quiet);
-        state.closed = true;
-        drop(state);
-        self.came.notify_one();
-    }
-
-    /// Waits until something is there and removes all of it; adds to `zeroings`.
-    pub(super) fn pop(&self, events: &mut Events, frames: &mut FrameBlock, zeroings: &mut Vec<Zeroing>) -> BatchEnd {
-        events.clear();
-        frames.clear();
-        let nothing = |s: &mut WaitingEvents| {
-            let silent = s.events.is_empty() && s.events.markers.is_empty() && s.zeroings.is_empty();
-            silent && s.frames.is_empty() && s.quiet.is_none() && !s.closed
-        };
-        let mut state = self.came.wait_while(self.state(), nothing).unwrap_or_else(PoisonError::into_inner);
-        std::mem::swap(&mut state.events, events);
-        std::mem::swap(&mut state.frames, frames);
-        zeroings.append(&mut state.zeroings);
-        BatchEnd { quiet: state.quiet.take(), last: state.closed }
-    }
-
-    /// Locks the state. No holder of the lock can panic half-way through a change, so a poisoned lock still guards a
-    /// valid state.
-    fn state(&self) -> MutexGuard<'_, WaitingEvents> {
-        lock(&self.state)
     }
 }
 
@@ -154,61 +127,55 @@ mod tests {
 
     use super::*;
 
-    fn events(t: &[i64], ticks: Option<u16>) -> Events {
+    fn input(t: &[i64], ticks: Option<u16>, quiet: Option<QuietUntil>) -> ReadoutInput {
         let n = t.len();
         let intensity = ticks.map(|v| Intensities { ticks: vec![v; n], present: vec![true; n] });
         let (x, y, p) = (vec![1; n], vec![2; n], vec![true; n]);
-        Events { t: t.to_vec(), x, y, p, intensity, ..Events::empty(Array::thesis()) }
+        let events = Events { t: t.to_vec(), x, y, p, intensity, ..Events::empty(Array::thesis()) };
+        ReadoutInput { events, quiet, ..ReadoutInput::new(&Array::thesis()) }
+    }
+
+    fn popped(queue: &ReadoutQueue) -> ReadoutInput {
+        let mut popped = ReadoutInput::new(&Array::thesis());
+        queue.pop(&mut popped);
+        popped
     }
 
     #[test]
     fn what_was_pushed_in_pieces_is_popped_as_one() {
-        let readout_queue = ReadoutQueue::new(&Array::thesis(), 10);
+        let queue = ReadoutQueue::new(&Array::thesis(), 10);
         for (t, ticks) in [(&[1, 2][..], None), (&[3], Some(7)), (&[4], None)] {
-            let mut piece = events(t, ticks);
-            assert_eq!(readout_queue.push(&mut piece, None), 0);
-            assert!(piece.is_empty());
+            assert_eq!(queue.push(&mut input(t, ticks, None)), 0);
         }
-        let mut popped = Events::empty(Array::thesis());
-        assert_eq!(
-            readout_queue.pop(&mut popped, &mut FrameBlock::default(), &mut vec![]),
-            BatchEnd { quiet: None, last: false }
-        );
-        assert_eq!(popped.t, [1, 2, 3, 4]);
-        let intensity = popped.intensity.as_ref().expect("one had an intensity");
+        let popped = popped(&queue);
+        assert_eq!((popped.quiet, popped.last), (None, false));
+        assert_eq!(popped.events.t, [1, 2, 3, 4]);
+        let intensity = popped.events.intensity.as_ref().expect("one had an intensity");
         assert_eq!(intensity.ticks, [0, 0, 7, 0]);
         assert_eq!(intensity.present, [false, false, true, false]);
-        popped.view().check().expect("columns are equally long");
+        popped.events.view().check().expect("columns are equally long");
     }
 
     #[test]
     fn what_finds_no_room_is_counted() {
-        let readout_queue = ReadoutQueue::new(&Array::thesis(), 3);
-        assert_eq!(readout_queue.push(&mut events(&[1, 2], None), None), 0);
-        assert_eq!(readout_queue.push(&mut events(&[3, 4, 5], None), None), 2);
-        let mut popped = Events::empty(Array::thesis());
-        readout_queue.pop(&mut popped, &mut FrameBlock::default(), &mut vec![]);
-        assert_eq!(popped.t, [1, 2, 3]);
+        let queue = ReadoutQueue::new(&Array::thesis(), 3);
+        assert_eq!(queue.push(&mut input(&[1, 2], None, None)), 0);
+        assert_eq!(queue.push(&mut input(&[3, 4, 5], None, None)), 2);
+        assert_eq!(popped(&queue).events.t, [1, 2, 3]);
     }
 
     #[test]
     fn silence_is_popped_once_and_only_where_nothing_came_after_it() {
-        let readout_queue = ReadoutQueue::new(&Array::thesis(), 10);
-        let mut popped = Events::empty(Array::thesis());
-        readout_queue.set_quiet(QuietUntil::ByHostClock(100));
-        assert_eq!(
-            readout_queue.pop(&mut popped, &mut FrameBlock::default(), &mut vec![]).quiet,
-            Some(QuietUntil::ByHostClock(100))
-        );
-        readout_queue.set_quiet(QuietUntil::ByHostClock(200));
-        readout_queue.push(&mut events(&[150], None), None);
-        assert_eq!(readout_queue.pop(&mut popped, &mut FrameBlock::default(), &mut vec![]).quiet, None);
-        readout_queue.push(&mut events(&[], None), Some(300));
-        assert_eq!(
-            readout_queue.pop(&mut popped, &mut FrameBlock::default(), &mut vec![]).quiet,
-            Some(QuietUntil::ByBoard(300))
-        );
-        readout_queue.close(None);
-        assert!(readout_queue.pop(&mut popped, &mut FrameBlock::default(), &mut vec![]).last);
+        let (queue, [by_host, by_board]) =
+            (ReadoutQueue::new(&Array::thesis(), 10), [QuietUntil::ByHostClock(100), QuietUntil::ByBoard(300)]);
+        queue.push(&mut input(&[], None, Some(by_host)));
+        assert_eq!(popped(&queue).quiet, Some(by_host));
+        queue.push(&mut input(&[], None, Some(by_host)));
+        queue.push(&mut input(&[150], None, None));
+        assert_eq!(popped(&queue).quiet, None);
+        queue.push(&mut input(&[], None, Some(by_board)));
+        queue.push(&mut ReadoutInput { last: true, ..input(&[], None, None) });
+        let popped = popped(&queue);
+        assert_eq!((popped.quiet, popped.last), (Some(by_board), true));
     }
 }

@@ -1,11 +1,11 @@
-//! The fourth stage: passes events to the readout, in this thread or through a queue to another one.
+//! The fourth stage: passes what arrived to the readout, in this thread or through a queue to another one.
 
-use taxel_core::Events;
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
+use taxel_core::{Array, Events};
 
 use super::frame_block::FrameBlock;
-use super::readout_queue::{BatchEnd, QuietUntil};
+use super::readout_queue::{QuietUntil, ReadoutInput};
 use super::running_readout::RunningReadout;
 use super::shared::PipelineShared;
 
@@ -16,6 +16,8 @@ pub(super) struct ReadoutStage {
     readout: Option<RunningReadout>,
     /// A readout that is about to move to its own thread.
     separated: Option<Box<RunningReadout>>,
+    /// What is about to be processed: empty between two calls, in memory that is reused.
+    input: ReadoutInput,
     /// Without a readout nothing is found.
     nothing: Vec<Detection>,
     /// The time up to which no more events will follow by the promises of version 2 that the readout has received, us.
@@ -23,8 +25,9 @@ pub(super) struct ReadoutStage {
 }
 
 impl ReadoutStage {
-    pub(super) fn new(readout: Option<RunningReadout>) -> Self {
-        Self { is_on: readout.is_some(), readout, separated: None, nothing: vec![], announced: None }
+    pub(super) fn new(readout: Option<RunningReadout>, array: &Array) -> Self {
+        let (is_on, input) = (readout.is_some(), ReadoutInput::new(array));
+        Self { is_on, readout, separated: None, input, nothing: vec![], announced: None }
     }
 
     pub(super) fn is_on(&self) -> bool {
@@ -64,56 +67,50 @@ impl ReadoutStage {
         self.announced = None;
     }
 
-    /// Processes events, with the time before which the board has promised no more; `events` may be empty after it.
+    /// Passes events on, with the time before which the board has promised no more; those in `events` are then others.
     pub(super) fn push(&mut self, shared: &PipelineShared, events: &mut Events, promised: Option<i64>) {
-        if !self.is_on || (promised.is_none() && events.is_empty() && events.markers.is_empty()) {
-            return;
+        if self.is_on {
+            std::mem::swap(&mut self.input.events, events);
+            self.input.quiet = promised.map(QuietUntil::ByBoard);
+            self.pass_on(shared);
+            self.announced = self.announced.max(promised);
         }
-        match &mut self.readout {
-            Some(readout) => {
-                readout.push(shared, events, BatchEnd { quiet: promised.map(QuietUntil::ByBoard), last: false });
-            }
-            None => {
-                let dropped = shared.readout_queue.push(events, promised);
-                shared.published().counters.readout.events_dropped = dropped;
-            }
-        }
-        self.announced = self.announced.max(promised);
     }
 
-    /// Processes frames.
+    /// Passes frames on; those in `frames` are then others.
     pub(super) fn push_frames(&mut self, shared: &PipelineShared, frames: &mut FrameBlock) {
-        match &mut self.readout {
-            _ if !self.is_on || frames.is_empty() => {}
-            Some(readout) => readout.push_frames(shared, frames),
-            None => {
-                let dropped = shared.readout_queue.push_frames(frames);
-                shared.published().counters.readout.events_dropped = dropped;
-            }
-        }
+        std::mem::swap(&mut self.input.frames, frames);
+        self.pass_on(shared);
     }
 
-    /// Processes a silence: no events before a time.
+    /// Passes a silence on: no data before a time.
     pub(super) fn process_silence(&mut self, shared: &PipelineShared, quiet: QuietUntil) {
-        match &mut self.readout {
-            Some(readout) => readout.advance(shared, BatchEnd { quiet: Some(quiet), last: false }),
-            None => shared.readout_queue.set_quiet(quiet),
-        }
+        self.input.quiet = Some(quiet);
+        self.pass_on(shared);
     }
 
     pub(super) fn zero(&mut self, shared: &PipelineShared, zeroings: &[Zeroing]) {
-        match &mut self.readout {
-            Some(readout) => readout.zero(zeroings),
-            None if self.is_on => shared.readout_queue.zero(zeroings),
-            None => {}
-        }
+        self.input.zeroings.extend_from_slice(zeroings);
+        self.pass_on(shared);
     }
 
     /// Ends the input.
     pub(super) fn close(&mut self, shared: &PipelineShared, quiet: Option<QuietUntil>) {
+        (self.input.quiet, self.input.last) = (quiet, true);
+        self.pass_on(shared);
+    }
+
+    fn pass_on(&mut self, shared: &PipelineShared) {
         match &mut self.readout {
-            Some(readout) => readout.advance(shared, BatchEnd { quiet, last: true }),
-            None => shared.readout_queue.close(quiet),
+            _ if !self.is_on || self.input.is_empty() => {}
+            Some(readout) => readout.process(shared, &self.input),
+            None => {
+                let dropped = shared.readout_queue.push(&mut self.input);
+                if dropped > 0 {
+                    shared.published().counters.readout.events_dropped += dropped as u64;
+                }
+            }
         }
+        self.input.clear();
     }
 }

@@ -12,13 +12,16 @@ use taxel_core::wire::DatagramInfo;
 
 use super::counters::Counters;
 use super::running_recording::RunningRecording;
-use super::shared::{EndedRecording, PipelineShared};
+use super::shared::PipelineShared;
 use crate::Result;
 use crate::locked::lock;
 use crate::recording::{BoardChange, BoardChangeKind, LOW_RATE_EVERY, now_ns};
 
 /// Interval at which the counts are written to an unfinished recording.
 pub(super) const COUNTS_EVERY: Duration = Duration::from_secs(1);
+
+/// The recording that was running, if any, and the counters after its last datagram.
+pub(super) type EndedRecording = (Option<RunningRecording>, Counters);
 
 pub(super) struct RecordStage {
     shared: Arc<PipelineShared>,
@@ -99,7 +102,7 @@ impl RecordStage {
 
     /// Ends the running recording, and starts the next one, if there is one, with the taxels' values. What was decoded
     /// so far belongs to the former, what arrives from now on to the latter.
-    pub(super) fn switch(&mut self, next: Option<Box<RunningRecording>>, held: &Held) -> Result<EndedRecording> {
+    pub(super) fn switch(&mut self, next: Option<RunningRecording>, held: &Held) -> Result<EndedRecording> {
         let now = self.shared.counters();
         let ended = lock(&self.shared.recording.running).take();
         let begins = next.is_some();
@@ -109,7 +112,7 @@ impl RecordStage {
                 return Err(error);
             }
             self.tared = false;
-            *lock(&self.shared.recording.running) = Some(*next);
+            *lock(&self.shared.recording.running) = Some(next);
             // Earlier zeroings remain valid.
             let zeroed: Vec<Zeroing> = self.shared.published().zeroed.values().copied().collect();
             self.with(|recording| zeroed.iter().try_for_each(|zeroing| recording.zeroing(now_ns(), zeroing)))?;

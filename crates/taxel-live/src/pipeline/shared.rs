@@ -7,7 +7,6 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel as channel;
 use taxel_core::Marker;
-use taxel_core::detect::FrameTime;
 use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::rest::ValueSteps;
 use taxel_core::wire::Registers;
@@ -19,12 +18,11 @@ use super::readout_queue::ReadoutQueue;
 use super::running_recording::RunningRecording;
 use super::sending::Sent;
 use super::sink::OutputDetection;
-use super::source::{FrameLayout, NamedSource};
-use super::viewer_queue::ViewerEvents;
-use crate::capture::{Origin, Receiver};
+use super::stages::Stages;
+use crate::capture::Receiver;
 use crate::latency::{Latencies, Quantiles};
 use crate::locked::lock;
-use crate::recording::{Decoding, Header, now_ns};
+use crate::recording::{Header, now_ns};
 use crate::{Error, Result};
 
 /// Interval at which a wait for a reply checks whether the decoding thread has ended.
@@ -67,15 +65,13 @@ pub(super) struct PipelineShared {
     pub(super) options: LiveOptions,
     /// The frames of numbers that it receives; it receives a board if there are none.
     pub(super) frames: Option<Arc<FrameInput>>,
-    /// The other sources of the recording.
-    pub(super) sources: Vec<NamedSource>,
     pub(super) begun: Instant,
     pub(super) receiver: Receiver,
     pub(super) readout_queue: ReadoutQueue,
     pub(super) published: Mutex<PublishedState>,
     pub(super) recording: RecordingSlot,
     /// Requests to the decoding thread, which handles them between two batches.
-    pub(super) requests: Mutex<Vec<PipelineRequest>>,
+    pub(super) requests: Mutex<Vec<Request>>,
     pub(super) requested: AtomicBool,
     /// Further queues that get each detection; a slow one misses some.
     pub(super) subscribers: Mutex<Vec<channel::Sender<OutputDetection>>>,
@@ -86,31 +82,17 @@ pub(super) struct PipelineShared {
     pub(super) ended: AtomicBool,
 }
 
-/// The recording that was running, if any, and the counters after its last datagram.
-pub(super) type EndedRecording = (Option<RunningRecording>, Counters);
-
-/// A request that the decoding thread handles between two batches.
-pub(super) enum PipelineRequest {
-    /// Ends the running recording, and records into this one, if there is one, from the next datagram on.
-    Record(Option<Box<RunningRecording>>, channel::Sender<Result<EndedRecording>>),
-    /// Copies the events for a viewer.
-    View(channel::Sender<ViewerEvents>),
-    /// Notes that the board was set to this version of the wire.
-    Expect(u8),
-    /// Notes a write of the registers.
-    Registers(Registers),
-    /// Zeroes these taxels, and returns the zeroings.
-    Zero(Vec<(u16, u16)>, channel::Sender<Result<Vec<Zeroing>>>),
-}
+/// What the decoding thread does between two batches; an error ends the pipeline.
+pub(super) type Request = Box<dyn FnOnce(&mut Stages) -> Result<()> + Send>;
 
 impl PipelineShared {
     pub(super) fn published(&self) -> MutexGuard<'_, PublishedState> {
         lock(&self.published)
     }
 
-    /// Adds a request to the decoding thread, which handles it within 20 ms, but not after its end.
-    pub(super) fn request(&self, request: PipelineRequest) {
-        lock(&self.requests).push(request);
+    /// Has the decoding thread do something, within 20 ms, but not after its end.
+    pub(super) fn request(&self, request: impl FnOnce(&mut Stages) -> Result<()> + Send + 'static) {
+        lock(&self.requests).push(Box::new(request));
         self.requested.store(true, Ordering::Release);
     }
 
@@ -119,15 +101,24 @@ impl PipelineShared {
         self.ended.store(true, Ordering::Release);
     }
 
-    /// Waits for the reply to a request.
+    /// Has the decoding thread do something, and returns what that gives; an error of it ends nothing.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` if the decoding thread has ended.
-    pub(super) fn wait<T>(&self, answer: &channel::Receiver<T>) -> Result<T> {
+    /// That of `work`; `Core(Problem)` if the decoding thread has ended.
+    pub(super) fn ask<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&mut Stages) -> Result<T> + Send + 'static,
+    ) -> Result<T> {
+        let (answer, answered) = channel::bounded(1);
+        self.request(move |stages| {
+            // A caller that no longer waits was told that all has ended.
+            let _ = answer.send(work(stages));
+            Ok(())
+        });
         loop {
-            match answer.recv_timeout(ANSWER_EVERY) {
-                Ok(answer) => return Ok(answer),
+            match answered.recv_timeout(ANSWER_EVERY) {
+                Ok(answer) => return answer,
                 Err(_) if self.has_ended() => return Err(taxel_core::problem!("live: has ended").into()),
                 Err(_) => {}
             }
@@ -153,11 +144,6 @@ impl PipelineShared {
         }
     }
 
-    /// The length of the source's frames, and the unit of their stamps.
-    pub(super) fn frame_time(&self) -> FrameTime {
-        frame_time(&self.options, self.frames.as_ref().map(|frames| &frames.layout))
-    }
-
     /// The header of a recording of this source alone.
     ///
     /// # Errors
@@ -165,7 +151,7 @@ impl PipelineShared {
     /// `Core(Problem)` if a name or a property is not valid.
     pub(super) fn header(&self) -> Result<Header> {
         let options = LiveOptions { registers: *lock(&self.registers), ..self.options.clone() };
-        header_of(&options, self.receiver.origin(), self.frames.as_ref().map(|frames| &frames.layout))
+        Ok(options.header(self.receiver.origin())?)
     }
 
     /// Writes a note, with the current time or without one.
@@ -190,27 +176,4 @@ impl PipelineShared {
         self.published().failed.get_or_insert(error);
         self.receiver.stop();
     }
-}
-
-/// The length of a source's frames, and the unit of their stamps: by its registers, or as its frames are laid out.
-pub(super) fn frame_time(options: &LiveOptions, frames: Option<&FrameLayout>) -> FrameTime {
-    frames.map_or_else(|| options.frames(), |layout| layout.frame_us.into())
-}
-
-/// The header of a recording of a board or of frames.
-///
-/// # Errors
-///
-/// `Core(Problem)` if a name or a property is not valid.
-pub(super) fn header_of(options: &LiveOptions, origin: &Origin, frames: Option<&FrameLayout>) -> Result<Header> {
-    let (array, name) = (options.array.clone(), options.name.clone());
-    let source = match origin {
-        Origin::Udp(address) => format!("udp {address}"),
-        Origin::Frames(name) => name.clone(),
-    };
-    if let Some(layout) = frames {
-        return Ok(Header::of_frames(&name, array, layout.properties(), source, now_ns())?);
-    }
-    let decoding = Decoding { difference: options.differences, ..Decoding::default() };
-    Ok(Header { decoding, name, ..Header::of_board(array, Some(options.registers), source, now_ns()) })
 }

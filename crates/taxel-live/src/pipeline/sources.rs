@@ -2,18 +2,15 @@
 //!
 //! Each source has its own clock, in addition to the host's arrival times, and its own counts.
 
-use std::net::SocketAddr;
-use std::sync::{Arc, Mutex};
+use std::sync::Mutex;
 use std::time::Instant;
 
 use taxel_core::problem;
 
 use super::counters::SourceCounts;
-use super::frame_input::{FrameInput, LineCounts, ReadLines};
+use super::frame_input::{LineCounts, ReadLines};
 use super::record_stage::COUNTS_EVERY;
-use super::source::FrameLayout;
 use crate::Result;
-use crate::capture::{Receiver, ReceiverOptions};
 use crate::locked::lock;
 use crate::recording::{self, Found, SourceWriter, StreamColumns, StreamFaults, now_ns};
 use crate::text_lines::LeftOut;
@@ -134,33 +131,4 @@ impl NumberStream {
 pub(super) fn losses_of_lines(lines: u64, faults: &Found) -> recording::RecordingCounts {
     let decoder = faults.counts;
     recording::RecordingCounts { received: lines, recorded: lines, decoder, ..recording::RecordingCounts::default() }
-}
-
-/// What a pipeline receives.
-pub(super) enum PipelineInput {
-    /// A board that sends to this address.
-    Board(SocketAddr),
-    /// Frames of numbers from this place.
-    Frames(String, Box<FrameLayout>),
-}
-
-impl PipelineInput {
-    /// The layout of its frames, if it has any.
-    pub(super) fn layout(&self) -> Option<&FrameLayout> {
-        match self {
-            Self::Frames(_, layout) => Some(layout),
-            Self::Board(_) => None,
-        }
-    }
-
-    /// Opens the input: the receiver, and the way of its frames.
-    pub(super) fn open(self, options: ReceiverOptions) -> Result<(Receiver, Option<Arc<FrameInput>>)> {
-        Ok(match self {
-            Self::Board(address) => (Receiver::bind(address, options)?, None),
-            Self::Frames(place, layout) => {
-                let (frames, receiver) = FrameInput::new(&place, *layout, options);
-                (receiver, Some(frames))
-            }
-        })
-    }
 }

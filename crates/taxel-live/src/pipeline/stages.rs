@@ -4,20 +4,20 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use crossbeam_channel as channel;
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
 use taxel_core::held::{Held, UNKNOWN};
 use taxel_core::problem;
+use taxel_core::wire::Registers;
 
 use super::decode_stage::DecodeStage;
 use super::frame_stage::FrameStage;
 use super::readout_queue::QuietUntil;
 use super::readout_stage::ReadoutStage;
-use super::record_stage::RecordStage;
+use super::record_stage::{EndedRecording, RecordStage};
 use super::running_readout::RunningReadout;
 use super::running_recording::RunningRecording;
-use super::shared::{EndedRecording, PipelineRequest, PipelineShared};
+use super::shared::PipelineShared;
 use super::viewer_queue::{ViewerEvents, ViewerQueue, viewer_queue};
 use crate::Result;
 use crate::capture::Batch;
@@ -104,16 +104,16 @@ pub(super) struct Stages {
 impl Stages {
     pub(super) fn new(shared: &Arc<PipelineShared>, readout: Option<RunningReadout>) -> Self {
         let options = &shared.options;
-        let source = match &shared.frames {
+        let source = match options.layout() {
             None => SourceStage::Board(Box::new(DecodeStage::new(options))),
-            Some(input) => SourceStage::Frames(Box::new(FrameStage::new(&input.layout, options.guard_frames))),
+            Some(layout) => SourceStage::Frames(Box::new(FrameStage::new(layout, options.guard_frames))),
         };
         Self {
             shared: Arc::clone(shared),
             batch: Batch::new(),
             source,
             record: RecordStage::new(Arc::clone(shared)),
-            readout: ReadoutStage::new(readout),
+            readout: ReadoutStage::new(readout, &options.array),
             viewers: vec![],
             published_frame: Instant::now(),
             begun: false,
@@ -238,38 +238,32 @@ impl Stages {
         self.answer()
     }
 
-    /// Handles the requests since the last batch. A caller may have stopped waiting for the reply.
+    /// Handles the requests since the last batch.
     fn answer(&mut self) -> Result<()> {
         let requests = std::mem::take(&mut *lock(&self.shared.requests));
-        for request in requests {
-            match request {
-                PipelineRequest::Record(next, answer) => drop(answer.send(self.switch_recording(next))),
-                PipelineRequest::View(answer) => self.add_viewer(&answer),
-                PipelineRequest::Zero(taxels, answer) => drop(answer.send(self.zero(&taxels))),
-                PipelineRequest::Expect(version) => self.expect_version(version)?,
-                PipelineRequest::Registers(registers) => {
-                    if let SourceStage::Board(decode) = &mut self.source {
-                        decode.set_frame_us(registers.frame_us());
-                    }
-                    self.expect_version(registers.wire_version)?;
-                    self.record.with(|recording| recording.registers(now_ns(), &registers))?;
-                }
-            }
-        }
-        Ok(())
+        requests.into_iter().try_for_each(|request| request(self))
     }
 
-    /// Adds a viewer of the events, if it is still there.
-    fn add_viewer(&mut self, answer: &channel::Sender<ViewerEvents>) {
+    /// Notes a write of the board's registers.
+    pub(super) fn note_registers(&mut self, registers: &Registers) -> Result<()> {
+        if let SourceStage::Board(decode) = &mut self.source {
+            decode.set_frame_us(registers.frame_us());
+        }
+        self.expect_version(registers.wire_version)?;
+        self.record.with(|recording| recording.registers(now_ns(), registers))
+    }
+
+    /// Adds a viewer of the events.
+    pub(super) fn add_viewer(&mut self) -> ViewerEvents {
         let counters = &self.shared.published().counters;
         let (latest, events) = (counters.board.board_us, counters.decoding.events);
         let (queue, events) = viewer_queue(&self.shared.options.array, self.source.held(), latest, events);
-        if answer.send(events).is_ok() {
-            self.viewers.push(queue);
-        }
+        self.viewers.push(queue);
+        events
     }
 
-    fn switch_recording(&mut self, next: Option<Box<RunningRecording>>) -> Result<EndedRecording> {
+    /// Ends the running recording, and records into this one, if there is one, from the next datagram on.
+    pub(super) fn switch_recording(&mut self, next: Option<RunningRecording>) -> Result<EndedRecording> {
         self.record.previews(self.source.count(), self.source.held(), true)?;
         if next.is_some() {
             self.move_to_threads()?;
@@ -283,7 +277,7 @@ impl Stages {
     }
 
     /// Notes that the board was set to this version of the wire.
-    fn expect_version(&mut self, version: u8) -> Result<()> {
+    pub(super) fn expect_version(&mut self, version: u8) -> Result<()> {
         if let SourceStage::Board(decode) = &mut self.source
             && decode.expect(version)
         {
@@ -294,7 +288,7 @@ impl Stages {
     }
 
     /// Makes what these taxels rest at now their rest: where one cannot be zeroed none is.
-    fn zero(&mut self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
+    pub(super) fn zero(&mut self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
         let array = &self.shared.options.array;
         let published = self.shared.published();
         if published.counters.readout.taring {

@@ -7,7 +7,7 @@
 //! A disk may delay a recording, and a readout may be slower than the events arrive. In these cases one thread receives
 //! (or reads what a third one received), decodes and records, and the other reads out from then on.
 
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use super::output::DetectionOutput;
@@ -16,97 +16,89 @@ use super::shared::PipelineShared;
 use super::stages::{Stages, StagesOutcome};
 use crate::locked::lock;
 
-/// Interval at which the follower checks whether the stages were released: a callback may delay receiving by this time.
+/// Interval at which the follower looks for work, of which it is not told, as a callback would have to wait for its wake-up: a
+/// callback may delay receiving by this time.
 const TAKE_OVER: Duration = Duration::from_millis(2);
 
 /// The stages and the output, which one thread at a time owns.
 pub(super) struct Threads {
-    turn: Mutex<StagesTurn>,
-    changed: Condvar,
+    turn: Mutex<Turn>,
     output: DetectionOutput,
+    shared: Arc<PipelineShared>,
 }
 
-struct StagesTurn {
-    /// `None` while a thread, the leader, owns the stages.
-    stages: Option<Box<Stages>>,
-    /// A readout that must move to its own thread.
-    readout: Option<RunningReadout>,
-    over: bool,
-    /// Number of threads that have not ended.
-    left: usize,
+/// What a thread that is free does next.
+enum Turn {
+    /// It waits: the other thread, the leader, owns the stages.
+    Wait,
+    Run(Box<Stages>),
+    ReadOut(Box<RunningReadout>),
+    End,
 }
 
 impl Threads {
-    pub(super) fn new(stages: Stages, output: DetectionOutput, threads: usize) -> Self {
-        let turn = StagesTurn { stages: Some(Box::new(stages)), readout: None, over: false, left: threads };
-        Self { turn: Mutex::new(turn), changed: Condvar::new(), output }
+    pub(super) fn new(stages: Stages, output: DetectionOutput, shared: Arc<PipelineShared>) -> Self {
+        Self { turn: Mutex::new(Turn::Run(Box::new(stages))), output, shared }
     }
 
     /// The loop of each thread, until the end.
-    pub(super) fn run(&self, shared: &Arc<PipelineShared>) {
-        let _leaving = ThreadEndGuard { threads: self, shared };
+    pub(super) fn run(&self) {
+        let _leaving = ThreadEndGuard(self);
         loop {
-            let nothing = |turn: &mut StagesTurn| turn.stages.is_none() && turn.readout.is_none() && !turn.over;
-            let waited = self.changed.wait_timeout_while(lock(&self.turn), TAKE_OVER, nothing);
-            let (mut turn, waited) = waited.unwrap_or_else(PoisonError::into_inner);
-            if waited.timed_out() {
-                continue;
+            match self.next(Turn::Wait) {
+                Turn::Wait => std::thread::sleep(TAKE_OVER),
+                Turn::Run(stages) => self.run_stages(stages),
+                Turn::ReadOut(readout) => return readout.run(&self.shared, &self.output),
+                Turn::End => return,
             }
-            if let Some(readout) = turn.readout.take() {
-                drop(turn);
-                readout.run(shared, &self.output);
-                return;
-            }
-            let Some(stages) = turn.stages.take() else { return };
-            drop(turn);
-            self.run_stages(stages, shared);
         }
     }
 
+    /// Takes what is to be done next, and leaves `then` for a thread that is free.
+    fn next(&self, then: Turn) -> Turn {
+        std::mem::replace(&mut *lock(&self.turn), then)
+    }
+
     /// Runs the stages until there are detections to output, or the pipeline has ended.
-    fn run_stages(&self, mut stages: Box<Stages>, shared: &PipelineShared) {
+    fn run_stages(&self, mut stages: Box<Stages>) {
         loop {
             let next = stages.run();
-            let alone = self.output.add(shared, stages.pending_detections());
+            let alone = self.output.add(&self.shared, stages.pending_detections());
             match next {
                 StagesOutcome::Output if !alone => continue,
-                // The follower is not woken for this, because the callback would have to wait for the wake-up.
-                StagesOutcome::Output => lock(&self.turn).stages = Some(stages),
+                StagesOutcome::Output => drop(self.next(Turn::Run(stages))),
                 StagesOutcome::MoveReadout(readout) => {
-                    lock(&self.turn).readout = Some(*readout);
-                    self.changed.notify_one();
+                    self.next(Turn::ReadOut(readout));
                     continue;
                 }
                 StagesOutcome::Finished => {
-                    lock(&self.turn).over = true;
-                    self.changed.notify_all();
+                    if let Turn::ReadOut(readout) = self.next(Turn::End) {
+                        readout.run(&self.shared, &self.output);
+                    }
                 }
             }
-            self.output.run(shared);
+            self.output.run(&self.shared);
             return;
         }
     }
 }
 
-/// Ends the other thread's wait when this one ends, in whichever way.
-struct ThreadEndGuard<'a> {
-    threads: &'a Threads,
-    shared: &'a PipelineShared,
+impl Drop for Threads {
+    /// Both threads have ended.
+    fn drop(&mut self) {
+        self.shared.end();
+    }
 }
+
+/// Ends the other thread too when this one ends, in whichever way.
+struct ThreadEndGuard<'a>(&'a Threads);
 
 impl Drop for ThreadEndGuard<'_> {
     fn drop(&mut self) {
-        let mut turn = lock(&self.threads.turn);
-        turn.left -= 1;
+        self.0.next(Turn::End);
         if std::thread::panicking() {
-            turn.over = true;
-            self.shared.receiver.stop();
-            self.shared.readout_queue.close(None);
+            self.0.shared.receiver.stop();
+            self.0.shared.readout_queue.close();
         }
-        if turn.left == 0 {
-            self.shared.end();
-        }
-        drop(turn);
-        self.threads.changed.notify_all();
     }
 }
