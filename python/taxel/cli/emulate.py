@@ -23,7 +23,7 @@ from taxel.cli._say import say
 from taxel.cli._task import progress
 from taxel.cli.app import App, Flat, JsonOption, Limits
 from taxel.cli.console import Console
-from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
+from taxel.demo.script import TRAINING_SEED, endless, script
 from taxel.live.sending import PORT
 from taxel.options import settings
 from taxel.recording.opening import open_one
@@ -80,8 +80,6 @@ class _EmulateArguments:
         How long the noise floor is 0 before the start marker, s. Default: as in the scene's file, or 0.05.
     session
         Version 2 of the wire: the number of the first session. Default: random.
-    rest
-        Let the ball bounce until it rests, instead of catching it.
     labels
         Write the true times of the touches to this CSV, label,t_us,host_ns, as they happen.
     overwrite
@@ -108,8 +106,6 @@ class _EmulateArguments:
     flaw: Annotated[Mapping[str, Any], _several("flaws", "--flaw", "SIZE")] = field(default_factory=dict)
     fault: Annotated[Mapping[str, Any], _several("faults", "--fault", "SHARE")] = field(default_factory=dict)
     control: Annotated[int | None, _option("control")] = None
-    source_port: Annotated[int, _option("source_port")] = EmulateOptions.source_port
-    rest: bool = False
     labels: Annotated[Path | None, Parameter(name="--truth", metavar="FILE")] = None
     overwrite: bool = False
     as_json: JsonOption = False
@@ -149,10 +145,10 @@ def emulate(*, typed: Flat[_EmulateArguments] = _EmulateArguments()) -> None:
 def _check_options(typed: _EmulateArguments) -> None:
     """Refuse options that do not go together."""
     replays = typed.replay is not None
-    if typed.scene is not None and (replays or typed.rest):
-        raise ProblemError("--scene: leave out --replay and --rest")
-    if replays and (typed.scenes is not None or typed.labels is not None or typed.rest):
-        raise ProblemError("--scenes, --truth and --rest are for scenes: leave them out with --replay")
+    if typed.scene is not None and replays:
+        raise ProblemError("--scene and --replay are both given: give only one of them")
+    if replays and (typed.scenes is not None or typed.labels is not None):
+        raise ProblemError("--scenes and --truth are for scenes: leave them out with --replay")
 
 
 def _touch_of(typed: _EmulateArguments) -> tuple[Any, str, dict[str, Any]]:
@@ -184,13 +180,12 @@ def _touch_of(typed: _EmulateArguments) -> tuple[Any, str, dict[str, Any]]:
         "drift_ppm": typed.drift,
         "control": None if typed.control is None else f"127.0.0.1:{typed.control}",
         "asynchronous": typed.asynchronous,
-        "source_port": typed.source_port,
     }
     if typed.replay is not None:
         return Replay(open_one(typed.replay)), f"replay of {typed.replay}", options
     if scene_file is not None:
         return _from_file(scene_file, typed.scenes, tare_ms), f"{typed.scene}, seed {seed}", options
-    return *_scenes(seed, typed.scenes, tare_ms, typed.rest), options
+    return *_scenes(seed, typed.scenes, tare_ms), options
 
 
 def _run(typed: _EmulateArguments, touch: Any, board: dict[str, Any], console: Console) -> EmulatorReport:
@@ -224,12 +219,11 @@ def _run(typed: _EmulateArguments, touch: Any, board: dict[str, Any], console: C
     return last[0]
 
 
-def _scenes(seed: int, scenes: int | None, tare_ms: float, rest: bool) -> tuple[Any, str]:
+def _scenes(seed: int, scenes: int | None, tare_ms: float) -> tuple[Any, str]:
     """Return random scenes as a touch, and their description."""
-    draw = left_to_rest if rest else drawn
     if scenes is None:
-        return endless(seed, tare_ms=tare_ms, draw=draw), f"seed {seed}: scenes until Ctrl-C"
-    return script(seed, scenes, tare_ms=tare_ms, draw=draw), f"seed {seed}: {counted(scenes, 'scene')}"
+        return endless(seed, tare_ms=tare_ms), f"seed {seed}: scenes until Ctrl-C"
+    return script(seed, scenes, tare_ms=tare_ms), f"seed {seed}: {counted(scenes, 'scene')}"
 
 
 def _from_file(scene_file: SceneFile, scenes: int | None, tare_ms: float) -> Iterator[Act]:
