@@ -61,7 +61,7 @@ use readout_queue::ReadoutQueue;
 use running_readout::RunningReadout;
 use running_recording::{RunningRecording, losses};
 use sending::Sending;
-pub use sending::{Destination, Sent};
+pub use sending::Sent;
 use shared::{PipelineShared, PublishedState, RecordingSlot};
 pub use sink::{LineSink, OutputDetection, Sink};
 pub use source::{BoardSource, FrameLayout, FrameSource, NamedSource, SourceKind};
@@ -133,7 +133,7 @@ impl Live {
         }
         let readout = RunningReadout::open(&options)?;
         let record = options.recording()?;
-        let sending = options.send.iter().map(|to| Sending::open(&to.parse()?)).collect::<Result<Vec<_>>>()?;
+        let sending = options.send.iter().map(|to| Sending::open(to)).collect::<Result<Vec<_>>>()?;
         // The socket is opened before the file, so that a port that is in use leaves no empty file.
         let (receiver, frames) = match &options.input {
             None => (Receiver::bind(options.address()?, options.capture())?, None),

@@ -1,11 +1,8 @@
 //! Lines of text as they arrive, for Python, which reads their numbers.
 
-use std::collections::BTreeMap;
-
 use pyo3::prelude::*;
-use taxel_core::problem;
 use taxel_live::line_input::LineReader;
-use taxel_live::line_place::{FORMS, LinePlace};
+use taxel_live::line_place::LinePlace;
 use taxel_live::text_lines::TextLine;
 
 use taxel_border::enter::{Exclusive, enter};
@@ -45,17 +42,11 @@ pub struct LineInput {
 
 #[pymethods]
 impl LineInput {
-    /// Opens serial:PLACE, lines:PATH, lines+tcp:HOST:PORT or lines+udp:HOST:PORT; only a serial port has a baud rate.
+    /// Opens serial:PLACE[,baud=RATE], lines:PATH, lines+tcp:HOST:PORT or lines+udp:HOST:PORT.
     #[new]
-    fn open(py: Python<'_>, place: &str, baud: Option<&str>) -> PyResult<Self> {
+    fn open(py: Python<'_>, place: &str) -> PyResult<Self> {
         let (found, reader) = enter(py, |_| {
-            let mut options: BTreeMap<&str, &str> = baud.map(|baud| ("baud", baud)).into_iter().collect();
-            let Some(found) = LinePlace::parse(place, &mut options)? else {
-                return Err(problem!("{place:?}: must be {FORMS}").into());
-            };
-            if let Some(baud) = options.get("baud") {
-                return Err(problem!("baud"; " is {baud}: must be left out, because {place} is no serial port").into());
-            }
+            let found: LinePlace = place.parse()?;
             LineReader::open(&found).map(|reader| (found, reader))
         })?;
         Ok(Self {

@@ -59,7 +59,7 @@ class Lines:
         self._input = None
         if stated.kind == "lines":
             baud = stated.printed.baud
-            self._input = _core.LineInput(stated.place, None if baud is None else str(baud))
+            self._input = _core.LineInput(stated.place if baud is None else f"{stated.place},baud={baud}")
         self.place = "given by a program" if self._input is None else self._input.place
         self.array = stated.array
         self.names: tuple[str, ...] = ()

@@ -3,22 +3,18 @@
 //! The thread that made a line sends it by UDP; other lines wait in a bounded queue for a thread of their destination. If a
 //! reader is too slow, or absent, lines are lost and counted; the pipeline never waits for it.
 
-use std::collections::BTreeMap;
-use std::fmt::{self, Display, Formatter};
 use std::fs::File;
 use std::io::{self, ErrorKind, Write};
 use std::net::{SocketAddr, UdpSocket};
-use std::str::FromStr;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crossbeam_channel as channel;
 use serde::Serialize;
-use taxel_core::problem;
 
 use super::sink::{OutputDetection, Sink};
-use crate::line_place::{FORMS, LinePlace};
+use crate::line_place::LinePlace;
 use crate::locked::lock;
 use crate::named_pipe::open_to_write;
 use crate::serial_line::{CONNECT, SerialLine};
@@ -35,31 +31,6 @@ const WRITE_EVERY: Duration = Duration::from_millis(2);
 
 /// Longest wait for a slow reader at the end.
 const LAST: Duration = Duration::from_secs(1);
-
-/// A destination of detections: as lines are written there.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Destination(LinePlace);
-
-impl FromStr for Destination {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        let in_text = |error: Error| error.in_part(&format!("send to {text:?}"));
-        let (place, option) = text.split_once(',').map_or((text, None), |(place, option)| (place, Some(option)));
-        let mut options: BTreeMap<&str, &str> = option.and_then(|option| option.split_once('=')).into_iter().collect();
-        let found = LinePlace::parse(place, &mut options).map_err(in_text)?;
-        match found.filter(|_| options.is_empty() && option.is_none_or(|option| option.contains('='))) {
-            Some(place) => Ok(Self(place)),
-            None => Err(problem!("send to {text:?}: must be {FORMS}").into()),
-        }
-    }
-}
-
-impl Display for Destination {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
 
 /// Counts of what was sent to a destination.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
@@ -92,18 +63,19 @@ impl Sending {
     /// # Errors
     ///
     /// `File` or `Socket` if it cannot be opened, `Core(Problem)` if it is no pipe. A pipe without a reader is no error.
-    pub(super) fn open(to: &Destination) -> Result<Self> {
+    pub(super) fn open(to: &str) -> Result<Self> {
+        let to: LinePlace = to.parse().map_err(|error: Error| error.in_part("send"))?;
         let counts = Arc::new(Mutex::new(Sent { to: to.to_string(), ..Sent::default() }));
         let mut sending = Self { counts, udp: None, lines: None, ended: Arc::default(), thread: None };
-        if let LinePlace::Udp(address) = to.0 {
+        if let LinePlace::Udp(address) = to {
             let any = if address.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
             let socket = UdpSocket::bind(any).and_then(|socket| socket.set_nonblocking(true).map(|()| socket));
-            sending.udp = Some((socket.map_err(Error::socket(to))?, address));
+            sending.udp = Some((socket.map_err(Error::socket(&to))?, address));
             return Ok(sending);
         }
         let (lines, waiting) = channel::bounded(WAITING);
         let (counts, ended) = (Arc::clone(&sending.counts), Arc::clone(&sending.ended));
-        let line = WaitingLines { place: to.0.clone(), device: Device::open(&to.0)?, lines: waiting, counts, ended };
+        let line = WaitingLines { device: Device::open(&to)?, place: to, lines: waiting, counts, ended };
         let thread = std::thread::Builder::new().name("taxel-send".to_owned()).spawn(move || line.send());
         (sending.lines, sending.thread) = (Some(lines), Some(thread.map_err(Error::socket("thread"))?));
         Ok(sending)
@@ -243,42 +215,6 @@ impl Device {
         match self {
             Self::File(file) => file.write(bytes),
             Self::Serial(line) => line.write(bytes),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn destinations_are_read_as_they_are_written() {
-        for (text, shown) in [
-            ("lines+udp:127.0.0.1:9000", "lines+udp:127.0.0.1:9000"),
-            ("lines+udp:[::1]:9", "lines+udp:[::1]:9"),
-            ("lines+tcp:localhost:9000", "lines+tcp:localhost:9000"),
-            ("lines:/tmp/out", "lines:/tmp/out"),
-            ("serial:/dev/ttyACM0", "serial:/dev/ttyACM0,baud=115200"),
-            ("serial:/dev/ttyACM0,baud=9600", "serial:/dev/ttyACM0,baud=9600"),
-            ("serial:COM3", "serial:COM3,baud=115200"),
-            ("serial:localhost:5209", "serial:localhost:5209"),
-        ] {
-            assert_eq!(text.parse::<Destination>().unwrap().to_string(), shown);
-        }
-        for text in [
-            "",
-            "udp:127.0.0.1:9000",
-            "lines+udp:",
-            "lines+udp:9000",
-            "lines+tcp:9000",
-            "lines:",
-            "serial:",
-            "serial:/dev/x,baud",
-            "serial:/dev/x,baud=fast",
-            "serial:/dev/x,rate=9600",
-            "file:x",
-        ] {
-            assert!(text.parse::<Destination>().is_err(), "{text}");
         }
     }
 }
