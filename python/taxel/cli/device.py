@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from dataclasses import asdict, dataclass
 from typing import Annotated, Any
 
@@ -12,11 +11,10 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from taxel._base.arguments import text
-from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.board_check import check_board
 from taxel.cli._say import say
-from taxel.cli.app import OUTSIDE, App, Flat, JsonOption, Limits, SecondsOption
+from taxel.cli.app import OUTSIDE, App, Flat, JsonOption, Limits
 from taxel.cli.console import Console
 from taxel.device import Device, ports
 from taxel.live.sending import PORT
@@ -115,44 +113,6 @@ def apply(
 
 
 @app.command
-def record(
-    place: PlaceArgument,
-    mark: Annotated[str, Parameter(help="The mark: start or stop.")],
-    /,
-    *,
-    line: Flat[_Line] = _Line(),
-) -> None:
-    """Make a board mark the start or stop of a recording, in its events and on its sync pin.
-
-    Example: taxel device record /dev/ttyACM0 start
-    """
-    if mark not in ("start", "stop"):
-        raise ProblemError(f"{mark}: must be start or stop")
-    with Device(place, baud=line.baud) as device:
-        _print(device, device.record(mark == "start"), line.as_json)
-
-
-@app.command
-def watch(place: PlaceArgument, /, *, seconds: SecondsOption = None, line: Flat[_Line] = _Line()) -> None:
-    """Print the faults that a board reports, as they come; waits for a cable that was pulled.
-
-    Example: taxel device watch /dev/ttyACM0 --seconds 60
-    """
-    with Device(place, baud=line.baud, patience=float("inf")) as device:
-        console = Console(stderr=True, quiet=line.as_json)
-        console.print(f"{device}; Ctrl-C ends")
-        begun, before = time.monotonic(), None
-        while seconds is None or time.monotonic() - begun < seconds:
-            now = {"faults": device.faults, "reconnects": device.reconnects}
-            if now != before:
-                faults = ", ".join(f"{n} {name}" for name, n in device.faults.items()) or "no faults"
-                reconnect_text = f"; reconnected {counted(device.reconnects, 'time')}" if device.reconnects else ""
-                say(json.dumps(now) if line.as_json else faults + reconnect_text)
-                before = now
-            time.sleep(_POLL_S)
-
-
-@app.command
 def check(
     place: str,
     /,
@@ -184,10 +144,6 @@ def check(
     if as_json:
         say(json.dumps({"good": result.good, "findings": [asdict(finding) for finding in result.findings]}))
     return 0 if result.good else OUTSIDE
-
-
-#: Interval at which `watch` reads the faults, s.
-_POLL_S = 0.1
 
 
 def _field(assignment: str) -> tuple[str, float]:
