@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from taxel import detect
 from taxel.detect import Example, Recipe, fit, run
@@ -73,10 +74,10 @@ class Drop(NamedTuple):
     contact: Contact
     kind: int
 
-    def since_contact(self, times_ms: Sequence[float]) -> list[Frames]:
-        """Return the frame of the readings above rest at times since the touch really began."""
+    def since_contact(self, times_ms: Sequence[float]) -> NDArray[np.float32]:
+        """Return the readings above rest at times since the touch really began, (times, rows, columns)."""
         at = [round(self.contact.start_us + to_us(t)) for t in times_ms]
-        return [self.tare.off(Frames.from_events(self.events, 1, t, t + 1)) for t in at]
+        return np.concatenate([self.tare.off(Frames.from_events(self.events, 1, t, t + 1)).values for t in at])
 
 
 def drawn(params: dict[str, Any], seed: int, scenes: int) -> list[Drop]:
@@ -117,15 +118,14 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     right = [first[1] if first[0] == KINDS[drop.kind] else np.inf for first, drop in known]
     shares: dict[str, Any] = {"neuron": [sum(at <= t for at in right) / len(test) for t in times]}
     shares |= {"rule": [], "numbers": [], "lda": [], "rules": []}
-    by_moment = [[drop.since_contact(times) for drop in which] for which in (train, test)]
-    for k in range(len(times)):
-        now = [[frames[k] for frames in which] for which in by_moment]
-        name, by_rule = best_rule(now, truths[0])
+    by_moment = [np.stack([drop.since_contact(times) for drop in which], axis=1) for which in (train, test)]
+    for now in zip(*by_moment, strict=True):
+        # A frame a scene.
+        learnt, judged = (Frames(one, np.arange(len(one)), unit="ticks", array=train[0].events.array) for one in now)
+        name, by_rule = best_rule(learnt, judged, truths[0])
         shares["rules"].append(name)
-        answers = {"rule": by_rule}
-        for way, features in (("numbers", numbers), ("lda", around)):
-            learnt, judged = (features(parts) for parts in now)
-            answers[way] = lda(learnt, truths[0])(judged)
+        answers = {way: lda(of(learnt), truths[0])(of(judged)) for way, of in (("numbers", numbers), ("lda", around))}
+        answers["rule"] = by_rule
         for way, kinds in answers.items():
             shares[way].append(float(np.mean(kinds == truths[1])))
     few = [

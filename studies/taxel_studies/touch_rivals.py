@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -25,25 +25,22 @@ AROUND = 16
 RIDGES = (0.1, 1.0, 10.0, 100.0)
 
 
-def best_rule(by_moment: list[list[Frames]], kinds: NDArray[np.int64]) -> tuple[str, NDArray[np.int64]]:
+def best_rule(train: Frames, test: Frames, kinds: NDArray[np.int64]) -> tuple[str, NDArray[np.int64]]:
     """Return the feature whose threshold classifies most training scenes right, and its answers for the others."""
-    features = [_features(which) for which in by_moment]
     best: tuple[float, str, float, int] = (-1.0, "", 0.0, 1)
-    for name, values in features[0].items():
+    for name, values in _features(train).items():
         edges = np.sort(values)
         for edge in (edges[1:] + edges[:-1]) / 2:
             for sign in (1, -1):
                 share = float(np.mean((sign * values > sign * edge) == kinds))
                 best = max(best, (share, name, float(edge), sign))
     _, name, edge, sign = best
-    return name, (sign * features[1][name] > sign * edge).astype(np.int64)
+    return name, (sign * _features(test)[name] > sign * edge).astype(np.int64)
 
 
-def _features(parts: list[Frames]) -> dict[str, Floats]:
+def _features(frames: Frames) -> dict[str, Floats]:
     """Return the simple features of each frame: area, total, peak and their ratios."""
-    area = np.array([frames.area(ABOVE)[0] for frames in parts])
-    total = np.array([frames.total()[0] for frames in parts])
-    peak = np.array([frames.peak()[0] for frames in parts])
+    area, total, peak = frames.area(ABOVE), frames.total(), frames.peak()
     some = np.maximum(area, 1.0), np.maximum(total, 1.0), np.maximum(peak, 1.0)
     return {
         "area": area,
@@ -56,35 +53,29 @@ def _features(parts: list[Frames]) -> dict[str, Floats]:
     }
 
 
-def numbers(parts: list[Frames]) -> Floats:
+def numbers(frames: Frames) -> Floats:
     """Return the logarithms of area, total and peak of each frame."""
-    three = _features(parts)
-    return np.log(np.maximum(np.stack([three[name] for name in ("area", "total", "peak")], axis=1), 1.0))
+    return np.log(np.maximum(np.stack([frames.area(ABOVE), frames.total(), frames.peak()], axis=1), 1.0))
 
 
-def around(parts: Iterable[Frames]) -> Floats:
+def around(frames: Frames) -> Floats:
     """Return the values of 16 x 16 taxels around the centre of what is loaded, frame by frame; beyond the edge 0.
 
     A touch is anywhere on the array, and weights learnt for the taxels of one place are of no use at another. Where
     nothing is loaded, the taxels are those in the middle of the array.
     """
-    regions = []
-    for frames in parts:
-        values = frames.values.astype(np.float64)
-        shape = values.shape[1:]
-        loaded = np.where(values >= ABOVE, values, 0.0)
-        all_of = loaded.sum(axis=(1, 2))
-        padded = np.pad(values, ((0, 0), (AROUND, AROUND), (AROUND, AROUND)))
-        index: list[NDArray[np.int64]] = [np.arange(len(values))]
-        for axis, size in enumerate(shape):
-            line = loaded.sum(axis=2 - axis)
-            middle = np.full(len(values), (size - 1) / 2)
-            np.divide(line @ np.arange(size), all_of, out=middle, where=all_of > 0)
-            first = np.rint(middle).astype(np.int64) + AROUND - AROUND // 2
-            index.append(first[:, None] + np.arange(AROUND))
-        n, row, column = index
-        regions.append(padded[n[:, None, None], row[:, :, None], column[:, None, :]].reshape(len(values), -1))
-    return np.concatenate(regions)
+    values = frames.values.astype(np.float64)
+    loaded = np.where(values >= ABOVE, values, 0.0)
+    all_of = loaded.sum(axis=(1, 2))
+    padded = np.pad(values, ((0, 0), (AROUND, AROUND), (AROUND, AROUND)))
+    index: list[NDArray[np.int64]] = []
+    for axis, size in enumerate(values.shape[1:]):
+        middle = np.full(len(values), (size - 1) / 2)
+        np.divide(loaded.sum(axis=2 - axis) @ np.arange(size), all_of, out=middle, where=all_of > 0)
+        index.append((np.rint(middle).astype(np.int64) + AROUND - AROUND // 2)[:, None] + np.arange(AROUND))
+    row, column = index
+    which = np.arange(len(values))[:, None, None]
+    return np.asarray(padded[which, row[:, :, None], column[:, None, :]].reshape(len(values), -1))
 
 
 def lda(values: ArrayLike, classes: NDArray[Any]) -> Callable[[ArrayLike], NDArray[Any]]:

@@ -33,14 +33,14 @@ def test_the_discriminant_knows_at_other_places_what_it_learnt_at_some() -> None
     kinds = np.arange(60) % 2
     rows, columns = np.indices((64, 64))
 
-    def felt(rows_from: float, rows_to: float) -> list[taxel.Frames]:
-        frames = []
+    def felt(rows_from: float, rows_to: float) -> taxel.Frames:
+        values = []
         for kind in kinds:
             row, column = rng.uniform(rows_from, rows_to), rng.uniform(0, 63)
             away = (rows - row) ** 2 + (columns - column) ** 2
             value = 20.0 * np.maximum(1 - away / (9.0 + 20.0 * kind), 0) + rng.normal(0, 0.3, away.shape)
-            frames.append(taxel.Frames(value[None], [0], unit="ticks"))
-        return frames
+            values.append(value)
+        return taxel.Frames(values, np.arange(len(kinds)), unit="ticks")
 
     tell = touch_rivals.lda(touch_rivals.around(felt(0, 30)), kinds)
     assert np.mean(tell(touch_rivals.around(felt(34, 63))) == kinds) > 0.9
@@ -51,7 +51,7 @@ def test_the_frame_around_a_touch_has_its_centre_in_the_middle_and_nothing_beyon
     values[0, 3:6, 30:33] = 9.0
     values[1, 0, 0] = 9.0
     values[2, 10, 20] = 3.0  # not loaded: the middle of the array is used
-    inside, corner, nothing = touch_rivals.around([taxel.Frames(values, [0, 1, 2], unit="ticks")]).reshape(3, 16, 16)
+    inside, corner, nothing = touch_rivals.around(taxel.Frames(values, [0, 1, 2], unit="ticks")).reshape(3, 16, 16)
     assert np.argwhere(inside).mean(axis=0).tolist() == [8.0, 8.0]
     assert np.count_nonzero(inside) == 9
     assert np.argwhere(corner).tolist() == [[8, 8]]
@@ -59,15 +59,14 @@ def test_the_frame_around_a_touch_has_its_centre_in_the_middle_and_nothing_beyon
 
 
 def test_the_best_rule_is_the_feature_that_differs() -> None:
-    def felt(peak: float) -> taxel.Frames:
-        values = np.full((1, 4, 4), 10.0)
-        values[0, 0, 0] = peak
-        return taxel.Frames(values, [0], unit="ticks", array=taxel.Array(4, 4, 1.0))
-
     rng = np.random.default_rng(2)
     kinds = np.arange(40) % 2
-    sets = [[felt(20 + 30 * kind + rng.normal(0, 2)) for kind in kinds] for _ in range(2)]
-    name, answers = touch_rivals.best_rule(sets, kinds)
+    sets = []
+    for _ in range(2):
+        values = np.full((40, 4, 4), 10.0)
+        values[:, 0, 0] = 20 + 30 * kinds + rng.normal(0, 2, 40)
+        sets.append(taxel.Frames(values, np.arange(40), unit="ticks", array=taxel.Array(4, 4, 1.0)))
+    name, answers = touch_rivals.best_rule(*sets, kinds)
     assert "peak" in name or "total" in name
     assert (answers == kinds).all()
 
