@@ -37,8 +37,8 @@ def footfall(shift: int = 0, late: float = 1.0) -> Trial:
 def test_the_insole_has_92_taxels_and_loses_no_load():
     assert insole.TAXELS == 92
     trial = footfall()
-    mine = insole.footprint(trial)
-    cut = insole.cut(trial, mine.origin_mm, insole.placement([mine]))
+    origin, foot = insole.footprint(trial)
+    cut = insole.cut(trial, origin, insole.placement([foot]))
     assert cut.values.shape == (60, 1, 92)
     assert np.allclose(cut.total(), trial.frames.total(), rtol=1e-5)
     heel = cut.values[:, 0, insole.HEEL].sum(axis=1)
@@ -49,18 +49,18 @@ def test_the_insole_has_92_taxels_and_loses_no_load():
 
 def test_the_cut_moves_with_the_foot():
     near, far = footfall(0), footfall(3)
-    a, b = insole.footprint(near), insole.footprint(far)
-    assert b.origin_mm[1] - a.origin_mm[1] == pytest.approx(3 * 7.62)
-    assert b.front_mm == pytest.approx(a.front_mm)
-    size = insole.placement([a])
-    assert np.allclose(insole.cut(near, a.origin_mm, size).values, insole.cut(far, b.origin_mm, size).values)
+    (a, foot), (b, other) = insole.footprint(near), insole.footprint(far)
+    assert b[1] - a[1] == pytest.approx(3 * 7.62)
+    assert other.front_mm == pytest.approx(foot.front_mm)
+    size = insole.placement([foot])
+    assert np.allclose(insole.cut(near, a, size).values, insole.cut(far, b, size).values)
 
 
 def test_what_a_footfall_does_later_does_not_move_its_own_taxels():
-    other = insole.placement([insole.footprint(footfall())])
+    other = insole.placement([insole.footprint(footfall())[1]])
     early, changed = footfall(), footfall(late=0.4)
-    first = insole.cut(early, insole.footprint(early).origin_mm, other)
-    second = insole.cut(changed, insole.footprint(changed).origin_mm, other)
+    first = insole.cut(early, insole.footprint(early)[0], other)
+    second = insole.cut(changed, insole.footprint(changed)[0], other)
     assert np.array_equal(first.values[:30], second.values[:30])
 
 

@@ -8,7 +8,7 @@ lose events (a second row of the study); a placement from later frames would loo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from taxel.array import Array
 from taxel.frames import Frames
 from taxel_studies.datasets import Trial
 
-__all__ = ["CELLS", "HEEL", "TAXELS", "TOES", "Footprint", "Placement", "cut", "footprint", "placement"]
+__all__ = ["CELLS", "HEEL", "TAXELS", "TOES", "Placement", "cut", "footprint", "placement"]
 
 #: Taxels by row, heel to toe: 92 in the outline of an insole.
 CELLS = (4, 5, 6, 6, 6, 6, 6, 6, 7, 7, 7, 7, 7, 6, 6)
@@ -29,41 +29,26 @@ HEEL = np.arange(_FIRST[5])
 TOES = np.arange(_FIRST[11], TAXELS)
 
 
-@dataclass(frozen=True)
-class Footprint:
-    """Properties of the foot in one footfall.
+class Placement(NamedTuple):
+    """Size and toe-out of a foot, or of an insole."""
 
-    Attributes
-    ----------
+    toe_out: float
+    """From the direction of walking to the axis from heel to forefoot, radians."""
+    back_mm: float
+    """How far it reaches from its origin, along its own axis; and the same to the front, and across."""
+    front_mm: float
+    inner_mm: float
+    outer_mm: float
+
+
+def footprint(trial: Trial) -> tuple[NDArray[np.float64], Placement]:
+    """Measure one footfall of the plate.
+
+    Returns
+    -------
     origin_mm : float64, shape (2,)
         Across and along the plate: the centroid of the sensors that the first loaded frame loads. Nothing later.
-    toe_out : float, radians
-        From the direction of walking to the axis from heel to forefoot.
-    back_mm, front_mm, inner_mm, outer_mm : float
-        How far the footprint reaches from its origin, along its own axis and across.
-    """
-
-    origin_mm: NDArray[np.float64]
-    toe_out: float
-    back_mm: float
-    front_mm: float
-    inner_mm: float
-    outer_mm: float
-
-
-@dataclass(frozen=True)
-class Placement:
-    """Size and toe-out of an insole, from other footfalls: extents in mm around the origin, angle in radians."""
-
-    toe_out: float
-    back_mm: float
-    front_mm: float
-    inner_mm: float
-    outer_mm: float
-
-
-def footprint(trial: Trial) -> Footprint:
-    """Measure one footfall of the plate.
+    foot : Placement
 
     Raises
     ------
@@ -90,23 +75,22 @@ def footprint(trial: Trial) -> Footprint:
         toe_out = float(np.arctan2(bx - ax, by - ay))
     u, v = _turned(across[peak > 0], along[peak > 0], origin, toe_out)
     half_row, half_column = 0.5 * float(trial.about["row_mm"]), 0.5 * float(trial.about["column_mm"])
-    return Footprint(
-        origin,
-        toe_out,
+    reach = (
         float(u.min()) - half_row,
         float(u.max()) + half_row,
         float(v.min()) - half_column,
         float(v.max()) + half_column,
     )
+    return origin, Placement(toe_out, *reach)
 
 
-def placement(others: Sequence[Footprint]) -> Placement:
+def placement(others: Sequence[Placement]) -> Placement:
     """Return mean toe-out and median extents of other footfalls.
 
     Parameters
     ----------
-    others : sequence of Footprint
-        Never the footfall that is to be cut.
+    others : sequence of Placement
+        As of `footprint`; never the footfall that is to be cut.
 
     Raises
     ------
@@ -114,8 +98,8 @@ def placement(others: Sequence[Footprint]) -> Placement:
     """
     if not others:
         raise ProblemError("an insole's size comes from other footfalls of the person: there is none")
-    extents = np.median([[f.back_mm, f.front_mm, f.inner_mm, f.outer_mm] for f in others], axis=0)
-    return Placement(float(np.mean([f.toe_out for f in others])), *(float(e) for e in extents))
+    toe_out, *extents = np.array(others).T
+    return Placement(float(np.mean(toe_out)), *np.median(extents, axis=1).tolist())
 
 
 def cut(trial: Trial, origin_mm: NDArray[np.float64], placed: Placement) -> Frames:
@@ -126,7 +110,7 @@ def cut(trial: Trial, origin_mm: NDArray[np.float64], placed: Placement) -> Fram
     trial : Trial
         Of the plate.
     origin_mm : float64, shape (2,)
-        Of this footfall's first loaded frame (`Footprint.origin_mm`).
+        Of this footfall's first loaded frame, as of `footprint`.
     placed : Placement
         Size and toe-out, from other footfalls.
 

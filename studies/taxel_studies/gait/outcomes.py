@@ -205,7 +205,8 @@ def _conversion(folder: Path) -> dict[str, Any]:
     cut = sources.cuts(folder, "plate")[0]
     piece = next(one for one in sources.encoded(folder, "plate", encoder).pieces if one.name == cut.name)
     begins = float(piece.truth["contact"][0])
-    peak = cut.values.max(axis=0)
+    values = cut.frames.values[:, 0]
+    peak = values.max(axis=0)
     first = np.concatenate([[0], np.cumsum(insole.CELLS)])
     loudest = {
         name: int(first[row] + np.argmax(peak[first[row] : first[row + 1]]))
@@ -215,7 +216,7 @@ def _conversion(folder: Path) -> dict[str, Any]:
         "footfall": cut.name,
         "peak": [float(v) for v in peak],
         "frame_ms": 2.0,
-        "felt": {name: [float(v) for v in cut.values[:, n]] for name, n in loudest.items()},
+        "felt": {name: [float(v) for v in values[:, n]] for name, n in loudest.items()},
         "threshold": encoder["levels"][0],
         "spikes_ms": [[round(float(t), 3) for t in train - begins] for train in piece.spikes],
         "truth_ms": {event: [float(t) for t in times - begins] for event, times in piece.truth.items()},

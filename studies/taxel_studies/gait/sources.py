@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from taxel import FormatError, ProblemError
 from taxel.array import Array
@@ -25,7 +24,7 @@ from taxel_studies.gait import insole
 from taxel_studies.gait.pieces import Piece
 from taxel_studies.gait.recipes import RULE_ENCODERS
 
-__all__ = ["SOURCES", "Cut", "Encoded", "Source", "cuts", "encoded", "fingerprint", "present"]
+__all__ = ["SOURCES", "Encoded", "Source", "cuts", "encoded", "fingerprint", "present"]
 
 #: Silence before each footfall of the plate, ms: random, so that its length does not reveal when events come.
 SILENCE_MS = (300, 900)
@@ -206,17 +205,17 @@ def _footfalls(folder: Path, name: str, encoder: Encoder) -> list[Piece]:
     return pieces
 
 
-def _row(cuts: list[Cut], encoder: Encoder) -> list[Piece]:
+def _row(cuts: list[Trial], encoder: Encoder) -> list[Piece]:
     """Encode a person's footfalls as one row with random silences, and take it apart again into pieces."""
     rng = np.random.default_rng([int.from_bytes(hashlib.sha256(cuts[0].person.encode()).digest()[:4])])
     order = rng.permutation(len(cuts))
     step = plate.FRAME_US // 1000
     silences = rng.integers(SILENCE_MS[0] // step, SILENCE_MS[1] // step + 1, len(cuts)) * step
-    lengths = np.array([(len(c.values) - 1) * step for c in cuts])
+    lengths = np.array([(len(c.frames) - 1) * step for c in cuts])
     begins = np.cumsum(silences + np.concatenate([[0], lengths[order][:-1]]))
     values = np.zeros(((int(begins[-1] + lengths[order[-1]]) + END_MS) // step, insole.TAXELS), np.float32)
     for at, k in zip(begins, order, strict=True):
-        values[at // step : at // step + len(cuts[k].values)] = cuts[k].values
+        values[at // step : at // step + len(cuts[k].frames)] = cuts[k].frames.values[:, 0]
     t = np.arange(len(values)) * plate.FRAME_US
     frames = Frames(values[:, None, :], t, unit="counts", array=Array(1, insole.TAXELS, name="insole"))
     spikes = encoder.encode(frames).split_by_sign()
@@ -236,7 +235,7 @@ def _row(cuts: list[Cut], encoder: Encoder) -> list[Piece]:
                 person=cuts[k].person,
                 group="healthy",
                 spikes=_moved(part, -start, stop - start),
-                truth={e: times + at - start for e, times in cuts[k].truth.items()},
+                truth={e: to_ms(times) + at - start for e, times in cuts[k].truth.items()},
                 scored=(0.0, stop - start),
                 sums={"total": (to_ms(t[rows]) - start, total[rows]), "heel": (to_ms(t[rows]) - start, heel[rows])},
             )
@@ -244,27 +243,15 @@ def _row(cuts: list[Cut], encoder: Encoder) -> list[Piece]:
     return pieces
 
 
-@dataclass(frozen=True)
-class Cut:
-    """One footfall as the insole measures it; truth in ms from its first frame."""
-
-    name: str
-    person: str
-    values: NDArray[np.float32]
-    truth: dict[str, NDArray[np.float64]]
-
-
 @lru_cache(maxsize=4)
-def cuts(folder: Path, name: str) -> tuple[Cut, ...]:
-    """Cut every footfall, once all footprints are known."""
+def cuts(folder: Path, name: str) -> tuple[Trial, ...]:
+    """Return every footfall as the insole measures it, once all footprints are known."""
     feet = _trials(folder, name)
-    prints = [insole.footprint(t) for t in feet]
+    origins, prints = zip(*(insole.footprint(trial) for trial in feet), strict=True)
     footfalls = []
     for k, trial in enumerate(feet):
         others = [prints[n] for n, other in enumerate(feet) if n != k and other.person == trial.person]
-        frames = insole.cut(trial, prints[k].origin_mm, insole.placement(others))
-        truth = {e: to_ms(times) for e, times in trial.truth.items()}
-        footfalls.append(Cut(trial.name, trial.person, frames.values[:, 0, :], truth))
+        footfalls.append(replace(trial, frames=insole.cut(trial, origins[k], insole.placement(others))))
     return tuple(footfalls)
 
 
