@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from taxel.encode import FA1
 from taxel.frames import Frames
 from taxel_studies import indented
-from taxel_studies.fem import Course, SamplingGrid, Yeoh, bodies
+from taxel_studies.fem import Course, SamplingGrid, Yeoh, bodies, conditions
 from taxel_studies.fem.solids import Solids
 from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, subplots
 
@@ -82,7 +82,7 @@ def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     most = max(row.result["most_kpa"] for row in rows)
     return {
         "paths": [{k: v for k, v in one.items() if k != "silicone"} for one in paths],
-        "conditions": len(indented.table_of(p).conditions()),
+        "conditions": len(conditions(p)),
         "most_kpa": most,
         "model": _shape(course, wanted["depth_mm"]),
         "sampled": _sampled(p, course, most),

@@ -12,7 +12,7 @@ from taxel.encode import FA1
 from taxel.frames import Frames
 from taxel.information import folds
 from taxel_studies.discriminants import FoldSums
-from taxel_studies.fem import TABLE_5_1, Condition, Course, Indentation, SamplingGrid, Table, paths, press
+from taxel_studies.fem import TABLE_5_1, Condition, Course, Indentation, SamplingGrid, conditions, paths, press
 from taxel_studies.kept_bits import information
 from taxel_studies.study import Kept
 
@@ -28,7 +28,6 @@ __all__ = [
     "rasters",
     "sampled",
     "shared",
-    "table_of",
     "varying",
 ]
 
@@ -36,10 +35,7 @@ __all__ = [
 _Way = tuple[float, float, float]
 #: Table 5.1 as a study's parameters; elements and steps that serve it.
 TABLE: dict[str, Any] = {
-    "diameters_mm": list(TABLE_5_1.diameters_mm),
-    "moduli_kpa": list(TABLE_5_1.moduli_kpa),
-    "depths_mm": list(TABLE_5_1.depths_mm),
-    "angles_deg": list(TABLE_5_1.angles_deg),
+    **TABLE_5_1,
     "mesh_mm": 0.1,
     "base_mesh_mm": 0.2,
     "step_um": 8.0,
@@ -58,15 +54,10 @@ TOY: dict[str, Any] = {
 }
 
 
-def table_of(p: Mapping[str, Any]) -> Table:
-    """Return the table of conditions that parameters name."""
-    return Table(*(tuple(p[name]) for name in ("diameters_mm", "moduli_kpa", "depths_mm", "angles_deg")))
-
-
 def courses_of(p: Mapping[str, Any]) -> dict[_Way, Indentation]:
     """Return the indentations that serve a study's conditions, by diameter, modulus and angle."""
     meshed = {name: p[name] for name in ("mesh_mm", "base_mesh_mm", "step_um")}
-    return {_way(asked): asked for asked in paths(table_of(p).conditions(), **meshed)}
+    return {_way(asked): asked for asked in paths(conditions(p), **meshed)}
 
 
 def shared(p: Mapping[str, Any]) -> list[tuple[Any, ...]]:
@@ -97,7 +88,7 @@ def contacts(p: Mapping[str, Any], kept: Kept) -> Contacts:
     """Return the contacts of a study's table."""
     courses = {way: pressed(asked, kept) for way, asked in courses_of(p).items()}
     reached: dict[bool, list[Condition]] = {True: [], False: []}
-    for one in table_of(p).conditions():
+    for one in conditions(p):
         course = courses[_way(one)]
         reached[not course.fault or bool(course.path_mm[-1] >= one.depth_mm)].append(one)
     return Contacts(courses, reached[True], reached[False])

@@ -20,6 +20,7 @@ from taxel_studies.fem import (
     Indentation,
     Yeoh,
     bodies,
+    conditions,
     paths,
     press,
 )
@@ -164,11 +165,11 @@ def test_a_course_that_finds_no_equilibrium_ends_there_and_says_so():
 
 
 def test_75_paths_serve_the_300_conditions():
-    asked = paths(TABLE_5_1.conditions())
-    assert len(TABLE_5_1.conditions()) == 300
+    asked = paths(conditions(TABLE_5_1))
+    assert len(conditions(TABLE_5_1)) == 300
     assert len(asked) == len(set(asked)) == 75
     assert {one.depth_mm for one in asked} == {2.0}
-    assert Condition(2.0, 50.0, 0.5, 0.0) == TABLE_5_1.conditions()[0]
+    assert Condition(2.0, 50.0, 0.5, 0.0) == conditions(TABLE_5_1)[0]
 
 
 # Against closed forms, finer meshes and another engine

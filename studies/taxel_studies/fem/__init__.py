@@ -6,7 +6,7 @@ conditions of Table 5.1.
 
 from __future__ import annotations
 
-from taxel_studies.fem.conditions import TABLE_5_1, Condition, Table, paths
+from taxel_studies.fem.conditions import TABLE_5_1, Condition, conditions, paths
 from taxel_studies.fem.grid import SamplingGrid
 from taxel_studies.fem.indentation import Course, Indentation, bodies, press
 from taxel_studies.fem.material import DRAGON_SKIN_10, Yeoh
@@ -20,9 +20,9 @@ __all__ = [
     "Indentation",
     "Mesh",
     "SamplingGrid",
-    "Table",
     "Yeoh",
     "bodies",
+    "conditions",
     "paths",
     "press",
 ]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
 from taxel_studies.fem.indentation import Indentation
 
-__all__ = ["TABLE_5_1", "Condition", "Table", "paths"]
+__all__ = ["TABLE_5_1", "Condition", "conditions", "paths"]
 
 
 @dataclass(frozen=True)
@@ -27,32 +27,24 @@ class Condition:
     angle_deg: float
 
 
-@dataclass(frozen=True)
-class Table:
-    """Hold the values of each variable; the conditions are all their combinations.
+#: Table 5.1: the values of each variable.
+TABLE_5_1: dict[str, list[float]] = {
+    "diameters_mm": [2.0, 2.5, 3.0, 3.5, 4.0],
+    "moduli_kpa": [50.0, 150.0, 250.0],
+    "depths_mm": [0.5, 1.0, 1.5, 2.0],
+    "angles_deg": [0.0, 5.0, 10.0, 15.0, 20.0],
+}
 
-    Parameters
-    ----------
-    diameters_mm, moduli_kpa, depths_mm, angles_deg : sequence of float
+
+def conditions(table: Mapping[str, Any]) -> list[Condition]:
+    """List all combinations of a table: diameter by diameter, then by modulus, depth and angle.
 
     Examples
     --------
-    >>> len(TABLE_5_1.conditions()), len(paths(TABLE_5_1.conditions()))
+    >>> len(conditions(TABLE_5_1)), len(paths(conditions(TABLE_5_1)))
     (300, 75)
     """
-
-    diameters_mm: tuple[float, ...]
-    moduli_kpa: tuple[float, ...]
-    depths_mm: tuple[float, ...]
-    angles_deg: tuple[float, ...]
-
-    def conditions(self) -> list[Condition]:
-        """List the conditions: diameter by diameter, then by modulus, depth and angle."""
-        return [Condition(*one) for one in product(self.diameters_mm, self.moduli_kpa, self.depths_mm, self.angles_deg)]
-
-
-#: Table 5.1.
-TABLE_5_1 = Table((2.0, 2.5, 3.0, 3.5, 4.0), (50.0, 150.0, 250.0), (0.5, 1.0, 1.5, 2.0), (0.0, 5.0, 10.0, 15.0, 20.0))
+    return [Condition(*one) for one in product(*(table[name] for name in TABLE_5_1))]
 
 
 def paths(conditions: Iterable[Condition], **settings: Any) -> list[Indentation]:
