@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from taxel.simulate.circuit import Converter, Fabric, VirtualGround
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task, subplots
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, subplots
 
 WHERE = "thesis 4.4.1, figure 4.7"
 PROTOCOL = (
@@ -32,28 +33,10 @@ SIZES = {"toy": {"every_us": 0.01}}
 SETTLED_US = 0.2
 
 
-def tasks(p: Parameters) -> list[Task]:
-    """List the impact, and one task a time constant of the amplifiers."""
-    impact = {name: p[name] for name in ("delay_us", "rise_us", "impact_n")}
-    scan = {name: p[name] for name in ("forces_n", "every_us", "settled")}
-    return [Task(impact, 0), *(Task({**scan, "amplifier_us": tau}, 0) for tau in p["amplifiers_us"])]
+tasks = partial(grid, amplifier_us="amplifiers_us")
 
 
 def realise(params: dict[str, Any], _seed: int) -> dict[str, Any]:
-    """Simulate the impact, or trace a comparator over a column."""
-    return _impact(params) if "impact_n" in params else _scan(params)
-
-
-def _impact(params: dict[str, Any]) -> dict[str, Any]:
-    """Strike one taxel at time 0: the fabric conducts by the force of `delay_us` before."""
-    t = np.arange(-20.0, 120.0, 0.5)
-    force = params["impact_n"] * np.clip((t - params["delay_us"]) / params["rise_us"], 0.0, 1.0)
-    volts = VirtualGround().volts(Fabric().conductance(force).reshape(-1, 1, 1)).ravel()
-    moved = t[np.argmax(volts > volts[0] + 1e-6)]
-    return {"t_us": t.tolist(), "volts": volts.round(6).tolist(), "moved_us": round(float(moved), 3)}
-
-
-def _scan(params: dict[str, Any]) -> dict[str, Any]:
     """Read four lines of one channel; then two columns of which the first was pressed and the second was not."""
     converter = Converter(amplifier_us=params["amplifier_us"])
     lines = VirtualGround().volts(Fabric().conductance(np.array(params["forces_n"]))[:, None]).ravel()
@@ -78,14 +61,17 @@ def _scan(params: dict[str, Any]) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """List the impact, and the scans by time constant."""
-    (impact,) = [r.result for r in rows if "impact_n" in r.params]
-    scans = [{"amplifier_us": tau, **r.result} for tau in p["amplifiers_us"] for r in _of(rows, tau)]
-    return {"impact": impact, "scans": scans}
+    """Strike one taxel at time 0, and list the scans by time constant."""
+    return {"impact": _impact(p), "scans": [{"amplifier_us": r.params["amplifier_us"], **r.result} for r in rows]}
 
 
-def _of(rows: Sequence[Row], tau: float) -> list[Row]:
-    return [r for r in rows if r.params.get("amplifier_us") == tau]
+def _impact(p: Parameters) -> dict[str, Any]:
+    """Strike one taxel at time 0: the fabric conducts by the force of `delay_us` before."""
+    t = np.arange(-20.0, 120.0, 0.5)
+    force = p["impact_n"] * np.clip((t - p["delay_us"]) / p["rise_us"], 0.0, 1.0)
+    volts = VirtualGround().volts(Fabric().conductance(force).reshape(-1, 1, 1)).ravel()
+    moved = t[np.argmax(volts > volts[0] + 1e-6)]
+    return {"t_us": t.tolist(), "volts": volts.round(6).tolist(), "moved_us": round(float(moved), 3)}
 
 
 def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
