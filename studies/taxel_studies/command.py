@@ -69,8 +69,7 @@ def study(
     """Run a study: a protocol, its parameters, a report. Stops on Ctrl-C, resumes where it was.
 
     Figures and tables of the thesis are names too: fig5.6 runs the study that holds it. Without NAME, the studies are
-    listed. Studies on recordings are left out of all, and named, where no recordings are; so are those whose packages
-    are not installed.
+    listed. Studies on recordings are left out of all, and named, where no recordings are.
 
     Example: taxel study fig6.9 --size toy
 

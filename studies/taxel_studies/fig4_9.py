@@ -20,7 +20,6 @@ PROTOCOL = (
     "t-SNE of scikit-learn on all frames of a drop, begun at its principal components; beside each map, how many "
     "of a drop's 10 nearest neighbours in it are of its own class; and the same of drops sampled from any phase on."
 )
-NEEDS = ("sklearn",)
 
 PARAMETERS: dict[str, Any] = {
     **dropped.TENNIS_TABLE,
@@ -44,7 +43,7 @@ tasks = partial(grid, rate_hz="rates_hz")
 
 def realise(params: dict[str, Any], _seed: int, kept: Kept) -> dict[str, Any]:
     """Map all drops at a rate onto a plane, and classify each by its neighbours."""
-    from sklearn.manifold import TSNE  # noqa: PLC0415  an extra
+    from sklearn.manifold import TSNE  # noqa: PLC0415  takes long
 
     result: dict[str, Any] = {}
     for how, aligned in (("", True), ("any_phase_", False)):

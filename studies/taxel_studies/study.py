@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from importlib import metadata
-from importlib.util import find_spec
 from inspect import signature
 from pathlib import Path
 from types import ModuleType
@@ -145,7 +144,7 @@ class Table:
 
 #: What a module must define to be a study, and what it may define.
 _REQUIRED = ("WHERE", "PROTOCOL", "PARAMETERS", "SIZES", "tasks", "realise", "summarise", "statements", "draw")
-_OPTIONAL = ("shared", "tables", "DATA", "NEEDS")
+_OPTIONAL = ("shared", "tables", "DATA")
 
 
 @dataclass(frozen=True)
@@ -185,8 +184,6 @@ class Study:
         Tables below the picture.
     data : tuple of str
         Folders of recordings that it needs.
-    needs : tuple of str
-        Modules of the extra ``studies`` that it needs.
     """
 
     name: str
@@ -203,7 +200,6 @@ class Study:
     shared: Callable[[Parameters], Sequence[tuple[Any, ...]]] | None = None
     tables: Callable[[Parameters, Summary], Iterable[Table]] | None = None
     data: tuple[str, ...] = ()
-    needs: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, name: str, title: str, module: ModuleType) -> Study:
@@ -240,17 +236,11 @@ class Study:
             raise ProblemError(f"realisations is {values['realisations']}: must be a whole number, 1 or more")
         return values
 
-    @property
-    def lacks(self) -> str | None:
-        """The modules that are not installed, in words; None where all are."""
-        missing = [name for name in self.needs if find_spec(name) is None]
-        return f'it needs {", ".join(missing)}: pip install "taxel[studies]"' if missing else None
-
     def cannot_run(self, data: Path | None) -> str | None:
-        """Say what a run would miss: all of its recordings, or modules; None where it can begin."""
+        """Say that a run would miss all of its recordings; None where it can begin."""
         if self.data and (data is None or not any((data / folder).is_dir() for folder in self.data)):
             return f"it needs any of {', '.join(self.data)} (--data)"
-        return self.lacks
+        return None
 
     def run(
         self,
@@ -287,13 +277,11 @@ class Study:
 
         Raises
         ------
-        ProblemError : an unknown size or parameter; a module that is not installed
+        ProblemError : an unknown size or parameter
         FormatError : recordings that it needs are not there, or one cannot be read
         """
         workers = Workers() if workers is None else workers
         parameters = self.set(size, **(changes or {}))
-        if self.lacks is not None:
-            raise ProblemError(f"{self.name}: {self.lacks}")
         begun = time.time()
         kept = Kept(report / "cache", code_version("taxel", "taxel_rules", "taxel_studies"))
         given: dict[str, Any] = {"kept": kept}

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 import pytest
 
-from taxel import Array, ProblemError, SpikeTrains
+from taxel import Array, SpikeTrains
 from taxel.metrics import pairwise
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
@@ -179,9 +177,3 @@ def test_t_sne_lays_classes_that_differ_apart(report):
     (line,) = section["said"]["lines"]
     assert len(line["map"]) == 24
     assert line["own"] > 0.5  # by chance a quarter
-
-
-def test_without_its_package_a_study_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "sklearn", None)
-    with pytest.raises(ProblemError, match=r'fig4.9: it needs sklearn: pip install "taxel\[studies\]"'):
-        load("fig4.9").run(tmp_path, size="toy", quiet=True)
