@@ -13,7 +13,19 @@ from numpy.typing import NDArray
 from taxel.information import confusion_matrix, nested_predictions, panzeri_treves
 from taxel_studies import dropped
 from taxel_studies.dropped import TENNIS, Condition
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, grid, logarithmic, results, subplots
+from taxel_studies.study import (
+    Kept,
+    Parameters,
+    Row,
+    Statement,
+    Summary,
+    Task,
+    grid,
+    listed,
+    logarithmic,
+    results,
+    subplots,
+)
 
 WHERE = "thesis 4.4.2, figures 4.8 and 4.10"
 PROTOCOL = (
@@ -110,7 +122,7 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 4.4.2 says."""
     lines, most = summary["lines"], float(np.log2(summary["conditions"]))
     size = f"{summary['conditions']} conditions, {p['drops']} drops each"
-    listed = ", ".join(f"{line['bits']:.2f} at {_hz(line)}" for line in lines)
+    rates = [1000 / line["period_ms"] for line in lines]
     any_phase = ", ".join(f"{line['any_phase_bits']:.2f}" for line in lines)
     total = np.array(summary["sum"])
     at, over = float(total[total[:, 1].argmax(), 0]), total[:, 1] < 0.1 * total[:, 1].max()
@@ -132,7 +144,7 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
         yield Statement(
             "Figure 4.10: below 100 Hz little is known of the impact.",
             "insufficient",
-            f"{listed} bits; begun at any phase {any_phase}",
+            f"{listed([line['bits'] for line in lines], rates, place='{:g} Hz')} bits; begun at any phase {any_phase}",
             least < LITTLE * most,
             f"little: less than half of {most:.0f} bits; at any phase at most {phased:.2f} below 100 Hz; {size}",
         )
@@ -152,10 +164,6 @@ def _from_100_hz(lines: list[dict[str, Any]], best: float) -> str:
         return ""
     phased = max(line["any_phase_bits"] for line in lines) - there["any_phase_bits"]
     return f"; from 100 Hz itself on {best - there['bits']:+.2f}, begun at any phase {phased:+.2f}"
-
-
-def _hz(line: dict[str, Any]) -> str:
-    return f"{1000 / line['period_ms']:g} Hz"
 
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:

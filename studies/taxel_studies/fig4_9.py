@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import dropped, fig4_8
 from taxel_studies.dropped import TENNIS
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, grid
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, grid, listed
 
 WHERE = "thesis 4.4.2, figure 4.9"
 PROTOCOL = (
@@ -78,12 +78,12 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     slow = [line["own"] for line in lines if line["rate_hz"] < CLEAR_HZ]
     if not (fast and slow):
         return
-    listed = ", ".join(f"{line['own']:.2f} at {line['rate_hz']:g} Hz" for line in lines)
+    shares = listed([line["own"] for line in lines], [line["rate_hz"] for line in lines], place="{:g} Hz")
     any_phase = ", ".join(f"{line['any_phase_own']:.2f}" for line in lines)
     yield Statement(
         "Figure 4.9: classes lie clearly apart at 500 Hz and above, less so below.",
         "the picture",
-        f"of the {NEIGHBOURS} nearest in the map are of one's own class: {listed}",
+        f"of the {NEIGHBOURS} nearest in the map are of one's own class: {shares}",
         bool(min(fast) >= CLEAR and max(slow) < min(fast)),
         f"clearly: {CLEAR:.0%} or more; by chance {1 / len(summary['classes']):.2f}; sampling begun at any "
         f"phase instead of at the impact: {any_phase}; {p['drops']} drops a class, perplexity {p['perplexity']:g}",

@@ -15,7 +15,7 @@ from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 from taxel_studies import dropped, kept_bits
 from taxel_studies.dropped import LENGTH_MS, REGION, distances_of
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Table, Task, grid
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Table, Task, grid, listed
 
 WHERE = "thesis 5.6.3 and 5.6.4, figures 5.11 to 5.13"
 PROTOCOL = (
@@ -170,6 +170,7 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 5.6.4 says."""
     lines, most = summary["lines"], float(np.log2(summary["conditions"]))
     by = {line["period_ms"]: line for line in lines}
+    periods, bits = list(by), [line["bits"] for line in lines]
     size = f"{summary['conditions']} conditions, {p['drops']} drops each, {p['neighbours']} neighbours"
     best = max(lines, key=lambda line: line["bits"])
     shorter = [line for line in lines if line["period_ms"] < PRINTED["period_ms"]]
@@ -177,7 +178,7 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     yield Statement(
         "Figure 5.11: most information at a period of 1 ms, a little less below it.",
         "1 ms; ceiling 4.17 bits",
-        f"most at {_ms(best['period_ms'])}: {kept_bits.listed(lines)} bits; ceiling {most:.2f}; "
+        f"most at {_ms(best['period_ms'])}: {listed(bits, periods, place='{:g} ms')} bits; ceiling {most:.2f}; "
         + (f"{less:.3f} less at a shorter period" if shorter else "no shorter period was asked"),
         bool(best["period_ms"] == PRINTED["period_ms"] and less >= ALIKE) if shorter else None,
         f"below {ALIKE:g} bits are no loss; {size}; simulated drops vary less than drops by hand, which the thesis "
@@ -206,7 +207,7 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     yield Statement(
         "5.8: bits at long periods are too many, as sampling begins at the impact.",
         "likely",
-        ", ".join(f"{line['bits'] - line['any_phase_bits']:+.2f} at {_ms(line['period_ms'])}" for line in lines)
+        listed([line["bits"] - line["any_phase_bits"] for line in lines], periods, "+.2f", "{:g} ms")
         + " bits more than with sampling begun at any time",
         bool(lines[-1]["bits"] > lines[-1]["any_phase_bits"]),
         size,

@@ -14,7 +14,7 @@ from taxel.encode import FA1
 from taxel_studies import indented, kept_bits
 from taxel_studies.discriminants import FoldSums
 from taxel_studies.fem import SamplingGrid
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Table, Task
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Table, Task, listed
 
 WHERE = "thesis 5.5.1 and 5.5.3, figures 5.5, 5.6 and 5.8"
 PROTOCOL = (
@@ -155,20 +155,20 @@ def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
 def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     """Judge what 5.5.1, 5.5.3 and Table 5.3 say."""
     lines, most = summary["lines"], np.log2(summary["conditions"])
-    bits = [line["bits"] for line in lines]
+    bits, periods = ([line[name] for line in lines] for name in ("bits", "period_ms"))
     size = f"{summary['conditions']} conditions, {p['samples']} samples each, mesh {p['mesh_mm']:g} mm"
     short, long = lines[0], lines[-1]
     yield Statement(
         "Figure 5.5: mutual information falls as the sampling period grows, with a large gap between .5 and 20 ms.",
         "falls; ceiling 8.23 bits",
-        f"{kept_bits.listed(lines)}; ceiling {most:.2f} bits",
+        f"{listed(bits, periods, place='{:g} ms')}; ceiling {most:.2f} bits",
         bool(all(b <= a + 0.02 for a, b in pairwise(bits)) and bits[0] - bits[-1] > 1),
         f"alpha {', '.join(format(line['alpha'], 'g') for line in lines)}; {size}",
     )
     yield Statement(
         "Part of the loss at long periods is the jump of the threshold, A T, which grows with them (ours).",
         "none",
-        ", ".join(f"{line['even_bits'] - line['bits']:+.2f} at {line['period_ms']:g} ms" for line in lines)
+        listed([line["even_bits"] - line["bits"] for line in lines], periods, "+.2f", "{:g} ms")
         + f" bits with A T held at that of {p['even_ms']:g} ms",
         None,
         size,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results, subplots
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, listed, results, subplots
 
 WHERE = "thesis 6.3.2, figure 6.2"
 PROTOCOL = (
@@ -90,20 +90,16 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     yield Statement(
         "The potential crosses the threshold more steeply for kappa > 1.",
         "steeper",
-        "mean slope behind the target, mV/ms: " + _by_kappa(p, slopes, ".4f"),
+        "mean slope behind the target, mV/ms: " + listed(slopes, p["kappas"], ".4f", "kappa {:g}"),
         bool(np.all(np.diff(slopes) > 0)),
     )
     yield Statement(
         "A larger negative change is required to prevent the neuron from spiking.",
         "robustness to false negatives",
         f"within {DELTA_T:g} ms the potential would come above the threshold by, %: "
-        + _by_kappa(p, [100 * r for r in rises], ".1f"),
+        + listed([100 * r for r in rises], p["kappas"], ".1f", "kappa {:g}"),
         bool(np.all(np.diff(rises) > 0)),
     )
-
-
-def _by_kappa(p: Parameters, values: Sequence[float], form: str) -> str:
-    return ", ".join(f"{format(v, form)} at kappa {k:g}" for k, v in zip(p["kappas"], values, strict=True))
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

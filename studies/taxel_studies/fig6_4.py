@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results, subplots
+from taxel_studies.study import Parameters, Row, Statement, Summary, grid, listed, results, subplots
 from taxel_studies.waves import READINGS
 
 WHERE = "thesis 6.4.1, figure 6.4"
@@ -102,23 +102,17 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
         yield Statement(
             "A larger kappa lifts the potential behind the target.",
             "higher trajectories",
-            f"U({p['target'] + DELTA_T:g} ms) in thresholds: " + _by_kappa(p, behind, ".3f"),
+            f"U({p['target'] + DELTA_T:g} ms) in thresholds: " + listed(behind, p["kappas"], ".3f"),
             None not in behind and bool(np.all(np.diff(behind) > 0)),
             why + ("" if reading == "targets" else ": it does, but by less than kappa asks for"),
         )
         yield Statement(
             "It does so by larger weights of the synapses that spike closer to the target.",
             "increased weights of relevant synapses",
-            f"mean weight within {2 * TABLE['tau']:g} ms of it, mV: " + _by_kappa(p, weights, ".4f"),
+            f"mean weight within {2 * TABLE['tau']:g} ms of it, mV: " + listed(weights, p["kappas"], ".4f"),
             None not in weights and bool(np.all(np.diff(weights) > 0)),
             why,
         )
-
-
-def _by_kappa(p: Parameters, values: Sequence[float | None], form: str) -> str:
-    return ", ".join(
-        f"{'none' if v is None else format(v, form)} at {k:g}" for k, v in zip(p["kappas"], values, strict=True)
-    )
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

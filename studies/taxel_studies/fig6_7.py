@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from taxel_studies import capacity
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task, grid, results, subplots
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task, grid, listed, results, subplots
 
 WHERE = "thesis 6.4.4, figure 6.7"
 PROTOCOL = (
@@ -83,11 +83,11 @@ def _of(p: Parameters, lines: list[dict[str, Any]], why: str) -> Iterator[Statem
     load = np.array([line["load"] for line in lines])
     late, bend = inputs >= SATURATED, inputs == BEND
     if not (late.any() and bend.any()):
-        ours = ", ".join(f"{v:.3f} at N = {n}" for v, n in zip(load.mean(axis=0), inputs, strict=True))
+        ours = listed(load.mean(axis=0), inputs, ".3f", "N = {:g}")
         yield Statement("The load factor rises and saturates.", "at about 0.3", f"{ours} (mean over C)", None, why)
         return
     saturated, at_bend = load[:, late].mean(axis=1), load[:, bend].mean()
-    by_class = [f"{v:.3f} at C = {line['classes']}" for v, line in zip(saturated, lines, strict=True)]
+    by_class = listed(saturated, [line["classes"] for line in lines], ".3f", "C = {:g}")
     best = max(capacity.PUBLISHED.values())
     yield Statement(
         f"The load factor increases rapidly until about N = {BEND}, thereafter only little.",
@@ -100,7 +100,7 @@ def _of(p: Parameters, lines: list[dict[str, Any]], why: str) -> Iterator[Statem
     yield Statement(
         "It saturates at about 0.3, whatever the number of classes.",
         "about 0.3",
-        f"mean from N = {SATURATED} on: {', '.join(by_class)}",
+        f"mean from N = {SATURATED} on: {by_class}",
         bool(np.all(np.abs(saturated - 0.3) <= 0.03) and np.ptp(saturated) <= 0.03),
         why,
     )

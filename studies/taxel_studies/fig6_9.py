@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from taxel_studies import waves
-from taxel_studies.study import Parameters, Statement, Summary, Task
+from taxel_studies.study import Parameters, Statement, Summary, Task, listed
 from taxel_studies.waves import NOISES, READINGS
 
 WHERE = "thesis 6.4.5 and 6.4.6, figure 6.9"
@@ -68,7 +68,7 @@ def _larger_is_better(p: Parameters, curve: dict[str, Any], noise: str, where: s
     return Statement(
         f"A larger kappa makes the neuron more robust against {noise} ({where}).",
         "columns 1 and 3: lower error",
-        "distance, mean over levels: " + _by_kappa(p["kappas"], mean),
+        "distance, mean over levels: " + listed(mean, p["kappas"], ".1f"),
         holds,
         why,
     )
@@ -87,14 +87,14 @@ def _turn(p: Parameters, curve: dict[str, Any], where: str, why: str) -> Iterato
     yield Statement(
         f"Below 15 Hz of background a larger kappa helps ({where}).",
         "lower error below 15 Hz",
-        "distance, mean below 15 Hz: " + _by_kappa(p["kappas"], mean[:, low].mean(axis=1)),
+        "distance, mean below 15 Hz: " + listed(mean[:, low].mean(axis=1), p["kappas"], ".1f"),
         bool(gain[low].mean() > SAME * p["repetitions"]),
         why,
     )
     yield Statement(
         f"Above 15 Hz of background a larger kappa hurts ({where}).",
         "rapid increase after 15 Hz",
-        "distance, mean above 15 Hz: " + _by_kappa(p["kappas"], mean[:, high].mean(axis=1)) + turn,
+        "distance, mean above 15 Hz: " + listed(mean[:, high].mean(axis=1), p["kappas"], ".1f") + turn,
         bool(gain[high].mean() < -SAME * p["repetitions"]),
         why,
     )
@@ -108,7 +108,7 @@ def _training_helps(p: Parameters, curves: dict[str, Any], why: str) -> Statemen
         before, after = np.array(clean["mean"])[:, columns].mean(axis=1), np.array(noisy["mean"]).mean(axis=1)
         gain = 100 * (1 - after / np.maximum(before, 1e-9))
         holds &= bool(np.all(gain[np.array(p["kappas"]) > 1] > 0))
-        parts.append(f"{noise} {_by_kappa(p['kappas'], gain, '.0f')}")
+        parts.append(f"{noise} {listed(gain, p['kappas'], '.0f')}")
     return Statement(
         "For all values of kappa training with noise is better, in all three noises (6.4.6).",
         "significant improvement (figure 6.9c)",
@@ -116,10 +116,6 @@ def _training_helps(p: Parameters, curves: dict[str, Any], why: str) -> Statemen
         holds,
         f"{why}; judged for kappa > 1, as 6.10 has it",
     )
-
-
-def _by_kappa(kappas: Sequence[float], values: Any, form: str = ".1f") -> str:
-    return ", ".join(f"{v:{form}} at {k:g}" for k, v in zip(kappas, values, strict=True))
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from taxel.information import confusion_matrix, panzeri_treves, plug_in
 from taxel_studies.study import Summary, logarithmic, subplots
 
-__all__ = ["by_period_parameter_and_time", "information", "listed", "lost", "shares"]
+__all__ = ["by_period_parameter_and_time", "information", "lost", "shares"]
 
 
 def information(truth: NDArray[Any], answers: NDArray[Any], *wanted: str) -> dict[str, float]:
@@ -25,11 +25,6 @@ def information(truth: NDArray[Any], answers: NDArray[Any], *wanted: str) -> dic
         "most": np.log2(len(classes)),
     }
     return {name: round(float(values[name]), 4) for name in wanted}
-
-
-def listed(lines: Sequence[Mapping[str, Any]]) -> str:
-    """Return the bits by period, in words."""
-    return ", ".join(f"{line['bits']:.2f} at {line['period_ms']:g} ms" for line in lines)
 
 
 def lost(short: Mapping[str, Any], long: Mapping[str, Any], named: Mapping[str, str]) -> tuple[dict[str, float], str]:

@@ -39,6 +39,7 @@ __all__ = [
     "drawn",
     "forecast",
     "grid",
+    "listed",
     "logarithmic",
     "machine",
     "one_task",
@@ -383,6 +384,18 @@ def only_result(_p: Parameters, rows: Sequence[Row]) -> Summary:
     """Return the result of the one realisation of a study."""
     summary: Summary = rows[0].result
     return summary
+
+
+def listed(values: Iterable[float | None], places: Iterable[float], form: str = ".2f", place: str = "{:g}") -> str:
+    """Return values in words, each with its place.
+
+    Examples
+    --------
+    >>> listed([1.0, None], [1, 5], place="{:g} ms")
+    '1.00 at 1 ms, none at 5 ms'
+    """
+    words = ["none" if value is None else f"{value:{form}}" for value in values]
+    return ", ".join(f"{word} at {place.format(at)}" for word, at in zip(words, places, strict=True))
 
 
 def svg(figure: Figure) -> bytes:

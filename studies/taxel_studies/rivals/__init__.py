@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from taxel_studies.capacity import PUBLISHED
 from taxel_studies.rivals import protocols
 from taxel_studies.rivals.rules import CHOSEN_ON, RULES
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task, grid, results
+from taxel_studies.study import Parameters, Row, Statement, Summary, Task, grid, listed, results
 
 WHERE = "thesis 6.4.4, beside figure 6.7; Gardner and Grüning 2016"
 PROTOCOL = (
@@ -102,8 +102,8 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
         common = [n for n in INST_PATTERNS if n in ours]
         yield Statement(
             "INST learns so many patterns within 1 ms (Gardner and Grüning 2016).",
-            ", ".join(f"{v} at N = {n}" for n, v in INST_PATTERNS.items()),
-            ", ".join(f"{v} at N = {n}" for n, v in ours.items()),
+            listed(INST_PATTERNS.values(), INST_PATTERNS, "d", "N = {:g}"),
+            listed(a["INST"]["p"], a["INST"]["inputs"], "d", "N = {:g}"),
             all(abs(ours[n] - INST_PATTERNS[n]) <= 5 for n in common) if common and full else None,
             "in steps of 5 patterns",
         )
@@ -134,7 +134,7 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
 
 
 def _loads(line: dict[str, Any]) -> str:
-    return ", ".join(f"{v:.3f} at {n}" for n, v in zip(line["inputs"], line["load"], strict=True))
+    return listed(line["load"], line["inputs"], ".3f")
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:
