@@ -18,8 +18,6 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.mapping import LEARN, TABLE
 
-__all__ = ["DURATION_MS", "PUBLISHED", "feasible", "largest", "patterns", "realise", "satisfied", "weakest"]
-
 DURATION_MS = 200.0
 #: Where rounding prevents a proof either way, rows that hold to within this count as satisfied, mV.
 MET_TO = 1e-9

@@ -15,8 +15,6 @@ from taxel.options import Settings
 from taxel.tasks import Workers
 from taxel_studies import DRAWN, FIGURES, STUDIES, load
 
-__all__ = ["app"]
-
 app = App(name="study")
 
 

@@ -14,8 +14,6 @@ from threadpoolctl import threadpool_limits
 
 from taxel import ProblemError
 
-__all__ = ["LDA", "FoldSums", "fold_predictions"]
-
 #: Rows that are turned into floats at a time.
 _ROWS = 2048
 #: Whole numbers up to this size are exact in float32.

@@ -19,30 +19,6 @@ from taxel.spikes import to_ms
 from taxel.wire import FRAME_US, Registers
 from taxel_studies.study import Kept
 
-__all__ = [
-    "ANSWERED",
-    "FRAMES",
-    "IMPACTS",
-    "REGION",
-    "TABLE",
-    "TENNIS",
-    "TENNIS_TABLE",
-    "TENNIS_TOY",
-    "TOY",
-    "Condition",
-    "Drops",
-    "Rig",
-    "conditions",
-    "distances_of",
-    "frames_of",
-    "named_by_neighbours",
-    "played",
-    "sampled",
-    "shared",
-    "smoothed",
-    "spatial_grams",
-]
-
 #: The experiment of 5.6.2: two spheres, three heights, three slants, 100 trials each; how trials differ is a guess.
 TABLE: dict[str, Any] = {
     "balls_mm": [50.0, 70.0],

@@ -14,8 +14,6 @@ from taxel.frames import Frames
 from taxel.simulate import Layer
 from taxel.simulate.circuit import Divider, Fabric
 
-__all__ = ["ARRAY", "SENSOR", "depth_of", "pressed", "read"]
-
 Values = NDArray[np.float64]
 
 #: 6 x 6 cm (3.4.1).

@@ -16,21 +16,6 @@ from taxel_studies.fem import TABLE_5_1, Condition, Course, Indentation, Samplin
 from taxel_studies.kept_bits import information
 from taxel_studies.study import Kept
 
-__all__ = [
-    "COARSE",
-    "TABLE",
-    "TOY",
-    "Contacts",
-    "bits_of",
-    "contacts",
-    "courses_of",
-    "pressed",
-    "rasters",
-    "sampled",
-    "shared",
-    "varying",
-]
-
 #: A course by diameter, modulus and angle of its indentation.
 _Way = tuple[float, float, float]
 #: Table 5.1 as a study's parameters; elements and steps that serve it.

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from taxel.information import confusion_matrix, panzeri_treves, plug_in
 from taxel_studies.study import Summary, logarithmic, subplots
 
-__all__ = ["by_period_parameter_and_time", "information", "lost", "shares"]
-
 
 def information(truth: NDArray[Any], answers: NDArray[Any], *wanted: str) -> dict[str, float]:
     """Return of answers: ``bits`` (corrected), ``plug_in`` (as counted), ``right`` (share), ``most`` (bits)."""

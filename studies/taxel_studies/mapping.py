@@ -12,8 +12,6 @@ from taxel.learn import ConeX
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
-__all__ = ["LEARN", "TABLE", "exactness", "fitted", "poisson", "single_spikes", "thresholds", "timing"]
-
 #: Table 6.1; parameters that it does not name have taxel's defaults.
 TABLE: dict[str, Any] = {"tau": 15.0, "theta_0": 0.3, "theta_plus": 0.2, "refractory": 3.0}
 LEARN: dict[str, Any] = {"delta_t_ms": 1.5, "lb": -0.3, "ub": 0.3}

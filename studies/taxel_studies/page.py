@@ -9,8 +9,6 @@ from taxel.report.page import render
 from taxel_studies import STUDIES
 from taxel_studies.study import read_section
 
-__all__ = ["write_page"]
-
 
 def write_page(report: Path) -> Path:
     """Write ``index.html`` from what lies in a report's folder: one file that needs no other.

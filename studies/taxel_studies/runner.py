@@ -20,8 +20,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from taxel.tasks import Workers
 
-__all__ = ["Kept", "Row", "Task", "Workers", "grid", "make", "run"]
-
 
 @dataclass(frozen=True)
 class Task:

@@ -18,20 +18,6 @@ from taxel.information import Estimate, estimate, nested_predictions
 from taxel.simulate import Act, Scene, Silence, play, truth
 from taxel_studies.study import Parameters, Row, Task
 
-__all__ = [
-    "PERIOD_US",
-    "SIDE",
-    "bits",
-    "drop",
-    "drop_tasks",
-    "firsts",
-    "kinds_of",
-    "latency",
-    "rate",
-    "relative_latency",
-    "since_contact",
-]
-
 #: Taxels along a side of the region under the impact, and the period of the afferents: whole frames of 192 us.
 SIDE = 20
 PERIOD_US = 192

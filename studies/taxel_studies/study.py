@@ -23,8 +23,9 @@ from matplotlib.figure import Figure
 
 from taxel import FormatError, ProblemError, __version__
 from taxel.report import write_whole
+from taxel.tasks import Workers
 from taxel_studies.commit import code_version
-from taxel_studies.runner import Kept, Row, Task, Workers, grid, make, run
+from taxel_studies.runner import Kept, Row, Task, grid, make, run
 
 __all__ = [
     "Kept",

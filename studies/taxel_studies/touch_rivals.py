@@ -13,8 +13,6 @@ from taxel.frames import Frames
 from taxel.information import folds
 from taxel_studies.discriminants import LDA
 
-__all__ = ["around", "best_rule", "lda", "numbers"]
-
 Floats = NDArray[np.float64]
 
 #: What a loaded taxel reads above rest at least, ticks.

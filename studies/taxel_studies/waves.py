@@ -21,27 +21,6 @@ from taxel.spikes import SpikeTrains
 from taxel_studies.mapping import LEARN
 from taxel_studies.study import Row, Task
 
-__all__ = [
-    "LEVELS",
-    "NEURON",
-    "NOISES",
-    "PROTOCOL",
-    "READINGS",
-    "REPETITIONS",
-    "TESTED",
-    "TESTED_TOY",
-    "TRAINED_AT",
-    "Waves",
-    "curves",
-    "noisy",
-    "pattern",
-    "realise",
-    "summarise",
-    "tasks",
-    "waves",
-    "why",
-]
-
 INPUTS, DURATION_MS, REPETITIONS = 200, 40.0, 30
 #: Between repetitions, ms; the first and the last have a gap outside too, so that jitter stays inside.
 GAP_MS = (50.0, 100.0)

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from taxel.tasks import Workers
 from taxel_studies import load
 from taxel_studies.commit import code_version
-from taxel_studies.runner import Workers
 
 #: A package that no test imports.
 NAME = "taxel_toy_study"

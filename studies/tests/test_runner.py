@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from taxel_studies.runner import Kept, Task, Workers, run
+from taxel.tasks import Workers
+from taxel_studies.runner import Kept, Task, run
 
 CALLS: list[int] = []
 

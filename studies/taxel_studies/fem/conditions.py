@@ -9,8 +9,6 @@ from typing import Any
 
 from taxel_studies.fem.indentation import Indentation
 
-__all__ = ["TABLE_5_1", "Condition", "conditions", "paths"]
-
 
 @dataclass(frozen=True)
 class Condition:

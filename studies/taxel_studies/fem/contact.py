@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-__all__ = ["Contact", "Touch"]
-
 #: Gauss points on an edge of the block's top, and their weights.
 _PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 #: The step of the complex derivative; nothing is subtracted, so it may be as small as one likes.

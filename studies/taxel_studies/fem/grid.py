@@ -11,8 +11,6 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from taxel import ProblemError
 from taxel_studies.fem.indentation import Course
 
-__all__ = ["SamplingGrid"]
-
 #: Samples that are computed at a time.
 _AT_ONCE = 100
 #: How far beyond the grid's ends the base's nodes still matter to the spline, mm.

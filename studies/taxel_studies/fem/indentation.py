@@ -16,8 +16,6 @@ from taxel_studies.fem.mesh import Mesh, block, half_disc
 from taxel_studies.fem.solids import Solids
 from taxel_studies.fem.solver import State, Stopped, march
 
-__all__ = ["Course", "Indentation", "bodies", "press"]
-
 #: Depths of the shapes that a course keeps, in mm; and its end.
 _SHAPES_MM = (0.5, 1.0, 1.5, 2.0)
 

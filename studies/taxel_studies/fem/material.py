@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from taxel import ProblemError
 
-__all__ = ["DRAGON_SKIN_10", "Yeoh"]
-
 #: How the cofactor of a 2 x 2 matrix follows from its entries (11, 12, 21, 22).
 _COFACTOR = np.array([[0, 0, 0, 1], [0, 0, -1, 0], [0, -1, 0, 0], [1, 0, 0, 0]], float)
 #: Largest stretch at which stability is looked at.

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Mesh", "block", "half_disc"]
-
 #: How much longer an element may be than its neighbour towards the finer side.
 _GROWTH = 1.15
 #: Length of the block's elements at its sides, mm.

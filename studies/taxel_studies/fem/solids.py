@@ -13,8 +13,6 @@ from taxel import ProblemError
 from taxel_studies.fem.material import Yeoh
 from taxel_studies.fem.mesh import Mesh
 
-__all__ = ["Solids"]
-
 _CORNERS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], float)
 
 

@@ -13,8 +13,6 @@ from scipy.sparse.linalg import splu
 from taxel_studies.fem.contact import Contact, Touch
 from taxel_studies.fem.solids import Solids
 
-__all__ = ["State", "Stopped", "march"]
-
 #: A residual below this, mN by mm of thickness, counts as none.
 _TOLERANCE = 1e-8
 _ITERATIONS = 15

@@ -24,8 +24,6 @@ from taxel_studies.gait.pieces import Piece, joined
 from taxel_studies.gait.protocols import Scope
 from taxel_studies.gait.sources import SOURCES, Encoded, encoded
 
-__all__ = ["realise"]
-
 #: Detections count up to so far from a reference event, ms (thesis 6.5.2).
 WINDOW_MS = 50.0
 

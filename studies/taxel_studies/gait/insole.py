@@ -18,8 +18,6 @@ from taxel.array import Array
 from taxel.frames import Frames
 from taxel_studies.datasets import Trial
 
-__all__ = ["CELLS", "HEEL", "TAXELS", "TOES", "Placement", "cut", "footprint", "placement"]
-
 #: Taxels by row, heel to toe: 92 in the outline of an insole.
 CELLS = (4, 5, 6, 6, 6, 6, 6, 6, 7, 7, 7, 7, 7, 6, 6)
 TAXELS = sum(CELLS)

@@ -10,8 +10,6 @@ from taxel_studies.gait.outcomes import EVENTS
 from taxel_studies.gait.protocols import ROWS
 from taxel_studies.study import Parameters, Statement, Summary, Table
 
-__all__ = ["STAND", "STANDS_FOR", "stand_for", "statements", "tables"]
-
 #: The experiments that sources stand for: 6.5.2 has one person's footfalls, 6.5.3 recordings cut by time.
 STANDS_FOR = {
     "plate": ("own footfalls", "6.5.2"),

@@ -17,8 +17,6 @@ from taxel_studies.gait.rules import RULES
 from taxel_studies.gait.sources import SOURCES, fingerprint
 from taxel_studies.study import Parameters, Row, Summary, Task
 
-__all__ = ["EVENTS", "PARAMETERS", "SIZES", "figures", "folds", "summarise", "tasks"]
-
 EVENTS = {"contact": "contact", "heel_off": "heel-off", "foot_off": "foot-off"}
 PARAMETERS: dict[str, Any] = {
     "sources": list(SOURCES),  # those that are absent are skipped, and listed

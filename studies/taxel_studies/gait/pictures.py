@@ -13,8 +13,6 @@ from taxel_studies.gait.judgement import STAND, stand_for
 from taxel_studies.gait.outcomes import EVENTS
 from taxel_studies.study import Parameters, Summary, subplots
 
-__all__ = ["draw"]
-
 
 def draw(_p: Parameters, summary: Summary) -> list[Figure]:
     """Draw 6.12 and 6.13, where there are footfalls of the plate, and 6.14, where what stands for 6.5 was run."""

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from taxel.spikes import SpikeTrains
 
-__all__ = ["Piece", "joined"]
-
 #: No piece is cut nearer than this to a reference event, ms: the spikes of an event stay with it.
 CLEAR_MS = 100.0
 

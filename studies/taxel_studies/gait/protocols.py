@@ -16,8 +16,6 @@ from taxel_studies.gait.recipes import RECIPE
 from taxel_studies.gait.rules import RULES
 from taxel_studies.gait.sources import encoded
 
-__all__ = ["PROTOCOLS", "ROWS", "Protocol", "Scope", "by_footfall", "by_person", "by_time", "of", "scopes"]
-
 #: The rows of the study.
 ROWS = {
     "recipe": "the study's own recipe (tuned on the shared people, and flattered by that)",

@@ -9,8 +9,6 @@ from __future__ import annotations
 from copy import deepcopy
 from typing import Any
 
-__all__ = ["PRINTED", "RECIPE", "RULE_ENCODERS", "SEARCH", "Point", "changed"]
-
 Point = dict[str, Any]
 
 

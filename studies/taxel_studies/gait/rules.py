@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from taxel_studies.gait.pieces import Piece
 
-__all__ = ["RULES", "Signal", "count_of", "detected", "grid"]
-
 RULES = {
     "count": "plain rule: sensors (and levels) that are on now, counted, with memory",
     "labels' own rule": "a threshold on the sum of the sensors whose threshold the labels are",

@@ -24,8 +24,6 @@ from taxel_studies.gait import insole
 from taxel_studies.gait.pieces import Piece
 from taxel_studies.gait.recipes import RULE_ENCODERS
 
-__all__ = ["SOURCES", "Encoded", "Source", "cuts", "encoded", "fingerprint", "present"]
-
 #: Silence before each footfall of the plate, ms: random, so that its length does not reveal when events come.
 SILENCE_MS = (300, 900)
 #: A footfall's piece ends so long after foot-off, ms; by then the encoder's latency and the delay are over.

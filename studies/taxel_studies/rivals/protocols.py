@@ -11,8 +11,6 @@ from taxel import ProblemError
 from taxel.spikes import SpikeTrains
 from taxel_studies.rivals.rules import RULES, learner
 
-__all__ = ["CLASSES", "DURATION_MS", "gardner_gruning", "realise", "thesis"]
-
 DURATION_MS = 200.0
 CLASSES = 5
 

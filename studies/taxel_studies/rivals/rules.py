@@ -15,8 +15,6 @@ from taxel.learn import ConeX
 from taxel.neuron import Neuron
 from taxel_rules import FILT, FP, HTP, INST, PSD, SPAN, Chronotron, ReSuMe
 
-__all__ = ["CHOSEN_ON", "RULES", "Rule", "learner"]
-
 CHOSEN_ON = range(1000, 1006)
 
 #: Membrane, synapse and threshold of Gardner and Grüning.
