@@ -444,8 +444,6 @@ def _values(document: dict[str, Any]) -> dict[str, Any]:
                 raise ProblemError(f"[{name}]: {first_line(error)}") from None
         else:
             values[name] = tuple(value) if name == "pitch_mm" and isinstance(value, list) else value
-    if "falls" in values and isinstance(values["falls"], str):
-        flag("falls", values["falls"])
     return values
 
 

@@ -117,14 +117,7 @@ def _frames(
 ) -> Frames:
     """Return the frames of a sensor, in the rows and columns of the layout."""
     rows, columns = values.shape[1:]
-    taxels, size = rows * columns, (layout.rows or 0) * (layout.columns or 0)
-    if size not in (0, taxels):
-        per_frame, left = divmod(size, taxels)
-        hint = f"; if {per_frame} lines are a frame, write [table] frame_lines = {per_frame}"
-        raise FormatError(
-            f"{path}: contains frames of {rows} x {columns} values; {layout.path} states {layout.rows} x "
-            f"{layout.columns} taxels{hint if layout.table and rows == 1 and per_frame > 1 and not left else ''}"
-        )
+    taxels = rows * columns
     try:
         # More channels than a sensor may have columns are a grid by the layout.
         stated = layout.grid() if taxels > 65_535 else None

@@ -68,10 +68,6 @@ class Rows:
         """A Series of the cells of times, or of the times in the lines above frames; None without."""
         return self.beside.get("time")
 
-    def texts(self, name: str) -> list[str]:
-        """Return the cells of labels or of keys; none without such a column."""
-        return self.beside[name].fillna("").tolist() if name in self.beside else []
-
     def line(self, row: int, path: Path, first: int) -> int:
         """Return the number of the line of a row, from 1; the `first` line of numbers is counted from 0."""
         below = ((n, line) for n, line in enumerate(Text(path).lines(), 1) if n > first and line.strip())
@@ -133,7 +129,7 @@ def read_table(
             values, names = _one_line_a_time(path, form, rows, values)
         if full.axis is not None:
             values, names = _by_axis(path, full, names, values)
-        for key, chosen in _parts(rows.texts("by")):
+        for key, chosen in _parts(rows.beside):
             # Each sensor has a clock of its own.
             of_part, beside = values[chosen], rows.beside.iloc[chosen]
             t, order = np.arange(len(of_part), dtype=np.int64), None
@@ -374,12 +370,14 @@ def _by_axis(
     return values[:, :, [[taxel[axis] for axis in AXES] for taxel in by_taxel.values()]], list(by_taxel)
 
 
-def _parts(keys: Sequence[str]) -> Iterator[tuple[str, Any]]:
+def _parts(beside: Any) -> Iterator[tuple[str, Any]]:
     """Yield the rows of each key, or all."""
-    if not keys:
+    if "by" not in beside:
         yield "", slice(None)
-    for key in dict.fromkeys(keys):
-        yield key, np.flatnonzero(np.array(keys) == key)
+        return
+    keys = beside["by"].fillna("")
+    for key in keys.unique():
+        yield key, np.flatnonzero(keys == key)
 
 
 def _labels(form: Form, beside: Any, t: NDArray[np.int64]) -> list[Note]:
