@@ -22,6 +22,7 @@ mod counts;
 mod crc;
 mod decoder;
 mod encode;
+mod event_words;
 mod packer;
 mod stream;
 

@@ -3,11 +3,8 @@
 //! Unlike a board ([`super::Packer`]), a table may step back in time, mix events with values and without, and contain
 //! events that were decoded from states. Every event is written; decoding returns the same columns.
 
-use super::packer::{add, first_line, put, steps};
-use super::{
-    BASE_BITS, BODY_BYTES, BodyKind, DATAGRAM_BYTES, DatagramHeader, LATEST_OFFSET, Layout, NEVER, START, STOP, before,
-    checked_stride,
-};
+use super::event_words::{EventWords, marker_body};
+use super::{BASE_BITS, BodyKind, DATAGRAM_BYTES, DatagramHeader, NEVER, checked_stride};
 use crate::events::EventsView;
 use crate::{Result, problem};
 
@@ -81,13 +78,8 @@ struct Writing<'a> {
     stride: u8,
     /// Whether every value fits in 8 bits.
     small: bool,
-    kind: BodyKind,
-    body: Vec<u8>,
-    base: i64,
-    at: i64,
-    latest: i64,
-    line: u8,
-    position: i64,
+    /// The events of the current datagram, all written as one kind; none before the first.
+    words: Option<(BodyKind, EventWords)>,
     values: Vec<u16>,
     since: Vec<i64>,
 }
@@ -98,53 +90,26 @@ impl<'a> Writing<'a> {
         let values = held.map_or_else(|| vec![u16::MAX; events.array.len()], <[u16]>::to_vec);
         let since = values.iter().map(|&value| if value == u16::MAX { NEVER } else { NEVER + 1 }).collect();
         let small = events.intensity.is_none_or(|all| all.ticks.iter().all(|&ticks| ticks <= u16::from(u8::MAX)));
-        Ok(Self {
-            events,
-            out: Encoded { origin_us, ..Encoded::default() },
-            sequence: FIRST_SEQUENCE,
-            stride,
-            small,
-            kind: BodyKind::Changes,
-            body: vec![],
-            base: 0,
-            at: 0,
-            latest: 0,
-            line: 0,
-            position: -1,
-            values,
-            since,
-        })
+        let out = Encoded { origin_us, ..Encoded::default() };
+        Ok(Self { events, out, sequence: FIRST_SEQUENCE, stride, small, words: None, values, since })
     }
 
     /// Adds an event; no later event is earlier than `promise`.
     fn event(&mut self, k: usize, promise: i64) {
         let events = self.events;
-        let (t, x, y, p) = (events.t[k], events.x[k], events.y[k], events.p[k]);
+        let (t, taxel, p) = (events.t[k], (events.x[k], events.y[k]), events.p[k]);
         let value = events.intensity.filter(|all| all.present[k]).map(|all| all.ticks[k]);
-        let index = usize::from(y) * usize::from(events.array.columns) + usize::from(x);
+        let index = events.array.index(taxel.0, taxel.1);
         let kind = self.kind_of(k, index, value);
-        let position = i64::from(x) << self.stride | i64::from(y);
-        let Some(word) = kind.layout() else { return };
-        let states = matches!(kind, BodyKind::SmallStates | BodyKind::LargeStates);
-        let offset = t.checked_sub(self.base).and_then(|us| u64::try_from(us).ok());
+        let Some(layout) = kind.layout() else { return };
         // A state has the time of its datagram, and positions of states ascend.
-        let goes_on = !self.body.is_empty()
-            && kind == self.kind
-            && offset.is_some_and(|us| if states { us == 0 && position > self.position } else { us <= LATEST_OFFSET })
-            && self.body.len() + self.room(word, t, position) <= BODY_BYTES;
-        if !goes_on {
+        let states = matches!(kind, BodyKind::SmallStates | BodyKind::LargeStates);
+        let takes = |words: &EventWords| words.takes(t, taxel) && (!states || words.continues(t, taxel));
+        if !self.words.as_ref().is_some_and(|(last, words)| *last == kind && takes(words)) {
             self.flush(promise);
-            (self.kind, self.base, self.at, self.latest, self.line) = (kind, t, t, t, first_line(x));
-            self.position = before(self.line, self.stride);
         }
-        if t != self.at || position <= self.position {
-            put(&mut self.body, word, true, word.control(), 0);
-            let offset = ((t - self.base) as u32).to_le_bytes();
-            self.body.extend(&offset[..word.bytes]);
-            (self.at, self.position) = (t, -1);
-        }
-        add(&mut self.body, word, position - self.position - 1, p, value.unwrap_or(0));
-        (self.position, self.latest) = (position, self.latest.max(t));
+        let (_, words) = self.words.get_or_insert_with(|| (kind, EventWords::new(layout, self.stride)));
+        words.add(t, taxel, p, value.unwrap_or(0));
         if let Some(value) = value
             && t >= self.since[index]
         {
@@ -172,33 +137,17 @@ impl<'a> Writing<'a> {
         }
     }
 
-    /// Most bytes that an event takes in the current body.
-    fn room(&self, word: Layout, t: i64, position: i64) -> usize {
-        let again = t != self.at || position <= self.position;
-        let gap = if again { position } else { position - self.position - 1 };
-        word.bytes * (steps(word, gap) + if again { 2 } else { 0 })
-    }
-
     /// Ends the current datagram, if there is one; no later event is earlier than `promise`.
     fn flush(&mut self, promise: i64) {
-        if self.body.is_empty() {
-            return;
-        }
-        let body = std::mem::take(&mut self.body);
+        let Some((kind, EventWords { bytes, base, latest, line, .. })) = self.words.take() else { return };
         // The promise of the last datagram is the time after the last event.
-        let until = if promise == i64::MAX { self.latest + 1 } else { promise };
-        let span = until.saturating_sub(self.base).clamp(0, i64::from(u16::MAX)) as u16;
-        let time = if span > 0 { self.base + i64::from(span) } else { self.latest };
-        self.write(self.kind, (self.base, self.line, span), &body, time);
-        self.body = body;
-        self.body.clear();
+        let until = if promise == i64::MAX { latest + 1 } else { promise };
+        let span = until.saturating_sub(base).clamp(0, i64::from(u16::MAX)) as u16;
+        self.write(kind, (base, line, span), &bytes, if span > 0 { base + i64::from(span) } else { latest });
     }
 
     fn marker(&mut self, t: i64, start: bool) {
-        let mut body = vec![0; 4];
-        body.extend((if start { START } else { STOP }).to_le_bytes());
-        body.extend([0, 0]);
-        self.write(BodyKind::Markers, (t, 0, 0), &body, t);
+        self.write(BodyKind::Markers, (t, 0, 0), &marker_body(start), t);
     }
 
     fn write(&mut self, kind: BodyKind, (base, line, span): (i64, u8, u16), body: &[u8], time: i64) {
