@@ -80,41 +80,30 @@ def formatted(expression: str, unit: str) -> tuple[str, str]:
     }[unit]
 
 
-def rust_entries(source: Table, values: Table) -> str:
-    """Write values of the registers as entries of a struct."""
-    flags = {field["name"] for field in source["field"] if field["unit"] == "flag"}
-    return " ".join(f"{name}: {str(bool(v)).lower() if name in flags else v}," for name, v in values.items())
+def rust_value(field: Table, number: int) -> str:
+    """Write a field's value."""
+    return str(bool(number)).lower() if field["unit"] == "flag" else str(number)
 
 
 def rust_preset(source: Table, preset: Table) -> str:
-    """Write a preset: what differs from the defaults."""
-    entries = rust_entries(source, preset["values"])
-    registers = f"Registers {{ {entries} ..DEFAULTS }}" if entries else "DEFAULTS"
-    return f'Preset {{ name: "{preset["name"]}", sense_lines: {preset["sense_lines"]}, registers: {registers} }},'
+    """Write a preset on a line: what differs from the values at reset."""
+    fields = {field["name"]: field for field in source["field"]}
+    values = ", ".join(f"{name} {rust_value(fields[name], number)}" for name, number in preset["values"].items())
+    return f'    "{preset["name"]}", {preset["sense_lines"]}: {values};'
 
 
-def rust_rules(source: Table, *, warns: bool) -> str:
-    """Write the rules that refuse, or those that warn."""
+def rust_rule(source: Table, rule: Table) -> str:
+    """Write a rule on two lines: its number and when it is broken; its text."""
     units = {field["name"]: field["unit"] for field in source["field"]} | OF_THE_ARRAY
-    lines = []
-    for rule in source["rule"]:
-        if rule["warns"] != warns:
-            continue
-        pieces = template(rule["text"], units)
-        shown, arguments = "", []
-        for before, expression, unit in pieces:
-            shown += before
-            if expression:
-                written, words = formatted(expression, unit)
-                shown += "{}" + words
-                arguments.append(written)
-        text = f'"{shown} (rule {rule["number"]})"'
-        broken_rule = (
-            f"({rule['number']}, format!(\n            {text},\n            {', '.join(arguments)}\n        ))"
-        )
-        action = f"warnings.push({broken_rule});" if warns else f"return Some({broken_rule});"
-        lines.append(f"    if {broken(parsed(rule['holds']))} {{\n        {action}\n    }}")
-    return "\n".join(lines)
+    shown, arguments = "", ""
+    for before, expression, unit in template(rule["text"], units):
+        shown += before
+        if expression:
+            written, words = formatted(expression, unit)
+            shown += (f"{{{written}}}" if written.isidentifier() else "{}") + words
+            arguments += "" if written.isidentifier() else f", {written}"
+    text = f'"{shown} (rule {rule["number"]})"'
+    return f"    {rule['number']}, {broken(parsed(rule['holds']))} =>\n        {text}{arguments};"
 
 
 def used(source: Table, *, warns: bool) -> list[str]:
@@ -127,14 +116,26 @@ def used(source: Table, *, warns: bool) -> list[str]:
     return [name for name in units if name in occurring]
 
 
-def rust_values(source: Table, *, warns: bool) -> str:
-    """Bind the names that the rules use."""
+def rust_rules(source: Table, *, warns: bool) -> str:
+    """Write the rules that refuse, or those that warn, behind the names that they use."""
     fields = {field["name"] for field in source["field"]}
-    lines = []
-    for name in used(source, warns=warns):
-        origin = f"registers.{name}" if name in fields else f"scanned.{name}"
-        lines.append(f"    let {name} = i64::from({origin});")
-    return "\n".join(lines)
+    occurring = used(source, warns=warns)
+    of_registers = " ".join(name for name in occurring if name in fields)
+    of_array = " ".join(name for name in occurring if name not in fields)
+    arguments = [f"        registers: Registers [{of_registers}]"]
+    arguments += [f"        scanned: Scanned [{of_array}]"] if of_array else []
+    name = "warnings" if warns else "refusals"
+    about = "probably mistakes" if warns else "not allowed"
+    rules = [rust_rule(source, rule) for rule in source["rule"] if rule["warns"] == warns]
+    return "\n".join(
+        [
+            f"    /// The rules by which values are {about}, with their numbers.",
+            f"    fn {name}(",
+            ",\n".join(arguments),
+            "    );",
+            *rules,
+        ]
+    )
 
 
 def rust_field(f: Table) -> str:
@@ -144,6 +145,7 @@ def rust_field(f: Table) -> str:
     serde = ", ".join(filter(None, [alias, "default" if f.get("later") else ""]))
     attribute = f"#[serde({serde})] " if serde else ""
     place = f"{f['register']}, {f['low']}, {2 ** f['bits'] - 1:#x}, {f['offset']}, {f['least']}, {f['greatest']}"
+    place += f", {rust_value(f, f['default'])}"
     return f'    /// {f["text"]}\n    {attribute}{f["name"]}: {rust_type(f)}, "{f["manual"]}", "{f["unit"]}", {place};'
 
 
@@ -157,10 +159,11 @@ def rust_table(source: Table) -> str:
     """Write the struct that holds the registers, and where each field lies in them."""
     rows = [rust_field(f) for f in source["field"] if "register" in f]
     build = [f for f in source["field"] if "register" not in f]
-    rest = [f"    /// {f['text']}\n    {f['name']}: {rust_type(f)};" for f in build]
+    rest = [f"    /// {f['text']}\n    {f['name']}: {rust_type(f)}, {f['default']};" for f in build]
     newline = "\n"
     return as_formatted(f"""super::field::registers! {{
-    // The field: its type, the manual's name, unit; register, lowest bit, mask, offset, least and greatest value.
+    // The field: its type, the manual's name, unit; register, lowest bit, mask, offset, least and greatest value, that at
+    // reset.
 {newline.join(rows)}
     ; // Of the board's build:
 {newline.join(rest)}
@@ -171,46 +174,26 @@ def rust_table(source: Table) -> str:
 def rust_presets(source: Table) -> str:
     """Write the presets."""
     newline = "\n"
-    return as_formatted(f"""use super::table::Registers;
+    return as_formatted(f"""use super::table::{{AT_RESET, Registers}};
 
-/// A named set of register values.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Preset {{
-    /// Name of the preset.
-    pub name: &'static str,
-    /// Number of sense lines of the boards for which it is made.
-    pub sense_lines: u16,
-    /// The values of the registers.
-    pub registers: Registers,
-}}
-
-const DEFAULTS: Registers = Registers {{ {rust_entries(source, {f["name"]: f["default"] for f in source["field"]})} }};
-
-/// The presets, in the order of the reference; a board's registers at reset are the first preset for its array's size.
-pub const PRESETS: [Preset; {len(source["preset"])}] = [
+super::field::presets! {{
+    // The preset's name, the sense lines of the boards for which it is made, and what differs from the values at reset.
 {newline.join(rust_preset(source, preset) for preset in source["preset"])}
-];
+}}
 """)
 
 
 def rust_checks(source: Table) -> str:
     """Write the rules that refuse and those that warn."""
-    return as_formatted(f"""use super::field::{{Scanned, us}};
+    return as_formatted(f"""use super::field::{{Scanned, rules, us}};
 use super::table::Registers;
 
-/// The first rule that refuses these registers, with its numbers.
-pub(super) fn first_refusal(registers: &Registers, scanned: &Scanned) -> Option<(u8, String)> {{
-{rust_values(source, warns=False)}
+rules! {{
 {rust_rules(source, warns=False)}
-    None
 }}
 
-/// Warnings about values that are allowed but probably a mistake.
-pub(super) fn warnings(registers: &Registers) -> Vec<(u8, String)> {{
-    let mut warnings = vec![];
-{rust_values(source, warns=True)}
+rules! {{
 {rust_rules(source, warns=True)}
-    warnings
 }}
 """)
 

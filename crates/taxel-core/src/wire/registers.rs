@@ -77,7 +77,7 @@ impl Registers {
     pub fn preset(name: &str) -> Result<Self> {
         match PRESETS.iter().find(|preset| preset.name == name) {
             Some(preset) => Ok(preset.registers),
-            None => Err(problem!("preset"; " {name:?} is not known: must be one of {}", preset_names(&PRESETS))),
+            None => Err(problem!("preset"; " {name:?} is not known: must be one of {}", preset_names(PRESETS))),
         }
     }
 
@@ -268,7 +268,7 @@ impl Registers {
             }
         }
         let scanned = Scanned { steps: self.steps(array), driven_lines: array.columns, sense_lines: array.rows };
-        match rules::first_refusal(self, &scanned) {
+        match rules::refusals(self, &scanned).into_iter().next() {
             Some((rule, text)) => Err(WriteRefusal { register, rule, text }),
             None => Ok(()),
         }

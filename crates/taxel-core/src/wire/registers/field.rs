@@ -62,10 +62,10 @@ macro_rules! registers {
         $(
             #[doc = $text:literal]
             $(#[serde($($serde:tt)*)])? $name:ident: $type:ident, $manual:literal, $unit:literal,
-            $register:literal, $shift:literal, $mask:literal, $offset:literal, $least:literal, $greatest:literal;
+            $register:literal, $shift:literal, $mask:literal, $offset:literal, $least:literal, $greatest:literal, $reset:literal;
         )*
         ;
-        $(#[doc = $about:literal] $other:ident: $kind:ident;)*
+        $(#[doc = $about:literal] $other:ident: $kind:ident, $other_reset:literal;)*
     ) => {
         /// The values of the registers, in the registers' own units (Table 5.5).
         #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -74,6 +74,9 @@ macro_rules! registers {
             $(#[doc = $text] #[doc = concat!(" Unit: ", $unit, ".")] $(#[serde($($serde)*)])? pub $name: $type,)*
             $(#[doc = $about] pub $other: $kind,)*
         }
+
+        /// The values at reset.
+        pub(super) const AT_RESET: Registers = Registers { $($name: $reset,)* $($other: $other_reset,)* };
 
         /// All fields, in the order of the registers.
         pub(super) const FIELDS: &[$crate::wire::registers::Field] = &[
@@ -117,7 +120,52 @@ macro_rules! registers {
         }
     };
 }
-pub(super) use registers;
+
+/// Makes the list of presets, of one line a preset.
+macro_rules! presets {
+    ($($name:literal, $sense_lines:literal: $($field:ident $value:literal),*;)*) => {
+        /// A named set of register values.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub struct Preset {
+            /// Name of the preset.
+            pub name: &'static str,
+            /// Number of sense lines of the boards for which it is made.
+            pub sense_lines: u16,
+            /// The values of the registers.
+            pub registers: Registers,
+        }
+
+        /// The presets, in the order of the reference; a board's registers at reset are the first preset for its array's size.
+        pub const PRESETS: &[Preset] = &[
+            $(Preset {
+                name: $name,
+                sense_lines: $sense_lines,
+                registers: Registers { $($field: $value,)* ..AT_RESET },
+            },)*
+        ];
+    };
+}
+
+/// Makes a function that returns the rules that values break, each with its number and text, of two lines a rule.
+macro_rules! rules {
+    (
+        #[doc = $about:literal]
+        fn $name:ident($($of:ident: $kind:ident [$($value:ident)*]),*);
+        $($rule:literal, $broken:expr => $text:literal $(, $shown:expr)*;)*
+    ) => {
+        #[doc = $about]
+        pub(super) fn $name($($of: &$kind),*) -> Vec<(u8, String)> {
+            $($(let $value = i64::from($of.$value);)*)*
+            let mut broken = vec![];
+            $(if $broken {
+                broken.push(($rule, format!($text $(, $shown)*)));
+            })*
+            broken
+        }
+    };
+}
+
+pub(super) use {presets, registers, rules};
 
 /// The numbers of an array on a board that the rules need.
 pub(super) struct Scanned {

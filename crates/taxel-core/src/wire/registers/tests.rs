@@ -26,7 +26,7 @@ fn a_preset_leaves_what_it_does_not_say() {
     let array = Array::new(16, 8, 1.0, "small").unwrap();
     for (wire_version, record, channels) in [(1, false, 16), (2, true, 64)] {
         let held = Registers { wire_version, record, channels, ..Registers::at_reset(&array, channels) };
-        for preset in &PRESETS {
+        for preset in PRESETS {
             let then = held.with_preset(&preset.registers, &array);
             assert_eq!(
                 (then.wire_version, then.record, then.channels, then.lines),
@@ -59,7 +59,7 @@ fn presets_keep_the_rules_and_their_rates() {
 
 #[test]
 fn a_set_comes_back_from_its_eight_words() {
-    for Preset { sense_lines, registers: preset, .. } in PRESETS {
+    for &Preset { sense_lines, registers: preset, .. } in PRESETS {
         let array = Array::new(sense_lines, sense_lines, 1.0, "of the preset's size").unwrap();
         let mut board = Registers::at_reset(&array, preset.channels);
         for command in board.commands_to(&preset, &array).unwrap() {
