@@ -156,7 +156,8 @@ struct Written {
     names: Vec<Row>,
     /// The target whose row was subtracted from a row of silence beside it, and the factor of the difference.
     beside: Vec<Option<(usize, f64)>>,
-    silent: HashSet<(usize, u64)>,
+    /// The keys of these rows.
+    present: HashSet<(u8, usize, u64)>,
     slopes: Slopes,
     of_rows: Vec<f64>,
     of_targets: Vec<f64>,
@@ -170,7 +171,7 @@ impl Written {
             limit: vec![],
             names: vec![],
             beside: vec![],
-            silent: HashSet::new(),
+            present: HashSet::new(),
             slopes: Slopes::new(&problem.statement)?,
             of_rows: vec![],
             of_targets: vec![0.0; problem.targets.len()],
@@ -213,41 +214,40 @@ impl Written {
 
     /// Adds a row of silence or of slope that the problem has and the set does not.
     fn push(&mut self, problem: &Exact, row: Row, multiplier: f64) -> Result<()> {
-        let is_new = match row {
-            Row::Silence { pattern, t } => {
-                problem.statement.is_asked(pattern, t) && self.silent.insert((pattern, t.to_bits()))
-            }
-            Row::Slope { .. } => self.slopes.0.iter().any(|s| s.0 == row) && !self.names.contains(&row),
+        let (statement, targets) = (&problem.statement, &problem.targets);
+        let is_asked = match row {
+            Row::Silence { pattern, t } => statement.is_asked(pattern, t),
+            Row::Slope { .. } => self.slopes.0.iter().any(|s| s.0 == row),
             Row::Target { .. } => false,
         };
-        if is_new {
-            let (statement, targets) = (&problem.statement, &problem.targets);
-            let from = self.coefficients.len();
-            self.coefficients.resize(from + statement.trains, 0.0);
-            let coefficients = &mut self.coefficients[from..];
-            let mut limit = statement.state_into(row, coefficients)?;
-            // Near a target the two rows are parallel to within rounding. Their difference divided by the time between
-            // them limits the slope instead and is as long as the other rows; it is equivalent because the target's row
-            // holds with equality.
-            let tau = statement.neuron.tau;
-            let beside = match row {
-                Row::Silence { pattern, t } => targets
-                    .next(pattern, t)
-                    .filter(|&k| targets.times[k] - t < BESIDE * tau)
-                    .map(|k| (k, tau / (targets.times[k] - t))),
-                _ => None,
-            };
-            if let Some((k, steep)) = beside {
-                let at = targets.row(k);
-                coefficients.iter_mut().zip(at.at).for_each(|(c, at)| *c = steep * (*c - at));
-                limit = steep * (limit - at.threshold);
-                self.of_targets[k] += multiplier;
-            }
-            self.limit.push(limit);
-            self.names.push(row);
-            self.of_rows.push(multiplier / beside.map_or(1.0, |(_, steep)| steep));
-            self.beside.push(beside);
+        if !is_asked || !self.present.insert(row.key()) {
+            return Ok(());
         }
+        let from = self.coefficients.len();
+        self.coefficients.resize(from + statement.trains, 0.0);
+        let coefficients = &mut self.coefficients[from..];
+        let mut limit = statement.state_into(row, coefficients)?;
+        // Near a target the two rows are parallel to within rounding. Their difference divided by the time between
+        // them limits the slope instead and is as long as the other rows; it is equivalent because the target's row
+        // holds with equality.
+        let tau = statement.neuron.tau;
+        let beside = match row {
+            Row::Silence { pattern, t } => targets
+                .next(pattern, t)
+                .filter(|&k| targets.times[k] - t < BESIDE * tau)
+                .map(|k| (k, tau / (targets.times[k] - t))),
+            _ => None,
+        };
+        if let Some((k, steep)) = beside {
+            let at = targets.row(k);
+            coefficients.iter_mut().zip(at.at).for_each(|(c, at)| *c = steep * (*c - at));
+            limit = steep * (limit - at.threshold);
+            self.of_targets[k] += multiplier;
+        }
+        self.limit.push(limit);
+        self.names.push(row);
+        self.of_rows.push(multiplier / beside.map_or(1.0, |(_, steep)| steep));
+        self.beside.push(beside);
         Ok(())
     }
 

@@ -1,6 +1,6 @@
 //! The shortest weights that satisfy every row: row generation around the dual active set.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 
 use super::cone_r::GapMultipliers;
 use super::exact::{Exact, MOST_ROUNDS, Slopes};
@@ -51,12 +51,12 @@ impl Exact {
             let before = std::mem::replace(&mut weights, working.engine.weights().to_vec());
             let end = match verdict {
                 SolveOutcome::Infeasible(ray) => self
-                    .refutation(working.name_rows(&ray.multipliers), stop)?
+                    .refutation(name_rows(&working.names, &ray.multipliers), stop)?
                     .map_or(RowGenerationEnd::Stopped, RowGenerationEnd::Infeasible),
                 SolveOutcome::Stopped => RowGenerationEnd::Stopped,
                 SolveOutcome::Optimal => {
                     let broken = self.broken(&weights, ASKED_SHARE, self.rounding(&weights));
-                    let rows = working.rows();
+                    let rows = working.present.len();
                     let objective = self.parts(&weights).sum();
                     progress(Round { round: rounds, rows, objective, left: Left::Broken(broken.len()) });
                     let flat = working.flat(&weights, (1.0 - ASKED_SHARE) * self.statement.margin.slope);
@@ -73,7 +73,7 @@ impl Exact {
                     }
                 }
             };
-            let held = working.name_rows(&working.engine.multipliers());
+            let held = name_rows(&working.names, &working.engine.multipliers());
             return Ok(Shortest { weights, held, rounds, end });
         }
     }
@@ -113,19 +113,15 @@ impl Exact {
     /// A proof that no weights satisfy these rows together.
     fn conflict(&self, rows: &[Row], stop: Stop<'_>) -> Result<Option<Certificate>> {
         let mut engine = DualActiveSet::new(&self.objective.bounds.lower, &self.objective.bounds.upper)?;
-        let (mut targets, mut others) = (vec![], vec![]);
         for &row in rows {
             let stated = self.statement.state(row)?;
-            if let Row::Target { .. } = row {
-                engine.equality(&stated.coefficients, stated.limit)?;
-                targets.push(row);
-            } else {
-                engine.inequality(&stated.coefficients, stated.limit)?;
-                others.push(row);
-            }
+            match row {
+                Row::Target { .. } => engine.equality(&stated.coefficients, stated.limit)?,
+                Row::Silence { .. } | Row::Slope { .. } => engine.inequality(&stated.coefficients, stated.limit)?,
+            };
         }
         let SolveOutcome::Infeasible(ray) = engine.solve(stop)? else { return Ok(None) };
-        Certificate::check(&self.statement, &self.objective.bounds, name_rows(&targets, &others, &ray.multipliers))
+        Certificate::check(&self.statement, &self.objective.bounds, name_rows(rows, &ray.multipliers))
     }
 
     /// A lower bound on the l2 term by any multipliers, from the minimum of the Lagrangian of `|w|^2 / 2` within the
@@ -156,14 +152,11 @@ impl Exact {
 /// The dual active set with the names of its rows.
 struct Working {
     engine: DualActiveSet,
-    targets: Vec<Row>,
-    /// The names of the inequalities, by their number.
+    /// The name of each row added so far, by its number.
     names: Vec<Row>,
-    /// Silent rows in the working set, by pattern and time.
-    silent: HashSet<(usize, u64)>,
+    /// The keys of the rows in the working set, with their numbers.
+    present: HashMap<(u8, usize, u64), RowId>,
     slopes: Slopes,
-    /// The number of each slope row in the working set.
-    ids: Vec<Option<RowId>>,
     row: Vec<f64>,
 }
 
@@ -173,19 +166,17 @@ impl Working {
         let bounds = &problem.objective.bounds;
         let mut working = Self {
             engine: DualActiveSet::new(&bounds.lower, &bounds.upper)?,
-            targets: statement.targets().map(|(pattern, target)| Row::Target { pattern, target }).collect(),
             names: vec![],
-            silent: HashSet::new(),
+            present: HashMap::new(),
             slopes: Slopes::new(statement)?,
-            ids: vec![],
             row: vec![0.0; statement.trains],
         };
-        for target in targets.iter() {
-            working.engine.equality(target.at, target.threshold)?;
+        for ((pattern, target), stated) in statement.targets().zip(targets.iter()) {
+            let id = working.engine.equality(stated.at, stated.threshold)?;
+            working.name(Row::Target { pattern, target }, id);
         }
-        for (name, stated) in &working.slopes.0 {
-            working.ids.push(Some(working.engine.inequality(&stated.coefficients, stated.limit)?));
-            working.names.push(*name);
+        for k in 0..working.slopes.0.len() {
+            working.add_slope(k)?;
         }
         if !start.is_empty() {
             working.start(statement, start)?;
@@ -194,30 +185,19 @@ impl Working {
     }
 
     fn start(&mut self, statement: &Statement, start: &[(Row, f64)]) -> Result<()> {
-        let mut multipliers = Multipliers { equalities: vec![0.0; self.targets.len()], inequalities: vec![] };
+        let mut multipliers = Multipliers::new();
         for &(row, multiplier) in start {
             if !multiplier.is_finite() {
                 return Err(problem!("start"; ": a multiplier is {multiplier}; must be finite"));
             }
-            match row {
-                Row::Target { .. } => {
-                    if let Some(k) = self.targets.iter().position(|r| *r == row) {
-                        multipliers.equalities[k] = multiplier;
-                    }
-                }
-                Row::Slope { .. } => {
-                    if let Some(id) = self.slopes.0.iter().position(|s| s.0 == row).and_then(|k| self.ids[k]) {
-                        multipliers.inequalities.push((id, multiplier.max(0.0)));
-                    }
-                }
+            let id = match (self.present.get(&row.key()), row) {
+                (Some(&id), _) => id,
+                (None, Row::Silence { pattern, t }) if statement.is_asked(pattern, t) => self.add(statement, row)?,
                 // Rows that this problem does not have are skipped.
-                Row::Silence { pattern, t } => {
-                    if statement.is_asked(pattern, t) && !self.silent.contains(&(pattern, t.to_bits())) {
-                        let id = self.add(statement, row)?;
-                        multipliers.inequalities.push((id, multiplier.max(0.0)));
-                    }
-                }
-            }
+                _ => continue,
+            };
+            let least = if matches!(row, Row::Target { .. }) { f64::NEG_INFINITY } else { 0.0 };
+            multipliers.push((id, multiplier.max(least)));
         }
         self.engine.start(&multipliers)
     }
@@ -226,58 +206,52 @@ impl Working {
     fn add(&mut self, statement: &Statement, row: Row) -> Result<RowId> {
         let limit = statement.state_into(row, &mut self.row)?;
         let id = self.engine.inequality(&self.row, limit)?;
-        self.names.push(row);
-        if let Row::Silence { pattern, t } = row {
-            self.silent.insert((pattern, t.to_bits()));
-        }
+        self.name(row, id);
         Ok(id)
+    }
+
+    fn add_slope(&mut self, k: usize) -> Result<()> {
+        let (name, stated) = &self.slopes.0[k];
+        let (name, id) = (*name, self.engine.inequality(&stated.coefficients, stated.limit)?);
+        self.name(name, id);
+        Ok(())
+    }
+
+    fn name(&mut self, row: Row, id: RowId) {
+        self.names.push(row);
+        self.present.insert(row.key(), id);
     }
 
     /// The slope rows outside the working set that are violated even when their limit is relaxed by `left_out`.
     fn flat(&self, weights: &[f64], left_out: f64) -> Vec<usize> {
         let mut broken = self.slopes.broken(weights, left_out);
-        broken.retain(|&k| self.ids[k].is_none());
+        broken.retain(|&k| !self.present.contains_key(&self.slopes.0[k].0.key()));
         broken
-    }
-
-    fn rows(&self) -> usize {
-        self.targets.len() + self.silent.len()
     }
 
     /// Drops rows that are not binding and adds the worst of the violated ones; returns whether any row is new.
     fn cut(&mut self, statement: &Statement, broken: &[SilencePeak], flat: &[usize]) -> Result<bool> {
         let mut new: Vec<&SilencePeak> =
-            broken.iter().filter(|p| !self.silent.contains(&(p.pattern, p.t.to_bits()))).collect();
+            broken.iter().filter(|peak| !self.present.contains_key(&peak.row().key())).collect();
         new.sort_by(|a, b| b.excess.total_cmp(&a.excess));
         new.truncate(((ENTER_SHARE * new.len() as f64) as usize).max(ENTER_LEAST));
         if new.is_empty() && flat.is_empty() {
             return Ok(false);
         }
         for id in self.engine.drop_inactive() {
-            match self.names[id.index()] {
-                Row::Silence { pattern, t } => drop(self.silent.remove(&(pattern, t.to_bits()))),
-                _ => self.ids.iter_mut().filter(|known| **known == Some(id)).for_each(|known| *known = None),
-            }
+            self.present.remove(&self.names[id.index()].key());
         }
         for peak in new {
             self.add(statement, peak.row())?;
         }
-        for &k in flat {
-            let (name, stated) = &self.slopes.0[k];
-            self.ids[k] = Some(self.engine.inequality(&stated.coefficients, stated.limit)?);
-            self.names.push(*name);
-        }
+        flat.iter().try_for_each(|&k| self.add_slope(k))?;
         Ok(true)
-    }
-
-    fn name_rows(&self, multipliers: &Multipliers) -> Vec<(Row, f64)> {
-        name_rows(&self.targets, &self.names, multipliers)
     }
 }
 
-/// The multipliers with the names of their rows.
-fn name_rows(targets: &[Row], others: &[Row], multipliers: &Multipliers) -> Vec<(Row, f64)> {
-    let targets = targets.iter().copied().zip(multipliers.equalities.iter().copied());
-    let others = multipliers.inequalities.iter().map(|&(id, z)| (others[id.index()], z));
-    targets.chain(others).filter(|(_, u)| *u != 0.0).collect()
+/// The multipliers with the names of their rows, those of targets first.
+fn name_rows(names: &[Row], multipliers: &[(RowId, f64)]) -> Vec<(Row, f64)> {
+    let mut named: Vec<(Row, f64)> = multipliers.iter().map(|&(id, u)| (names[id.index()], u)).collect();
+    named.sort_by_key(|(row, _)| !matches!(row, Row::Target { .. }));
+    named
 }

@@ -83,8 +83,8 @@ pub struct DualActiveSet {
     weights: Vec<f64>,
     /// `a.w - limit` by slot.
     excess: Vec<f64>,
-    equalities: Vec<usize>,
-    inequalities: usize,
+    /// The number of rows added so far.
+    added: usize,
     dependent: usize,
     /// The slots of the bounds in the working set, by synapse.
     bounds: Vec<[Option<usize>; 2]>,
@@ -127,8 +127,7 @@ impl DualActiveSet {
             multipliers: Vec::new(),
             weights: vec![0.0; stride],
             excess: Vec::new(),
-            equalities: Vec::new(),
-            inequalities: 0,
+            added: 0,
             dependent: 0,
             bounds: vec![[None; 2]; lower.len()],
         })
@@ -139,10 +138,8 @@ impl DualActiveSet {
     /// # Errors
     ///
     /// `Problem` if the number of coefficients is wrong or one is not finite.
-    pub fn equality(&mut self, coefficients: &[f64], value: f64) -> Result<()> {
-        let slot = self.add(ConstraintKind::Equality(self.equalities.len()), coefficients, value)?;
-        self.equalities.push(slot);
-        Ok(())
+    pub fn equality(&mut self, coefficients: &[f64], value: f64) -> Result<RowId> {
+        self.add(ConstraintKind::Equality, coefficients, value)
     }
 
     /// Adds the row `coefficients.w <= limit`.
@@ -151,10 +148,7 @@ impl DualActiveSet {
     ///
     /// `Problem` if the number of coefficients is wrong or one is not finite.
     pub fn inequality(&mut self, coefficients: &[f64], limit: f64) -> Result<RowId> {
-        let id = RowId(self.inequalities);
-        self.add(ConstraintKind::Inequality(id), coefficients, limit)?;
-        self.inequalities += 1;
-        Ok(id)
+        self.add(ConstraintKind::Inequality, coefficients, limit)
     }
 
     /// The weights, optimal for the active rows.
@@ -163,7 +157,7 @@ impl DualActiveSet {
         &self.weights[..self.lower.len()]
     }
 
-    /// The multipliers: `w` minimises `|w|^2 / 2 + y.(A_eq w) + z.(A_in w)` within the bounds.
+    /// The multipliers u: `w` minimises `|w|^2 / 2 + u.(A w)` within the bounds.
     #[must_use]
     pub fn multipliers(&self) -> Multipliers {
         self.multipliers_by_row(&self.multipliers)
@@ -194,46 +188,33 @@ impl DualActiveSet {
     ///
     /// # Errors
     ///
-    /// `Problem` if an inequality is not in the working set or its multiplier is negative, or the number of equalities differs.
-    pub fn start(&mut self, from: &Multipliers) -> Result<()> {
-        if from.equalities.len() != self.equalities.len() {
-            return Err(problem!(
-                "start"; ": {} multipliers for {} equalities; must be one per equality",
-                from.equalities.len(),
-                self.equalities.len()
-            ));
-        }
-        let mut wanted = self.equalities.clone();
-        let mut slots = vec![None; self.inequalities];
+    /// `Problem` if a row is not in the working set, or the multiplier of an inequality is negative.
+    pub fn start(&mut self, from: &[(RowId, f64)]) -> Result<()> {
+        let mut wanted: Vec<usize> = self.live.iter().copied().filter(|&slot| self.is_equality(slot)).collect();
+        let mut slots = vec![None; self.added];
         for &slot in &self.live {
-            if let ConstraintKind::Inequality(id) = self.rows[slot].kind {
+            if let ConstraintKind::Equality(id) | ConstraintKind::Inequality(id) = self.rows[slot].kind {
                 slots[id.0] = Some(slot);
             }
         }
-        for &(id, z) in &from.inequalities {
-            let Some(slot) = slots.get(id.0).copied().flatten() else {
-                return Err(problem!("start"; ": inequality {} is not in the working set", id.0));
+        let mut by_slot = vec![0.0; self.rows.len()];
+        for &(RowId(id), u) in from {
+            let Some(slot) = slots.get(id).copied().flatten() else {
+                return Err(problem!("start"; ": row {id} is not in the working set"));
             };
-            if z.is_nan() || z < 0.0 {
-                return Err(problem!("start"; ": multiplier of inequality {} is {z}; must be 0 or more", id.0));
+            if !self.is_equality(slot) {
+                if u.is_nan() || u < 0.0 {
+                    return Err(problem!("start"; ": multiplier of inequality {id} is {u}; must be 0 or more"));
+                }
+                wanted.extend((u > 0.0).then_some(slot));
             }
-            if z > 0.0 {
-                wanted.push(slot);
-            }
+            by_slot[slot] = u;
         }
         self.extend_gram();
         self.deactivate_all();
         self.activate(&wanted);
-        for k in 0..self.active.len() {
-            let slot = self.active[k];
-            let u = match self.rows[slot].kind {
-                ConstraintKind::Equality(k) => from.equalities[k],
-                ConstraintKind::Inequality(id) => {
-                    from.inequalities.iter().find(|(i, _)| *i == id).map_or(0.0, |(_, z)| *z)
-                }
-                _ => 0.0,
-            };
-            self.multipliers[slot] = u * self.rows[slot].length;
+        for &slot in &self.active {
+            self.multipliers[slot] = by_slot[slot] * self.rows[slot].length;
         }
         self.ascend();
         Ok(())

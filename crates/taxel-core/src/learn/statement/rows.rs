@@ -45,6 +45,17 @@ pub enum Row {
     },
 }
 
+impl Row {
+    /// The row as a key: its kind, its pattern, and its target or the bits of its time.
+    pub(crate) fn key(self) -> (u8, usize, u64) {
+        match self {
+            Self::Target { pattern, target } => (0, pattern, target as u64),
+            Self::Silence { pattern, t } => (1, pattern, t.to_bits()),
+            Self::Slope { pattern, target } => (2, pattern, target as u64),
+        }
+    }
+}
+
 /// A computed row: `coefficients.w = limit` at a target, `<= limit` otherwise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StatedRow {

@@ -7,16 +7,16 @@ use super::rows::{ConstraintKind, Multipliers, Ray};
 impl DualActiveSet {
     /// Converts multipliers by slot to multipliers of the rows as stated.
     pub(super) fn multipliers_by_row(&self, by_slot: &[f64]) -> Multipliers {
-        let mut out = Multipliers { equalities: vec![0.0; self.equalities.len()], inequalities: Vec::new() };
+        let mut out = Multipliers::new();
         for &slot in &self.live {
             let u = by_slot[slot] / self.rows[slot].length;
             match self.rows[slot].kind {
-                ConstraintKind::Equality(k) => out.equalities[k] = u,
-                ConstraintKind::Inequality(id) if u > 0.0 => out.inequalities.push((id, u)),
+                ConstraintKind::Equality(id) if u != 0.0 => out.push((id, u)),
+                ConstraintKind::Inequality(id) if u > 0.0 => out.push((id, u)),
                 _ => {}
             }
         }
-        out.inequalities.sort_by_key(|&(id, _)| id);
+        out.sort_by_key(|&(id, _)| id);
         out
     }
 

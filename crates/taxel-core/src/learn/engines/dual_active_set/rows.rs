@@ -4,12 +4,12 @@
 pub(super) const TOLERANCE: f64 = 5e-13;
 /// The smallest tolerance of a long row, scaled to length 1.
 const FINEST: f64 = 4e-14;
-/// Identifies an inequality by the order of its addition; never reused.
+/// Identifies a row by the order of its addition; never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct RowId(pub(super) usize);
 
 impl RowId {
-    /// The number of inequalities that had been added before this one.
+    /// The number of rows that had been added before this one.
     #[must_use]
     pub fn index(self) -> usize {
         self.0
@@ -20,7 +20,7 @@ impl RowId {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ConstraintKind {
     Free,
-    Equality(usize),
+    Equality(RowId),
     Inequality(RowId),
     Lower(usize),
     Upper(usize),
@@ -41,22 +41,17 @@ impl WorkingRow {
     }
 }
 
-/// Multipliers of the active rows as stated (not scaled).
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Multipliers {
-    /// The multiplier of each equality, in the order of their addition; any sign.
-    pub equalities: Vec<f64>,
-    /// The multipliers of the active inequalities, 0 or more; that of every other inequality is 0.
-    pub inequalities: Vec<(RowId, f64)>,
-}
+/// The multipliers of the active rows as stated (not scaled), in the order of their addition: of equalities of any sign,
+/// of inequalities 0 or more; that of every other row is 0.
+pub type Multipliers = Vec<(RowId, f64)>;
 
 /// Proof that the rows contradict each other within the bounds (Farkas).
 ///
-/// With `g = A_eq'y + A_in'z` the rows require `g.w <= y.value + z.limit`, but the least value of `g.w` within the
+/// With `g = A'u` the rows require `g.w <= u.limit`, but the least value of `g.w` within the
 /// bounds, `sum_n min(lower_n g_n, upper_n g_n)`, is larger.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Ray {
-    /// y and z.
+    /// u.
     pub multipliers: Multipliers,
     /// The difference between that least value and what the rows allow.
     pub gap: f64,

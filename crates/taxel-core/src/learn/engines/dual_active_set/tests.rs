@@ -44,14 +44,19 @@ impl Stated {
         (solver, verdict)
     }
 
+    /// A row with its multiplier, and whether it is an inequality: the equalities were added before all of these.
+    fn row(&self, &(id, u): &(RowId, f64)) -> (&[f64], f64, f64, bool) {
+        let after = id.index().checked_sub(self.equalities.len());
+        let (a, limit) = after.map_or_else(|| &self.equalities[id.index()], |k| &self.inequalities[k]);
+        (a, *limit, u, after.is_some())
+    }
+
     fn combine(&self, m: &Multipliers) -> Vec<f64> {
         let n = self.equalities.first().or(self.inequalities.first()).unwrap().0.len();
         let mut g = vec![0.0; n];
-        let equalities = self.equalities.iter().zip(&m.equalities).map(|((a, _), &y)| (a, y));
-        let inequalities = m.inequalities.iter().map(|&(id, z)| (&self.inequalities[id.index()].0, z));
-        for (a, y) in equalities.chain(inequalities) {
+        for (a, _, u, _) in m.iter().map(|row| self.row(row)) {
             for (g, a) in g.iter_mut().zip(a) {
-                *g += y * a;
+                *g += u * a;
             }
         }
         g
@@ -69,8 +74,7 @@ impl Stated {
         for (a, limit) in &self.inequalities {
             assert!(dot(a) - limit < 1e-12 * length(a), "inequality off by {}", dot(a) - limit);
         }
-        for &(id, z) in &m.inequalities {
-            let (a, limit) = &self.inequalities[id.index()];
+        for (a, limit, z, _) in m.iter().map(|row| self.row(row)).filter(|row| row.3) {
             assert!(z > 0.0 && (dot(a) - limit).abs() < 1e-13 * (1.0 + length(a)), "held but not met");
         }
         for (n, (w, g)) in w.iter().zip(self.combine(&m)).enumerate() {
@@ -82,10 +86,10 @@ impl Stated {
     }
 
     fn assert_refuted(&self, ray: &Ray) {
-        assert!(ray.multipliers.inequalities.iter().all(|(_, z)| *z >= 0.0));
+        let rows = || ray.multipliers.iter().map(|row| self.row(row));
+        assert!(rows().all(|(.., u, inequality)| u >= 0.0 || !inequality));
         let least: f64 = self.combine(&ray.multipliers).iter().map(|g| -self.bound * g.abs()).sum();
-        let demanded = self.equalities.iter().zip(&ray.multipliers.equalities).map(|((_, b), y)| b * y).sum::<f64>()
-            + ray.multipliers.inequalities.iter().map(|&(id, z)| self.inequalities[id.index()].1 * z).sum::<f64>();
+        let demanded: f64 = rows().map(|(_, limit, u, _)| limit * u).sum();
         assert!(least - demanded > 0.0, "ray proves nothing: {least} against {demanded}");
     }
 }
@@ -176,7 +180,7 @@ fn a_cut_takes_the_place_of_one_that_it_hardly_differs_from() {
         assert_eq!(solver.active.len(), 3 + usize::from(exchanged), "instead of that");
         assert_eq!(solver.solve(Stop::never()).unwrap(), SolveOutcome::Optimal);
     }
-    assert_eq!(solver.multipliers().inequalities.iter().map(|(id, _)| *id).collect::<Vec<_>>(), held[1..]);
+    assert_eq!(solver.multipliers().iter().skip(3).map(|(id, _)| *id).collect::<Vec<_>>(), held[1..]);
     stated.assert_optimal(&solver);
 }
 
@@ -197,13 +201,14 @@ fn rows_in_rounds_give_what_all_rows_at_once_give() {
             let verdict = solver.solve(Stop::never()).unwrap();
             let w = solver.weights().to_vec();
             solver.drop_inactive();
-            let held: Vec<RowId> = solver.multipliers().inequalities.iter().map(|(id, _)| *id).collect();
+            let held = solver.multipliers();
             let mut added = false;
             for (k, (a, limit)) in stated.inequalities.iter().enumerate() {
                 let over = a.iter().zip(&w).map(|(a, w)| a * w).sum::<f64>() - limit;
                 if over > 1e-11 * a.iter().map(|a| a * a).sum::<f64>().sqrt() {
-                    assert!(!held.iter().any(|id| names[id.index()] == k), "a held row is violated");
-                    assert_eq!(solver.inequality(a, *limit).unwrap().index(), names.len());
+                    let is_held = |id: RowId| id.index() >= 6 && names[id.index() - 6] == k;
+                    assert!(!held.iter().any(|(id, _)| is_held(*id)), "a held row is violated");
+                    assert_eq!(solver.inequality(a, *limit).unwrap().index(), 6 + names.len());
                     names.push(k);
                     added = true;
                 }
@@ -262,9 +267,8 @@ fn nonsense_is_refused() {
     assert!(solver.equality(&[1.0, f64::NAN], 0.0).is_err());
     assert!(solver.inequality(&[1.0, 1.0], f64::INFINITY).is_err());
     let id = solver.inequality(&[1.0, 1.0], -1.0).unwrap();
-    let start = |equalities: Vec<f64>, z: f64| Multipliers { equalities, inequalities: vec![(id, z)] };
-    assert!(solver.start(&start(vec![1.0], 1.0)).is_err());
-    assert!(solver.start(&start(vec![], -1.0)).is_err());
-    assert!(solver.start(&start(vec![], 1.0)).is_ok());
+    assert!(solver.start(&[(id, 1.0), (RowId(7), 1.0)]).is_err());
+    assert!(solver.start(&[(id, -1.0)]).is_err());
+    assert!(solver.start(&[(id, 1.0)]).is_ok());
     assert_eq!(solver.solve(Stop::when(&|| true)).unwrap(), SolveOutcome::Stopped);
 }

@@ -1,7 +1,7 @@
 //! The working set: its rows by slot, and their Gram matrix (the products of all pairs).
 
 use super::kernels::products;
-use super::rows::{ConstraintKind, WorkingRow};
+use super::rows::{ConstraintKind, RowId, WorkingRow};
 use super::{BLOCK, DualActiveSet};
 use crate::vectors::{Aligned, LANES, dot};
 use crate::{Result, problem};
@@ -11,7 +11,8 @@ use crate::{Result, problem};
 const AT_FIRST: usize = 1024;
 
 impl DualActiveSet {
-    pub(super) fn add(&mut self, kind: ConstraintKind, coefficients: &[f64], limit: f64) -> Result<usize> {
+    /// Adds a row as stated.
+    pub(super) fn add(&mut self, kind: fn(RowId) -> ConstraintKind, coefficients: &[f64], limit: f64) -> Result<RowId> {
         if coefficients.len() != self.lower.len() {
             return Err(problem!("row: {} coefficients for {} weights", coefficients.len(), self.lower.len()));
         }
@@ -20,12 +21,14 @@ impl DualActiveSet {
         }
         let length = dot(coefficients, coefficients).sqrt();
         let length = if length > 0.0 { length } else { 1.0 };
-        let slot = self.slot(WorkingRow { kind, length, limit: limit / length });
+        let id = RowId(self.added);
+        self.added += 1;
+        let slot = self.slot(WorkingRow { kind: kind(id), length, limit: limit / length });
         for (to, a) in self.coefficients[slot * self.stride..].iter_mut().zip(coefficients) {
             *to = a / length;
         }
         self.fresh.push(slot);
-        Ok(slot)
+        Ok(id)
     }
 
     /// Puts a row into a free slot, with coefficients of 0.
