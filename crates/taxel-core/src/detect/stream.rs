@@ -2,20 +2,18 @@
 
 use std::collections::VecDeque;
 
-use crate::detect::running_rule::RunningRule;
+use crate::detect::running_rule::{Decision, RunningRule};
 use crate::detect::{Detection, FrameClock};
 use crate::encode::{Stream, Zeroing};
 use crate::spikes::ms;
 use crate::{Array, EventsView, FramesView, Result, Spike, Stop, problem};
 
-mod labelled_rule;
 mod named_neuron;
 mod neurons;
 mod repairs;
 #[cfg(test)]
 mod tests;
 
-use labelled_rule::LabelledRule;
 pub(super) use named_neuron::{NamedNeuron, ReceivedTrains};
 pub(super) use neurons::DelayedNeurons;
 use repairs::Repairs;
@@ -55,7 +53,7 @@ pub struct ReadoutStream {
 pub(super) struct Way {
     encoder: Box<dyn Stream>,
     decides: Decides,
-    /// Spikes of the encoder that were not yet passed on.
+    /// Spikes of the encoder that were not yet passed on, in order of time.
     emitted: Vec<Spike>,
     repairs: Repairs,
 }
@@ -64,7 +62,8 @@ pub(super) struct Way {
 #[derive(Clone)]
 enum Decides {
     Neurons(DelayedNeurons),
-    Rule(Box<LabelledRule>),
+    /// A plain rule, for which they are changes of its quantities, with its labels.
+    Rule(Box<RunningRule>, [Option<String>; 2]),
 }
 
 impl Way {
@@ -75,7 +74,7 @@ impl Way {
 
     /// That of a plain rule: `loads` emits the changes of its quantities.
     pub(super) fn of_rule(loads: Box<dyn Stream>, rule: RunningRule, labels: [Option<String>; 2]) -> Self {
-        Self::new(loads, Decides::Rule(Box::new(LabelledRule::new(rule, labels))))
+        Self::new(loads, Decides::Rule(Box::new(rule), labels))
     }
 
     fn new(encoder: Box<dyn Stream>, decides: Decides) -> Self {
@@ -86,28 +85,33 @@ impl Way {
     fn neurons(&self) -> Option<&DelayedNeurons> {
         match &self.decides {
             Decides::Neurons(neurons) => Some(neurons),
-            Decides::Rule(_) => None,
+            Decides::Rule(..) => None,
         }
     }
 
     /// Passes the encoder's spikes on, up to `until`, before which every spike is known.
     fn settle(&mut self, until: i64, clock: &FrameClock, begin: i64, out: &mut Vec<Detection>) -> Result<()> {
-        let emitted = std::mem::take(&mut self.emitted);
-        let spikes = emitted.into_iter().map(|spike| (spike, self.repairs.may_repair(spike.t)));
+        let certain = self.emitted.partition_point(|spike| spike.t < ms(until));
+        let spikes = self.emitted.drain(..certain).map(|spike| (spike, self.repairs.may_repair(spike.t)));
         match &mut self.decides {
             Decides::Neurons(neurons) => {
                 neurons.receive(spikes, self.encoder.trains(), self.encoder.kind());
-                // The encoder has emitted all spikes before `until`, so repairs too far in the past no longer matter.
-                self.repairs.forget_before(ms(until));
-                neurons.settle(ms(until), clock, begin, out)
+                neurons.settle(ms(until), clock, begin, out)?;
             }
-            Decides::Rule(rule) => {
-                rule.receive(spikes);
-                self.repairs.forget_before(ms(until));
-                rule.settle(until, clock, begin, out);
-                Ok(())
+            Decides::Rule(rule, labels) => {
+                let mut decisions = vec![];
+                spikes.for_each(|(change, repaired)| rule.change(change, repaired, clock, &mut decisions));
+                rule.advance(until, clock, &mut decisions);
+                out.extend(decisions.into_iter().filter_map(|Decision { label, t, known, repaired, .. }| {
+                    let label = labels[label].clone().filter(|_| t >= begin)?;
+                    // A rule has no potential, hence no slope.
+                    Some(Detection { label, t, known, slope: f64::NAN, repaired })
+                }));
             }
         }
+        // The encoder has emitted all spikes before `until`, so repairs too far in the past no longer matter.
+        self.repairs.forget_before(ms(until));
+        Ok(())
     }
 }
 

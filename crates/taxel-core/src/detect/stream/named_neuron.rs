@@ -1,6 +1,6 @@
 //! A neuron of a readout in a stream: its label, its state, and its crossings so far.
 
-use crate::detect::TrainedNeuron;
+use crate::detect::{Detection, FrameClock, TrainedNeuron};
 use crate::neuron::{Neuron, NeuronStream, OutputSpike, Time};
 use crate::spikes::us;
 use crate::{Result, Spike};
@@ -44,21 +44,12 @@ pub(in crate::detect) struct NamedNeuron {
     weights: Vec<f64>,
     threshold: f64,
     /// The delay of its crossings after the event: the encoder's latency plus the trained delay, ms.
-    pub offset_ms: f64,
+    offset_ms: f64,
     /// Started at the first spike, so that a grid has the same points wherever the input begins.
     pub stream: Option<NeuronStream>,
     crossings: Vec<OutputSpike>,
     /// The time of the latest input that may rest on a repaired taxel, ms.
     repaired: Option<f64>,
-}
-
-/// A crossing of a neuron, and what it rests on.
-pub(in crate::detect) struct NeuronCrossing {
-    pub spike: OutputSpike,
-    /// The neuron's number.
-    pub neuron: usize,
-    /// Whether it may rest on repaired taxels.
-    pub repaired: bool,
 }
 
 impl NamedNeuron {
@@ -77,18 +68,19 @@ impl NamedNeuron {
         }
     }
 
-    /// The time of the event of a crossing, us: without the delay.
-    pub fn event_us(&self, crossing: &OutputSpike) -> i64 {
-        us(crossing.t - self.offset_ms).round() as i64
-    }
-
-    /// Passes a spike of an encoder's train to the neuron, the number of which is `k`, if it is one of its inputs; adds
-    /// to `out` the crossings so far, if later ones rest on something else.
+    /// Passes a spike of an encoder's train to the neuron, if it is one of its inputs; reports the crossings so far, if later
+    /// ones rest on something else.
     ///
     /// # Errors
     ///
     /// Those of [`NeuronStream::push`].
-    pub fn push(&mut self, spike: Spike, repaired: bool, k: usize, out: &mut Vec<NeuronCrossing>) -> Result<()> {
+    pub fn push(
+        &mut self,
+        spike: Spike,
+        repaired: bool,
+        clock: &FrameClock,
+        out: &mut Vec<(f64, Detection)>,
+    ) -> Result<()> {
         let Some(input) = self.inputs.input(spike.train) else { return Ok(()) };
         let spike = Spike { train: input, ..spike };
         let stream = match &mut self.stream {
@@ -104,27 +96,26 @@ impl NamedNeuron {
         stream.push(spike, &mut self.crossings)?;
         if repaired {
             // Crossings up to here cannot rest on this spike.
-            self.drain_crossings(k, out);
+            self.report(clock, out);
             self.repaired = Some(spike.t);
         }
         Ok(())
     }
 
-    /// Advances to `until_ms`, before which every spike is known; adds the crossings to `out`.
-    pub fn advance(&mut self, until_ms: f64, k: usize, out: &mut Vec<NeuronCrossing>) {
+    /// Advances to `until_ms`, before which every spike is known; reports the crossings.
+    pub fn advance(&mut self, until_ms: f64, clock: &FrameClock, out: &mut Vec<(f64, Detection)>) {
         if let Some(stream) = &mut self.stream {
             stream.advance(until_ms, &mut self.crossings);
         }
-        self.drain_crossings(k, out);
+        self.report(clock, out);
     }
 
-    /// Moves the crossings so far to `out`.
-    fn drain_crossings(&mut self, k: usize, out: &mut Vec<NeuronCrossing>) {
-        let rests = |since: Option<f64>, t: f64| since.is_some_and(|at| at <= t && t - at <= self.neuron.memory_ms());
-        out.extend(self.crossings.drain(..).map(|spike| NeuronCrossing {
-            repaired: rests(self.repaired, spike.t),
-            spike,
-            neuron: k,
-        }));
+    /// Appends the crossings so far as detections to `out`, each behind the time of its crossing, ms.
+    fn report(&mut self, clock: &FrameClock, out: &mut Vec<(f64, Detection)>) {
+        for OutputSpike { t, slope } in self.crossings.drain(..) {
+            let repaired = self.repaired.is_some_and(|at| at <= t && t - at <= self.neuron.memory_ms());
+            let event = us(t - self.offset_ms).round() as i64;
+            out.push((t, Detection { label: self.label.clone(), t: event, known: clock.end_of(t), slope, repaired }));
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! The neurons of a readout in a stream, and the spikes that wait for them.
 
-use super::named_neuron::{NamedNeuron, NeuronCrossing};
+use super::named_neuron::NamedNeuron;
 use crate::detect::{Detection, FrameClock};
 use crate::neuron::NeuronStream;
 use crate::{Result, Spike, SpikeKind};
@@ -49,24 +49,16 @@ impl DelayedNeurons {
     pub fn settle(&mut self, until_ms: f64, clock: &FrameClock, begin: i64, out: &mut Vec<Detection>) -> Result<()> {
         self.waiting.sort_by(|(a, _), (b, _)| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
         let certain = self.waiting.partition_point(|(spike, _)| spike.t < until_ms);
-        let mut crossings: Vec<NeuronCrossing> = Vec::new();
-        for (k, neuron) in self.neurons.iter_mut().enumerate() {
+        let mut found = vec![];
+        for neuron in &mut self.neurons {
             for (spike, repaired) in &self.waiting[..certain] {
-                neuron.push(*spike, *repaired, k, &mut crossings)?;
+                neuron.push(*spike, *repaired, clock, &mut found)?;
             }
-            neuron.advance(until_ms, k, &mut crossings);
+            neuron.advance(until_ms, clock, &mut found);
         }
         self.waiting.drain(..certain);
-        let t_of = |crossing: &NeuronCrossing| self.neurons[crossing.neuron].event_us(&crossing.spike);
-        crossings.retain(|crossing| t_of(crossing) >= begin);
-        crossings.sort_by(|a, b| a.spike.t.total_cmp(&b.spike.t));
-        out.extend(crossings.iter().map(|crossing| Detection {
-            label: self.neurons[crossing.neuron].label.clone(),
-            t: t_of(crossing),
-            known: clock.end_of(crossing.spike.t),
-            slope: crossing.spike.slope,
-            repaired: crossing.repaired,
-        }));
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        out.extend(found.into_iter().map(|(_, detection)| detection).filter(|detection| detection.t >= begin));
         Ok(())
     }
 }
