@@ -117,31 +117,27 @@ impl Events {
     /// Appends the first `n` events of a table of the same array, and all its markers; a column that only one table has
     /// is filled for the other.
     pub fn append(&mut self, more: &Self, n: usize) {
+        if let Some(Intensities { ticks, present }) = &more.intensity {
+            self.complete_intensities();
+            let column = self.intensity.get_or_insert_default();
+            column.ticks.extend_from_slice(&ticks[..n]);
+            column.present.extend_from_slice(&present[..n]);
+        }
         let rows = self.len();
         self.t.extend_from_slice(&more.t[..n]);
         self.x.extend_from_slice(&more.x[..n]);
         self.y.extend_from_slice(&more.y[..n]);
         self.p.extend_from_slice(&more.p[..n]);
         self.markers.extend_from_slice(&more.markers);
-        if self.intensity.is_some() || more.intensity.is_some() {
-            let none = || Intensities { ticks: vec![0; rows], present: vec![false; rows] };
-            let column = self.intensity.get_or_insert_with(none);
-            match &more.intensity {
-                Some(intensity) => {
-                    column.ticks.extend_from_slice(&intensity.ticks[..n]);
-                    column.present.extend_from_slice(&intensity.present[..n]);
-                }
-                None => {
-                    column.ticks.resize(rows + n, 0);
-                    column.present.resize(rows + n, false);
-                }
-            }
+        if self.intensity.is_some() {
+            self.complete_intensities();
         }
-        if self.repaired.is_some() || more.repaired.is_some() {
-            let column = self.repaired.get_or_insert_with(|| vec![false; rows]);
-            match &more.repaired {
-                Some(repaired) => column.extend_from_slice(&repaired[..n]),
-                None => column.resize(rows + n, false),
+        match &more.repaired {
+            None => self.mark_repaired(rows, false),
+            Some(repaired) => {
+                let column = self.repaired.get_or_insert_default();
+                column.resize(rows, false);
+                column.extend_from_slice(&repaired[..n]);
             }
         }
     }
