@@ -2,8 +2,8 @@
 
 use rand::{SeedableRng, rngs::StdRng};
 use taxel_core::board::Board;
+use taxel_core::wire::Registers;
 use taxel_core::wire::v2::{BodyKind, DatagramHeader, DatagramOutcome, Decoder, Packer, Settings};
-use taxel_core::wire::{Decoder as Decoder1, Registers};
 use taxel_core::{Array, Events};
 
 use crate::scenes::{Row, arrays, board, rows, scene};
@@ -79,39 +79,6 @@ fn the_host_decodes_the_events_that_the_board_sent() {
         assert_eq!(decoder.counts().events, board.counts().changes);
         assert_eq!(events.repaired, None);
     }
-}
-
-#[test]
-fn both_versions_carry_the_same_events_of_one_scene() {
-    let mut random = StdRng::seed_from_u64(11);
-    let array = Array::thesis();
-    let frames = scene(&mut random, &array, 100, 150);
-    let play = |version: u8| {
-        let registers = Registers { wire_version: version, ..Registers::default() };
-        let mut board = Board::new(registers, &array).unwrap().queue(usize::MAX);
-        let mut bytes = vec![];
-        for frame in &frames {
-            board
-                .frame(frame, |datagram| {
-                    bytes.push(datagram.to_vec());
-                    true
-                })
-                .unwrap();
-        }
-        bytes
-    };
-    let (mut of_1, mut decoder_1) = (Events::empty(array.clone()), Decoder1::new(array.clone()));
-    decoder_1.push(&play(1).concat(), None, &mut of_1);
-    let (mut two, mut decoder) = (Events::empty(array.clone()), Decoder::new(array.clone()));
-    for datagram in play(2) {
-        decoder.push(&datagram, None, &mut two);
-    }
-    // Version 1 rounds times down to 100 us.
-    two.t.iter_mut().for_each(|t| *t = *t / 100 * 100);
-    let (mut a, mut b) = (rows(&of_1), rows(&two));
-    a.sort_unstable();
-    b.sort_unstable();
-    assert_eq!(a, b);
 }
 
 #[test]

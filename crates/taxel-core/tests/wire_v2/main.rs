@@ -5,4 +5,3 @@ mod faults;
 mod instructions;
 mod scenes;
 mod streams;
-mod vectors;

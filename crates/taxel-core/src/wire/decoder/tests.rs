@@ -1,4 +1,4 @@
-//! Tests of the decoder of version 1.
+//! Tests of the decoder of version 1 beside those in Python, which compare it with a slow reference on any bytes.
 
 use rand::{Rng, SeedableRng, rngs::StdRng, seq::IndexedRandom};
 
@@ -31,29 +31,6 @@ fn push(decoder: &mut Decoder, bytes: &[u8], arrived: Option<i64>) -> Events {
 fn intensities(events: &Events) -> Vec<Option<u16>> {
     let i = events.intensity.clone().unwrap_or_default();
     i.ticks.iter().zip(&i.present).map(|(&t, &p)| p.then_some(t)).collect()
-}
-
-#[test]
-fn a_word_comes_back_from_its_bytes() {
-    for value in [0, 1, 0x7f, 0x80, 0x3fff, 0x4000, 0xc000, 0xffff] {
-        for p in [false, true] {
-            let (x, y) = (63, 21);
-            for word in [
-                Word::Change { stamp: value, x, y, p },
-                Word::Intensity { ticks: value, x, y, p },
-                Word::Marker { stamp: value, start: p },
-            ] {
-                assert_eq!(Word::from_bytes(word.to_bytes()), word);
-            }
-        }
-    }
-}
-
-#[test]
-fn time_goes_on_over_the_wrap() {
-    let (events, counts) = decode(&[change(65_000, 0, 0), change(65_535, 0, 0), change(3, 0, 0)]);
-    assert_eq!(events.t, [6_500_000, 6_553_500, 6_553_900]);
-    assert_eq!(counts.back, 0);
 }
 
 #[test]
@@ -94,71 +71,6 @@ fn arrival_times_out_of_all_reason_do_no_harm() {
 }
 
 #[test]
-fn an_intensity_belongs_to_the_change_directly_before_it() {
-    let (events, counts) = decode(&[
-        change(0, 1, 1),
-        intensity(50, 1, 1),
-        intensity(51, 1, 1),
-        change(0, 2, 2),
-        intensity(52, 3, 2),
-        change(1, 3, 3),
-        change(1, 4, 4),
-        intensity(53, 4, 4),
-        intensity(54, 3, 3),
-    ]);
-    assert_eq!(intensities(&events), [Some(50), None, None, Some(53)]);
-    assert_eq!((counts.changes, counts.intensities, counts.unpaired), (4, 2, 3));
-}
-
-#[test]
-fn a_change_waits_no_longer_than_its_datagram() {
-    let mut decoder = Decoder::new(Array::thesis());
-    let mut events = push(&mut decoder, &bytes(&[change(0, 1, 1)]), None);
-    assert_eq!(events.len(), 0);
-    decoder.end_of_datagram(&mut events);
-    assert_eq!(events.len(), 1);
-    decoder.push(&bytes(&[intensity(5, 1, 1)]), None, &mut events);
-    decoder.finish(&mut events);
-    assert_eq!((events.len(), events.intensity.is_none(), decoder.counts().unpaired), (1, true, 1));
-}
-
-#[test]
-fn any_word_ends_the_wait() {
-    let array = Array::new(8, 8, 1.0, "small").unwrap();
-    let other = [
-        change(0, 20, 1),
-        intensity(0, 1, 20),
-        Word::Marker { stamp: 0, start: true },
-        Word::Contradictory,
-        change(0, 1, 2),
-    ];
-    for word in other {
-        let mut decoder = Decoder::new(array.clone());
-        let mut events = push(&mut decoder, &bytes(&[change(0, 1, 1), word]), None);
-        assert_eq!(events.len(), 1, "{word:?}");
-        decoder.push(&bytes(&[intensity(9, 1, 1)]), None, &mut events);
-        assert!(events.intensity.is_none());
-        assert_eq!(decoder.counts().unpaired, 1);
-    }
-}
-
-#[test]
-fn differences_add_up_to_held_values() {
-    let words = [
-        change(0, 1, 1),
-        intensity(50, 1, 1),
-        Word::Change { stamp: 1, x: 1, y: 1, p: false },
-        Word::Intensity { ticks: 20, x: 1, y: 1, p: false },
-        Word::Change { stamp: 2, x: 1, y: 1, p: false },
-        Word::Intensity { ticks: 40, x: 1, y: 1, p: false },
-    ];
-    let mut decoder = Decoder::new(Array::thesis()).differences(true);
-    let mut events = push(&mut decoder, &bytes(&words), None);
-    decoder.finish(&mut events);
-    assert_eq!(intensities(&events), [Some(50), Some(30), Some(0)]);
-}
-
-#[test]
 fn differences_add_up_from_what_was_held_and_to_nothing_from_what_is_unknown() {
     let words = [change(0, 1, 1), intensity(50, 1, 1), change(1, 2, 1), intensity(7, 2, 1)];
     let mut decoder = Decoder::new(Array::thesis()).differences(true);
@@ -168,26 +80,6 @@ fn differences_add_up_from_what_was_held_and_to_nothing_from_what_is_unknown() {
     decoder.finish(&mut events);
     assert_eq!((events.len(), intensities(&events)), (2, vec![Some(350), None]));
     assert_eq!((decoder.counts().intensities, decoder.counts().unpaired), (1, 1));
-}
-
-#[test]
-fn sums_close_over_damage() {
-    let whole = bytes(&[change(0, 1, 1), intensity(5, 1, 1), Word::Contradictory, change(2, 1, 1)]);
-    for at in 0..whole.len() {
-        for damage in [0x00, 0x7f, 0x80, 0xff, 0xa8] {
-            let mut spoilt = whole.clone();
-            spoilt[at] = damage;
-            spoilt.insert(at / 2, damage);
-            let mut decoder = Decoder::new(Array::thesis());
-            let mut events = push(&mut decoder, &spoilt, None);
-            decoder.finish(&mut events);
-            let c = decoder.counts();
-            assert_eq!(c.bytes, spoilt.len() as u64);
-            assert_eq!(c.bytes, 5 * c.words + c.skipped);
-            let kinds = c.changes + c.intensities + c.unpaired + c.markers + c.contradictory + c.outside;
-            assert_eq!(c.words, kinds);
-        }
-    }
 }
 
 /// The rounds of a test; two under Miri, which is thousands of times slower.
@@ -324,19 +216,6 @@ fn overtaken_datagrams_decode_as_byte_by_byte() {
         }
     }
     assert!(back > 20_000, "streams that say little: {back} back");
-}
-
-#[test]
-fn a_cut_changes_nothing() {
-    let mut random = StdRng::seed_from_u64(12);
-    for round in rounds(100) {
-        let bytes = stream(&mut random, 500);
-        for differences in [false, true] {
-            let decoder = Decoder::new(Array::thesis()).differences(differences);
-            let whole = pieces(decoder.clone(), &bytes, bytes.len(), false, round);
-            assert!(pieces(decoder, &bytes, 40, false, round) == whole, "round {round}");
-        }
-    }
 }
 
 /// 10^9 random bytes; minutes without optimisation, seconds with.
