@@ -5,15 +5,16 @@ use std::net::SocketAddr;
 use serde_json::json;
 use taxel_core::Array;
 use taxel_core::detect::{Detector, Readout};
+use taxel_core::wire::Registers;
 use taxel_live::pipeline::LiveOptions;
 
 /// The default options to receive a board of this array at an address.
 pub fn options(array: &Array, address: SocketAddr) -> LiveOptions {
     let all = json!({
-        "host": address.ip(), "port": address.port(), "array": array, "registers": {}, "differences": false,
-        "record_later": false, "name": "board", "sources": [], "compression": "none", "overwrite": false,
-        "guard_frames": 5.0, "gap_frames": 1.0, "lines": false, "send": [], "kernel_buffer_bytes": 33_554_432,
-        "queue_bytes": 67_108_864, "readout_events": 1_048_576, "gro": true,
+        "host": address.ip(), "port": address.port(), "array": array, "registers": Registers::default(),
+        "differences": false, "record_later": false, "name": "board", "sources": [], "compression": "none",
+        "overwrite": false, "guard_frames": 5.0, "gap_frames": 1.0, "lines": false, "send": [],
+        "kernel_buffer_bytes": 33_554_432, "queue_bytes": 67_108_864, "readout_events": 1_048_576, "gro": true,
     });
     serde_json::from_value(all).expect("every option has a value")
 }
