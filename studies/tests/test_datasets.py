@@ -108,29 +108,6 @@ def test_gaitndd_gives_step_times_and_leaves_out_invalid_samples(tmp_path: Path)
     assert right.frames.t[0] == 3333
 
 
-def test_grasps_rise_with_pressure_and_count_slices(tmp_path: Path) -> None:
-    raw = np.arange(120).reshape(2, 60)
-    making.write_icub(tmp_path, "ball", {1: raw, 4: raw[:1]})
-    making.write_icub(tmp_path, "edge", {1: raw}, packed=False)
-    found = list(trials(icub, tmp_path))
-    assert [trial.name for trial in found] == ["ball/1", "ball/4", "edge/1"]
-    assert np.array_equal(found[0].frames.values, 255 - raw.reshape(2, 5, 12))
-    assert found[0].frames.t.tolist() == [0, 1]
-    assert found[0].series["joint7"].tolist() == [1.5, 1.5]
-    assert [trial.about["object"] for trial in found] == ["ball", "ball", "edge"]
-
-
-def test_postures_have_their_pose_and_variant(tmp_path: Path) -> None:
-    readings = np.random.default_rng(1).integers(0, 90, (3, 4, 6, 5))
-    found = list(popu.trials(making.write_popu(tmp_path, readings, ["left2_0", "left2_1", "empty1"])))
-    assert np.array_equal(np.stack([trial.frames.values for trial in found]), readings)
-    assert [(trial.about["posture"], trial.about["pose"], trial.about["variant"]) for trial in found] == [
-        ("left", "left2", "0"),
-        ("left", "left2", "1"),
-        ("empty", "empty1", ""),
-    ]
-
-
 @pytest.mark.parametrize(("name", "folder", "count"), [("gaitpdb", "insole_gaitpdb", 48), ("plate", "plate", 360)])
 def test_derived_truth_equals_the_table_of_the_published_recordings(
     name: str, folder: str, count: int, tmp_path: Path

@@ -15,19 +15,6 @@ def delayed(arm: str, seed: int = 3) -> list:
     return delays.delayed({**PARAMS, "arm": arm}, patterns(seed, 40, 4, 3)[0], seed)
 
 
-def test_random_delays_are_an_inputs_own_and_the_same_in_every_pattern() -> None:
-    plain, put_off = delayed("none"), delayed("random")
-    apart = np.array([b.times - a.times for a, b in zip(plain, put_off, strict=True)])
-    assert np.allclose(apart, apart[0])
-    assert (apart[0].min() >= 0.0, apart[0].max() <= 90.0, len(np.unique(apart[0]))) == (True, True, 40)
-    assert not np.allclose(apart[0], delayed("random", seed=4)[0].times - delayed("none", seed=4)[0].times)
-
-
-def test_copies_are_spaced_evenly_up_to_the_longest() -> None:
-    for plain, copied in zip(delayed("none"), delayed("4 copies"), strict=True):
-        assert copied == plain.delayed([0.0, 30.0, 60.0, 90.0])
-
-
 @pytest.mark.parametrize("arm", ["none", "4 copies"])
 def test_what_l1_chooses_fires_at_the_targets_and_nowhere_else(arm: str) -> None:
     params = {**PARAMS, "inputs": 60, "arm": arm}

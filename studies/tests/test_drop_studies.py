@@ -9,8 +9,8 @@ from taxel import Array, SpikeTrains
 from taxel.metrics import pairwise
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
-from taxel_studies import dropped, drops, fig4_9, fig5_11, load
-from taxel_studies.dropped import FRAMES, REGION, TENNIS, Condition
+from taxel_studies import dropped, fig4_9, fig5_11, load
+from taxel_studies.dropped import FRAMES, REGION, Condition
 from taxel_studies.runner import Kept
 
 FEW, TENNIS_FEW = {**dropped.TABLE, "drops": 4, "seed": 1}, {**dropped.TENNIS_TABLE, "drops": 3, "seed": 1}
@@ -74,28 +74,6 @@ def test_at_every_frame_the_events_are_the_boards(fallen):
     assert (fallen.lasted_us > 15_000).all()  # an impact on this foam lasts that long
 
 
-def test_a_longer_period_and_another_phase_see_less(fallen):
-    counts = [dropped.sampled(fallen.ticks, period, np.zeros(4)).sum() for period in (0.5, 2.0, 10.0)]
-    assert counts[0] > counts[1] > counts[2] > 0
-    late = dropped.sampled(fallen.ticks, 2.0, np.array([0.0, 0.5, 1.0, 1.9]))
-    assert late[:, 0].any(axis=(1, 2)).all()  # sample 0 is the first at which anything fires
-    np.testing.assert_array_equal(late[0], dropped.sampled(fallen.ticks, 2.0, np.zeros(4))[0])
-
-
-def test_drops_are_kept_and_belong_to_what_made_them(folder, fallen):
-    def kept() -> int:
-        return len(list(folder.folder.rglob("output.pkl")))
-
-    before = kept()
-    again = dropped.played(FEW, Condition(50.0, 100.0, 0.0), folder)
-    np.testing.assert_array_equal(again.ticks, fallen.ticks)
-    assert kept() == before
-    other = dropped.played({**FEW, "drops": 2, "seed": 2}, Condition(50.0, 100.0, 0.0), folder)
-    assert kept() == before + 1
-    assert len(other.ticks) == 2
-    assert not np.array_equal(other.ticks, fallen.ticks[:2])
-
-
 def test_a_ball_glances_off_along_the_rows_of_a_tilted_array_and_off_a_level_one_straight_up(folder, fallen):
     """By some 13 mm, 5 taxels, in a contact of 18 ms: friction leaves five sevenths of 1 m/s."""
     slanted = dropped.played(FEW, Condition(50.0, 200.0, 30.0), folder)
@@ -124,42 +102,6 @@ def test_search_first_then_a_look_at_each_periods_best(tmp_path):
         assert (found["absolute_bits"] is None) == (found["period_ms"] not in p["absolute_ms"])
 
 
-def test_frames_cost_what_the_thesis_says():
-    assert drops._frames_kbit_s(drops.INTENSITY_BITS) == pytest.approx(13_333, rel=1e-3)
-    assert drops._frames_kbit_s(drops.CHANGE_BITS) == pytest.approx(2_667, rel=1e-3)
-
-
-@pytest.fixture(scope="module")
-def tennis(folder):
-    return dropped.played(TENNIS_FEW, Condition(65.0, 400.0, 0.0), folder, TENNIS)
-
-
-def test_a_tennis_ball_is_filmed_at_2_khz_around_the_first_taxel_that_answered(folder, tennis):
-    assert TENNIS.frame_us == pytest.approx(500, abs=1)
-    assert tennis.ticks.shape == (3, 1 + 80, 17 * 17)
-    film = dropped.frames_of(tennis.ticks, TENNIS.frame_us / 1000, np.zeros(3), TENNIS, 40.0)
-    np.testing.assert_array_equal(film, tennis.ticks[:, 1:].astype(int) - tennis.ticks[:, :1].astype(int))
-    middle = 17 * 8 + 8
-    assert (film[:, 0, middle] > 0).all()  # it responded in the impact's first frame
-    rise = film.sum(2)
-    assert (rise.argmax(1) * TENNIS.frame_us < 12_000).all()
-    assert (rise[:, -1] < 0.3 * rise.max(1)).all()  # the ball has left the array again
-
-
-@pytest.fixture(scope="module")
-def report(tmp_path_factory):
-    """The folder in which both studies of a tennis ball save and share their drops."""
-    return tmp_path_factory.mktemp("tennis")
-
-
-def test_faster_films_of_a_tennis_ball_tell_more(report):
-    section = load("fig4.8").run(report, size="toy", changes={"drops": 6}, quiet=True)
-    fast, slow = section["said"]["lines"]
-    assert (fast["period_ms"], slow["period_ms"]) == (2.0, 40.0)
-    assert fast["bits"] > slow["bits"] + 0.5
-    assert all(0 <= line[name] <= 2 for line in (fast, slow) for name in ("bits", "any_phase_bits"))
-
-
 def test_own_neighbours_are_those_of_scikit_learn():
     from sklearn.neighbors import NearestNeighbors
 
@@ -168,12 +110,3 @@ def test_own_neighbours_are_those_of_scikit_learn():
     places = rng.normal(size=(60, 2)) + 1.5 * y[:, None]
     near = NearestNeighbors(n_neighbors=fig4_9.NEIGHBOURS).fit(places).kneighbors(return_distance=False)
     assert fig4_9.own_neighbours(places, y) == pytest.approx(np.mean(y[near] == y[:, None]))
-
-
-def test_t_sne_lays_classes_that_differ_apart(report):
-    section = load("fig4.9").run(
-        report, size="toy", changes={"drops": 6, "rates_hz": [1000.0], "perplexity": 4.0}, quiet=True
-    )
-    (line,) = section["said"]["lines"]
-    assert len(line["map"]) == 24
-    assert line["own"] > 0.5  # by chance a quarter

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +13,10 @@ import pytest
 from taxel import ProblemError
 from taxel_studies.fem import (
     DRAGON_SKIN_10,
-    TABLE_5_1,
-    Condition,
     Course,
     Indentation,
     Yeoh,
     bodies,
-    conditions,
-    paths,
     press,
 )
 from taxel_studies.fem.contact import Contact
@@ -29,11 +24,8 @@ from taxel_studies.fem.solids import Solids
 
 #: Chosen so that the tests take seconds, not minutes.
 COARSE = {"mesh_mm": 0.25, "step_um": 25.0}
-#: Programs by engine, and the Python that runs each: GetFEM lives in the system's.
-ENGINES = {
-    name: (python, Path(__file__).parent / f"press_by_{name}.py")
-    for name, python in (("getfem", "/usr/bin/python3"), ("ngsolve", sys.executable))
-}
+#: The other engine lives in the system's Python: on Debian, apt install python3-getfem.
+PYTHON, OTHER = "/usr/bin/python3", Path(__file__).parent / "press_by_getfem.py"
 
 
 @pytest.fixture(scope="module")
@@ -143,33 +135,12 @@ def test_the_base_gives_back_what_presses_to_rounding(slanted):
     assert slanted.reaction[-1, 0] > 1 < slanted.reaction[-1, 1]
 
 
-def test_straight_down_everything_is_symmetrical():
-    course = press(Indentation(diameter_mm=2, modulus_kpa=50, depth_mm=0.6, **COARSE))
-    assert np.abs(course.reaction[:, 0]).max() < 1e-9
-    np.testing.assert_allclose(course.pressure_kpa, course.pressure_kpa[:, ::-1], atol=1e-8)
-    np.testing.assert_allclose(course.contact_kpa, course.contact_kpa[::-1], atol=1e-5)
-
-
-def test_the_other_slant_is_the_mirrored_one(slanted):
-    other = press(Indentation(diameter_mm=2, modulus_kpa=150, angle_deg=-20, depth_mm=0.6, **COARSE))
-    np.testing.assert_allclose(other.pressure_kpa[:, ::-1], slanted.pressure_kpa, atol=1e-6)
-    np.testing.assert_allclose(other.reaction * [-1, 1], slanted.reaction, atol=1e-6)
-
-
 def test_a_course_that_finds_no_equilibrium_ends_there_and_says_so():
     """The half disc goes more sideways than down, until its end would touch."""
     course = press(Indentation(angle_deg=60, modulus_kpa=50, depth_mm=1.5, mesh_mm=0.4, step_um=100.0))
     assert "stopped at" in course.fault
     assert course.path_mm[-1] < 1.5
     assert len(course.path_mm) == len(course.pressure_kpa) == len(course.reaction)
-
-
-def test_75_paths_serve_the_300_conditions():
-    asked = paths(conditions(TABLE_5_1))
-    assert len(conditions(TABLE_5_1)) == 300
-    assert len(asked) == len(set(asked)) == 75
-    assert {one.depth_mm for one in asked} == {2.0}
-    assert Condition(2.0, 50.0, 0.5, 0.0) == conditions(TABLE_5_1)[0]
 
 
 # Against closed forms, finer meshes and another engine
@@ -207,7 +178,7 @@ def test_a_mesh_twice_as_fine_gives_the_same_base_pressure():
         assert coarse.reaction[k, 1] == pytest.approx(fine.reaction[at, 1], rel=0.005)
 
 
-def pressed_by(engine: str, asked: Indentation, steps: int, folder: Path) -> dict[str, np.ndarray]:
+def pressed_by_getfem(asked: Indentation, steps: int, folder: Path) -> dict[str, np.ndarray]:
     ground, disc = bodies(asked)
     laws = {"block": asked.silicone, "disc": Yeoh.of_modulus(asked.modulus_kpa)}
     angle = math.radians(asked.angle_deg)
@@ -225,7 +196,7 @@ def pressed_by(engine: str, asked: Indentation, steps: int, folder: Path) -> dic
         paths=np.linspace(0, asked.depth_mm, steps + 1),
     )
     done = subprocess.run(
-        [*ENGINES[engine], folder / "asked.npz", folder / "answer.npz"],
+        [PYTHON, OTHER, folder / "asked.npz", folder / "answer.npz"],
         capture_output=True,
         text=True,
         timeout=1200,
@@ -236,15 +207,14 @@ def pressed_by(engine: str, asked: Indentation, steps: int, folder: Path) -> dic
     return dict(np.load(folder / "answer.npz"))
 
 
-def is_there(engine: str) -> bool:
-    try:
-        subprocess.run([ENGINES[engine][0], "-c", f"import {engine}"], capture_output=True, check=True)
-    except (OSError, subprocess.CalledProcessError):
-        return False
-    return True
-
-
-def assert_the_same(ours: Course, theirs: dict[str, np.ndarray]) -> None:
+@pytest.mark.slow
+@pytest.mark.timeout(2500)
+@pytest.mark.parametrize(("diameter", "modulus", "angle"), [(2.0, 150.0, 20.0), (4.0, 50.0, 20.0), (4.0, 150.0, 0.0)])
+def test_getfem_says_the_same(tmp_path, diameter, modulus, angle):
+    if subprocess.run([PYTHON, "-c", "import getfem"], capture_output=True, check=False).returncode:
+        pytest.skip("GetFEM is not in the system's Python: on Debian, apt install python3-getfem")
+    asked = Indentation(diameter_mm=diameter, modulus_kpa=modulus, angle_deg=angle)
+    ours, theirs = press(asked), pressed_by_getfem(asked, 100, tmp_path)
     across, down = theirs["reaction"][-1]
     assert ours.reaction[-1, 1] == pytest.approx(down, rel=0.002)
     assert ours.reaction[-1, 0] == pytest.approx(across, rel=0.015, abs=1e-6 * down)
@@ -254,24 +224,3 @@ def assert_the_same(ours: Course, theirs: dict[str, np.ndarray]) -> None:
     pressure = theirs["base_force"][:, 1] / length
     sensed = np.abs(ours.x_mm) <= 3.5  # the block's corners are singular, and no taxel lies there
     assert np.abs(ours.pressure_kpa[-1] - pressure)[sensed].max() < 0.002 * pressure.max()
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(2500)
-@pytest.mark.parametrize(("diameter", "modulus", "angle"), [(2.0, 150.0, 20.0), (4.0, 50.0, 20.0), (4.0, 150.0, 0.0)])
-def test_getfem_says_the_same(tmp_path, diameter, modulus, angle):
-    if not is_there("getfem"):
-        pytest.skip("GetFEM is not in the system's Python: on Debian, apt install python3-getfem")
-    asked = Indentation(diameter_mm=diameter, modulus_kpa=modulus, angle_deg=angle)
-    assert_the_same(press(asked), pressed_by("getfem", asked, 100, tmp_path))
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(2500)
-@pytest.mark.parametrize(("diameter", "modulus", "angle"), [(2.0, 150.0, 20.0), (4.0, 50.0, 20.0)])
-def test_ngsolve_says_the_same(tmp_path, diameter, modulus, angle):
-    """To half the depth; at 2 mm base pressure is .19 % and lateral force 1.05 % apart, as smoothed friction creeps."""
-    if not is_there("ngsolve"):
-        pytest.skip("NGSolve is not installed: pip install 'taxel[fem]'")
-    asked = Indentation(diameter_mm=diameter, modulus_kpa=modulus, angle_deg=angle, depth_mm=1.0)
-    assert_the_same(press(asked), pressed_by("ngsolve", asked, 50, tmp_path))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import h5py
@@ -12,8 +11,6 @@ from tests.formats.making import interpolated, write_gaitndd
 
 from taxel import FormatError, ProblemError
 from taxel_studies import load
-from taxel_studies.page import write_page
-from taxel_studies.runner import Kept, Task
 from taxel_studies.study import Section
 
 GAIT = load("gait")
@@ -75,13 +72,6 @@ def ran(data, tmp_path_factory) -> tuple[Path, Section]:
     return folder, study(data, folder)
 
 
-def results_of(data: Path, report: Path, **changes) -> list[tuple[Task, dict]]:
-    """Return the realisations of a run with their results."""
-    kept = Kept(report / "cache", "0123abc")
-    listed = GAIT.tasks(GAIT.set("toy", **changes), data=data)
-    return [(task, kept.row(GAIT.realise, {"data": data}, task).result) for task in listed]
-
-
 def rows(section: Section, source: str, event: str) -> dict[str, dict]:
     found = next(s for s in section["said"]["sources"] if s["source"] == source)
     return {row["row"]: row for row in found["protocols"][0]["rows"] if row["event"] == event}
@@ -113,53 +103,10 @@ def test_every_figure_adds_up(ran):
             assert sum(p["false"] for p in row["by_person"].values()) == f["false"]
 
 
-def test_errors_take_off_the_delay_that_known_keeps(data, ran):
-    for task, result in results_of(data, ran[0]):
-        if task.params["kind"] == "neuron" and task.params["source"] == "gaitpdb":
-            for unit in result["tested"].values():
-                late = np.subtract(unit["delays"], unit["errors"])
-                assert np.allclose(late, result["point"]["learner"]["delay_ms"], atol=0.2)
-
-
-def test_the_page_shows_every_row(ran):
-    folder, section = ran
-    assert json.loads((folder / "gait" / "summary.json").read_text())["said"] == json.loads(json.dumps(section["said"]))
-    assert len(json.loads((folder / "gait" / "summary.json").read_text())["pictures"]) == 2
-    page = write_page(folder).read_text()
-    assert "Table 6.2 as printed" in page
-    assert "sum of the inputs" in page
-    assert page.count("count") >= 2, "a row a source"
-    assert "gaitpdb, people left out: contact, chosen, by person" in page
-
-
-def test_a_second_run_reckons_nothing_again(data, ran):
-    folder, section = ran
-    before = set((folder / "cache").rglob("output.pkl"))
-    assert study(data, folder)["said"] == section["said"]
-    assert set((folder / "cache").rglob("output.pkl")) == before
-
-
-def test_what_the_thesis_says_is_judged_by_the_rows_that_stand_for_it(ran):
-    says = [statement["says"] for statement in ran[1]["statements"]]
-    assert "On walking recordings it finds more than 95 % of contact." in says
-    assert {s["why"].split(";")[0] for s in ran[1]["statements"] if "walking" in s["says"]} == {
-        "gaitpdb, people left out"
-    }
-    with pytest.raises(ProblemError, match="gait has no parameter 'tau'"):
-        GAIT.set("toy", tau=3)
-
-
 @pytest.mark.parametrize("changes", [{"sources": ["mat"]}, {"protocols": ["nobody left out"]}])
 def test_a_source_or_protocol_that_is_none_is_refused(data, tmp_path, changes):
     with pytest.raises(ProblemError, match="must be one of"):
         study(data, tmp_path, **changes)
-
-
-def test_a_folder_that_is_not_there_is_told(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        study(tmp_path / "nothing", tmp_path)
-    with pytest.raises(FormatError, match="gait: contains no recordings; give a folder"):
-        study(None, tmp_path)
 
 
 @pytest.mark.parametrize("name", ["gait", "fig6.15"])

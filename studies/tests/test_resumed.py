@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import subprocess
-from itertools import count
 from pathlib import Path
 
 import pytest
 
-from taxel.tasks import Workers
 from taxel_studies import load
 from taxel_studies.commit import code_version
 
@@ -46,14 +44,3 @@ def test_a_resumed_study_uses_the_results_of_the_same_commit_without_local_chang
     assert [saved(), saved()] == [4 * each, 4 * each]
     git("checkout", "-q", "HEAD~1")
     assert saved() == 4 * each
-
-
-def test_the_processes_of_a_run_share_what_they_save_also_with_local_changes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    calls = count()
-    monkeypatch.setattr("taxel_studies.study.code_version", lambda *packages: f"0123abc, {next(calls)}")
-    for runs in (1, 2):
-        section = load("drops").run(tmp_path, size="toy", changes={"drops": 2}, workers=Workers(2), quiet=True)
-        assert len(list((tmp_path / "cache").rglob("_made/*/output.pkl"))) == runs * section["realisations"]
-        assert section["commit"] == f"0123abc, {runs - 1}"

@@ -35,17 +35,3 @@ def test_rates_hide_the_pattern_and_its_copies_differ_by_the_jitter() -> None:
     (times, who), begin = stdp.part(quiet, np.random.default_rng(1))
     copies = [np.sort(times[(times >= b) & (times < b + 50) & (who < 100)] - b) for b in begin[:10]]
     assert all(np.allclose(copy, copies[0]) for copy in copies)
-
-
-def test_no_input_is_silent_for_longer_than_the_pattern() -> None:
-    times, who = stdp.background({**SMALL, "seconds": 5}, np.random.default_rng(2))
-    longest = max(np.diff(times[who == n]).max() for n in range(200))
-    assert longest <= 52.0
-
-
-def test_pieces_hold_all_spikes_once() -> None:
-    p = {**SMALL, "seconds": 3}
-    spikes, _ = stdp.part(p, np.random.default_rng(3))
-    result = list(stdp.pieces(p, spikes, 5000.0))
-    assert [(one.start, one.stop) for one in result] == [(5000 + 1000 * k, 6000 + 1000 * k) for k in range(3)]
-    assert sum(len(one.times) for one in result) == len(spikes[0])

@@ -1,8 +1,7 @@
-"""Every study is in the registry, and has a test of its own beside the laws that run over all."""
+"""Every study is in the registry and says what it is; `test_studies.py` runs all of them."""
 
 from __future__ import annotations
 
-import ast
 import json
 import pkgutil
 from importlib import import_module
@@ -21,31 +20,11 @@ def module(name: str) -> str:
     return name.replace(".", "_")
 
 
-def named() -> set[str]:
-    """Return the studies that a test of this folder imports or names, but for the laws over all."""
-    found = set()
-    for file in HERE.glob("test_*.py"):
-        for node in ast.walk(ast.parse(file.read_text())):
-            if isinstance(node, ast.ImportFrom) and node.module:
-                parts = [*node.module.split("."), *(alias.name for alias in node.names)]
-                found |= set(parts[1:]) if parts[0] == "taxel_studies" else set()
-            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-                found.add(module(node.value))
-    return found
-
-
 def test_every_file_with_a_study_is_in_the_registry() -> None:
     files = [m.name for m in pkgutil.iter_modules(studies.__path__)]
     there = {name for name in files if hasattr(import_module(f"taxel_studies.{name}"), "WHERE")}
     missing = sorted(there - {module(name) for name in studies.STUDIES})
     assert not missing, f"taxel_studies/__init__.py: STUDIES lacks {', '.join(missing)}"
-
-
-@pytest.mark.parametrize("name", studies.STUDIES)
-def test_a_study_has_a_test_of_its_own(name: str) -> None:
-    assert module(name) in named(), (
-        f"no test of studies/tests imports or names {name}: add studies/tests/test_{module(name)}.py"
-    )
 
 
 @pytest.mark.parametrize("name", studies.STUDIES)
