@@ -1,6 +1,6 @@
 //! What a rule sees of a presentation, and what it answers.
 
-use super::stepped::{Laid, SteppedNeuron};
+use super::stepped::{AfterSpike, Laid, SteppedNeuron};
 use taxel_core::SpikeTrains;
 
 /// One correction of all weights: `amount (constant + sum over inputs of factor(t - t_ij))`, by the rule's own factor.
@@ -22,6 +22,14 @@ pub(super) struct Presented<'a> {
     pub laid: &'a Laid,
     pub trains: &'a SpikeTrains,
     pub targets: &'a [f64],
+}
+
+impl Presented<'_> {
+    /// The time up to which inputs have no effect at `t`, ms, where the neuron fired at `spikes` (ms, ascending).
+    pub(super) fn lost_up_to(&self, spikes: &[f64], t: f64) -> f64 {
+        let earlier = spikes.iter().copied().take_while(|&spike| spike < t);
+        earlier.last().filter(|_| self.neuron.after_spike == AfterSpike::Reset).unwrap_or(f64::NEG_INFINITY)
+    }
 }
 
 impl Correction {

@@ -2,10 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::fp::Fp;
-use super::htp::Htp;
 use super::rule::{Rule, change_of};
-use super::stepped::{AfterSpike, Current, SteppedNeuron, peak_factor};
+use super::stepped::{AfterSpike, Kernels, SteppedNeuron};
 use crate::checks::{check_ungraded, check_untargeted};
 use taxel_core::allowed::{Parameter, Range, one_weight_a_train, ranges};
 use taxel_core::learn::{check_examples, check_some_target};
@@ -225,15 +223,12 @@ impl EpochLearner {
         {
             return Err(problem!("initial"; " is {low} to {high} mV: must be two finite weights, the smaller first"));
         }
-        let current = match (self.name, self.tau_s) {
-            (Name::Psd, None) => {
-                Current::DoubleExponential { tau_1: given("tau_1", self.tau_1)?, tau_2: given("tau_2", self.tau_2)? }
-            }
-            (_, tau_s) => Current::Exponential { tau_s: given("tau_s", tau_s)? },
+        let kernels = match (self.name, self.tau_s) {
+            (Name::Psd, None) => self.own_kernels()?,
+            (_, tau_s) => Kernels::of_exponential(self.tau, given("tau_s", tau_s)?),
         };
         let neuron = SteppedNeuron {
-            tau: self.tau,
-            current,
+            kernels,
             theta_0: self.theta_0,
             after_spike: given("after_spike", self.after_spike)?,
             refractory: self.refractory,
@@ -243,14 +238,17 @@ impl EpochLearner {
         Ok((self.rule(&neuron)?, neuron))
     }
 
+    /// PSD's own.
+    fn own_kernels(&self) -> Result<Kernels> {
+        let (tau_1, tau_2) = (given("tau_1", self.tau_1)?, given("tau_2", self.tau_2)?);
+        Ok(Kernels::of_double_exponential(self.tau, tau_1, tau_2))
+    }
+
     fn rule(&self, neuron: &SteppedNeuron) -> Result<Rule> {
-        let (kernels, forgets) = (neuron.kernels(), neuron.after_spike == AfterSpike::Reset);
+        let kernels = neuron.kernels;
         Ok(match self.name {
             Name::Inst => Rule::Inst(kernels),
-            Name::Filt => {
-                let (tau_s, tau_q) = (given("tau_s", self.tau_s)?, given("tau_q", self.tau_q)?);
-                Rule::Filt { eps_0: peak_factor(self.tau, tau_s), tau: self.tau, tau_s, tau_q }
-            }
+            Name::Filt => Rule::Filt { kernels, tau_q: given("tau_q", self.tau_q)? },
             Name::Chronotron => match given("rule", self.rule)? {
                 ChronotronRule::E => {
                     let (tau_q, gamma_r) = (given("tau_q", self.tau_q)?, given("gamma_r", self.gamma_r)?);
@@ -265,22 +263,19 @@ impl EpochLearner {
             },
             Name::Span => Rule::Span { tau_a: given("tau_a", self.tau_a)? },
             Name::Psd => {
-                let (tau_1, tau_2) = (given("tau_1", self.tau_1)?, given("tau_2", self.tau_2)?);
-                if tau_2 >= tau_1 {
-                    return Err(problem!("tau_2"; " is {tau_2} ms: must be below tau_1, {tau_1} ms"));
-                }
-                Rule::Psd { peak: peak_factor(tau_1, tau_2), tau_1, tau_2 }
+                let own = self.own_kernels()?;
+                own.check()?;
+                Rule::Psd(own)
             }
             Name::Fp => {
                 let window = given(WINDOW.name, self.window_ms)?;
                 WINDOW.check(&window)?;
                 neuron.check_linear("FP")?;
-                Rule::Fp(Fp { kernels, window, forgets })
+                Rule::Fp { kernels, window }
             }
             Name::Htp => {
                 neuron.check_linear("HTP")?;
-                let window = given(WINDOW.name, self.window_ms)?;
-                Rule::Htp(Htp { kernels, window, theta_0: self.theta_0, tau: self.tau, forgets })
+                Rule::Htp { kernels, window: given(WINDOW.name, self.window_ms)? }
             }
         })
     }

@@ -1,10 +1,8 @@
 //! The rules that learn spike times by epochs, ready to compute.
 
-use super::chronotron;
 use super::corrections::{Correction, Presented};
-use super::fp::Fp;
-use super::htp::Htp;
 use super::stepped::{Kernels, SteppedNeuron};
+use super::{chronotron, fp, htp};
 use taxel_core::{Result, SpikeTrains, Stop};
 
 /// A rule with its constants.
@@ -17,7 +15,7 @@ pub(super) enum Rule {
     /// FILT (the same paper): both spike trains are filtered by `e^{-s/tau_q}`. An input counts by
     /// `eps_0 (c_m e^{-s/tau} - c_s e^{-s/tau_s})`, with `c = tau / (tau + tau_q)`, before a spike, and by
     /// `eps_0 (c_m - c_s) e^{s/tau_q}` after it.
-    Filt { eps_0: f64, tau: f64, tau_s: f64, tau_q: f64 },
+    Filt { kernels: Kernels, tau_q: f64 },
     /// The Chronotron's E-learning (Florian 2012, PLoS ONE 7(8) e40233).
     ELearning { kernels: Kernels, tau_q: f64, gamma_r: f64 },
     /// Its I-learning: the factor is the synaptic current, with the sign of the weight.
@@ -32,11 +30,11 @@ pub(super) enum Rule {
     Span { tau_a: f64 },
     /// PSD, precise-spike-driven plasticity (Yu, Tang, Tan and Li 2013, PLoS ONE 8(11) e78318): the factor is the *current*
     /// `V0 (e^{-s/tau_1} - e^{-s/tau_2})`, peak 1, which the membrane filters once more.
-    Psd { peak: f64, tau_1: f64, tau_2: f64 },
-    /// FP-learning.
-    Fp(Fp),
-    /// HTP.
-    Htp(Htp),
+    Psd(Kernels),
+    /// FP-learning; `window` is how far from its target a spike may lie, ms.
+    Fp { kernels: Kernels, window: f64 },
+    /// HTP; `window` is how long before a target the neuron may fire, ms.
+    Htp { kernels: Kernels, window: f64 },
 }
 
 impl Rule {
@@ -46,21 +44,19 @@ impl Rule {
         match *self {
             Self::Inst(kernels)
             | Self::ELearning { kernels, .. }
-            | Self::Fp(Fp { kernels, .. })
-            | Self::Htp(Htp { kernels, .. }) => kernels.value(since),
-            Self::ILearning(kernels) => kernels.current(since),
-            Self::Filt { eps_0, tau, tau_s, tau_q } => {
+            | Self::Fp { kernels, .. }
+            | Self::Htp { kernels, .. } => kernels.value(since),
+            Self::ILearning(kernels) | Self::Psd(kernels) => kernels.current(since),
+            Self::Filt { kernels: Kernels { slow: tau, fast: tau_s, peak, .. }, tau_q } => {
                 let (c_m, c_s) = (tau / (tau + tau_q), tau_s / (tau_s + tau_q));
-                eps_0
-                    * if since > 0.0 {
-                        c_m * (-since / tau).exp() - c_s * (-since / tau_s).exp()
-                    } else {
-                        (c_m - c_s) * (since / tau_q).exp()
-                    }
+                peak * if since > 0.0 {
+                    c_m * (-since / tau).exp() - c_s * (-since / tau_s).exp()
+                } else {
+                    (c_m - c_s) * (since / tau_q).exp()
+                }
             }
             Self::Resume { amplitude, tau_w, .. } if since > 0.0 => amplitude * (-since / tau_w).exp(),
-            Self::Psd { peak, tau_1, tau_2 } if since > 0.0 => peak * ((-since / tau_1).exp() - (-since / tau_2).exp()),
-            Self::Resume { .. } | Self::Psd { .. } => 0.0,
+            Self::Resume { .. } => 0.0,
             Self::Span { tau_a } => {
                 let (apart, half_e) = (since.abs(), std::f64::consts::E / 2.0);
                 half_e * half_e * (apart + tau_a) * (-apart / tau_a).exp()
@@ -68,9 +64,19 @@ impl Rule {
         }
     }
 
-    /// The change that every synapse gets, with or without an input.
-    pub(super) fn constant(&self) -> f64 {
-        if let Self::Resume { a, .. } = self { *a } else { 0.0 }
+    /// The contribution of each synapse to a spike at `t`, by its inputs after `lost_up_to`.
+    pub(super) fn factors<'a>(
+        &'a self,
+        trains: &'a SpikeTrains,
+        t: f64,
+        lost_up_to: f64,
+    ) -> impl Iterator<Item = f64> + 'a {
+        // What every synapse gets, with or without an input.
+        let constant = if let Self::Resume { a, .. } = self { *a } else { 0.0 };
+        (0..trains.len()).map(move |n| {
+            let inputs = trains.train(n).iter().filter(|&&input| input > lost_up_to);
+            constant + inputs.map(|input| self.factor(t - input)).sum::<f64>()
+        })
     }
 
     /// Whether a synapse's change has the sign of its weight.
@@ -84,8 +90,8 @@ impl Rule {
             Self::ELearning { tau_q, gamma_r, .. } => {
                 chronotron::correct(presented.targets, fired, *tau_q, *gamma_r, out);
             }
-            Self::Fp(fp) => fp.correct(presented.targets, fired, out),
-            Self::Htp(htp) => htp.correct(presented, weights, out),
+            Self::Fp { window, .. } => fp::correct(presented, fired, *window, out),
+            Self::Htp { window, .. } => htp::correct(self, presented, weights, *window, out),
             _ => {
                 out.extend(presented.targets.iter().enumerate().map(|(k, &t)| Correction::at_target(k, t, 1.0)));
                 out.extend(fired.iter().map(|&t| Correction::new(t, -1.0)));
@@ -134,25 +140,13 @@ pub(super) fn add_up(
     at_targets: &mut [Option<Vec<f64>>],
     change: &mut [f64],
 ) {
-    let factor = |n: usize, t: f64, after: f64| {
-        let inputs = presented.trains.train(n).iter().filter(|&&input| input > after);
-        rule.constant() + inputs.map(|input| rule.factor(t - input)).sum::<f64>()
-    };
-    let signed = |n: usize, value: f64| if rule.by_sign() && weights[n] < 0.0 { -value } else { value };
     for c in corrections {
-        match c.target {
-            Some(k) => {
-                let factors =
-                    at_targets[k].get_or_insert_with(|| (0..change.len()).map(|n| factor(n, c.t, c.after)).collect());
-                for (n, change) in change.iter_mut().enumerate() {
-                    *change += signed(n, c.amount * factors[n]);
-                }
-            }
-            None => {
-                for (n, change) in change.iter_mut().enumerate() {
-                    *change += signed(n, c.amount * factor(n, c.t, c.after));
-                }
-            }
+        let mut here = None;
+        let factors = c.target.map_or(&mut here, |k| &mut at_targets[k]);
+        let factors = factors.get_or_insert_with(|| rule.factors(presented.trains, c.t, c.after).collect());
+        for ((change, factor), weight) in change.iter_mut().zip(factors).zip(weights) {
+            let value = c.amount * *factor;
+            *change += if rule.by_sign() && *weight < 0.0 { -value } else { value };
         }
     }
 }

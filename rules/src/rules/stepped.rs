@@ -5,24 +5,6 @@ use serde::{Deserialize, Serialize};
 use taxel_core::neuron::{Grid, MOST_LAID_OUT, check_points, points_between};
 use taxel_core::{Result, SpikeTrains, Stop, problem};
 
-/// The current into the membrane after an input.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Current {
-    /// A current `e^{-s/tau_s}`, scaled so that the potential of one input of weight 1 peaks at 1 mV: it is the double
-    /// exponential `V0 (e^{-s/tau} - e^{-s/tau_s})` of Tempotron, Chronotron, INST and FILT.
-    Exponential {
-        /// ms, not `tau`.
-        tau_s: f64,
-    },
-    /// A current `V0 (e^{-s/tau_1} - e^{-s/tau_2})` that peaks at 1, over 1 MOhm: the membrane filters it once more (PSD).
-    DoubleExponential {
-        /// Slow, ms.
-        tau_1: f64,
-        /// Fast, ms.
-        tau_2: f64,
-    },
-}
-
 /// The effect of an output spike on the potential.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -38,10 +20,8 @@ pub enum AfterSpike {
 /// A leaky membrane, compared with its threshold every `step_ms`; inputs keep their true times.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct SteppedNeuron {
-    /// Membrane time constant, ms.
-    pub tau: f64,
-    /// The current that drives it.
-    pub current: Current,
+    /// The membrane, and the current that drives it.
+    pub kernels: Kernels,
     /// Threshold, mV.
     pub theta_0: f64,
     /// The effect of an output spike.
@@ -82,23 +62,50 @@ pub(super) struct Laid {
 }
 
 /// `V0` of a difference of exponentials: the factor that makes its peak 1.
-pub(super) fn peak_factor(slow: f64, fast: f64) -> f64 {
+fn peak_factor(slow: f64, fast: f64) -> f64 {
     let at = slow * fast / (slow - fast) * (slow / fast).ln();
     1.0 / ((-at / slow).exp() - (-at / fast).exp())
 }
 
 /// A neuron's kernels.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Kernels {
-    tau: f64,
-    slow: f64,
-    fast: f64,
-    peak: f64,
-    /// Whether the difference of exponentials is the current, which the membrane filters once more.
+    /// Membrane time constant, ms.
+    pub tau: f64,
+    /// The difference of exponentials: its time constants, ms, and its factor.
+    pub slow: f64,
+    pub fast: f64,
+    pub peak: f64,
+    /// Whether that difference is the current, which the membrane filters once more.
     twice: bool,
 }
 
 impl Kernels {
+    /// Those of a current `e^{-s/tau_s}`, scaled so that the potential of one input of weight 1 peaks at 1 mV: it is the
+    /// double exponential `V0 (e^{-s/tau} - e^{-s/tau_s})` of Tempotron, Chronotron, INST and FILT.
+    pub(super) fn of_exponential(tau: f64, tau_s: f64) -> Self {
+        Self { tau, slow: tau, fast: tau_s, peak: peak_factor(tau, tau_s), twice: false }
+    }
+
+    /// Those of a current `V0 (e^{-s/tau_1} - e^{-s/tau_2})` that peaks at 1, over 1 MOhm: the membrane filters it once
+    /// more (PSD).
+    pub(super) fn of_double_exponential(tau: f64, tau_1: f64, tau_2: f64) -> Self {
+        Self { tau, slow: tau_1, fast: tau_2, peak: peak_factor(tau_1, tau_2), twice: true }
+    }
+
+    /// Checks what its time constants are to each other.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the parameter, its value and what would be right.
+    pub(super) fn check(&self) -> Result<()> {
+        let (slow, fast) = if self.twice { ("tau_1", "tau_2") } else { ("tau", "tau_s") };
+        if self.fast >= self.slow {
+            return Err(problem!(fast; " is {} ms: must be below {slow}, {} ms", self.fast, self.slow));
+        }
+        Ok(())
+    }
+
     /// The potential `since` ms after an input of weight 1, mV.
     pub(super) fn value(&self, since: f64) -> f64 {
         if since <= 0.0 {
@@ -147,13 +154,7 @@ impl SteppedNeuron {
     ///
     /// `Problem`, naming the parameter, its value and what would be right.
     pub(super) fn check(&self) -> Result<()> {
-        let (names, values) = match self.current {
-            Current::Exponential { tau_s } => (["tau", "tau_s"], [self.tau, tau_s]),
-            Current::DoubleExponential { tau_1, tau_2 } => (["tau_1", "tau_2"], [tau_1, tau_2]),
-        };
-        if values[1] >= values[0] {
-            return Err(problem!(names[1]; " is {} ms: must be below {}, {} ms", values[1], names[0], values[0]));
-        }
+        self.kernels.check()?;
         if self.refractory > 0.0 && self.after_spike != AfterSpike::Membrane {
             return Err(
                 problem!("refractory"; " is {} ms: must be 0 unless after_spike is \"membrane\"", self.refractory),
@@ -172,26 +173,12 @@ impl SteppedNeuron {
         Ok(())
     }
 
-    /// Its kernels, with their constants computed once.
-    pub(super) fn kernels(&self) -> Kernels {
-        let (tau, (slow, fast)) = (
-            self.tau,
-            match self.current {
-                Current::Exponential { tau_s } => (self.tau, tau_s),
-                Current::DoubleExponential { tau_1, tau_2 } => (tau_1, tau_2),
-            },
-        );
-        let twice = matches!(self.current, Current::DoubleExponential { .. });
-        Kernels { tau, slow, fast, peak: peak_factor(slow, fast), twice }
-    }
-
     /// Sorts the inputs of a pattern by time, each with its contribution at its first grid point.
     ///
     /// # Errors
     ///
     /// `Problem` where its grid has too many points; `Interrupted` where the caller stops it.
     pub(super) fn lay_out(&self, trains: &SpikeTrains, stop: Stop<'_>) -> Result<Laid> {
-        let kernels = self.kernels();
         let grid = Grid::new(trains.start, self.step_ms);
         let points = grid.points_until(trains.stop);
         check_points(points, MOST_LAID_OUT, self.step_ms)?;
@@ -201,7 +188,7 @@ impl SteppedNeuron {
             .into_iter()
             .map(|spike| {
                 let point = grid.first_from(spike.t);
-                let pass = kernels.pass((grid.time(point) - spike.t).max(0.0));
+                let pass = self.kernels.pass((grid.time(point) - spike.t).max(0.0));
                 Input {
                     step: point as usize,
                     train: spike.train as usize,
@@ -255,7 +242,7 @@ impl SteppedNeuron {
                         walk.clear();
                         lost_up_to = at;
                     }
-                    _ => walk.v -= self.theta_0 * (-(t - at) / self.tau).exp(),
+                    _ => walk.v -= self.theta_0 * (-(t - at) / self.kernels.tau).exp(),
                 }
             }
             walk.add_inputs(step, lost_up_to);
@@ -277,7 +264,7 @@ struct Walk<'a> {
 impl<'a> Walk<'a> {
     fn new(neuron: &SteppedNeuron, weights: &'a [f64], laid: &'a Laid) -> Self {
         let inputs = laid.inputs.iter().copied().peekable();
-        Self { weights, inputs, pass: neuron.kernels().pass(neuron.step_ms), a: 0.0, b: 0.0, v: 0.0 }
+        Self { weights, inputs, pass: neuron.kernels.pass(neuron.step_ms), a: 0.0, b: 0.0, v: 0.0 }
     }
 
     /// Moves currents and potential one step on, except at the first.
