@@ -270,17 +270,3 @@ class FoldSums:
                     rows = mine[first : first + _ROWS]
                     predicted[rows] = model.predict(self._table[rows, :features])
         return predicted
-
-
-def fold_predictions(x: ArrayLike, y: ArrayLike, folds: ArrayLike, *, ridge: float = 0.0) -> NDArray[Any]:
-    """Predict each trial by an `LDA` that was trained on all other folds, as `FoldSums` does, to which x, y, folds go.
-
-    Each fold's sums are taken once; a training set is the whole less a fold, so ten folds cost little more than one.
-
-    Examples
-    --------
-    >>> x = [[0.0], [4.0], [1.0], [5.0], [0.5], [4.5], [0.2], [4.2]]
-    >>> fold_predictions(x, ["a", "b"] * 4, [0, 0, 0, 0, 1, 1, 1, 1]).tolist()
-    ['a', 'b', 'a', 'b', 'a', 'b', 'a', 'b']
-    """
-    return FoldSums(x, y, folds).predictions(ridge=ridge)

@@ -153,14 +153,14 @@ def tasks(
     return listed
 
 
-def curves(p: Mapping[str, Any], rows: Sequence[Row]) -> dict[str, Any]:
+def summarise(p: Mapping[str, Any], rows: Sequence[Row]) -> dict[str, Any]:
     """Average distances over realisations.
 
     Returns
     -------
     dict
-        By reading, training ("clean", "noisy") and noise: ``levels``, and ``mean`` and ``sem`` (standard error), one
-        list a setting.
+        ``curves``: by reading, training ("clean", "noisy") and noise ``levels``, and ``mean`` and ``sem`` (standard
+        error), one list a setting.
     """
     averages: dict[str, Any] = {}
     for reading in p["readings"]:
@@ -174,12 +174,7 @@ def curves(p: Mapping[str, Any], rows: Sequence[Row]) -> dict[str, Any]:
                     "mean": each.mean(axis=0).round(3).tolist(),
                     "sem": (each.std(axis=0) / np.sqrt(len(each))).round(3).tolist(),
                 }
-    return averages
-
-
-def summarise(p: Mapping[str, Any], rows: Sequence[Row]) -> dict[str, Any]:
-    """Average the distances."""
-    return {"curves": curves(p, rows)}
+    return {"curves": averages}
 
 
 def why(reading: str) -> str:

@@ -6,7 +6,7 @@ from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 from sklearn.neighbors import KNeighborsClassifier
 
 from taxel.information import folds, nested_predictions
-from taxel_studies.discriminants import LDA, FoldSums, fold_predictions
+from taxel_studies.discriminants import LDA, FoldSums
 from taxel_studies.dropped import distances_of, named_by_neighbours
 
 
@@ -92,9 +92,9 @@ def test_folds_from_sums_are_folds_trained_one_by_one(dtype, tmp_path):
     for k in range(7):
         model = LinearDiscriminantAnalysis().fit(x[fold != k].astype(float), y[fold != k])
         expected[fold == k] = model.predict(x[fold == k].astype(float))
-    assert np.array_equal(fold_predictions(x, y, fold), expected)
+    assert np.array_equal(FoldSums(x, y, fold).predictions(), expected)
     np.save(tmp_path / "x.npy", x)
-    assert np.array_equal(fold_predictions(np.load(tmp_path / "x.npy", mmap_mode="r"), y, fold), expected)
+    assert np.array_equal(FoldSums(np.load(tmp_path / "x.npy", mmap_mode="r"), y, fold).predictions(), expected)
 
 
 @pytest.mark.parametrize("dtype", [np.int8, np.float64])
@@ -106,11 +106,10 @@ def test_one_set_of_sums_answers_for_coarser_labels_and_for_the_first_features(d
     sums = FoldSums(x, y, fold)
     parity = {k: "even" if k % 2 == 0 else "odd" for k in range(6)}
     merged = [parity[k] for k in y.tolist()]
-    assert np.array_equal(sums.predictions(), fold_predictions(x, y, fold))
-    assert np.array_equal(sums.predictions(merge=parity), fold_predictions(x, merged, fold))
-    assert np.array_equal(sums.predictions(features=12), fold_predictions(x[:, :12], y, fold))
+    assert np.array_equal(sums.predictions(merge=parity), FoldSums(x, merged, fold).predictions())
+    assert np.array_equal(sums.predictions(features=12), FoldSums(x[:, :12], y, fold).predictions())
     both = sums.predictions(merge=parity, features=12)
-    assert np.array_equal(both, fold_predictions(x[:, :12], merged, fold))
+    assert np.array_equal(both, FoldSums(x[:, :12], merged, fold).predictions())
 
 
 def test_neighbours_are_scikit_learns():

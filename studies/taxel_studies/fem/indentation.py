@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -136,14 +135,12 @@ def bodies(indentation: Indentation) -> tuple[Mesh, Mesh]:
     )
 
 
-def press(indentation: Indentation, *, progress: Callable[[float, float], object] | None = None) -> Course:
+def press(indentation: Indentation) -> Course:
     """Press the half disc, step by step, in equilibrium at each (quasi-static).
 
     Parameters
     ----------
     indentation : Indentation
-    progress : function of (path, depth), mm, optional
-        What it raises ends the work.
 
     Returns
     -------
@@ -189,8 +186,6 @@ def press(indentation: Indentation, *, progress: Callable[[float, float], object
             base.add(state)
             if k in shape_steps:
                 shapes[state.path] = (solids.nodes + state.u.reshape(-1, 2)).astype(np.float32)
-            if progress is not None:
-                progress(state.path, i.depth_mm)
     except Stopped as stopped:
         fault = str(stopped)
     assert state is not None  # the first is at rest
