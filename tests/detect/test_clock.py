@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from touching import pressed, touched
+from touching import pressed
 
 import taxel
-from taxel import Detections, Tare
-from taxel.detect import Example, Outcome, PlainRule, score
+from taxel import Tare
+from taxel.detect import Example, PlainRule
 from taxel.detect.clock import ClockFit, explain, off_loads
 from taxel.detect.examples import check_examples
 
@@ -116,14 +116,6 @@ def test_nothing_is_said_of_labels_of_another_recording_nor_beside_many_detectio
         assert off(both(others, true)) == []
         anywhere = np.sort(random.uniform(0.0, true[0][-1], 300))
         assert off({"contact": (true[0][:12], anywhere)}) == []
-
-
-def outcome(late_us: int) -> Outcome:
-    frames, truth = touched(3, 20)
-    labels = {label: t + late_us for label, t in truth.items()}
-    times = np.concatenate(list(truth.values()))
-    found = Detections(["contact"] * 20 + ["lift"] * 20, times.tolist(), times.tolist())
-    return Outcome("a.npz", Example(frames, labels, name="a.npz"), found, score(found, labels))
 
 
 @pytest.mark.parametrize("shift_ms", [300, -150])

@@ -7,15 +7,6 @@ from refusal import refused
 from taxel.information import nested_predictions
 
 
-def clouds(trials, features, classes, seed, apart=1.0):
-    random = np.random.default_rng(seed)
-    y = random.integers(0, classes, trials)
-    y[:classes] = np.arange(classes)
-    y[classes : 2 * classes] = np.arange(classes)
-    x = random.normal(size=(classes, features))[y] * apart + random.normal(size=(trials, features))
-    return x @ (np.eye(features) + 0.3 * random.normal(size=(features, features))), y
-
-
 @pytest.mark.parametrize("scale", [1e-100, 1.0, 1e100])
 @pytest.mark.parametrize("ridge", [5e-324, 1e-310, 1e-200, 1e-17])
 def test_a_ridge_that_rounding_loses_is_named(ridge, scale):

@@ -136,12 +136,6 @@ def word(t_us, x, y, ticks, more=True):
     return b"".join(bytes([a | b >> 14, b >> 7 & 127, b & 127, x, y]) for a, b in (first, second))
 
 
-def marker(t_us):
-    """The start of a recording, version 1 of the wire."""
-    t = t_us // 100 % 65_536
-    return bytes([0xC8 | t >> 14, t >> 7 & 127, t & 127, 0, 0])
-
-
 def say(live, *datagrams):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
         for datagram in datagrams:

@@ -20,8 +20,6 @@ from taxel._base.errors import Place
 
 from .making import record, some_events
 
-LAYOUT = '[data]\narray = "run/pressure"\n'
-
 
 @pytest.mark.parametrize("values", [np.array([1, "x"], object), np.zeros(3, "M8[s]"), np.zeros(3, complex)])
 @pytest.mark.parametrize("ending", [".npy", ".npz"])
