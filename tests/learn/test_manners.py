@@ -13,7 +13,7 @@ import pytest
 from refusal import refused
 
 import taxel
-from taxel import Events, Neuron, SpikeTrains, learn
+from taxel import Events, Neuron, NotFittedError, SpikeTrains, learn
 from taxel._base.parameters import Parameters, described
 from taxel.encode import ContactArea
 from taxel.learn import ConeR, ConeX, OnlineConeR
@@ -67,6 +67,17 @@ def test_a_learner_has_a_file_in_each_place_and_nothing_is_left_out():
 
 
 @each_learner
+def test_a_clone_has_the_same_parameters_and_nothing_learnt(name):
+    one, _ = fitted(name)
+    other = sklearn.base.clone(one)
+    assert other.get_params() == one.get_params()
+    assert repr(other) in repr(one)
+    assert not hasattr(other, "weights_")
+    with refused(NotFittedError):
+        other.predict([])
+
+
+@each_learner
 def test_what_was_learnt_survives_a_copy_and_a_pickle(name):
     one, patterns = fitted(name)
     for other in (copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
@@ -98,6 +109,20 @@ def test_weights_that_are_assigned_have_no_verdict_of_the_fit_and_a_new_fit_has_
 
 #: The learners that read the values of graded trains; all others refuse them.
 READ_VALUES = {"ConeR", "ConeX", "OnlineConeR"}
+
+
+@each_learner
+def test_scores_lie_between_0_and_1_and_predictions_are_spikes(name):
+    one, patterns = fitted(name)
+    if name == "Tempotron":
+        assert one.score(patterns, one.predict(patterns)) == 1.0
+        return
+    spikes = one.predict(patterns)
+    assert [type(times) for times in spikes] == [np.ndarray] * 2
+    assert 0.0 <= one.score(patterns, examples()[1]) <= 1.0
+    # The learner's own prediction must agree with the score.
+    assert one.score(patterns, spikes, window_ms=0.0) == 1.0
+    assert one.score(patterns, [[1.0], [1.0]], window_ms=0.0) == 0.0
 
 
 @each_learner
