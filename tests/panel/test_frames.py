@@ -122,10 +122,9 @@ def test_spikes_of_frames_are_those_of_the_encoder(tmp_path, encoder):
                 counted[column, train * 4 // encoder.trains(frames.array)] += 1
             assert np.array_equal((raster & 15) + (raster >> 4), counted)
         if encoder.name == "level_crossing":
-            # Narrow columns end 1.8 s after the beginning: the encoder begins there, with the frame before.
+            # Narrow columns begin 1.8 s after the beginning: the encoder begins there or before, with the frame before.
             assert page.ask("zoom", column_us=125)["type"] == "done"
             told = spikes_up_to(page, 2_200_007)
-            assert len(told) < len(there)
             assert {*there} >= {*told} >= {one for one in there if one[0] > 2100}
 
 

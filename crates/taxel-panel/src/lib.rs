@@ -3,21 +3,27 @@
 //! It works on copies of the events ([`taxel_live::pipeline::ViewerEvents`]), in a thread of its own. The server of the page is
 //! Python's.
 
-mod array_state;
-mod keyframe_index;
+mod activity;
+mod change_file;
+mod columns;
+mod event_rate;
+mod events;
+mod frames;
+mod history;
+mod index;
 mod live_source;
 mod load;
+mod player;
 mod readout_encoders;
 mod shown;
-mod taxel_history;
-mod time_columns;
+mod spikes;
+mod state;
 mod view;
 
-pub use array_state::RestSource;
-pub use keyframe_index::Activity;
-pub use keyframe_index::events::{EventIndex, Kept};
-pub use keyframe_index::frames::{FrameArea, FrameIndex, FrameRest, FrameSource};
+pub use activity::Activity;
+pub use frames::{FrameRest, FrameSource, FramesOfSource};
+pub use index::{Index, Kept};
 pub use live_source::{LiveSource, News, limits};
 pub use readout_encoders::encoder_names;
-pub use shown::Shown;
+pub use state::RestSource;
 pub use view::View;

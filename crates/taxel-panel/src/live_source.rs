@@ -17,16 +17,21 @@ use taxel_core::wire::Registers;
 use taxel_live::capture::{FIREWALL, Origin};
 use taxel_live::clock::Offset;
 use taxel_live::locked::lock;
-use taxel_live::pipeline::{Counters, Handle, LiveOptions, OutputDetection, StatedTare, ViewerEvents};
+use taxel_live::pipeline::{Counters, Handle, LiveOptions, OutputDetection, Piece, StatedTare, ViewerEvents};
 use taxel_live::recording::now_ns;
 use taxel_live::{Error, Result};
 
-use crate::array_state::{ArrayState, Keyframe};
-use crate::keyframe_index::live::{LiveIndex, REACH_US};
-use crate::keyframe_index::{Activity, KeyframeIndex};
+use crate::activity::Activity;
+use crate::columns::{COLUMN_US, COLUMNS_US, SPAN};
+use crate::index::{Block, Index, Kept};
 use crate::readout_encoders::ReadoutEncoders;
 use crate::shown::sensor;
-use crate::time_columns::{COLUMN_US, COLUMNS_US, SPAN, TimeColumns};
+use crate::state::{ArrayState, Keyframe, Sensor};
+
+/// How far back a live source can be viewed, us ...
+const REACH_US: i64 = 60_000_000;
+/// ... and the memory that it may take, bytes.
+const REACH_BYTES: usize = 512 << 20;
 
 /// How often new events are fetched from the pipeline, and how often its clock and its counters are read.
 const RECEIVE_EVERY: Duration = Duration::from_millis(16);
@@ -57,30 +62,21 @@ pub struct News {
     pub about: bool,
 }
 
-/// A live source with the state and the keyframe index that its events make, in a thread of its own until it is dropped.
+/// A live source with the state and the index that its events make, in a thread of its own until it is dropped.
 pub struct LiveSource {
     /// What else can be done with the pipeline.
     pub handle: Handle,
-    events: Mutex<ViewerEvents>,
-    detections: channel::Receiver<OutputDetection>,
-    /// The latest of them, oldest first, for clients that connect later.
-    latest_detections: Mutex<VecDeque<OutputDetection>>,
     pub(crate) state: Mutex<ArrayState>,
-    pub(crate) index: LiveIndex,
+    pub(crate) index: Arc<Index>,
     activity: Mutex<Activity>,
     /// The labels of the readout that runs.
     labels: Option<Vec<String>>,
     /// The encoders of that readout, without a tare that is measured.
     encoders: ReadoutEncoders,
+    /// The latest detections, oldest first, for clients that connect later.
+    latest_detections: Mutex<VecDeque<OutputDetection>>,
     /// Events that found no room in the queue from the pipeline.
     missing: AtomicU64,
-    /// Whether the state has the rest that was given with the readout.
-    rested: AtomicBool,
-    /// Number of zeroings that the state has applied.
-    zeroings: AtomicU64,
-    silence: Mutex<SilentTime>,
-    /// The steps of the values of frames of numbers, as clients know them.
-    steps: Mutex<Option<ValueSteps>>,
     /// Counts up when a new frame can be shown.
     received: AtomicU64,
     /// Whether a client is connected.
@@ -88,6 +84,19 @@ pub struct LiveSource {
     news: Mutex<News>,
     /// The counters that were told last, and when.
     counted: Mutex<Option<(Instant, Counters)>>,
+}
+
+/// What the thread that receives for a live source holds alone.
+struct Receiving {
+    events: ViewerEvents,
+    detections: channel::Receiver<OutputDetection>,
+    /// Whether the state has the rest that was given with the readout.
+    rested: bool,
+    /// Number of zeroings that the state has applied.
+    zeroings: u64,
+    silence: SilentTime,
+    /// The steps of the values of frames of numbers, as clients know them.
+    steps: Option<ValueSteps>,
 }
 
 /// Where the board's time is while no events arrive.
@@ -124,39 +133,40 @@ impl LiveSource {
         if let Some(registers) = registers {
             handle.announce_registers(registers);
         }
+        let mut receiving = Receiving {
+            detections: handle.detections(MOST_WAITING),
+            events: handle.events()?,
+            rested: false,
+            zeroings: 0,
+            silence: SilentTime::default(),
+            steps: None,
+        };
         let source = Arc::new(Self::new(handle)?);
         let received = Arc::downgrade(&source);
         std::thread::Builder::new()
             .name("taxel-view".to_owned())
-            .spawn(move || receive_until_dropped(&received))
+            .spawn(move || receiving.receive_until_dropped(&received))
             .map_err(Error::socket("the panel's thread"))?;
         Ok(source)
     }
 
     fn new(handle: Handle) -> Result<Self> {
         let noise_floor = handle.registers().noise_floor;
-        let (detections, events) = (handle.detections(MOST_WAITING), handle.events()?);
         let options = handle.options();
         let (labels, encoders) = labels_and_encoders(options)?.unzip();
-        let array = options.array.clone();
-        let blank = Keyframe::blank(array.len());
+        let sensor = Arc::new(Sensor::new(options.array.clone(), noise_floor.into(), None));
+        let blank = Keyframe::blank(sensor.array.len());
         // Enough for all that a view of the past can show, at the widest columns too.
-        let bytes = TimeColumns::bytes_for(&array, REACH_US / COLUMN_US);
+        let columns = REACH_US / COLUMN_US;
         Ok(Self {
-            state: Mutex::new(ArrayState::new(&array, noise_floor.into(), &blank, COLUMN_US, bytes)),
-            activity: Mutex::new(Activity::new(&array)),
-            index: LiveIndex::new(array, noise_floor.into()),
-            events: Mutex::new(events),
+            state: Mutex::new(ArrayState::new(&sensor, &blank, COLUMN_US, columns)),
+            activity: Mutex::new(Activity::new(&sensor.array)),
+            index: Arc::new(Index::new(sensor, Kept::Latest { us: REACH_US, bytes: REACH_BYTES })),
             labels,
             encoders: encoders.unwrap_or_default(),
             handle,
-            detections,
             latest_detections: Mutex::default(),
             missing: AtomicU64::new(0),
-            rested: AtomicBool::new(false),
-            zeroings: AtomicU64::new(0),
-            silence: Mutex::default(),
-            steps: Mutex::default(),
             received: AtomicU64::new(0),
             watched: AtomicBool::new(false),
             news: Mutex::default(),
@@ -166,7 +176,7 @@ impl LiveSource {
 
     /// The sensor.
     pub fn array(&self) -> &Array {
-        self.index.array()
+        &self.index.sensor.array
     }
 
     /// What the panel says of it at first, and when that changes.
@@ -241,23 +251,13 @@ impl LiveSource {
 
     /// The `overview` message of the past that can be viewed.
     pub fn overview(&self) -> Value {
-        let (start_us, step_us, events) = self.index.event_rate();
-        let state = lock(&self.state);
-        let force = state.time_columns().greatest_sums(start_us, step_us, events.len(), COLUMN_US);
-        json!({
-            "type": "overview", "source": null, "start_us": start_us, "step_us": step_us, "events": events, "force": force,
-        })
+        let columns = lock(&self.state).columns().clone();
+        self.index.overview(None, Some(&columns))
     }
 
     /// The steps of the values; ticks of a board.
     fn value_steps(&self) -> ValueSteps {
         self.handle.frame_values().map_or(ValueSteps { size: 1.0, zero: 0 }, |(_, steps, _)| steps)
-    }
-
-    /// Whether those are others than at the last call, so that clients are to be told.
-    fn has_new_steps(&self) -> bool {
-        let now = self.handle.frame_values().map(|(_, steps, _)| steps);
-        std::mem::replace(&mut *lock(&self.steps), now) != now
     }
 
     /// The encoders of the readout that runs, with its tare where that is known.
@@ -320,113 +320,142 @@ impl LiveSource {
         })
     }
 
+    /// Applies a piece of what the pipeline has copied, and stores it.
+    fn take(&self, piece: Piece) {
+        let mut state = lock(&self.state);
+        if let (Some(first), Some(latest)) = (piece.changes.first(), state.latest) {
+            // A sensor whose driver stalled is behind the time that the host's clock gave to its silence.
+            let t = self.index.range().map_or(first.t, |(_, last)| last.max(first.t));
+            if t < latest - STALLED_US {
+                state.set_back(t);
+            }
+        }
+        if piece.reset {
+            state.clear();
+        }
+        let Piece { changes, held, since, before, missing, reset, .. } = piece;
+        let key = held.is_some();
+        let gap = missing > 0 || reset || state.latest.is_none();
+        let block =
+            Block { held: held.filter(|_| gap).map(|held| (held, before)), changes: Arc::new(changes), rest: None };
+        state.begin_block(&block);
+        // How the rest is tracked takes more memory than all else of a keyframe.
+        let key = key.then(|| Keyframe { latest: since, tracked: None, ..state.keyframe() });
+        state.apply(&block.changes);
+        let mut activity = lock(&self.activity);
+        block.changes.iter().for_each(|change| activity.count(change));
+        self.index.push(key, block).expect("nothing is written to a file");
+    }
+
     /// The `detection` messages of the latest, oldest first.
     pub fn latest_detections(&self) -> Vec<String> {
         lock(&self.latest_detections).iter().map(message_of).collect()
     }
+}
+
+impl Receiving {
+    /// Receives until nobody holds the source any more.
+    fn receive_until_dropped(&mut self, source: &Weak<LiveSource>) {
+        let mut followed = Instant::now();
+        loop {
+            std::thread::sleep(RECEIVE_EVERY);
+            let Some(source) = source.upgrade() else { return };
+            self.receive(&source);
+            if followed.elapsed() >= COUNT_EVERY {
+                followed = Instant::now();
+                self.follow(&source);
+            }
+        }
+    }
 
     /// Applies what the pipeline has copied.
-    fn receive(&self) {
+    fn receive(&mut self, source: &LiveSource) {
         let (mut frame, mut reset) = (false, false);
-        let events = lock(&self.events);
-        events.set_watched(self.watched.load(Ordering::Relaxed));
-        while let Some(piece) = events.next() {
-            let mut state = lock(&self.state);
-            self.missing.fetch_add(piece.missing, Ordering::Relaxed);
-            if let (Some(first), Some(latest)) = (piece.changes.first(), state.latest()) {
-                // A sensor whose driver stalled is behind the time that the host's clock gave to its silence.
-                let t = self.index.range().map_or(first.t, |(_, last)| last.max(first.t));
-                if t < latest - STALLED_US {
-                    state.set_back(t);
-                }
+        self.events.set_watched(source.watched.load(Ordering::Relaxed));
+        while let Some(piece) = self.events.next() {
+            source.missing.fetch_add(piece.missing, Ordering::Relaxed);
+            frame |= !piece.changes.is_empty();
+            reset |= piece.reset;
+            if piece.reset {
+                self.rested = false;
             }
             if let Some(last) = piece.changes.last() {
-                lock(&self.silence).latest = Some((now_ns(), last.t));
+                self.silence.latest = Some((now_ns(), last.t));
             }
-            if piece.reset {
-                state.clear();
-                self.rested.store(false, Ordering::Relaxed);
-                reset = true;
-            }
-            let stored = self.index.push(piece, &state);
-            let gap = stored.piece.missing > 0 || state.latest().is_none();
-            if let Some(held) = stored.piece.held.as_ref().filter(|_| gap) {
-                state.set_held(held, stored.piece.before);
-            }
-            state.apply(&stored.piece.changes);
-            let mut activity = lock(&self.activity);
-            stored.piece.changes.iter().for_each(|change| activity.count(change));
-            frame |= !stored.piece.changes.is_empty();
+            source.take(piece);
         }
-        drop(events);
         let detections: Vec<OutputDetection> = self.detections.try_iter().collect();
         let told = detections.iter().map(message_of).collect::<Vec<_>>();
-        let mut latest = lock(&self.latest_detections);
+        let mut latest = lock(&source.latest_detections);
         latest.extend(detections);
         let excess = latest.len().saturating_sub(MOST_LATEST);
         latest.drain(..excess);
         drop(latest);
-        self.apply_rest();
-        let zeroed = self.apply_zeroings();
+        self.apply_rest(source);
+        let zeroed = self.apply_zeroings(source);
         if frame || zeroed {
-            self.received.fetch_add(1, Ordering::Relaxed);
+            source.received.fetch_add(1, Ordering::Relaxed);
         }
-        let mut news = lock(&self.news);
+        let mut news = lock(&source.news);
         news.detections.extend(told);
         news.reset |= reset;
         news.zeroed |= zeroed;
     }
 
     /// Reads the clock of the pipeline, and what it says of its values.
-    fn follow(&self) {
-        if let Some(offset) = self.handle.counters().board.offset {
-            self.follow_clock(offset);
+    fn follow(&mut self, source: &LiveSource) {
+        if let Some(offset) = source.handle.counters().board.offset {
+            let behind_us = self.silence.behind_us(offset);
+            let mut state = lock(&source.state);
+            if state.latest.is_some() {
+                // Time moves on while no events arrive; that of a stalled source from where it is.
+                state.advance(offset.board_us(now_ns() - BEHIND_NS) - behind_us);
+            }
         }
-        if self.has_new_steps() {
-            lock(&self.news).about = true;
+        let steps = source.handle.frame_values().map(|(_, steps, _)| steps);
+        if std::mem::replace(&mut self.steps, steps) != steps {
+            lock(&source.news).about = true;
         }
-        self.received.fetch_add(1, Ordering::Relaxed);
+        source.received.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Sets the rest of all taxels once, where a tare was given or has been measured.
-    fn apply_rest(&self) {
-        if self.rested.load(Ordering::Relaxed) {
+    fn apply_rest(&mut self, source: &LiveSource) {
+        if self.rested {
             return;
         }
-        let rest = self.handle.rest();
-        if rest.len() == self.array().len() {
-            let steps = self.value_steps();
+        let rest = source.handle.rest();
+        if rest.len() == source.array().len() {
+            let steps = source.value_steps();
             let ticks = rest.into_iter().map(|rest| rest.map_or(UNKNOWN, |rest| steps.of_rest(rest))).collect();
-            lock(&self.state).set_rest(ticks);
-            self.rested.store(true, Ordering::Relaxed);
+            lock(&source.state).set_rest(ticks);
+            self.rested = true;
         }
     }
 
     /// Sets the rest of taxels that were zeroed since the last call; returns whether there were any.
-    fn apply_zeroings(&self) -> bool {
-        let zeroings = self.handle.zeroings();
-        if self.zeroings.swap(zeroings, Ordering::Relaxed) == zeroings {
+    fn apply_zeroings(&mut self, source: &LiveSource) -> bool {
+        let zeroings = source.handle.zeroings();
+        if std::mem::replace(&mut self.zeroings, zeroings) == zeroings {
             return false;
         }
-        let (columns, steps) = (usize::from(self.array().columns), self.value_steps());
-        let mut state = lock(&self.state);
-        for zeroing in self.handle.latest_zeroings().0 {
-            state.zero(usize::from(zeroing.y) * columns + usize::from(zeroing.x), steps.of_rest(zeroing.rest));
+        let (array, steps) = (source.array(), source.value_steps());
+        let mut state = lock(&source.state);
+        for zeroing in source.handle.latest_zeroings().0 {
+            state.zero(array.index(zeroing.x, zeroing.y), steps.of_rest(zeroing.rest));
         }
         true
     }
+}
 
-    /// Moves the time shown on while no events arrive; that of a stalled source from where it is.
-    fn follow_clock(&self, offset: Offset) {
-        let mut silence = lock(&self.silence);
-        if let Some((arrived_ns, t)) = silence.latest.take() {
+impl SilentTime {
+    /// How far the source is behind the host's clock, us: as far as a stalled one was with its latest event.
+    fn behind_us(&mut self, offset: Offset) -> i64 {
+        if let Some((arrived_ns, t)) = self.latest.take() {
             let late = offset.board_us(arrived_ns) - t;
-            silence.behind_us = if late > STALLED_US { late } else { 0 };
+            self.behind_us = if late > STALLED_US { late } else { 0 };
         }
-        let mut state = lock(&self.state);
-        if state.latest().is_some() {
-            state.advance(offset.board_us(now_ns() - BEHIND_NS) - silence.behind_us);
-        }
+        self.behind_us
     }
 }
 
@@ -443,20 +472,6 @@ fn message_of(output: &OutputDetection) -> String {
         "slope_mv_per_ms": (!detection.slope.is_nan()).then_some(detection.slope),
     })
     .to_string()
-}
-
-/// Receives until nobody holds the source any more.
-fn receive_until_dropped(source: &Weak<LiveSource>) {
-    let mut followed = Instant::now();
-    loop {
-        std::thread::sleep(RECEIVE_EVERY);
-        let Some(source) = source.upgrade() else { return };
-        source.receive();
-        if followed.elapsed() >= COUNT_EVERY {
-            followed = Instant::now();
-            source.follow();
-        }
-    }
 }
 
 /// What every panel says at first beside its sources.

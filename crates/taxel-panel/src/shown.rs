@@ -1,110 +1,65 @@
-//! A recording with its index, of events or of frames, and what is said of it.
-
-use std::sync::Arc;
+//! What is said of a recording.
 
 use serde_json::{Value, json};
 use taxel_core::Array;
 
-use crate::array_state::RestSource;
-use crate::keyframe_index::KeyframeIndex;
-use crate::keyframe_index::events::EventIndex;
-use crate::keyframe_index::frames::{FrameArea, FrameIndex};
-use crate::time_columns::{COLUMN_US, TimeColumns};
+use crate::columns::{COLUMN_US, TimeColumns};
+use crate::frames::{Frames, FramesOfSource};
+use crate::index::Index;
 
 /// A label may lie so long before the first event or after the last one, us.
 const LATE_LABEL_US: i64 = 1_000_000;
 
-/// An indexed recording.
-#[derive(Debug, Clone)]
-pub enum Shown {
-    /// Of a board's events.
-    Events(Arc<EventIndex>),
-    /// Of frames.
-    Frames(Arc<FrameIndex>),
-}
-
-impl Shown {
-    pub(crate) fn index(&self) -> Arc<dyn KeyframeIndex> {
-        match self {
-            Self::Events(index) => index.clone(),
-            Self::Frames(index) => index.clone(),
-        }
-    }
-
-    /// The sensor.
-    #[must_use]
-    pub fn array(&self) -> &Array {
-        match self {
-            Self::Events(index) => KeyframeIndex::array(&**index),
-            Self::Frames(index) => KeyframeIndex::array(&**index),
-        }
-    }
-
+impl Index {
     /// Time in the index of one us of the file: above 1 where frames are numbered, one a us.
     #[must_use]
     pub fn us(&self) -> i64 {
-        match self {
-            Self::Events(_) => 1,
-            Self::Frames(index) => index.number_us.unwrap_or(1),
-        }
+        self.sensor.frames.as_ref().and_then(|frames| frames.number_us).unwrap_or(1)
     }
 
-    /// First and last time, us, and how long before and after them a label may lie: a late label of its last touch may lie a little
+    /// How long before the first time and after the last one a label may lie, us: a late label of its last touch may lie a little
     /// after the last event, and a frame holds until the next one.
     #[must_use]
-    pub fn range(&self) -> (Option<(i64, i64)>, i64) {
-        let late_us = match self {
-            Self::Events(_) => LATE_LABEL_US,
-            Self::Frames(index) => index.frame_us(),
-        };
-        (self.index().range(), late_us)
+    pub fn late_us(&self) -> i64 {
+        self.sensor.frames.as_ref().map_or(LATE_LABEL_US, |frames| frames.frame_us)
     }
 
-    /// The `overview` message.
+    /// The `overview` message of a recording, or of the past of a live source, which these columns hold.
     #[must_use]
-    pub fn overview(&self, name: &str) -> Value {
-        let (start_us, step_us, bins, events) = match self {
-            Self::Events(index) => {
-                let (start, step, events) = &index.event_rate;
-                (*start, *step, events.len(), events.clone())
-            }
-            Self::Frames(index) => {
-                let (start, step, bins) = index.bins();
-                (start, step, bins, vec![])
-            }
-        };
-        let index = self.index();
-        let force = index.time_columns().map(|columns| columns.greatest_sums(start_us, step_us, bins, COLUMN_US));
+    pub fn overview(&self, name: Option<&str>, columns: Option<&TimeColumns>) -> Value {
+        let (start_us, step_us, events) = self.event_rate();
+        let force = columns.map(|columns| columns.greatest_sums(start_us, step_us, events.len(), COLUMN_US));
+        let events = if self.sensor.frames.is_some() { vec![] } else { events };
         json!({
             "type": "overview", "source": name, "start_us": start_us, "step_us": step_us, "events": events,
             "force": force.unwrap_or_default(),
         })
     }
 
-    /// What the `opened` message says of its values.
-    #[must_use]
-    pub fn opened(&self) -> Value {
-        let index = self.index();
-        let range = index.range();
-        // The end of the column, which has all of its force.
-        let touch = index.time_columns().and_then(TimeColumns::first_touch);
+    /// What the `opened` message says of the values of a recording.
+    ///
+    /// # Errors
+    ///
+    /// As [`Index::next`].
+    pub fn opened(&self) -> taxel_live::Result<Value> {
+        let (range, frames) = (self.range(), self.sensor.frames.as_ref());
+        // The end of the column, which has all of its force; of frames the last one in it.
+        let touch = self.whole.as_ref().and_then(|columns| columns.first_touch());
         let touch_us =
             touch.zip(range).map(|(column, (first, last))| ((column + 1) * COLUMN_US - 1).clamp(first, last));
-        let (touch_us, events, preload_at, frames) = match self {
-            Self::Events(index) => (touch_us, index.events(), index.preload_at.as_str(), None),
-            Self::Frames(index) => {
-                (touch_us.map(|t| index.frame_until(t).unwrap_or(t)), 0, "", Some(about_frames(index)))
-            }
+        let touch_us = match touch_us {
+            Some(t) if frames.is_some() => self.stamp_before(t + 1)?,
+            touch_us => touch_us,
         };
-        json!({
-            "array": sensor(index.array()),
+        Ok(json!({
+            "array": sensor(&self.sensor.array),
             "start_us": range.map(|(first, _)| first),
             "stop_us": range.map(|(_, last)| last),
             "touch_us": touch_us,
-            "events": events,
-            "frames": frames,
-            "preload_at": preload_at,
-        })
+            "events": if frames.is_some() { 0 } else { self.changes() },
+            "frames": frames.map(|frames| about_frames(frames, self.sensor.floor)),
+            "preload_at": self.preload_at,
+        }))
     }
 }
 
@@ -118,22 +73,21 @@ pub(crate) fn sensor(array: &Array) -> Value {
 }
 
 /// What `opened` says of frames.
-fn about_frames(index: &FrameIndex) -> Value {
-    let source = |(area, rest, falls, preload_at): (&FrameArea, RestSource, bool, &str)| {
+fn about_frames(frames: &Frames, floor: u16) -> Value {
+    let source = |FramesOfSource { name, left, sensor, rest }: &FramesOfSource| {
         json!({
-            "name": area.name, "left": area.left, "rows": area.rows, "columns": area.columns,
-            "rest": rest, "falls": falls, "preload_at": preload_at,
+            "name": name, "left": left, "rows": sensor.rows, "columns": sensor.columns,
+            "rest": rest.source, "falls": rest.falls, "preload_at": rest.preload_at,
         })
     };
     json!({
-        "count": index.count,
-        "unit": index.unit,
-        "step": index.step,
-        "zero": index.zero,
-        "floor": index.floor,
-        "newtons": index.newtons,
-        "number_us": index.number_us,
-        "sources": index.areas().map(source).collect::<Vec<_>>(),
-        "flickering": index.flickering().collect::<Vec<_>>(),
+        "count": frames.count,
+        "unit": frames.unit,
+        "step": frames.steps.size,
+        "zero": frames.steps.zero,
+        "floor": floor,
+        "newtons": frames.newtons,
+        "number_us": frames.number_us,
+        "sources": frames.sources.iter().map(source).collect::<Vec<_>>(),
     })
 }

@@ -1,11 +1,9 @@
 //! A client's view: which source it shows, at which time, and how; and the frames that are sent of it.
 
 mod delivered;
-pub(super) mod encoded_spikes;
 mod following;
 pub(super) mod frame;
 mod playback;
-pub(super) mod player;
 
 use std::sync::Arc;
 
@@ -16,22 +14,22 @@ use taxel_core::problem;
 use taxel_live::Result;
 use taxel_live::locked::lock;
 
-use crate::keyframe_index::KeyframeIndex;
+use crate::columns::{COLUMN_US, COLUMNS_US, Curve, MISSING, is_column};
+use crate::index::Index;
 use crate::live_source::LiveSource;
+use crate::player::{Player, ViewOptions};
 use crate::readout_encoders::{ReadoutEncoders, ViewEncoder};
-use crate::shown::Shown;
-use crate::time_columns::{COLUMN_US, COLUMNS_US, Curve, MISSING, is_column};
+use crate::spikes::EncodedSpikes;
+use crate::state::Keyframe;
 use delivered::Delivered;
-use encoded_spikes::EncodedSpikes;
 use following::Following;
 use frame::{About, FOLLOWS, LIVE, MOVES, RECORDS, RESTART};
 use playback::Playback;
-use player::{Player, ViewOptions};
 
 /// Where in its source a view is.
 enum Position {
     /// At the newest state of the live source.
-    Following,
+    Following(Box<Following>),
     /// At a time of a recording or of the live source; empty where nothing can be shown.
     At(Option<Box<SourcePosition>>),
 }
@@ -47,7 +45,7 @@ struct SourcePosition {
 pub struct View {
     live: Option<Arc<LiveSource>>,
     /// The recording that is shown, in place of the live source.
-    recording: Option<Shown>,
+    recording: Option<Arc<Index>>,
     position: Position,
     playback: Playback,
     options: ViewOptions,
@@ -57,7 +55,6 @@ pub struct View {
     recording_encoders: ReadoutEncoders,
     /// Where the window of columns ends, us; `None`: at the time of the view.
     window_us: Option<i64>,
-    following: Following,
     delivered: Delivered,
     /// A new frame can be shown.
     dirty: bool,
@@ -76,13 +73,12 @@ impl View {
         Self {
             live,
             recording: None,
-            position: Position::Following,
+            position: Position::Following(Box::default()),
             playback: Playback::paused(),
             options: ViewOptions::plain(COLUMN_US),
             requested_encoder: None,
             recording_encoders: ReadoutEncoders::default(),
             window_us: None,
-            following: Following::default(),
             delivered: Delivered::nothing(),
             dirty: true,
             received: 0,
@@ -103,7 +99,7 @@ impl View {
     #[must_use]
     pub fn transport(&self) -> (&'static str, f64, Option<i64>) {
         let state = match (&self.position, self.playback.is_playing()) {
-            (Position::Following, _) => "following",
+            (Position::Following(_), _) => "following",
             (Position::At(_), true) => "playing",
             (Position::At(_), false) => "paused",
         };
@@ -113,9 +109,12 @@ impl View {
     /// Whether [`View::advance`] has work to do before the next frame.
     #[must_use]
     pub fn moves(&self) -> bool {
-        let follows = matches!(self.position, Position::Following) && self.live.is_some();
-        let narrow = self.options.column_us < COLUMN_US;
-        self.playback.is_playing() || follows && (narrow || self.options.encoder.is_some())
+        let follows = self.is_following() && self.live.is_some();
+        self.playback.is_playing() || follows && (self.options.is_narrow() || self.options.encoder.is_some())
+    }
+
+    fn is_following(&self) -> bool {
+        matches!(self.position, Position::Following(_))
     }
 
     /// Board time of the view, us.
@@ -123,14 +122,14 @@ impl View {
         match &self.position {
             Position::At(Some(position)) => Some(position.player.t()),
             Position::At(None) => None,
-            Position::Following => self.live.as_ref().and_then(|live| lock(&live.state).latest()),
+            Position::Following(_) => self.live.as_ref().and_then(|live| lock(&live.state).latest),
         }
     }
 
-    fn index(&self) -> Result<Arc<dyn KeyframeIndex>> {
+    fn index(&self) -> Result<Arc<Index>> {
         match (&self.recording, &self.live) {
-            (Some(shown), _) => Ok(shown.index()),
-            (None, Some(live)) => Ok(Arc::new(live.index.clone())),
+            (Some(index), _) => Ok(Arc::clone(index)),
+            (None, Some(live)) => Ok(Arc::clone(&live.index)),
             (None, None) => Err(problem!("nothing is shown: open a recording first").into()),
         }
     }
@@ -144,8 +143,7 @@ impl View {
     pub fn values(&self) -> Result<impl FnOnce(i64) -> Result<Value> + Send + use<>> {
         let (index, watched) = (self.index()?, self.options.watched);
         Ok(move |t| {
-            let player = Player::open(index, t, ViewOptions::plain(COLUMNS_US.0))?;
-            let state = player.state();
+            let Player { state, .. } = Player::open(&index, t, &ViewOptions::plain(COLUMNS_US.0), None)?;
             let curves = state.curves().map(|Curve { sum, area, x, y }| match area {
                 area if area == MISSING.area => Value::Null,
                 area => json!({ "sum": sum, "area": area, "x": x, "y": y }),
@@ -163,12 +161,10 @@ impl View {
 
     /// Moves a playing view on, decodes narrow columns and encodes; returns whether it has arrived at the end of its recording.
     pub fn advance(&mut self) -> bool {
-        let live = self.live.clone().filter(|_| matches!(self.position, Position::Following));
-        if let Err(error) = self.following.update_narrow(live.as_ref(), self.options.column_us) {
+        if let (Position::Following(following), Some(live)) = (&mut self.position, &self.live)
+            && let Err(error) = following.update(live, &self.options)
+        {
             self.warn(&error);
-        }
-        if let Some(live) = live {
-            self.following.encode(&live);
         }
         let Some(t) = self.playback.now() else { return false };
         let moved = self.position().and_then(|position| {
@@ -195,10 +191,13 @@ impl View {
 
     /// The next frame, and messages that go with it; `None` where there is nothing new to show. `records`: something is recorded.
     pub fn frame(&mut self, records: bool) -> Option<(Vec<u8>, Vec<String>)> {
-        if let (Position::Following, Some(live)) = (&self.position, &self.live) {
+        if let (Position::Following(following), Some(live)) = (&mut self.position, &self.live) {
             let received = live.received();
             self.dirty |= std::mem::replace(&mut self.received, received) != received;
-            self.delivered.note_source_restarts(lock(&live.state).restarts());
+            self.delivered.note_source_restarts(lock(&live.state).restarts);
+            if self.dirty && self.options.watched.is_some() && !self.options.is_narrow() {
+                following.read(live).ok()?;
+            }
         }
         if !std::mem::take(&mut self.dirty) {
             return None;
@@ -206,7 +205,7 @@ impl View {
         let restart = if self.delivered.is_restart() { RESTART } else { 0 };
         let live = if self.recording.is_none() { LIVE } else { 0 };
         let moves = match self.position {
-            Position::Following => MOVES | FOLLOWS,
+            Position::Following(_) => MOVES | FOLLOWS,
             Position::At(_) if self.playback.is_playing() => MOVES,
             Position::At(_) => 0,
         };
@@ -221,12 +220,15 @@ impl View {
         self.write_spikes();
         let needs_rest = |rests: u64| self.delivered.needs_rest(rests, moves != 0);
         let (bytes, last, rests) = match &mut self.position {
-            Position::Following => self.following.frame(self.live.as_ref()?, about, needs_rest),
+            Position::Following(following) => following.frame(self.live.as_ref()?, about, needs_rest),
             Position::At(position) => {
                 let SourcePosition { player, window } = &mut **position.as_mut()?;
-                let rests = Some(player.state().rests()).filter(|rests| needs_rest(*rests));
+                let rests = Some(player.state.rests()).filter(|rests| needs_rest(*rests));
                 let about = About { with_rest: rests.is_some(), ..about };
-                let (bytes, last) = frame::of_player(player, window.as_mut(), about);
+                window.iter_mut().for_each(|window| window.state.update_curve());
+                player.state.update_curve();
+                let beside = window.as_ref().unwrap_or(player);
+                let (bytes, last) = frame::write(&player.state, &beside.state, &beside.watched, about);
                 (bytes, last, rests)
             }
         };
@@ -237,21 +239,20 @@ impl View {
 
     /// Writes the `spikes` message, where the encoder has made any since the last frame.
     fn write_spikes(&mut self) {
-        if self.options.encoder.is_none() {
-            return;
-        }
-        let spikes = match &mut self.position {
-            Position::Following => self.live.as_ref().and_then(|live| self.following.encode(live)),
-            Position::At(position) => position
-                .as_mut()
-                .and_then(|position| position.window.as_mut().unwrap_or(&mut position.player).spikes_mut()),
+        let of_view = match &mut self.position {
+            Position::Following(following) => following.spikes(),
+            Position::At(Some(position)) => {
+                let SourcePosition { player, window } = &mut **position;
+                &mut window.as_mut().unwrap_or(player).watched.spikes
+            }
+            Position::At(None) => return,
         };
-        let Some(spikes) = spikes else { return };
+        let Some(spikes) = of_view else { return };
         let (message, failed) = (spikes.message(), spikes.failed().cloned());
         self.texts.extend(message.map(|message| message.to_string()));
         if let Some(error) = failed {
+            *of_view = None;
             (self.options.encoder, self.requested_encoder) = (None, None);
-            self.following.stop_encoding();
             self.warn(&error.into());
         }
     }
@@ -260,7 +261,7 @@ impl View {
 
     fn position(&mut self) -> Result<&mut SourcePosition> {
         match &mut self.position {
-            Position::Following => Err(problem!("the view follows the newest data").into()),
+            Position::Following(_) => Err(problem!("the view follows the newest data").into()),
             Position::At(None) => Err(problem!("this view has ended: open the recording again").into()),
             Position::At(Some(position)) => Ok(position),
         }
@@ -274,12 +275,11 @@ impl View {
         }
         // For the past of a live source at wide columns, the shared state has them all.
         let live = self.live.as_ref().filter(|_| self.recording.is_none() && self.options.column_us > COLUMN_US);
-        let all_columns = live.map(|live| {
+        let whole = live.map(|live| {
             let mut state = lock(&live.state);
             state.update_curve();
-            Arc::new(state.time_columns().clone())
+            Arc::new(state.columns().clone())
         });
-        let options = ViewOptions { all_columns, ..self.options.clone() };
         // A window whose columns the client has already stays as it is.
         let same = match &mut self.position {
             Position::At(Some(position)) if !self.delivered.is_restart() => position.window.take(),
@@ -289,10 +289,11 @@ impl View {
         if end.is_none() || same.is_none() {
             self.restart();
         }
+        let open = |t, options: &ViewOptions| Player::open(&index, t, options, whole.as_ref());
         let position = match end {
-            None => Player::open(index, t, options).map(|player| SourcePosition { player, window: None }),
-            Some(end) => Player::open(Arc::clone(&index), t, ViewOptions::plain(COLUMN_US)).and_then(|player| {
-                let window = same.map_or_else(|| Player::open(index, end, options), Ok)?;
+            None => open(t, &self.options).map(|player| SourcePosition { player, window: None }),
+            Some(end) => open(t, &ViewOptions::plain(COLUMN_US)).and_then(|player| {
+                let window = same.map_or_else(|| open(end, &self.options), Ok)?;
                 Ok(SourcePosition { player, window: Some(window) })
             }),
         };
@@ -302,7 +303,6 @@ impl View {
         self.position = Position::At(Some(Box::new(position?)));
         self.delivered.invalidate_rest();
         self.dirty = true;
-        self.following.stop_encoding();
         Ok(())
     }
 
@@ -310,37 +310,32 @@ impl View {
     fn restart(&mut self) {
         self.dirty = true;
         self.delivered.invalidate();
-        self.following.restart();
     }
 
     /// Shows the newest state of the live source from now on.
     fn follow_newest(&mut self) {
-        (self.position, self.recording, self.window_us) = (Position::Following, None, None);
+        (self.recording, self.window_us) = (None, None);
         self.recording_encoders = ReadoutEncoders::default();
         self.playback.pause();
-        self.restart();
-        self.start_encoding();
+        self.begin_following();
     }
 
-    /// While following: begins the encoder anew.
-    fn start_encoding(&mut self) {
-        self.following.stop_encoding();
-        let (Position::Following, Ok(index), Some(live)) = (&self.position, self.index(), self.live.clone()) else {
-            return;
-        };
-        let started = self.choose_encoder(&index).and_then(|()| match &self.options.encoder {
-            Some(encoder) => self.following.start_encoding(&live, encoder, self.options.column_us),
-            None => Ok(()),
-        });
-        if let Err(error) = started {
-            (self.options.encoder, self.requested_encoder) = (None, None);
+    fn begin_following(&mut self) {
+        self.restart();
+        self.position = Position::Following(Box::default());
+        let (Ok(index), Some(live)) = (self.index(), self.live.clone()) else { return };
+        if let Err(error) = self.choose_encoder(&index) {
             self.warn(&error);
+        }
+        match Following::begin(&live, &self.options) {
+            Ok(following) => self.position = Position::Following(Box::new(following)),
+            Err(error) => self.warn(&error),
         }
     }
 
     /// Chooses the encoder that the client has requested, of the readout that reads what is shown; none where it does not
     /// encode what an index holds.
-    fn choose_encoder(&mut self, index: &Arc<dyn KeyframeIndex>) -> Result<()> {
+    fn choose_encoder(&mut self, index: &Index) -> Result<()> {
         self.options.encoder = None;
         let Some(request) = self.requested_encoder.take() else { return Ok(()) };
         let live = self.live.as_ref().filter(|_| self.recording.is_none());
@@ -348,10 +343,9 @@ impl View {
             Some(live) => ViewEncoder::requested(&request, &live.encoders())?,
             None => ViewEncoder::requested(&request, &self.recording_encoders)?,
         };
-        let stream = match Arc::clone(index).frames() {
-            Some(frames) => EncodedSpikes::of_frames(&encoder, &frames, COLUMN_US, None)?.check(),
-            None => encoder.encoder.stream(index.array()).map(drop).map_err(Into::into),
-        };
+        let blank = Keyframe::blank(index.sensor.array.len());
+        let stream =
+            EncodedSpikes::new(&encoder, &index.sensor, COLUMN_US, &blank).and_then(|spikes| spikes.check(index));
         if stream.is_err() && encoder.of_readout && live.is_some_and(|live| live.measures_tare()) {
             let name = encoder.name;
             return Err(problem!(
@@ -378,11 +372,12 @@ impl View {
     fn reopen(&mut self) -> Result<()> {
         self.restart();
         match self.t() {
-            Some(t) if matches!(self.position, Position::At(_)) => {
+            _ if self.is_following() => self.begin_following(),
+            Some(t) => {
                 self.go(t)?;
                 self.playback.continue_from(t);
             }
-            _ => self.start_encoding(),
+            None => {}
         }
         Ok(())
     }
@@ -396,19 +391,13 @@ impl View {
     /// `Core(Problem)` for a taxel outside the array; `File` or `Core` where the recording cannot be read.
     pub fn watch(&mut self, taxel: Option<(u16, u16)>) -> Result<()> {
         let index = self.index()?;
-        let array = index.array();
+        let array = &index.sensor.array;
         let (rows, columns) = (array.rows, array.columns);
         if taxel.is_some_and(|(x, y)| x >= columns || y >= rows) {
             return Err(problem!("taxel"; ": must be [x, y] on {rows} rows x {columns} columns, or null").into());
         }
         self.options.watched = taxel.and_then(|(x, y)| u32::try_from(array.index(x, y)).ok());
-        if !matches!(self.position, Position::Following) {
-            return self.reopen();
-        }
-        self.dirty = true;
-        self.delivered.invalidate();
-        self.following.restart_history();
-        Ok(())
+        self.reopen()
     }
 
     /// Makes spikes by this encoder from now on, or none.
@@ -437,7 +426,7 @@ impl View {
             return Err(problem!("column_us"; ": must be {least} times a power of two, up to {most}").into());
         }
         self.options.column_us = column_us;
-        self.window_us = end_us.filter(|_| !matches!(self.position, Position::Following));
+        self.window_us = end_us.filter(|_| !self.is_following());
         self.reopen()
     }
 
@@ -459,7 +448,7 @@ impl View {
     pub fn play(&mut self, speed: Option<f64>) -> Result<()> {
         let speed = speed.unwrap_or_else(|| self.playback.speed());
         let t = self.t().ok_or_else(|| problem!("nothing is shown yet"))?;
-        if matches!(self.position, Position::Following) {
+        if self.is_following() {
             // Playing the live source from now on would be a delay of zero, which is following.
             return Err(problem!("the view already follows the newest data: go to an earlier time first").into());
         }
@@ -479,7 +468,7 @@ impl View {
     /// `Core(Problem)` before the first event.
     pub fn pause(&mut self) -> Result<()> {
         self.playback.pause();
-        if matches!(self.position, Position::Following) {
+        if self.is_following() {
             let t = self.t().ok_or_else(|| problem!("no events have arrived yet"))?;
             self.go(t)?;
         }
@@ -500,7 +489,8 @@ impl View {
                 let Some(t) = player.next_stamp()? else { break };
                 player.advance(t)?;
             } else {
-                let Some(t) = player.last_stamp()? else { break };
+                let before = player.t();
+                let Some(t) = self.index()?.stamp_before(before)? else { break };
                 self.go(t)?;
             }
         }
@@ -526,10 +516,9 @@ impl View {
     /// # Errors
     ///
     /// `File` or `Core` where the recording cannot be read.
-    pub fn show(&mut self, recording: Shown) -> Result<()> {
-        let index = recording.index();
-        self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < index.array().len());
-        (self.recording, self.window_us) = (Some(recording), None);
+    pub fn show(&mut self, index: Arc<Index>) -> Result<()> {
+        self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < index.sensor.array.len());
+        (self.recording, self.window_us) = (Some(Arc::clone(&index)), None);
         self.recording_encoders = ReadoutEncoders::default();
         self.playback.pause();
         match index.range() {
@@ -546,7 +535,7 @@ mod tests {
     use taxel_core::encode::{ChangeEvents, Composite, Fa1};
 
     use super::*;
-    use crate::keyframe_index::events::tests::{indexed, recorded};
+    use crate::events::tests::{indexed, recorded};
 
     /// The `spikes` message of the next frame, and whether it is of the readout's encoder.
     fn spikes(view: &mut View) -> (Value, bool) {
@@ -567,7 +556,7 @@ mod tests {
         let (index, _) = indexed(&path, u64::MAX);
         let last = index.range().unwrap().1;
         let mut view = View::new(None);
-        view.show(Shown::Events(index)).unwrap();
+        view.show(index).unwrap();
         view.seek(last).unwrap();
         let coarse = Encoder::ChangeEvents(ChangeEvents { noise_floor: 20.0, ..ChangeEvents::default() });
         let by_name = || json!({ "name": "change_events" });

@@ -15,7 +15,7 @@ use taxel_core::wire::Registers;
 use taxel_live::clock::BoardClock;
 use taxel_live::pipeline::Record;
 use taxel_live::recording::{Compression, Condition};
-use taxel_panel::{Activity, EventIndex, FrameArea, FrameIndex, FrameRest, FrameSource, Kept, LiveSource, Shown, View};
+use taxel_panel::{Activity, FrameRest, FrameSource, FramesOfSource, Index, Kept, LiveSource, View};
 
 use crate::held::{TouchesOut, from_touches};
 use crate::live::Live;
@@ -147,7 +147,7 @@ impl PanelLive {
 
 /// An indexed recording.
 #[pyclass(frozen)]
-pub struct PanelRecording(Shown);
+pub struct PanelRecording(Arc<Index>);
 
 #[pymethods]
 impl PanelRecording {
@@ -162,7 +162,7 @@ impl PanelRecording {
     ) -> PyResult<(Self, Remarks, Plain<Value>)> {
         let reader = &reader.reader;
         enter(py, |_| {
-            let (index, remarks, decoded) = EventIndex::of_board(reader, Kept { memory, folder: &folder })?;
+            let (index, remarks, decoded) = Index::of_board(reader, Kept::All { memory, folder })?;
             let condition = reader.condition(&remarks, decoded.bad_chunks);
             let condition = Condition { decoded: Some(decoded.found), ..condition };
             let mut clock = BoardClock::default();
@@ -171,7 +171,7 @@ impl PanelRecording {
             {
                 clock.note(left, arrived_ns);
             }
-            let shown = Self(Shown::Events(Arc::new(index)));
+            let shown = Self(Arc::new(index));
             Ok::<_, taxel_live::Error>((shown, Remarks::new(&remarks, &condition), Plain(json!(clock.pace()))))
         })
     }
@@ -187,42 +187,43 @@ impl PanelRecording {
         memory: u64,
     ) -> PyResult<Self> {
         let (events, held) = (events.view()?, held.as_ref().map(|held| slice("held", held)).transpose()?);
-        let index = enter(py, |_| EventIndex::of_events(events, held, noise_floor, Kept { memory, folder: &folder }))?;
-        Ok(Self(Shown::Events(Arc::new(index))))
+        let index = enter(py, |_| Index::of_events(events, held, noise_floor, Kept::All { memory, folder }))?;
+        Ok(Self(Arc::new(index)))
     }
 
     /// Takes frames, `ReadFrames` of Python.
     #[staticmethod]
-    fn of_frames(py: Python<'_>, frames: ReadFrames<'_>) -> PyResult<Self> {
-        to_index(py, frames).map(|index| Self(Shown::Frames(Arc::new(index))))
+    fn of_frames(py: Python<'_>, frames: ReadFrames<'_>, folder: PathBuf, memory: u64) -> PyResult<Self> {
+        to_index(py, frames, Kept::All { memory, folder }).map(|index| Self(Arc::new(index)))
     }
 
     /// What the `opened` message says of its values.
-    fn opened(&self, py: Python<'_>) -> Plain<Value> {
-        Plain(py.detach(|| self.0.opened()))
+    fn opened(&self, py: Python<'_>) -> PyResult<Plain<Value>> {
+        enter(py, |_| self.0.opened()).map(Plain)
     }
 
     /// Its `overview` message.
     fn overview(&self, py: Python<'_>, name: &str) -> String {
-        py.detach(|| self.0.overview(name).to_string())
+        py.detach(|| self.0.overview(Some(name), self.0.whole.as_deref()).to_string())
     }
 
     /// First and last time, us; how long before and after them a label may lie, us; how long one us of the file is in the view.
     fn times(&self) -> (Option<(i64, i64)>, i64, i64) {
-        let (range, late_us) = self.0.range();
-        (range, late_us, self.0.us())
+        (self.0.range(), self.0.late_us(), self.0.us())
     }
 
     /// The sensor.
     fn array(&self) -> ArrayParts {
-        from_array(self.0.array())
+        from_array(&self.0.sensor.array)
     }
 
     /// Counts by which unhealthy taxels are found; None of frames.
     fn activity<'py>(&self, py: Python<'py>) -> PyResult<Option<ActivityOut<'py>>> {
-        let Shown::Events(index) = &self.0 else { return Ok(None) };
-        let activity = enter(py, |_| index.activity())?;
-        Ok(Some(activity_out(py, self.0.array(), activity)))
+        if self.0.sensor.frames.is_some() {
+            return Ok(None);
+        }
+        let activity = enter(py, |_| self.0.activity())?;
+        Ok(Some(activity_out(py, &self.0.sensor.array, activity)))
     }
 }
 
@@ -361,7 +362,7 @@ impl PanelView {
 
     /// Shows a recording at its beginning.
     fn show(&self, py: Python<'_>, recording: &PanelRecording) -> PyResult<()> {
-        let recording = recording.0.clone();
+        let recording = Arc::clone(&recording.0);
         self.with(py, |view| view.show(recording))
     }
 }
@@ -374,7 +375,6 @@ struct ReadRest<'py> {
     ticks_by_unit: f64,
     loaded_from: f64,
     falls: bool,
-    flickering: Vec<usize>,
     preload_at: String,
 }
 
@@ -383,8 +383,7 @@ struct ReadRest<'py> {
 struct ReadSource<'py> {
     name: String,
     left: u16,
-    rows: u16,
-    columns: u16,
+    array: ArrayParts,
     t: PyReadonlyArray1<'py, i64>,
     values: PyReadonlyArray1<'py, f32>,
     rest: ReadRest<'py>,
@@ -399,16 +398,17 @@ struct ReadFrames<'py> {
     number_us: Option<i64>,
 }
 
-fn to_index(py: Python<'_>, frames: ReadFrames<'_>) -> PyResult<FrameIndex> {
+fn to_index(py: Python<'_>, frames: ReadFrames<'_>, kept: Kept) -> PyResult<Index> {
     let ReadFrames { array, sources, unit, number_us } = frames;
     let array = to_array(array)?;
     let mut placed = vec![];
-    for ReadSource { name, left, rows, columns, t, values, rest } in &sources {
-        let (t, values, rests) = (slice("t", t)?, slice("values", values)?, slice("rest", &rest.values)?);
-        let inside = *left <= array.columns && *columns <= array.columns - left && *rows <= array.rows;
-        let cells = usize::from(*rows) * usize::from(*columns);
-        let each = rests.len() == cells && rest.flickering.iter().all(|&cell| cell < cells);
-        if !inside || values.len() != t.len() * cells || !each {
+    let values: Vec<PyReadonlyArray1<'_, f32>> = sources.iter().map(|source| source.values.clone()).collect();
+    for (ReadSource { name, left, array: parts, t, rest, .. }, values) in sources.into_iter().zip(&values) {
+        let sensor = to_array(parts)?;
+        let (t, values, rests) = (slice("t", &t)?, slice("values", values)?, slice("rest", &rest.values)?);
+        let cells = sensor.len();
+        let inside = left <= array.columns && sensor.columns <= array.columns - left && sensor.rows <= array.rows;
+        if !inside || values.len() != t.len() * cells || rests.len() != cells {
             return Err(ProblemError::new_err(format!("source {name}: does not fit the array")));
         }
         let known = |&rest: &f64| if rest.is_nan() { f64::NO_REST } else { rest };
@@ -419,11 +419,9 @@ fn to_index(py: Python<'_>, frames: ReadFrames<'_>) -> PyResult<FrameIndex> {
             ticks_by_unit: rest.ticks_by_unit,
             loaded_from: rest.loaded_from,
             falls: rest.falls,
-            flickering: rest.flickering.clone(),
-            preload_at: rest.preload_at.clone(),
+            preload_at: rest.preload_at,
         };
-        let area = FrameArea { name: name.clone(), left: *left, rows: *rows, columns: *columns };
-        placed.push(FrameSource { area, t: t.to_vec(), values, rest });
+        placed.push(FrameSource { about: FramesOfSource { name, left, sensor, rest }, t: t.to_vec(), values });
     }
-    enter(py, |_| Ok::<_, taxel_core::Error>(FrameIndex::new(array, unit, number_us, placed)))
+    enter(py, |_| Index::of_frames(array, unit, number_us, placed, kept))
 }

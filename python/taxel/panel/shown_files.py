@@ -61,8 +61,6 @@ class ReadRest:
         From where on a value above rest is a load.
     falls : bool
         Whether values fall under load.
-    flickering : list of int
-        Indices of taxels that count as 0; none.
     preload_at : str
         What lay on the sensor, in words.
     """
@@ -72,7 +70,6 @@ class ReadRest:
     ticks_by_unit: float
     loaded_from: float
     falls: bool
-    flickering: list[int]
     preload_at: str
 
 
@@ -82,8 +79,7 @@ class ReadSource:
 
     name: str
     left: int
-    rows: int
-    columns: int
+    array: _core._Array
     t: NDArray[np.int64]
     values: NDArray[np.float32]
     rest: ReadRest
@@ -396,7 +392,7 @@ def _frames(recording: Recording) -> Viewed:
     array, lefts = _array_of(frames)
     us = 1 if recording.timed else _NUMBER_US
     parts = [
-        ReadSource(name, left, read.array.rows, read.array.columns, _times(read.t, us), _values(read), _rest(read))
+        ReadSource(name, left, read.array._parts(), _times(read.t, us), _values(read), _rest(read))
         for (name, read), left in zip(frames.items(), lefts, strict=True)
     ]
     noted = {name: {(note.t, note.text) for note in sensor.notes} for name, sensor in sources.items()}
@@ -410,7 +406,7 @@ def _frames(recording: Recording) -> Viewed:
     found = ((d.label, d.t, d.known, name) for name, sensor in each for d in sensor.detections)
     sorted_notes = sorted(notes, key=lambda note: (note[0] or 0, note[1]))
     read_frames = ReadFrames(array._parts(), parts, units.pop(), None if us == 1 else us)
-    shown = _core.PanelRecording.of_frames(read_frames)
+    shown = _core.PanelRecording.of_frames(read_frames, recording.path.parent, available() // _MEMORY_SHARE)
     return Viewed(shown, _contents(shown, _verdict(recording), sorted_notes, found))
 
 
@@ -429,7 +425,7 @@ def _in_its_unit(recording: Recording) -> Frames:
 def _rest(frames: Frames) -> ReadRest:
     rest = of_frames(frames)
     source, loaded = {"unit": "given"}.get(rest.source, rest.source), loaded_from(frames, rest)
-    return ReadRest(source, rest.values, ticks_by_unit(frames), loaded, rest.falls, [], rest.preload_at)
+    return ReadRest(source, rest.values, ticks_by_unit(frames), loaded, rest.falls, rest.preload_at)
 
 
 def _times(t: NDArray[np.int64], us: int) -> NDArray[np.int64]:

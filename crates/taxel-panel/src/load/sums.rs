@@ -2,7 +2,7 @@
 
 use super::centre::Coordinates;
 use super::weights::Weights;
-use crate::time_columns::{Curve, NOTHING};
+use crate::columns::{Curve, NOTHING};
 
 /// Sums over taxels, modulo 2^64: a decrease wraps, and the sums are right.
 #[derive(Debug, Clone, Copy, Default)]

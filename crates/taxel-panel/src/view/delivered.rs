@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::time_columns::LATE_US;
+use crate::columns::LATE_US;
 
 /// Minimum time from one rest to the next, while the view moves.
 const REST_EVERY: Duration = Duration::from_millis(500);

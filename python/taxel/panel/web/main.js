@@ -396,9 +396,7 @@ function open(message) {
     if (message.touch_us !== null) player.seek(message.touch_us);
   }
   training.choose(message.name, message.frames?.trial);
-  const noisy = message.frames?.flickering ?? [];
-  maps.flickering = noisy.length;
-  maps.health = noisy.length ? { dead: [], stuck: [], noisy } : null;
+  maps.health = null;
   showZeroed();
   part("files", HTMLSelectElement).value = message.name;
   labels.choose(message.name, message.frames?.trial);

@@ -109,8 +109,6 @@ export class Maps {
     this.values = { unit: "ticks", step: 1, zero: 0, frames: false };
     /** The sources that stand side by side, of frames. @type {FrameSourceInfo[]} */
     this.sources = [];
-    /** How many taxels of frames flicker, and never count as above rest. */
-    this.flickering = 0;
     /** Taxels whose rest a person set. @type {Zeroing[]} */
     this.zeroed = [];
     /** @type {Frame | null} */
@@ -272,7 +270,7 @@ export class Maps {
     if (!this.values.frames) return REST_FROM[this.frame.restFrom];
     const all = new Set(this.sources.map(({ rest }) => REST_OF_FRAMES[rest]));
     const from = all.size === 1 ? [...all] : this.sources.map(({ name, rest }) => `${name}: ${REST_OF_FRAMES[rest]}`);
-    return [...from, ...(this.flickering ? [`${counted(this.flickering, "flickering taxel")} left out`] : [])].join("; ");
+    return from.join("; ");
   }
 
   /** @returns {string} the taxel under the crosshair; of a board its traces, too */

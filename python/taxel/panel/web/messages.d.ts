@@ -60,7 +60,6 @@ export interface FrameRecording {
   number_us: number | null;
   sources: FrameSourceInfo[];
   /** Taxels that never count as above rest. */
-  flickering: [number, number][];
   trial: string | null;
   /** The trials of a file with several. */
   trials: string[];

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::time_columns::{SPAN, column_of};
+use crate::columns::{SPAN, column_of};
 use taxel_core::held::UNKNOWN;
 use taxel_live::pipeline::TaxelChange;
 
@@ -20,7 +20,6 @@ pub struct TaxelHistory {
 
 impl TaxelHistory {
     /// Begins the history of a taxel that holds `held` at time `since` (us; `None`: before the first event).
-    #[must_use]
     pub fn new(taxel: u32, held: u16, since: Option<i64>, column_us: i64) -> Self {
         let first = since.map_or(i64::MIN, |t| column_of(t, column_us));
         Self { taxel, column_us, first: (first, held), last: held, columns: VecDeque::new() }
@@ -80,7 +79,7 @@ impl TaxelHistory {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::time_columns::COLUMN_US;
+    use crate::columns::COLUMN_US;
 
     fn change(t: i64, taxel: u32, ticks: u16) -> TaxelChange {
         TaxelChange { t, taxel, ticks, up: true, repaired: false }

@@ -2,7 +2,7 @@
 
 use taxel_live::pipeline::TaxelChange;
 
-use crate::time_columns::COLUMN_US;
+use crate::columns::COLUMN_US;
 
 /// Maximum number of bins; beyond it pairs of bins are merged.
 const BINS: usize = 1000;
@@ -11,8 +11,6 @@ const BINS: usize = 1000;
 #[derive(Debug, Default)]
 pub(super) struct EventRate {
     first: Option<i64>,
-    /// The earliest time, us, which may come later.
-    pub(super) earliest: Option<i64>,
     step: i64,
     bins: Vec<u64>,
 }
@@ -25,7 +23,6 @@ impl EventRate {
     }
 
     fn add_at(&mut self, t: i64, count: u64) {
-        self.earliest = self.earliest.into_iter().chain([t]).min();
         let first = *self.first.get_or_insert(t);
         self.step = self.step.max(COLUMN_US);
         loop {
@@ -44,7 +41,7 @@ impl EventRate {
     }
 
     /// Start of the first bin and width of a bin, both us, and the counts.
-    pub(super) fn into_bins(self) -> (i64, i64, Vec<u64>) {
-        (self.first.unwrap_or(0), self.step.max(COLUMN_US), self.bins)
+    pub(super) fn bins(&self) -> (i64, i64, Vec<u64>) {
+        (self.first.unwrap_or(0), self.step.max(COLUMN_US), self.bins.clone())
     }
 }

@@ -1,19 +1,22 @@
 //! The view of any time of a recording equals that of a full decode.
 
-use std::path::PathBuf;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use rand::{Rng, SeedableRng, rngs::StdRng};
+use taxel_core::Array;
 use taxel_core::board::Board;
 use taxel_core::encode::{ChangeEvents, Encoder};
 use taxel_core::wire::{Command, Registers};
 
 use super::*;
+use crate::columns::{COLUMN_US, SPAN, column_of};
+use crate::player::{Player, ViewOptions};
 use crate::readout_encoders::ViewEncoder;
-use crate::time_columns::{Extent, SPAN};
-use crate::view::encoded_spikes::EncodedSpikes;
-use crate::view::frame::{About, of_player};
-use crate::view::player::{Player, ViewOptions};
+use crate::spikes::EncodedSpikes;
+use crate::state::ArrayState;
+use crate::view::frame::{About, write};
 use taxel_live::recording::{Header, Writer, WriterOptions};
 
 /// The taxel whose history is shown.
@@ -58,7 +61,7 @@ pub(crate) fn recorded(name: &str, seed: u64) -> PathBuf {
 }
 
 /// Held values at a time, computed from the changes alone, without state or keyframe.
-pub(in crate::keyframe_index) fn held_at(changes: &[TaxelChange], t: i64, taxels: usize) -> (Vec<u16>, u64) {
+pub(crate) fn held_at(changes: &[TaxelChange], t: i64, taxels: usize) -> (Vec<u16>, u64) {
     let (mut held, mut events) = (vec![UNKNOWN; taxels], 0);
     for change in changes.iter().take_while(|change| change.t <= t) {
         if change.ticks != UNKNOWN {
@@ -70,18 +73,19 @@ pub(in crate::keyframe_index) fn held_at(changes: &[TaxelChange], t: i64, taxels
 }
 
 /// The index of a recording with so many bytes in memory, and all of its changes.
-pub(crate) fn indexed(path: &Path, memory: u64) -> (Arc<EventIndex>, Vec<TaxelChange>) {
+pub(crate) fn indexed(path: &Path, memory: u64) -> (Arc<Index>, Vec<TaxelChange>) {
     let reader = Reader::open(path).unwrap();
     // A temporary file is in the folder of the system, as this one cannot be written.
-    let kept = Kept { memory, folder: Path::new("/nowhere") };
-    let (index, ..) = EventIndex::of_board(&reader, kept).unwrap();
+    let kept = Kept::All { memory, folder: "/nowhere".into() };
+    let (index, ..) = Index::of_board(&reader, kept).unwrap();
     (Arc::new(index), changes(reader.decode(Stop::never()).unwrap().events.view()))
 }
 
 /// Raster and curves of a frame, and of which columns they are.
 fn shown(player: &mut Player, us: i64) -> (std::ops::Range<i64>, Vec<u8>, Vec<u8>) {
     let about = About { flags: 0, number: 0, from: i64::MIN, with_rest: false, watched: Some(WATCHED), column_us: us };
-    let (bytes, _) = of_player(player, None, about);
+    player.state.update_curve();
+    let (bytes, _) = write(&player.state, &player.state, &player.watched, about);
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
     let section = |k: usize| bytes[word(64 + 8 * k)..][..word(68 + 8 * k)].to_vec();
     let first = i64::from_le_bytes(bytes[48..56].try_into().unwrap());
@@ -107,9 +111,10 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
     for (seed, memory) in [(1, u64::MAX), (2, 10 << 20)] {
         let path = recorded("any-time", seed);
         let (index, changes) = indexed(&path, memory);
-        assert_eq!(index.events(), changes.len() as u64);
-        assert!(index.keys.len() >= 5, "{seed}: {} keyframes", index.keys.len());
-        let (first, last) = index.range.unwrap();
+        assert_eq!(index.changes(), changes.len() as u64);
+        let (first, last) = index.range().unwrap();
+        let keys: BTreeSet<u64> = (0..100).map(|k| index.open(first + k * (last - first) / 100).unwrap().1).collect();
+        assert!(keys.len() >= 5, "{seed}: {} keyframes", keys.len());
         let (mut random, mut some) = (StdRng::seed_from_u64(7), 0);
         for turn in 0..25 {
             let t = if turn == 24 { last } else { random.random_range(first..=last) };
@@ -119,47 +124,47 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
             let spiking = ViewEncoder::from(Encoder::ChangeEvents(spiking));
             let options =
                 ViewOptions { watched: Some(WATCHED), encoder: Some(spiking.clone()), ..ViewOptions::plain(us) };
-            let mut player = Player::open(index.clone(), t, options).unwrap();
-            let (held, events) = held_at(&changes, t, index.array.len());
-            assert_eq!((player.state().held(), player.state().events()), (&held[..], events), "{seed} at {t} us");
+            let mut player = Player::open(&index, t, &options, None).unwrap();
+            let (held, events) = held_at(&changes, t, index.sensor.array.len());
+            assert_eq!((player.state.held(), player.state.events), (&held[..], events), "{seed} at {t} us");
             let (columns, raster, curves) = shown(&mut player, us);
             assert_eq!(columns.end, column_of(t, us) + 1);
             let begin = (columns.end - SPAN).max(column_of(first, us));
             assert_eq!(columns.start, begin, "{seed} at {t} us: all of the window");
             assert!(
-                raster == counted(&changes, columns.clone(), us, t, &index.array),
+                raster == counted(&changes, columns.clone(), us, t, &index.sensor.array),
                 "{seed}: raster at {t} us by {us} us"
             );
             // Curves and changes by a state of the same column width, from the beginning, without a keyframe.
-            let blank = Keyframe::blank(index.array.len());
-            let mut slow = ArrayState::new(&index.array, index.noise_floor, &blank, us, 1 << 28);
-            changes.iter().filter(|change| change.t <= t).for_each(|change| slow.apply_one(change));
+            let blank = Keyframe::blank(index.sensor.array.len());
+            let mut slow = ArrayState::new(&index.sensor, &blank, us, 1 << 22);
+            changes.iter().filter(|change| change.t <= t).for_each(|change| slow.apply(&[*change]));
             slow.advance(t);
             slow.update_curve();
-            assert_eq!(player.state().change(), slow.change(), "{seed} at {t} us");
+            assert_eq!(player.state.change(), slow.change(), "{seed} at {t} us");
             // A column wider than those that are stored has the least and the greatest of its parts.
             let part_us = us.min(COLUMN_US);
-            let mut parts = ArrayState::new(&index.array, index.noise_floor, &blank, part_us, 1 << 28);
-            changes.iter().filter(|change| change.t <= t).for_each(|change| parts.apply_one(change));
+            let mut parts = ArrayState::new(&index.sensor, &blank, part_us, 1 << 22);
+            changes.iter().filter(|change| change.t <= t).for_each(|change| parts.apply(&[*change]));
             parts.advance(t);
             parts.update_curve();
             let mut same = vec![];
             for column in columns.clone() {
                 let last = (((column + 1) * us - 1).div_euclid(part_us)).min(column_of(t, part_us));
-                let mut whole = Extent::NOTHING;
-                (column * us / part_us..=last).for_each(|part| whole.join(&parts.time_columns().curve(part)));
-                whole.write(&mut same);
+                let mut whole = parts.columns().no_curves();
+                parts.columns().join_curves(column * us / part_us..last + 1, &mut whole);
+                whole.sums[0].write(&mut same);
             }
             assert!(curves == same, "{seed}: curves at {t} us by {us} us");
             // An encoder that is given all changes from the beginning has the same spikes. Where stamps are not multiples of
             // its period it may sample one period earlier or later, so that a spike may cross an edge of the window.
-            let mut full = EncodedSpikes::new(&spiking, &index.array, us, &[], None).unwrap();
+            let mut full = EncodedSpikes::new(&spiking, &index.sensor, us, &blank).unwrap();
             changes.iter().filter(|change| change.t <= t).for_each(|change| full.push(&[*change]));
             full.advance(if t >= last { last + 1 } else { t });
             let (mut spikes, mut all) = (vec![], vec![]);
-            player.spikes().unwrap().write(columns.clone(), &mut spikes);
+            player.watched.spikes.as_ref().unwrap().write(columns.clone(), &mut spikes);
             full.write(columns, &mut all);
-            let rows = usize::from(index.array.rows);
+            let rows = usize::from(index.sensor.array.rows);
             let of_row = |cells: &[u8], row: usize| -> i64 {
                 cells.iter().skip(row).step_by(rows).map(|&cell| i64::from(cell & 15) + i64::from(cell >> 4)).sum()
             };
@@ -167,7 +172,8 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
             let edges = [begin * us, t];
             let at_edge = |t: i64| edges.iter().any(|edge| (t - edge).abs() <= 100);
             for row in 0..rows {
-                let is_of_row = |change: &&TaxelChange| change.taxel as usize / usize::from(index.array.columns) == row;
+                let is_of_row =
+                    |change: &&TaxelChange| change.taxel as usize / usize::from(index.sensor.array.columns) == row;
                 let may = changes.iter().filter(|change| at_edge(change.t)).filter(is_of_row).count() as i64;
                 let differ = (of_row(&spikes, row) - of_row(&all, row)).abs();
                 assert!(differ <= may, "{seed}: spikes of row {row} at {t} us by {us} us: {differ}, not {may}");
@@ -188,8 +194,8 @@ fn steps_go_from_stamp_to_stamp_both_ways_and_through_silence() {
     let mut random = StdRng::seed_from_u64(8);
     for _ in 0..20 {
         let n = random.random_range(1..stamps.len() - 1);
-        let mut player = Player::open(index.clone(), stamps[n], ViewOptions::plain(COLUMN_US)).unwrap();
-        assert_eq!(player.last_stamp().unwrap(), Some(stamps[n - 1]));
+        let mut player = Player::open(&index, stamps[n], &ViewOptions::plain(COLUMN_US), None).unwrap();
+        assert_eq!(index.stamp_before(player.t()).unwrap(), Some(stamps[n - 1]));
         assert_eq!(player.next_stamp().unwrap(), Some(stamps[n + 1]));
     }
     std::fs::remove_file(&path).unwrap();

@@ -1,0 +1,304 @@
+//! The index of a recording of frames.
+//!
+//! Views show changes of ticks. Of frames a tick is a step of their unit, and the changes at a time are the cells that differ
+//! from the frame before; one that equals it has a change all the same, as it has a time.
+
+use taxel_core::Array;
+use taxel_core::held::UNKNOWN;
+use taxel_core::rest::{FrameNoise, NOISE_FLOOR, TrackedRest, ValueSteps, above_noise};
+use taxel_live::Result;
+use taxel_live::pipeline::TaxelChange;
+
+use crate::index::{Block, CHANGES, Index, Indexing, Kept};
+use crate::load::Weights;
+use crate::state::{Keyframe, RestSource, Sensor};
+
+/// Maximum number of sources that each have a curve of their sum.
+const MOST_SOURCES: usize = 4;
+
+/// A tracked rest is stored where that of a taxel is further than this from the stored one, in ticks of the noise floor.
+const REST_MOVED: f64 = 0.5;
+
+/// What the values of a source's frames are above.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameRest {
+    /// Where it is known from. That of a quiet stretch is tracked from its values on; without any the values are above 0.
+    pub source: RestSource,
+    /// The rest of each cell, in the unit; [`Value::NO_REST`](taxel_core::rest::Value::NO_REST) where it is unknown.
+    pub values: Vec<f64>,
+    /// Ticks, in which the noise floor is, by the unit.
+    pub ticks_by_unit: f64,
+    /// From how much above the rest on a value is a load, in the unit.
+    pub loaded_from: f64,
+    /// Whether values fall from that of a quiet stretch: less may mean more pressure.
+    pub falls: bool,
+    /// Where something lay in the quiet stretch, for people; empty where nothing did.
+    pub preload_at: String,
+}
+
+/// A source of frames.
+#[derive(Debug, Clone)]
+pub struct FramesOfSource {
+    /// Its name.
+    pub name: String,
+    /// The column of the array of the recording that is its first.
+    pub left: u16,
+    /// Its sensor.
+    pub sensor: Array,
+    /// What its values are above.
+    pub rest: FrameRest,
+}
+
+impl FramesOfSource {
+    /// Its taxels in an array of `columns` columns, row by row.
+    pub(crate) fn taxels(&self, columns: u16) -> impl Iterator<Item = usize> + use<> {
+        let (left, width, columns) = (usize::from(self.left), usize::from(self.sensor.columns), usize::from(columns));
+        (0..usize::from(self.sensor.rows)).flat_map(move |y| (0..width).map(move |x| y * columns + left + x))
+    }
+}
+
+/// The frames of a source as they are given.
+#[derive(Debug, Clone)]
+pub struct FrameSource<'a> {
+    /// The source.
+    pub about: FramesOfSource,
+    /// Their times, us, ascending.
+    pub t: Vec<i64>,
+    /// Their values row by row, frame after frame; NaN where one is missing.
+    pub values: &'a [f32],
+}
+
+/// What the values of a recording of frames are.
+#[derive(Debug)]
+pub struct Frames {
+    /// Their unit.
+    pub unit: String,
+    /// Time from one frame to the next in the index, where the frames are numbered, us; `None` where they have times.
+    pub number_us: Option<i64>,
+    /// Size of a tick in the unit, and the ticks of the value 0.
+    pub steps: ValueSteps,
+    /// Number of frames.
+    pub count: usize,
+    /// The force that a tick of the sums is, N; `None` where they are sums of the values.
+    pub newtons: Option<f64>,
+    /// The sources, from left to right.
+    pub sources: Vec<FramesOfSource>,
+    /// Mean time from one frame of a source to the next, us; 0 where there is one alone.
+    pub frame_us: i64,
+    /// Where the rest of all sources comes from; none where they differ.
+    pub(crate) rest_source: RestSource,
+    /// Ticks above rest that count as none in the sums. Forces and pressures are summed over all taxels; of others, above a rest that was found, the noise is no load.
+    pub(crate) sum_floor: u16,
+    /// Number of the source of each column of the array; empty where there is one, or more than have a curve each.
+    pub(crate) source_of: Vec<usize>,
+    /// Up to this sum of ticks above rest there is noise alone, and no centre: of each source that has a curve, and of all.
+    pub(crate) noise: Vec<u32>,
+    pub(crate) noise_of_all: u32,
+}
+
+impl Frames {
+    /// Number of the source of a column. An empty one between two sources counts as of the one before.
+    pub(crate) fn source_at(&self, column: u16) -> usize {
+        self.sources.partition_point(|source| source.left <= column).saturating_sub(1)
+    }
+}
+
+/// The frames of a source, in ticks.
+struct SteppedFrames<'a> {
+    given: FrameSource<'a>,
+    /// Row by row, frame after frame; [`UNKNOWN`] where a value is missing.
+    ticks: Vec<u16>,
+    /// The taxels of its cells.
+    taxels: Vec<usize>,
+    /// The rest of its cells, each from the frame of this number on; there is one at least.
+    rests: Vec<(usize, Vec<u16>)>,
+}
+
+impl<'a> SteppedFrames<'a> {
+    fn new(given: FrameSource<'a>, steps: ValueSteps, columns: u16) -> Self {
+        let ticks = given.values.iter().map(|&value| steps.ticks(value)).collect();
+        Self { ticks, taxels: given.about.taxels(columns).collect(), rests: rests(&given, steps), given }
+    }
+
+    fn frame(&self, k: usize) -> &[u16] {
+        &self.ticks[k * self.taxels.len()..(k + 1) * self.taxels.len()]
+    }
+
+    /// The rest of its cells at a frame.
+    fn rest(&self, k: usize) -> &[u16] {
+        &self.rests[self.rests.partition_point(|&(from, _)| from <= k).max(1) - 1].1
+    }
+
+    /// Whether another rest holds from this frame on.
+    fn rest_moves(&self, k: usize) -> bool {
+        k > 0 && self.rests.binary_search_by_key(&k, |&(from, _)| from).is_ok()
+    }
+
+    /// Appends the changes of a frame.
+    fn changes(&self, k: usize, to: &mut Vec<TaxelChange>) {
+        let (t, before) = (self.given.t[k], k.checked_sub(1).map(|before| self.frame(before)));
+        let begin = to.len();
+        let change = |(cell, &ticks): (usize, &u16)| {
+            let held = before.map_or(UNKNOWN, |before| before[cell]);
+            // A sensor has 2^22 taxels at most (the limits of recordings).
+            #[allow(clippy::cast_possible_truncation)]
+            let taxel = self.taxels[cell] as u32;
+            (TaxelChange { t, taxel, ticks, up: ticks >= held, repaired: false }, held != ticks)
+        };
+        let all = || self.frame(k).iter().enumerate().map(change);
+        to.extend(all().filter(|&(_, differs)| differs).map(|(change, _)| change));
+        if to.len() == begin {
+            to.extend(all().next().map(|(change, _)| change));
+        }
+    }
+
+    /// The most that noise above a rest that was found adds up to: above a given one any value is load.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn noise(&self, floor: u16, sum_floor: u16, weights: &Weights) -> u32 {
+        if self.given.about.rest.source != RestSource::Quiet {
+            return 0;
+        }
+        let mut noise = FrameNoise::default();
+        for (k, &t) in self.given.t.iter().enumerate() {
+            let frame = self.frame(k);
+            if frame.iter().all(|&ticks| ticks == UNKNOWN) {
+                continue;
+            }
+            let (mut plain, mut weighted) = (0_u64, 0_u64);
+            for ((&ticks, &rest), &taxel) in frame.iter().zip(self.rest(k)).zip(&self.taxels) {
+                let above = u64::from(above_noise(ticks, rest, sum_floor));
+                (plain, weighted) = (plain + above, weighted.wrapping_add(weights.weighed(taxel, above)));
+            }
+            noise.take(t, weights.sum(plain, weighted).into());
+        }
+        noise.most(floor.into()) as u32
+    }
+
+    fn frame_us(&self) -> i64 {
+        let t = &self.given.t;
+        let steps = i64::try_from(t.len()).unwrap_or(i64::MAX).saturating_sub(1).max(1);
+        t.first().zip(t.last()).map_or(0, |(first, last)| (last - first) / steps)
+    }
+}
+
+/// The rest of a source's cells in steps, each from the frame of this number on: once where it is fixed, else where it moved.
+#[allow(clippy::cast_possible_truncation)]
+fn rests(given: &FrameSource<'_>, steps: ValueSteps) -> Vec<(usize, Vec<u16>)> {
+    let FrameRest { source, values, ticks_by_unit, falls, .. } = &given.about.rest;
+    let fixed = || vec![(0, values.iter().map(|&value| steps.of_rest(value)).collect())];
+    match source {
+        RestSource::None => return vec![(0, vec![steps.zero; values.len()])],
+        RestSource::Given => return fixed(),
+        RestSource::Quiet => {}
+    }
+    let begins: Vec<f64> = values.iter().map(|rest| rest * ticks_by_unit).collect();
+    let mut tracked = TrackedRest::new(given.about.sensor.columns.into(), NOISE_FLOOR, begins);
+    if *falls {
+        tracked = tracked.falling();
+    }
+    let mut stored: Vec<Option<f64>> = vec![];
+    let mut rests: Vec<(usize, Vec<u16>)> = vec![];
+    for (k, (&t, frame)) in given.t.iter().zip(given.values.chunks_exact(values.len())).enumerate() {
+        tracked.take(t, frame.iter().map(|value| value * *ticks_by_unit as f32));
+        let moved = |(now, then): (Option<f64>, &Option<f64>)| match (now, then) {
+            (Some(now), Some(then)) => (now - then).abs() > REST_MOVED,
+            (now, then) => now.is_some() != then.is_some(),
+        };
+        if stored.is_empty() || tracked.rests().zip(&stored).any(moved) {
+            stored = tracked.rests().collect();
+            let ticks = |rest: &Option<f64>| rest.map_or(UNKNOWN, |rest| steps.of_rest(rest / ticks_by_unit));
+            rests.push((k, stored.iter().map(ticks).collect()));
+        }
+    }
+    if rests.is_empty() { fixed() } else { rests }
+}
+
+impl Index {
+    /// Indexes frames of sources that have areas in `array`, from left to right.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where the temporary file cannot be made or has no room.
+    pub fn of_frames(
+        array: Array,
+        unit: String,
+        number_us: Option<i64>,
+        sources: Vec<FrameSource<'_>>,
+        kept: Kept,
+    ) -> Result<Self> {
+        let steps = ValueSteps::fitting(sources.iter().map(|source| source.values), array.len());
+        // Of several sources, the most.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let floor = sources.iter().map(|source| (source.about.rest.loaded_from / steps.size) as u16).max().unwrap_or(0);
+        let step = |source| SteppedFrames::new(source, steps, array.columns);
+        let sources: Vec<SteppedFrames<'_>> = sources.into_iter().map(step).collect();
+        let frames = about(&array, unit, number_us, steps, floor, &sources);
+        let begin = Keyframe { rest: rest_at(&sources, i64::MIN, array.len()), ..Keyframe::blank(array.len()) };
+        let taxels = array.len();
+        let mut indexing = Indexing::new(Sensor::new(array, floor, Some(frames)), &begin, kept);
+        let numbers =
+            |(number, source): (usize, &SteppedFrames<'_>)| (0..source.given.t.len()).map(move |k| (number, k));
+        let mut order: Vec<(usize, usize)> = sources.iter().enumerate().flat_map(numbers).collect();
+        let time = |&(source, k): &(usize, usize)| sources[source].given.t[k];
+        order.sort_by_key(time);
+        let mut changes = vec![];
+        for together in order.chunk_by(|a, b| time(a) == time(b)) {
+            together.iter().for_each(|&(source, k)| sources[source].changes(k, &mut changes));
+            let moves = together.iter().any(|&(source, k)| sources[source].rest_moves(k));
+            if moves || changes.len() >= CHANGES {
+                let rest = moves.then(|| rest_at(&sources, time(&together[0]), taxels));
+                indexing.push(Block { held: None, changes: std::mem::take(&mut changes).into(), rest })?;
+            }
+        }
+        indexing.push(Block { changes: changes.into(), ..Block::default() })?;
+        Ok(indexing.finish())
+    }
+}
+
+/// The rest of each taxel at a time, us; before the first frame, that of it.
+fn rest_at(sources: &[SteppedFrames<'_>], t: i64, taxels: usize) -> Vec<u16> {
+    let mut rest = vec![UNKNOWN; taxels];
+    for source in sources {
+        let last = source.given.t.partition_point(|&at| at <= t).saturating_sub(1);
+        source.taxels.iter().zip(source.rest(last)).for_each(|(&taxel, &ticks)| rest[taxel] = ticks);
+    }
+    rest
+}
+
+/// What the values of stepped frames are.
+fn about(
+    array: &Array,
+    unit: String,
+    number_us: Option<i64>,
+    steps: ValueSteps,
+    floor: u16,
+    sources: &[SteppedFrames<'_>],
+) -> Frames {
+    let rests = || sources.iter().map(|source| source.given.about.rest.source);
+    let sum_floor = if rests().any(|rest| rest == RestSource::Quiet) { floor } else { 0 };
+    let (weights, newtons) = Weights::new(array, &unit);
+    let noise: Vec<u32> = sources.iter().map(|source| source.noise(floor, sum_floor, &weights)).collect();
+    let first = rests().next().unwrap_or(RestSource::None);
+    let mut frames = Frames {
+        unit,
+        number_us,
+        steps,
+        count: sources.iter().map(|source| source.given.t.len()).sum(),
+        newtons: newtons.map(|newtons| newtons * steps.size),
+        sources: sources.iter().map(|source| source.given.about.clone()).collect(),
+        frame_us: sources.iter().map(SteppedFrames::frame_us).max().unwrap_or(0),
+        rest_source: if rests().all(|rest| rest == first) { first } else { RestSource::None },
+        sum_floor,
+        source_of: vec![],
+        noise_of_all: noise.iter().fold(0, |sum: u32, &noise| sum.saturating_add(noise)),
+        noise: vec![],
+    };
+    if (2..=MOST_SOURCES).contains(&sources.len()) {
+        frames.source_of = (0..array.columns).map(|column| frames.source_at(column)).collect();
+        frames.noise = noise;
+    }
+    frames
+}
+
+#[cfg(test)]
+mod tests;

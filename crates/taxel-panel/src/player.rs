@@ -1,0 +1,181 @@
+//! The state of a source at a time that moves forward, and what one client sees beside it.
+
+use std::sync::Arc;
+
+use taxel_core::problem;
+use taxel_live::Result;
+use taxel_live::pipeline::TaxelChange;
+
+use crate::columns::{COLUMN_US, LATE_US, SPAN, TimeColumns, column_of};
+use crate::history::TaxelHistory;
+use crate::index::{Block, Index};
+use crate::readout_encoders::ViewEncoder;
+use crate::spikes::EncodedSpikes;
+use crate::state::{ArrayState, FORGET, Keyframe};
+
+/// Maximum number of changes that are decoded only for the history of a taxel and the spikes of an encoder.
+pub(crate) const HISTORY_CHANGES: u64 = 2_000_000;
+
+/// What a view shows of a source.
+#[derive(Debug, Clone)]
+pub struct ViewOptions {
+    /// Width of a column of time, us ([`is_column`](crate::columns::is_column)).
+    pub column_us: i64,
+    /// The taxel whose history is shown.
+    pub watched: Option<u32>,
+    /// The encoder whose spikes are shown.
+    pub encoder: Option<ViewEncoder>,
+}
+
+impl ViewOptions {
+    /// Columns of `column_us` without history and spikes.
+    pub fn plain(column_us: i64) -> Self {
+        Self { column_us, watched: None, encoder: None }
+    }
+
+    /// Whether the columns are narrower than those that are stored of a whole source.
+    pub fn is_narrow(&self) -> bool {
+        self.column_us < COLUMN_US
+    }
+}
+
+/// What one client sees beside the state: the history of a taxel, and the spikes of an encoder.
+#[derive(Clone, Default)]
+pub(crate) struct Watched {
+    pub(crate) history: Option<TaxelHistory>,
+    pub(crate) spikes: Option<EncodedSpikes>,
+}
+
+impl Watched {
+    /// Begins with what the array held before the changes that follow.
+    pub(crate) fn new(options: &ViewOptions, index: &Index, from: &Keyframe) -> Result<Self> {
+        let history = options
+            .watched
+            .map(|taxel| TaxelHistory::new(taxel, from.held[taxel as usize], from.latest, options.column_us));
+        let encode = |encoder| EncodedSpikes::new(encoder, &index.sensor, options.column_us, from);
+        Ok(Self { history, spikes: options.encoder.as_ref().map(encode).transpose()? })
+    }
+
+    /// Applies the next changes.
+    pub(crate) fn push(&mut self, changes: &[TaxelChange]) {
+        if let Some(history) = &mut self.history {
+            changes.iter().for_each(|change| history.apply(change));
+        }
+        if let Some(spikes) = &mut self.spikes {
+            spikes.push(changes);
+        }
+    }
+}
+
+/// A source at a time.
+pub struct Player {
+    index: Arc<Index>,
+    /// The state at this time.
+    pub state: ArrayState,
+    pub(crate) watched: Watched,
+    /// The changes that were read last, how many of them were applied, and the number of the next block.
+    block: Block,
+    applied: usize,
+    next: u64,
+    t: i64,
+}
+
+impl Player {
+    /// Opens a source at `t` (us), limited to the range of the source. `whole` are raster and curves of the whole source, where its
+    /// index does not have them.
+    ///
+    /// # Errors
+    ///
+    /// As [`Index::open`] and [`Index::next`]; `Core(Problem)` where the encoder does not fit the array, or the frames.
+    pub fn open(index: &Arc<Index>, t: i64, options: &ViewOptions, whole: Option<&Arc<TimeColumns>>) -> Result<Self> {
+        let (first, last) =
+            index.range().ok_or_else(|| problem!("nothing to show: the recording contains no events"))?;
+        let t = t.clamp(first, last);
+        let whole = whole.or(index.whole.as_ref()).filter(|_| !options.is_narrow());
+        let (unit_us, span) = (options.column_us.min(COLUMN_US), SPAN * options.column_us);
+        let needs_changes = options.watched.is_some() || options.encoder.is_some();
+        let decodes = whole.is_none() || needs_changes && index.changes_between(t - span, t) <= HISTORY_CHANGES;
+        let before = if decodes { span } else { 0 };
+        let (from, next) = index.open(t.saturating_sub(before.max(FORGET * COLUMN_US) + LATE_US))?;
+        let mut state = ArrayState::new(&index.sensor, &from, unit_us, span / unit_us);
+        if let (Some(whole), Some(latest)) = (whole, from.latest) {
+            state = state.after(Arc::clone(whole), column_of(latest + LATE_US, unit_us));
+        }
+        let watched = Watched::new(options, index, &from)?;
+        let mut player =
+            Self { index: Arc::clone(index), state, watched, block: Block::default(), applied: 0, next, t };
+        player.advance(t)?;
+        Ok(player)
+    }
+
+    /// Moves to a later time, at most to the end; returns whether the end is still ahead.
+    ///
+    /// # Errors
+    ///
+    /// As [`Index::next`].
+    pub fn advance(&mut self, t: i64) -> Result<bool> {
+        let last = self.index.range().map_or(t, |(_, last)| last);
+        self.follow(t.min(last))?;
+        if let Some(spikes) = self.watched.spikes.as_mut().filter(|_| t >= last) {
+            // All events of the last time stamp have been applied too.
+            spikes.advance(last + 1);
+        }
+        Ok(t < last)
+    }
+
+    /// Moves to a later time, also beyond the last event.
+    ///
+    /// # Errors
+    ///
+    /// As [`Index::next`].
+    pub fn follow(&mut self, t: i64) -> Result<()> {
+        loop {
+            let ahead = &self.block.changes[self.applied..];
+            let now = ahead.iter().position(|change| change.t > t).unwrap_or(ahead.len());
+            let (now, later) = ahead.split_at(now);
+            self.state.apply(now);
+            self.watched.push(now);
+            self.applied += now.len();
+            if !later.is_empty() || !self.read()? {
+                break;
+            }
+        }
+        self.state.advance(t);
+        if let Some(spikes) = &mut self.watched.spikes {
+            spikes.advance(t);
+        }
+        self.t = self.t.max(t);
+        Ok(())
+    }
+
+    /// Goes on to the next block; returns false at the end.
+    fn read(&mut self) -> Result<bool> {
+        self.state.end_block(&self.block);
+        self.block.rest = None;
+        let Some(block) = self.index.next(&mut self.next)? else { return Ok(false) };
+        self.state.begin_block(&block);
+        (self.block, self.applied) = (block, 0);
+        Ok(true)
+    }
+
+    /// The next time stamp that has events, us.
+    ///
+    /// # Errors
+    ///
+    /// As [`Index::next`].
+    pub fn next_stamp(&mut self) -> Result<Option<i64>> {
+        loop {
+            if let Some(change) = self.block.changes.get(self.applied) {
+                return Ok(Some(change.t.max(self.t)));
+            }
+            if !self.read()? {
+                return Ok(None);
+            }
+        }
+    }
+
+    /// The time shown, us.
+    pub fn t(&self) -> i64 {
+        self.t
+    }
+}
