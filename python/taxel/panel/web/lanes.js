@@ -43,8 +43,9 @@ import { rounded, integer } from "./words.js";
  * @property {(element: HTMLElement) => Painter} [painter]
  */
 
-/** Room for the numbers on either side, CSS pixels; the raster has the same. */
+/** Room for the numbers on the left, and for half a number of the axis of time on the right, CSS pixels; as in style.css. */
 const SIDE = 44;
+const RIGHT = 14;
 /** CSS pixels between two lines of the grid. */
 const GRID_PX = 96;
 /** Steps between the numbers of an axis of counts. */
@@ -59,17 +60,13 @@ const swatch = (kind) => make("span", { class: `swatch ${kind}` });
 /** @param {Record<string, string>} [attributes] */
 const output = (attributes) => make("output", { "aria-live": "off", ...attributes });
 
-/**
- * @param {string} scale
- * @param {number} side
- * @param {string} stroke
- * @returns {uPlot.Axis}
- */
-const axis = (scale, side, stroke) => ({
-  scale, side, stroke,
-  size: SIDE, gap: 4, space: 24,
+/** @param {string} scale @param {string} stroke @returns {uPlot.Axis} on the left */
+const axis = (scale, stroke) => ({
+  scale, stroke,
+  side: 3,
+  size: SIDE, gap: 4, space: 20,
   font: "11px system-ui, sans-serif",
-  grid: { show: side === 3, stroke: themed("grid"), width: 1 },
+  grid: { stroke: themed("grid"), width: 1 },
   ticks: { show: false },
   values: (_, marks) => marks.map((mark) => (mark >= 10_000 ? `${mark / 1000}k` : String(mark))),
 });
@@ -141,7 +138,7 @@ export const LANES = [
         scales: { value: { range: (_, least, greatest) => (least === null ? [0, 10] : [least - room(), greatest + room()]) } },
         series: [bound, bound, line(themed("more"), "value")],
         bands: [{ series: [2, 1], fill: themed("band") }],
-        axes: [axis("value", 3, themed("dim"))],
+        axes: [axis("value", themed("dim"))],
       };
     },
     at: ({ values: { step, zero } }, { history }, column) =>
@@ -158,7 +155,7 @@ export const LANES = [
     plan: (shown, sources) => ({
       scales: { force: { range: fromZero(() => 8 * shown().sums.step) } },
       ...extents(coloured(sources), "force"),
-      axes: [axis("force", 3, sources.length ? themed("dim") : themed("more"))],
+      axes: [axis("force", sources.length ? themed("dim") : themed("more"))],
     }),
     at: ({ sums: { step } }, timeline, column) => timeline.drawn.flatMap((curve) => ends(timeline.sumIn(column, curve), step)),
   },
@@ -167,7 +164,7 @@ export const LANES = [
     fits: ({ sensor }) => sensor.kind !== "channels",
     heading: () => ["Area ", swatch("less"), " ", output({ id: "area-now" })],
     says: (shown, values) => [areaAt(shown, values)],
-    plan: () => ({ scales: { area: { range: fromZero(() => 8) } }, ...extents([themed("less")], "area"), axes: [{ ...axis("area", 3, themed("less")), incrs: WHOLE }] }),
+    plan: () => ({ scales: { area: { range: fromZero(() => 8) } }, ...extents([themed("less")], "area"), axes: [{ ...axis("area", themed("less")), incrs: WHOLE }] }),
     at: (_, timeline, column) => ends(timeline.areaIn(column)),
   },
   {
@@ -184,7 +181,7 @@ export const LANES = [
       return {
         scales: { centre: { range: [low, high] } },
         ...extents(colours, "centre", colours.map((_, k) => (k % 2 ? [5, 3] : undefined))),
-        axes: [{ ...axis("centre", 3, themed("dim")), splits: () => [low, (low + high) / 2, high], values: (_, marks) => marks.map(rounded) }],
+        axes: [{ ...axis("centre", themed("dim")), splits: () => [low, (low + high) / 2, high], values: (_, marks) => marks.map(rounded) }],
       };
     },
     // A single loaded taxel has no centre of its own.
@@ -266,8 +263,8 @@ export class Lanes {
         {
           bands, series: [{}, ...series], axes: [time, ...axes],
           width: Math.max(100, element.clientWidth), height: Math.max(40, element.clientHeight),
-          // Half of the uppermost number's height; on the right, room for numbers where there are none.
-          padding: [7, axes.length > 1 ? 0 : SIDE, 4, 0],
+          // Half of the uppermost number's height.
+          padding: [7, RIGHT, 4, 0],
           legend: { show: false }, cursor: { show: false },
           scales: { x: { time: false, range: () => [0, this.span_s] }, ...scales },
         },
