@@ -69,7 +69,7 @@ def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path, difference
     else:
         said = events
     touch().save(tmp_path / "touch.json")
-    files = ["--readout", tmp_path / "touch.json", "--record", tmp_path / "live.mcap"]
+    files = ["--readout", tmp_path / "touch.json", "--record", tmp_path / "live.mcap", "--report", tmp_path / "report"]
     arguments = command("live", *files, "--host", LOOPBACK, "--port", port, "--array", "4x4", "--json")
     # The datagrams' times do not follow the board's pace: the guard prevents the host's clock from advancing time here.
     arguments += ["--guard-frames", "1e6", *(["--differences"] if differences else [])]
@@ -83,6 +83,7 @@ def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path, difference
         process.send_signal(signal.SIGINT)
         lines += [json.loads(line) for line in process.stdout]
     assert process.returncode == 0
+    assert "Live detections, recorded to" in (tmp_path / "report" / "report.html").read_text()
     keys = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired"}
     assert [set(line) for line in lines] == [keys | {"reported_us", "reported_ns"}] * 5
     heard_again = ("detect", tmp_path / "live.mcap", "--readout", tmp_path / "touch.json", "--json")

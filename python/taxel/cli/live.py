@@ -21,6 +21,7 @@ from taxel._core import FIREWALL, DeviceError, ProblemError
 from taxel.array import Array
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._say import say
+from taxel.cli._task import Output
 from taxel.cli.app import App, Flat, SecondsOption
 from taxel.cli.board import (
     REDRAW_S,
@@ -61,6 +62,8 @@ class _LiveArguments:
     control
         The board's serial line (COM3, /dev/ttyACM0, host:port), on which the panel sets registers, and taxel sets a
         noise floor of 0 while it takes a tare.
+    report
+        With --record: write a report to this folder, with potential, weights, errors and the worst events.
     panel
         Show the board in a browser.
     folder
@@ -71,6 +74,7 @@ class _LiveArguments:
     bits: BitsOption = None
     control: str | None = None
     seconds: SecondsOption = None
+    report: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
     panel: bool = False
     panel_host: PanelHostOption = "127.0.0.1"
     panel_port: PanelPortOption = 0
@@ -97,9 +101,13 @@ def live(*, options: Any, typed: Flat[_LiveArguments] = _LiveArguments()) -> int
     """
     _check_options(options, typed)
     options = for_live(options, typed.rate_hz, typed.bits, typed.seconds)
-    trained, rest, lines = (options[name] for name in ("readout", "tare", "lines"))
+    trained, rest, record, lines = (options[name] for name in ("readout", "tare", "record", "lines"))
     if typed.control is not None and not typed.panel and not isinstance(rest, float):
         raise ProblemError("--control needs a fresh tare or the panel: give --tare SECONDS, or --panel")
+    if typed.report is not None:
+        if record is None:
+            raise ProblemError("--report needs a recording: give --record FILE.mcap")
+        Output(overwrite=options["overwrite"]).check_report(typed.report)
     console = Console(stderr=True)
     if typed.control is not None and options["registers"] is None:
         sensor = trained.array if options["array"] is None and trained is not None else options["array"]
@@ -127,6 +135,11 @@ def live(*, options: Any, typed: Flat[_LiveArguments] = _LiveArguments()) -> int
             summary = last.stop()
             # Detections that the readout made while `stop` ran.
             _drain(last, None if lines else say)
+    if typed.report is not None and trained is not None and summary.path is not None:
+        printed = list(_summary_lines(summary, options["guard_frames"]))
+        given = rest if summary.tare is None else summary.tare
+        _report(typed.report, trained, summary, given, printed, overwrite=options["overwrite"])
+        console.print(f"report: {typed.report / 'report.html'}")
     _report_unsent(summary)
     say(*_summary_lines(summary, options["guard_frames"]), err=lines)
     return exit_code(summary, pipeline.array)
@@ -193,6 +206,28 @@ def _show(
     return pipeline if shows is None or shows.live is None else shows.live
 
 
+def _report(
+    folder: Path,
+    readout: Readout | PlainRule,
+    summary: Summary,
+    tare: Tare | float | None,
+    printed: list[str],
+    *,
+    overwrite: bool,
+) -> None:
+    """Write the report on a recording: its events and its detections."""
+    import taxel  # noqa: PLC0415
+    from taxel.detect import Example, Outcome  # noqa: PLC0415
+    from taxel.report import write_detections  # noqa: PLC0415  pictures load slowly
+
+    assert summary.path is not None
+    recording = taxel.open(summary.path)
+    rest = tare if isinstance(tare, Tare) else None
+    outcome = Outcome(str(summary.path), Example(recording, {}, rest), recording.detections)
+    title = f"Live detections, recorded to {summary.path}"
+    write_detections(folder, readout, [outcome], title=title, printed=printed, overwrite=overwrite)
+
+
 def _summary_lines(summary: Summary, guard_frames: float) -> Iterator[str]:
     """Yield what was detected, received and lost."""
     counters = summary.counters
@@ -222,10 +257,11 @@ def _report_unsent(summary: Summary) -> None:
 
 def _check_options(options: Any, typed: _LiveArguments) -> None:
     """Refuse options that would have no effect."""
-    if options.readout is None and not typed.panel:
+    readout, tare = options.readout, options.tare
+    if readout is None and not typed.panel:
         raise ProblemError("nothing to do: give --readout FILE to detect, or --panel to show the board")
-    if options.readout is None and options.tare:
-        raise ProblemError("--tare needs a readout: give --readout FILE")
+    if readout is None and (tare or typed.report):
+        raise ProblemError("--tare and --report need a readout: give --readout FILE")
     if typed.folder is not None and not typed.panel:
         raise ProblemError("--folder needs the panel: give --panel")
 
