@@ -134,6 +134,9 @@ def readout_run_frames(
     zeroings: list[tuple[int, int, int, float]],
     begin: int | None,
 ) -> _Detections: ...
+def frame_ends(
+    times: NDArray[np.float64], frame_us: float, wire_version: int, frames: NDArray[np.int64]
+) -> NDArray[np.int64]: ...
 
 # t and known (us), quantity
 _Decisions: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
@@ -142,23 +145,23 @@ _Decisions: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.f
 class LoadCurve:
     @staticmethod
     def of_events(
-        quantity: str,
+        quantities: list[str],
         levels: list[float],
         noise_floor: float,
         events: _Events,
         frame_us: float,
         wire_version: int,
         tare: str | None,
-    ) -> LoadCurve: ...
+    ) -> list[LoadCurve]: ...
     @staticmethod
     def of_frames(
-        quantity: str,
+        quantities: list[str],
         levels: list[float],
         noise_floor: float,
         frames: _Frames,
         frame_us: float | None,
         tare: str | None,
-    ) -> LoadCurve: ...
+    ) -> list[LoadCurve]: ...
     def changes(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...
     def edges(
         self, threshold: float, release: float, frames: int, dated_at: float | None, of_largest: bool

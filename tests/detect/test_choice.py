@@ -2,14 +2,17 @@
 
 from itertools import pairwise
 
+import discs
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain_rules import ARRAY, FLOOR, clocks, events, tare
 
 import taxel
 from taxel import Frames, Neuron, Readout
-from taxel.detect import Example, PlainRule, Recipe, judge, run
+from taxel.detect import Example, Part, PlainRule, Recipe, judge, run
+from taxel.detect.fit import Fitter
 from taxel.encode import ContactArea, LevelCrossing
 
 NEURON = Neuron(tau=0.5, refractory=1.0, kernel="exponential", after_spike="reset", time="grid", step_ms=0.1)
@@ -73,3 +76,27 @@ def test_each_fold_is_scored_by_what_is_better_inside_its_training_data():
     judged = judge(examples, recipe, 4)
     assert judged.by_rule == ("on",)
     assert (judged.neurons.found, judged.plain.together.found, judged.together.found) == (0, 36, 36)
+
+
+@pytest.mark.filterwarnings("ignore:.*cannot be learnt")
+@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("of_frames", [False, True])
+def test_what_neurons_detect_in_a_part_is_what_their_readout_detects_there(of_frames, version):
+    events, labels = discs.touches(3, 8)
+    source, how = events, {"frame_us": discs.FRAME_US, "wire_version": version}
+    if of_frames:
+        t = np.cumsum(np.random.default_rng(4).integers(600, 800, events.t.max() // 800))
+        held = np.array([events.intensity[(events.x == x) & (events.y == y)][
+            np.searchsorted(events.t[(events.x == x) & (events.y == y)], t, side="right") - 1
+        ] for y in range(8) for x in range(8)])  # fmt: skip
+        source, how = Frames(held.T.reshape(-1, 8, 8), t, unit="ticks", array=discs.ARRAY), {}
+    example = Example(source, labels, discs.tare())
+    fitter = Fitter([example], discs.recipe(), frame_us=how.get("frame_us"))
+    fitter.clocks = [(how.get("frame_us"), version)]
+    trained = fitter.fit()
+    middle = int(np.median(labels["contact"]))
+    whole = run(trained.readout.using("neuron"), source, tare=example.tare, **how)
+    for start, stop in ((-np.inf, middle), (middle, np.inf)):
+        found = fitter.detected(trained, Part(0, start, stop)).by_neurons
+        assert sorted(rows(found)) == sorted(rows(whole.between(start, stop)))
+        assert len(found)

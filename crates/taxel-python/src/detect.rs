@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::Stop;
 use taxel_core::detect::{
-    Decision, Detection, Detector, EdgeNumbers, FrameTime, LoadCurve as CoreCurve, PlainRule, Readout,
+    Decision, Detection, Detector, EdgeNumbers, FrameClock, FrameTime, LoadCurve as CoreCurve, PlainRule, Readout,
     ReadoutStream as CoreStream, Reference, Spread, score as score_core,
 };
 use taxel_core::encode::{Quantity, Tare, Zeroing};
@@ -212,6 +212,19 @@ pub fn readout_run_frames<'py>(
     Ok(from_detections(py, enter(py, run)?))
 }
 
+/// The ends of the frames in which times (ms, ascending) lie, us: of those of an input of frames, or of the board's.
+#[pyfunction]
+pub fn frame_ends<'py>(
+    py: Python<'py>,
+    times: PyReadonlyArray1<'py, f64>,
+    frame_us: f64,
+    wire_version: u8,
+    frames: PyReadonlyArray1<'py, i64>,
+) -> PyResult<Bound<'py, PyArray1<i64>>> {
+    let clock = FrameClock::new(FrameTime::on_wire(frame_us, wire_version)).map_err(core)?;
+    Ok(array(py, clock.ends_of(slice("times", &times)?, slice("frames", &frames)?)))
+}
+
 /// A readout or a plain rule at work.
 #[pyclass(frozen)]
 pub struct ReadoutStream(Exclusive<CoreStream>);
@@ -264,7 +277,7 @@ fn from_decisions<'py>(py: Python<'py>, found: &[Decision]) -> DecisionsOut<'py>
     (column(|d| d.t), column(|d| d.known), array(py, found.iter().map(|d| d.value).collect()))
 }
 
-/// A quantity over a recording, on which plain rules are tried.
+/// A quantity over a recording, on which plain rules are tried; several are measured at once.
 #[pyclass(frozen)]
 pub struct LoadCurve(CoreCurve);
 
@@ -273,38 +286,39 @@ impl LoadCurve {
     #[staticmethod]
     fn of_events(
         py: Python<'_>,
-        quantity: &str,
+        quantities: Vec<String>,
         levels: Vec<f64>,
         noise_floor: f64,
         events: EventsIn<'_>,
         frame_us: f64,
         wire_version: u8,
         tare: Option<&str>,
-    ) -> PyResult<Self> {
-        let (quantity, tare) = (to_quantity(quantity)?, parse_tare(tare)?);
+    ) -> PyResult<Vec<Self>> {
+        let (quantities, tare) = (to_quantities(&quantities)?, parse_tare(tare)?);
         let events = events.view()?;
         let frames = FrameTime::on_wire(frame_us, wire_version);
-        let made =
-            |stop: Stop<'_>| CoreCurve::of_events(quantity, &levels, noise_floor, events, frames, tare.as_ref(), stop);
-        enter(py, made).map(Self)
+        let made = |stop: Stop<'_>| {
+            CoreCurve::of_events(&quantities, &levels, noise_floor, events, frames, tare.as_ref(), stop)
+        };
+        Ok(enter(py, made)?.into_iter().map(Self).collect())
     }
 
     #[staticmethod]
     fn of_frames(
         py: Python<'_>,
-        quantity: &str,
+        quantities: Vec<String>,
         levels: Vec<f64>,
         noise_floor: f64,
         frames: FramesIn<'_>,
         frame_us: Option<f64>,
         tare: Option<&str>,
-    ) -> PyResult<Self> {
-        let (quantity, tare) = (to_quantity(quantity)?, parse_tare(tare)?);
+    ) -> PyResult<Vec<Self>> {
+        let (quantities, tare) = (to_quantities(&quantities)?, parse_tare(tare)?);
         let frames = frames.view()?;
         let made = |stop: Stop<'_>| {
-            CoreCurve::of_frames(quantity, &levels, noise_floor, frames, frame_us, tare.as_ref(), stop)
+            CoreCurve::of_frames(&quantities, &levels, noise_floor, frames, frame_us, tare.as_ref(), stop)
         };
-        enter(py, made).map(Self)
+        Ok(enter(py, made)?.into_iter().map(Self).collect())
     }
 
     /// The times of its changes, us, and the quantity after each.
@@ -341,6 +355,6 @@ impl LoadCurve {
     }
 }
 
-fn to_quantity(name: &str) -> PyResult<Quantity> {
-    parsed("quantity", &serde_json::Value::from(name).to_string())
+fn to_quantities(names: &[String]) -> PyResult<Vec<Quantity>> {
+    names.iter().map(|name| parsed("quantity", &serde_json::Value::from(name.as_str()).to_string())).collect()
 }

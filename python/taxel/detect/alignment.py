@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import integer
 from taxel._base.messages import counted, escaped
-from taxel._core import ProblemError
+from taxel._core import ProblemError, Tally
 from taxel.detect.ages import Ages, onsets
-from taxel.detect.scoring import APART_US, Score, score
-from taxel.detections import Detections
+from taxel.detect.scoring import APART_US, tally
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: How far from its label an input spike may be, either way, ms.
@@ -152,30 +151,31 @@ def align(
     }
     if ages is not None:
         candidates[ages.trains[0]] = [onsets(pattern, ages) for pattern in patterns]
-    scores = {}
+    pairs = {}
     for train, spikes in candidates.items():
         times = [np.rint(to_us(ms - latency_ms)).astype(np.int64) for ms in spikes]
         fired = np.concatenate([t + (k * APART_US - starts[k]) for k, t in enumerate(times)])
-        scores[train] = score(Detections([label] * len(fired), fired, fired), {label: truth}, WINDOW_MS)
-    best = _best(scores, len(truth))
+        if (of_train := tally(fired, fired, truth, round(to_us(WINDOW_MS)))) is not None:
+            pairs[train] = of_train
+    best = _best(pairs, len(truth))
     if best is None:
         return Alignment(label, None, example, labels, np.zeros(len(example)))
     moved = np.full(len(example), np.nan)
-    place = known[scores[best].pairs[:, 1]]
-    moved[place] = scores[best].errors_ms + to_ms(felt[place] - labels[place])
+    place = known[pairs[best].events]
+    moved[place] = pairs[best].errors_ms + to_ms(felt[place] - labels[place])
     return Alignment(label, best, example, labels, moved)
 
 
-def _best(scores: Mapping[int, Score], labels: int) -> int | None:
+def _best(pairs: Mapping[int, Tally], labels: int) -> int | None:
     """Return the train that shows best when the events were felt; None if it has no spike near any label."""
-    left = dict(scores)
-    criteria: list[tuple[Callable[[Score], float], float]] = [
-        (lambda score: score.missed + score.false, max(_ALIKE, _ALIKE_SHARE * labels)),
-        (lambda score: -score.found, 0),
-        (lambda score: float(np.median(np.abs(score.errors_ms))) if score.found else np.inf, _ALIKE_MS),
+    left = dict(pairs)
+    criteria: list[tuple[Callable[[Tally], float], float]] = [
+        (lambda of: len(of.missed_events) + len(of.false_detections), max(_ALIKE, _ALIKE_SHARE * labels)),
+        (lambda of: -len(of.detected), 0),
+        (lambda of: float(np.median(np.abs(of.errors_ms))) if len(of.detected) else np.inf, _ALIKE_MS),
     ]
     for worth, more in criteria:
         least = min(map(worth, left.values()), default=0.0) + more
-        left = {train: score for train, score in left.items() if worth(score) <= least}
+        left = {train: of for train, of in left.items() if worth(of) <= least}
     best = min(left, default=None)
-    return None if best is None or not scores[best].found else best
+    return None if best is None or not len(pairs[best].detected) else best

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _core
 from taxel._base.arguments import finite, instance, parameters, several, shown
 from taxel._base.messages import collected, counted, warn
 from taxel._base.progress import Progress, reporting
@@ -23,21 +24,25 @@ from taxel.detect.ages import in_frames
 from taxel.detect.alignment import WINDOW_MS, Alignment
 from taxel.detect.board import noise_floor
 from taxel.detect.detector import raised
-from taxel.detect.examples import Example, array_of, check_examples, name_of, sizes_of, unit_of
+from taxel.detect.examples import Example, array_of, check_examples, frame_ms, name_of, sizes_of, unit_of
 from taxel.detect.fitted_point import FittedPoint, Inputs
 from taxel.detect.floors import floor_alone, floor_of
 from taxel.detect.folds import Fold, Part, inside, split, whole
 from taxel.detect.loads import Loads, clock_of, lacks, lacks_neighbours
 from taxel.detect.plain_rule import PlainRule
-from taxel.detect.readout import Readout, run
+from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.detect.recipe import Recipe
-from taxel.detect.scoring import Score, score_together
+from taxel.detect.scoring import Score, score_together, tally
 from taxel.detect.trained import TrainedNeuron
 from taxel.detect.tuning import Tuning
 from taxel.detections import Detections
 from taxel.encode import Composite, Encoder, LocalLoad, Moments
+from taxel.events import Events
+from taxel.frames import Frames
 from taxel.learn import ConeR
+from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains, to_ms, to_us
+from taxel.wire import FRAME_US
 
 #: How many fewer events a point must leave missed or false to count before the first of those to choose from.
 _FEWER = 3
@@ -45,6 +50,7 @@ _FEWER = 3
 _FEWER_SHARE = 0.05
 #: A rule that finds this share of the labels of its training says when they were felt.
 _ALIGNS = 0.95
+_NO_FRAMES = np.empty(0, np.int64)
 #: The rule of each label; None where none is better than to detect nothing.
 Rules = Mapping[str, PlainRule | None]
 
@@ -135,6 +141,14 @@ class Found(NamedTuple):
     """By the labels' own rules, of the quantity whose thresholds labels are."""
 
 
+class _Received(NamedTuple):
+    """What a neuron receives: the encoder, or some parts of a composite one, and its trains of each example."""
+
+    encoder: Encoder
+    latency_ms: float
+    trains: Sequence[SpikeTrains]
+
+
 class Fitter:
     """Fit readouts to parts of labelled examples; what all of them need is computed once.
 
@@ -187,7 +201,7 @@ class Fitter:
             self._tuning = Tuning(loads, self.labels, self.window_ms)
         # The quantity whose thresholds the labels are.
         self._own = min((example.labels_of for example in self.examples if example.labels_of), default=None)
-        self._trains: dict[str, list[SpikeTrains]] = {}
+        self._trains: dict[str, _Received] = {}
 
     def fit(self, parts: Sequence[Part] | None = None) -> Trained:
         """Return neurons and rules of parts of the examples, by default of all; the neurons run."""
@@ -199,27 +213,26 @@ class Fitter:
         points: dict[str, Mapping[str, Any]] = {}
         for label in self.labels:
             try:
-                best = self._best(plan, label, parts, rules[label])
+                best = self._best(label, parts, rules[label])
             except ProblemError as error:
                 if error.hint != "unfelt" or rules[label] is None:
                     raise
                 warn(f"{label}: its neuron feels nothing and never fires; its plain rule detects it", stacklevel=4)
-                silent, points[label] = self._silent(plan, label), plan.points_of(label)[0].values
+                silent, points[label] = self._silent(label), plan.points_of(label)[0].values
                 learners[label], delays[label] = silent, silent.delay_ms
                 continue
             learners[label], points[label], delays[label] = best.learner, best.point, best.delay_ms
             if best.alignment is not None:
                 alignments[label] = best.alignment
         plan = replace(plan, neurons=points)
-        readout = _readout_of(learners, delays, plan, self.array)
         known = {label: rule for label, rule in rules.items() if rule is not None}
-        readout = readout._with(unit=self._unit, pads=self._pads)._with_rules(known)
-        return Trained(plan, learners, readout, alignments)
+        readout = _readout_of(learners, delays, plan, array=self.array, unit=self._unit, rules=known)
+        return Trained(plan, learners, readout._with(pads=True) if self._pads else readout, alignments)
 
-    def _silent(self, plan: Recipe, label: str) -> TrainedNeuron:
+    def _silent(self, label: str) -> TrainedNeuron:
         """Return a neuron that never fires."""
-        learner, delay_ms = plan.learner_of(label)
-        _, trains = self._received(plan, plan.points_of(label)[0].values)
+        learner, delay_ms = self._recipe.learner_of(label)
+        trains = self._received(self._recipe.points_of(label)[0].values).trains
         return TrainedNeuron(learner._on_grid(), np.zeros(len(trains[0])), delay_ms)
 
     def decided(self, parts: Sequence[Part]) -> Trained:
@@ -260,17 +273,39 @@ class Fitter:
 
     def detected(self, trained: Trained, part: Part, own: Rules | None = None) -> Found:
         """Return what the neurons and the rules of a training detect in a part, and what the labels' own rules do."""
-        example, (frame_us, version) = self.examples[part.example], self.clocks[part.example]
-        neurons = trained.readout.using("neuron")
-        found = run(neurons, example.source, tare=example.tare, frame_us=frame_us, wire_version=version)  # type: ignore[arg-type]
-        by_neurons = found[(found.t >= part.start) & (found.t < part.stop)]
+        by_neurons = self._by_neurons(trained, part)
         return Found(by_neurons, self._by_rules(trained.readout.rules, part), self._by_rules(own or {}, part))
+
+    def _by_neurons(self, trained: Trained, part: Part) -> Detections:
+        """Return what the neurons detect in a part of an example, as `taxel.detect.run` finds it in the whole."""
+        source = self.examples[part.example].source
+        labels: list[str] = []
+        columns: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]] = []
+        for label, neuron in trained.readout.neurons.items():
+            received = self._received(trained.recipe.points_of(label)[0].values)
+            inputs = received.trains[part.example]
+            if not isinstance(source, SpikeTrains):
+                inputs = _from_first_spike(inputs, neuron.neuron)
+            inputs = inputs.lasting(inputs.stop + SILENCE_MS)
+            spikes, slopes = neuron.neuron._run(neuron.weights, inputs, trained.readout.run_threshold)
+            t = np.rint(to_us(spikes - received.latency_ms - neuron.delay_ms)).astype(np.int64)
+            inside = (t >= part.start) & (t < part.stop)
+            labels += [label] * int(inside.sum())
+            known = _known(spikes[inside], source, *self.clocks[part.example])
+            columns.append((t[inside], known, slopes[inside]))
+        t, known, slopes = (np.concatenate(column) for column in zip(*columns, strict=True))
+        order = np.argsort(known, kind="stable")
+        return Detections([labels[k] for k in order], t[order], known[order], slopes[order])
 
     def _by_rules(self, rules: Rules, part: Part) -> Detections:
         """Return what the rule of each label detects of it in a part of an example."""
-        if self._tuning is None:
+        if self._tuning is None or not rules:
             return Detections([], [], [])
-        return self._tuning.detected(rules, part)
+        found = {label: self._tuning.detected(rule, label, part) for label, rule in rules.items()}
+        labels = [label for label, one in found.items() for _ in one.t]
+        t, known = (np.concatenate([getattr(one, name) for one in found.values()]) for name in ("t", "known"))
+        order = np.argsort(t, kind="stable")
+        return Detections([labels[k] for k in order], t[order], known[order])
 
     def inside_loads(self, labels: Sequence[str]) -> dict[str, int]:
         """Return how many events of each label lie within a load, farther from its begin and end than the window."""
@@ -288,19 +323,17 @@ class Fitter:
         truths = [{label: times[n] for label, times in each.items()} for n in range(len(parts))]
         return score_together(found, truths, self.window_ms)
 
-    def _received(self, plan: Recipe, point: Mapping[str, Any]) -> tuple[Encoder, list[SpikeTrains]]:
-        """Return the encoder whose trains a neuron receives, and these trains of all examples."""
-        received = plan._received(point)
-        key = received.to_json()
+    def _received(self, point: Mapping[str, Any]) -> _Received:
+        """Return what a neuron with these parameters receives of all examples."""
+        key = json.dumps({**self._recipe.learner, **point}.get("inputs"), default=str)
         if key not in self._trains:
-            self._trains[key] = [
-                self._encoded(k, example, plan.encoder, received, point) for k, example in enumerate(self.examples)
-            ]
-        return received, self._trains[key]
+            encoder = self._recipe._received(point)
+            trains = [self._encoded(k, encoder, point) for k in range(len(self.examples))]
+            self._trains[key] = _Received(encoder, encoder.latency_ms, trains)
+        return self._trains[key]
 
-    def _encoded(
-        self, k: int, example: Example, encoder: Encoder, received: Encoder, point: Mapping[str, Any]
-    ) -> SpikeTrains:
+    def _encoded(self, k: int, received: Encoder, point: Mapping[str, Any]) -> SpikeTrains:
+        example, encoder = self.examples[k], self._recipe.encoder
         trains = example.source
         if isinstance(trains, SpikeTrains):
             trains = trains.split_by_sign() if trains.signed else trains
@@ -316,7 +349,7 @@ class Fitter:
         trains = with_rest.encode(trains)
         return trains.split_by_sign() if trains.signed else trains
 
-    def _best(self, plan: Recipe, label: str, parts: Sequence[Part], rule: PlainRule | None) -> FittedPoint:
+    def _best(self, label: str, parts: Sequence[Part], rule: PlainRule | None) -> FittedPoint:
         """Return the first of the points to choose from, or a later one that leaves fewer events missed or false.
 
         They are tried in turn. A later one counts if it leaves as many fewer as its `fewer` says, else `_FEWER`, and
@@ -324,11 +357,12 @@ class Fitter:
         point that cannot be learnt is left out. If the first felt nothing, which counts as all labels missed, a later
         one must leave as many fewer, or none. Warnings are those of the point that counts.
         """
-        points = plan.points_of(label)
+        points = self._recipe.points_of(label)
+        felt = self._felt(label, parts, rule) if self._recipe.align else None
         count = sum(map(len, self.labels_in(label, parts)))
         best, refused = None, None
         try:
-            best = self._fitted(plan, label, points[0].values, parts, rule)
+            best = self._fitted(label, points[0].values, parts, felt)
         except ProblemError as error:
             if error.hint != "unfelt":
                 raise
@@ -340,7 +374,7 @@ class Fitter:
             if wrong < fewer:
                 continue
             with contextlib.suppress(ProblemError):
-                second = self._fitted(plan, label, point, parts, rule)
+                second = self._fitted(label, point, parts, felt)
                 if second.wrong <= wrong - fewer:
                     best = second
         if best is None:
@@ -351,28 +385,51 @@ class Fitter:
         return best
 
     def _fitted(
-        self, plan: Recipe, label: str, point: Mapping[str, Any], parts: Sequence[Part], rule: PlainRule | None
+        self,
+        label: str,
+        point: Mapping[str, Any],
+        parts: Sequence[Part],
+        felt: Sequence[NDArray[np.float64]] | None,
     ) -> FittedPoint:
         """Return one point of a label's neuron, fitted."""
-        received, trains = self._received(plan, point)
-        cut = [_cut(trains[part.example], part) for part in parts]
-        felt = self._felt(label, parts, rule) if plan.align else None
+        received = self._received(point)
+        cut = [_cut(received.trains[part.example], part) for part in parts]
         given = self.labels_in(label, parts)
-        inputs = Inputs(label, received, cut, given, felt, parts, self.examples, self.array, self.report)
-        return inputs.fitted(plan, point)
+        inputs = Inputs(label, received.encoder, cut, given, felt, parts, self.examples, self.array, self.report)
+        return inputs.fitted(self._recipe, point)
 
     def _felt(self, label: str, parts: Sequence[Part], rule: PlainRule | None) -> list[NDArray[np.float64]] | None:
         """Return when a rule felt each event of a label in parts, us, NaN of those that it misses; None if many are."""
         labels = self.labels_in(label, parts)
-        if rule is None:
+        if rule is None or self._tuning is None:
             return None
-        found = [self._by_rules({label: rule}, part)[label].t for part in parts]
         times = [np.full(len(each), np.nan) for each in labels]
-        for k, (t, given) in enumerate(zip(found, labels, strict=True)):
-            scored = score_together([Detections([label] * len(t), t, t)], [{label: given}], WINDOW_MS)
-            times[k][scored.pairs[:, 1]] = t[scored.pairs[:, 0]]
+        for felt, given, part in zip(times, labels, parts, strict=True):
+            t = self._tuning.detected(rule, label, part).t
+            if (pairs := tally(t, t, given, round(to_us(WINDOW_MS)))) is not None:
+                felt[pairs.events] = t[pairs.detected]
         count = sum(map(len, labels))
         return times if np.isfinite(np.concatenate(times)).sum() >= _ALIGNS * count else None
+
+
+def _from_first_spike(trains: SpikeTrains, neuron: Neuron) -> SpikeTrains:
+    """Return trains that begin where a stream's neuron does: its grid begins at or before its first spike."""
+    first = float(trains.times.min(initial=trains.stop))
+    start = first if neuron.time == "continuous" else min(first, np.floor(first / neuron.step_ms) * neuron.step_ms)
+    return SpikeTrains(trains.times, trains.offsets, float(start), trains.stop, trains.values, kind=trains.kind)
+
+
+def _known(
+    crossings_ms: NDArray[np.float64], source: object, frame_us: float | None, wire_version: int
+) -> NDArray[np.int64]:
+    """Return when crossings in a source are known, us: at the end of a frame, of spike trains at once."""
+    if isinstance(source, Frames):
+        period_us = to_us(frame_ms(source)) if frame_us is None else frame_us
+        return _core.frame_ends(crossings_ms, float(period_us), wire_version, source.t)
+    if isinstance(source, Events):
+        return _core.frame_ends(crossings_ms, FRAME_US if frame_us is None else frame_us, wire_version, _NO_FRAMES)
+    known: NDArray[np.int64] = np.rint(to_us(crossings_ms)).astype(np.int64)
+    return known
 
 
 def better_by_rule(labels: Sequence[str], neurons: Score, rules: Score) -> tuple[str, ...]:
@@ -421,7 +478,7 @@ def _possible(recipe: Recipe, examples: Sequence[Example]) -> Recipe:
 
 
 def _readout_of(
-    learners: Mapping[str, ConeR | TrainedNeuron], delays_ms: Mapping[str, float], recipe: Recipe, array: Array | None
+    learners: Mapping[str, ConeR | TrainedNeuron], delays_ms: Mapping[str, float], recipe: Recipe, **parts: Any
 ) -> Readout:
     """Return the readout of fitted learners with their delays, behind the encoder of the recipe that made them.
 
@@ -433,7 +490,7 @@ def _readout_of(
         encoder = encoder.only(sorted(used))
         inputs = inputs if isinstance(encoder, Composite) else {}
     threshold = float(recipe.run_threshold)
-    return Readout(encoder, learners, array=array, delay_ms=delays_ms, run_threshold=threshold, inputs=inputs)
+    return Readout(encoder, learners, delay_ms=delays_ms, run_threshold=threshold, inputs=inputs, **parts)
 
 
 def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, ...]:

@@ -21,8 +21,7 @@ from taxel.detect.examples import Example, name_of
 from taxel.detect.folds import Part
 from taxel.detect.readout import SILENCE_MS
 from taxel.detect.recipe import Recipe, learner_from
-from taxel.detect.scoring import Score, score_together
-from taxel.detections import Detections
+from taxel.detect.scoring import tally
 from taxel.encode import Encoder
 from taxel.learn import ConeR
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -112,9 +111,9 @@ class Inputs:
                 )
             except ProblemError as error:
                 raise ProblemError(f"{self.label}: {error}") from None
-        scored = self._score(cone, plan.run_threshold, shift_ms)
+        found, wrong = self._marks(cone, plan.run_threshold, shift_ms)
         begins = [_begin_ms(train) for train in self.trains]
-        remarks = _remarks(cone, targets, self.names, shift_ms, begins, scored.found, caught)
+        remarks = _remarks(cone, targets, self.names, shift_ms, begins, found, caught)
         if alignment is not None:
             places = np.array([part.example for part in self.parts])
             alignment = replace(alignment, example=places[alignment.example])
@@ -123,7 +122,7 @@ class Inputs:
             point,
             shift_ms - self.received.latency_ms,
             alignment,
-            scored.rank[0],
+            wrong,
             [f"{self.label}: {remark}" for remark in remarks],
         )
 
@@ -139,15 +138,17 @@ class Inputs:
             return [later_us(train, ages, to_ms(t), delay_ms) for train, t in zip(self.trains, felt, strict=True)]
         return [np.zeros(len(times), np.int64) for times in felt]
 
-    def _score(self, cone: ConeR, run_threshold: float, shift_ms: float) -> Score:
-        """Return the score of a fitted learner in the training data, against the labels as given."""
+    def _marks(self, cone: ConeR, run_threshold: float, shift_ms: float) -> tuple[int, int]:
+        """Return how many events of the training data a fitted learner finds, and how many are missed or false."""
         neuron = cone._on_grid()
         neuron.set_params(theta_0=run_threshold * neuron.theta_0)
-        found = []
-        for train in self.trains:
+        found = wrong = 0
+        for train, times in zip(self.trains, self.given, strict=True):
             t = np.rint(to_us(neuron.run(cone.weights_, train) - shift_ms)).astype(np.int64)
-            found.append(Detections([self.label] * len(t), t, t))
-        return score_together(found, [{self.label: times} for times in self.given], WINDOW_MS)
+            if (pairs := tally(t, t, times, round(to_us(WINDOW_MS)))) is not None:
+                found += len(pairs.detected)
+                wrong += len(pairs.missed_events) + len(pairs.false_detections)
+        return found, wrong
 
     def _check_inside(self) -> None:
         """Refuse labels outside their example."""

@@ -18,6 +18,9 @@ from taxel.recording import Recording
 from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.wire import FRAME_US
 
+#: Local loads above and below their running mean, which are measured together with the local load.
+CHANGES = ("local_rise", "local_fall")
+LOCAL = ("local_load", *CHANGES)
 #: The peak that noise does not reach.
 PEAK = 6.0
 #: Of an example so many frames at least are read for the levels of counts, if it has them; at most twice as many.
@@ -106,14 +109,17 @@ class Loads:
 
     def _curves_of(self, quantity: str, levels: tuple[float, ...] = ()) -> list[_core.LoadCurve]:
         """Return a quantity of each example; `levels` are those of a count."""
-        key = quantity, levels
-        if key not in self._curves:
+        if (quantity, levels) not in self._curves:
             self._report(f"measuring the {quantity.replace('_', ' ')} for plain rules", 0, 0)
-            self._curves[key] = [
-                _curve(quantity, levels, self.noise_floor, example, *clock)
+            together = LOCAL if quantity in LOCAL else (quantity,)
+            measured = [
+                _curves(together, levels, self.noise_floor, example, *clock)
                 for example, clock in zip(self._examples, self._clocks, strict=True)
             ]
-        return self._curves[key]
+            self._curves |= {
+                (name, levels): list(of) for name, of in zip(together, zip(*measured, strict=True), strict=True)
+            }
+        return self._curves[quantity, levels]
 
     def readings(self, parts: Iterable[Stretch]) -> NDArray[np.float64]:
         """Return what loaded taxels of frames read above their rest in parts of the examples, of spaced frames."""
@@ -259,16 +265,16 @@ def _first(example: Example) -> int:
     return int(t[0]) if len(t) else 0
 
 
-def _curve(
-    quantity: str,
+def _curves(
+    quantities: Sequence[str],
     levels: tuple[float, ...],
     noise_floor: float,
     example: Example,
     frame_us: float | None,
     wire_version: int,
-) -> _core.LoadCurve:
-    """Return a quantity over an example."""
-    source, tare, how = example.source, tare_text(example.tare), (quantity, list(levels), noise_floor)
+) -> list[_core.LoadCurve]:
+    """Return quantities over an example, each a curve."""
+    source, tare, how = example.source, tare_text(example.tare), (list(quantities), list(levels), noise_floor)
     if isinstance(source, Frames):
         return _core.LoadCurve.of_frames(*how, source._parts(), frame_us, tare)
     period = FRAME_US if frame_us is None else frame_us

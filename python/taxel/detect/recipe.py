@@ -411,16 +411,14 @@ def learner_from(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
     values = {key: value for key, value in values.items() if key != "inputs"}
     delay_ms = number(f"{name}.delay_ms", values.pop("delay_ms", 0.0))
     # In a recipe a neuron's parameters stand among the learner's, which is trained on a grid whatever its clock.
-    cone = ConeR()
-    learner = [key for key in cone.get_params(deep=False) if key != "neuron"]
-    neuron = [key for key in Neuron().get_params() if key != "time"]
+    learner = [key for key in ConeR._names() if key != "neuron"]
+    neuron = [key for key in Neuron._names() if key != "time"]
     for key in values:
         if key not in learner + neuron:
             raise refused(
                 name,
                 f": no parameter {shown(key)}: the parameters are {', '.join(neuron + learner)}, delay_ms and inputs",
             )
-    nested = {f"neuron__{key}" if key in neuron else key: value for key, value in values.items()} | {
-        "neuron__time": "grid"
-    }
-    return cone.set_params(**nested), delay_ms
+    of_neuron = {key: value for key, value in values.items() if key in neuron}
+    of_learner = {key: value for key, value in values.items() if key not in neuron}
+    return ConeR(neuron=Neuron(**of_neuron, time="grid"), **of_learner), delay_ms

@@ -258,6 +258,15 @@ def score(
     return Score(parts[-1].label if len(scores) == 1 else "all", false_near=near, by_label=scores, **together)
 
 
+def tally(
+    t: NDArray[np.int64], known: NDArray[np.int64], events: NDArray[np.int64], window_us: int
+) -> _core.Tally | None:
+    """Return how detections of one label pair with its events, as `score` pairs them; None without any of both."""
+    parts = ([""] * len(t), t, known, np.full(len(t), np.nan), np.zeros(len(t), bool))
+    tallies = _core.score(parts, [""] * len(events), events, np.full(len(events), window_us, np.int64))
+    return tallies[0] if tallies else None
+
+
 def mistakes_of(
     detections: Sequence[Detections], truths: Sequence[Mapping[str, NDArray[np.int64]]], scores: Sequence[Score]
 ) -> tuple[Mistake, ...]:

@@ -9,14 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import _core
 from taxel._base.arguments import finite, number, several, text
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect.examples import Example, check_examples
-from taxel.detect.loads import EdgeRule, FoundTimes, Loads, Stretch, clock_of, lacks
+from taxel.detect.loads import CHANGES, EdgeRule, FoundTimes, Loads, Stretch, clock_of, lacks
 from taxel.detect.plain_rule import PlainRule
-from taxel.detections import Detections
+from taxel.detect.scoring import tally
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: Thresholds of the area, taxels.
@@ -25,8 +24,6 @@ AREAS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 TOTALS_A_DECADE, QUANTILES = 8, (0.0, 0.95)
 #: Thresholds of local loads, units of noise.
 LOCAL_LOADS = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
-#: Local loads above and below their running mean.
-CHANGES = ("local_rise", "local_fall")
 #: Thresholds of the peak, units of noise.
 PEAKS = (4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 24.0, 32.0, 48.0)
 #: Parts of the threshold below which a load ends.
@@ -187,6 +184,7 @@ class Tuning:
     def __init__(self, loads: Loads, names: Sequence[str], window_ms: float) -> None:
         self.loads, self._names, self._width_us = loads, list(names), round(float(to_us(window_ms)))
         self._truth = {name: loads.truth(name, loads.whole_examples) for name in names}
+        self._windows = loads.windows(loads.whole_examples)
         self._outcomes: dict[EdgeRule, dict[tuple[str, int], _Outcomes]] = {}
 
     def best_rules(self, parts: Sequence[Stretch], only: str | None = None) -> dict[str, PlainRule | None]:
@@ -233,35 +231,32 @@ class Tuning:
         how: dict[str, Any] = {"labels": labels_of, "noise_floor": self.loads.noise_floor, "unit": self.loads.unit}
         return _Best(fit, PlainRule(**rule._asdict(), **how))
 
-    def detected(self, rules: Mapping[str, PlainRule | None], part: Stretch) -> Detections:
-        """Return what the rule of each label detects of it in a part of an example, as `taxel.detect.run` finds it."""
-        detections = Detections([], [], [])
-        for label, rule in rules.items():
-            if rule is None:
-                continue
-            label_index = rule._parts["labels"].index(label)
-            if isinstance(rule.age_ms, str):
-                edges = self.loads.at_end()
-            elif rule.age_ms is None:
-                numbers = rule.quantity, rule.threshold, rule.release, rule.frames, rule.levels
-                edges = self.loads.edges(EdgeRule(*numbers, rule.dated_at, rule.of_largest))[label_index]
-            else:
-                edges = self.loads.at_age(rule.age_ms)
-            found = self.loads.off(edges.between(self.loads.windows([part])), part[0])
-            if rule.age_ms is not None:
-                is_label = (found.value >= rule.threshold) == bool(label_index)
-                found = found._replace(t=found.t[is_label], known=found.known[is_label])
-            detections += Detections([label] * len(found.t), found.t, found.known)
-        return detections
+    def detected(self, rule: PlainRule | None, label: str, part: Stretch) -> FoundTimes:
+        """Return what the rule of a label detects of it in a part of an example, as `taxel.detect.run` finds it."""
+        if rule is None:
+            return FoundTimes(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
+        label_index = rule._parts["labels"].index(label)
+        if isinstance(rule.age_ms, str):
+            edges = self.loads.at_end()
+        elif rule.age_ms is None:
+            numbers = rule.quantity, rule.threshold, rule.release, rule.frames, rule.levels
+            edges = self.loads.edges(EdgeRule(*numbers, rule.dated_at, rule.of_largest))[label_index]
+        else:
+            edges = self.loads.at_age(rule.age_ms)
+        found = self.loads.off(edges.between(self.loads.windows([part])), part[0])
+        if rule.age_ms is None:
+            return found
+        is_label = (found.value >= rule.threshold) == bool(label_index)
+        return found._replace(t=found.t[is_label], known=found.known[is_label])
 
     def _found(self, point: EdgeRule) -> dict[tuple[str, int], _Outcomes]:
         """Return what a rule makes of each label at either edge; none where that is no better than nothing."""
         if point not in self._outcomes:
             self._outcomes[point] = {}
             for edge, edges in enumerate(self.loads.edges(point)):
+                found = edges.between(self._windows)
                 for name, true in self._truth.items():
-                    windows = self.loads.windows(self.loads.whole_examples)
-                    outcomes = _outcomes(edges.between(windows), true, self._width_us)
+                    outcomes = _outcomes(found, true, self._width_us)
                     if outcomes is not None:
                         self._outcomes[point][name, edge] = outcomes
         return self._outcomes[point]
@@ -330,15 +325,15 @@ def _outcomes(found: FoundTimes, true: NDArray[np.int64], width_us: int) -> _Out
     t = found.t
     if not len(true) or abs(len(t) - len(true)) >= len(true):
         return None
-    tally = _tally(found, true, width_us)
-    assert tally is not None
-    missed, false = tally.missed_events, tally.false_detections
+    pairs = tally(t, found.known, true, width_us)
+    assert pairs is not None
+    missed, false = pairs.missed_events, pairs.false_detections
     if len(missed) + len(false) >= len(true):
         return None
     lost = np.full(len(missed), np.nan), np.full(len(false), np.inf)
-    errors, delays = (np.abs(ms) for ms in (tally.errors_ms, tally.delays_ms))
+    errors, delays = (np.abs(ms) for ms in (pairs.errors_ms, pairs.delays_ms))
     return _Outcomes(
-        np.concatenate([true[tally.events], true[missed], t[false]]),
+        np.concatenate([true[pairs.events], true[missed], t[false]]),
         np.concatenate([errors, *lost]).astype(np.float32),
         np.concatenate([delays, *lost]).astype(np.float32),
     )
@@ -359,15 +354,19 @@ def _best_of(
     found = np.isfinite(errors)
     wrong, near = (np.bincount(rule[of], minlength=len(several)) for of in (~found, errors <= to_ms(NEAR_US)))
     equal = np.flatnonzero(wrong <= wrong.min() + EQUAL_SHARE * labels)
-    fits = {}
-    for k in equal[near[equal] >= near[equal].max() - 1 - EQUAL_SHARE * labels].tolist():
-        mine = found & (rule == k)
-        fits[k] = _RuleFit(int(wrong[k]), int(near[k]), _median(delays[mine]), _median(errors[mine]))
-    best = min(fits, key=lambda k: (-fits[k].near, fits[k].delay_ms, k))
+    equal = equal[near[equal] >= near[equal].max() - 1 - EQUAL_SHARE * labels]
+    rule, errors, delays = rule[found], errors[found], delays[found]
+    stops = np.searchsorted(rule, np.arange(len(several)), side="right")
+
+    def median(of: NDArray[np.float32], k: int) -> float:
+        return _median(of[stops[k - 1] if k else 0 : stops[k]])
+
+    nearest = equal[near[equal] == near[equal].max()]
+    best = min(nearest.tolist(), key=lambda k: (median(delays, k), k))
     if not points[best].levels:
-        alike = [k for k in fits if points[k] == points[best]._replace(threshold=points[k].threshold)]
+        alike = [k for k in equal.tolist() if points[k] == points[best]._replace(threshold=points[k].threshold)]
         best = alike[(len(alike) - 1) // 2]
-    return best, fits[best]
+    return best, _RuleFit(int(wrong[best]), int(near[best]), median(delays, best), median(errors, best))
 
 
 def _is_onset(onset: _Best, end: _Best) -> bool:
@@ -382,25 +381,19 @@ def _better(pair: tuple[_Best, _Best], labels: int) -> _Best:
     return min(equal, key=lambda tuned: (-tuned.fit.near, tuned.fit.delay_ms))
 
 
-def _median(values: NDArray[np.float32]) -> float:
-    return float(np.median(values)) if len(values) else np.inf
-
-
-def _tally(found: FoundTimes, true: NDArray[np.int64], width_us: int) -> _core.Tally | None:
-    """Return how detections pair with labels; None without any of both."""
-    t, known, _ = found
-    parts = ([""] * len(t), t, known, np.full(len(t), np.nan), np.zeros(len(t), bool))
-    tallies = _core.score(parts, [""] * len(true), true, np.full(len(true), width_us, np.int64))
-    return tallies[0] if tallies else None
+def _median(values: NDArray[np.floating[Any]]) -> float:
+    """Return the median; infinite without any. NumPy's takes ten times as long, and tens of thousands are asked for."""
+    ordered, count = np.sort(values), len(values)
+    return float((ordered[(count - 1) // 2] + ordered[count // 2]) / 2) if count else np.inf
 
 
 def _fit(found: FoundTimes, true: NDArray[np.int64], width_us: int) -> _RuleFit:
     """Return how detections fit labels."""
-    tally = _tally(found, true, width_us)
-    if tally is None:
+    pairs = tally(found.t, found.known, true, width_us)
+    if pairs is None:
         return _RuleFit(0, 0, np.inf, np.inf)
-    wrong = len(tally.missed_events) + len(tally.false_detections)
-    errors, delays = np.abs(tally.errors_ms), np.abs(tally.delays_ms)
+    wrong = len(pairs.missed_events) + len(pairs.false_detections)
+    errors, delays = np.abs(pairs.errors_ms), np.abs(pairs.delays_ms)
     return _RuleFit(wrong, int(np.count_nonzero(errors <= to_ms(NEAR_US))), _median(delays), _median(errors))
 
 
@@ -421,8 +414,8 @@ def _for_kinds(
     is_second = (np.arange(len(times)) >= len(truth[kinds[0]]))[order]
     chosen: tuple[tuple[int, float], list[_Best]] | None = None
     for age, (t, known, areas) in touches.items():
-        tally = _tally(FoundTimes(t, known, areas), times[order], width_us)
-        detected, events = (np.empty(0, np.int64),) * 2 if tally is None else (tally.detected, tally.events)
+        pairs = tally(t, known, times[order], width_us)
+        detected, events = (np.empty(0, np.int64),) * 2 if pairs is None else (pairs.detected, pairs.events)
         second = is_second[events]
         if second.all() or not second.any():
             continue

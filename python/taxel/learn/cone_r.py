@@ -232,8 +232,8 @@ class ConeR(SpikeLearner):
 
     def _on_grid(self) -> Neuron:
         """Return the neuron that is trained: the given one, on the grid of its step."""
-        neuron = Neuron() if self.neuron is None else instance("neuron", self.neuron, Neuron)
-        return copy.copy(neuron).set_params(time="grid")
+        neuron = copy.copy(Neuron() if self.neuron is None else instance("neuron", self.neuron, Neuron))
+        return neuron if neuron.time == "grid" else neuron.set_params(time="grid")
 
     def _plain(self) -> dict[str, Any]:
         return super()._plain() | {"neuron": self._on_grid()._plain()}

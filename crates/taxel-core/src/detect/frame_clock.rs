@@ -1,6 +1,7 @@
 //! The frames of a board, or of an input of frames: the number of a time's frame, and the end of that frame, which is the earliest
 //! time at which the host can know of an event in it.
 
+use crate::spikes::ms;
 use crate::wire::STAMP_US;
 use crate::{Result, problem};
 
@@ -83,6 +84,20 @@ impl FrameClock {
             None => (self.board_frame(t) + 1) * self.period_ns,
         };
         whole_us(end)
+    }
+
+    /// The ends of the frames to which times belong, us, as [`FrameClock::end_of`] gives them as they come; `times` (ms)
+    /// and the times of the input's `frames` (us; none of events) ascend.
+    #[must_use]
+    pub fn ends_of(mut self, times: &[f64], frames: &[i64]) -> Vec<i64> {
+        let mut frames = frames.iter().peekable();
+        let end = |&t: &f64| {
+            while let Some(&start) = frames.next_if(|&&start| ms(start) <= t) {
+                self.start_frame(start);
+            }
+            self.end_of(t)
+        };
+        times.iter().map(end).collect()
     }
 
     /// The number of the frame to which the time `t` us belongs; of an input of frames, that of its last frame.

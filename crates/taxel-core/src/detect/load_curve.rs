@@ -14,6 +14,7 @@ const PIECE: usize = 16_384;
 const LONGEST_REACH_US: i64 = 10_000_000;
 
 /// The changes of a quantity in a recording.
+#[derive(Clone)]
 pub struct LoadCurve {
     quantity: Quantity,
     changes: Vec<Spike>,
@@ -26,22 +27,22 @@ pub struct LoadCurve {
 }
 
 impl LoadCurve {
-    /// The quantity in a recording of events; `levels` are those of a count.
+    /// Each of several quantities in a recording of events; `levels` are those of a count.
     ///
     /// # Errors
     ///
     /// Those of [`Quantity::stream`], [`FrameClock::new`] and [`EventsView::check_order`]; `Interrupted` if asked to
     /// stop.
     pub fn of_events(
-        quantity: Quantity,
+        quantities: &[Quantity],
         levels: &[f64],
         noise_floor: f64,
         events: EventsView<'_>,
         frames: FrameTime,
         tare: Option<&Tare>,
         stop: Stop<'_>,
-    ) -> Result<Self> {
-        let mut stream = Quantity::stream(&[quantity], levels, events.array, tare, noise_floor)?;
+    ) -> Result<Vec<Self>> {
+        let mut stream = Quantity::stream(quantities, levels, events.array, tare, noise_floor)?;
         let clock = FrameClock::new(frames)?;
         events.check()?;
         events.check_order()?;
@@ -52,25 +53,33 @@ impl LoadCurve {
         }
         let last = events.t.iter().copied().chain(events.markers.iter().map(|marker| marker.t)).max().unwrap_or(0);
         stream.advance(last + SILENCE_US + LONGEST_REACH_US, &mut changes);
-        Ok(Self { quantity, changes, frame_times: vec![], clock, period_us: frames.period_us, last })
+        let empty = Self {
+            quantity: Quantity::Area,
+            changes: vec![],
+            frame_times: vec![],
+            clock,
+            period_us: frames.period_us,
+            last,
+        };
+        Ok(empty.each(quantities, changes))
     }
 
-    /// The quantity in a recording of frames, which last `frame_us`, or by default their median distance; `levels` are those of
-    /// a count.
+    /// Each of several quantities in a recording of frames, which last `frame_us`, or by default their median distance;
+    /// `levels` are those of a count.
     ///
     /// # Errors
     ///
     /// Those of [`Quantity::stream`], [`FrameClock::new`] and [`FramesView::check`]; `Interrupted` if asked to stop.
     pub fn of_frames(
-        quantity: Quantity,
+        quantities: &[Quantity],
         levels: &[f64],
         noise_floor: f64,
         frames: FramesView<'_>,
         frame_us: Option<f64>,
         tare: Option<&Tare>,
         stop: Stop<'_>,
-    ) -> Result<Self> {
-        let mut stream = Quantity::stream(&[quantity], levels, frames.array, tare, noise_floor)?;
+    ) -> Result<Vec<Self>> {
+        let mut stream = Quantity::stream(quantities, levels, frames.array, tare, noise_floor)?;
         let period_us = frame_us.map_or_else(|| usual_distance(frames.t), Ok)?;
         let clock = FrameClock::new(period_us)?;
         frames.check()?;
@@ -82,7 +91,18 @@ impl LoadCurve {
             stream.push_frame(t, frame, &mut changes)?;
         }
         let last = frames.t.last().copied().unwrap_or(0);
-        Ok(Self { quantity, changes, frame_times: frames.t.to_vec(), clock, period_us, last })
+        let empty =
+            Self { quantity: Quantity::Area, changes: vec![], frame_times: frames.t.to_vec(), clock, period_us, last };
+        Ok(empty.each(quantities, changes))
+    }
+
+    /// One curve like this for each quantity, whose changes are a train.
+    fn each(&self, quantities: &[Quantity], changes: Vec<Spike>) -> Vec<Self> {
+        let mut curves: Vec<Self> = quantities.iter().map(|&quantity| Self { quantity, ..self.clone() }).collect();
+        for change in changes {
+            curves[change.train as usize].changes.push(Spike { train: 0, ..change });
+        }
+        curves
     }
 
     /// The quantity's changes: their times, ms, and what it is after each.
