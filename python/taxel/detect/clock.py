@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.messages import counted
-from taxel._base.progress import reporting
 from taxel._base.times import beginning_us
 from taxel.detect import recipes
 from taxel.detect.examples import Example, Outcome
-from taxel.detect.floors import TOUCH, early_part, floor_of
-from taxel.detect.loads import PEAK, EdgeRule, Loads, clock_of, lacks_neighbours
+from taxel.detect.floors import early_part, floor_of
+from taxel.detect.loads import touches
 from taxel.recorded import recorded
 from taxel.spikes import SpikeTrains, to_us
 
@@ -367,13 +366,12 @@ def constants_ms(examples: Sequence[Example]) -> dict[str, float]:
 
 def _beside_loads(examples: Sequence[Example]) -> dict[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.int64]]]:
     """Return the labels of each example, and the begins or ends of loads that they are of, us."""
-    if any(example.tare is None or isinstance(example.source, SpikeTrains) for example in examples):
-        return {}
     # Late labels let a tare end in a touch.
     early = [example if (tare := early_part(example)) is None else example._replace(tare=tare) for example in examples]
-    quantity, threshold = ("peak", PEAK) if lacks_neighbours(examples) else ("area", TOUCH)
-    loads = Loads(early, [clock_of(example) for example in early], floor_of(early), reporting(None))
-    edges_of_loads = loads.edges(EdgeRule(quantity, threshold))
+    found = touches(early, floor_of(early))
+    if found is None:
+        return {}
+    loads, *edges_of_loads = found
     of_kinds = {}
     for k, example in enumerate(examples):
         here = loads.windows([(k, -np.inf, np.inf)])

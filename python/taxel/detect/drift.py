@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.messages import three_digits
-from taxel._base.progress import reporting
 from taxel.detect.examples import Example
-from taxel.detect.floors import TOUCH, floor_of
-from taxel.detect.loads import PEAK, EdgeRule, Loads, clock_of, lacks_neighbours
+from taxel.detect.floors import floor_of
+from taxel.detect.loads import touches
 from taxel.detect.scoring import Score
-from taxel.spikes import SpikeTrains
 
 #: The quantiles of a feature that are kept.
 _SHARES = np.linspace(0.0, 1.0, 41)
@@ -43,12 +41,10 @@ def of_loads(examples: Sequence[Example], noise_floor: float) -> dict[str, _Valu
         ``sum`` above rest, in the sensor's unit; ``peak`` above rest, in noises; ``taxels`` that are loaded;
         ``lasts_ms``; ``apart_ms``, from begin to begin.
     """
-    if not examples or any(example.tare is None or isinstance(example.source, SpikeTrains) for example in examples):
+    found = touches(examples, noise_floor)
+    if found is None:
         return {}
-    felt, threshold = ("peak", PEAK) if lacks_neighbours(examples) else ("area", TOUCH)
-    clocks = [clock_of(example) for example in examples]
-    loads = Loads(examples, clocks, noise_floor, reporting(None))
-    edges = loads.edges(EdgeRule(felt, threshold))
+    loads, *edges = found
     features: dict[str, list[_Values]] = {}
     for k in range(len(examples)):
         here = loads.windows([(k, -np.inf, np.inf)])

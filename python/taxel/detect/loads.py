@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.progress import Progress
+from taxel._base.progress import Progress, reporting
 from taxel.detect.detector import tare_text
 from taxel.detect.examples import Example, frame_ms, name_of, unit_of
+from taxel.detect.floors import TOUCH
 from taxel.detect.scoring import APART_US
 from taxel.frames import Frames
 from taxel.recording import Recording
@@ -229,6 +230,17 @@ class Loads:
             return np.concatenate([t + by for t, by in zip(times, self._shift, strict=True)])
 
         return FoundTimes(shifted(t), shifted(known), np.concatenate(values))
+
+
+def touches(examples: Sequence[Example], noise_floor: float) -> tuple[Loads, FoundTimes, FoundTimes] | None:
+    """Return the loads of (checked) examples, and the begins and the ends of touches; None where one has no rest.
+
+    A touch loads two taxels or more, or a channel above its noise.
+    """
+    if not examples or any(example.tare is None or isinstance(example.source, SpikeTrains) for example in examples):
+        return None
+    loads = Loads(examples, [clock_of(example) for example in examples], noise_floor, reporting(None))
+    return loads, *loads.edges(EdgeRule("peak", PEAK) if loads.are_channels else EdgeRule("area", TOUCH))
 
 
 def largest(

@@ -112,7 +112,7 @@ impl Neuron {
     fn check_inputs(&self, weights: &[f64], trains: &SpikeTrains) -> Result<()> {
         trains.check()?;
         if trains.kind == SpikeKind::Signed {
-            return Err(problem!("trains"; ": spikes are signed; split them into ON and OFF trains first"));
+            return Err(problem!("trains"; ": spikes are signed; split them into ON and OFF trains (split_by_sign)"));
         }
         one_weight_a_train(weights, trains.len())
     }

@@ -110,7 +110,7 @@ pub fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
         return Err(problem!("pattern {p}: has no train"));
     }
     if pattern.kind == SpikeKind::Signed {
-        return Err(problem!("pattern {p}: spikes are signed; split them into ON and OFF trains first"));
+        return Err(problem!("pattern {p}: spikes are signed; split them into ON and OFF trains (split_by_sign)"));
     }
     Ok(())
 }
