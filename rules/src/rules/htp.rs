@@ -1,7 +1,6 @@
 //! HTP, high threshold projection (Memmesheimer, Rubin, Ölveczky and Sompolinsky 2014, Neuron 82:925).
 
 use super::corrections::{Correction, Presented};
-use super::rule::Rule;
 use super::stepped::AfterSpike;
 
 /// Output spikes are forced at the targets, so resets are known and each demand is linear in the weights: the potential
@@ -10,11 +9,19 @@ use super::stepped::AfterSpike;
 /// stretch above the threshold.
 ///
 /// With `after_spike` "reset" and no window these are the rows of CONE-X without bounds and threshold recovery.
-pub(super) fn correct(rule: &Rule, presented: &Presented<'_>, weights: &[f64], window: f64, out: &mut Vec<Correction>) {
+///
+/// `drive` is the potential at a time, given weights and inputs after another time alone.
+pub(super) fn correct(
+    drive: impl Fn(f64, f64) -> f64,
+    presented: &Presented<'_>,
+    weights: &[f64],
+    window: f64,
+    out: &mut Vec<Correction>,
+) {
     const ROUNDING: f64 = 1e-12;
     let (targets, theta_0) = (presented.targets, presented.neuron.theta_0);
     for (k, &t) in targets.iter().enumerate() {
-        if potential(rule, presented, weights, t) < theta_0 * (1.0 - ROUNDING) {
+        if potential(&drive, presented, t) < theta_0 * (1.0 - ROUNDING) {
             out.push(Correction { after: presented.lost_up_to(targets, t), ..Correction::at_target(k, t, 1.0) });
         }
     }
@@ -41,10 +48,9 @@ pub(super) fn correct(rule: &Rule, presented: &Presented<'_>, weights: &[f64], w
 }
 
 /// The potential at `t`, given output spikes at the targets before it.
-fn potential(rule: &Rule, presented: &Presented<'_>, weights: &[f64], t: f64) -> f64 {
-    let Presented { neuron, trains, targets, .. } = presented;
-    let factors = rule.factors(trains, t, presented.lost_up_to(targets, t));
-    let drive: f64 = weights.iter().zip(factors).map(|(w, factor)| w * factor).sum();
+fn potential(drive: impl Fn(f64, f64) -> f64, presented: &Presented<'_>, t: f64) -> f64 {
+    let Presented { neuron, targets, .. } = presented;
+    let drive = drive(t, presented.lost_up_to(targets, t));
     if neuron.after_spike == AfterSpike::Reset {
         return drive;
     }

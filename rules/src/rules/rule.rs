@@ -91,7 +91,16 @@ impl Rule {
                 chronotron::correct(presented.targets, fired, *tau_q, *gamma_r, out);
             }
             Self::Fp { window, .. } => fp::correct(presented, fired, *window, out),
-            Self::Htp { window, .. } => htp::correct(self, presented, weights, *window, out),
+            Self::Htp { window, .. } => {
+                let drive = |t: f64, lost_up_to: f64| -> f64 {
+                    weights
+                        .iter()
+                        .zip(self.factors(presented.trains, t, lost_up_to))
+                        .map(|(w, factor)| w * factor)
+                        .sum()
+                };
+                htp::correct(drive, presented, weights, *window, out);
+            }
             _ => {
                 out.extend(presented.targets.iter().enumerate().map(|(k, &t)| Correction::at_target(k, t, 1.0)));
                 out.extend(fired.iter().map(|&t| Correction::new(t, -1.0)));
