@@ -11,7 +11,7 @@ use taxel_core::held::Held;
 use taxel_core::wire::DatagramInfo;
 
 use super::counters::Counters;
-use super::running_recording::RunningRecording;
+use super::running_recording::{EndedRecording, RunningRecording};
 use super::shared::PipelineShared;
 use crate::Result;
 use crate::locked::lock;
@@ -19,9 +19,6 @@ use crate::recording::{BoardChange, BoardChangeKind, LOW_RATE_EVERY, now_ns};
 
 /// Interval at which the counts are written to an unfinished recording.
 pub(super) const COUNTS_EVERY: Duration = Duration::from_secs(1);
-
-/// The recording that was running, if any, and the counters after its last datagram.
-pub(super) type EndedRecording = (Option<RunningRecording>, Counters);
 
 pub(super) struct RecordStage {
     shared: Arc<PipelineShared>,

@@ -17,6 +17,9 @@ use crate::recording::{
     WriterOptions, now_ns,
 };
 
+/// The recording that was running, if any, and the counters after its last datagram.
+pub(super) type EndedRecording = (Option<RunningRecording>, Counters);
+
 /// One recording, from the beginning of its file to its end. Its times are those of the pipeline's clock.
 pub(super) struct RunningRecording {
     file: RecordingFile,
