@@ -44,12 +44,12 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
     (
         "taxel-panel",
         &[
-            &["readout_encoders", "time_columns"],
-            &["load", "taxel_history"],
-            &["array_state"],
-            &["keyframe_index"],
-            &["shown"],
-            &["live_source"],
+            &["activity", "block", "change_file", "columns", "frame_values", "readout_encoders"],
+            &["event_rate", "history", "load"],
+            &["state"],
+            &["index"],
+            &["events", "frames", "shown", "spikes"],
+            &["live_source", "player"],
             &["view"],
         ],
     ),

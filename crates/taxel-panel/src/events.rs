@@ -7,7 +7,8 @@ use taxel_live::Result;
 use taxel_live::pipeline::TaxelChange;
 use taxel_live::recording::{DecodedRecording, Reader, Remarks, Topic};
 
-use crate::index::{Block, CHANGES, Index, Indexing, Kept};
+use crate::block::Block;
+use crate::index::{CHANGES, Index, Indexing, Kept};
 use crate::state::{Keyframe, Sensor};
 
 /// Decoded blocks that may wait for the indexing thread.

@@ -14,6 +14,7 @@ use taxel_live::locked::lock;
 use taxel_live::pipeline::TaxelChange;
 
 use crate::activity::Activity;
+use crate::block::Block;
 use crate::change_file::{BYTES, ChangeFile};
 use crate::columns::{COLUMN_US, TimeColumns, column_of};
 use crate::event_rate::EventRate;
@@ -26,17 +27,6 @@ const TIME_COLUMN_BYTES: i64 = 256 << 20;
 
 /// Changes in a block of a recording.
 pub(crate) const CHANGES: usize = 1 << 16;
-
-/// Changes that follow one another.
-#[derive(Debug, Clone, Default)]
-pub struct Block {
-    /// Where changes are missing before these: the values held after the gap, and the number of events up to there.
-    pub held: Option<(Vec<u16>, u64)>,
-    /// The changes.
-    pub changes: Arc<Vec<TaxelChange>>,
-    /// The rest of each taxel after these changes, where it is another from there on.
-    pub rest: Option<Vec<u16>>,
-}
 
 /// What of a source is kept.
 #[derive(Debug)]

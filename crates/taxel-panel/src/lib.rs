@@ -4,10 +4,12 @@
 //! Python's.
 
 mod activity;
+mod block;
 mod change_file;
 mod columns;
 mod event_rate;
 mod events;
+mod frame_values;
 mod frames;
 mod history;
 mod index;
@@ -21,9 +23,9 @@ mod state;
 mod view;
 
 pub use activity::Activity;
-pub use frames::{FrameRest, FrameSource, FramesOfSource};
+pub use frame_values::{FrameRest, FramesOfSource, RestSource};
+pub use frames::FrameSource;
 pub use index::{Index, Kept};
 pub use live_source::{LiveSource, News, limits};
 pub use readout_encoders::encoder_names;
-pub use state::RestSource;
 pub use view::View;

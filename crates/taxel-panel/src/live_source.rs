@@ -22,8 +22,9 @@ use taxel_live::recording::now_ns;
 use taxel_live::{Error, Result};
 
 use crate::activity::Activity;
+use crate::block::Block;
 use crate::columns::{COLUMN_US, COLUMNS_US, SPAN};
-use crate::index::{Block, Index, Kept};
+use crate::index::{Index, Kept};
 use crate::readout_encoders::ReadoutEncoders;
 use crate::shown::sensor;
 use crate::state::{ArrayState, Keyframe, Sensor};

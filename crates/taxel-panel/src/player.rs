@@ -6,9 +6,10 @@ use taxel_core::problem;
 use taxel_live::Result;
 use taxel_live::pipeline::TaxelChange;
 
+use crate::block::Block;
 use crate::columns::{COLUMN_US, LATE_US, SPAN, TimeColumns, column_of};
 use crate::history::TaxelHistory;
-use crate::index::{Block, Index};
+use crate::index::Index;
 use crate::readout_encoders::ViewEncoder;
 use crate::spikes::EncodedSpikes;
 use crate::state::{ArrayState, FORGET, Keyframe};

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use taxel_core::Array;
 
 use crate::columns::{COLUMN_US, TimeColumns};
-use crate::frames::{Frames, FramesOfSource};
+use crate::frame_values::{Frames, FramesOfSource};
 use crate::index::Index;
 
 /// A label may lie so long before the first event or after the last one, us.

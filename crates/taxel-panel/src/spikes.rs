@@ -8,7 +8,7 @@ use taxel_core::encode::Stream;
 use taxel_core::{Array, Error, Events, Hint, Intensities, Spike, SpikeKind, problem};
 
 use crate::columns::{TimeColumns, column_of};
-use crate::frames::Frames;
+use crate::frame_values::Frames;
 use crate::index::Index;
 use crate::readout_encoders::ViewEncoder;
 use crate::state::{Keyframe, Sensor};

@@ -6,11 +6,10 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use crate::block::Block;
 use crate::columns::{COLUMN_US, Curve, Curves, MISSING, TimeColumns, column_of};
-use crate::frames::Frames;
-use crate::index::Block;
+use crate::frame_values::{Frames, RestSource};
 use crate::load::{Coordinates, Load, Weights};
-use serde::{Deserialize, Serialize};
 use taxel_core::Array;
 use taxel_core::held::{Held, UNKNOWN};
 use taxel_core::rest::{NOISE_FLOOR, Rest, TrackedRest, Value};
@@ -41,18 +40,6 @@ pub struct Keyframe {
     pub rest: Vec<u16>,
     /// How that rest was found; `None`: it is tracked anew from there.
     pub tracked: Option<Box<TrackedRest>>,
-}
-
-/// Where the rest comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum RestSource {
-    /// A tare, or the values held at a moment; 0 of frames of force or pressure.
-    Given,
-    /// A quiet stretch, from which it is tracked.
-    Quiet,
-    /// There was no quiet stretch so far: the taxels' first values, from which it is tracked; 0 of frames.
-    None,
 }
 
 impl Keyframe {

@@ -3,8 +3,9 @@
 use taxel_live::recording::now_ns;
 
 use crate::columns::{COLUMN_US, Curve, Curves, SPAN, column_of};
+use crate::frame_values::RestSource;
 use crate::player::Watched;
-use crate::state::{ArrayState, RestSource};
+use crate::state::ArrayState;
 
 /// Bytes of the header.
 const HEADER: usize = 144;
