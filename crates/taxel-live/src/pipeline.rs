@@ -76,7 +76,7 @@ const CHECK_EVERY: Duration = Duration::from_millis(50);
 /// Capacity of the queue of [`Live::next`], detections; more are lost for it, and counted, but still reach the sinks.
 const OUTPUT_WAITING: usize = 1 << 14;
 
-/// A running pipeline from datagrams to detections, from [`Live::start`] until [`Live::stop`].
+/// A running pipeline from datagrams to detections, from [`Live::open`] until [`Live::stop`].
 pub struct Live {
     handle: Handle,
     detections: channel::Receiver<OutputDetection>,

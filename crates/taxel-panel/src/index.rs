@@ -250,7 +250,7 @@ impl Index {
     ///
     /// # Errors
     ///
-    /// As [`Index::open`] and [`Index::next`].
+    /// `Core(Problem)` where there is no keyframe; `File` where the temporary file cannot be read.
     pub fn activity(&self) -> Result<Activity> {
         let mut activity = Activity::new(&self.sensor.array);
         let (begin, mut next) = self.open(i64::MIN)?;

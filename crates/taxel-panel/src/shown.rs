@@ -40,7 +40,7 @@ impl Index {
     ///
     /// # Errors
     ///
-    /// As [`Index::next`].
+    /// `File` where the temporary file cannot be read.
     pub fn opened(&self) -> taxel_live::Result<Value> {
         let (range, frames) = (self.range(), self.sensor.frames.as_ref());
         // The end of the column, which has all of its force; of frames the last one in it.
