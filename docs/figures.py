@@ -4,7 +4,7 @@ python docs/figures.py            judges all statements and draws all pictures a
 python docs/figures.py REPORT     takes the numbers of a report (taxel study all --report REPORT) first, with the commit
 
 A report is taken if the commit that is checked out computed it, without local changes. Beside each figure its toy
-result is kept, with which `make slow` compares that of later code.
+result is kept, with which the tests compare that of later code.
 """
 
 from __future__ import annotations
