@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,9 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 import taxel
+from taxel import FormatError, Frames
+from taxel._base.errors import Place
 from taxel.formats.layout import Layout
+from taxel.formats.layout_text import of_layout
+from taxel.formats.table import read_table
 from taxel.reading import InMemory
 
 VALUES = np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [6.5, 0.0, 1.0, 2.0, 3.0, 4.0], [9.0, 8.0, 7.0, 6.0, 5.0, 4.0]])
@@ -53,3 +59,38 @@ def opened_by(read: Callable[[Path, Layout], list[InMemory]], path: Path, layout
         tuple((note.text, note.t) for note in readers[0].marked.notes),
         facts.lost,
     )
+
+
+def opened(folder: Path, text: str | bytes, layout: str | None = None, name: str = "a.csv") -> Opened:
+    """Open a table; the layout that is printed of it, pasted, must give the same."""
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    if layout is not None:
+        return opened_by(read_table, path, layout)
+    found = opened_by(read_table, path, None)
+    assert found.said.startswith(f"{name}: read as ")
+    assert "\n" not in found.said
+    again = opened_by(read_table, path, of_layout(found.layout))
+    assert again.sources == found.sources
+    assert (again.timed, again.said) == (found.timed, "")
+    return found
+
+
+def layouts(folder: Path, text: str, name: str = "a.csv") -> list[str]:
+    """Return the layouts of a table that can be read in several ways; each must open it."""
+    path = folder / name
+    path.write_text(text)
+    with pytest.raises(FormatError) as caught:
+        read_table(path, Layout(path))
+    assert caught.value.place == Place(str(path))
+    printed = str(caught.value).partition("\n")[2]
+    found = [part.partition("\n")[2] for part in re.split(r"(?m)^# \d+\. ", printed)[1:]]
+    for layout in found:
+        opened(folder, text, layout, name)
+    return found
+
+
+def frames(found: Opened, source: str = "") -> tuple[list[int], list[Any]]:
+    table = found.sources[source]
+    assert isinstance(table, Frames)
+    return table.t.tolist(), table.values.reshape(len(table), -1).tolist()

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import gzip
 import json
-import re
-from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -13,56 +11,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from refusal import refused
 
 import taxel
 from taxel import Array, Events, FormatError, Frames
 from taxel._base.errors import Place
-from taxel.formats.layout import Layout
 from taxel.formats.layout_text import of_layout
-from taxel.formats.lines import KINDS, read_line
 from taxel.formats.table import read_table
-from taxel.formats.times import repaired
 
-from .tables import Opened, opened_by
-
-
-def opened(folder: Path, text: str | bytes, layout: str | None = None, name: str = "a.csv") -> Opened:
-    """Open a table; the layout that is printed of it, pasted, must give the same."""
-    path = folder / name
-    path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    if layout is not None:
-        return opened_by(read_table, path, layout)
-    found = opened_by(read_table, path, None)
-    assert found.said.startswith(f"{name}: read as ")
-    assert "\n" not in found.said
-    again = opened_by(read_table, path, of_layout(found.layout))
-    assert again.sources == found.sources
-    assert (again.timed, again.said) == (found.timed, "")
-    return found
-
-
-def layouts(folder: Path, text: str, name: str = "a.csv") -> list[str]:
-    """Return the layouts of a table that can be read in several ways; each must open it."""
-    path = folder / name
-    path.write_text(text)
-    with pytest.raises(FormatError) as caught:
-        read_table(path, Layout(path))
-    assert caught.value.place == Place(str(path))
-    printed = str(caught.value).partition("\n")[2]
-    found = [part.partition("\n")[2] for part in re.split(r"(?m)^# \d+\. ", printed)[1:]]
-    for layout in found:
-        opened(folder, text, layout, name)
-    return found
-
-
-def frames(found: Opened, source: str = "") -> tuple[list[int], list[Any]]:
-    table = found.sources[source]
-    assert isinstance(table, Frames)
-    return table.t.tolist(), table.values.reshape(len(table), -1).tolist()
-
+from .tables import frames, layouts, opened, opened_by
 
 JSON_AXES = '{"ts": 0.1, "left": [[1, 2, 30], [4, 5, 60]]}\n{"ts": 0.2, "left": [[1, 2, 31], [4, 5, 61]]}\n'
 SIDES = (
@@ -461,186 +418,3 @@ def test_a_table_of_events_opens_as_events(tmp_path: Path) -> None:
     found = opened(tmp_path, "x,y,p,t_us\n1,2,1,10\n3,4,0,10\n5,6,1,30\n")
     expected = Events([10, 10, 30], [1, 3, 5], [2, 4, 6], [True, False, True], array=Array.thesis())
     assert found.sources == {"": expected}
-
-
-NUMBERS = st.floats(-1e6, 1e6, width=32).map(lambda value: round(value, 3))
-WRITERS: dict[str, Callable[[list[str], list[float], list[list[float]]], str]] = {
-    "json": lambda names, t, rows: "".join(
-        json.dumps({"t": a, "p": row} if len(row) > 1 else {"t": a, names[0]: row[0]}) + "\n"
-        for a, row in zip(t, rows, strict=True)
-    ),
-    "brackets": lambda names, t, rows: "".join(f"{a} -> {row}\n" for a, row in zip(t, rows, strict=True)),
-    "names": lambda names, t, rows: "".join(
-        f"t:{a} " + " ".join(f"{name}={value}" for name, value in zip(names, row, strict=True)) + "\n"
-        for a, row in zip(t, rows, strict=True)
-    ),
-}
-
-
-@given(
-    data=st.data(),
-    form=st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), *WRITERS]),
-    taxels=st.integers(1, 6),
-    count=st.integers(8, 30),
-    step_ms=st.sampled_from([5, 10, 20, 100]),
-    unit=st.sampled_from(["s", "ms"]),
-    odd=st.sampled_from(["", "Sensor ready", "again", "torn"]),
-    code=st.sampled_from(["utf-8", "utf-16", "latin-1"]),
-)
-def test_what_was_written_is_read_and_the_printed_layout_reads_it_again(
-    tmp_path_factory: pytest.TempPathFactory,
-    data: st.DataObject,
-    form: Any,
-    taxels: int,
-    count: int,
-    step_ms: int,
-    unit: str,
-    odd: str,
-    code: str,
-) -> None:
-    rows = data.draw(st.lists(st.lists(NUMBERS, min_size=taxels, max_size=taxels), min_size=count, max_size=count))
-    t = [step_ms * k / (1000 if unit == "s" else 1) for k in range(count)]
-    names = [f"Zehe{k}ß" for k in range(taxels)]
-    if isinstance(form, str):
-        head, lines = "", WRITERS[form](names, t, rows).splitlines()
-    else:
-        separator, decimal = form
-        head = separator.join([f"Zeit [{unit}]", *names]) + "\n"
-        lines = [
-            separator.join(f"{v}".replace(".", decimal) for v in (a, *row)) for a, row in zip(t, rows, strict=True)
-        ]
-    if odd:
-        at = data.draw(st.integers(2, count - 1))
-        lines.insert(at, head.rstrip("\n") or odd if odd == "again" else odd)
-        lines = [*lines[:at], *lines[at + 1 :], lines[0][:1]] if odd == "torn" else lines
-    text = (head + "\n".join(lines) + "\n" * (odd != "torn")).encode(code)
-    found = opened(tmp_path_factory.mktemp("drawn"), text)
-    times, values = frames(found)
-    assert times == [1000 * step_ms * k for k in range(count)]
-    np.testing.assert_array_equal(values, np.array(rows, np.float32))
-
-
-#: Columns that are no taxels, by what they are: a name, and the cell of a line.
-BESIDE: dict[str, tuple[str, Callable[[int], str]]] = {
-    "a counter": ("seq", str),
-    "labels": ("slipped", lambda k: str(k // 7 % 2)),
-    "another quantity": ("Battery [%]", lambda k: str(87 - k % 3)),
-    "a remark": ("note", lambda k: "ok" if k % 9 else "wet"),
-    "empty": ("spare", lambda k: ""),
-}
-BEGIN = datetime(2024, 5, 1, 10, 0, 0)
-EPOCH_US = 1_714_557_600_000_000
-#: How a time in us after the beginning is written, by the name of its column, and that of the beginning, us.
-TIMES: dict[str, tuple[str, int, Callable[[int], str]]] = {
-    "s": ("Zeit [s]", 0, lambda us: f"{us / 1e6:.3f}"),
-    "ms": ("time_ms", 0, lambda us: f"{us / 1e3:g}"),
-    "us": ("micros", 0, str),
-    "min": ("Zeit [min]", 0, lambda us: f"{us / 60e6:.9f}"),
-    "minutes and seconds": ("Elapsed", 0, lambda us: f"{us // 60_000_000:02}:{us / 1e6 % 60:06.3f}"),
-    "epoch": ("t", EPOCH_US, lambda us: f"{(EPOCH_US + us) / 1e6:.3f}"),
-    "iso": ("timestamp", EPOCH_US, lambda us: (BEGIN + timedelta(microseconds=us)).isoformat(timespec="milliseconds")),
-    "day": ("Uhrzeit", 36_000_000_000, lambda us: (BEGIN + timedelta(microseconds=us)).strftime("%H:%M:%S.%f")),
-    "German": ("Zeit", EPOCH_US, lambda us: (BEGIN + timedelta(microseconds=us)).strftime("%d.%m.%Y %H:%M:%S.%f")),
-}
-
-
-@st.composite
-def whole_tables(draw: st.DrawFn) -> tuple[str, list[int], list[list[float]]]:
-    """Draw a table of a time, taxels and other columns in any order, its times and its readings."""
-    count, taxels, step_us = draw(st.integers(24, 40)), draw(st.integers(2, 4)), draw(st.sampled_from([5000, 20_000]))
-    rows = draw(st.lists(st.lists(NUMBERS, min_size=taxels, max_size=taxels), min_size=count, max_size=count))
-    name, begin, write = TIMES[draw(st.sampled_from([*TIMES]))]
-    separator, decimal = draw(st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")]))
-    columns = [(name, [write(step_us * k) for k in range(count)])]
-    for k in range(taxels):
-        columns.append((f"Zehe{k}", [f"{row[k]:g}".replace(".", decimal) for row in rows]))
-        rows = [[*row[:k], float(f"{row[k]:g}"), *row[k + 1 :]] for row in rows]
-    beside = [BESIDE[kind] for kind in draw(st.sets(st.sampled_from([*BESIDE]), max_size=3))]
-    columns += [(called, list(map(cell, range(count)))) for called, cell in beside]
-    columns[0] = (
-        name,
-        [cell.replace(".", decimal) if name in ("Zeit [s]", "Zeit [min]", "t") else cell for cell in columns[0][1]],
-    )
-    at = draw(st.permutations(range(len(columns))))
-    order = [k for k in at if not 1 <= k <= taxels]
-    place = draw(st.integers(0, len(order)))
-    order[place:place] = range(1, taxels + 1)
-    lines = [separator.join(columns[k][0] for k in order)]
-    lines += [separator.join(columns[k][1][line] for k in order) for line in range(count)]
-    t = [begin + step_us * k for k in range(count)]
-    match draw(st.sampled_from(["", "again", "text", "torn", "swapped", "head"])):
-        case "again":
-            lines.insert(9, lines[0])
-        case "text":
-            lines.insert(9, "Sensor ready")
-        case "torn":
-            lines.append(lines[9][:1])
-        case "swapped":
-            lines[9], lines[10] = lines[10], lines[9]
-        case "head":
-            lines[:0] = ["Messung 7", ""]
-    return "\n".join(lines) + "\n" * (lines[-1] != lines[9][:1]), t, rows
-
-
-@given(drawn=whole_tables())
-def test_a_table_with_other_columns_in_any_order_is_read_or_asked_and_its_layouts_read_it_again(
-    drawn: tuple[str, list[int], list[list[float]]], tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    text, t, rows = drawn
-    found = frames(opened(tmp_path_factory.mktemp("drawn"), text))
-    assert found[0] == t
-    np.testing.assert_array_equal(found[1], np.array(rows, np.float32))
-
-
-@given(
-    values=st.lists(st.lists(st.integers(0, 9), min_size=6, max_size=6), min_size=4, max_size=9),
-    above=st.sampled_from(["Frame {k} ({t:.2f} ms)", "frame {k}, t={t:g}ms", "Bild {k} {t:g} ms"]),
-    separator=st.sampled_from(", ;\t"),
-)
-def test_frames_of_lines_below_a_line_of_text_are_read_and_their_layout_reads_them_again(
-    values: list[list[int]], above: str, separator: str, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    text = ""
-    for k, frame in enumerate(values):
-        lines = [separator.join(map(str, frame[begin : begin + 3])) for begin in (0, 3)]
-        text += "\n".join([above.format(k=k, t=20 * k), *lines]) + "\n"
-    found = opened(tmp_path_factory.mktemp("drawn"), text)
-    assert frames(found) == ([20_000 * k for k in range(len(values))], values)
-    assert found.sources[""].array.shape == (2, 3)
-
-
-@given(
-    steps=st.lists(st.integers(1, 1000), min_size=3, max_size=40),
-    begin=st.integers(0, 2**32),
-    bits=st.sampled_from([16, 32]),
-)
-def test_a_counter_that_was_full_goes_on(steps: list[int], begin: int, bits: int) -> None:
-    steps = [max(steps)] * len(steps)
-    t = begin % 2**bits + np.cumsum([0, *steps])
-    found = repaired(t % 2**bits)
-    assert (found.t - t).tolist() == [0] * len(t)
-
-
-@given(t=st.lists(st.integers(-(2**40), 2**40), max_size=30))
-def test_repaired_times_ascend_and_sound_ones_stay(t: list[int]) -> None:
-    times = np.array(t, np.int64)
-    found = repaired(times)
-    assert (np.diff(found.t) > 0).all()
-    assert len(found.t) == len(t)
-    ascending = np.unique(times)
-    assert repaired(ascending).t.tolist() == ascending.tolist()
-    assert repaired(ascending).said == ()
-
-
-@given(line=st.text(max_size=60), kind=st.sampled_from(KINDS), decimal=st.sampled_from(".,"))
-def test_any_line_has_cells_with_a_name_each_or_is_none(line: str, kind: str, decimal: str) -> None:
-    found = read_line(line, kind, ";", decimal)
-    assert found is None or len(found.cells) == len(found.names)
-
-
-@pytest.mark.parametrize("cells", ['"1,{0}","1.234,{1}"', '"1,200","2,10{1}.5"', '"1,200","2,10{1}"'])
-def test_quoted_numbers_that_may_be_thousands_are_refused(tmp_path: Path, cells: str) -> None:
-    lines = [f"{10 * k},{cells.format(k % 7, k % 5)}" for k in range(20)]
-    (tmp_path / "a.csv").write_text("\n".join(["time_ms,a,b", *lines]) + "\n")
-    with refused(FormatError, place=Place("a.csv")):
-        taxel.open(tmp_path / "a.csv")
