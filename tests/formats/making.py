@@ -148,6 +148,14 @@ def write_icub(folder: Path, name="ball", trials=None, packed=True) -> Path:
     return file
 
 
+def write_popu(folder: Path, readings=None, names=("left1_0", "supine2_1")) -> Path:
+    """Write readings, poses x snapshots x rows x columns, with a name a pose."""
+    file = folder / "poses.npz"
+    given = np.arange(48).reshape(2, 2, 4, 3) if readings is None else readings
+    np.savez(file, readings=np.asarray(given, np.uint8), pose=np.array(names))
+    return file
+
+
 def write_tekscan(folder: Path, change=lambda rows: rows, unit="raw", name="press.csv") -> Path:
     """Write a movie of 6 frames of 4 x 5 cells, one of which does not exist; frame 4 is missing."""
     head = [
