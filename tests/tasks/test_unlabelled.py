@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ from shell import call
 from tests.tasks.recordings import mat
 
 import taxel
-from taxel.reading import Facts, InMemory
+from taxel.reading import Facts, InMemory, Marks
 from taxel.tasks import train
 
 
@@ -41,6 +42,17 @@ def test_a_source_that_no_row_names_is_neither_trained_nor_scored(feet: Path, tm
     assert (training.score.found, training.score.false) == (8, 0)
     assert "left out, because no row of labels names this source: right" in training.lines()
     assert training.to_dict()["unlabelled"] == ["right"]
+
+
+def test_a_source_without_notes_beside_one_with_them_is_left_out(feet: Path, tmp_path: Path) -> None:
+    frames = {name: each.frames() for name, each in taxel.open(feet).sources.items()}
+    marks = {"left": Marks(tuple(taxel.Note("contact", 10_000 * k) for k in BEGINS)), "right": Marks()}
+    facts = Facts(path=tmp_path, array=frames["left"].array)
+    opened = taxel.Recording.of(*(InMemory(replace(facts, label=name), frames[name], marks[name]) for name in frames))
+    taxel.convert(opened, tmp_path / "noted.mcap")
+    for each in (opened, taxel.open(tmp_path / "noted.mcap")):
+        training = train(each)
+        assert (training.unlabelled, len(training.recordings)) == (("right",), 1)
 
 
 def test_where_rows_name_no_source_nothing_happened_where_no_row_is(feet: Path, tmp_path: Path) -> None:

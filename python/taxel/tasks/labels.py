@@ -124,12 +124,11 @@ def sources_without(
     """
     if not are_tables(source):
         return ()
-    rows = (
-        (note for each in recordings for note in each.notes) if source == "notes" else _opened(source, recordings).rows
-    )
-    titles = {name for each in recordings if each.label for name in (each.title, each.name)}
-    if not any(row.source or row.recording in titles for row in rows):
-        return ()
+    # Notes of a file are those of all its sources; where a source has none, its reader gave notes to others alone.
+    if source != "notes":
+        titles = {name for each in recordings if each.label for name in (each.title, each.name)}
+        if not any(row.source or row.recording in titles for row in _opened(source, recordings).rows):
+            return ()
     named = {each.label for each, of_recording in zip(recordings, events, strict=True) if of_recording}
     return tuple(dict.fromkeys(each.label for each in recordings if each.label and each.label not in named))
 
