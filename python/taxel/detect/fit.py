@@ -185,7 +185,7 @@ class Fitter:
         #: Makes the same fitter in another process, where nobody is told of its progress.
         self.made_anew = partial(Fitter, examples, recipe, window_ms=window_ms, frame_us=frame_us)
         #: All of the examples.
-        self.whole = whole(self.examples)
+        self.whole = whole(self.examples, recipe.around_labels_ms)
         of_board = max(noise_floor(example[0]) for example in examples)
         recipe = _above(instance("recipe", recipe, Recipe), of_board)
         self._in_frames = in_frames(recipe, self.examples, clocks)

@@ -145,7 +145,7 @@ def judge(
 
 def judge_by(fitter: Fitter, k: int | Sequence[Fold], workers: Workers = HERE) -> Judged:
     """Return what `judge` does, by a fitter that may have been used before; `workers` train the folds."""
-    folds, how = folds_of(fitter.examples, k)
+    folds, how = folds_of(fitter.examples, fitter.whole, k)
     # Another process makes a fitter of its own: what is computed once is no part of it.
     train = partial(_decided, (lambda: fitter) if workers.are_here else fitter.made_anew)
     trained: dict[int, Trained] = {}

@@ -66,6 +66,9 @@ class Recipe:
         is when the sensor felt the event. Meant for labels that the same input follows each time, such as contact and
         lift. Labels of the kinds of touches have no such input, so their recipes leave it off. Scores are against the
         labels as given.
+    around_labels_ms : float, 0 or more, ms, optional
+        What is farther from an example's first and last label is neither learnt nor scored: for labels of what goes on
+        before and after them, as steps do. Default: all of it is, and nothing happened where no label is.
 
     Raises
     ------
@@ -87,6 +90,7 @@ class Recipe:
     about: str = ""
     source: str = ""
     align: bool = False
+    around_labels_ms: float | None = None
 
     def __post_init__(self) -> None:
         instance("encoder", self.encoder, Encoder)
@@ -95,6 +99,8 @@ class Recipe:
         text("about", self.about)
         text("source", self.source)
         flag("align", self.align)
+        if self.around_labels_ms is not None:
+            finite("around_labels_ms", self.around_labels_ms, least=0.0)
         if not isinstance(self.neurons, Mapping):
             raise refused("neurons", f" is {shown(self.neurons)}: must be parameters by label")
         learner_from("learner", self.learner)
