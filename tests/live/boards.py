@@ -4,7 +4,6 @@ import socket
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 from loopback import until
@@ -29,6 +28,18 @@ def presses(presses: int) -> Events:
             p.append(k < 10)
     n = len(t)
     return Events(t, np.full(n, 1), np.full(n, 2), p, array=SMALL, intensity=np.array(ticks))
+
+
+def touches(count: int) -> Events:
+    """Each 40 ms two taxels rise and fall again, one 400 us behind the other."""
+    rows = []
+    for press in range(count):
+        for k in range(20):
+            for x, behind in ((1, 0), (2, 400)):
+                ticks = 20 + 3 * (k if k < 10 else 19 - k)
+                rows.append((press * 40_000 + k * 200 + behind, x, 2, k < 10, ticks))
+    t, x, y, p, ticks = zip(*sorted(rows), strict=True)
+    return Events(t, x, y, p, array=SMALL, intensity=np.array(ticks))
 
 
 def datagrams(events: Events) -> list[bytes]:
@@ -66,14 +77,6 @@ def listening(process: subprocess.Popen[str]) -> None:
         if "listening" in line:
             return
     raise AssertionError("ended before it listened")
-
-
-def recording(file: Path, port: int, *more: object) -> subprocess.Popen[str]:
-    """Begin ``taxel record``."""
-    arguments = command("record", file, "--host", LOOPBACK, "--port", port, "--array", "4x4", *more)
-    return subprocess.Popen(
-        arguments, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
 
 
 def spikes_of(events: Events) -> list[tuple[int, int, float]]:

@@ -4,13 +4,12 @@ import json
 import os
 import pty
 import socket
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from loopback import free_port
 from shell import run
 
 import taxel
@@ -125,30 +124,25 @@ def test_a_pulled_cable_is_found_again_and_the_board_set_as_it_was(tmp_path: Pat
 
 
 def test_the_command_does_all_of_it_on_an_emulated_board() -> None:
-    emulate = [sys.executable, "-m", "taxel", "emulate", "--control", "0", "--port", "9", "--wire", "2", "--tare", "0"]
-    board = subprocess.Popen(emulate, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    try:
-        place = next(line.split()[-1] for line in board.stderr if line.startswith("commands are accepted"))
-        shown = json.loads(run("device", "show", place, "--json").stdout)
-        assert (shown["rows"], shown["columns"], shown["wire_version"]) == (64, 64, 2)
-        assert shown["registers"]["line_period"] == 3.0
-        assert "line_period" in run("device", "show", place).stdout
-        said = json.loads(run("device", "set", place, "noise_floor=6", "ramp=140", "--json").stdout)
-        assert (said["registers"]["noise_floor"], said["registers"]["ramp"]) == (6, 140)
-        assert run("device", "set", place, "noise_floor=7").stdout == "noise_floor: 6 -> 7 ticks\n"
-        assert "nothing changed" in run("device", "set", place, "noise_floor=7").stdout
-        assert json.loads(run("device", "apply", place, "2 kHz", "--json").stdout)["registers"]["line_period"] == 7.81
-        assert json.loads(run("device", "set", place, "record=false", "--json").stdout)["registers"]["record"] == 0
-        refused = run("device", "set", place, "line_read=99999")
-        assert refused.returncode == 3
-        assert "rule 1" in refused.stderr
-        assert refused.stderr.count("\n") == 1
-    finally:
-        board.send_signal(2)
-        out, _ = board.communicate(timeout=60)
-    assert board.returncode == 0
-    assert "datagrams, " in out
-    gone = run("device", "show", place)
+    ours, theirs = pty.openpty()
+    serve(Board(Registers(wire_version=2)), ours, ours)
+    place = os.ttyname(theirs)
+    shown = json.loads(run("device", "show", place, "--json").stdout)
+    assert (shown["rows"], shown["columns"], shown["wire_version"]) == (64, 64, 2)
+    assert shown["registers"]["line_period"] == 3.0
+    assert "line_period" in run("device", "show", place).stdout
+    said = json.loads(run("device", "set", place, "noise_floor=6", "ramp=140", "--json").stdout)
+    assert (said["registers"]["noise_floor"], said["registers"]["ramp"]) == (6, 140)
+    assert run("device", "set", place, "noise_floor=7").stdout == "noise_floor: 6 -> 7 ticks\n"
+    assert "nothing changed" in run("device", "set", place, "noise_floor=7").stdout
+    assert json.loads(run("device", "apply", place, "2 kHz", "--json").stdout)["registers"]["line_period"] == 7.81
+    assert json.loads(run("device", "set", place, "record=false", "--json").stdout)["registers"]["record"] == 0
+    refused = run("device", "set", place, "line_read=99999")
+    assert refused.returncode == 3
+    assert "rule 1" in refused.stderr
+    assert refused.stderr.count("\n") == 1
+    os.close(theirs)
+    gone = run("device", "show", f"127.0.0.1:{free_port(socket.SOCK_STREAM)}")
     assert (gone.returncode, gone.stderr.count("\n")) == (3, 1)
     assert json.loads(run("device", "ports", "--json").stdout) == [
         {"place": p.place, "kind": p.kind, "product": p.product, "maker": p.maker, "serial": p.serial, "usb": p.usb}

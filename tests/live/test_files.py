@@ -1,7 +1,5 @@
 """Files of recordings: locked while they are written, whole or not there, never lost without a word."""
 
-import signal
-import time
 from pathlib import Path
 
 import pytest
@@ -9,8 +7,9 @@ from loopback import free_port
 from shell import run
 
 import taxel
+from taxel.live import Live
 
-from .boards import LOOPBACK, listening, play, presses, recording
+from .boards import LOOPBACK, SMALL, play, presses, wait_for
 
 
 def test_a_recording_to_which_nothing_came_is_not_kept(tmp_path: Path) -> None:
@@ -24,18 +23,13 @@ def test_a_recording_to_which_nothing_came_is_not_kept(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("earlier", [False, True])
 def test_a_second_recorder_does_not_take_the_file_of_a_running_one(tmp_path: Path, earlier: bool) -> None:
-    port, file = free_port(), tmp_path / "walk.mcap"
+    file = tmp_path / "walk.mcap"
     if earlier:
         file.write_bytes(b"an earlier one")
-    with recording(file, port, "--overwrite") as first:
-        listening(first)
-        play(presses(2), port)
+    with Live(0, host=LOOPBACK, array=SMALL, record=file, overwrite=True) as first:
+        sent = play(presses(2), first.address[1])
         done = run("record", file, "--host", LOOPBACK, "--port", free_port(), "--overwrite", "--seconds", 0.1)
         said = "is being recorded by another program; end that first, or name another file"
         assert (done.returncode, done.stderr) == (3, f"taxel: {file}: {said}\n")
-        play(presses(2), port)
-        time.sleep(0.3)
-        first.send_signal(signal.SIGINT)
-        out, _ = first.communicate(timeout=60)
-    assert first.returncode == 0, out
+        wait_for(first, sent + play(presses(2), first.address[1]))
     assert len(taxel.open(file).events) == 2 * len(presses(2))

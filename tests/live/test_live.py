@@ -87,22 +87,6 @@ def test_a_board_that_lags_its_own_clock_gives_the_detections_of_its_recording(
     assert counters["detections"] == len(again) + counters["wrong"]
 
 
-def test_what_a_thread_keeps_for_itself_lasts_from_one_call_to_the_next() -> None:
-    own, calls = threading.local(), []
-
-    def count(said: Detection) -> None:
-        own.calls = getattr(own, "calls", 0) + 1
-        calls.append((threading.get_ident(), own.calls))
-
-    with Live(0, host=LOOPBACK, array=SMALL, readout=touch(), guard_frames=1e6, say=count) as live:
-        play(presses(6), live.address[1])
-        for _ in zip(range(4), live, strict=False):
-            pass
-    each = {thread: [k for t, k in calls if t == thread] for thread, _ in calls}
-    assert all(numbers == list(range(1, len(numbers) + 1)) for numbers in each.values()), calls
-    assert max(len(numbers) for numbers in each.values()) > 1
-
-
 def test_what_the_callers_function_raises_is_raised() -> None:
     def refuse(said: Detection) -> None:
         raise LookupError(f"nothing to do with {said.label}")
@@ -132,25 +116,3 @@ def test_ctrl_c_ends_a_wait_for_detections() -> None:
         threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
         with pytest.raises(KeyboardInterrupt):
             live.next(60)
-
-
-def test_stop_from_several_threads_gives_each_the_same_summary() -> None:
-    for _ in range(10):
-        live = Live(0, host=LOOPBACK, array=SMALL)
-        wait_for(live, play(presses(1), live.address[1]))
-        ends: list[object] = []
-        begin = threading.Barrier(4)
-
-        def stop(live: Live = live, ends: list[object] = ends, begin: threading.Barrier = begin) -> None:
-            begin.wait()
-            try:
-                ends.append(live.stop())
-            except Exception as error:
-                ends.append(error)
-
-        threads = [threading.Thread(target=stop) for _ in range(4)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        assert ends == [live.stop()] * 4

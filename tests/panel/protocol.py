@@ -7,13 +7,13 @@ import socket
 import struct
 import time
 from contextlib import contextmanager
-from types import SimpleNamespace
-from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from loopback import free_port
-from panel.browser import running
+from tests.live.emulated import ARRAY, emulated
+
+from taxel.live import Live
+from taxel.panel import Panel
 
 websockets = pytest.importorskip("websockets", reason="the test extra brings websockets")
 
@@ -150,25 +150,15 @@ def heard(live, events):
 
 
 @contextmanager
-def page_of_a_board(folder, *options):
-    """A client of the command's panel, which hears an emulated board and holds its serial line."""
-    port = str(free_port())
-    with running("emulate", "--port", port, "--control", "0", *options, folder=folder) as emulated:
-        control = emulated.wait_for(r"commands are accepted at (\S+)")
-        panel = ("live", "--panel", "--port", port, "--host", "127.0.0.1", "--control", control)
-        with running(*panel, folder=folder) as server:
-            url = urlsplit(server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
-            door = SimpleNamespace(address=(url.hostname, url.port), token=url.fragment.removeprefix("token="))
-            with Client(door) as page:
-                yield page
-
-
-def spikes_of(page, columns):
-    """The section of spikes, by column of time, of the last frame."""
-    frame = page.frames[-1]
-    first, rows = head(frame)[0]["first"], head(frame)[0]["rows"]
-    ups = section(frame, 6, "u1").reshape(-1, rows)
-    return {column: list(np.flatnonzero(ups[column - first])) for column in columns}
+def page_of_a_board(folder, **fields):
+    """An emulated board, a panel that hears it and holds its serial line, and a client of that."""
+    with (
+        emulated(**fields) as board,
+        Live(board.port, host="127.0.0.1", array=ARRAY) as live,
+        Panel(live, control=board.place, folder=folder) as panel,
+        Client(panel) as page,
+    ):
+        yield board, panel, page
 
 
 def opened(page, name, **more):

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import random
-import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -38,29 +35,6 @@ def mark(table: Path, label: str, t: int, **of_file) -> None:
 
 def held(table: Path) -> list[tuple[str, int]]:
     return sorted((row.text, row.t or 0) for row in taxel.Labels(table).rows)
-
-
-def label(table: Path, name: str, seed: int, until: float, last_save) -> tuple[set[int], set[int]]:
-    """Mark, move and delete labels of one name at random; return the times acknowledged since the last older text."""
-    choose, file = random.Random(seed), LabelFile(table, OWN)
-    there: dict[int, float] = {}
-    gone: dict[int, float] = {}
-    while time.monotonic() < until:
-        begun, new = time.monotonic(), choose.randrange(10**9)
-        kind = choose.choice(["mark", "move", "delete"]) if there else "mark"
-        old = choose.choice(list(there)) if kind != "mark" else None
-        edit = None if old is None else Note(name, old), None if kind == "delete" else Note(name, new)
-        since = there.pop(old, math.inf)
-        try:
-            file.change([edit])
-        except ProblemError:
-            # An older table may have won, so that the label was no longer there.
-            assert since <= last_save.value
-            continue
-        there |= {new: begun} if edit[1] else {}
-        gone |= {old: begun} if old is not None else {}
-    since = last_save.value
-    return {t for t, at in there.items() if at > since}, {t for t, at in gone.items() if at > since}
 
 
 NOTES = st.builds(

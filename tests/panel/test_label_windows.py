@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections import Counter
-from contextlib import contextmanager
 from pathlib import Path
-from types import SimpleNamespace
-from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
 from panel.protocol import Client, row
-from tests.panel.browser import running
 
 import taxel
 from taxel.panel import Panel
@@ -30,15 +25,6 @@ def walk(tmp_path: Path) -> Path:
 @pytest.fixture
 def table(walk: Path) -> Path:
     return walk.with_suffix(".notes.csv")
-
-
-@contextmanager
-def server(recording: Path):
-    """A `taxel view` of its own; also how to connect to it."""
-    with running("view", recording.name, "--no-open", "--json", folder=recording.parent) as process:
-        said = json.loads(process.wait_for(r"(\{.*\})"))
-        url = urlsplit(said["url"])
-        yield process.process, SimpleNamespace(address=(url.hostname, url.port), token=said["token"])
 
 
 def told(page: Client) -> list[tuple[str, int]]:
@@ -61,7 +47,7 @@ def held(table: Path) -> Counter:
 
 
 def test_a_page_shows_what_another_window_and_a_hand_write_and_refuses_to_change_what_is_gone(walk, table):
-    with server(walk) as (_, one), server(walk) as (_, other), Client(one) as here, Client(other) as there:
+    with Panel(walk) as one, Panel(walk) as other, Client(one) as here, Client(other) as there:
         opened(here)
         opened(there)
 

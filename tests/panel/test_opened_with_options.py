@@ -57,7 +57,7 @@ def test_a_folder_of_bags_is_shown_by_options_that_hold_for_each(capsys, tmp_pat
         palms(tmp_path / "bags", name)
     folder = tmp_path / "bags"
     assert [file.name for file in recordings_in(folder)] == sorted(KINDS)
-    with viewed(tmp_path, folder, "--topic", "/palm", "--array", "24x32") as page:
+    with shown(folder, topic=["/palm"], array=["24x32"]) as page:
         page.send(type="recordings")
         files = {one["name"]: one["bytes"] for one in page.until("recordings")["files"]}
         assert set(files) == set(KINDS)
@@ -141,8 +141,8 @@ def test_frames_are_in_the_unit_of_a_calibration(capsys, tmp_path):
     with viewed(tmp_path, "press.npz", "--calibration", "of another name.json") as page:
         about = opened(page, "press.npz")
         assert about["frames"]["unit"] == "N"
-        shown, _ = values_at(page, about, 20_000)
-        assert np.allclose(shown, calibration.apply(frames).values[2], atol=about["frames"]["step"])
+        values, _ = values_at(page, about, 20_000)
+        assert np.allclose(values, calibration.apply(frames).values[2], atol=about["frames"]["step"])
         assert [one["rest"] for one in about["frames"]["sources"]] == ["given"]
     taxel.convert(Frames(np.zeros((2, 3, 2)), [0, 1000], unit="counts", array=Array(3, 2)), tmp_path / "other.npz")
     words = (tmp_path / "other.npz", "--calibration", tmp_path / "of another name.json", "--seconds", 1)

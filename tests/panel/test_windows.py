@@ -61,7 +61,7 @@ def columns_of(frames):
     return sums
 
 
-@pytest.mark.parametrize("column_us", [1000, 4000, 8000, 64_000, 4_096_000])
+@pytest.mark.parametrize("column_us", [1000, 64_000])
 def test_the_window_ends_where_it_is_asked_to_and_the_time_moves_in_it(steps, column_us):
     with Panel(steps) as panel, Client(panel) as page:
         page.send(type="credit", n=2)
@@ -87,7 +87,8 @@ def test_the_window_ends_where_it_is_asked_to_and_the_time_moves_in_it(steps, co
                 f * (begin < 1_000_000 * s + 500_000 and last >= 1_000_000 * s) for s, f in ((2, 30), (5, 60), (8, 90))
             )
             assert near(found, inside), (column, found, inside)
-        assert page.ask("zoom", column_us=column_us, end_us="soon")["field"] == "end_us"
+        for field, wrong in (("end_us", "soon"), ("column_us", 3000), ("column_us", 125 << 21)):
+            assert page.ask("zoom", **{"column_us": column_us, field: wrong})["field"] == field
 
 
 def test_a_view_that_plays_beyond_its_window_takes_it_along(steps):

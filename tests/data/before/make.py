@@ -11,8 +11,7 @@ import tty
 from pathlib import Path
 
 import numpy as np
-from live.boards import LOOPBACK, SMALL, datagrams, play, presses, touch, wait_for
-from live.test_plain_rule import touches
+from live.boards import LOOPBACK, SMALL, datagrams, play, presses, touch, touches, wait_for
 from loopback import until
 from test_before import contents
 
