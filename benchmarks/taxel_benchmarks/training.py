@@ -33,7 +33,7 @@ from taxel.cli.console import Console
 from taxel.demo.script import script
 from taxel.detect import Example, Readout, Recipe, fit, judge, score
 from taxel.detect import run as detect
-from taxel.detect.folds import count_of_folds, whole
+from taxel.detect.folds import count_of_folds
 from taxel.detections import Detections
 from taxel.encode import Composite
 from taxel.live import Live
@@ -109,7 +109,7 @@ def learnt(example: Example) -> Readout:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # targets out of reach are counted as missed
         recipe = Recipe.load("touch", labels=LABELS)
-        judged = judge([example], recipe, count_of_folds([example], whole([example]))[0])
+        judged = judge([example], recipe, count_of_folds([example])[0])
         return fit([example], recipe, by_rule=judged.by_rule)
 
 

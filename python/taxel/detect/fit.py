@@ -185,7 +185,7 @@ class Fitter:
         #: Makes the same fitter in another process, where nobody is told of its progress.
         self.made_anew = partial(Fitter, examples, recipe, window_ms=window_ms, frame_us=frame_us)
         #: All of the examples.
-        self.whole = whole(self.examples, recipe.around_labels_ms)
+        self.whole = whole(self.examples)
         of_board = max(noise_floor(example[0]) for example in examples)
         recipe = _above(instance("recipe", recipe, Recipe), of_board)
         self._in_frames = in_frames(recipe, self.examples, clocks)
@@ -256,8 +256,9 @@ class Fitter:
         for fold in halves or [Fold(parts, parts)]:
             with collected(), contextlib.suppress(ProblemError):
                 trained = self.fit(fold.train)
-                found += [self.detected(trained, part) for part in fold.test]
-                parts_found += fold.test
+                tested = [self.scored(part) for part in fold.test]
+                found += [self.detected(trained, part) for part in tested]
+                parts_found += tested
         each = ([one.by_neurons for one in found], [one.by_rules for one in found])
         return better_by_rule(self.labels, *(self.score(way, parts_found) for way in each)) if found else ()
 
@@ -270,6 +271,14 @@ class Fitter:
         if self._tuning is None or (own and self._own is None):
             return dict.fromkeys(self.labels)
         return self._tuning.best_rules(parts, self._own if own else None)
+
+    def scored(self, part: Part) -> Part:
+        """Return what is scored of a part of an example: by the recipe, no more than what is near its labels."""
+        around, times = self._recipe.around_labels_ms, self.examples[part.example].labels.values()
+        if around is None or not any(map(len, times)):
+            return part
+        t, around_us = np.concatenate(list(times)), float(to_us(around))
+        return Part(part.example, max(part.start, t.min() - around_us), min(part.stop, t.max() + around_us))
 
     def detected(self, trained: Trained, part: Part, own: Rules | None = None) -> Found:
         """Return what the neurons and the rules of a training detect in a part, and what the labels' own rules do."""

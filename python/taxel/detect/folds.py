@@ -14,7 +14,6 @@ from taxel._base.errors import refused
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.detect.examples import Example
-from taxel.spikes import to_us
 
 __all__ = ["Fold", "Part", "count_of_folds", "folds_of", "inside", "split", "whole"]
 
@@ -70,8 +69,8 @@ class Fold(NamedTuple):
     test: Sequence[Part]
 
 
-def count_of_folds(examples: Sequence[Example], parts: Sequence[Part]) -> tuple[int, str]:
-    """Return into how many folds parts of (checked) examples are split by default; 0 where they cannot be, and why.
+def count_of_folds(examples: Sequence[Example]) -> tuple[int, str]:
+    """Return into how many folds (checked) examples are split by default; 0 where they cannot be, and why.
 
     At most five, not more than half the events of the rarest label, of several examples not more than these. Each
     label must be in the training data of every fold.
@@ -81,6 +80,7 @@ def count_of_folds(examples: Sequence[Example], parts: Sequence[Part]) -> tuple[
         for label, times in example.labels.items():
             counts[label] += len(times)
     rarest = min(counts, key=lambda label: counts[label])
+    parts = whole(examples)
     recordings = len(_group(examples, parts))
     most = min(_MOST, counts[rarest] // 2, *([recordings] if recordings > 1 else []))
     if most < 2:
@@ -107,24 +107,17 @@ def _lacks(examples: Sequence[Example], parts: Sequence[Part], labels: Iterable[
     return None
 
 
-def whole(examples: Sequence[Example], around_labels_ms: float | None = None) -> list[Part]:
-    """Return each example as a part: all of it, or from so much before its first label to after its last."""
-    parts = [Part(n) for n in range(len(examples))]
-    if around_labels_ms is None:
-        return parts
-    around = round(float(to_us(around_labels_ms)))
-    times = [_only_inside(example, part) for example, part in zip(examples, parts, strict=True)]
-    return [
-        part._replace(start=float(t[0] - around), stop=float(t[-1] + around + 1)) if len(t) else part
-        for part, t in zip(parts, times, strict=True)
-    ]
+def whole(examples: Sequence[Example]) -> list[Part]:
+    """Return each example as a part."""
+    return [Part(n) for n in range(len(examples))]
 
 
-def folds_of(examples: Sequence[Example], parts: Sequence[Part], k: int | Sequence[Fold]) -> tuple[Sequence[Fold], str]:
-    """Return folds, made of parts or given, and what they hold out."""
+def folds_of(examples: Sequence[Example], k: int | Sequence[Fold]) -> tuple[Sequence[Fold], str]:
+    """Return folds, made or given, and what they hold out."""
     if isinstance(k, Sequence) and not isinstance(k, str):
         return _check_folds(k, len(examples)), f"{len(k)} given folds"
     count = integer("folds", k, 2, 2**31)
+    parts = whole(examples)
     recordings = len(_group(examples, parts))
     if recordings > 1 and count > recordings:
         raise refused("folds", f" is {count}: must be at most {recordings}, the number of recordings")

@@ -145,7 +145,7 @@ def judge(
 
 def judge_by(fitter: Fitter, k: int | Sequence[Fold], workers: Workers = HERE) -> Judged:
     """Return what `judge` does, by a fitter that may have been used before; `workers` train the folds."""
-    folds, how = folds_of(fitter.examples, fitter.whole, k)
+    folds, how = folds_of(fitter.examples, k)
     # Another process makes a fitter of its own: what is computed once is no part of it.
     train = partial(_decided, (lambda: fitter) if workers.are_here else fitter.made_anew)
     trained: dict[int, Trained] = {}
@@ -174,12 +174,12 @@ def scored(fitter: Fitter, folds: Sequence[Fold], trained: Sequence[Trained]) ->
     found: list[list[Found]] = []
     for fold, of_fold in zip(folds, trained, strict=True):
         own = fitter.rules(fold.train, own=True)
-        found.append([fitter.detected(of_fold, part, own) for part in fold.test])
+        found.append([fitter.detected(of_fold, fitter.scored(part), own) for part in fold.test])
 
     def each(way: str) -> list[Detections]:
         return [getattr(one, way) for of_fold in found for one in of_fold]
 
-    parts = [part for fold in folds for part in fold.test]
+    parts = [fitter.scored(part) for fold in folds for part in fold.test]
     chosen = [
         _chosen(one, of_fold.readout.by_rule)
         for of_fold, parts_found in zip(trained, found, strict=True)

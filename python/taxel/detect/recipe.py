@@ -67,8 +67,8 @@ class Recipe:
         lift. Labels of the kinds of touches have no such input, so their recipes leave it off. Scores are against the
         labels as given.
     around_labels_ms : float, 0 or more, ms, optional
-        What is farther from an example's first and last label is neither learnt nor scored: for labels of what goes on
-        before and after them, as steps do. Default: all of it is, and nothing happened where no label is.
+        What is farther from an example's first and last label is not scored, as what goes on there, such as steps, has
+        no label. Default: all of it is scored, and nothing happened where no label is.
 
     Raises
     ------

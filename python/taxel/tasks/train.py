@@ -281,10 +281,7 @@ class _Work:
         registers = self.opened[0].registers
         frame_us = None if registers is None else registers.frame_us
         fitter = Fitter(self.examples, plan, window_ms=window_ms, frame_us=frame_us, progress=self.update)
-        if folds is None:
-            count, why = count_of_folds(fitter.examples, fitter.whole)
-        else:
-            count, why = folds, "" if folds else "folds is 0"
+        count, why = count_of_folds(fitter.examples) if folds is None else (folds, "" if folds else "folds is 0")
         for line in _within_touches(fitter):
             warn(line)
             self.update(line, 0, 0)
