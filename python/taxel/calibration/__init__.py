@@ -23,8 +23,8 @@ from taxel._base.messages import counted, escaped, first_line
 from taxel._base.saved import Saved
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
-from taxel.calibration._curves import Curve, PointCurve, Power, Values, above_0, curve_of
-from taxel.calibration._loads import UNITS, CalibratedArray, Load, LoadEquations, best_exponent, gains, same
+from taxel.calibration._curves import Curve, Values, curve_of, power, table
+from taxel.calibration._loads import UNITS, Load, Measured, best_exponent, gains, same
 from taxel.frames import Frames
 from taxel.tare import Tare
 
@@ -169,7 +169,7 @@ class Calibration(Saved):
         array([0.5, 3. , 5. ], dtype=float32)
         """
         how = {"gain": gain, "rest": rest, "floor": floor, "date": date, "note": note}
-        return cls._made(array, PointCurve(readings, values), unit, reading_unit, how)
+        return cls._made(array, table(readings, values), unit, reading_unit, how)
 
     @classmethod
     def fit(
@@ -227,7 +227,7 @@ class Calibration(Saved):
         if not measured:
             raise refused("loads", " is empty: must contain at least one load")
         array, reading_unit = instance("frames", measured[0].frames, Frames).array, measured[0].frames.unit
-        curve: Curve = Power(1.0)
+        curve = Curve()
         if start is not None:
             instance("start", start, Calibration)
             same(array, start.array, "start")
@@ -237,21 +237,24 @@ class Calibration(Saved):
                 )
             curve, rest = start._curve, start.rest if rest is None else rest
         fitted = cls._made(array, curve, unit, reading_unit, {"rest": rest, "floor": floor, "date": date, "note": note})
-        sensor = CalibratedArray(array, reading_unit, unit, fitted._rest(None), fitted.floor)
-        equations = [LoadEquations.from_load(load, k, sensor) for k, load in enumerate(measured, start=1)]
-        differ = len({load.load for load in measured}) > 1
+        units, at_rest = (reading_unit, unit), fitted._rest(None)
+        known = [Measured.of(load, k, array, units, at_rest, fitted.floor) for k, load in enumerate(measured, start=1)]
+        is_fitted = exponent is None and curve.points is None and len({load.load for load in measured}) > 1
         if exponent is not None:
-            curve = curve.bent(above_0("exponent", exponent))
-        elif differ and not isinstance(curve, PointCurve):
-            curve = curve.bent(best_exponent(curve, equations))
-        each_gain, gain = gains(array, curve, equations, flag("each", each))
-        fitted._curve, fitted.gain = curve, each_gain
-        totals = [load_equations.total(curve, each_gain) for load_equations in equations]
-        missed = np.concatenate([load_equations.errors(curve, each_gain) for load_equations in equations])
-        unknown = 1 + (differ and exponent is None and not isinstance(curve, PointCurve))
-        unknown += int(np.count_nonzero(each_gain[array._there()] != gain)) if each else 0
+            if curve.points is not None:
+                raise refused("exponent", ": a table has no exponent; only the gain of a table is fitted")
+            curve = power(exponent)
+        elif is_fitted:
+            curve = Curve(best_exponent(known))
+        fitted._curve = curve
+        fitted.gain, gain = gains(array, curve, known, each=flag("each", each))
+        missed = np.concatenate([load.errors(curve, fitted.gain) for load in known])
+        unknown = 1 + is_fitted + (int(np.count_nonzero(fitted.gain[array._there()] != gain)) if each else 0)
         fitted.residual = float(np.sqrt(np.mean(missed**2))) if len(missed) > unknown else None
-        fitted.loads = tuple((load.load, load.unit, value) for load, value in zip(measured, totals, strict=True))
+        fitted.loads = tuple(
+            (load.load, load.unit, load.load * of.share(curve, fitted.gain))
+            for load, of in zip(measured, known, strict=True)
+        )
         return fitted
 
     def apply(self, frames: Frames, rest: Tare | ArrayLike | None = None) -> Frames:
@@ -288,10 +291,10 @@ class Calibration(Saved):
         return np.zeros(self.array.shape)
 
     def _values(self, readings: NDArray[Any], rest: Values) -> NDArray[np.float32]:
-        known = np.nan_to_num(rest)
-        read = np.asarray(readings, np.float64)
-        loaded = (read > known + self.floor) & ~np.isnan(rest) & self.array._there()
-        return _32_bits(np.where(loaded, self.gain * self._curve.values(read, known), 0.0))
+        above = np.asarray(readings, np.float64) - rest
+        values = np.where((above > self.floor) & self.array._there(), self.gain * self._curve.values(above), 0.0)
+        # As frames hold them.
+        return np.minimum(values, np.finfo(np.float32).max).astype(np.float32)
 
     def _region(self, columns: slice, rows: slice) -> Calibration:
         """Return the calibration of a rectangle of the array."""
@@ -392,12 +395,8 @@ class Calibration(Saved):
 
     def described(self) -> str:
         """Return a line with the curve, the day and the residual."""
-        (kind, values), count = next(iter(self._curve.to_dict().items())), len(self.loads)
-        curve = {
-            "power": f"power {values.get('exponent', 0):.3g}",
-            "table": f"table of {len(values.get('values', ()))}",
-        }
-        parts = [curve[kind]]
+        points, count = self._curve.points, len(self.loads)
+        parts = [f"power {self._curve.exponent:.3g}" if points is None else f"table of {len(points[1])}"]
         parts += [f"fit to {counted(count, 'load')}"] * bool(count)
         parts += [] if self.residual is None else [f"residual {100 * self.residual:.1f} %"]
         return ", ".join([f"{self.reading_unit} to {self.unit}", *parts, self.date])
@@ -405,11 +404,6 @@ class Calibration(Saved):
     def __repr__(self) -> str:
         size = f"{self.array.name}: {self.array.rows} x {self.array.columns} taxels"
         return escaped(f"Calibration({self.described()}, of {size})")
-
-
-def _32_bits(values: Values) -> NDArray[np.float32]:
-    """Return values as float32, as frames hold them; larger ones become the largest float32."""
-    return np.minimum(values, np.finfo(np.float32).max).astype(np.float32)
 
 
 def _by_taxel(name: str, value: Any, array: Array) -> Values:

@@ -1,10 +1,11 @@
-"""Curves from readings to N or kPa: a power, a table."""
+"""Curves from readings above rest to N or kPa: a power, or straight lines through known points."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Protocol
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,74 +21,59 @@ N_PER_KPA_MM2 = 1e-3
 Values = NDArray[np.float64]
 
 
-class Curve(Protocol):
-    """Conversion of readings to values by a taxel of gain 1; both rise."""
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Conversion of readings above rest to values by a taxel of gain 1; both rise.
 
-    def values(self, readings: Values, rest: Values) -> Values:
-        """Return the values of readings, each with its rest."""
-        ...
+    A power, whose gain is the value where the reading is 1; or, if there are points, straight lines through them, with
+    the last value beyond.
+    """
 
-    def to_dict(self) -> dict[str, Any]:
+    exponent: float = 1.0
+    points: tuple[Values, Values] | None = None
+
+    def values(self, above: Values) -> Values:
+        """Return the values of readings above rest."""
+        if self.points is not None:
+            return np.asarray(np.interp(above, *self.points))
+        return np.asarray(np.maximum(above, 0.0) ** self.exponent)
+
+    def to_dict(self) -> dict[str, dict[str, Any]]:
         """Return the curve as plain values, as files hold it."""
-        ...
-
-    def bent(self, exponent: float) -> Curve:
-        """Return the same with another exponent of the value by what is read."""
-        ...
+        if self.points is None:
+            return {"power": {"exponent": self.exponent}}
+        return {"table": {name: of.tolist() for name, of in zip(("readings", "values"), self.points, strict=True)}}
 
 
-class Power:
-    """A power of the reading above rest; the gain is the value where that reading is 1."""
-
-    def __init__(self, exponent: object) -> None:
-        self.exponent = above_0("exponent", exponent)
-
-    def values(self, readings: Values, rest: Values) -> Values:
-        return np.asarray(np.maximum(readings - rest, 0.0) ** self.exponent)
-
-    def to_dict(self) -> dict[str, Any]:
-        return {"power": {"exponent": self.exponent}}
-
-    def bent(self, exponent: float) -> Power:
-        return Power(exponent)
+def power(exponent: object) -> Curve:
+    """Return a power of the reading."""
+    return Curve(above_0("exponent", exponent))
 
 
-class PointCurve:
-    """Straight lines through known points; the last value holds beyond its point."""
-
-    def __init__(self, readings: Any, values: Any) -> None:
-        self.x, self.y = floats("readings", readings), floats("values", values)
-        if not self.y.size or len(self.x) != len(self.y):
-            raise ProblemError(
-                f"the table has {counted(len(self.x), 'reading')} and {counted(len(self.y), 'value')}: must have as "
-                "many readings as values, 1 or more"
-            )
-        for name, column in (("readings", self.x), ("values", self.y)):
-            rising = np.isfinite(column) & (np.diff(column, prepend=-np.inf) > 0) & (column >= 0)
-            if not rising.all():
-                k = int(np.argmin(rising))
-                raise ProblemError(f"{name}[{k}] is {column[k]:g}: the numbers must begin at 0 or more, and rise")
-        if (self.x[0] == 0) != (self.y[0] == 0):
-            raise ProblemError(
-                f"the table begins with reading {self.x[0]:g}, value {self.y[0]:g}: the value must be 0 where the "
-                "reading above rest is 0, and only there"
-            )
-        if self.x[0]:
-            self.x, self.y = np.append(0.0, self.x), np.append(0.0, self.y)
-
-    def values(self, readings: Values, rest: Values) -> Values:
-        return np.asarray(np.interp(readings - rest, self.x, self.y))
-
-    def to_dict(self) -> dict[str, Any]:
-        return {"table": {"readings": self.x.tolist(), "values": self.y.tolist()}}
-
-    def bent(self, exponent: float) -> PointCurve:  # noqa: ARG002  what a curve with an exponent takes
-        raise refused("exponent", ": a table has no exponent; only the gain of a table is fitted")
+def table(readings: Any, values: Any) -> Curve:
+    """Return straight lines through points that rise, from 0 on."""
+    x, y = floats("readings", readings), floats("values", values)
+    if not y.size or len(x) != len(y):
+        raise ProblemError(
+            f"the table has {counted(len(x), 'reading')} and {counted(len(y), 'value')}: must have as many readings as "
+            "values, 1 or more"
+        )
+    for name, column in (("readings", x), ("values", y)):
+        rising = np.isfinite(column) & (np.diff(column, prepend=-np.inf) > 0) & (column >= 0)
+        if not rising.all():
+            k = int(np.argmin(rising))
+            raise ProblemError(f"{name}[{k}] is {column[k]:g}: the numbers must begin at 0 or more, and rise")
+    if (x[0] == 0) != (y[0] == 0):
+        raise ProblemError(
+            f"the table begins with reading {x[0]:g}, value {y[0]:g}: the value must be 0 where the reading above rest "
+            "is 0, and only there"
+        )
+    return Curve(points=(np.append(0.0, x), np.append(0.0, y)) if x[0] else (x, y))
 
 
 def curve_of(document: Mapping[str, Any]) -> Curve:
     """Return the curve that a file describes."""
-    kinds: dict[str, Any] = {"power": Power, "table": PointCurve}
+    kinds: dict[str, Any] = {"power": power, "table": table}
     if len(document) != 1 or next(iter(document)) not in kinds:
         raise ProblemError(f"{shown(dict(document))}: must be one of {', '.join(kinds)}")
     ((kind, values),) = document.items()

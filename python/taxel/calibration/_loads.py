@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, integer, several, shown
 from taxel._base.arguments import text as checked_text
@@ -55,97 +55,86 @@ class Load(NamedTuple):
     taxel: tuple[int, int] | None = None
 
 
-class CalibratedArray(NamedTuple):
-    """Sensor to calibrate: its array, the units of its readings and of the result, its rest, and the floor above it."""
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What a load says of the taxels that read it, from their mean readings above the floor.
 
-    array: Array
-    reading_unit: str
-    unit: str
-    rest: Values
-    floor: float
-
-
-class LoadEquations(NamedTuple):
-    """The equations of a load: its taxels, their weights and the value; from mean readings above the floor."""
+    Parameters
+    ----------
+    load : float
+    above : float64, shape (rows, columns)
+        Readings above rest; NaN where a taxel does not count.
+    weight : float64, shape (rows, columns)
+        The load's unit by that of the calibration.
+    alone : bool
+        Whether each taxel has to make the load by itself.
+    """
 
     load: float
-    weight: float | Values
-    readings: Values
-    rest: Values
-    chosen: NDArray[np.bool_]
+    above: Values
+    weight: Values
     alone: bool
-    """Whether each chosen taxel has to make the load by itself."""
 
     @classmethod
-    def from_load(cls, load: Load, number_of: int, sensor: CalibratedArray) -> LoadEquations:
+    def of(
+        cls, load: Load, number_of: int, array: Array, units: tuple[str, str], rest: Values, floor: float
+    ) -> Measured:
+        """Return what a load says; `units` are those of readings and of the calibration."""
         frames, location = instance("frames", load.frames, Frames), f"load {number_of}"
-        same(sensor.array, frames.array, f"the frames of {location}", frames.unit, sensor.reading_unit)
+        same(array, frames.array, f"the frames of {location}", frames.unit, units[0])
         value, unit = above_0(location, load.load), checked_text("unit", load.unit, UNITS)
         if not len(frames):
             raise ProblemError(f"{location}: no frame was recorded while the load was on the array")
-        rest = sensor.rest
-        readings = frames.values.mean(axis=0, dtype=np.float64)
-        chosen = sensor.array._there() & ~np.isnan(rest)
+        above = frames.values.mean(axis=0, dtype=np.float64) - rest
+        chosen = array._there() & (above > floor)
         if load.taxel is not None:
             only = several(f"{location}, taxel", load.taxel)
             if len(only) != 2:
                 raise ProblemError(f"{location}, taxel is {shown(load.taxel)}: must be a column and a row")
             x, y = (integer(f"{location}, taxel", n, 0) for n in only)
-            index = int(sensor.array.index(x, y))
-            chosen &= np.arange(chosen.size).reshape(chosen.shape) == index
-        rest = np.nan_to_num(rest)
-        loaded = chosen & (readings > rest + sensor.floor)
-        if not loaded.any():
-            raise ProblemError(
-                f"{location}: no taxel reads more than {sensor.floor:g} {sensor.reading_unit} above its rest"
-            )
-        weight: float | Values = 1.0
-        if unit != sensor.unit:
-            areas = sensor.array.area_mm2
-            if areas is None:
+            chosen &= np.arange(chosen.size).reshape(chosen.shape) == int(array.index(x, y))
+        if not chosen.any():
+            raise ProblemError(f"{location}: no taxel reads more than {floor:g} {units[0]} above its rest")
+        weight = np.ones(array.shape)
+        if unit != units[1]:
+            if array.area_mm2 is None:
                 raise ProblemError(
-                    f"{location}: the unit is {unit}, but that of the calibration is {sensor.unit}; to convert, "
-                    f"taxel needs "
-                    f"the area of each taxel, which is unknown for {sensor.array!r}"
+                    f"{location}: the unit is {unit}, but that of the calibration is {units[1]}; to convert, taxel "
+                    f"needs the area of each taxel, which is unknown for {array!r}"
                 )
-            weight = 1 / (areas * N_PER_KPA_MM2) if unit == "kPa" else areas * N_PER_KPA_MM2
-        alone = unit == "kPa" or load.taxel is not None
+            newtons = array.area_mm2 * N_PER_KPA_MM2
+            weight = 1 / newtons if unit == "kPa" else newtons
         # Uniform pressure is on every taxel: one that reads nothing is broken, and no measure of the others.
-        return cls(value, weight, readings, rest, loaded, alone)
+        alone = unit == "kPa" or load.taxel is not None
+        return cls(value, np.where(chosen, above, np.nan), weight, alone)
 
-    def by_taxel(self, curve: Curve, gain: float | Values = 1.0) -> Values:
-        """Return the value of each chosen taxel, in the load's own unit; 0 elsewhere."""
-        values = self.weight * gain * curve.values(self.readings, self.rest)
-        return np.where(self.chosen, values, 0.0)
+    def shares(self, curve: Curve, gain: float | Values = 1.0) -> Values:
+        """Return the share of the load that each taxel makes, shape (rows, columns); NaN where it does not count."""
+        return np.asarray(self.weight * gain * curve.values(self.above) / self.load)
 
-    def total(self, curve: Curve, gain: float | Values = 1.0) -> float:
-        """Return the value of all chosen taxels: the sum of forces, the mean of pressures."""
-        readings = self.by_taxel(curve, gain)[self.chosen]
-        return float(readings.mean() if self.alone else readings.sum())
+    def share(self, curve: Curve, gain: float | Values = 1.0) -> float:
+        """Return the share of the load that all make: the sum of forces, the mean of pressures."""
+        shares = self.shares(curve, gain)
+        return float(np.nanmean(shares) if self.alone else np.nansum(shares))
 
     def errors(self, curve: Curve, gain: Values) -> Values:
         """Return the error of each equation, as a share of the load."""
-        if self.alone:
-            return np.asarray(self.by_taxel(curve, gain)[self.chosen] / self.load - 1.0)
-        return np.array([self.total(curve, gain) / self.load - 1.0])
+        shares = self.shares(curve, gain)
+        return (shares[~np.isnan(shares)] if self.alone else np.nansum(shares, keepdims=True).reshape(1)) - 1.0
 
 
-def _least(totals: Sequence[float], loads: Sequence[float]) -> tuple[float, float]:
-    """Return the gain with the least squares of relative error, and their mean."""
-    share = np.array(totals) / np.array(loads)
-    gain = float(share.sum() / (share**2).sum()) if (share > 0).any() else 1.0
-    return gain, float(np.mean((gain * share - 1.0) ** 2))
+def _least(shares: Values) -> tuple[float, float]:
+    """Return the gain of loads with the least squares of relative error, by the share that each is, and their mean."""
+    gain = float(shares.sum() / (shares**2).sum()) if (shares > 0).any() else 1.0
+    return gain, float(np.mean((gain * shares - 1.0) ** 2))
 
 
-def best_exponent(curve: Curve, equations: Sequence[LoadEquations]) -> float:
+def best_exponent(measured: Sequence[Measured]) -> float:
     """Return the exponent whose best gain has the least squares of relative error."""
     from scipy.optimize import minimize_scalar  # noqa: PLC0415  loads slowly
 
-    loads = [load.load for load in equations]
-
     def missed(log: float) -> float:
-        bent = curve.bent(math.exp(log))
-        return _least([load.total(bent) for load in equations], loads)[1]
+        return _least(np.array([load.share(Curve(math.exp(log))) for load in measured]))[1]
 
     # A grid comes first, as the squares may have several minima.
     grid = np.linspace(math.log(_EXPONENTS[0]), math.log(_EXPONENTS[1]), 33)
@@ -158,27 +147,26 @@ def best_exponent(curve: Curve, equations: Sequence[LoadEquations]) -> float:
     if alike:
         also = ", ".join(f"{exponent:.3g}" for exponent in alike)
         warn(
-            f"loads: the exponent {best[1]:.3g} is used, but {also} would fit the loads as well; to be sure, "
-            f"add a load "
-            "or give the exponent",
+            f"loads: the exponent {best[1]:.3g} is used, but {also} would fit the loads as well; to be sure, add a "
+            "load or give the exponent",
             stacklevel=3,
         )
     return best[1]
 
 
-def gains(array: Array, curve: Curve, equations: Sequence[LoadEquations], each: bool) -> tuple[Values, float]:
+def gains(array: Array, curve: Curve, measured: Sequence[Measured], *, each: bool) -> tuple[Values, float]:
     """Return the gain of each taxel, and the common one."""
-    common, _ = _least([load.total(curve) for load in equations], [load.load for load in equations])
+    common, _ = _least(np.array([load.share(curve) for load in measured]))
     by_taxel = np.full(array.shape, common)
     if not each:
         return by_taxel, common
-    if not any(load.alone for load in equations):
+    if not any(load.alone for load in measured):
         raise refused(
             "each", ": no load determines a single taxel; give a load of uniform pressure (kPa), or the taxel of a load"
         )
-    share = np.array([load.by_taxel(curve) / load.load for load in equations if load.alone])
-    squares = (share**2).sum(axis=0)
-    np.divide(share.sum(axis=0), squares, out=by_taxel, where=squares > 0)
+    shares = np.nan_to_num([load.shares(curve) for load in measured if load.alone])
+    squares = (shares**2).sum(axis=0)
+    np.divide(shares.sum(axis=0), squares, out=by_taxel, where=squares > 0)
     return by_taxel, common
 
 
