@@ -69,7 +69,10 @@ _OTHERS = re.compile(
 #: A cell that says a unit, as N, [kPa] or (m/s^2).
 _UNITS = re.compile(r"[\[(]?[^\d\s\[\]()]{0,8}[²³2]?[\])]?")
 #: A unit of a force, a pressure or a voltage that ends a name behind a low line or alone: thumb_mN, mV.
-_BARE_UNIT = re.compile(r"(?:^|(?<=_))([mk]?N|kgf?|gf|[hkM]?Pa|m?bar|psi|mmHg|[mµu]?V)$")
+_BARE = r"[mk]?N|kgf?|gf|[hkM]?Pa|m?bar|psi|mmHg|[mµu]?V"
+_BARE_UNIT = re.compile(rf"(?:^|(?<=_))({_BARE})$")
+#: A unit behind the number of a cell: 12.3N, 5 ms.
+UNIT_BEHIND = re.compile(rf"(?<=\d) ?({_BARE}|{_SHORT_UNIT_OF_TIME}|min|N/cm[2²]|%|°C|g|mm)(?![\w/])")
 _IN_BRACKETS = re.compile(r"[\[(]\s*([^\s\d\[\]()][^\s\[\]()]{0,7})\s*[\])]$")
 _FORCES = re.compile(r"[mk]?N|kgf?|gf?|[hkM]?Pa|m?bar|psi|N/(?:cm|mm|m)[²2]|mmHg|counts|raw|adc", re.IGNORECASE)
 _AXIS = re.compile(r"(.+?)[ _.\-]?[\[(]?([xyzXYZ])[\])]?(?: *[\[(][^\])]*[\])])?")

@@ -45,7 +45,7 @@ class Table:
         them; default: none.
     time_unit : {"s", "ms", "us", "ns", "min", "h", "iso"}
         "iso": texts as of ISO 8601, dates with times, of UTC where they state no zone, or times of a day;
-        days with points (01.05.2024 10:15:02,010) too.
+        days with points (01.05.2024 10:15:02,010) too, and, with AM or PM, with slashes, the month first.
     missing : str, optional
         A further cell without a value, beside those of `taxel.formats.lines.MISSING`.
     leave_out : list of str or int
@@ -60,8 +60,9 @@ class Table:
         A column that says which taxel a line is of, whose reading is in the only other column: the lines of one time
         are a frame. "A+B": two columns, the row and the column of the taxel.
     lines : {"plain", "marked", "json", "hex"}
-        "marked": brackets, quotes, arrows and ``NAME:`` are between cells too; "json": a line is an object or a list
-        of JSON, whose columns have the names of its keys; "hex": cells are hexadecimal numbers.
+        "marked": brackets, quotes, arrows and ``NAME:`` are between cells too, and a unit may be behind a number;
+        "json": a line is an object or a list of JSON, whose columns have the names of its keys; "hex": cells are
+        hexadecimal numbers.
     frame_lines : int, 1 or more, optional
         Number of lines of a frame, whose first line has its time; default: 1.
     frame_end : {"blank"}, optional

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel.formats.column_names import UNIT_BEHIND
 from taxel.formats.lines import MISSING, Line, has_marks, is_number, read_line
 from taxel.formats.times import epoch_of, is_day, is_time
 
@@ -110,6 +111,7 @@ def fits_of(
             (not marked and separator != "," and not any(separator in line for line in few))
             or (separator == decimal and not _are_quoted_decimals(few))
             or (kind == "marked" and (2 * sum(map(has_marks, few)) < len(few) or _are_quoted_numbers(few)))
+            or (kind == "marked" and decimal == "." and _have_units_behind_decimals(few))
             or (kind == "json" and not any(line.lstrip()[:1] in "{[" for line in few))
         ):
             continue
@@ -138,6 +140,13 @@ def _are_quoted_decimals(lines: Sequence[str]) -> bool:
     """Return whether these have decimal commas: 1,234 alone may be a thousand."""
     quoted = _with_comma(lines)
     return all(map(_DECIMAL.fullmatch, quoted)) and not all(map(_THOUSANDS.fullmatch, quoted))
+
+
+def _have_units_behind_decimals(lines: Sequence[str]) -> bool:
+    """Return whether a decimal comma is in the numbers that have a unit behind them, between other separators."""
+    behind = ((line, unit.start()) for line in lines for unit in UNIT_BEHIND.finditer(line))
+    found = [re.split(r"[;\s]", line[:end])[-1] for line, end in behind if ";" in line or "\t" in line]
+    return bool(found) and all("," in number for number in found)
 
 
 def _fit(

@@ -13,6 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from taxel._base.messages import counted
+from taxel.formats.column_names import UNIT_BEHIND
 
 #: How the cells of a line are found: between separators; where marks and names are between them too; JSON; hex.
 KINDS = ("plain", "marked", "json", "hex")
@@ -33,15 +34,15 @@ _DAY = re.compile(r"(\d{4}-\d\d-\d\d|\d\d?\.\d\d?\.\d{4}) +(?=\d\d?:\d\d)")
 
 
 def has_marks(line: str) -> bool:
-    """Return whether brackets, quotes, an arrow or a name separate cells of a line.
+    """Return whether brackets, quotes, an arrow or a name separate cells of a line, or units are behind its numbers.
 
     Examples
     --------
-    >>> [has_marks(line) for line in ("1,2", "10:00:00 PM,2", "0.1 [2, 3]", "1 -> 2", "a: 3")]
-    [False, False, True, True, True]
+    >>> [has_marks(line) for line in ("1,2", "10:00:00 PM,2", "0.1 [2, 3]", "1 -> 2", "a: 3", "1,2.5N")]
+    [False, False, True, True, True, True]
     """
-    return (
-        any(mark in line for mark in "[](){}<>\"'") or _ARROW.search(line) is not None or _NAME.search(line) is not None
+    return any(mark in line for mark in "[](){}<>\"'") or any(
+        mark.search(line) is not None for mark in (_ARROW, _NAME, UNIT_BEHIND)
     )
 
 
@@ -123,6 +124,8 @@ def read_line(line: str, kind: str = "marked", separator: str = ",", decimal: st
     --------
     >>> read_line('0.01,"[3, 9]"').cells, read_line("12:30:00.5 -> 3,4").cells
     (('0.01', '3', '9'), ('12:30:00.5', '3', '4'))
+    >>> read_line("0 ms, 2.5N").cells
+    ('0', '2.5')
     >>> read_line("a:3,b:4")
     Line(cells=('3', '4'), names=('a', 'b'))
     >>> read_line('{"t": 0, "p": [[1, 2], [3, 4]]}', "json")
@@ -149,7 +152,10 @@ def read_line(line: str, kind: str = "marked", separator: str = ",", decimal: st
     cells, names = list[str](), list[str]()
     first, *pairs = _NAME.split(_DAY.sub(r"\1T", _ARROW.sub(" ", line)))
     for name, text in zip(["", *pairs[::2]], [first, *pairs[1::2]], strict=True):
-        found = tuple(filter(None, _BETWEEN[decimal].split(text.translate(_MARKS))))
+        # Most lines have no letters but those of names, and are read as they arrive.
+        has_units = text.lower() != text.upper() or "%" in text
+        bare: str = UNIT_BEHIND.sub("", text) if has_units else text
+        found = tuple(filter(None, _BETWEEN[decimal].split(bare.translate(_MARKS))))
         cells += found
         names += [f"{name}[{k}]" if name and len(found) > 1 else name for k in range(len(found))]
     return Line(tuple(cells), tuple(names))

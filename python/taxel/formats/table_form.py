@@ -202,7 +202,7 @@ def draft_of(fit: Fit, lines: Sequence[str]) -> Draft:
         names = own if any(own) else _names_above_marks(fit, lines)
         if not any(own) and any(names):
             table = replace(table, columns=list(names))
-        return Draft(fit, table, names, ("",) * fit.count)
+        return Draft(fit, table, names, tuple(map(column_names.unit_of, names)))
     real = fit.count
     while real > 1 and fit.types[real - 1] == "empty":
         real -= 1
@@ -275,7 +275,11 @@ def _names_above_marks(fit: Fit, lines: Sequence[str]) -> tuple[str, ...]:
         inner = [read_line(cell, "marked", ",", fit.decimal) for cell in groups.cells]
         sizes = [0 if line is None else len(line.cells) for line in inner]
         if sum(sizes) == fit.count and not any(is_number(name) for name in names.cells):
-            pairs = zip(names.cells, sizes, strict=True)
+            units = [column_names.UNIT_BEHIND.search(cell) for cell in groups.cells]
+            called = [
+                name if unit is None else f"{name} [{unit[1]}]" for name, unit in zip(names.cells, units, strict=True)
+            ]
+            pairs = zip(called, sizes, strict=True)
             return tuple(f"{name}[{k}]" if size > 1 else name for name, size in pairs for k in range(size))
     return ("",) * fit.count
 

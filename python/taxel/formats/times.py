@@ -33,11 +33,18 @@ ISO = "iso"
 
 _CLOCK = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+|:\d{3})?|[.,]\d+)?"
 _DATE = r"(?:\d{4}-\d\d-\d\d|\d{1,2}\.\d{1,2}\.\d{4})"
+#: The half of the day of a clock of twelve hours, and the day with slashes before it, which is month, day and year.
+_HALF = r" ?([AP])\.?M\.?"
+_HALF_DAY = re.compile(
+    rf"(?:(\d{{1,2}})/(\d{{1,2}})/(\d{{4}}),? +|({_DATE}[T ]))?({_CLOCK}){_HALF}", re.ASCII | re.IGNORECASE
+)
 _IS_TIME = re.compile(rf"(?:{_DATE}[T ])?{_CLOCK}(?:Z|[+-]\d\d:?\d\d)?")
 _IS_DAY = re.compile(_DATE)
 _DAY_US = 86_400_000_000
 _DAY_WITH_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?:[ T]+(\S+))?", re.ASCII)
 _TIME_OF_DAY = re.compile(r"\d?\d:.*|\d{6}(?:[.,+Z-].*)?", re.ASCII)
+#: An hour, or minutes, of one digit.
+_ONE_DIGIT = re.compile(r"(?:^|(?<=[T ]))(?=\d:)")
 #: Minutes and seconds with a fraction, and hours to seconds with milliseconds behind a colon.
 _MINUTES, _COLON_MS = re.compile(r"(?=\d?\d:\d\d[.,])"), re.compile(r"(?<=:\d\d:\d\d):(?=\d{3})")
 #: Characters of a date without separators.
@@ -58,7 +65,7 @@ def is_time(cell: str) -> bool:
     >>> is_time("2024-05-01T10:00:00.25"), is_time("01.05.2024 10:00:00,25"), is_time("10:00:00"), is_time("10.5")
     (True, True, True, False)
     """
-    return _IS_TIME.fullmatch(cell) is not None
+    return _IS_TIME.fullmatch(cell) is not None or _HALF_DAY.fullmatch(cell) is not None
 
 
 def is_day(cell: str) -> bool:
@@ -69,8 +76,8 @@ def is_day(cell: str) -> bool:
 def seconds_of(cell: str) -> float:
     """Return the seconds since 1970, or of the day, of a text of ISO 8601 or a day with points; NaN of any other text.
 
-    Days with points are day, month and year (DIN 5008). Days with slashes are none: their order differs by country.
-    Without a zone a time is of UTC. Six digits of a fraction count.
+    Days with points are day, month and year (DIN 5008). Days with slashes are read where AM or PM follows, as month,
+    day and year: else their order differs by country. Without a zone a time is of UTC. Six digits of a fraction count.
 
     Examples
     --------
@@ -78,16 +85,23 @@ def seconds_of(cell: str) -> float:
     (86400.5, 0.0, 60.25)
     >>> seconds_of("02.01.1970 00:00:00,5"), seconds_of("1:02.5"), seconds_of("01/02/1970 00:00")
     (86400.5, 62.5, nan)
+    >>> seconds_of("1/2/1970 12:00:30 AM"), seconds_of("01.01.1970 1:00:00.5 PM"), seconds_of("1:00 am")
+    (86430.0, 46800.5, 3600.0)
     """
-    cell = _COLON_MS.sub(".", cell)
+    if half := _HALF_DAY.fullmatch(cell):
+        month, day, year, other, clock, of_day = half.groups()
+        date = f"{day}.{month}.{year} " if month else other or ""
+        hour = clock.partition(":")[0]
+        return seconds_of(f"{date}{clock}") + 43_200 * ((of_day in "pP") - (hour == "12"))
+    cell = _COLON_MS.sub(".", _ONE_DIGIT.sub("0", cell))
     if _MINUTES.match(cell):
-        cell = f"00:{'0' * (cell[1] == ':')}{cell}"
+        cell = f"00:{cell}"
     found = _DAY_WITH_POINTS.fullmatch(cell)
     if found is not None:
         day, month, year, rest = found.groups()
         cell = f"{year}-{month:0>2}-{day:0>2}T{rest or '00:00'}"
     elif _TIME_OF_DAY.fullmatch(cell):
-        cell = f"1970-01-01T{cell.zfill(len(cell) + (cell[1] == ':'))}"
+        cell = f"1970-01-01T{cell}"
     elif not cell[:4].isdecimal() or len(cell) < _SHORTEST_DATE:
         return math.nan
     try:
