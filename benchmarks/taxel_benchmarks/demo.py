@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from taxel.demo.playing import Demo, evaluate
+from taxel.demo.playing import Demo, evaluate, shipped
 from taxel.demo.script import script
-from taxel.demo.shipped import shipped
 from taxel.detect import Score, Spread
 from taxel.simulate import Act, Contact, Silence, play, truth
 from taxel_benchmarks._goals import Goal, at_least, at_most

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from taxel._base.files import check_writable
 from taxel._base.messages import counted
 from taxel.cli._say import say
 from taxel.cli._task import progress
@@ -32,7 +31,6 @@ def demo(
     no_clock: bool = False,
     readout: Path | None = None,
     folder: Annotated[Path | None, Parameter(metavar="FOLDER")] = None,
-    train_to: Annotated[Path | None, Parameter(name="--train")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Play scenes on the emulated board, detect contact and lift-off while they run, and write a report.
@@ -56,20 +54,11 @@ def demo(
         A readout to use instead of the one that comes with taxel.
     folder
         A new folder for the report.
-    train_to
-        Train the demo's readout, write it to this file, and end.
     """
-    from taxel.demo.playing import play_live, play_simulated  # noqa: PLC0415  the command line starts quickly
-    from taxel.demo.shipped import shipped, trained  # noqa: PLC0415
+    from taxel.demo.playing import play_live, play_simulated, shipped  # noqa: PLC0415  the command line starts quickly
     from taxel.detect import Readout  # noqa: PLC0415
     from taxel.report import write_detections  # noqa: PLC0415  pictures load slowly
 
-    if train_to is not None:
-        check_writable(train_to)
-        with progress(as_json) as update:
-            trained(progress=update).save(train_to)
-        say(json.dumps({"readout": str(train_to)}) if as_json else f"readout: {train_to.resolve()}")
-        return
     used = shipped() if readout is None else Readout.load(readout)
     seed = secrets.randbelow(TRAINING_SEED) if seed is None else seed
     if folder is None:

@@ -7,6 +7,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from taxel.simulate import Act, play, truth
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
-__all__ = ["Demo", "evaluate", "play_live", "play_simulated"]
+__all__ = ["Demo", "evaluate", "play_live", "play_simulated", "shipped"]
 
 #: Impacts come 30 ms apart: a wider window would pair a miss with its neighbour.
 _IMPACT_MS, _PRESS_MS = 10.0, 50.0
@@ -53,6 +54,11 @@ class Demo:
         assert self.outcome.score is not None  # the truth is known
         scores = {"neurons": self.outcome.score.to_dict(), "plain_rule": self.plain.to_dict()}
         return scores | {"verdicts": list(self.verdicts)}
+
+
+def shipped() -> Readout:
+    """Return the readout that `taxel demo` plays with, which tools/demo_readout.py trained on other scenes."""
+    return Readout.from_json(files("taxel.demo").joinpath("readout.json").read_text(encoding="utf-8"))
 
 
 def play_simulated(readout: Readout, *, seed: int, scenes: int, progress: Progress | None = None) -> Demo:
