@@ -34,7 +34,7 @@ from taxel.tare import Tare
 
 if TYPE_CHECKING:
     from taxel.detect import Recipe
-    from taxel.encode import Encoder
+    from taxel.encode import ChangeEvents, Encoder
     from taxel.recording import Recording
 
 __all__ = [
@@ -408,10 +408,8 @@ class InformationOptions:
 
     Parameters
     ----------
-    encoder : {"change_events", "fa1"}
-        The encoder: change_events or fa1.
     parameters : mapping of str to value
-        A parameter of the encoder and its value (TOML). May be repeated.
+        A parameter of `taxel.encode.ChangeEvents` and its value (TOML), as noise_floor=5. May be repeated.
     window_ms : float, ms, optional
         Time after contact in which events count, ms; needed if trials have no stop_us.
     windows_ms : sequence of float, ms, optional
@@ -431,7 +429,7 @@ class InformationOptions:
 
     Raises
     ------
-    ProblemError : an encoder that is none of the two, or parameters that it has not
+    ProblemError : parameters that change events have not
 
     Examples
     --------
@@ -439,7 +437,6 @@ class InformationOptions:
     10
     """
 
-    encoder: Annotated[str, Parameter(metavar="NAME")] = "change_events"
     parameters: Settings = field(default_factory=dict)
     window_ms: Annotated[float | None, Parameter(metavar="MS")] = None
     windows_ms: Annotated[Sequence[float] | None, Parameter(name="--windows", n_tokens=1, converter=_FLOATS)] = None
@@ -451,19 +448,16 @@ class InformationOptions:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse anything but an encoder, before the recordings are read."""
+        """Refuse other parameters, before the recordings are read."""
         self._chosen()
 
-    def _chosen(self) -> Encoder | None:
-        """Return the encoder; None of that which the answer chooses by itself."""
-        if text("encoder", self.encoder) not in ("change_events", "fa1"):
-            raise refused(
-                "encoder", f" is {self.encoder}: must be change_events or fa1, which have one train per taxel"
-            )
-        mapping("parameters", self.parameters)
-        if self.encoder == "change_events" and not self.parameters:
+    def _chosen(self) -> ChangeEvents | None:
+        """Return the change events that parameters state; None of those which the answer chooses by itself."""
+        if not mapping("parameters", self.parameters):
             return None
-        return encoder_of(self.encoder, self.parameters)
+        encoder = encoder_of("change_events", self.parameters)
+        assert encoder.name == "change_events"
+        return encoder  # type: ignore[return-value]
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ def test_a_recording_and_its_table_give_figures_and_a_page(tmp_path):
     assert "10 ms " in said
     assert "wire version" in said
     text = page.read_text()
-    assert text.count('<div class="picture"><svg') == 2
+    assert text.count('<div class="picture"><svg') == 1
     assert "keeps 95 % of the full bits?" in text
     assert "{{" not in text
     again = run(recording, "--labels", labels, *QUICK, "--report", page)
@@ -170,7 +170,7 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
         (GOOD, ["--windows", "1000"], "--windows is [1000.0]: must be from"),
         (GOOD, ["--folds", "1"], "--folds is 1: must be a whole number from 2"),
         (GOOD, ["--taxels", "1.5"], "--taxels 1.5: must be whole numbers"),
-        (GOOD, ["--encoder", "level_crossing"], "must be change_events or fa1"),
+        (GOOD, ["--set", "alpha=2"], "alpha"),
     ],
 )
 def test_what_is_wrong_is_one_clear_error(tmp_path, table, arguments, text):

@@ -6,18 +6,18 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import callback, instance, integer, several
 from taxel._base.parallel import HERE, Workers
-from taxel.encode import ChangeEvents, Encoder
+from taxel.encode import ChangeEvents
 from taxel.information._threads import threads
 from taxel.information.answers import Answer, Control, Point, is_above_chance
-from taxel.information.estimate import Estimate, zero_test
-from taxel.information.keeping import Keeping, keeps
+from taxel.information.estimate import zero_test
+from taxel.information.keeping import keeps
 from taxel.information.nested import WORTH_THREADS, Matrices, predictions
 from taxel.information.question import Question
 from taxel.information.sampling import SampledEvents
@@ -31,7 +31,7 @@ __all__ = ["answer"]
 def answer(
     trials: Sequence[LabelledTrial],
     *,
-    encoder: Encoder | None = None,
+    encoder: ChangeEvents | None = None,
     window_ms: float | None = None,
     windows_ms: Sequence[float] | None = None,
     periods_ms: Sequence[float] | None = None,
@@ -49,8 +49,8 @@ def answer(
     ----------
     trials : sequence of LabelledTrial
         All of one array.
-    encoder : Encoder, optional
-        `ChangeEvents` or `FA1`; its period is set. Default: change events of one bit with the floor of `floor_of`.
+    encoder : ChangeEvents, optional
+        Default: of one bit, with the floor of `floor_of`.
     window_ms : float, ms, optional
         Longest time after the contact that counts; needed if trials have no end. Default: the length of the shortest
         trial.
@@ -93,6 +93,19 @@ def answer(
         return answering.answer(int(shuffles), progress, instance("workers", workers, Workers))
 
 
+class _Setting(NamedTuple):
+    """A draw of a sampling period, us, with all taxels, or so many at random."""
+
+    draw: int
+    period: int
+    taxels: int = 0
+
+    def __str__(self) -> str:
+        if self.taxels:
+            return f"{self.taxels} taxels at random, draw {self.draw + 1}"
+        return f"{to_ms(self.period):g} ms, draw {self.draw + 1}"
+
+
 class _Answering(Question):
     """Computes the answer to a question, setting by setting."""
 
@@ -104,34 +117,34 @@ class _Answering(Question):
     ) -> Answer:
         """Return the answer for all settings."""
         self._progress, self._done = progress, 0
-        self._steps = self.draws * (len(self.periods) + len(self.random_taxels)) + shuffles + 1
-        values = isinstance(self.encoder, ChangeEvents) and self.encoder.bits > 1
-        responses_at: dict[tuple[int, float], dict[int, Any]] = {}
-        about: dict[tuple[int, float], dict[int, tuple[float, float, float]]] = {}
+        values = self.encoder is not None and self.encoder.bits > 1
+        finest, longest, draws = self.periods[0], self.windows[-1], range(self.draws)
+        settings = [_Setting(draw, period) for draw in draws for period in self.periods]
+        settings += [_Setting(draw, finest, size) for draw in draws for size in self.random_taxels]
+        self._steps = len(settings) + shuffles + 1
+        found_at: dict[tuple[int, float, int], dict[int, Any]] = {}
         missing: set[str] = set()
-        settings = [(draw, period) for draw in range(self.draws) for period in self.periods]
         alone = copy(self)
         alone._progress = None
-        self._begin(_step(*settings[0]))
+        self._begin(str(settings[0]))
         for done, (k, found) in enumerate(workers.run(partial(_of_setting, alone, values), settings), 1):
-            draw, period = settings[k]
-            for window, (responses, counts, lacking) in zip(self.windows, found, strict=True):
-                responses_at.setdefault((period, window), {})[draw] = responses
-                about.setdefault((period, window), {})[draw] = counts
+            draw, period, size = settings[k]
+            for window, (responses, counts, lacking) in zip(self.windows[-len(found) :], found, strict=True):
+                found_at.setdefault((period, window, size), {})[draw] = responses, counts
                 missing |= lacking
             if done < len(settings):
-                self._begin(_step(*settings[done]))
+                self._begin(str(settings[done]))
         self._begin("intervals")
-        keys = [(period, window) for period in self.periods for window in self.windows]
-        estimates = {key: self.estimate(_in_order(responses_at[key])) for key in keys}
-        everything, finest, longest = len(self.active), self.periods[0], self.windows[-1]
-        points = []
-        for (period, window), bits in estimates.items():
-            verdict = None
-            if window == longest and period != finest:
-                verdict = keeps(bits, estimates[finest, longest], groups=self.groups)
-            points.append(_point(period, window, everything, bits, _in_order(about[period, window]), verdict))
-        full = next(p for p in points if (p.period_ms, p.window_ms) == (to_ms(finest), to_ms(longest)))
+        keys = [(period, window, 0) for period in self.periods for window in self.windows]
+        keys += [(finest, longest, size) for size in self.random_taxels]
+        points: dict[tuple[int, float, int], Point] = {}
+        for period, window, size in keys:
+            of_draws = [found_at[period, window, size][draw] for draw in draws]
+            bits = self.estimate([responses for responses, _ in of_draws])
+            events, silent, kbps = np.mean([counts for _, counts in of_draws], axis=0).tolist()
+            taxels = size or len(self.active)
+            points[period, window, size] = Point(to_ms(period), to_ms(window), taxels, bits, events, silent, kbps)
+        full = points[finest, longest, 0]
         spikes = self.spikes(finest, 0)
         [matrices] = self.matrices(spikes, [longest])
         zero = zero_test(
@@ -143,16 +156,19 @@ class _Answering(Question):
             seed=self.seed,
         )
         self._warn(missing)
-        taxels = self._by_taxels(values)
-        if not is_above_chance(full.found, zero):
-            points = [_with_nothing(p) for p in points]
+        for period in self.periods[1:]:
+            point = points[period, longest, 0]
+            verdict = keeps(point.found, full.found, groups=self.groups)
+            # Where the full setting's bits are not above those of shuffled labels, there is nothing to keep.
+            says = verdict.says if is_above_chance(full.found, zero) else "nothing"
+            points[period, longest, 0] = replace(point, verdict=replace(verdict, says=says))
         return Answer(
             labels={str(name): int(n) for name, n in zip(*np.unique(self.labels, return_counts=True), strict=True)},
             groups=0 if self.groups is None else len(np.unique(self.groups)),
             encoder=repr(self.encoder),
             full=full,
-            points=tuple(points),
-            taxels=taxels,
+            points=tuple(point for (_, _, size), point in points.items() if not size),
+            taxels=tuple(point for (_, _, size), point in points.items() if size),
             control=self._length(spikes),
             zero=zero,
             notes=tuple(self.notes),
@@ -169,25 +185,6 @@ class _Answering(Question):
     def _shuffled(self, matrices: Matrices, labels: Any) -> NDArray[np.generic]:
         self._begin("labels shuffled")
         return predictions(matrices, self.split(labels)).responses
-
-    def _by_taxels(self, values: bool) -> tuple[Point, ...]:
-        """Return the points with fewer taxels, at the finest period and to the whole window."""
-        period, window = self.periods[0], self.window_us
-        responses: dict[int, list[Any]] = {size: [] for size in self.random_taxels}
-        about: dict[int, list[Any]] = {size: [] for size in self.random_taxels}
-        for draw in range(self.draws):
-            all_spikes = self.spikes(period, draw)
-            for size in self.random_taxels:
-                self._begin(f"{size} taxels at random")
-                random = np.random.default_rng([self.seed, draw, size, 1])
-                spikes = all_spikes.select(np.sort(random.choice(self.active, size, replace=False)))
-                nested = self.nested(self.matrices(spikes, [window])[0], draw)
-                responses[size].append(nested.responses)
-                about[size].append(_about(spikes, window, values))
-        return tuple(
-            _point(period, window, size, self.estimate(responses[size]), about[size], None)
-            for size in self.random_taxels
-        )
 
     def _length(self, spikes: SampledEvents) -> Control:
         """Return the bits of the time from contact to the trial's end, or to the last event in the window."""
@@ -226,39 +223,21 @@ class _Answering(Question):
 
 
 def _of_setting(
-    question: Question, values: bool, setting: tuple[int, int]
+    question: Question, values: bool, setting: _Setting
 ) -> list[tuple[Any, tuple[float, float, float], set[str]]]:
-    """Return of each window the responses, what is counted, and what is missing, in one draw of a period."""
-    draw, period = setting
-    spikes, found = question.spikes(period, draw), []
-    for window, matrices in zip(question.windows, question.matrices(spikes, question.windows), strict=True):
-        nested = question.nested(matrices, draw)
+    """Return of each window the responses, what is counted, and what is missing, in one draw of a setting.
+
+    Of some taxels the whole window alone counts.
+    """
+    draw, period, size = setting
+    spikes, windows, found = question.spikes(period, draw), question.windows, []
+    if size:
+        random = np.random.default_rng([question.seed, draw, size, 1])
+        spikes = spikes.select(np.sort(random.choice(question.active, size, replace=False)))
+        windows = windows[-1:]
+    for window, matrices in zip(windows, question.matrices(spikes, windows), strict=True):
+        nested, counts = question.nested(matrices, draw), spikes.counts(window)
         missing = {f"fold {fold + 1} has no training trial of {name}" for fold, name in nested.missing}
-        found.append((nested.responses, _about(spikes, window, values), missing))
+        rate = kilobits_per_second(spikes, window, values=values)
+        found.append((nested.responses, (float(counts.mean()), float(np.mean(counts == 0)), rate), missing))
     return found
-
-
-def _step(draw: int, period: int) -> str:
-    return f"{to_ms(period):g} ms, draw {draw + 1}"
-
-
-def _in_order(of_draws: dict[int, Any]) -> list[Any]:
-    """Return what the draws gave in the order of the draws."""
-    return [of_draws[draw] for draw in sorted(of_draws)]
-
-
-def _about(spikes: SampledEvents, window: float, values: bool) -> tuple[float, float, float]:
-    counts = spikes.counts(window)
-    return float(counts.mean()), float(np.mean(counts == 0)), kilobits_per_second(spikes, window, values=values)
-
-
-def _point(
-    period: int, window: float, taxels: int, estimated: Estimate, about: list[Any], verdict: Keeping | None
-) -> Point:
-    events, silent, kbps = np.mean(about, axis=0)
-    return Point(to_ms(period), to_ms(window), taxels, estimated, float(events), float(silent), float(kbps), verdict)
-
-
-def _with_nothing(point: Point) -> Point:
-    """Return a point with the verdict "nothing": the full setting's bits are not above those of shuffled labels."""
-    return point if point.verdict is None else replace(point, verdict=replace(point.verdict, says="nothing"))

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from taxel._base.arguments import integer, number, several, shown
+from taxel._base.arguments import instance, integer, number, several, shown
 from taxel._base.errors import refused
 from taxel._base.messages import are, counted
 from taxel._core import ProblemError
-from taxel.encode import FA1, ChangeEvents, Encoder
+from taxel.encode import ChangeEvents
 from taxel.frames import Frames
 from taxel.information.estimate import Estimate, estimate
 from taxel.information.folds import Split, split
@@ -44,7 +44,7 @@ class Question:
     """Labelled trials, and the settings at which their information is estimated."""
 
     trials: list[LabelledTrial]
-    encoder: Encoder | None
+    encoder: ChangeEvents | None
     window_ms: float | None
     draws: int
     folds: int
@@ -69,8 +69,7 @@ class Question:
         stratified(self.labels, count=self.folds, groups=self.groups, seed=self.seed)
         if self.encoder is None:
             self.encoder = ChangeEvents(noise_floor=floor_of(self.trials))
-        if not isinstance(self.encoder, ChangeEvents | FA1):
-            raise refused("encoder", f" is {shown(self.encoder)}: must be ChangeEvents or FA1, one train per taxel")
+        instance("encoder", self.encoder, ChangeEvents)
         sources = {id(trial.source): trial.source for trial in self.trials}
         held = {key: HeldValues(source) for key, source in sources.items()}
         self.held = [held[id(trial.source)] for trial in self.trials]

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import instance, several
+from taxel._base.arguments import several
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.encode import FA1, ChangeEvents, Encoder
+from taxel.encode import ChangeEvents
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.information.trials import LabelledTrial
@@ -149,7 +149,11 @@ def finest_us(sources: Sequence[Events | Frames]) -> int:
 
 
 def contacts(
-    trials: Sequence[LabelledTrial], values_of: Sequence[HeldValues], encoder: Encoder, period_us: int, window_us: float
+    trials: Sequence[LabelledTrial],
+    values_of: Sequence[HeldValues],
+    encoder: ChangeEvents,
+    period_us: int,
+    window_us: float,
 ) -> NDArray[np.float64]:
     """Return when each touch begins, us: the first event at or after its start at the finest period; NaN without one.
 
@@ -159,11 +163,11 @@ def contacts(
     for k, (trial, values) in enumerate(zip(trials, values_of, strict=True)):
         stop = trial.start_us + window_us if trial.stop_us is None else trial.stop_us
         t, step = trial.source.t, max(period_us, STEP_US)
-        if isinstance(trial.source, Events) and isinstance(encoder, ChangeEvents):
+        if isinstance(trial.source, Events):
             grid = np.unique(np.append(t[(t >= trial.start_us) & (t < stop)], trial.start_us - 1))
         else:
             grid = np.arange(trial.start_us - step, int(stop), step)
-        bins, _, _ = _encoded(encoder, values, grid, step)
+        bins, _, _ = _encoded(encoder, values, grid)
         if len(bins):
             onsets[k] = grid[bins.min()]
     return onsets
@@ -172,7 +176,7 @@ def contacts(
 def spikes_of(
     trials: Sequence[LabelledTrial],
     held: Sequence[HeldValues],
-    encoder: Encoder,
+    encoder: ChangeEvents,
     *,
     period_us: int,
     contact_us: NDArray[np.float64],
@@ -186,8 +190,7 @@ def spikes_of(
     trials : sequence of LabelledTrial
     held : sequence of HeldValues
         Of each trial's recording.
-    encoder : Encoder
-        `ChangeEvents` or `FA1`; its `period_ms` is set.
+    encoder : ChangeEvents
     period_us : int, us
     contact_us : float64, shape (trials,), us
         The true contact; NaN where there is none, and the trial is silent.
@@ -217,7 +220,7 @@ def spikes_of(
         grid = np.arange(begin, int(np.ceil(stop)), period_us)
         if len(grid) < 2:
             continue
-        bins, taxel, value = _encoded(encoder, values, grid, period_us)
+        bins, taxel, value = _encoded(encoder, values, grid)
         late = grid[bins] >= contact_us[k]
         bins, taxel, value = bins[late], taxel[late], value[late]
         if not len(bins):
@@ -232,25 +235,16 @@ def spikes_of(
 
 
 def _encoded(
-    encoder: Encoder,
-    held: HeldValues,
-    grid: NDArray[np.int64],
-    period_us: int,
+    encoder: ChangeEvents, held: HeldValues, grid: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
     """Return bin, taxel and value of the events that an encoder makes of the values held at a grid of times."""
     values = held.at(grid)
     frames = Frames(values[:, None, :], grid, unit="held", array=Array(1, values.shape[1]))
-    trains = _at_period(encoder, period_us).encode(frames)
+    trains = encoder.encode(frames)
     taxel = np.repeat(np.arange(len(trains)), trains.counts)
     bins = np.searchsorted(grid, np.rint(to_us(trains.times)).astype(np.int64))
     value = np.ones(len(bins), np.float32) if trains.values is None else trains.values
     return bins, taxel, value
-
-
-def _at_period(encoder: Encoder, period_us: int) -> Encoder:
-    if isinstance(encoder, FA1):
-        return FA1(**{**encoder.get_params(), "period_ms": to_ms(period_us)})
-    return instance("encoder", encoder, ChangeEvents)
 
 
 def checked_periods(periods_us: Sequence[int], finest: int) -> list[int]:

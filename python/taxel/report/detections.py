@@ -11,16 +11,14 @@ import matplotlib as mpl
 import numpy as np
 from markupsafe import Markup
 from matplotlib import pyplot as plt
-from numpy.typing import NDArray
 
 from taxel._base.errors import refused
 from taxel._base.files import write_whole
 from taxel._base.messages import escaped
-from taxel.array import Array
 from taxel.detect import Judged, Outcome, PlainRule, Readout, Score
 from taxel.detect.detector import detector
-from taxel.detect.examples import array_of, padded_to
-from taxel.encode import Composite, Encoder
+from taxel.detect.examples import padded_to
+from taxel.encode import Composite
 from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.report import compared
@@ -186,7 +184,7 @@ def _of_label(
         axis.set(xlabel="time minus true, ms", ylabel="events")
         yield figure
     if by_neuron is not None:
-        yield _weights(by_neuron, listened[0], label)
+        yield _weights(by_neuron, label)
 
 
 def _moments(listened: Sequence[Outcome], label: str) -> list[_Moment]:
@@ -253,45 +251,12 @@ def _trains(readout: Readout, outcome: Outcome) -> SpikeTrains:
     return (encoder if tare is None else encoder.with_tare(tare)).encode(source)
 
 
-def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
-    """Draw the weight of each taxel over the array where trains are taxels', else the weights of all trains as bars."""
+def _weights(readout: Readout, label: str) -> Figure:
+    """Draw the weights of all trains that a neuron receives."""
     weights, encoder = np.asarray(readout.neurons[label].weights), readout.encoder_of(label)
-    array = array_of([outcome.example]) if readout.array is None else readout.array
-    of_taxels = None if array is None or array.rows * array.columns < 4 else _by_taxel(weights, encoder, array)
-    if array is None or of_taxels is None:
-        figure, axis = plt.subplots(figsize=(6.5, 2.2), layout="constrained")
-        axis.bar(np.arange(len(weights)), weights, color=INK)
-        axis.axhline(0, color=_QUIET, linewidth=0.8)
-        parts = f": {', '.join(sorted(encoder.parts))}" if isinstance(encoder, Composite) else ""
-        axis.set(xlabel=escaped(f"input: the encoder's trains in their order{parts}"), ylabel="weight, mV")
-        return figure
-    grid = of_taxels.reshape(array.shape)
-    figure, axis = plt.subplots(figsize=(4.2, 3.4) if min(array.shape) > 1 else (6.5, 2.2), layout="constrained")
-    shown = grid if array.exists is None else np.where(array.exists, grid, np.nan)
-    most = float(np.abs(weights).max()) or 1.0
-    image = axis.imshow(shown, "RdBu_r", vmin=-most, vmax=most, aspect="equal" if min(array.shape) > 1 else "auto")
-    axis.set(xlabel="column", ylabel="row")
-    if array.names is not None and array.rows == 1:
-        axis.set_xticks(range(array.columns), [escaped(name) for name in array.names], rotation=45, ha="right")
-    figure.colorbar(image, label="largest weight of the taxel, mV")
+    figure, axis = plt.subplots(figsize=(6.5, 2.2), layout="constrained")
+    axis.bar(np.arange(len(weights)), weights, color=INK)
+    axis.axhline(0, color=_QUIET, linewidth=0.8)
+    parts = f": {', '.join(sorted(encoder.parts))}" if isinstance(encoder, Composite) else ""
+    axis.set(xlabel=escaped(f"input: the encoder's trains in their order{parts}"), ylabel="weight, mV")
     return figure
-
-
-def _by_taxel(weights: NDArray[np.float64], encoder: Encoder, array: Array) -> NDArray[np.float64] | None:
-    """Return of each taxel the weight furthest from 0; None where trains are not taxels'.
-
-    Trains are ordered by delay, then ON before OFF, then by taxel and level; the tonic trains come last.
-    """
-    taxels = array.rows * array.columns
-    several = isinstance(encoder, Composite)
-    if several or encoder.trains(Array(taxels, 1)) == encoder.trains(Array(taxels, 2)):
-        return None
-    count = encoder.trains(array)
-    tonic = int(getattr(encoder, "tonic_ms", None) is not None)
-    levels = count // taxels - tonic
-    at = np.concatenate([np.repeat(np.arange(taxels), levels), np.tile(np.arange(taxels), tonic)])
-    at = np.tile(at, len(weights) // count)
-    order = np.argsort(np.abs(weights), kind="stable")
-    largest = np.zeros(taxels)
-    largest[at[order]] = weights[order]  # the last of a taxel stays
-    return largest

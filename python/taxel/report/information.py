@@ -1,10 +1,9 @@
-"""The page of ``taxel information``: a table of all settings, a curve, and the confusion matrix."""
+"""The page of ``taxel information``: a table of all settings, and a curve."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -12,13 +11,9 @@ from matplotlib.figure import Figure
 
 from taxel._base.arguments import instance
 from taxel._base.files import write_whole
-from taxel._base.messages import escaped
 from taxel.information import Answer
 from taxel.report.page import render
 from taxel.report.svg import STYLE, picture
-
-#: Labels whose names still fit a confusion matrix.
-_MOST_NAMES = 40
 
 
 def write_information(path: str | os.PathLike[str], answer: Answer, *, overwrite: bool = False) -> Path:
@@ -43,8 +38,8 @@ def write_information(path: str | os.PathLike[str], answer: Answer, *, overwrite
     """
     checked = instance("answer", answer, Answer)
     with mpl.rc_context(STYLE):
-        drawn = {"curve": picture(_curve(checked)), "confusion": picture(_confusion(checked))}
-    text = render("report/information.html.j2", answer=checked, pictures=drawn, labels=sum(checked.labels.values()))
+        curve = picture(_curve(checked))
+    text = render("report/information.html.j2", answer=checked, curve=curve, labels=sum(checked.labels.values()))
     return write_whole(path, lambda file: file.write(text.encode()), overwrite=overwrite)
 
 
@@ -62,19 +57,4 @@ def _curve(answer: Answer) -> Figure:
     axis.set(xlabel="time since contact, ms", ylabel="bits", xscale="log", title="by sampling period")
     axis.axhline(answer.full.found.most, color="0.8", lw=1)
     axis.legend(frameon=False)
-    return figure
-
-
-def _confusion(answer: Answer) -> Figure:
-    counts = answer.full.found.counts.mean(0)
-    share: Any = counts / np.maximum(counts.sum(1, keepdims=True), 1)
-    figure = Figure(figsize=(6.4, 5.4), layout="constrained")
-    axis = figure.subplots()
-    image = axis.imshow(share, cmap="Blues", vmin=0, vmax=1)
-    names = [escaped(name) for name in answer.full.found.classes]
-    if len(names) <= _MOST_NAMES:
-        axis.set_xticks(range(len(names)), names, rotation=45, ha="right")
-        axis.set_yticks(range(len(names)), names)
-    axis.set(xlabel="classified as", ylabel="label")
-    figure.colorbar(image, ax=axis, label="share of the label's trials")
     return figure
