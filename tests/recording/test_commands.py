@@ -67,17 +67,15 @@ def test_a_rate_before_the_start_marker_is_said_to_be_that(tmp_path: Path, start
     assert (", before the start marker, where a board sends the rest of every taxel" in said) == before
 
 
-def test_info_writes_its_picture_once(walk: Path, tmp_path: Path) -> None:
-    picture = tmp_path / "walk.png"
-    said = run("info", walk, "--picture", picture)
-    assert said.returncode == 0
-    assert f"picture written to {picture}" in said.stdout
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    again = run("info", walk, "--picture", picture)
+def test_info_writes_its_table_once(walk: Path, tmp_path: Path) -> None:
+    table = tmp_path / "walk.csv"
+    said = run("info", walk, "--table", table)
+    assert (said.returncode, f"table written to {table}" in said.stdout) == (0, True)
+    again = run("info", walk, "--table", table)
     assert (again.returncode, again.stderr.count("\n")) == (2, 1)
     assert "exists already" in again.stderr
-    assert run("info", walk, "--picture", picture, "--overwrite").returncode == 0
-    assert "the name of a picture must end in" in run("info", walk, "--picture", tmp_path / "a.txt").stderr
+    assert run("info", walk, "--table", table, "--overwrite").returncode == 0
+    assert "the name of a table must end in" in run("info", walk, "--table", tmp_path / "a.txt").stderr
 
 
 def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_path: Path) -> None:

@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
 app = App(name="info")
 
-_PICTURES = (".png", ".svg", ".pdf")
 #: Verdicts that name no fault.
 _SOUND = ("complete", "complete after arrival", "unknown")
 #: Columns of the table of several recordings: how many taxels do not work.
@@ -47,7 +46,6 @@ def info(
     file: Path,
     /,
     *,
-    picture: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     table: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     tare: Annotated[str | None, Parameter(metavar="SECONDS|FILE")] = None,
     each: bool = False,
@@ -62,15 +60,13 @@ def info(
     For several recordings, such as a folder: a row for each, and their sum. Files that cannot be read are named at the
     end, with exit code 2; --jobs reads several at once. Exit code 3: a recording was cut off, as where a disk was full.
 
-    Example: taxel info walk.mcap --picture walk.png --table walk.csv
+    Example: taxel info walk.mcap --table walk.csv
     Example: taxel info grasp.db3 --topic /palm --field taxels --array 24x32
 
     Parameters
     ----------
     file
         A recording, a file of a sensor's maker, or a folder.
-    picture
-        Write rates, a map of the taxels and the pressure over time to this .png, .svg or .pdf.
     table
         Write contact area, peak, sum and centre of pressure over time to this .csv.
     tare
@@ -84,14 +80,12 @@ def info(
     from taxel.recording.reading_options import names_topic  # noqa: PLC0415
     from taxel.tasks.labels import are_trials, trial_name  # noqa: PLC0415
 
-    if picture is not None and picture.suffix.lower() not in _PICTURES:
-        raise ProblemError(f"{picture}: the name of a picture must end in {', '.join(_PICTURES)}")
     if table is not None and table.suffix.lower() != ".csv":
         raise ProblemError(f"{table}: the name of a table must end in .csv")
-    output.check(picture, table)
-    as_json, overwrite = output.json, output.overwrite
+    output.check(table)
+    as_json = output.json
     files = recordings_in(file, reading.layout) if file.exists() and is_folder(file) else []
-    if len(files) > 1 and picture is None and table is None:
+    if len(files) > 1 and table is None:
         return _of_files(file, files, partial(_infos, reading, tare), workers, each=each, as_json=as_json)
     with progress(as_json) as show:
         show(f"reading {file}", 0, 0)
@@ -105,9 +99,7 @@ def info(
                 raise ProblemError(_several(file, recordings))
             infos = [taxel.tasks.info(each, tare) for each in recordings]
             of_each = [found.facts for found in infos]
-            sensors = [source for each in recordings for source in each.sources.values() if not source.is_stream]
-            written = _draw(picture, sensors, tare, overwrite)
-            say(*_of_several(file, of_each, written, as_json=as_json, each=each))
+            say(*_of_several(file, of_each, as_json=as_json, each=each))
             if are_trials(recordings) and not as_json:
                 example = trial_name(recordings[0])
                 say(f"labels of these trials need a column recording with the trial's name, for example {example}")
@@ -121,9 +113,8 @@ def info(
         if pressed is None:
             raise ProblemError(f"{file}: contains events without intensities, so no pressure can be written to a table")
         text = "".join(f"{line}\n" for line in _lines(pressed))
-        write_whole(table, lambda out: out.write(text.encode()), overwrite=overwrite)
+        write_whole(table, lambda out: out.write(text.encode()), overwrite=output.overwrite)
         facts["table"] = str(table)
-    facts |= _draw(picture, [recording], tare, overwrite)
     say(*([json.dumps(facts)] if as_json else _page(facts)))
     return _code([facts])
 
@@ -153,43 +144,8 @@ def _of_files(
         failed = [{"file": str(f), "error": one.failure} for f, one in zip(files, found, strict=True) if one.failure]
         say(json.dumps([*facts, *failed]))
     elif facts:
-        say(*_of_several(folder, facts, {}, as_json=False, each=each))
+        say(*_of_several(folder, facts, as_json=False, each=each))
     return say_failures(files, found) or _code(facts)
-
-
-def _draw(picture: Path | None, sensors: Sequence[Recording], tare: str | None, overwrite: bool) -> dict[str, str]:
-    """Write rates, a map of the taxels and the pressure over time as a picture, if asked; return its place.
-
-    Each sensor has a panel.
-    """
-    if picture is None:
-        return {}
-    import matplotlib as mpl  # noqa: PLC0415  loads slowly
-
-    from taxel._base.messages import collected  # noqa: PLC0415
-    from taxel.plot import overview, pressure  # noqa: PLC0415
-    from taxel.recording.analysis.pressure import above_rest  # noqa: PLC0415
-    from taxel.tasks.rest import given_tare  # noqa: PLC0415
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt  # noqa: PLC0415
-
-    columns, height = int(np.ceil(len(sensors) ** 0.5)), 4
-    rows = -(-len(sensors) // columns)
-    figure = plt.figure(layout="constrained")
-    for sensor, panel in zip(sensors, figure.subfigures(rows, columns, squeeze=False).flat, strict=False):
-        with collected():  # the facts have the same warnings
-            above = above_rest(sensor, None if tare is None else given_tare(tare, sensor))
-        if above is None:
-            overview(sensor, panel)
-        else:
-            height = 10
-            grid = panel.add_gridspec(2, 1, height_ratios=(2, 3))
-            overview(sensor, panel.add_subfigure(grid[0]))
-            pressure(*above[:2], figure=panel.add_subfigure(grid[1]))
-    figure.set_size_inches(11 * columns, height * rows)
-    write_whole(picture, lambda out: figure.savefig(out, format=picture.suffix[1:]), overwrite=overwrite)
-    return {"picture": str(picture)}
 
 
 def _several(file: Path, recordings: Sequence[Recording]) -> str:
@@ -205,15 +161,11 @@ def _several(file: Path, recordings: Sequence[Recording]) -> str:
     )
 
 
-def _of_several(
-    place: Path, of_each: Sequence[dict[str, Any]], written: dict[str, str], *, as_json: bool, each: bool
-) -> Iterable[str]:
+def _of_several(place: Path, of_each: Sequence[dict[str, Any]], *, as_json: bool, each: bool) -> Iterable[str]:
     """Return the facts of several recordings, or of one with several sources, as JSON or as lines for people."""
     if as_json:
-        facts = [facts | written for facts in of_each]
-        return [json.dumps(facts if len(facts) > 1 else facts[0])]
-    pages = chain.from_iterable(map(_pages, of_each)) if each or len(of_each) == 1 else _overview(place, of_each)
-    return chain(pages, (f"{kind} written to {file}" for kind, file in written.items()))
+        return [json.dumps(of_each if len(of_each) > 1 else of_each[0])]
+    return chain.from_iterable(map(_pages, of_each)) if each or len(of_each) == 1 else _overview(place, of_each)
 
 
 def _overview(place: Path, of_each: Sequence[dict[str, Any]]) -> list[str]:
@@ -305,7 +257,7 @@ def _page(facts: dict[str, Any]) -> list[str]:
             f"read by this layout, which {layout_name(Path(facts['file']))} may state:",
             *facts["layout"].splitlines(),
         ]
-    return [*lines, *(f"{kind} written to {facts[kind]}" for kind in ("picture", "table") if kind in facts)]
+    return [*lines, *([f"table written to {facts['table']}"] if "table" in facts else [])]
 
 
 def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
