@@ -143,6 +143,31 @@ def test_a_training_and_a_detection_warn_of_it(tmp_path: Path) -> None:
         assert warnings == ()
 
 
+def test_names_that_are_exchanged_are_said(tmp_path: Path) -> None:
+    frames, truth = pressed(4, 20)
+    taxel.convert(frames, tmp_path / "a.npz")
+    recording, rule = taxel.open(tmp_path / "a.npz"), PlainRule("area", 2, noise_floor=5.0)
+    exchanged = [{"contact": truth["lift"], "lift": truth["contact"]}]
+    training = taxel.train(recording, exchanged, taxel.tasks.TrainOptions(folds=0))
+    for warnings in (training.warnings, taxel.tasks.detect(rule, recording, exchanged).warnings):
+        assert (
+            "40 of 40 labels are where the other of contact and lift is felt: are the two names exchanged?" in warnings
+        )
+    assert training.constants_ms == {}
+
+
+def test_a_label_of_which_most_are_missed_is_not_learnt(tmp_path: Path) -> None:
+    """Too few are where something was felt."""
+    frames, truth = pressed(4, 20)
+    taxel.convert(frames, tmp_path / "a.npz")
+    late = np.where(np.arange(20) < 7, truth["lift"], truth["lift"] + 600_000)
+    labels = {"contact": truth["contact"], "lift": np.sort(late)}
+    training = taxel.train(taxel.open(tmp_path / "a.npz"), [labels], taxel.tasks.TrainOptions(folds=0))
+    assert training.score["lift"].found < 10
+    assert training.learnt == ("contact",)
+    assert any(line.startswith("lift: do not rely on this readout") for line in training.warnings)
+
+
 @pytest.mark.parametrize("late_ms", [-80, 60, 120])
 def test_by_how_much_the_labels_of_one_name_are_off_what_was_felt_is_taken_off(tmp_path: Path, late_ms: int) -> None:
     frames, truth = pressed(4, 20)

@@ -17,8 +17,8 @@ def reporting(progress: Progress | None) -> Progress:
     return (lambda *_: None) if progress is None else callback("progress", progress)
 
 
-class Forecast(str):
-    """A step that says how long the work takes, and how that is known: those who show steps print it as a line."""
+class Announcement(str):
+    """A step that says what is known before the work begins: those who show steps print it as a line."""
 
     __slots__ = ()
 

@@ -16,7 +16,7 @@ from cyclopts import Parameter
 
 from taxel._base.files import check_writable
 from taxel._base.messages import collected, escaped
-from taxel._base.progress import Forecast, Steps
+from taxel._base.progress import Announcement, Steps
 from taxel._core import Error, ProblemError
 from taxel.cli._say import say
 from taxel.cli.app import WRONG_INPUT
@@ -112,7 +112,7 @@ def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
             with console.status("") as status:
 
                 def show(step: str, done: int, total: int) -> None:
-                    if isinstance(step, Forecast):
+                    if isinstance(step, Announcement):
                         console.print(Text(escaped(step)))
                     steps.update(step, done, total)
                     status.update(Text(escaped(steps)))
@@ -124,7 +124,7 @@ def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
             reporting.start()
 
             def update(step: str, done: int, total: int) -> None:
-                if isinstance(step, Forecast):
+                if isinstance(step, Announcement):
                     say(f"taxel: {step}", err=True)
                 steps.update(step, done, total)
 

@@ -179,9 +179,8 @@ def _clock(kinds: Kinds, reach_ms: float) -> tuple[float, float, int]:
     """Return the shift and the rate that explain most, and among how many places they were found."""
     kinds = {kind: pair for kind, pair in kinds.items() if len(pair[0]) and len(pair[1])}
     possible = sum(min(map(len, pair)) for pair in kinds.values())
-    zero = np.array([0.0]), np.array([1.0])
     flat = [_refined(kinds, float(shift), 1.0, reach_ms) for shift in _shifts(kinds, reach_ms)]
-    shift, rate, weight = max([(0.0, 1.0, float(_weights(kinds, *zero, reach_ms)[0])), *flat], key=lambda at: at[2])
+    shift, rate, weight = max([(0.0, 1.0, _weight(kinds, 0.0, 1.0, reach_ms)), *flat], key=lambda at: at[2])
     tried = 1 if abs(shift) <= reach_ms else round(2 * FAR_MS / reach_ms)
     if weight >= _MOST * possible:
         return shift, rate, tried
@@ -263,17 +262,14 @@ def _refined(
         if until >= last and np.allclose(before, (shift_ms, rate), rtol=0.0, atol=1e-9):
             break
         until = min(2 * until, last)
-    return shift_ms, rate, float(_weights(kinds, np.array([shift_ms]), np.array([rate]), reach_ms)[0])
+    return shift_ms, rate, _weight(kinds, shift_ms, rate, reach_ms)
 
 
-def _weights(
-    kinds: Kinds, shifts_ms: NDArray[np.float64], rates: NDArray[np.float64], reach_ms: float
-) -> NDArray[np.float64]:
-    """Return how many labels some clocks explain; one at the reach counts half, so that the sharper fit wins."""
-    total = np.zeros(len(shifts_ms))
-    for k, (shift_ms, rate) in enumerate(zip(shifts_ms, rates, strict=True)):
-        for pairs in _pairs(kinds, shift_ms, rate, reach_ms).values():
-            total[k] += np.sum(1.0 - np.abs(pairs[:, 0] / rate - shift_ms - pairs[:, 1]) / (2 * reach_ms))
+def _weight(kinds: Kinds, shift_ms: float, rate: float, reach_ms: float) -> float:
+    """Return how many labels a clock explains; one at the reach counts half, so that the sharper fit wins."""
+    total = 0.0
+    for pairs in _pairs(kinds, shift_ms, rate, reach_ms).values():
+        total += float(np.sum(1.0 - np.abs(pairs[:, 0] / rate - shift_ms - pairs[:, 1]) / (2 * reach_ms)))
     return total
 
 
@@ -309,7 +305,7 @@ def _chance(kinds: Kinds, fit: ClockFit) -> float:
 
 
 def off_detections(outcomes: Sequence[Outcome], error_ms: Mapping[str, float]) -> list[str]:
-    """Return by how much labels are off their detections, a line for each fit of which they are; at most three.
+    """Return by how much labels are off their detections, a line for each fit of which they are, or two names are.
 
     Parameters
     ----------
@@ -324,23 +320,38 @@ def off_detections(outcomes: Sequence[Outcome], error_ms: Mapping[str, float]) -
         for label, times in outcome.example.labels.items():
             of_label = known.t[np.array([each == label for each in known.label], np.bool_)]
             of_kinds[k, label] = np.asarray(times, np.int64), of_label - round(to_us(error_ms.get(label, 0.0)))
-    return _lines([outcome.example for outcome in outcomes], of_kinds, "their detection", "detections")
+    examples = [outcome.example for outcome in outcomes]
+    kinds = _of_clock(examples, of_kinds)
+    return [*filter(None, [exchanged(kinds)]), *_lines(examples, kinds, "their detection", "detections")]
 
 
 def off_loads(examples: Sequence[Example]) -> list[str]:
     """Return by how much labels are off the begins and ends of loads, a line for each fit of which they are.
 
-    Labels of contacts are compared with begins, those of lifts with ends, all others with both.
-
     Parameters
     ----------
     examples : sequence of Example, checked
-        Nothing is known where one has no tare, or is of spike trains.
     """
-    return _lines(examples, _beside_loads(examples), "where a load begins or ends", "loads")
+    return _lines(examples, beside_loads(examples), "where a load begins or ends", "loads")
 
 
-def constants_ms(examples: Sequence[Example]) -> dict[str, float]:
+def exchanged(kinds: Kinds) -> str:
+    """Return that the labels of two names are where the other one was felt; "" where they are not."""
+    names = sorted({label for _, label in kinds})
+    others = dict(zip(names, reversed(names), strict=True))
+    crossed = {
+        (k, label): (times, kinds.get((k, others[label]), (times, times[:0]))[1])
+        for (k, label), (times, _) in kinds.items()
+    }
+    own, of_other = (sum(map(len, _pairs(each, 0.0, 1.0, REACHES_MS[0]).values())) for each in (kinds, crossed))
+    total = sum(len(times) for times, _ in kinds.values())
+    if len(names) != 2 or own > (1.0 - _MOST) * total or of_other < max(_LEAST, _MOST * total):
+        return ""
+    both = " and ".join(names)
+    return f"{of_other} of {total} labels are where the other of {both} is felt: are the two names exchanged?"
+
+
+def constants_ms(beside: Kinds) -> dict[str, float]:
     """Return by how much the labels of contacts, and those of lifts, are later than loads begin and end, ms.
 
     Of each label whose offset is larger than labels are usually off, and the same for most of them; up to 200 ms, as
@@ -348,12 +359,10 @@ def constants_ms(examples: Sequence[Example]) -> dict[str, float]:
 
     Parameters
     ----------
-    examples : sequence of Example, checked
-        Nothing is known where one has no tare, is of spike trains, or has labels that are thresholds of a quantity.
+    beside : mapping
+        As of `beside_loads`.
     """
-    if any(example.labels_of for example in examples):
-        return {}
-    beside, constants = _of_clock(examples, _beside_loads(examples)), {}
+    constants = {}
     for label in sorted({label for _, label in beside if recipes.neuron_of("touch", label)}):
         kinds = {kind: pair for kind, pair in beside.items() if kind[1] == label}
         fit = next(iter(explain(kinds)), None)
@@ -364,8 +373,16 @@ def constants_ms(examples: Sequence[Example]) -> dict[str, float]:
     return constants
 
 
-def _beside_loads(examples: Sequence[Example]) -> dict[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Return the labels of each example, and the begins or ends of loads that they are of, us."""
+def beside_loads(examples: Sequence[Example]) -> dict[tuple[int, str], tuple[_Times, _Times]]:
+    """Return the labels of each example, and the begins or ends of loads that they are of.
+
+    Labels of contacts are compared with begins, those of lifts with ends, all others with both.
+
+    Parameters
+    ----------
+    examples : sequence of Example, checked
+        Nothing is known where one has no tare, or is of spike trains.
+    """
     # Late labels let a tare end in a touch.
     early = [example if (tare := early_part(example)) is None else example._replace(tare=tare) for example in examples]
     found = touches(early, floor_of(early))
@@ -379,7 +396,7 @@ def _beside_loads(examples: Sequence[Example]) -> dict[tuple[int, str], tuple[ND
         for label, times in example.labels.items():
             edges = {"contact": begins, "lift": ends}.get(recipes.neuron_of("touch", label) or "")
             of_kinds[k, label] = times, np.concatenate([begins, ends]) if edges is None else edges
-    return of_kinds
+    return _of_clock(examples, of_kinds)
 
 
 def _of_clock(
@@ -394,13 +411,9 @@ def _of_clock(
 
 
 def _lines(
-    examples: Sequence[Example],
-    of_kinds: Mapping[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.int64]]],
-    where: str,
-    clock: str,
+    examples: Sequence[Example], kinds: Mapping[tuple[int, str], tuple[_Times, _Times]], where: str, clock: str
 ) -> list[str]:
     """Return the fits of which labels are off as lines."""
-    kinds = _of_clock(examples, of_kinds)
     total = sum(len(labels) for labels, _ in kinds.values())
     fits, lines = explain(kinds), []
     # Detections are a little early or late, which those that are in place show.

@@ -314,20 +314,7 @@ class Recipe:
         >>> recipe.learner_of("foot off")[1], sorted(recipe.neurons)
         (8.0, ['contact', 'foot off'])
         """
-        for key in changes if isinstance(changes, Mapping) else ():
-            if text("key", key).partition(".")[0] in _OF_THE_FILE:
-                raise ProblemError(
-                    f"{key}: only decides when a recipe's file is chosen, so changing it has no effect: change learner "
-                    "or neurons, or write your own recipe"
-                )
         values = recipes.read(recipe)
-        several_of = values.get("encoders")
-        for key in changes if isinstance(changes, Mapping) else ():
-            if key.startswith("encoder.") and isinstance(several_of, Mapping):
-                raise ProblemError(
-                    f"{key}: recipe {recipe} has several encoders: change encoders.NAME{key[7:]}, where NAME is one of "
-                    f"{', '.join(several_of)}"
-                )
         if labels is not None:
             values = recipes.for_labels(values, several("labels", labels))
         values = change_values(values, {} if changes is None else changes)

@@ -33,17 +33,8 @@ from taxel.recording import Recording
 from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
 from taxel.recording.opening import sensors_of
 from taxel.tasks.info import sensor_line
-from taxel.tasks.labels import (
-    GivenLabels,
-    are_tables,
-    few,
-    moved,
-    references,
-    sources_without,
-    table_names,
-    titles_of,
-)
-from taxel.tasks.rest import TakenRest, UnknownRestError, rest
+from taxel.tasks.labels import GivenLabels, given_labels
+from taxel.tasks.rest import TakenRest, rest
 
 #: So many lines, beside that of each sensor, say what was measured.
 _LINES = 3
@@ -115,7 +106,7 @@ class Detecting:
         The labels whose score is too bad to rely on, in all recordings or in some.
     warnings : tuple of str
     left_out : tuple of str
-        The recordings of other arrays than the readout's, beside those that fit, and those without a known rest.
+        The recordings in which the readout cannot detect, as those of another array or without a known rest.
     """
 
     each: tuple[Detected, ...]
@@ -180,7 +171,7 @@ def detect(
 
     Raises
     ------
-    ProblemError : recordings or a truth that do not fit; a recording that is never quiet, whose readout needs the rest
+    ProblemError : recordings of which none fits, or a truth that does not
     FormatError : a table or a tare that is none
 
     Notes
@@ -207,29 +198,19 @@ def detect(
     update = reporting(progress)
     opened = sensors_of(recordings)
     with collected() as warnings:
-        events = [] if truth is None else references(truth, opened, "truth")
-        if truth is not None and not any(events):
-            names = table_names(truth) if are_tables(truth) else truth
-            raise refused("truth", f" is {names}: names no event in {titles_of(opened)}")
-        sources = () if truth is None else sources_without(truth, opened, events)
+        events, sources = ([], ()) if truth is None else given_labels(truth, opened, "truth", options.shift_ms)
         named = {label for of_recording in events for label in of_recording}
         known = [label for label in readout.labels if label in named] or list(readout.labels)
         each_labelled = [
-            None if truth is None or recording.label in sources else moved(events[k], recording, options.shift_ms)
-            for k, recording in enumerate(opened)
+            None if truth is None or recording.label in sources else events[k] for k, recording in enumerate(opened)
         ]
-        left_out = _of_other_arrays(readout, opened)
-        each_one = [
-            (recording, labelled)
-            for recording, labelled in zip(opened, each_labelled, strict=True)
-            if not left_out or readout._accepts(recording.array)
-        ]
+        each_one = list(zip(opened, each_labelled, strict=True))
         workers = Workers() if workers is None else workers
-        found, unknown_rests = _in_each(readout, known, options, each_one, workers, update)
-        if not found and unknown_rests:
-            raise next(iter(unknown_rests.values()))
-        for unknown_rest in unknown_rests.values():
-            warn(f"left out: {unknown_rest}", stacklevel=2)
+        found, failed = _in_each(readout, known, options, each_one, workers, update)
+        if not found and failed:
+            raise next(iter(failed.values()))
+        for failure in failed.values():
+            warn(f"left out: {failure}", stacklevel=2)
         each = tuple(found)
         scored = [outcome for detected in each if (outcome := detected.outcome).score is not None]
         together = _score_of(scored, options.window_ms) if scored else None
@@ -251,7 +232,6 @@ def detect(
     differing = [differences(training, held) for held in boards if held is not None]
     differing += [other_frames(training, recording) for recording in opened]
     warnings += dict.fromkeys(filter(None, differing))
-    names = (*(recording.title for recording in left_out), *unknown_rests)
     with_labels = [outcome for outcome in scored if outcome.score is not None and outcome.score.events]
     bad = (
         tuple(_unreliable(with_labels, _score_of(with_labels, options.window_ms), options.window_ms))
@@ -260,7 +240,7 @@ def detect(
     )
     how = options.window_ms, options.shift_ms, options.use
     without = () if truth is None else (*(label for label in readout.labels if label not in known), *sources)
-    return Detecting(each, together, tuple(unknown), without, *how, bad, tuple(warnings), names)
+    return Detecting(each, together, tuple(unknown), without, *how, bad, tuple(warnings), tuple(failed))
 
 
 def _used(readout: Readout | PlainRule, use: str) -> Readout | PlainRule:
@@ -295,20 +275,6 @@ def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) 
                 yield text
 
 
-def _of_other_arrays(readout: Readout | PlainRule, recordings: Sequence[Recording]) -> list[Recording]:
-    """Return the recordings that are left out as the readout is of another array, with a warning; none if all are."""
-    others = [recording for recording in recordings if not readout._accepts(recording.array)]
-    array = readout.array
-    if not others or len(others) == len(recordings) or array is None:
-        return []
-    warn(
-        f"left out {counted(len(others), 'recording')} of other arrays than the {array.rows} x {array.columns} taxels "
-        f"that the {readout._WHAT} was trained on: {few(recording.title for recording in others)}",
-        stacklevel=3,
-    )
-    return others
-
-
 #: A recording, and its labels if the truth is known.
 _One: TypeAlias = tuple[Recording, Mapping[str, Any] | None]
 
@@ -320,25 +286,25 @@ def _in_each(
     each: Sequence[_One],
     workers: Workers,
     update: Progress,
-) -> tuple[list[Detected], dict[str, UnknownRestError]]:
-    """Return what is detected in recordings, in their order, and those whose rest is not known, by title."""
-    results: dict[int, tuple[Detected | UnknownRestError, tuple[str, ...]]] = {}
+) -> tuple[list[Detected], dict[str, ProblemError]]:
+    """Return what is detected in recordings, in their order, and why it cannot be in others, by title."""
+    results: dict[int, tuple[Detected | ProblemError, tuple[str, ...]]] = {}
     for recording, _ in each[:1]:
         update(f"detecting in {recording.title}", 0, 0)
     for k, result in instance("workers", workers, Workers).run(partial(_tried, readout, known, options), each):
         results[k] = result
         update("detecting", len(results), len(each))
     found: list[Detected] = []
-    unknown: dict[str, UnknownRestError] = {}
+    failed: dict[str, ProblemError] = {}
     for k, (recording, _) in enumerate(each):
         detected, warned = results[k]
         for line in warned:
             warn(line, stacklevel=3)
-        if isinstance(detected, UnknownRestError):
-            unknown[recording.title] = detected
+        if isinstance(detected, ProblemError):
+            failed[recording.title] = detected
         else:
             found.append(detected)
-    return found, unknown
+    return found, failed
 
 
 def _tried(
@@ -346,13 +312,13 @@ def _tried(
     known: Sequence[str],
     options: DetectOptions,
     one: _One,
-) -> tuple[Detected | UnknownRestError, tuple[str, ...]]:
-    """Return what is detected in a recording, or that its rest is not known, and the warnings."""
+) -> tuple[Detected | ProblemError, tuple[str, ...]]:
+    """Return what is detected in a recording, or why it cannot be, and the warnings."""
     recording, labels = one
     with collected() as warnings:
         try:
-            found: Detected | UnknownRestError = _detected(readout, recording, labels, known, options)
-        except UnknownRestError as error:
+            found: Detected | ProblemError = _detected(readout, recording, labels, known, options)
+        except ProblemError as error:
             found = error
     return found, tuple(warnings)
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import column, mapping, several, shown
-from taxel._base.errors import refused
+from taxel._base.errors import helped, refused
 from taxel._base.messages import are, counted, warn
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
@@ -34,6 +34,24 @@ _SIDES = {"left", "right"}
 #: How long after the last event of a board a label may be, us, as people mark late; and from which distance on, the
 #: window of a score, a warning names the label, as no detection can be near it.
 _LATE_US, _NEAR_US = 1_000_000, 50_000
+
+
+def given_labels(
+    source: GivenLabels, recordings: Sequence[Recording], argument: str = "labels", shift_ms: float = 0.0
+) -> tuple[list[dict[str, NDArray[np.int64]]], tuple[str, ...]]:
+    """Return the labels of each recording, so much later, and the sources of which nothing is known.
+
+    Raises
+    ------
+    ProblemError : no event in any recording
+    """
+    events = references(source, recordings, argument)
+    if not any(events):
+        names = table_names(source) if are_tables(source) else "given as times"
+        error = refused(argument, f" is {names}: names no event in {titles_of(recordings)}")
+        raise helped(error, argument, "give") if source == "notes" else error
+    unlabelled = sources_without(source, recordings, events)
+    return [moved(each, one, shift_ms) for each, one in zip(events, recordings, strict=True)], unlabelled
 
 
 def references(

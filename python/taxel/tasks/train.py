@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from time import perf_counter
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import instance
-from taxel._base.errors import helped, refused
 from taxel._base.messages import collected, counted, warn
 from taxel._base.parallel import HERE, Workers
-from taxel._base.progress import Forecast, Progress, reporting
+from taxel._base.progress import Announcement, Progress, reporting
 from taxel._core import ProblemError
-from taxel.detect import Example, Outcome, Readout, Recipe, recipes, score
+from taxel.detect import Example, Outcome, Recipe, recipes, score
 from taxel.detect.board import of_training
-from taxel.detect.clock import constants_ms, off_loads
+from taxel.detect.clock import beside_loads, constants_ms, exchanged, off_loads
 from taxel.detect.drift import training_data
 from taxel.detect.examples import check_examples, sizes_of
 from taxel.detect.fit import Fitter
@@ -33,21 +31,10 @@ from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.opening import sensors_of
 from taxel.tasks.info import sensor_line
-from taxel.tasks.labels import (
-    GivenLabels,
-    are_tables,
-    labelled_trials,
-    moved,
-    references,
-    sources_without,
-    table_names,
-    titles_of,
-)
+from taxel.tasks.labels import GivenLabels, given_labels, labelled_trials
 from taxel.tasks.rest import TakenRest, UnknownRestError, rest
 from taxel.tasks.train_result import Training
 
-#: Work that takes longer says so before it begins, s.
-_LONG_S = 60.0
 #: Sensors of more taxels are no columns of a table.
 _CHANNELS = 256
 #: So many lines say what was measured of labels and sensor.
@@ -118,27 +105,10 @@ def _train(
     recordings: Sequence[Recording], labels: GivenLabels, options: TrainOptions, update: Progress, workers: Workers
 ) -> Training:
     opened = labelled_trials(labels, recordings)
-    labelled = references(labels, opened)
-    if not any(labelled):
-        titles = titles_of(opened)
-        if labels == "notes":
-            raise helped(ProblemError(f"notes: names no event in {titles}"), "labels", "give")
-        raise refused("labels", f" is {_named(labels)}: names no event in {titles}")
-    for table in map(recorded, opened):
-        if isinstance(table, Events) and table.intensity is None:
-            raise ProblemError(
-                "the events have no intensities, but the recipe touch and its encoders need them: for an event camera, "
-                "use frames of counts (window_ms = 5 in [event_camera] of a layout file) and the recipe event_counts"
-            )
-    for each, events in zip(opened, labelled, strict=True):
-        like = _like_labels(recorded(each), events)
-        if len(like) == 1:
-            right = "if it holds labels, not readings, leave it out (leave_out in a layout file)"
-            warn(f"{each.name}: {like[0]} alone changes with the labels and hardly else; {right}")
-    unlabelled = sources_without(labels, opened, labelled)
+    labelled, unlabelled = given_labels(labels, opened, shift_ms=options.shift_ms)
+    _check(opened, labelled)
     some = [k for k, each in enumerate(opened) if each.label not in unlabelled]
     opened, labelled = [opened[k] for k in some], [labelled[k] for k in some]
-    labelled = [moved(events, each, options.shift_ms) for events, each in zip(labelled, opened, strict=True)]
     names = sorted({label for events in labelled for label in events})
     rests = _rests(opened, labelled, options.tare)
     if options.recipe is None and "encoder.name" not in options.changes:
@@ -160,7 +130,7 @@ def _train(
         warn(
             f"arrays of {len(sizes)} sizes, the smallest {smallest} taxels, are padded at their far edges to {largest}"
         )
-    constants = constants_ms(check_examples(examples))
+    constants = _constants(examples, update)
     examples = [
         example._replace(
             labels={label: times - round(1000.0 * constants.get(label, 0.0)) for label, times in example.labels.items()}
@@ -170,8 +140,45 @@ def _train(
     plan = options._plan(names, measured_floor(examples))
     assert plan is not None
     taken = [one for one in rests if isinstance(one, TakenRest)]
-    training = _Work(opened, examples, taken, options, update, workers).training(plan)
+    try:
+        training = _trained(opened, examples, taken, options, plan, update, workers)
+    except ProblemError as error:
+        if off := off_loads(check_examples(examples)):
+            error.args = (f"{error.args[0]}; {off[0]}", *error.args[1:])
+        raise
+    # Where many labels are missed or false, it is said by how much they are off what was felt.
+    if many_wrong(training.score):
+        lines = off_loads(check_examples(examples)) + [sensor_line(recording) for recording in opened]
+        for line in list(filter(None, lines))[:_LINES]:
+            warn(line)
     return replace(training, unlabelled=unlabelled, constants_ms=constants)
+
+
+def _check(opened: Sequence[Recording], labelled: Sequence[Mapping[str, NDArray[np.int64]]]) -> None:
+    """Refuse events without intensities; warn of a channel that is one of labels."""
+    for each, events in zip(opened, labelled, strict=True):
+        table = recorded(each)
+        if isinstance(table, Events) and table.intensity is None:
+            raise ProblemError(
+                "the events have no intensities, but the recipe touch and its encoders need them: for an event camera, "
+                "use frames of counts (window_ms = 5 in [event_camera] of a layout file) and the recipe event_counts"
+            )
+        like = _like_labels(table, events)
+        if len(like) == 1:
+            right = "if it holds labels, not readings, leave it out (leave_out in a layout file)"
+            warn(f"{each.name}: {like[0]} alone changes with the labels and hardly else; {right}")
+
+
+def _constants(examples: Sequence[Example], update: Progress) -> dict[str, float]:
+    """Return by how much the labels of each name are later than what was felt, ms; say where two are exchanged."""
+    if any(example.labels_of for example in examples):
+        return {}
+    beside = beside_loads(check_examples(examples))
+    if not (line := exchanged(beside)):
+        return constants_ms(beside)
+    warn(line)
+    update(Announcement(line), 0, 0)
+    return {}
 
 
 def _like_labels(table: Events | Frames, events: Mapping[str, NDArray[np.int64]]) -> list[str]:
@@ -185,10 +192,6 @@ def _like_labels(table: Events | Frames, events: Mapping[str, NDArray[np.int64]]
     names = table.array.names or [f"channel {k + 1}" for k in range(changes.shape[1])]
     at = {k: table.t[1:][changes[:, k]] for k in few.tolist()}
     return [names[k] for k, own in at.items() if np.abs(own[:, None] - t).min(axis=0).max() <= 1.5 * step]
-
-
-def _named(labels: GivenLabels) -> str:
-    return table_names(labels) if are_tables(labels) else "given as times"
 
 
 def _rests(
@@ -247,85 +250,46 @@ def _within_touches(fitter: Fitter) -> Iterator[str]:
             )
 
 
-@dataclass(frozen=True)
-class _Work:
-    """Hold the labelled recordings of a training, and how it is scored."""
-
-    opened: Sequence[Recording]
-    examples: Sequence[Example]
-    rests: Sequence[TakenRest]
-    options: TrainOptions
-    update: Progress
-    workers: Workers
-
-    def training(self, plan: Recipe) -> Training:
-        """Return the readout with its scores, held out where that can be, and its outcomes on the training data.
-
-        Where many labels are missed or false, or none can be learnt, it is said by how much they are off what was felt.
-        """
+def _trained(
+    opened: Sequence[Recording],
+    examples: Sequence[Example],
+    rests: Sequence[TakenRest],
+    options: TrainOptions,
+    plan: Recipe,
+    update: Progress,
+    workers: Workers,
+) -> Training:
+    """Return the readout with its scores, held out where that can be, and its outcomes on the training data."""
+    registers = opened[0].registers
+    frame_us = None if registers is None else registers.frame_us
+    fitter = Fitter(examples, plan, window_ms=options.window_ms, frame_us=frame_us, progress=update)
+    count, why = options.folds or 0, "folds is 0"
+    if options.folds is None:
+        count, why = count_of_folds(fitter.examples)
+    for line in _within_touches(fitter):
+        warn(line)
+        update(Announcement(line), 0, 0)
+    trained = fitter.fit()
+    scored = None
+    if count:
         try:
-            training = self._training(plan)
+            scored, why = judge_by(fitter, count, workers), ""
         except ProblemError as error:
-            off = off_loads(check_examples(self.examples))
-            if off:
-                error.args = (f"{error.args[0]}; {off[0]}", *error.args[1:])
-            raise
-        if many_wrong(training.score):
-            lines = off_loads(check_examples(self.examples)) + [sensor_line(recording) for recording in self.opened]
-            for line in list(filter(None, lines))[:_LINES]:
-                warn(line)
-        return training
-
-    def _training(self, plan: Recipe) -> Training:
-        folds, window_ms = self.options.folds, self.options.window_ms
-        registers = self.opened[0].registers
-        frame_us = None if registers is None else registers.frame_us
-        fitter = Fitter(self.examples, plan, window_ms=window_ms, frame_us=frame_us, progress=self.update)
-        count, why = count_of_folds(fitter.examples) if folds is None else (folds, "" if folds else "folds is 0")
-        for line in _within_touches(fitter):
-            warn(line)
-            self.update(line, 0, 0)
-        begun = perf_counter()
-        trained = fitter.fit()
-        self._say_how_long(perf_counter() - begun, count)
-        scored = None
-        if count:
-            try:
-                scored = judge_by(fitter, count, self.workers)
-            except ProblemError as error:
-                # These folds are the default, not a request, and all of the data may still be learnt from.
-                if folds is not None:
-                    raise
-                count, why = 0, f"a part of the training data cannot be learnt from: {error}"
-        if scored is None:
-            by_halves = trained.readout._with_rules(trained.readout.rules, fitter.by_rule(fitter.whole))
-            scored = judge_training(fitter, trained._replace(readout=by_halves))
-        rules = {label: rule for label, rule in scored.plain.rules.items() if rule is not None}
-        readout = trained.readout._with_rules(rules, scored.by_rule)
-        data = training_data(fitter.examples, scored.together, of_training(self.examples))
-        trained = trained._replace(readout=readout._with(training=data))
-        return Training(self.options, self.opened, trained, scored, why, self._outcomes(trained.readout), self.rests)
-
-    def _say_how_long(self, once_s: float, folds: int) -> None:
-        """Say how long all takes by what one training on all data took, if that is more than a minute."""
-        # Each fold trains on its part, and on each half of it.
-        trainings = 2 * (folds - 1)
-        if once_s * trainings < _LONG_S:
-            return
-        ground = (
-            f"one training on all data took {once_s:.1f} s, and the folds take about as long as {trainings} of them"
-        )
-        sooner = "fewer recordings, or no folds (--folds 0), are a quick trial"
-        self.update(Forecast(f"about {once_s * trainings / 60:.0f} min left: {ground}; {sooner}"), 0, 0)
-
-    def _outcomes(self, readout: Readout) -> list[Outcome]:
-        """Return the outcomes of the readout on the recordings that it was trained on."""
-        outcomes = []
-        for recording, example in zip(self.opened, self.examples, strict=True):
-            self.update(f"scoring on {recording.title}", 0, 0)
-            truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
-            detections = run(readout, recording, tare=example.tare)
-            scored = score(detections, truth, self.options.window_ms)
-            of_recording = Example(recording, truth, example.tare)
-            outcomes.append(Outcome(recording.title, of_recording, detections, scored))
-        return outcomes
+            # These folds are the default, not a request, and all of the data may still be learnt from.
+            if options.folds is not None:
+                raise
+            why = f"a part of the training data cannot be learnt from: {error}"
+    if scored is None:
+        by_halves = trained.readout._with_rules(trained.readout.rules, fitter.by_rule(fitter.whole))
+        scored = judge_training(fitter, trained._replace(readout=by_halves))
+    rules = {label: rule for label, rule in scored.plain.rules.items() if rule is not None}
+    readout = trained.readout._with_rules(rules, scored.by_rule)
+    readout = readout._with(training=training_data(fitter.examples, scored.together, of_training(examples)))
+    outcomes = []
+    for recording, example in zip(opened, examples, strict=True):
+        update(f"scoring on {recording.title}", 0, 0)
+        truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
+        detections = run(readout, recording, tare=example.tare)
+        of_recording = Example(recording, truth, example.tare)
+        outcomes.append(Outcome(recording.title, of_recording, detections, score(detections, truth, options.window_ms)))
+    return Training(options, opened, trained._replace(readout=readout), scored, why, outcomes, rests)

@@ -78,11 +78,10 @@ class Training:
 
     @property
     def learnt(self) -> tuple[str, ...]:
-        """The labels that are detected with fewer missed and false than there are labels."""
+        """The labels of which the readout finds half or more, with fewer missed and false than there are labels."""
         of_label = self.score.by_label
-        return tuple(
-            one for one in self.readout.labels if one in of_label and of_label[one].rank[0] < of_label[one].events
-        )
+        sound = {name for name, part in of_label.items() if part.events and not unreliable(name, part, "labels")}
+        return tuple(name for name in self.readout.labels if name in sound)
 
     @property
     def held_out(self) -> bool:
