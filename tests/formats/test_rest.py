@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from draws import mixed
 from shell import call
 
 import taxel
@@ -18,10 +17,10 @@ from taxel.recording.analysis.rest import of_frames
 
 from .making import SHARED
 
-#: Where the rest of each shared recording is known from. The plate's footfalls begin at contact and end at foot-off;
-#: of gaitndd's single channels, which have an offset, some stood still without a load first.
+#: Where the rest of each shared recording is known from. The plate's footfalls, here of one subject, begin at contact
+#: and end at foot-off; of gaitndd's single channels, which have an offset, some stood still without a load first.
 EXPECTED = {
-    "plate": {"none": 360},
+    "plate": {"none": 60},
     "insole_gaitpdb": {"unit": 48},
     "insole_moticon": {"unit": 4},
     "insole_fscan": {"unit": 1},
@@ -41,6 +40,7 @@ def _each(name: str) -> list[taxel.Recording]:
         pytest.skip(f"no {name} in {SHARED}: set TAXEL_DATA")
     endings = (".h5", ".txt", ".asf")
     files = sorted(one for one in place.iterdir() if one.suffix in endings) if place.is_dir() else []
+    files = files[:1] if name == "plate" else files
     return [one for file in files or [place] for each in taxel.open_all(file) for one in each.sources.values()]
 
 
@@ -118,7 +118,7 @@ def mat(seed: int, sign: int) -> taxel.Frames:
     return taxel.Frames(np.round(values), np.arange(3000) * 20_000, unit="counts", array=taxel.Array(16, 16))
 
 
-@pytest.mark.parametrize(("seed", "bad"), mixed(range(4), [None, 0, 4095]))
+@pytest.mark.parametrize(("seed", "bad"), [(0, None), (1, 0), (2, 4095), (3, None)])
 def test_presses_that_are_held_fall_too(tmp_path, capsys, seed: int, bad: float | None) -> None:
     """A quiet stretch within a press sets the tracked rest anew; two bad taxels hide nothing and pretend nothing."""
     for sign in (1, -1):
