@@ -43,8 +43,6 @@ _IS_DAY = re.compile(_DATE)
 _DAY_US = 86_400_000_000
 _DAY_WITH_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?:[ T]+(\S+))?", re.ASCII)
 _TIME_OF_DAY = re.compile(r"\d?\d:.*|\d{6}(?:[.,+Z-].*)?", re.ASCII)
-#: An hour, or minutes, of one digit.
-_ONE_DIGIT = re.compile(r"(?:^|(?<=[T ]))(?=\d:)")
 #: Minutes and seconds with a fraction, and hours to seconds with milliseconds behind a colon.
 _MINUTES, _COLON_MS = re.compile(r"(?=\d?\d:\d\d[.,])"), re.compile(r"(?<=:\d\d:\d\d):(?=\d{3})")
 #: Characters of a date without separators.
@@ -65,7 +63,12 @@ def is_time(cell: str) -> bool:
     >>> is_time("2024-05-01T10:00:00.25"), is_time("01.05.2024 10:00:00,25"), is_time("10:00:00"), is_time("10.5")
     (True, True, True, False)
     """
-    return _IS_TIME.fullmatch(cell) is not None or _HALF_DAY.fullmatch(cell) is not None
+    return _IS_TIME.fullmatch(cell) is not None or _half_day(cell) is not None
+
+
+def _half_day(cell: str) -> re.Match[str] | None:
+    """Return the parts of a time with AM or PM; None of others, most of which their end tells."""
+    return _HALF_DAY.fullmatch(cell) if cell[-1:] in ("M", "m", ".") else None
 
 
 def is_day(cell: str) -> bool:
@@ -88,12 +91,15 @@ def seconds_of(cell: str) -> float:
     >>> seconds_of("1/2/1970 12:00:30 AM"), seconds_of("01.01.1970 1:00:00.5 PM"), seconds_of("1:00 am")
     (86430.0, 46800.5, 3600.0)
     """
-    if half := _HALF_DAY.fullmatch(cell):
+    if half := _half_day(cell):
         month, day, year, other, clock, of_day = half.groups()
         date = f"{day}.{month}.{year} " if month else other or ""
         hour = clock.partition(":")[0]
         return seconds_of(f"{date}{clock}") + 43_200 * ((of_day in "pP") - (hour == "12"))
-    cell = _COLON_MS.sub(".", _ONE_DIGIT.sub("0", cell))
+    colon = cell.find(":")
+    if colon == 1 or (colon > 1 and not cell[colon - 2].isdigit()):
+        cell = f"{cell[: colon - 1]}0{cell[colon - 1 :]}"
+    cell = _COLON_MS.sub(".", cell)
     if _MINUTES.match(cell):
         cell = f"00:{cell}"
     found = _DAY_WITH_POINTS.fullmatch(cell)
