@@ -6,7 +6,6 @@ import csv
 import io
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 
 from taxel._base.arguments import shown
@@ -97,13 +96,9 @@ class HeaderTable:
 
 def _rows(location: str | Path, lines: Iterable[str]) -> Iterator[tuple[int, tuple[str, ...]]]:
     """Yield the rows of a table that are not empty, each with the number of its line."""
-    rest = iter(lines)
-    above = list[str]()
-    for first in rest:
-        above.append(first)
-        if first.strip():
-            break
-    reader = csv.reader(chain(above, rest), strict=True, delimiter=separator_of(above[-1] if above else ""))
+    lines = [*lines]
+    names = next((line for line in lines if line.strip()), "")
+    reader = csv.reader(lines, strict=True, delimiter=separator_of(names))
     line = 1
     try:
         for cells in reader:
@@ -129,14 +124,16 @@ def separator_of(names: str) -> str:
 
 
 def text_of(path: Path) -> list[str]:
-    """Read the lines of a text or a sheet, including line ends, as a quoted cell may contain one.
+    """Read the lines of a text or a sheet, with their ends, as a quoted cell may contain one.
 
     Raises
     ------
     FormatError : not a text
     OSError : the file is not there, or cannot be read
     """
-    return lines_of(Text(path).whole())
+    text = Text(path)
+    # A short text is known to its end, whatever its encoding.
+    return [f"{line}\n" for line in (text.head and text.lines())]
 
 
 def lines_of(text: str) -> list[str]:

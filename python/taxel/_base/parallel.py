@@ -13,10 +13,9 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import chdir, contextmanager, suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import psutil
@@ -213,17 +212,6 @@ def _dask(jobs: int, scheduler: str | None) -> Iterator[None]:
 
 
 @contextmanager
-def _in_folder(folder: str) -> Iterator[None]:
-    """Run a block in another current folder."""
-    here = Path.cwd()
-    os.chdir(folder)
-    try:
-        yield
-    finally:
-        os.chdir(here)
-
-
-@contextmanager
 def _with_handler(number: signal.Signals) -> Iterator[None]:
     """Keep the handler of a signal, which Ray replaces."""
     handler = signal.getsignal(number)
@@ -245,7 +233,7 @@ def _ray(jobs: int, scheduler: str | None) -> Iterator[int]:
     # Ray adds the current folder to the path of its workers, which run there, whatever the environment says.
     with tempfile.TemporaryDirectory() as empty:
         try:
-            with _in_folder(empty), _with_handler(signal.SIGTERM):
+            with chdir(empty), _with_handler(signal.SIGTERM):
                 if scheduler is None:
                     ray.init(num_cpus=jobs, include_dashboard=False, _node_ip_address="127.0.0.1", **quiet)
                 else:

@@ -81,19 +81,6 @@ class Text:
                 self.ends_in_line = line.endswith("\n")
                 yield line.rstrip("\n")
 
-    def whole(self) -> str:
-        """Return all of the text, its lines with their ends."""
-        if not self.is_file:
-            return self._sheet
-        with self._bytes() as file:
-            data = file.read()
-        try:
-            return data.decode(self.encoding)
-        except UnicodeDecodeError as error:
-            if self.encoding != "utf-16":
-                return data.decode("latin-1")
-            raise unreadable(f"not text in {self.encoding.upper()} ({error.reason})", self.path) from None
-
     @cached_property
     def head(self) -> list[str]:
         """The first lines; the last of them is whole, if the text goes on."""
