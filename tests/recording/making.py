@@ -7,6 +7,8 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from mcap.reader import make_reader
 
 import taxel
 from taxel import Verdict, _core
@@ -62,13 +64,34 @@ def record(
     writer.note(at + 6_000_000, None, "somebody coughed")
     writer.detection(at + 7_000_000, "contact", 6000, 6192, 1.5, False)
     writer.registers(at, json.dumps(_core.registers_preset("5.2 kHz")))
-    writer.preview(at, 0, 64, np.full(4096, 75, np.uint16))
+    writer.preview(at, 0, np.full(4096, 75, np.uint16))
     pressed = np.full(4096, 75, np.uint16)
     pressed[:2] = 135, 105
-    writer.preview(at + 100_000_000, 100_000, 64, pressed)
+    writer.preview(at + 100_000_000, 100_000, pressed)
     writer.counts(at, json.dumps({"received": number, "recorded": number}))
     if finish:
         writer.finish(json.dumps({"received": number}))
+
+
+def images(place: Path, topics: str) -> list[tuple[str, dict[str, str], int, object]]:
+    """Return topic, metadata of the channel, time in the file and message of all images of some topics."""
+    found = []
+    with place.open("rb") as file:
+        for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():
+            if not channel.topic.startswith(topics):
+                continue
+            assert (schema.name, schema.encoding, channel.message_encoding) == (
+                "foxglove.RawImage",
+                "protobuf",
+                "protobuf",
+            )
+            files = descriptor_pb2.FileDescriptorSet.FromString(schema.data)
+            pool = descriptor_pool.DescriptorPool()
+            for one in files.file:
+                pool.Add(one)
+            image = message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name)).FromString(message.data)
+            found.append((channel.topic, channel.metadata, message.log_time, image))
+    return found
 
 
 @cache

@@ -10,8 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from formats.making import write_icub, write_moticon, write_pedar
-from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
-from mcap.reader import make_reader
 from shell import call
 
 import taxel
@@ -23,30 +21,11 @@ from taxel.options import FullReading
 from taxel.reading import Facts, InMemory, Marks
 from taxel.tasks.labels import references
 
+from .making import images
+
 
 def bits(frames: Frames) -> np.ndarray:
     return frames.values.view(np.uint32)
-
-
-def decoded(place: Path) -> list[tuple[str, dict[str, str], int, object]]:
-    """Return topic, metadata of the channel, time in the file and message of all frames, by the official reader."""
-    found = []
-    with place.open("rb") as file:
-        for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():
-            if not channel.topic.startswith("/frames/"):
-                continue
-            assert (schema.name, schema.encoding, channel.message_encoding) == (
-                "foxglove.RawImage",
-                "protobuf",
-                "protobuf",
-            )
-            files = descriptor_pb2.FileDescriptorSet.FromString(schema.data)
-            pool = descriptor_pool.DescriptorPool()
-            for one in files.file:
-                pool.Add(one)
-            image = message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name)).FromString(message.data)
-            found.append((channel.topic, channel.metadata, message.log_time, image))
-    return found
 
 
 def test_the_official_reader_decodes_every_frame(tmp_path: Path) -> None:
@@ -58,7 +37,7 @@ def test_the_official_reader_decodes_every_frame(tmp_path: Path) -> None:
         place, t = tmp_path / f"{name}.mcap", [-1_500_001, 7, 20_000_000]
         frames = Frames(np.array([values] * 3), t, unit="kPa", array=Array(2, 3, 5.0, name="mat"))
         taxel.convert(frames, place)
-        found = decoded(place)
+        found = images(place, "/frames/")
         assert [log for _, _, log, _ in found] == [0, 1_500_008_000, 21_500_001_000]
         for (topic, metadata, _, image), at in zip(found, t, strict=True):
             assert topic == "/frames/board"
@@ -121,7 +100,7 @@ def test_both_feet_of_a_file_become_sources_left_and_right(
         assert (source.name, source.title) == (f"both.mcap {label}", f"{tmp_path / 'both.mcap'} {label}")
         assert not source.truncated
     # The feet are interleaved by time in the file, and a cut of both is one of each.
-    topics = [topic for topic, _, _, _ in decoded(tmp_path / "both.mcap")]
+    topics = [topic for topic, _, _, _ in images(tmp_path / "both.mcap", "/frames/")]
     assert set(topics) == {"/frames/left", "/frames/right"}
     stop = int(trials[0].frames().t[len(trials[0].frames()) // 2])
     [half] = taxel.cut(both, stop_us=stop)
@@ -214,7 +193,7 @@ def test_frames_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest.C
         assert not taxel.open(tmp_path / f"one{ending}").timed
     assert "that it has no times" in taxel.convert(opened[0], tmp_path / "one.csv")[-1]
     one = taxel.open(tmp_path / "one.mcap")
-    assert decoded(tmp_path / "one.mcap")[0][1]["clock"] == "false"
+    assert images(tmp_path / "one.mcap", "/frames/")[0][1]["clock"] == "false"
     with pytest.raises(ProblemError, match="its frames have no times; give rate_hz"):
         LevelCrossing([100.0]).encode(one)
     with pytest.raises(ProblemError, match="their rate is unknown"):

@@ -73,7 +73,6 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
                 "metrics",
                 "neuron",
                 "nouns",
-                "previews",
                 "recording",
                 "simulate",
                 "test_hooks",

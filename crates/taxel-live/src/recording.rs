@@ -8,9 +8,7 @@
 //! and the reader rebuilds the index by walking the records, whether the file was finished or not.
 
 mod causes;
-mod event_previews;
 mod frames;
-mod grey_preview;
 mod limits;
 mod lsa;
 mod mcap_reader;
@@ -28,7 +26,6 @@ use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
 pub use causes::{Cause, CauseKind, Counts};
-pub use event_previews::EventPreviews;
 pub use frames::{FrameEncoding, FrameProperties, Frames};
 pub use lsa::{DecodedLsa, decode_lsa, write_lsa};
 pub use mcap_reader::{Datagrams, DecodedRecording, Message, Reader, Remarks};

@@ -47,7 +47,7 @@ fn record(path: &Path, datagrams: u64, compression: Compression) {
     let detection = Detection { label: "contact".to_owned(), t: 100, known: 192, slope: 1.5, repaired: true };
     writer.detection(1_000_000_000_700, &detection).unwrap();
     writer.registers(1_000_000_000_800, &header().registers.unwrap()).unwrap();
-    writer.preview(1_000_000_000_900, 192, 64, &vec![75; 4096]).unwrap();
+    writer.preview(1_000_000_000_900, 192, &vec![75; 4096]).unwrap();
     let counts = RecordingCounts { received: datagrams, ..RecordingCounts::default() };
     writer.finish(counts).unwrap();
 }

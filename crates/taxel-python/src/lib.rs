@@ -21,7 +21,6 @@ mod metrics;
 mod neuron;
 mod nouns;
 mod panel;
-mod previews;
 mod recording;
 mod simulate;
 mod wire;
@@ -77,8 +76,6 @@ mod _core {
     use crate::nouns::{check_events, check_spikes, split_by_sign};
     #[pymodule_export]
     use crate::panel::{PanelLive, PanelRecording, PanelView, panel_encoders, panel_limits};
-    #[pymodule_export]
-    use crate::previews::RecordingPreviews;
     #[pymodule_export]
     use crate::recording::{
         DecodedDatagrams, DecodedLsa, RecordingReader, RecordingWriter, Remarks, Samples, clock_doubt, clock_lines,

@@ -327,16 +327,9 @@ impl RecordingWriter {
     }
 
     /// Writes a preview of held ticks, row by row.
-    fn preview(
-        &self,
-        py: Python<'_>,
-        at_ns: i64,
-        t_us: i64,
-        columns: u16,
-        ticks: PyReadonlyArray1<'_, u16>,
-    ) -> PyResult<()> {
+    fn preview(&self, py: Python<'_>, at_ns: i64, t_us: i64, ticks: PyReadonlyArray1<'_, u16>) -> PyResult<()> {
         let ticks = slice("ticks", &ticks)?;
-        self.with(py, |writer| writer.preview(at_ns, t_us, columns, ticks))
+        self.with(py, |writer| writer.preview(at_ns, t_us, ticks))
     }
 
     /// Writes the values that the taxels held when it began, ticks by index, 65 535 of a taxel without any event so far.

@@ -315,7 +315,8 @@ impl Handle {
     }
 
     /// Makes the values that these taxels (column, row) hold (of a source of frames: their medians over the last second) their
-    /// rest from now on, in the readout and in the recording's previews; the recording states when that was, and the rests before and after. Only done on request.
+    /// rest from now on, in the readout; the recording states when that was, and the rests before and after. Only done on
+    /// request.
     ///
     /// # Errors
     ///

@@ -27,22 +27,13 @@ pub(super) struct RecordStage {
     /// When the last preview was recorded, and the number of decoded datagrams then.
     previewed: Instant,
     considered: u64,
-    /// Whether the recording has the fresh tare.
-    tared: bool,
     /// When the counts were last written.
     counted: Instant,
 }
 
 impl RecordStage {
     pub(super) fn new(shared: Arc<PipelineShared>) -> Self {
-        Self {
-            shared,
-            awaits_origin: false,
-            previewed: Instant::now(),
-            considered: 0,
-            tared: false,
-            counted: Instant::now(),
-        }
+        Self { shared, awaits_origin: false, previewed: Instant::now(), considered: 0, counted: Instant::now() }
     }
 
     pub(super) fn runs(&self) -> bool {
@@ -108,7 +99,6 @@ impl RecordStage {
                 *lock(&self.shared.recording.running) = ended;
                 return Err(error);
             }
-            self.tared = false;
             *lock(&self.shared.recording.running) = Some(next);
             // Earlier zeroings remain valid.
             let zeroed: Vec<Zeroing> = self.shared.published().zeroed.values().copied().collect();
@@ -135,32 +125,19 @@ impl RecordStage {
         }
         (self.previewed, self.considered) = (Instant::now(), decoded);
         let Some(t_us) = self.shared.published().counters.board.board_us else { return Ok(()) };
-        let (columns, values) = (self.shared.options.array.columns, held.frame().collect::<Vec<_>>());
-        self.with(|recording| recording.preview(now_ns(), t_us, columns, &values))
+        let values: Vec<u16> = held.frame().collect();
+        self.with(|recording| recording.preview(now_ns(), t_us, &values))
     }
 
-    /// Runs ten times a second: writes the tare once it is complete and, once a second, the counts.
+    /// Writes the counts if they are due.
     pub(super) fn progress(&mut self) -> Result<()> {
-        if !self.runs() {
+        if self.counted.elapsed() < COUNTS_EVERY || !self.runs() {
             return Ok(());
         }
-        let (counters, tare) = {
-            let published = self.shared.published();
-            let tare = if self.tared { None } else { published.tare.clone() };
-            (published.counters.clone(), tare)
-        };
-        self.tared |= tare.is_some();
-        let due = self.counted.elapsed() >= COUNTS_EVERY;
-        if due {
-            self.counted = Instant::now();
-        }
+        self.counted = Instant::now();
+        let counters = self.shared.published().counters.clone();
         let capture = self.shared.receiver.counts();
         let lines = self.shared.frames.as_ref().map(|frames| frames.counts());
-        self.with(|recording| {
-            if let Some(tare) = tare {
-                recording.tare(&tare);
-            }
-            if due { recording.write_losses(&Counters { capture, lines, ..counters }) } else { Ok(()) }
-        })
+        self.with(|recording| recording.write_losses(&Counters { capture, lines, ..counters }))
     }
 }

@@ -10,18 +10,17 @@ mod record_file;
 mod write_queue;
 
 use std::path::Path;
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::Arc;
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD as STANDARD;
 use serde_json::json;
 use taxel_core::detect::Detection;
-use taxel_core::encode::{Tare, Zeroing};
+use taxel_core::encode::Zeroing;
 use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
 use super::frames::{FrameEncoding, message};
-use super::grey_preview::{GreyPreview, GreyScale};
 use super::{BoardChange, Header, OutputFile, RecordingCounts, StreamColumns, Topic, WriterOptions};
 use crate::Result;
 use crate::locked::lock;
@@ -59,7 +58,6 @@ pub struct SourceWriter {
     columns: u16,
     /// Number of cells in the array.
     taxels: usize,
-    grey_scale: Mutex<GreyScale>,
 }
 
 impl std::ops::Deref for Writer {
@@ -142,7 +140,6 @@ impl SourceWriter {
             stream: header.stream.clone(),
             columns: header.array.columns,
             taxels: header.array.len(),
-            grey_scale: Mutex::new(GreyScale::new(header.array.len())),
         }
     }
 
@@ -314,7 +311,6 @@ impl SourceWriter {
         let text = format!("zeroed row {y}, column {x}: its rest was {before_text} and is now {rest:.1} ticks");
         let mut note = log(at_ns, Some(t), &text);
         note["zeroed"] = json!({ "x": x, "y": y, "rest": rest, "before": before });
-        self.grey_scale().zero(usize::from(y) * usize::from(self.columns) + usize::from(x), rest);
         self.push_json(Topic::Notes, at_ns, &note)
     }
 
@@ -349,35 +345,18 @@ impl SourceWriter {
         self.push_json(Topic::Counts, at_ns, &json!(counts))
     }
 
-    /// Subtracts a tare's rest from the previews from now on; without a tare it is the
-    /// rest that [`TrackedRest`](taxel_core::rest::TrackedRest) finds.
-    pub fn tare(&self, tare: &Tare) {
-        self.grey_scale().tare(tare);
-    }
-
-    fn grey_scale(&self) -> MutexGuard<'_, GreyScale> {
-        lock(&self.grey_scale)
-    }
-
-    /// Writes a preview of the taxels' values for viewers: 8 bits above rest, scaled so that the largest value of the
-    /// last 10 s is white. The message states the rest that was subtracted and the value of white in ticks.
+    /// Writes a preview of the taxels' values, ticks, for viewers, in the form of frames.
     ///
     /// # Errors
     ///
-    /// As [`SourceWriter::datagram`]; `Core` if the number of `ticks` is not a multiple of `columns`.
-    pub fn preview(&self, at_ns: i64, t_us: i64, columns: u16, ticks: &[u16]) -> Result<()> {
-        let columns = usize::from(columns);
-        if columns == 0 || ticks.is_empty() || !ticks.len().is_multiple_of(columns) {
-            let n = ticks.len();
-            return Err(problem!("preview of {n} taxels, {columns} a row: must be whole rows").into());
+    /// As [`SourceWriter::datagram`]; `Core(Problem)` if there is not one value a taxel.
+    pub fn preview(&self, at_ns: i64, t_us: i64, ticks: &[u16]) -> Result<()> {
+        if ticks.len() != self.taxels {
+            return Err(problem!("preview of {} taxels: must be {}", ticks.len(), self.taxels).into());
         }
-        let GreyPreview { bytes, rest, full } = self.grey_scale().draw(t_us, columns, ticks);
-        let preview = json!({
-            "timestamp": time(at_ns), "frame_id": "taxel", "width": columns, "height": bytes.len() / columns,
-            "encoding": "mono8", "step": columns, "data": STANDARD.encode(bytes), "t_us": t_us, "rest": rest,
-            "full_ticks": full,
-        });
-        self.push_json(Topic::Pressure, at_ns, &preview)
+        let values: Vec<f32> = ticks.iter().map(|&ticks| ticks.into()).collect();
+        let preview = message(&self.name, t_us, self.columns, &values, FrameEncoding::Whole);
+        self.push(Topic::Pressure, at_ns, 0, &preview)
     }
 
     /// Writes the taxels' values before the recording's first datagram, ticks by taxel index; 65 535 for a taxel

@@ -79,7 +79,7 @@ impl Topic {
     pub(super) fn encoding(self) -> &'static str {
         match self {
             Self::Datagrams => "taxel.wire.v1",
-            Self::Frames => "protobuf",
+            Self::Frames | Self::Pressure => "protobuf",
             _ => "json",
         }
     }
@@ -90,13 +90,14 @@ impl Topic {
         let (name, text) = match self {
             Self::Datagrams => return None,
             // A `FileDescriptorSet` of protobuf: foxglove/RawImage.proto and the time stamp that it uses.
-            Self::Frames => return Some(("foxglove.RawImage", "protobuf", include_bytes!("schemas/RawImage.bin"))),
+            Self::Frames | Self::Pressure => {
+                return Some(("foxglove.RawImage", "protobuf", include_bytes!("schemas/RawImage.bin")));
+            }
             Self::Registers => ("taxel.Registers", include_str!("schemas/Registers.json")),
             Self::Markers => ("taxel.Marker", include_str!("schemas/Marker.json")),
             Self::Notes => ("foxglove.Log", include_str!("schemas/Log.json")),
             Self::Detections => ("taxel.Detection", include_str!("schemas/Detection.json")),
             Self::Counts => ("taxel.Counts", include_str!("schemas/Counts.json")),
-            Self::Pressure => ("foxglove.RawImage", include_str!("schemas/RawImage.json")),
             Self::Held => ("taxel.Held", include_str!("schemas/Held.json")),
             Self::Board => ("taxel.Board", include_str!("schemas/Board.json")),
             Self::Samples => ("taxel.Sample", include_str!("schemas/Sample.json")),

@@ -25,6 +25,8 @@ __all__ = ["RecordingWriter", "encode_events", "write_mcap"]
 _BLOCK = 1 << 18
 #: The most numbers of repaired events in the description of a file, which is limited to 16 MiB.
 _MOST = 1_000_000
+#: From one preview to the next, us, as in recordings of a board.
+_PREVIEW_US = 100_000
 
 
 def write_mcap(path: Path, sources: Mapping[str, SourceView], compression: str) -> tuple[str, ...]:
@@ -274,9 +276,17 @@ def _add_remarks(writer: Any, events: Events, source: SourceView) -> None:
     at_ns = _by_host(source)
     for t, start in events.markers:
         writer.marker(at_ns(t), t, start)
-    for t, ticks in _core.RecordingPreviews(events._parts()):
-        writer.preview(at_ns(t), t, events.array.columns, ticks)
+    if events.intensity is not None:
+        _add_previews(writer, events, at_ns)
     _add_small(writer, source, at_ns)
+
+
+def _add_previews(writer: Any, events: Events, at_ns: Callable[[int], int]) -> None:
+    """Write what taxels hold, for viewers: at each multiple of 100 ms, if an event occurred in the 100 ms up to it."""
+    times = np.unique(-(-events.t // _PREVIEW_US) * _PREVIEW_US)
+    held = _core.HeldValues(events._parts(), None, None)
+    for t in times.tolist():
+        writer.preview(at_ns(t), t, held.at(np.array([t])).astype(np.uint16))
 
 
 def _add_small(writer: Any, source: SourceView, at_ns: Callable[[int], int]) -> None:
