@@ -347,18 +347,6 @@ def recording_verdict(basis: str) -> dict[str, Any]: ...
 def verdict_text(verdict: str) -> str: ...
 def recording_damage(counts: str) -> dict[str, int]: ...
 
-@final
-class DecodedLsa:
-    """A .lsa: its bytes, events as parts, the decoder's counts and the damage among them, whether its .lss is there."""
-
-    payload: Final[NDArray[np.uint8]]
-    events: Final[_Events]
-    counts: Final[dict[str, Any]]
-    damage: Final[dict[str, int]]
-    complete: Final[bool]
-
-def read_lsa(path: str | PathLike[str], sensor: _Array, differences: bool, memory: int) -> DecodedLsa: ...
-
 @type_check_only
 class _ClockLine(TypedDict):
     board_us: int
@@ -367,7 +355,6 @@ class _ClockLine(TypedDict):
 
 def clock_lines(own_us: NDArray[np.int64], arrived_ns: NDArray[np.int64]) -> list[tuple[int, _ClockLine]]: ...
 def clock_doubt(drift_ppm: float, delay_us: float, median_us: float) -> str | None: ...
-def write_lsa(path: str | PathLike[str], payload: bytes) -> None: ...
 
 # encode: encoder and tare as JSON
 
@@ -527,6 +514,7 @@ class EncodedDatagrams:
     unmarked: Final[NDArray[np.int64]]
 
 def encode_datagrams(events: _Events, held: NDArray[np.uint16] | None, promised: bool) -> EncodedDatagrams: ...
+def is_version_2(data: NDArray[np.uint8]) -> bool: ...
 def decode_datagrams(data: NDArray[np.uint8], sensor: _Array, columns: _Columns) -> _Filled: ...
 
 @final

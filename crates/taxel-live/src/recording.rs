@@ -1,4 +1,4 @@
-//! Recording files, which stay readable after a crash: MCAP, and the raw `.lsa` of the manual.
+//! Recording files, which stay readable after a crash: MCAP.
 //!
 //! A recording contains the datagrams as they arrived, not decoded events, with the host's arrival time and an arrival
 //! number. It also contains the board's registers, markers, notes, detections, counts of what was lost, and a low-rate
@@ -10,7 +10,6 @@
 mod causes;
 mod frames;
 mod limits;
-mod lsa;
 mod mcap_reader;
 mod mcap_writer;
 mod metadata;
@@ -27,7 +26,6 @@ use taxel_core::{Array, problem};
 
 pub use causes::{Cause, CauseKind, Counts};
 pub use frames::{FrameEncoding, FrameProperties, Frames};
-pub use lsa::{DecodedLsa, decode_lsa, write_lsa};
 pub use mcap_reader::{Datagrams, DecodedRecording, Message, Reader, Remarks};
 pub use mcap_writer::{SourceWriter, Writer};
 pub use output::OutputFile;

@@ -78,8 +78,8 @@ mod _core {
     use crate::panel::{PanelLive, PanelRecording, PanelView, panel_encoders, panel_limits};
     #[pymodule_export]
     use crate::recording::{
-        DecodedDatagrams, DecodedLsa, RecordingReader, RecordingWriter, Remarks, Samples, clock_doubt, clock_lines,
-        read_lsa, recording_damage, recording_verdict, verdict_text, whole_frames, write_lsa,
+        DecodedDatagrams, RecordingReader, RecordingWriter, Remarks, Samples, clock_doubt, clock_lines, recording_damage,
+        recording_verdict, verdict_text, whole_frames,
     };
     #[pymodule_export]
     use crate::simulate::{
@@ -95,7 +95,7 @@ mod _core {
         registers_warnings, registers_with, registers_with_preset, registers_words, wire_cut, wire_encode, wire_rows,
     };
     #[pymodule_export]
-    use crate::wire_v2::{DatagramStream, EncodedDatagrams, decode_datagrams, encode_datagrams};
+    use crate::wire_v2::{DatagramStream, EncodedDatagrams, decode_datagrams, encode_datagrams, is_version_2};
     #[pymodule_export]
     use taxel_border::instructions::instructions;
 

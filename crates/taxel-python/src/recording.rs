@@ -1,11 +1,11 @@
-//! Recordings: the live format's reader and writer, and the manual's raw files.
+//! Recordings: the live format's reader and writer.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyTuple};
+use pyo3::types::PyTuple;
 use serde_json::{Value, json};
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
@@ -13,11 +13,11 @@ use taxel_core::{Marker, wire};
 use taxel_live::clock::{self, BoardClock, Offset};
 use taxel_live::recording::{
     self, Basis, BoardChange, Condition, Counts, FrameEncoding, Header, Reader, RecordingCounts, SourceWriter, Verdict,
-    Writer, WriterOptions, decode_lsa,
+    Writer, WriterOptions,
 };
 
 use crate::threaded::Threaded;
-use taxel_border::convert::{ArrayParts, Column, array, column, from_events, slice, to_array};
+use taxel_border::convert::{Column, array, column, from_events, slice};
 use taxel_border::enter::enter;
 use taxel_border::errors::{core, live};
 use taxel_border::parameters::{Plain, parsed};
@@ -381,46 +381,6 @@ pub fn verdict_text(verdict: &str) -> PyResult<String> {
 #[pyfunction]
 pub fn recording_damage(counts: &str) -> PyResult<Plain<Counts>> {
     Ok(Plain(Counts::of_version_1(&parsed("counts", counts)?)))
-}
-
-/// Writes raw bytes as a new, complete `.lsa` with its `.lss`.
-#[pyfunction]
-pub fn write_lsa(py: Python<'_>, path: PathBuf, payload: &Bound<'_, PyBytes>) -> PyResult<()> {
-    let bytes = payload.as_bytes();
-    enter(py, |_| taxel_live::recording::write_lsa(&path, bytes))
-}
-
-/// A `.lsa`, decoded.
-#[pyclass(frozen, get_all)]
-pub struct DecodedLsa {
-    payload: Column<u8>,
-    /// The parts of the events.
-    events: Py<PyTuple>,
-    /// The decoder's counts, and the damage among them.
-    counts: Plain<Value>,
-    damage: Plain<Value>,
-    /// Whether the `.lss` is there.
-    complete: bool,
-}
-
-/// Reads a `.lsa` and decodes it.
-#[pyfunction]
-pub fn read_lsa(
-    py: Python<'_>,
-    path: PathBuf,
-    sensor: ArrayParts,
-    differences: bool,
-    memory: u64,
-) -> PyResult<DecodedLsa> {
-    let sensor = to_array(sensor)?;
-    let read = enter(py, |stop| decode_lsa(&path, sensor, differences, memory, stop))?;
-    Ok(DecodedLsa {
-        payload: column(py, read.bytes),
-        events: from_events(py, read.events).into_pyobject(py)?.unbind(),
-        counts: Plain(json!(read.counts)),
-        damage: Plain(json!(Counts::of_version_1(&read.counts))),
-        complete: read.complete,
-    })
 }
 
 /// Lines between a source's clock and the host's, one for each stretch: its middle (us), and the line.

@@ -24,6 +24,12 @@ pub fn decode_datagrams<'py>(
     Ok(from_columns(py, &columns))
 }
 
+/// Whether bytes begin with a datagram of version 2, with or without its length.
+#[pyfunction]
+pub fn is_version_2(data: PyReadonlyArray1<'_, u8>) -> PyResult<bool> {
+    Ok(v2::begins(slice("data", &data)?))
+}
+
 /// Events as datagrams.
 #[pyclass(frozen, get_all, module = "taxel._core")]
 pub struct EncodedDatagrams {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,11 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.limits import available
+from taxel._base.errors import unreadable
+from taxel._base.limits import check_memory
 from taxel.array import Array
-from taxel.events import Events
 from taxel.reading import Datagrams, Facts, InMemory
 from taxel.verdict import Verdict
+from taxel.wire.columns import filled
+
+#: Bytes of an event in memory.
+_EVENT = 16
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -49,19 +54,32 @@ def read_lsa(path: Path, array: Array | None = None, *, differences: bool = Fals
     OSError : the file cannot be read
     """
     array = Array.thesis() if array is None else array
-    read = _core.read_lsa(path, array._parts(), differences, available())
+    size = path.stat().st_size
+    rows = _core.wire_rows(1, size)
+    check_memory(path, size + rows * _EVENT)
+    payload = np.fromfile(path, np.uint8)
+    if _core.is_version_2(payload):
+        raise unreadable(
+            "begins with a datagram of wire version 2; a .lsa file contains only version 1: record version 2 to a "
+            ".mcap file",
+            path,
+        )
+    decoder = _core.WireDecoder(1, array._parts(), differences)
+    events = filled(array, rows, lambda columns: decoder.fill(payload, None, columns, True))
+    decoded, marker = decoder.counts(), path.with_suffix(".lss")
+    complete = marker.exists()
     facts = Facts(
         path=path,
         array=array,
         kind="lsa",
         begins_us=0,
         remarks=("after a silence of more than 6.45 s, times are too early by a multiple of 6.5536 s",),
-        truncated=not read.complete,
+        truncated=not complete,
     )
-    verdict = Verdict._of({"raw": [None if read.complete else path.with_suffix(".lss").name, read.damage]})
-    counts = {"bytes": len(read.payload), "decoder": read.counts}
-    events = Events._from_parts(read.events, array)
-    return LsaReader(facts, events, lost=verdict, counted=counts, payload=read.payload, differences=differences)
+    damage = _core.recording_damage(json.dumps(decoded))
+    verdict = Verdict._of({"raw": [None if complete else marker.name, damage]})
+    counts = {"bytes": len(payload), "decoder": decoded}
+    return LsaReader(facts, events, lost=verdict, counted=counts, payload=payload, differences=differences)
 
 
 def cut_raw(raw: NDArray[np.uint8], *, differences: bool = False) -> Datagrams:

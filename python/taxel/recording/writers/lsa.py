@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import errno
 import os
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
 from taxel import _core
-from taxel._base.files import whole_file, write_whole
+from taxel._base.files import write_whole
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -54,12 +53,6 @@ def write_lsa(path: Path, source: SourceView, *, overwrite: bool) -> list[str]:
     again = wire_decode(payload, array=source.array, differences=differences)
     if not np.array_equal(again.t, events.t // STAMP_US * STAMP_US):
         lost.append("whole turns of 6.5536 s in times")
-    with (
-        whole_file(path, overwrite=overwrite) as temporary,
-        tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder,
-    ):
-        new = Path(folder) / "made.lsa"
-        _core.write_lsa(new, payload.tobytes())
-        os.replace(new, temporary)
+    write_whole(path, lambda file: file.write(payload.data), overwrite=overwrite)
     write_whole(marker, lambda _: None, overwrite=True)
     return lost
