@@ -2,40 +2,26 @@
 
 use taxel_core::detect::{Detector, FrameTime, ReadoutStream};
 use taxel_core::encode::{Tare, TareBuilder};
-use taxel_core::{Events, FramesView, Intensities, Result};
+use taxel_core::held::{Held, as_events};
+use taxel_core::{Array, Events, FramesView, Result};
 
 /// Gathers a tare from the first event on for an interval of the board's time, or until the board marks a start. For
-/// any duration, it stores only the last event of each taxel, that is, the taxel's value.
+/// any duration, it stores only the taxels' values.
 pub(super) struct TareMeasurement {
     stretch_us: i64,
     readout: Box<Detector>,
     builder: TareBuilder,
     first: Option<i64>,
-    last: Vec<Option<LastEvent>>,
+    held: Held,
     /// The time and the values of the last frame.
     frame: Option<(i64, Vec<f32>)>,
-    array: taxel_core::Array,
-}
-
-#[derive(Clone, Copy)]
-struct LastEvent {
-    t: i64,
-    p: bool,
-    ticks: u16,
+    array: Array,
 }
 
 impl TareMeasurement {
-    pub(super) fn new(stretch_us: i64, readout: Box<Detector>, array: &taxel_core::Array) -> Self {
-        let builder = TareBuilder::new(array, None);
-        Self {
-            stretch_us,
-            readout,
-            builder,
-            first: None,
-            last: vec![None; array.len()],
-            frame: None,
-            array: array.clone(),
-        }
+    pub(super) fn new(stretch_us: i64, readout: Box<Detector>, array: &Array) -> Self {
+        let (builder, held) = (TareBuilder::new(array, None), Held::unknown(array.len()));
+        Self { stretch_us, readout, builder, first: None, held, frame: None, array: array.clone() }
     }
 
     /// Processes the next events; once the interval is over, returns its end (us) and the number of these events that
@@ -51,12 +37,7 @@ impl TareMeasurement {
         let piece = events.view().piece(0..inside);
         if !piece.is_empty() {
             self.builder.push_events(piece)?;
-        }
-        if let Some(intensity) = piece.intensity {
-            for k in (0..inside).filter(|&k| intensity.present[k]) {
-                let last = LastEvent { t: piece.t[k], p: piece.p[k], ticks: intensity.ticks[k] };
-                self.last[self.array.index(piece.x[k], piece.y[k])] = Some(last);
-            }
+            self.held.push(piece);
         }
         let over = inside < events.len() || marked.is_some() || quiet_until.is_some_and(|t| t >= stop);
         Ok(over.then_some((stop, inside)))
@@ -78,32 +59,15 @@ impl TareMeasurement {
     /// The tare, and the readout that uses it and is initialised with the taxels' values at `stop` us.
     pub(super) fn finish(self, stop: i64, frames: FrameTime) -> Result<(Tare, ReadoutStream)> {
         let tare = self.builder.finish(stop, "taken live")?;
-        let mut stream = self.readout.stream(&self.array, frames, Some(&tare))?;
+        let (mut stream, mut none) = (self.readout.stream(&self.array, frames, Some(&tare))?, vec![]);
+        stream.begin_at(stop);
         if let Some((t, values)) = self.frame {
-            stream.begin_at(stop);
-            stream.push_frame(t, &values, &mut vec![])?;
+            stream.push_frame(t, &values, &mut none)?;
             return Ok((tare, stream));
         }
-        let mut held: Vec<(usize, LastEvent)> =
-            self.last.iter().enumerate().filter_map(|(taxel, last)| last.map(|last| (taxel, last))).collect();
-        held.sort_by_key(|(_, last)| last.t);
-        let columns = usize::from(self.array.columns);
-        // A taxel's index is on the array, so its row and column fit.
-        #[allow(clippy::cast_possible_truncation)]
-        let events = Events {
-            t: held.iter().map(|(_, last)| last.t).collect(),
-            x: held.iter().map(|(taxel, _)| (taxel % columns) as u16).collect(),
-            y: held.iter().map(|(taxel, _)| (taxel / columns) as u16).collect(),
-            p: held.iter().map(|(_, last)| last.p).collect(),
-            intensity: Some(Intensities {
-                ticks: held.iter().map(|(_, last)| last.ticks).collect(),
-                present: vec![true; held.len()],
-            }),
-            ..Events::empty(self.array)
-        };
-        stream.begin_at(stop);
-        let mut none = vec![];
-        stream.push_events(events.view(), &mut none)?;
+        // The board sent these values, so none is repaired.
+        let held = as_events(self.held.values(), self.first.unwrap_or(stop), &self.array);
+        stream.push_events(Events { repaired: None, ..held }.view(), &mut none)?;
         stream.advance(stop, &mut none)?;
         Ok((tare, stream))
     }
