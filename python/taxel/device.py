@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 from taxel import _core
 from taxel._base.arguments import flag, instance, integer, number, shown, text
 from taxel._base.errors import refused
 from taxel._base.messages import escaped
+from taxel._base.text_lines import TextLines
 from taxel._core import DeviceError
 from taxel.array import Array
 from taxel.wire import Command, Registers
@@ -24,6 +27,14 @@ _RECORD = 1 << 16
 
 #: The noise floor: REG5[15:8] (Table 5.5).
 _FLOOR_REGISTER, _FLOOR_MASK = 5, 0xFF00
+
+#: The register that is written to read another one, and its value for the greeting.
+_READ, _GREET = 6, 8
+#: Longest wait for bytes, while a line is full, and for the greeting of a board whose line was opened again, s.
+_WAIT_S, _FULL_S, _GREETING_S = 0.05, 0.005, 0.25
+#: Longest line of a board, bytes, and how many lines are kept.
+_LONGEST, _RECENT = 1024, 256
+_TEXT = bytes(range(0x20, 0x7F)) + b"\t\n\f\r"
 
 
 @dataclass(frozen=True)
@@ -111,6 +122,13 @@ class Cable:
     timeout : float, s, above 0
         Longest time that the board may take to answer.
 
+    Attributes
+    ----------
+    faults : dict of int
+        Number of faults by name, as far as lines were read.
+    resets : int
+        Number of received greetings that were not requested: the board sends one at a reset and on connecting.
+
     Raises
     ------
     OSError : the port or the server cannot be opened, or another program has opened the port
@@ -133,17 +151,14 @@ class Cable:
         self.timeout = number("timeout", timeout)
         if not 0 < self.timeout <= 3600:
             raise refused("timeout", f" is {shown(timeout)}: must be from 0 to 3600")
-        self._line = _core.BoardLine(self.place, integer("baud", baud, *_core.BAUDS), self.timeout)
-
-    @property
-    def faults(self) -> dict[str, int]:
-        """Number of faults by name, as far as lines were read."""
-        return self._line.faults()
-
-    @property
-    def resets(self) -> int:
-        """Number of received greetings that were not requested: the board sends one at a reset and on connecting."""
-        return self._line.resets()
+        self._baud = integer("baud", baud, *_core.BAUDS)
+        self.faults: dict[str, int] = {}
+        self.resets = 0
+        self._line: _core.SerialLine | None = None
+        self._recent: deque[str] = deque(maxlen=_RECENT)
+        #: Number of bytes that are no text, as those of a line at another baud rate.
+        self._strange = 0
+        self._open(self.timeout)
 
     def command(self, command: Command) -> int:
         """Write a register and return the value that the board reports; other lines of the board are skipped.
@@ -178,8 +193,17 @@ class Cable:
         ...     cable.command(Command(4, 140)), cable.read(4)
         (140, 140)
         """
-        instance("command", command, Command)
-        return self._line.command(command.register, command.value)
+        register, value = instance("command", command, Command).register, command.value
+        reported = value if register == _READ else register
+
+        def answer(kind: str, parts: Any) -> int | None:
+            if kind == "refusal" and parts[0] == register:
+                raise self._failed(
+                    f"the board refuses REG{register} = 0x{value:08X} (REG{register} rule {parts[1]} of its registers)"
+                )
+            return int(parts[1]) if kind == "register" and parts[0] == reported else None
+
+        return self._ask(command, self.timeout, answer)
 
     def greeting(self) -> Greeting:
         """Request the greeting of the board (a write of 8 to REG6), as its line at reset may not have been received.
@@ -192,7 +216,7 @@ class Cable:
         ------
         DeviceError : the board does not answer
         """
-        return Greeting(**self._line.greeting())
+        return self._greeting(self.timeout)
 
     def listen(self) -> dict[str, int]:
         """Read the lines that have arrived, and return the number of faults so far by name ("queue": 3).
@@ -206,8 +230,11 @@ class Cable:
         OSError : the cable was pulled
         DeviceError : the line is closed
         """
-        self._line.listen()
-        return self.faults
+        begun = time.monotonic()
+        # A line that never pauses is no board's.
+        while self._receive(0) is not None and time.monotonic() - begun < self.timeout:
+            pass
+        return dict(self.faults)
 
     def take_lines(self) -> list[str]:
         """Return the lines of the board since the last call, answers to commands included; at most the last 256.
@@ -221,7 +248,10 @@ class Cable:
         OSError : the cable was pulled
         DeviceError : the line is closed
         """
-        return self._line.take_lines()
+        self.listen()
+        lines = list(self._recent)
+        self._recent.clear()
+        return lines
 
     def reopen(self, within: float = 2.0) -> Greeting:
         """Reopen the line until the board answers with its greeting; the fault counts begin again at 0.
@@ -240,7 +270,22 @@ class Cable:
         DeviceError : no board answers within that time
         ProblemError : not a number
         """
-        return Greeting(**self._line.reopen(number("within", within)))
+        within, begun, most = number("within", within), time.monotonic(), min(self.timeout, _GREETING_S)
+        while True:
+            self.close()
+            try:
+                self._open(most)
+                self.faults.clear()
+                return self._greeting(most)
+            except (OSError, DeviceError) as error:
+                if time.monotonic() - begun >= within:
+                    why = (
+                        f"{error.filename}: {error.strerror}"
+                        if isinstance(error, OSError) and error.strerror
+                        else error
+                    )
+                    raise self._failed(f"no board answered within {within:g} s ({why})") from None
+            time.sleep(_WAIT_S)
 
     def read(self, register: int) -> int:
         """Return the value of a register (a write of REG6 with its number).
@@ -259,7 +304,7 @@ class Cable:
         DeviceError : the board does not answer
         ProblemError : no such register
         """
-        return self.command(Command(6, integer("register", register, 0, 7)))
+        return self.command(Command(_READ, integer("register", register, 0, 7)))
 
     @contextlib.contextmanager
     def floor(self, ticks: int) -> Iterator[None]:
@@ -288,7 +333,59 @@ class Cable:
 
     def close(self) -> None:
         """Close the line."""
-        self._line.close()
+        self._line = None
+
+    def _open(self, within: float) -> None:
+        line = _core.SerialLine(self.place, self._baud, within)
+        self._line, self._name, self._lines = line, line.name, TextLines(_LONGEST)
+
+    def _greeting(self, most: float) -> Greeting:
+        greeting = self._ask(
+            Command(_READ, _GREET), most, lambda kind, parts: Greeting(**parts) if kind == "greeting" else None
+        )
+        # This greeting was requested, so it does not indicate a reset.
+        self.resets -= 1
+        return greeting
+
+    def _ask(self, command: Command, most: float, answer: Callable[[str, Any], T | None]) -> T:
+        """Send a command; return what `answer` finds first in the lines that follow."""
+        # A line that arrived before the command is not its answer.
+        self.listen()
+        until, strange, data = time.monotonic() + most, self._strange, command.to_bytes()
+        while True:
+            if data and self._line is not None:
+                data = data[self._line.write(data) :]
+            left = until - time.monotonic()
+            if left <= 0:
+                raise self._silence(most, self._strange - strange)
+            for kind, parts in self._receive(min(left, _FULL_S if data else _WAIT_S)) or ():
+                found = answer(kind, parts)
+                if found is not None:
+                    return found
+
+    def _receive(self, within: float) -> list[tuple[str, Any]] | None:
+        """Return what the lines say that arrive within a time, s; None if nothing arrives. Count faults and resets."""
+        if self._line is None:
+            raise self._failed("the line is closed")
+        data = self._line.read(within)
+        if not data:
+            return None
+        self._strange += len(data.translate(None, _TEXT))
+        said = [line for arrived in self._lines.push(data) if (line := arrived.text.strip())]
+        self._recent.extend(said)
+        statuses = [status for line in said if (status := _core.status_line(line)) is not None]
+        self.resets += sum(kind == "greeting" for kind, _ in statuses)
+        self.faults.update(parts for kind, parts in statuses if kind == "fault")
+        return statuses
+
+    def _silence(self, most: float, strange: int) -> DeviceError:
+        why = "is this the board's serial line?"
+        if strange and not self._name.startswith("TCP "):
+            why = f"{strange} bytes arrived that are not text: is the board's baud rate {self._baud}?"
+        return self._failed(f"no answer within {most:g} s: {why}")
+
+    def _failed(self, text: str) -> DeviceError:
+        return DeviceError(f"{self._name}: {text}")
 
     def __enter__(self) -> Cable:
         return self

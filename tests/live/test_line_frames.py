@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from taxel._base.text_lines import ArrivedLine
 from taxel.formats.layout import PrintedFrames
 from taxel.formats.line_form import form_of_lines
-from taxel.live.line_frames import ArrivedLine, LineFrames
+from taxel.live.line_frames import LineFrames
 
 
 def frames_of(example: str, size: int, **stated: object) -> LineFrames:

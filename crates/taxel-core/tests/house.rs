@@ -32,12 +32,12 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
     (
         "taxel-live",
         &[
-            &["error", "kernel_drops", "latency", "locked", "read_at", "readable_file", "system_error", "text_lines"],
+            &["error", "kernel_drops", "latency", "locked", "read_at", "system_error"],
             &["clock", "named_pipe"],
             &["address", "ports"],
             &["serial_line"],
-            &["board_line", "line_place", "recording"],
-            &["capture", "line_input"],
+            &["line_place", "recording"],
+            &["capture"],
             &["emulate", "pipeline"],
         ],
     ),
@@ -68,7 +68,6 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
                 "encode",
                 "held",
                 "learn",
-                "line_input",
                 "live",
                 "metrics",
                 "neuron",

@@ -1,21 +1,17 @@
 //! Input and output around `taxel-core`: sockets, files and threads.
 
 pub mod address;
-pub mod board_line;
 pub mod clock;
 pub mod error;
 mod kernel_drops;
 mod latency;
-pub mod line_input;
 pub mod line_place;
 pub mod locked;
 mod named_pipe;
 pub mod ports;
 pub mod read_at;
-mod readable_file;
 pub mod serial_line;
 mod system_error;
-pub mod text_lines;
 
 pub mod capture;
 pub mod emulate;

@@ -62,25 +62,6 @@ impl FromStr for LinePlace {
     }
 }
 
-impl LinePlace {
-    /// Whether what arrives first may be the rest of a line: whatever sends may have begun before. A file is read from its
-    /// beginning, and a datagram begins with a line.
-    #[must_use]
-    pub fn begins_anywhere(&self) -> bool {
-        match self {
-            Self::Serial(_) | Self::Tcp(_) => true,
-            Self::File(_) => !self.is_regular_file(),
-            Self::Udp(_) => false,
-        }
-    }
-
-    /// Whether it is a file on a disk, which has what was written before it is read.
-    #[must_use]
-    pub fn is_regular_file(&self) -> bool {
-        matches!(self, Self::File(path) if std::fs::metadata(path).is_ok_and(|about| about.is_file()))
-    }
-}
-
 impl Display for LinePlace {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self {

@@ -1,15 +1,17 @@
-//! Serial ports, and a board on its serial line.
+//! Serial ports and lines, and the status lines of a board.
 
-use std::collections::BTreeMap;
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use taxel_core::wire::{Command, Greeting};
+use pyo3::types::PyBytes;
+use serde_json::{Value, json};
+use taxel_core::wire::StatusLine;
+use taxel_live::line_place::LinePlace;
 use taxel_live::serial_line::SerialPlace;
-use taxel_live::{board_line, ports};
+use taxel_live::{Error, ports, serial_line};
 
 use taxel_border::enter::{Exclusive, enter};
-use taxel_border::errors::core;
+use taxel_border::errors::{core, live};
 use taxel_border::parameters::Plain;
 
 /// The serial ports that the system knows.
@@ -18,59 +20,61 @@ pub fn serial_ports(py: Python<'_>) -> PyResult<Plain<Vec<ports::Port>>> {
     enter(py, |_| ports::ports()).map(Plain)
 }
 
-/// A board on its serial line.
+/// Kind of a place of lines, where it is, its baud rate, and all of it as it is shown.
+#[pyfunction]
+pub fn line_place(py: Python<'_>, text: &str) -> PyResult<(&'static str, String, u32, String)> {
+    let place: LinePlace = enter(py, |_| text.parse())?;
+    let shown = place.to_string();
+    Ok(match place {
+        LinePlace::Serial(SerialPlace::Port(port, baud)) => ("serial", port, baud, shown),
+        LinePlace::Serial(server) => ("serial", server.to_string(), serial_line::BAUD, shown),
+        LinePlace::Tcp(server) => ("tcp", server.to_string(), serial_line::BAUD, shown),
+        LinePlace::File(path) => ("file", path.to_string_lossy().into_owned(), 0, shown),
+        LinePlace::Udp(address) => ("udp", address.to_string(), 0, shown),
+    })
+}
+
+/// Kind and parts of a line of a board; None of another line.
+#[pyfunction]
+pub fn status_line(text: &str) -> Option<(&'static str, Plain<Value>)> {
+    Some(match StatusLine::parse(text)? {
+        StatusLine::Greeting(greeting) => ("greeting", Plain(json!(greeting))),
+        StatusLine::Register { register, value } => ("register", Plain(json!((register, value)))),
+        StatusLine::Refusal { register, rule } => ("refusal", Plain(json!((register, rule)))),
+        StatusLine::Fault { name, count } => ("fault", Plain(json!((name, count)))),
+    })
+}
+
+/// An open serial line: a port, or TCP to a server.
 #[pyclass(frozen)]
-pub struct BoardLine(Exclusive<board_line::BoardLine>);
+pub struct SerialLine {
+    line: Exclusive<serial_line::SerialLine>,
+    /// The place as errors name it.
+    #[pyo3(get)]
+    name: String,
+}
 
 #[pymethods]
-impl BoardLine {
-    /// The board may take `timeout` s to answer.
+impl SerialLine {
+    /// A server may take so many seconds to answer.
     #[new]
-    fn new(py: Python<'_>, place: &str, baud: u32, timeout: f64) -> PyResult<Self> {
+    fn open(py: Python<'_>, place: &str, baud: u32, within: f64) -> PyResult<Self> {
         let place = SerialPlace::new(place, baud).map_err(core)?;
-        let line = enter(py, |_| board_line::BoardLine::open(place, seconds(timeout)))?;
-        Ok(Self(Exclusive::new(line)))
+        let line = enter(py, |_| serial_line::SerialLine::open(&place, seconds(within)))?;
+        Ok(Self { line: Exclusive::new(line), name: place.name() })
     }
 
-    /// Writes a register; returns the value that the board reports.
-    fn command(&self, py: Python<'_>, register: u8, value: u32) -> PyResult<u32> {
-        let command = Command::new(register, value).map_err(core)?;
-        self.0.enter(py, |line, stop| line.command(command, stop))
+    /// What has arrived, after at most so many seconds.
+    fn read<'py>(&self, py: Python<'py>, within: f64) -> PyResult<Bound<'py, PyBytes>> {
+        let mut bytes = vec![0; 1 << 16];
+        let n = self.line.with(py, |line| line.read(&mut bytes, seconds(within)));
+        let n = n.map_err(|error| live(Error::socket(&self.name)(error)))?;
+        Ok(PyBytes::new(py, &bytes[..n]))
     }
 
-    /// Requests the greeting of the board.
-    fn greeting(&self, py: Python<'_>) -> PyResult<Plain<Greeting>> {
-        self.0.enter(py, |line, stop| line.greeting(stop)).map(Plain)
-    }
-
-    /// Reads the lines that have arrived.
-    fn listen(&self, py: Python<'_>) -> PyResult<()> {
-        self.0.enter(py, |line, _| line.listen())
-    }
-
-    /// The lines of the board since the last call.
-    fn take_lines(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        self.0.enter(py, |line, _| line.take_lines())
-    }
-
-    /// Opens the line again until the board answers, for at most `within` s.
-    fn reopen(&self, py: Python<'_>, within: f64) -> PyResult<Plain<Greeting>> {
-        self.0.enter(py, |line, stop| line.reopen(seconds(within), stop)).map(Plain)
-    }
-
-    /// Closes the line.
-    fn close(&self, py: Python<'_>) {
-        self.0.with(py, board_line::BoardLine::close);
-    }
-
-    /// Number of faults by name.
-    fn faults(&self, py: Python<'_>) -> BTreeMap<String, u64> {
-        self.0.with(py, |line| line.faults().clone())
-    }
-
-    /// Number of received greetings that were not requested.
-    fn resets(&self, py: Python<'_>) -> u64 {
-        self.0.with(py, |line| line.resets())
+    /// Writes as many bytes as there is room for; returns their number.
+    fn write(&self, py: Python<'_>, data: &[u8]) -> PyResult<usize> {
+        self.line.with(py, |line| line.write(data)).map_err(|error| live(Error::socket(&self.name)(error)))
     }
 }
 

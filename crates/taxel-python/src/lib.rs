@@ -15,7 +15,6 @@ mod detect;
 mod device;
 mod encode;
 mod learn;
-mod line_input;
 mod live;
 mod metrics;
 mod neuron;
@@ -51,7 +50,7 @@ mod _core {
         make_plain_rule, make_readout, readout_run_events, readout_run_frames, score, spread,
     };
     #[pymodule_export]
-    use crate::device::{BoardLine, serial_ports};
+    use crate::device::{SerialLine, line_place, serial_ports, status_line};
     #[pymodule_export]
     use crate::encode::{
         EncoderStream, check_encoder, check_tare, encode_events, encode_frames, encoder_about, encoder_names,
@@ -64,8 +63,6 @@ mod _core {
     };
     #[pymodule_export]
     use crate::learn::{ConeRFitOut, ConeRProblem, OnlineConeR};
-    #[pymodule_export]
-    use crate::line_input::{ArrivedLines, LineInput};
     #[pymodule_export]
     use crate::live::{Ended, Live, send};
     #[pymodule_export]

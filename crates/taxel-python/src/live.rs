@@ -16,7 +16,7 @@ use taxel_live::capture::Sender;
 use taxel_live::pipeline::{
     Handle, LineSink, Live as Pipeline, LiveOptions, LiveSummary, OutputDetection, ReadLines, Record, Sink,
 };
-use taxel_live::text_lines::LeftOut;
+use taxel_live::recording::LeftOut;
 
 use crate::thread_state;
 use crate::threaded::Threaded;

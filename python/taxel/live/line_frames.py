@@ -10,40 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.messages import counted
+from taxel._base.text_lines import ArrivedLine
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.formats.form import Form
 from taxel.formats.lines import is_number
 
-__all__ = ["ArrivedLine", "LineFrames", "PassedLines", "array_of"]
+__all__ = ["LineFrames", "PassedLines", "array_of"]
 
 #: Length of the first line of a kind, as it is kept, characters.
 _SHOWN = 40
 #: An array that is not square has at most so many times as many columns as rows.
 _FLATTEST = 3
-
-
-@dataclass(frozen=True)
-class ArrivedLine:
-    """Hold a line as it arrived.
-
-    Parameters
-    ----------
-    text : str
-    at_ns : int, ns since 1970
-    size : int
-        Bytes.
-    is_cut : bool
-        Whether it is only the beginning of a line that is too long.
-    is_text : bool
-        Whether its bytes are text.
-    """
-
-    text: str
-    at_ns: int
-    size: int = 0
-    is_cut: bool = False
-    is_text: bool = True
 
 
 @dataclass

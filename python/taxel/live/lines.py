@@ -11,16 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import _core
 from taxel._base.limits import VALUE
 from taxel._base.messages import counted, first_line
+from taxel._base.text_lines import ArrivedLine
 from taxel._core import Error, ProblemError
 from taxel.array import Array
 from taxel.formats.form import Form
 from taxel.formats.line_form import form_of_lines, stated_count
 from taxel.formats.lines import is_number
 from taxel.formats.times import FOUND_US, ISO, UNITS_US
-from taxel.live.line_frames import ArrivedLine, LineFrames, array_of
+from taxel.live.line_frames import LineFrames, array_of
+from taxel.live.line_input import LineInput
 from taxel.live.stated_source import StatedSource
 
 __all__ = ["Lines", "preview"]
@@ -59,7 +60,7 @@ class Lines:
         self._input = None
         if stated.kind == "lines":
             baud = stated.printed.baud
-            self._input = _core.LineInput(stated.place if baud is None else f"{stated.place},baud={baud}")
+            self._input = LineInput(stated.place if baud is None else f"{stated.place},baud={baud}")
         self.place = "given by a program" if self._input is None else self._input.place
         self.array = stated.array
         self.names: tuple[str, ...] = ()
@@ -342,25 +343,29 @@ class Lines:
     def _read(self) -> None:
         """Take the lines that arrive within a short time."""
         assert self._input is not None
-        arrived = self._input.read()
-        self._left_out[0] += arrived.in_no_line
-        self._left_out[1] += arrived.unfinished
-        self._has_ended |= arrived.ended
-        if arrived.trouble is not None:
-            self._trouble = arrived.trouble
+        lines: list[ArrivedLine] = []
+        try:
+            lines = self._input.read()
+        except OSError as error:
+            self._trouble = str(error) if error.strerror is None else f"{error.filename}: {error.strerror}"
             if self._frames is not None:
                 self._frames.restart()
-        lines = [
-            ArrivedLine(text, arrived.arrived_ns, size, is_cut, is_text)
-            for text, size, is_cut, is_text in arrived.lines
-        ]
-        if arrived.cut is not None and lines:
+        self._leave_out()
+        self._has_ended |= self._input.has_ended
+        is_lost = self._input.take_cut() if lines else None
+        if is_lost is not None:
             # Of a serial line whose form is not known, the rest of a number is a number too.
             if self._input.is_serial and self._frames is None and self._declared is None:
                 del lines[0]
             else:
-                self._cut = (lines[0], arrived.cut)
+                self._cut = (lines[0], is_lost)
         self._waiting += lines
+
+    def _leave_out(self) -> None:
+        """Count the bytes that are in no line."""
+        assert self._input is not None
+        in_no_line, unfinished = self._input.lines.take_left_out()
+        self._left_out = [self._left_out[0] + in_no_line, self._left_out[1] + unfinished]
 
     def _leave_out_cut(self, frames: LineFrames) -> None:
         """Leave out a first line that is the rest of one: it does not fit, and ends in a number as lines do."""
@@ -418,8 +423,8 @@ class Lines:
 
     def _end(self) -> None:
         assert self._input is not None
-        in_no_line, unfinished = self._input.end()
-        self._left_out = [self._left_out[0] + in_no_line, self._left_out[1] + unfinished]
+        self._input.lines.discard()
+        self._leave_out()
         self._pass()
 
 

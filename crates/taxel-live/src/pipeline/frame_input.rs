@@ -13,8 +13,7 @@ use super::source::FrameLayout;
 use crate::Result;
 use crate::capture::{MessageFeed, Origin, Receiver, ReceiverOptions};
 use crate::locked::lock;
-use crate::recording::{Cause, Found, now_ns};
-use crate::text_lines::LeftOut;
+use crate::recording::{Cause, Found, LeftOut, now_ns};
 
 /// Interval at which a caller checks whether there is room for its frames.
 const ROOM_EVERY: Duration = Duration::from_millis(1);

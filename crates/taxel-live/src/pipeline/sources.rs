@@ -12,8 +12,7 @@ use super::frame_input::{LineCounts, ReadLines};
 use super::record_stage::COUNTS_EVERY;
 use crate::Result;
 use crate::locked::lock;
-use crate::recording::{self, Found, SourceWriter, StreamColumns, StreamFaults, now_ns};
-use crate::text_lines::LeftOut;
+use crate::recording::{self, Found, LeftOut, SourceWriter, StreamColumns, StreamFaults, now_ns};
 
 /// Sources by their names.
 pub(super) type Named<T> = Vec<(String, T)>;

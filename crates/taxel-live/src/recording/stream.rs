@@ -9,7 +9,6 @@ use taxel_core::problem;
 use super::causes::Cause;
 use super::limits;
 use super::verdict::Found;
-use crate::text_lines::LeftOut;
 use clock::StreamClock;
 
 /// The columns of a source's lines.
@@ -147,6 +146,15 @@ impl<'a> Sampling<'a> {
     pub(super) fn finish(self) -> Samples {
         Samples { found: self.faults.found(), ..self.samples }
     }
+}
+
+/// Number of bytes that arrived and that are in no line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LeftOut {
+    /// Those that cannot be part of a line.
+    pub in_no_line: u64,
+    /// Those of lines whose end did not arrive, or whose beginning did not.
+    pub unfinished: u64,
 }
 
 /// Counts what could not be read of a stream, and what is wrong with its stamps: while it is recorded as in its file.
