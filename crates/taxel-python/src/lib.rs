@@ -75,13 +75,11 @@ mod _core {
     use crate::panel::{PanelLive, PanelRecording, PanelView, panel_encoders, panel_limits};
     #[pymodule_export]
     use crate::recording::{
-        DecodedDatagrams, RecordingReader, RecordingWriter, Remarks, Samples, clock_doubt, clock_lines, recording_damage,
-        recording_verdict, verdict_text, whole_frames,
+        DecodedDatagrams, RecordingReader, RecordingWriter, Remarks, Samples, clock_doubt, clock_lines,
+        recording_damage, recording_verdict, verdict_text, whole_frames,
     };
     #[pymodule_export]
-    use crate::simulate::{
-        Layer, Played, SendingBoard, check_scene, draw_scene, emulate, motion, pattern_values, play, truth,
-    };
+    use crate::simulate::{Layer, Played, check_scene, draw_scene, emulate, motion, pattern_values, play, truth};
     #[cfg(feature = "test-hooks")]
     #[pymodule_export]
     use crate::test_hooks::test_hook;

@@ -5,15 +5,12 @@ use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use serde::Deserialize;
-use taxel_core::board::{
-    self, Board, BoardCounts, Crossed, Flaws, IntensityWord, NetworkFaults, Play, Previous, Version2, opening,
-};
+use taxel_core::board::{self, Board, Crossed, Flaws, IntensityWord, NetworkFaults, Play, Previous, Version2, opening};
 use taxel_core::circuit::Chain;
 use taxel_core::contact::{Act, Bonded, Contact, Foam, FrameSequence, Motion, Narrow, Scene, Sensor, Taxels, Track};
 use taxel_core::wire::Registers;
-use taxel_core::{Array, Error, Result, Stop, reading};
+use taxel_core::{Error, Result, Stop, reading};
 use taxel_live::address::of_text;
-use taxel_live::capture::Sender;
 use taxel_live::emulate::{Emulator, EmulatorOptions, Replay, Report, Scenes, Touch};
 
 use taxel_border::convert::{ArrayParts, Column, EventsIn, array, column, from_events, slice, to_array};
@@ -383,41 +380,4 @@ pub fn pattern_values<'py>(
     let (x, y, frame) = (slice("x", &x)?, slice("y", &y)?, slice("frame", &frame)?);
     let values = x.iter().zip(y).zip(frame).map(|((&x, &y), &n)| board::pattern(&layout, (x, y), n, ramp));
     Ok(array(py, values.collect()))
-}
-
-/// A board that scans frames as they are pushed, and sends what it makes of them.
-#[pyclass(frozen, module = "taxel._core")]
-pub struct SendingBoard(Exclusive<(Board, Sender)>);
-
-#[pymethods]
-impl SendingBoard {
-    /// `registers` and `version_2` are JSON.
-    #[new]
-    fn new(py: Python<'_>, to: &str, parts: ArrayParts, registers: &str, version_2: &str) -> PyResult<Self> {
-        let (array, registers): (Array, Registers) = (to_array(parts)?, parsed("registers", registers)?);
-        let version_2: Version2 = parsed("version 2", version_2)?;
-        let board = Board::new(registers, &array).map_err(core)?.version_2(version_2).map_err(core)?;
-        let sender = enter(py, |_| Sender::open(of_text(to)?, true))?;
-        Ok(Self(Exclusive::new((board, sender))))
-    }
-
-    /// Scans a frame and sends its events; gives how many there were.
-    fn push(&self, py: Python<'_>, ticks: PyReadonlyArray1<'_, u16>) -> PyResult<u64> {
-        let ticks = slice("ticks", &ticks)?;
-        self.0.enter(py, |(board, sender), _| {
-            let before = board.counts().changes;
-            let mut sent = Ok(());
-            board.frame(ticks, |datagram| {
-                sent = sender.push(datagram);
-                sent.is_ok()
-            })?;
-            sent?;
-            sender.flush()?;
-            Ok::<_, taxel_live::Error>(board.counts().changes - before)
-        })
-    }
-
-    fn counts(&self, py: Python<'_>) -> Plain<BoardCounts> {
-        Plain(self.0.with(py, |(board, _)| *board.counts()))
-    }
 }

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import os
+import socket
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import instance, integer, number, numbers, parameters, text
+from taxel._base.arguments import instance, integer, number, numbers, text
 from taxel._base.errors import refused
 from taxel._base.messages import counted, plain
 from taxel.array import Array
 from taxel.live.sending import PORT
+from taxel.simulate.board import Board, Version2
 from taxel.wire import Registers
 
 
@@ -68,10 +70,14 @@ class Source:
         registers, self.shift = Registers._of_source(self.array, number("rate", rate), integer("bits", bits, 1, 16))
         self.bits = int(bits)
         self.registers = registers.replace(noise_floor=integer("noise_floor", noise_floor, 0, 255))
-        options = parameters(
-            {"board": integer("board", board, 0, 65_535), "seed": int.from_bytes(os.urandom(2), "little")}
-        )
-        self._core = _core.SendingBoard(text("to", to), array._parts(), self.registers._json(), options)
+        session = int.from_bytes(os.urandom(2), "little")
+        version_2 = Version2(board=integer("board", board, 0, 65_535), seed=session)
+        self._board = Board(self.registers, self.array, version_2=version_2)
+        _, address, _, _ = _core.line_place(f"lines+udp:{text('to', to)}")
+        host, _, port = address.rpartition(":")
+        self._to = (host.strip("[]"), int(port))
+        # A socket that is connected fails where nothing receives; a board sends regardless.
+        self._socket = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM)
 
     def push(self, frame: ArrayLike) -> int:
         """Send the events of the next frame; return how many there are.
@@ -88,7 +94,10 @@ class Source:
         OSError : the system refuses to send
         """
         ticks = np.minimum(self._whole(frame) >> self.shift, self.registers.ramp)
-        return self._core.push(ticks.astype(np.uint16).reshape(-1))
+        before = self._board.counts["changes"]
+        for datagram in self._board.frame(ticks.astype(np.uint16)):
+            self._socket.sendto(datagram, self._to)
+        return self._board.counts["changes"] - before
 
     def _whole(self, frame: ArrayLike) -> NDArray[np.int64]:
         """Return a frame's values as rows x columns; refuse those that the bits cannot hold."""
