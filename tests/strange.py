@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from formats import bags
 
 import taxel
 from taxel import Note
@@ -64,50 +62,3 @@ def labels(place: Path) -> Path:
     rows = "".join(f'"{NAME}",{10_000 * k}\n' for k in range(40, 400, 80))
     place.write_text(f"label,t_us\n{rows}", newline="")
     return place
-
-
-def write(folder: Path) -> dict[str, Path]:
-    """Write a file of each kind, with every text hostile, into a folder with a hostile name."""
-    folder = folder / FILE
-    folder.mkdir(parents=True)
-    places = {}
-    for ending in (".mcap", ".npz", ".h5", ".csv"):
-        places[ending] = folder / f"{FILE}{ending}"
-        taxel.convert(recording(), places[ending])
-    places["events"] = folder / f"{FILE} events.mcap"
-    events = taxel.Events([0, 200, 300], [0, 1, 2], [1, 1, 0], [True, False, True], array=frames().array)
-    taxel.convert(events, places["events"])
-    places["lsa"] = folder / f"{FILE}.lsa"
-    taxel.convert(events, places["lsa"])
-    rows = "".join(f"{k / 100:g},{','.join(map(str, one.ravel()))}\n" for k, one in enumerate(pressed()))
-    head = ",".join(f'"{k}{CELL}"' for k in range(6))
-    places["table"] = folder / f"{FILE}.txt"
-    places["table"].write_text(f'"t{CELL}",{head}\n{rows}', newline="")
-    places["table without a layout"] = folder / f"{FILE} alone.txt"
-    places["table without a layout"].write_text(f'"t{CELL}",{head}\n{rows}', newline="")
-    layout = places["table"].with_name(f"{FILE}.layout.toml")
-    layout.write_text(f"unit = {toml(CELL)}\n[table]\nseparator = ','\ntime_column = {toml('t' + CELL)}\n")
-    places["arrays"] = folder / f"{FILE} arrays.npz"
-    np.savez(places["arrays"], **{f"a{CELL}": pressed(), f"b{CELL}": np.arange(3)})
-    places["layout"] = folder / f"{FILE} unknown.txt"
-    places["layout"].write_text("1,2\n3,4\n")
-    places["layout"].with_name(f"{FILE} unknown.layout.toml").write_text(f"{toml(NAME)} = 3\n")
-    places["nothing"] = folder / f"{FILE} nothing.csv"
-    places["nothing"].write_text(f"{CELL}\n{CELL}\n")
-    places["missing"] = folder / f"{FILE} missing.mcap"
-    places["bag"] = folder / f"{FILE}.bag"
-    kind = "std_msgs/msg/Int16MultiArray"
-    sent: list[bags.Message] = [
-        (f"/{NAME}", kind, 10 * k, None, bags.multi_array(one, (2, 3))) for k, one in enumerate(pressed())
-    ]
-    bags.write(places["bag"], [*sent, (f"/b{CELL}", kind, 5000, None, bags.multi_array(range(6), ()))])
-    places["labels"] = labels(folder / f"{FILE} labels.csv")
-    return places
-
-
-def toml(text: str) -> str:
-    """Return a text as a basic string of TOML."""
-    return '"' + "".join(f"\\u{ord(c):04x}" if not c.isalnum() else c for c in text) + '"'
-
-
-Each = Callable[[], Any]

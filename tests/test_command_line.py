@@ -1,76 +1,22 @@
 """Errors of the command line name the option that was typed, in one line; exit codes are those of the docs."""
 
-import os
 import re
-import signal
-import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 from shell import call, commands
 
-import taxel
 from taxel.cli._commands import OWN, plugins
 from taxel.cli.app import rows
 
 DOCS = Path(__file__).parent.parent / "docs"
 
 
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with a recording, labels and a readout that needs a tare."""
-    monkeypatch.chdir(tmp_path)
-    array = taxel.Array(4, 4, name="small")
-    t = np.arange(0, 2_000_000, 1000)
-    events = taxel.Events(t, t // 1000 % 4, t // 4000 % 4, t % 2000 == 0, array=array, intensity=40 + t // 1000 % 2)
-    taxel.convert(events, "walk.npz")
-    Path("labels.csv").write_text("label,t_us\ncontact,500000\n")
-    readout = taxel.Readout(taxel.encode.ContactArea(), {"contact": (taxel.Neuron(tau=0.5), np.ones(10))})
-    readout.save("touch.json")
-    Path("there.json").write_text("{}")
-    Path("there.mcap").write_bytes(b"")
-    return tmp_path
-
-
-@pytest.mark.usefixtures("here")
-def test_an_existing_file_is_not_replaced_by_a_result(capsys) -> None:
-    call(capsys, "train", "walk.npz", "--labels", "labels.csv", "-o", "there.json")
-    assert Path("there.json").read_text() == "{}"
-
-
 def test_exit_codes_are_those_of_the_docs() -> None:
     table = (DOCS / "howto.md").read_text()
     assert set(re.findall(r"^\| (\d+) \|", table, re.MULTILINE)) == {"0", "1", "2", "3", "130"}
-
-
-@pytest.mark.parametrize("after_s", [0.0, 0.1, 0.3, 1.0])
-def test_ctrl_c_while_it_starts_ends_quietly(after_s: float) -> None:
-    program = Path(sys.executable).with_name("taxel")
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
-        link.bind(("127.0.0.1", 0))
-        port = str(link.getsockname()[1])
-    arguments = [program, "emulate", "--port", port, "--scenes", "3", "--json"]
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        # After Python itself has started: the process is importing taxel now.
-        until = time.monotonic() + 60
-        while "numpy" not in _maps(process.pid):
-            assert time.monotonic() < until
-            time.sleep(0.005)
-        time.sleep(after_s)
-        os.kill(process.pid, signal.SIGINT)
-        out, error = process.communicate(timeout=60)
-    assert (process.returncode, out, error) == (130, "", "")
-
-
-def _maps(pid: int) -> str:
-    try:
-        return Path(f"/proc/{pid}/maps").read_text()
-    except OSError:
-        return ""
 
 
 def test_the_help_has_a_whole_line_for_each_command_in_the_order_of_the_work(capsys) -> None:
@@ -105,10 +51,7 @@ finally:
     ("arguments", "loaded"),
     [
         (["--help"], ""),
-        (["--version"], ""),
-        (["nonsense"], ""),
         (["trian"], ""),
-        (["merge", "--help"], "merge"),
         (["device", "show", "--help"], "device"),
     ],
 )

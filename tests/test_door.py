@@ -71,39 +71,6 @@ def test_another_thread_runs_while_a_call_waits():
     assert woken
 
 
-def together(work, threads=6):
-    """Do work in several threads at once; raise what any of them raises."""
-    failed, begin = [], threading.Barrier(threads)
-
-    def run(number):
-        begin.wait()
-        try:
-            work(number)
-        except BaseException as error:
-            failed.append(error)
-
-    started = [threading.Thread(target=run, args=(number,)) for number in range(threads)]
-    for thread in started:
-        thread.start()
-    for thread in started:
-        thread.join()
-    if failed:
-        raise failed[0]
-
-
-def test_a_board_may_be_used_from_several_threads():
-    board = taxel.simulate.Board()
-    ticks = np.full((64, 64), 100, np.uint16)
-
-    def scan(_):
-        for _ in range(20):
-            board.frame(ticks)
-            assert isinstance(board.counts, dict)
-
-    together(scan)
-    assert board.time_us > 0
-
-
 def test_what_progress_raises_ends_a_fit_that_keeps_its_best():
     """A fit stopped at its first round is not solved, which shows that it did not continue."""
     rng = np.random.default_rng(3)

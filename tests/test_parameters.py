@@ -1,154 +1,31 @@
 """Parameters are defined once, in the compiled part; every class with parameters follows scikit-learn's conventions."""
 
-import ast
-import copy
-import inspect
-import math
-import pickle
-import re
-import sys
-from collections.abc import Iterator, Sequence
-from pathlib import Path
-from typing import Any, get_args, get_type_hints
-
 import numpy as np
+import parameter_laws as laws
 import pytest
-from refusal import refused
 
 import taxel
-from taxel._base.parameters import Parameters, Value
-
-
-def of(kind: type[Parameters]) -> Iterator[type[Parameters]]:
-    for one in kind.__subclasses__():
-        if not inspect.isabstract(one) and "_kind" in vars(one):
-            yield one
-        yield from of(one)
-
-
-#: Every class with parameters, of rooms that are imported at their first use too.
-ROOMS = (taxel.calibration, taxel.encode, taxel.learn, taxel.metrics, taxel.information)
-KINDS = sorted(set(of(Parameters)), key=lambda kind: kind.__name__)
-#: Values for parameters without a default.
-REQUIRED: dict[str, Any] = {
-    "levels": [1.0],
-    "parts": {"area": taxel.encode.ContactArea()},
-}
-
-
-def make(kind: type[Parameters], **changes: Any) -> Any:
-    return kind(**{**{name: REQUIRED[name] for name in kind._described()["required"]}, **changes})
-
-
-def ranged(kinds: list[Any] = KINDS) -> list[Any]:
-    return [
-        pytest.param(kind, name, id=f"{kind.__name__}.{name}") for kind in kinds for name in kind._described()["ranges"]
-    ]
 
 
 def test_every_class_with_parameters_is_found():
     """Every public class with parameters has the same base class."""
-    named = {kind.__name__ for kind in KINDS}
+    named = {kind.__name__ for kind in laws.KINDS}
     assert {"Neuron", "RunningRange", *Encoders} <= named
 
 
 Encoders = {kind.__name__ for kind in taxel.encode.Encoder._by_name.values()}
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_signature_shows_what_the_compiled_part_has(kind):
-    """Names and defaults of the constructor, one by one; a group is None, which stands for its defaults."""
-    known = kind._described()
-    shown = {name: entry.default for name, entry in inspect.signature(kind).parameters.items()}
-    assert [name for name, default in sorted(shown.items()) if default is inspect.Parameter.empty] == sorted(
-        known["required"]
-    )
-    assert set(shown) - set(known["required"]) == set(known["defaults"])
-    for name, default in known["defaults"].items():
-        wanted = tuple(default) if isinstance(default, list) else None if isinstance(default, dict) else default
-        assert shown[name] == wanted, name
-        assert type(shown[name]) is type(wanted), name
+@pytest.mark.parametrize("law", laws.OF_A_KIND)
+@pytest.mark.parametrize("kind", laws.KINDS)
+def test_parameters_are_defined_once(law, kind):
+    law(kind)
 
 
-@pytest.mark.parametrize(("kind", "name"), ranged())
-def test_a_value_outside_its_range_is_refused(kind, name):
-    rules = kind._described()["ranges"][name]
-    wrong = [math.nan]
-    if "least" in rules:
-        wrong.append(rules["least"] - 1 if rules["least_in"] else rules["least"])
-    if "most" in rules:
-        wrong.append(rules["most"] * 2 + 1 if rules["most_in"] else rules["most"])
-    default = kind._described()["defaults"].get(name)
-    hint = get_type_hints(kind)[name]
-    whole = hint in (int, int | None)
-    entries = max(1, len(default)) if isinstance(default, list) else int(hint == Sequence[float] | None)
-    for value in wrong:
-        given = int(value) if whole and math.isfinite(value) else value
-        with refused(argument=name):
-            make(kind, **{name: [given] * entries if entries else given})
-
-
-def documented(kind: Any, name: str) -> str:
-    """The documentation of a parameter, or that of the class that it refers to."""
-    lines = inspect.getdoc(kind).split("Attributes\n")[0].split("Returns\n")[0].splitlines()
-    (place,) = (k for k, line in enumerate(lines) if re.match(rf"(\w+, )*{name}\b(, \w+)*( : |$)", line))
-    there = re.search(r"[Aa]s (?:in|for) `(\w+)`", " ".join(lines[place + 1 : place + 3]))
-    if there and not re.search(r"\d", lines[place].partition(" : ")[2]):
-        return documented(getattr(sys.modules[kind.__module__.rpartition(".")[0]], there[1]), name)
-    return lines[place]
-
-
-@pytest.mark.parametrize(("kind", "name"), ranged())
-def test_the_documentation_says_the_table_s_range_and_unit(kind, name):
-    rules = kind._described()["ranges"][name]
-    said = documented(kind, name)
-    wanted = rules["must_be"].removesuffix(" and finite")
-    if "number of us" in wanted:
-        wanted = "whole us"
-    if wanted != "finite":
-        assert wanted.replace(" and ", ", ") in said.replace(" and ", ", "), f"{said}: {wanted}"
-    if rules["unit"]:
-        assert f", {rules['unit']}" in said.replace("percent", "%"), said
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_words_of_a_choice_are_the_compiled_part_s(kind):
-    """A value that the type does not list is refused with the list of valid ones."""
-    for name, hint in get_type_hints(kind).items():
-        words = [word for part in (hint, *get_args(hint)) for word in get_args(part) if isinstance(word, str)]
-        if not words or name not in inspect.signature(kind).parameters:
-            continue
-        with refused(argument=name) as error:
-            make(kind, **{name: "nonsense"})
-        listed = str(error.value).partition("nonsense")[2][1:]
-        assert sorted(re.findall('[`"](.+?)[`"]', listed)) == sorted(words)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_parameters_go_round(kind):
-    """By `get_params`, a copy and a pickle; a constructor keeps the objects that it was given."""
-    one = make(kind)
-    again = type(one)(**one.get_params(deep=False))
-    for other in (again, copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
-        assert type(other) is type(one)
-        assert (other._json(), repr(other)) == (one._json(), repr(one))
-        assert (other == one) is isinstance(one, Value)
-    for name, value in one.get_params(deep=False).items():
-        assert getattr(again, name) is value
-    assert kind._compiled.check_parameters(kind._kind, one._json())
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_wrong_value_changes_nothing(kind):
-    one = make(kind)
-    known = kind._described()
-    before, name = one.get_params(), next(iter(known["ranges"] or known["defaults"] or known["required"]))
-    for nonsense in ({name: math.nan}, {name: object()}, {"nonsense": 1}, {f"{name}__nonsense": 1}, {"__": 1}):
-        with pytest.raises(taxel.ProblemError):
-            one.set_params(**nonsense)
-        assert all(held is before[key] for key, held in one.get_params(deep=False).items())
-    with refused(argument="deep"):
-        one.get_params(deep=2)
+@pytest.mark.parametrize("law", laws.OF_A_RANGE)
+@pytest.mark.parametrize(("kind", "name"), laws.ranged())
+def test_ranges_are_those_of_the_table(law, kind, name):
+    law(kind, name)
 
 
 def test_a_group_that_two_share_is_never_changed():
@@ -165,34 +42,3 @@ def test_a_representation_shows_what_differs_from_the_default():
     assert repr(taxel.Neuron(tau=10.0, time="grid")) == "Neuron(tau=10.0, time='grid')"
     assert repr(taxel.encode.ContactArea(levels=[2, 4, 8, 16, 32])) == "ContactArea()"
     assert repr(taxel.encode.ContactArea(levels=np.array([2, 4]))) == "ContactArea(levels=array([2, 4]))"
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_python_types_no_default_of_a_parameter(kind):
-    """A constructor's default is read from the compiled part: `_DEFAULT.tau`, never a number, a word or None."""
-    typed = []
-    path = Path(inspect.getsourcefile(kind))
-    tree = ast.parse(path.read_text())
-    (held,) = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef) and node.name == kind.__name__]
-    for node in held.body:
-        name = node.target.id if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) else ""
-        if name not in inspect.signature(kind).parameters or node.value is None:
-            continue
-        read = isinstance(node.value, ast.Attribute) and isinstance(node.value.value, ast.Name)
-        if not (read and node.value.attr == name):
-            typed.append(f"{path.name}: {kind.__name__}.{name} = {ast.unparse(node.value)}")
-    assert not typed
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_python_compares_no_parameter_with_a_number(kind):
-    """Ranges are checked in the compiled part: no Python class compares one of its parameters with a number."""
-    typed = []
-    path = Path(inspect.getsourcefile(kind))
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Compare):
-            sides = [node.left, *node.comparators]
-            own = any(isinstance(s, ast.Attribute) and s.attr in inspect.signature(kind).parameters for s in sides)
-            if own and any(isinstance(s, ast.Constant) and isinstance(s.value, int | float) for s in sides):
-                typed.append(f"{path.name}: {ast.unparse(node)}")
-    assert not typed

@@ -6,21 +6,12 @@ from pathlib import Path
 
 import cyclopts
 import pytest
+from pages import README, ROOT, shell_lines
 
 from taxel.cli._commands import command
 from taxel.cli.app import own_commands, rows
 
-ROOT = Path(__file__).parent.parent
-README = ROOT / "README.md"
 PAGES = [README, ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
-
-
-def shell_lines(page: Path) -> list[str]:
-    """Return the shell commands of a page, without comments."""
-    fenced = re.findall(r"^```(\S*)[^\n]*\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
-    blocks = [block for language, block in fenced if language in ("", "bash", "console", "powershell", "sh", "shell")]
-    lines = [re.sub(r"\s+#.*", "", line).strip() for block in blocks for line in block.splitlines()]
-    return [line for line in lines if re.match(r"(taxel|make|source|pip|cargo|\.venv/bin/taxel) ", line)]
 
 
 def inline(page: Path) -> list[str]:

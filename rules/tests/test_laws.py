@@ -9,13 +9,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, get_args
 
+import docstrings
+import manners
+import nonsense
 import numpy as np
+import parameter_laws as parameters
 import pytest
 import sound
-import test_docstrings as docstrings
-import test_manners as manners
-import test_nonsense as nonsense
-import test_parameters as parameters
 from sound import PLAIN
 
 import taxel
@@ -62,7 +62,6 @@ def made(rule: Any) -> Any:
 
 each_rule = pytest.mark.parametrize("name", RULES)
 each_kind = pytest.mark.parametrize("kind", KINDS)
-each_range = pytest.mark.parametrize(("kind", "name"), parameters.ranged(KINDS))
 
 
 @pytest.fixture(autouse=True)
@@ -90,54 +89,24 @@ def test_a_rule_has_a_file_in_each_place_and_nothing_is_left_out() -> None:
 
 
 @each_rule
-@pytest.mark.parametrize(
-    "law",
-    [
-        manners.test_a_clone_has_the_same_parameters_and_nothing_learnt,
-        manners.test_what_was_learnt_survives_a_copy_and_a_pickle,
-        manners.test_weights_that_are_assigned_have_no_verdict_of_the_fit_and_a_new_fit_has_its_own,
-        manners.test_scores_lie_between_0_and_1_and_predictions_are_spikes,
-        manners.test_values_are_read_or_graded_trains_are_refused_by_name,
-    ],
-)
+@pytest.mark.parametrize("law", manners.LAWS)
 def test_a_rule_has_the_manners_of_a_learner(law: Any, name: str) -> None:
     law(name)
 
 
-@each_rule
-@pytest.mark.parametrize("shift", [1000.0, 1e9])
-def test_moved_in_time_it_learns_the_same(name: str, shift: float) -> None:
-    manners.test_moved_in_time_it_learns_the_same(name, shift)
-
-
 @each_kind
-@pytest.mark.parametrize(
-    "law",
-    [
-        parameters.test_the_signature_shows_what_the_compiled_part_has,
-        parameters.test_the_words_of_a_choice_are_the_compiled_part_s,
-        parameters.test_parameters_go_round,
-        parameters.test_a_wrong_value_changes_nothing,
-        parameters.test_python_compares_no_parameter_with_a_number,
-    ],
-)
+@pytest.mark.parametrize("law", parameters.OF_A_KIND[:-1])
 def test_parameters_are_defined_once(law: Any, kind: type[Parameters]) -> None:
     law(kind)
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if not issubclass(kind, EpochLearner)])
 def test_python_types_no_default_of_a_parameter_but_those_of_a_rule_by_epochs(kind: type[Parameters]) -> None:
-    parameters.test_python_types_no_default_of_a_parameter(kind)
+    parameters.python_types_no_default_of_a_parameter(kind)
 
 
-@each_range
-@pytest.mark.parametrize(
-    "law",
-    [
-        parameters.test_a_value_outside_its_range_is_refused,
-        parameters.test_the_documentation_says_the_table_s_range_and_unit,
-    ],
-)
+@pytest.mark.parametrize(("kind", "name"), parameters.ranged(KINDS))
+@pytest.mark.parametrize("law", parameters.OF_A_RANGE)
 def test_ranges_are_those_of_the_table(law: Any, kind: type[Parameters], name: str) -> None:
     law(kind, name)
 
@@ -149,7 +118,6 @@ def test_nonsense_in_an_argument_is_one_clear_error() -> None:
 
 def test_docstrings_are_whole() -> None:
     assert [fault for name, value in PUBLIC.items() for fault in docstrings.faults_of_parameters(name, value)] == []
-    assert docstrings.unnamed_sources(PUBLIC) == []
 
 
 def test_the_words_of_status_are_those_of_the_readme() -> None:

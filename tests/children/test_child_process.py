@@ -14,13 +14,15 @@ from loopback import until
 
 from taxel._base.child_process import ChildProcess
 
-#: What a child may do that makes it hard to end; it says its number first.
-SAYS = "import os, pathlib, time\npathlib.Path('half').write_text(str(os.getpid()))\nos.rename('half', 'number')\n"
-STUBBORN = {
-    "plain": "time.sleep(600)",
-    "ignores signals": "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); time.sleep(600)",
-    "computes": "while True: pass",
-}
+#: A child that is hard to end; it says its number first.
+BUSY = """
+import os, pathlib, signal
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+pathlib.Path('half').write_text(str(os.getpid()))
+os.rename('half', 'number')
+while True:
+    pass
+"""
 PARENT = """
 import os, sys, time
 from taxel._base.child_process import ChildProcess
@@ -48,17 +50,15 @@ def program(here: Path, text: str) -> None:
     (here.parent / "named" / "program.py").write_text(text)
 
 
-@pytest.mark.parametrize("does", STUBBORN)
-def test_a_child_ends_with_its_parent(here: Path, does: str) -> None:
-    program(here, SAYS + STUBBORN[does])
+def test_a_child_ends_with_its_parent(here: Path) -> None:
+    program(here, BUSY)
     subprocess.run([sys.executable, "-P", "-c", PARENT], check=False)
     number = int((here / "number").read_text())
     until(lambda: not psutil.pid_exists(number) or psutil.Process(number).status() == "zombie", WITHIN_S)
 
 
-@pytest.mark.parametrize("does", STUBBORN)
-def test_a_parent_ends_its_child_when_it_likes(here: Path, does: str) -> None:
-    program(here, SAYS + STUBBORN[does])
+def test_a_parent_ends_its_child_when_it_likes(here: Path) -> None:
+    program(here, BUSY)
     with ChildProcess("program", stderr=subprocess.DEVNULL) as child:
         until((here / "number").exists, WITHIN_S)
     assert child.returncode != 0

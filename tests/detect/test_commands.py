@@ -1,13 +1,12 @@
 """The commands encode, train and detect: from a recording to scored detections, and what they refuse."""
 
 import json
-import re
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from discs import ARRAY, recipe, tare, touches
+from discs import recipe, tare, touches
 from markupsafe import escape
 from shell import call
 
@@ -285,41 +284,6 @@ def test_a_folder_of_trials_is_trained_on_and_heard_as_its_recordings_are(tmp_pa
     code, said, _ = call(capsys, "detect", *files, "--readout", out, "--truth", trials / "labels.csv", "--json")
     del folder["written"], folder["report"]
     assert (code, json.loads(said)) == (0, {key: value for key, value in folder.items() if key != "recording"})
-
-
-def test_times_since_1970_are_written_from_the_beginning_on(folder: Path, trained: Path, capsys, tmp_path: Path):
-    events, truth = touches(9)
-    since = 1_700_000_000_000_000 - int(events.t[0])
-    moved = taxel.Events(events.t + since, events.x, events.y, events.p, array=ARRAY, intensity=events.intensity)
-    walk = tmp_path / "walk.npz"
-    taxel.convert(moved, walk)
-    rows = [f"{label},{t + since + 9000 * (label == 'lift')}" for label, times in truth.items() for t in times]
-    (tmp_path / "truth.csv").write_text("\n".join(["label,t_us", *rows]) + "\n")
-    truths = ("--truth", tmp_path / "truth.csv")
-    arguments = ("detect", walk, "--readout", trained, "--tare", folder / "tare.json", *truths)
-    code, out, _ = call(capsys, *arguments, "--list", "--report", tmp_path / "page")
-    assert (code, out.count("times are counted from 2023-11-14 22:13:20.000 UTC")) == (0, 1)
-    assert "17000000" not in out
-    found = json.loads(call(capsys, *arguments, "--json")[1])["detections"]
-    assert len(found) == 12
-    assert all(one["t_us"] > 1_700_000_000_000_000 for one in found)
-    written = [
-        line.split()[1:3]
-        for line in out.partition("times are counted from")[2].splitlines()
-        if line.startswith(("contact  ", "lift  "))
-    ]
-    of = [[one[name] - 1_700_000_000_000_000 for name in ("t_us", "known_us")] for one in found]
-    assert written[: len(found)] == [[f"{us / 1000:.3f}" for us in each] for each in of]
-    page = (tmp_path / "page" / "report.html").read_text()
-    assert "2023-11-14 22:13:20.000 UTC" in page
-    assert not re.search(r"17000000\d\d\.", page)
-    assert any(f"<td>{(t + 9000 - int(events.t[0])) / 1e6:.4f}</td>" in page for t in truth["lift"]), "the worst"
-    code, out, _ = call(capsys, "info", walk)
-    assert re.search(r"board time +0 to \d{1,8} us", out)
-    assert "2023-11-14 22:13:20.000 UTC, 1700000000000000 us since 1970" in out
-    assert re.search(r"peak +at most \S+ ticks, at \d{1,8} us", out)
-    drawn = [ax.get_xlabel() for ax in taxel.plot.overview(taxel.open(walk)).axes]
-    assert "time from 2023-11-14 22:13:20.000 UTC (s)" in drawn
 
 
 def test_where_no_label_is_learnt_nothing_is_written(tmp_path: Path, capsys) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from draws import seeds
@@ -32,6 +34,7 @@ def touches(seed: int, taps: int, presses: int, *, held: bool = False) -> Exampl
     return Example(frames, labels, Tare.take(frames, stop_us=1_900_000))
 
 
+@cache
 def trained(seed: int = 1) -> Readout:
     return fit([touches(seed, 8, 5)], Recipe.load("touch", labels=["press", "tap"], noise_floor=5.0))
 

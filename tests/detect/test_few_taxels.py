@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import mixed
 
 import taxel
 from taxel import Array, Frames, Readout, Tare
@@ -25,8 +26,7 @@ def single(shape: tuple[int, int], seed: int, count: int = 14, *, times: float =
     return Example(frames, {"contact": t[begins], "lift": t[begins + 30]}, Tare.take(frames, stop_us=1_900_000))
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (2, 2), (8, 8)])
-@pytest.mark.parametrize("times", [10.0, 100.0])
+@pytest.mark.parametrize(("shape", "times"), mixed([(1, 1), (1, 6), (2, 2), (8, 8)], [10.0, 100.0]))
 def test_one_loaded_taxel_is_learnt_on_any_array(shape: tuple[int, int], times: float) -> None:
     learnt, unseen = single(shape, 1, times=times), single(shape, 2, times=times)
     assert recipes.chosen(learnt.source, ["contact", "lift"])[0] == "touch"

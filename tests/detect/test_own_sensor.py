@@ -11,7 +11,7 @@ from shell import call
 
 import taxel
 from taxel import Array, Frames, Tare
-from taxel.detect import Example, load, recipes, run, score
+from taxel.detect import Example, recipes, run, score
 from taxel.detect.floors import measured_floor
 
 LABELS = ("contact", "lift")
@@ -114,20 +114,3 @@ def test_labels_and_neighbours_choose_the_recipe(
     labels: tuple[str, ...], unit: str, shape: tuple[int, int], recipe: str
 ) -> None:
     assert recipes.chosen(Frames(np.zeros((1, *shape)), [0], unit=unit, array=Array(*shape)), labels)[0] == recipe
-
-
-@pytest.mark.parametrize("labels", [("contact", "lift"), ("contact",)])
-def test_the_rule_in_a_readout_detects_what_the_training_says(tmp_path: Path, capsys, labels: tuple[str, ...]) -> None:
-    frames, truth = touched((6, 6), 1, gain=100.0, noise=1.0, offset=10.0)
-    arguments = written(tmp_path, frames, {label: truth[label] for label in labels})
-    code, out, error = call(capsys, *arguments, "--folds", "0")
-    assert code == 0, error
-    tare = Tare.take(frames, stop_us=int(truth["contact"][0]) - 20_000)
-    readout = load(tmp_path / "readout.json")
-    for label in labels:
-        found = score(run(readout.using("rule"), frames, tare=tare)[label], {label: truth[label]})
-        counts = f"{found.found} of 12 found, {found.missed} missed, {found.false} false"
-        assert any(line.startswith(f"{label}, plain rule") and counts in line for line in out.splitlines())
-    asked = ("detect", tmp_path / "own.npz", "--readout", tmp_path / "readout.json", "--tare", "0.5", "--use", "rule")
-    code, out, _ = call(capsys, *asked)
-    assert (code, "known (ms)" in out, "nan" in out, "slope" in out) == (0, True, False, False)

@@ -24,7 +24,7 @@ def test_events_give_what_a_loop_over_frames_gives(source, rule, clock):
     assert not found.repaired.any()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=2 * settings.default.max_examples, deadline=None)
 @given(events(), st.one_of(rules(), kinds), clocks, st.data())
 def test_pieces_give_what_the_whole_gives(source, rule, clock, data):
     frame_us, version = clock

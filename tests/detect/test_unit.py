@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusal import refused
 
@@ -41,6 +41,7 @@ def both(unit: str) -> list[Readout | PlainRule]:
     return [fit([example(unit)], RECIPE), rule]
 
 
+@settings(max_examples=settings.default.max_examples // 4)
 @given(UNITS, UNITS)
 def test_values_in_another_unit_are_refused_by_a_file_too(own: str, other: str) -> None:
     tare = example(own).tare

@@ -285,3 +285,13 @@ def afferent(t, values, stages, e, *, settled):
             wait = max(e.refractory_ms - since, 0.0)
             spikes.append(at)
     return np.array(spikes), np.inf
+
+
+def slow(encoder, t, x):
+    """Spikes of a slowly adapting afferent by the oracle, ms, and how far they are sure."""
+    e = encoder
+    # (1 + onset) - onset / (1 + s onset_ms) - loss / (1 + s loss_ms), over 1 + s membrane_ms.
+    recent, long, membrane = ([tau, 1.0] for tau in (e.onset_ms, e.loss_ms, e.membrane_ms))
+    both = np.polymul(recent, long)
+    top = (1 + e.onset) * both - e.onset * np.pad(long, (1, 0)) - e.loss * np.pad(recent, (1, 0))
+    return afferent(t, x, [(top, both), ([1.0], membrane)], e, settled=1 - e.loss)

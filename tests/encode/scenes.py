@@ -63,3 +63,15 @@ def rest(array, ticks=55):
     """A tare of an array whose taxels all rest at the same value."""
     frames = np.full((2, array.rows, array.columns), ticks, np.float32)
     return Tare.take(Frames(frames, [0, 1000], unit="ticks", array=array))
+
+
+def smooth(rng, n, period):
+    """A pressure that begins at 0 and wanders smoothly, some of it below 0, ms and ticks."""
+    t = np.arange(n) * period
+    waves = rng.uniform(0.5, 60, 4), rng.uniform(0, 2 * np.pi, 4), rng.uniform(5, 30, 4)
+    x = 45 + sum(a * np.sin(2 * np.pi * f * t / 1000 + phase) for f, phase, a in zip(*waves, strict=True))
+    return t, (x * np.minimum(t / 20, 1)).astype(np.float32)
+
+
+def of(encoder, t, x):
+    return encoder.encode(frames_of(np.rint(t * 1000).astype(int), np.asarray(x)[:, None]))[0]

@@ -10,7 +10,7 @@ from taxel import Array
 from taxel.encode import FA2
 
 from . import oracles
-from .test_sa1 import of, smooth
+from .scenes import of, smooth
 
 REPAIRED = "silent"
 #: Examples for the laws of all encoders (test_laws.py).

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from taxel.encode import SA1
 
-from . import oracles
-from .scenes import frames_of
+from .oracles import slow
+from .scenes import of, smooth
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -23,24 +23,6 @@ EXAMPLES = {
 def trains_of(encoder, taxels, of):
     """The numbers of the trains of some taxels."""
     return taxels
-
-
-def slow(encoder, t, x):
-    """Spikes of a slowly adapting afferent by the oracle, ms, and how far they are sure."""
-    e = encoder
-    # (1 + onset) - onset / (1 + s onset_ms) - loss / (1 + s loss_ms), over 1 + s membrane_ms.
-    recent, long, membrane = ([tau, 1.0] for tau in (e.onset_ms, e.loss_ms, e.membrane_ms))
-    both = np.polymul(recent, long)
-    top = (1 + e.onset) * both - e.onset * np.pad(long, (1, 0)) - e.loss * np.pad(recent, (1, 0))
-    return oracles.afferent(t, x, [(top, both), ([1.0], membrane)], e, settled=1 - e.loss)
-
-
-def smooth(rng, n, period):
-    """A pressure that begins at 0 and wanders smoothly, some of it below 0, ms and ticks."""
-    t = np.arange(n) * period
-    waves = rng.uniform(0.5, 60, 4), rng.uniform(0, 2 * np.pi, 4), rng.uniform(5, 30, 4)
-    x = 45 + sum(a * np.sin(2 * np.pi * f * t / 1000 + phase) for f, phase, a in zip(*waves, strict=True))
-    return t, (x * np.minimum(t / 20, 1)).astype(np.float32)
 
 
 @settings(max_examples=2 * settings.default.max_examples, deadline=None)
@@ -66,10 +48,6 @@ def pressed(t, depth, ramp_ms=1625.0, hold_ms=12_500.0):
 def rate(spikes, start, stop):
     """Spikes/s between two times in ms."""
     return 1000 * np.count_nonzero((spikes >= start) & (spikes < stop)) / (stop - start)
-
-
-def of(encoder, t, x):
-    return encoder.encode(frames_of(np.rint(t * 1000).astype(int), np.asarray(x)[:, None]))[0]
 
 
 def test_a_held_pressure_is_told_for_as_long_and_38_percent_slower_after_12_s():

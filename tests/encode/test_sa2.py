@@ -5,7 +5,8 @@ import pytest
 
 from taxel.encode import SA2
 
-from .test_sa1 import of, slow, smooth
+from .oracles import slow
+from .scenes import of, smooth
 
 REPAIRED = "read"
 #: Examples for the laws of all encoders (test_laws.py).

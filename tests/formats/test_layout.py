@@ -65,8 +65,9 @@ def test_taxels_keep_the_names_of_their_columns(tmp_path: Path, time: int | str 
     assert "names               Daumen, Handfläche, , x3y5, a, a\n" in shown
 
 
-@pytest.mark.parametrize("array", [None, Array(1, 3), Array(3, 1, pitch_mm=2.0)])
-@pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "latin-1"])
+@pytest.mark.parametrize(
+    ("array", "code"), mixed([None, Array(1, 3), Array(3, 1, pitch_mm=2.0)], ["utf-8", "utf-8-sig", "latin-1"])
+)
 def test_channels_of_our_own_table_keep_their_names(tmp_path: Path, array: Array | None, code: str) -> None:
     (tmp_path / "a.csv").write_bytes("t_us,Daumen,Handfläche,c\n0,1,2,3\n10,4,5,6\n".encode(code))
     recording = taxel.open(tmp_path / "a.csv", array=array)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from taxel.information import estimate, folds, keeps, zero_test
 
-from .test_bits import channel
+from .channels import channel
 
 
 def answers(p, trials, random):

@@ -6,9 +6,11 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from shell import call
-from test_command_line import here  # noqa: F401  a fixture
+
+import taxel
 
 #: Words of parsers and of Python that no message to a user should contain.
 FOREIGN = r"unable to parse|Traceback|_core|overwrite=|NoneType|Input should be|taxel\.[A-Z]"
@@ -57,7 +59,23 @@ TYPED = [
 ]
 
 
-def test_messages(here: Path, capsys: pytest.CaptureFixture[str], snapshot: Any) -> None:  # noqa: F811
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a recording, labels and a readout that needs a tare."""
+    monkeypatch.chdir(tmp_path)
+    array = taxel.Array(4, 4, name="small")
+    t = np.arange(0, 2_000_000, 1000)
+    events = taxel.Events(t, t // 1000 % 4, t // 4000 % 4, t % 2000 == 0, array=array, intensity=40 + t // 1000 % 2)
+    taxel.convert(events, "walk.npz")
+    Path("labels.csv").write_text("label,t_us\ncontact,500000\n")
+    readout = taxel.Readout(taxel.encode.ContactArea(), {"contact": (taxel.Neuron(tau=0.5), np.ones(10))})
+    readout.save("touch.json")
+    Path("there.json").write_text("{}")
+    Path("there.mcap").write_bytes(b"")
+    return tmp_path
+
+
+def test_messages(here: Path, capsys: pytest.CaptureFixture[str], snapshot: Any) -> None:
     before = sorted(here.iterdir())
     said = {}
     for arguments in TYPED:
@@ -67,4 +85,5 @@ def test_messages(here: Path, capsys: pytest.CaptureFixture[str], snapshot: Any)
         assert not re.search(FOREIGN, error), error
         said[" ".join(arguments)] = error.rstrip("\n")
     assert sorted(here.iterdir()) == before, "nothing is left behind"
+    assert Path("there.json").read_text() == "{}", "nothing is replaced"
     assert said == snapshot

@@ -13,7 +13,7 @@ from taxel import SpikeTrains
 from taxel._base.errors import Place
 from taxel._core import FormatError
 
-from .test_spikes import some
+from .trains import some
 
 
 def graded(*values: float) -> SpikeTrains:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.panel.protocol import Client
-from tests.recording.test_clock_doubt import CAUSE, recorded
+from tests.recording.pauses import CAUSE, recorded
 
 import taxel
 from taxel.panel import Panel

@@ -109,3 +109,17 @@ def sent_by_a_board(version: int = 2, frames: int = 400) -> list[bytes]:
 def at_least(verdict: Verdict, status: str) -> bool:
     """Whether a status is that one or a worse one."""
     return STATUSES.index(verdict.status) >= STATUSES.index(status)
+
+
+def pressed(path: Path) -> None:
+    """Two taxels that rest at 50 and 40 ticks and are pressed by 30 and 10 from 1.1 s to 1.2 s."""
+    rows = [
+        (0, 2, 3, 50),
+        (0, 4, 3, 40),
+        (1_100_000, 2, 3, 80),
+        (1_100_000, 4, 3, 50),
+        (1_200_000, 2, 3, 50),
+        (1_200_000, 4, 3, 40),
+    ]
+    t, x, y, ticks = zip(*rows, (1_300_000, 2, 3, 50), strict=True)
+    taxel.convert(taxel.Events(t, x, y, [1] * 7, array=taxel.Array(6, 8, 2.0, name="small"), intensity=ticks), path)

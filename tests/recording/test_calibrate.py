@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shell import run
 
 import taxel
 
-from .test_commands import run
-from .test_pressure import pressed
+from .making import pressed
 
 
 def weighed(path: Path) -> None:

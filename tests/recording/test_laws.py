@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import taxel
 from taxel import Array, Clock, Events, Frames, Note
-from taxel.reading import Facts, InMemory, Marks, Zeroing
+from taxel.reading import Facts, InMemory, Marks
 from taxel.recording.recording import Recording
 
 from .making import record, some_events
@@ -219,28 +219,6 @@ def test_opening_cutting_and_listing_read_no_datagram(tmp_path: Path, monkeypatc
     assert (part.array.columns, part.is_slice, part.lost) == (8, True, ("raw datagrams",))
     with pytest.raises(AssertionError, match="a datagram is read"):
         _ = part.events
-
-
-def test_slices_of_one_file_have_its_losses_once(tmp_path: Path) -> None:
-    record(tmp_path / "a.mcap", some_events())
-    whole = taxel.open(tmp_path / "a.mcap")
-    parts = [whole.between(a, a + 20_000) for a in range(0, 80_000, 20_000)]
-    assert {part.verdict for part in parts} == {whole.verdict}
-    assert taxel.merge(parts).verdict == whole.verdict
-
-
-def test_zeroed_taxels_are_those_of_the_part(tmp_path: Path) -> None:
-    array = Array(2, 3)
-    events = Events([0, 9000], [0, 2], [0, 1], [True, True], array=array, intensity=[5, 9])
-    zeroings = (Zeroing(10, 0, 0, 5.0, None), Zeroing(5000, 2, 1, 7.0, 1.0))
-    facts = Facts(path=tmp_path / "a", array=array)
-    whole = Recording.of(InMemory(facts, events, Marks(zeroings=zeroings)))
-    assert whole.between(2000, 9500).zeroings == zeroings
-    assert whole.between(0, 20).zeroings == zeroings[:1]
-    [part] = taxel.cut(whole, columns=slice(1, 3), rows=slice(1, 2))
-    assert part.zeroings == (Zeroing(5000, 1, 0, 7.0, 1.0),)
-    taxel.convert(part, tmp_path / "a.mcap")
-    assert taxel.open(tmp_path / "a.mcap").zeroings == part.zeroings
 
 
 def test_only_the_sensor_of_a_recording_is_cut_where_clocks_differ() -> None:

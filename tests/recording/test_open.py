@@ -14,7 +14,6 @@ import taxel
 from taxel import Frames
 from taxel._core import FormatError, ProblemError
 from taxel.options import FullReading
-from taxel.panel import Panel
 
 from .making import HEADER, record, some_events
 
@@ -80,13 +79,6 @@ def test_a_wrong_file_is_one_line_with_place_and_remedy(tmp_path: Path, name: st
     assert said in text
     assert name in text
     assert "\n" not in text
-
-
-def test_a_pickle_in_a_npz_is_never_loaded(tmp_path: Path) -> None:
-    path = tmp_path / "a.npz"
-    path.write_bytes(npz(t=np.array([object()])))
-    with pytest.raises(FormatError):
-        taxel.open(path)
 
 
 def test_a_missing_file_and_a_folder_are_refused_where_one_recording_is_opened(tmp_path: Path) -> None:
@@ -256,9 +248,3 @@ def test_a_saved_array_of_events_opens(tmp_path: Path) -> None:
     (tmp_path / "a.npy").write_bytes((tmp_path / "a.npy").read_bytes()[:-4])
     with pytest.raises(FormatError, match=r"a\.npy"):
         taxel.open(tmp_path / "a.npy")
-
-
-def test_the_page_opens_an_array_whose_rate_is_given(tmp_path: Path) -> None:
-    np.save(tmp_path / "a.npy", np.ones((4, 256)))
-    with Panel(tmp_path / "a.npy", options=FullReading(rate_hz=30.0)) as panel:
-        assert panel.url

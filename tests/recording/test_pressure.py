@@ -8,29 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shell import run
 
 import taxel
 from taxel.reading import Facts, InMemory
 from taxel.recording.analysis.pressure import series
 from taxel.recording.recording import Recording
 
-from .test_commands import run
+from .making import pressed
 
 ARRAY = taxel.Array(6, 8, 2.0, name="small")
-
-
-def pressed(path: Path) -> None:
-    """Two taxels that rest at 50 and 40 ticks and are pressed by 30 and 10 from 1.1 s to 1.2 s."""
-    rows = [
-        (0, 2, 3, 50),
-        (0, 4, 3, 40),
-        (1_100_000, 2, 3, 80),
-        (1_100_000, 4, 3, 50),
-        (1_200_000, 2, 3, 50),
-        (1_200_000, 4, 3, 40),
-    ]
-    t, x, y, ticks = zip(*rows, (1_300_000, 2, 3, 50), strict=True)
-    taxel.convert(taxel.Events(t, x, y, [1] * 7, array=ARRAY, intensity=ticks), path)
 
 
 def test_area_peak_sum_and_centre_are_said_and_written(tmp_path: Path) -> None:

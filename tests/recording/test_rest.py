@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shell import run
 
 import taxel
 from taxel._base.messages import collected
 from taxel.recording.analysis.pressure import above_rest, series
 from taxel.recording.analysis.rest import by_unit
-
-from .test_commands import run
 
 
 def noisy(noise: float, seconds: float = 2.0) -> taxel.Events:

@@ -22,7 +22,7 @@ from taxel import Verdict, _core
 from taxel.live.summary import summary_of
 from taxel.reading import Facts, InMemory
 
-from .making import HEADER, record, sent_by_a_board, some_events
+from .making import HEADER, record, some_events
 
 START_NS = HEADER["started_ns"]
 
@@ -51,17 +51,10 @@ def test_a_cause_of_a_later_version_is_damage() -> None:
     assert (verdict.status, verdict.damaged) == ("damaged", {"unknown_causes": 3})
 
 
-def written_anew(
-    of: Path,
-    path: Path,
-    times: Callable[[int], int],
-    number: Callable[[int], int],
-    topic: str = "/datagrams",
-    data: Callable[[int, bytes], bytes] = lambda _, data: data,
-) -> list[int]:
-    """Write a recording by the official library; return how many of a topic are there 0 times, once and twice."""
+def written_anew(of: Path, path: Path, topic: str, keeps: Callable[[int], bool]) -> int:
+    """Write a recording by the official library; return how many messages of a topic it leaves out."""
     with of.open("rb") as source, path.open("wb") as file:
-        reader, writer, channels, there = make_reader(source), Writer(file), {}, [0, 0, 0]
+        reader, writer, channels, there = make_reader(source), Writer(file), {}, []
         writer.start("taxel")
         metadata = [(one.name, one.metadata) for one in reader.iter_metadata()]
         for one in metadata[:1]:
@@ -72,18 +65,15 @@ def written_anew(
                 channels[channel.topic] = writer.register_channel(
                     channel.topic, channel.message_encoding, known or 0, channel.metadata
                 )
-            copies = 1
             if channel.topic == topic:
-                copies = times(message.sequence if topic == "/datagrams" else sum(there))
-                there[copies] += 1
-            held = data(message.sequence, message.data) if channel.topic == topic else message.data
-            said = message.log_time, held, message.publish_time, number(message.sequence)
-            for _ in range(copies):
-                writer.add_message(channels[channel.topic], *said)
+                there.append(keeps(len(there)))
+            if channel.topic != topic or there[-1]:
+                times = message.publish_time, message.sequence
+                writer.add_message(channels[channel.topic], message.log_time, message.data, *times)
         for one in metadata[1:]:
             writer.add_metadata(*one)
         writer.finish()
-    return there
+    return there.count(False)
 
 
 @pytest.mark.parametrize("cut", [0, 300])
@@ -102,32 +92,13 @@ def test_small_messages_that_another_program_left_out_are_lost(
     topic: str, keeps: Callable[[int], bool], cause: str | None, cut: int, tmp_path: Path
 ) -> None:
     record(tmp_path / "a.mcap", some_events(), finish=not cut)
-    left_out, *_ = written_anew(tmp_path / "a.mcap", tmp_path / "b.mcap", lambda n: int(keeps(n)), lambda n: n, topic)
+    left_out = written_anew(tmp_path / "a.mcap", tmp_path / "b.mcap", topic, keeps)
     data = (tmp_path / "b.mcap").read_bytes()
     (tmp_path / "b.mcap").write_bytes(data[: len(data) - cut])
     verdict = taxel.open(tmp_path / "b.mcap").verdict
     assert left_out > 0
     assert verdict.lost == ({cause: left_out} if cause else {})
     assert not cut or "not finished" in verdict
-
-
-@pytest.mark.parametrize(
-    ("times", "number"),
-    [
-        (lambda n: 1 + (n == 5), lambda n: n),
-        (lambda _: 2, lambda n: n),
-        (lambda _: 1, lambda _: 0),
-        (lambda n: int(n % 3 != 1), lambda _: 0),
-    ],
-)
-def test_datagrams_that_are_there_twice_or_without_their_numbers_are_not_lost(
-    times: Callable[[int], int], number: Callable[[int], int], tmp_path: Path
-) -> None:
-    record(tmp_path / "a.mcap", some_events())
-    left_out, _, twice = written_anew(tmp_path / "a.mcap", tmp_path / "b.mcap", times, number)
-    verdict = taxel.open(tmp_path / "b.mcap").verdict
-    assert verdict.lost == ({"lost_in_file": left_out} if left_out else {})
-    assert verdict.damaged.get("repeated_in_file", 0) == twice
 
 
 def test_datagrams_of_version_1_that_come_again_are_damage_as_their_events_are_there_twice(tmp_path: Path) -> None:
@@ -145,7 +116,7 @@ def test_datagrams_of_version_1_that_come_again_are_damage_as_their_events_are_t
     assert "5 datagrams decoded again" in recording.verdict
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(4))
 def test_times_after_a_damaged_stamp_are_doubtful(seed: int, tmp_path: Path) -> None:
     draw, path = np.random.default_rng(seed), tmp_path / "a.mcap"
     events = some_events(3000, seed=seed, intensity=False)
@@ -200,32 +171,6 @@ def test_times_after_a_damaged_stamp_are_doubtful(seed: int, tmp_path: Path) -> 
     assert after >= recording.events.t[10 * (wrong - 1)]
 
 
-@pytest.mark.parametrize("converted", [False, True])
-def test_damage_of_a_file_of_two_boards_counts_once(converted: bool, tmp_path: Path) -> None:
-    path, sent = tmp_path / "two.mcap", sent_by_a_board(frames=1500)
-    writer = _core.RecordingWriter(path, json.dumps(HEADER | {"sources": [HEADER | {"name": "b"}]}), "none", False)
-    b = writer.track("b")
-    for number, one in enumerate(sent):
-        writer.datagram(START_NS + number * 1_000_000, number, one)
-        b.datagram(START_NS + number * 1_000_000, number, one)
-    b.end(json.dumps({"received": len(sent), "missing": 0}))
-    writer.finish(json.dumps({"received": len(sent), "missing": 0}))
-    data = bytearray(path.read_bytes())
-    data[data.index(sent[len(sent) // 2]) + 5] ^= 1
-    path.write_bytes(bytes(data) + b"more")
-    whole = taxel.open(path)
-    if converted:
-        whole = whole.on_clock("b")
-    parts = whole.verdict.parts
-    assert [one.damaged for one in parts.values()] == 2 * [{"bad_chunks": 1, "bytes_after_end": 4}]
-    assert whole.verdict.damaged == {"bad_chunks": 1, "bytes_after_end": 4}
-    both = taxel.merge(taxel.open(path).sources.values(), gap_us=10)
-    assert both.verdict.damaged == {"bad_chunks": 1, "bytes_after_end": 4}
-    gone = [len(sent) - len(one.datagrams()) for one in taxel.open(path).sources.values()]
-    assert [one.lost for one in parts.values()] == [{"lost_in_file": n} for n in gone]
-    assert whole.verdict.lost == {"lost_in_file": sum(gone)}
-
-
 def test_a_merged_verdict_is_the_worst_and_keeps_those_of_its_parts(tmp_path: Path) -> None:
     record(tmp_path / "good.mcap", some_events(300))
     for name, lost in (("bad", 2), ("worse", 3)):
@@ -244,15 +189,11 @@ def test_a_merged_verdict_is_the_worst_and_keeps_those_of_its_parts(tmp_path: Pa
     # Parts of one file have its verdict, which counts once; two files that lost as much have lost twice as much.
     middle = int(bad.events.t[10])
     assert taxel.merge([bad.between(0, middle), bad.between(middle, 2**40)]).verdict.lost == {"dropped_by_kernel": 2}
-    (tmp_path / "other").mkdir()
-    (tmp_path / "other" / "bad.mcap").write_bytes((tmp_path / "bad.mcap").read_bytes())
-    twice = taxel.merge([bad, taxel.open(tmp_path / "other" / "bad.mcap")], gap_us=10).verdict
+    other = tmp_path / "other" / "bad.mcap"
+    other.parent.mkdir()
+    other.write_bytes((tmp_path / "bad.mcap").read_bytes())
+    twice = taxel.merge([bad, taxel.open(other)], gap_us=10).verdict
     assert (twice.lost, list(twice.parts)) == ({"dropped_by_kernel": 4}, ["bad.mcap", "bad.mcap (2)"])
-    # So have two merged recordings that say the same, but not two parts of one.
-    other = taxel.merge([good, taxel.open(tmp_path / "other" / "bad.mcap"), worse], gap_us=10)
-    assert other.verdict == verdict
-    assert taxel.merge([both, other], gap_us=10).verdict.lost == {"dropped_by_kernel": 10}
-    assert taxel.merge([both.between(0, 99), both.between(99, 2**40)]).verdict.lost == {"dropped_by_kernel": 5}
 
 
 def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
