@@ -18,14 +18,6 @@ def seeds(count: int, *, quick: int) -> list[Any]:
     return [_marked([seed], seed < quick) for seed in range(count)]
 
 
-def stretches(count: int, *, quick: int) -> list[Any]:
-    """Return two ranges, the first few numbers and, slow, those after them: for a test that counts over its seeds."""
-    return [
-        _marked([range(quick)], True, f"first {quick}"),
-        _marked([range(quick, count)], False, f"{quick} to {count}"),
-    ]
-
-
 def mixed(*values: Sequence[Any]) -> list[Any]:
     """Return all combinations of the values of several parameters; those are quick that try each value once."""
     sizes = [len(each) for each in values]

@@ -14,7 +14,7 @@ pub(crate) fn check_ungraded(pattern: &SpikeTrains, reader: &str) -> Result<()> 
 pub(crate) fn check_untargeted(pattern: &SpikeTrains) -> Result<()> {
     pattern.check()?;
     if pattern.kind == SpikeKind::Signed {
-        return Err(problem!("pattern: spikes are signed; split them into ON and OFF trains first"));
+        return Err(problem!("pattern: spikes are signed; split them into ON and OFF trains (split_by_sign)"));
     }
     if pattern.is_empty() {
         return Err(problem!("pattern: has no train"));

@@ -108,18 +108,3 @@ def test_an_installed_package_is_its_version_also_within_a_strangers_repository(
     assert repository.version() == f"{NAME} 1.2"
     installed(tmp_path_factory.mktemp("alone"), monkeypatch)
     assert repository.version() == f"{NAME} 1.2"
-
-
-def test_where_git_or_the_installation_does_not_say_nothing_is_used_again(
-    repository: Repository, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with monkeypatch.context() as patch:
-        patch.setenv("PATH", str(repository.root))
-        assert never_again(repository)
-    (repository.root / ".git" / "HEAD").write_text("nonsense\n")
-    assert never_again(repository)
-    alone = tmp_path_factory.mktemp("alone")
-    (alone / NAME).mkdir()
-    (alone / NAME / "__init__.py").write_text("")
-    monkeypatch.syspath_prepend(str(alone))
-    assert never_again(repository)

@@ -71,15 +71,6 @@ def test_a_distribution_takes_public_names_of_taxel_alone(file: Path) -> None:
     assert [why for why in found if why] == []
 
 
-def test_what_is_private_or_unnamed_is_found() -> None:
-    assert wrong("taxel", "Neuron") is None
-    assert wrong("taxel", "learn") is None
-    assert wrong("taxel.learn", "ConeX") is None
-    assert wrong("taxel._base.files", "write_whole") == "taxel._base.files.write_whole is private"
-    assert wrong("taxel.neuron", "_core") == "taxel.neuron._core is private"
-    assert wrong("taxel.neuron", "np") == "taxel.neuron does not name np in __all__"
-
-
 def test_taxel_imports_none() -> None:
     importing = re.compile(rf"^\s*(from|import) taxel_({'|'.join(BESIDE)})\b", re.MULTILINE)
     product = (ROOT / "python").rglob("*.py")

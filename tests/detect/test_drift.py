@@ -35,7 +35,6 @@ def test_features_that_differ_from_the_training_are_named(gain: float, differs: 
         assert len(line) <= 160
 
 
-@pytest.mark.usefixtures("undrawn")
 def test_a_readout_keeps_its_training_and_the_report_draws_both(tmp_path: Path, capsys) -> None:
     frames, labels = pressed(1, 25)
     taxel.convert(frames, tmp_path / "a.npz")

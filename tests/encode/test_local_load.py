@@ -215,15 +215,6 @@ def test_levels_are_crossed_where_the_largest_sums_of_numpy_cross_them(seed, loc
     assert (encoder.kind, graded.kind) == ("unsigned", "graded")
 
 
-STILL = np.full((8, 9), 50.0)
-
-
-def largest(readings, period_us=192, **parameters):
-    frames = Frames(np.array(readings), np.arange(len(readings)) * period_us, unit="ticks", array=Array(8, 9))
-    encoder = LocalLoad(tare=rest(Array(8, 9), 50), **parameters)
-    return encoder.values(frames)[:, 1]
-
-
 def test_without_a_tare_nothing_is_encoded():
     frames = Frames(np.zeros((1, 3, 4)), [0])
     for call in (lambda x: LocalLoad().stream(x.array), LocalLoad().encode, LocalLoad().values):

@@ -152,9 +152,6 @@ def test_moments_of_events_are_sampled_every_period_from_the_first_stamp_on():
     assert (unsigned.kind, list(map(len, unsigned))) == ("unsigned", [2, 2])
 
 
-STILL = np.full((16, 24), 50.0)
-
-
 def test_without_a_tare_nothing_is_encoded():
     for call in (lambda: Moments().stream(ARRAY), lambda: Moments().encode(Frames(np.zeros((1, 3, 4)), [0]))):
         with refused(argument="tare"):

@@ -1,4 +1,4 @@
-"""Problems of CONE-X, drawn by seed and kind: pauses of an hour, inputs beside targets, years from time 0, grids."""
+"""Problems of CONE-X, drawn by seed and kind: pauses of an hour, inputs beside targets, grids."""
 
 from __future__ import annotations
 
@@ -69,34 +69,6 @@ def graded_at(seed):
         return random.choice([-1, 1], n) * 10 ** random.uniform(-largest, largest, n)
 
     return around(random, drawn_neuron(random), 0.0, near, values)
-
-
-def far(seed):
-    """An hour to a year before or after time 0; inputs up to three neighbouring times beside targets."""
-    random = np.random.default_rng([52, seed])
-    neuron, start = drawn_neuron(random), float(random.choice([-1, 1]) * 10 ** random.uniform(6.5, 10.5))
-
-    def near(t):
-        t += neuron.refractory * random.integers(2)
-        return float(t + random.integers(-3, 4) * np.spacing(abs(t)))
-
-    return around(random, neuron, start, near)
-
-
-def farthest(seed):
-    """Patterns that start days to decades from time 0, where neighbouring times are up to 2e-4 ms apart."""
-    random = np.random.default_rng([21, seed])
-    start, trains, lists, wanted = float(random.choice([2.0**28, 2.0**34, 2.0**40])), 25, [], []
-    for _ in range(3):
-        times = [np.sort(np.round(random.uniform(0, 100, random.integers(1, 4)) * 64) / 64) for _ in range(trains)]
-        lists.append(SpikeTrains.from_lists([start + t for t in times], start=start, stop=start + 120))
-        wanted.append([start + float(np.round(random.uniform(35, 90) * 64) / 64)])
-    neuron = Neuron(
-        first_threshold=str(random.choice(["theta_0", "printed"])),
-        after_spike=str(random.choice(["keep", "ignore", "reset"])),
-        refractory=float(random.choice([4.0, 30.0])),
-    )
-    return ConeX(neuron=neuron, lambdas=LAMBDAS[random.integers(2)], lb=-2, ub=2), lists, wanted
 
 
 def paused(seed):
@@ -179,4 +151,4 @@ def lifted(seed):
     return cone, lists, wanted
 
 
-KINDS = {kind.__name__: kind for kind in (usual, before, close, graded_at, far, farthest, paused, grid, lifted)}
+KINDS = {kind.__name__: kind for kind in (usual, before, close, graded_at, paused, grid, lifted)}

@@ -133,3 +133,9 @@ def test_what_does_not_fit_together_is_one_clear_error():
         ConeR(ub=[1.0, 1.0]).fit(one, [[5.0]])
     with refused():
         ConeR(horizon=50.0).fit(one, [[60.0]])
+
+
+def test_a_target_that_only_negative_weights_reach_is_reachable():
+    one = SpikeTrains.from_lists([[10.0]], stop=60.0, values=[[-1.0]], kind="graded")
+    for lb, ub, unreachable in ((-2.0, 0.0, []), (0.0, 2.0, [(0, 0)])):
+        assert made(ConeR, lb=lb, ub=ub, tau=10.0).fit([one], [[18.0]]).unreachable_ == unreachable

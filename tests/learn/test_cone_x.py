@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from draws import mixed, stretches
+from draws import mixed
 from interrupts import ctrl_c_after
 from making import made
 from refusal import refused
-from stated import examples, grid_rows, row, shares, terms, threshold
+from stated import examples, grid_rows, shares, terms
 
-from taxel import Neuron, SpikeTrains
+from taxel import SpikeTrains
 from taxel.learn import ConeX, check_certificate
 
 clarabel = pytest.importorskip("clarabel")
@@ -111,75 +111,6 @@ def test_on_the_grid_verdict_and_objective_are_those_of_every_row_handed_whole_t
     assert np.all(w >= np.array(cone.lb))
     assert np.all(w <= np.array(cone.ub))
     assert cone.margin_.mv == pytest.approx(np.min(rows[4] + (cone.margin or 0.0) - rows[3] @ w), abs=1e-12)
-
-
-@pytest.mark.parametrize("seeds", stretches(60, quick=8))
-def test_verdicts_over_the_edge_of_what_can_be_met_are_those_of_highs_and_each_no_is_proven(seeds):
-    verdicts = []
-    for seed in seeds:
-        patterns, targets = examples(
-            seed, trains=16, patterns=3 + seed % 4, targets=1 + seed % 2, whole_ms=seed % 3 == 0
-        )
-        cone = ConeX(
-            neuron=Neuron(time="grid", after_spike=("keep", "ignore", "reset")[seed % 3]),
-            lb=-2.0,
-            ub=2.0,
-            lambdas=(0, 0, 0),
-        )
-        cone.fit(patterns, targets)
-        verdicts.append(cone.status_ == "solved")
-        assert verdicts[-1] == feasible(cone, grid_rows(cone, patterns, targets)), seed
-        if cone.status_ == "infeasible":
-            assert check_certificate(cone.problem_, cone.certificate_)
-            assert cone.certificate_.at_all
-        else:
-            assert (cone.objective_, cone.gap_) == (0.0, 0.0)
-    assert len(seeds) / 6 < sum(verdicts) < len(seeds) * 5 / 6
-
-
-@pytest.mark.parametrize(
-    ("kernel", "first_threshold", "after_spike"),
-    mixed(["alpha", "double_exponential"], ["theta_0", "printed"], ["keep", "ignore", "reset"]),
-)
-def test_the_problem_states_rows_at_any_instant_with_their_tapered_margin_and_slope(
-    kernel, first_threshold, after_spike
-):
-    patterns, targets = examples(5)
-    cone = ConeX(
-        neuron=Neuron(kernel=kernel, first_threshold=first_threshold, after_spike=after_spike),
-        margin=0.02,
-        slope=0.004,
-        lb=-3,
-        ub=3,
-    )
-    cone.fit(patterns, targets)
-    wanted, near = targets[0], 1e-4
-    for k, t in enumerate(wanted):
-        coefficients, limit = cone.problem_.slope(0, k)
-        late, before = (row(cone, patterns[0], x, wanted[:k]) for x in (t, t - near))
-        assert coefficients == pytest.approx(-(late - before) / near, abs=1e-3)
-        theta = [threshold(cone, x, wanted[:k], 0.0) for x in (t, t - near)]
-        assert limit == pytest.approx(-(theta[0] - theta[1]) / near - 0.004, abs=1e-5)
-        assert cone.problem_.slope(0, k, margin=False)[1] == pytest.approx(limit + 0.004, abs=1e-15)
-    tau, tau_s = 15.0, 3.75
-
-    def family(x):
-        if kernel == "alpha":
-            return 0.004 * x * np.exp(x / tau)
-        return 0.004 / (1 / tau_s - 1 / tau) * (np.exp(x / tau_s) - np.exp(x / tau))
-
-    last = 0.0
-    for t in np.linspace(0.1, 129.9, 400):
-        fired = [e for e in wanted if e < t]
-        if fired and t < fired[-1] + 3.0:
-            continue
-        ahead = [e - t for e in wanted if e >= t]
-        margin = min(0.02, family(ahead[0])) if ahead else 0.02
-        coefficients, limit = cone.problem_.silence(0, t)
-        assert coefficients == pytest.approx(row(cone, patterns[0], t, fired), abs=1e-14)
-        assert threshold(cone, t, fired, 0.0) - limit == pytest.approx(margin, abs=1e-12)
-        last = max(last, margin)
-    assert last == 0.02
 
 
 def test_a_start_from_an_earlier_fit_changes_the_way_but_not_the_result():

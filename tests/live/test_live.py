@@ -14,7 +14,7 @@ import taxel
 from taxel import Array, Detection, Events, Neuron, ProblemError, Readout, Tare
 from taxel.detect import PlainRule
 from taxel.encode import ContactArea
-from taxel.live import Live, send
+from taxel.live import Live
 
 from .boards import (
     LOOPBACK,
@@ -25,35 +25,6 @@ from .boards import (
     touch,
     wait_for,
 )
-
-
-@pytest.mark.parametrize("portable", [False, True])
-@pytest.mark.parametrize("segment", [False, True])
-@pytest.mark.parametrize("gro", [False, True])
-def test_the_sums_close_with_the_senders_own_count(
-    monkeypatch: pytest.MonkeyPatch, segment: bool, gro: bool, portable: bool
-) -> None:
-    if portable:
-        monkeypatch.setenv("TAXEL_CAPTURE", "portable")
-    with Live(0, host=LOOPBACK, gro=gro) as live:
-        sent = send(
-            [bytes.fromhex("c00005030 4".replace(" ", "")) * 280] * 7,
-            *live.address,
-            each=7,
-            seconds=0.1,
-            segment=segment,
-        )
-    summary = live.stop()
-    counters = summary.counters
-    capture, words = counters["capture"], counters["wire"]
-    whole_trains = capture["gro"] and sent["segmenting"]
-    dropped = capture["dropped_by_kernel"]
-    assert (dropped is None, capture["stamped_when_read"]) == (portable, portable)
-    assert capture["messages"] + (dropped or 0) == sent["messages" if whole_trains else "datagrams"]
-    assert capture["datagrams"] == counters["decoded"] + capture["dropped_by_queue"]
-    assert words["bytes"] == 5 * words["words"] + words["skipped"]
-    assert dropped or words["bytes"] == sent["bytes"]
-    assert (summary.lost, summary.nothing_came) == (0, False)
 
 
 @pytest.mark.parametrize("tared", [False, True])

@@ -4,7 +4,6 @@ import re
 import socket as udp
 
 import numpy as np
-import pytest
 from loopback import until
 from shell import call
 
@@ -31,38 +30,6 @@ def test_the_numbers_of_a_verdict_are_those_of_the_recording(tmp_path, capsys):
     _, printed, _ = call(capsys, "info", path)
     printed = dict(re.findall(r"^ +(missing|checksum) +(\d+)$", printed, re.MULTILINE))
     assert {name: int(n) for name, n in printed.items()} == {name: found[name] for name in ("missing", "checksum")}
-
-
-@pytest.mark.parametrize("wire", [1, 2])
-@pytest.mark.parametrize("boards", [1, 2])
-def test_two_boards_that_send_to_one_port_are_told(tmp_path, wire, boards):
-    """Also with one session number, where the second's datagrams look as if the first's came again."""
-    frames = [np.full(4096, 20 + 10 * (k % 2), np.uint16) for k in range(6)]
-    path, registers = tmp_path / "two.mcap", Registers(wire_version=wire)
-    with taxel.live.Live(0, host="127.0.0.1", record=path) as live:
-        links = [udp.socket(udp.AF_INET, udp.SOCK_DGRAM) for _ in range(boards)]
-        every, sent = [Board(registers, version_2=Version2(states_us=0)) for _ in links], 0
-        for frame in frames:
-            for link, board in zip(links, every, strict=True):
-                for one in board.frame(frame):
-                    link.sendto(one, live.address)
-                    sent += 1
-                until(lambda: live.counters["decoded"] == sent)  # noqa: B023  called at once
-        for link in links:
-            link.close()
-        # One that goes on from another address is no second one.
-        with udp.socket(udp.AF_INET, udp.SOCK_DGRAM) as link:
-            for one in every[0].frame(frames[0]):
-                link.sendto(one, live.address)
-                sent += 1
-        until(lambda: live.counters["decoded"] == sent)
-        verdict = live.stop().verdict
-    changes = 2 * len(frames) - 2 if boards == 2 else 0
-    assert verdict.damaged.get("changes_between_senders", 0) == changes
-    assert (f"{changes} changes between senders" in verdict) == (boards == 2)
-    assert verdict.noted["changes_of_address"] == boards
-    assert verdict.status == {1: "complete after arrival" if wire == 1 else "complete", 2: "damaged"}[boards]
-    assert taxel.open(path).verdict.to_dict() == verdict.to_dict()
 
 
 def test_resets_and_changes_of_version_are_marked_in_the_recording(tmp_path):

@@ -6,9 +6,8 @@ import json
 
 import numpy as np
 import pytest
-from formats.making import write_gaitpdb, write_icub, write_pedar
+from formats.making import write_icub, write_pedar
 from panel.protocol import (
-    EXTENT,
     UNKNOWN,
     Client,
     head,
@@ -208,45 +207,6 @@ def max_and_column(page, about):
     page.send(type="overview")
     force = page.until("overview")["force"]
     return max(force) * about["frames"]["step"], int(np.argmax(force))
-
-
-@pytest.mark.parametrize("column_us", [4_000, 64_000])
-def test_each_foot_has_a_sum_and_a_centre(tmp_path, column_us):
-    random = np.random.default_rng(4)
-
-    def walked(rows):
-        """Give each sensor a load of its own."""
-        table = np.array([[float(cell) for cell in row.split("\t")] for row in rows])
-        table[:, 1:17] *= random.uniform(0.2, 2, (len(table), 16)).round(2)
-        table[:, 17], table[:, 18] = table[:, 1:9].sum(axis=1), table[:, 9:17].sum(axis=1)
-        return ["\t".join(f"{cell:.6g}" for cell in row) for row in table]
-
-    file = write_gaitpdb(tmp_path, change=walked)
-    [both] = FullReading().open_trials(file)
-    feet = [both.sources[foot].frames() for foot in ("left", "right")]
-    with Panel(file) as panel, Client(panel) as page:
-        about = opened(page, file.name)
-        assert page.ask("zoom", column_us=column_us)["type"] == "done"
-        _, frame = values_at(page, about, 5_000_000)
-        while head(frame)[0]["column_us"] != column_us:
-            frame = page.until("frame")
-        of = head(frame)[0]
-        curves = section(frame, 8, EXTENT).reshape(-1, 2)
-        assert len(curves) == of["count"] > 70
-        for number, own in enumerate(curves, of["first"]):
-            for k, frames in enumerate(feet):
-                held = held_in(frames.t, number, column_us, 5_000_000)
-                seen = frames.values.reshape(len(frames), -1)[held].astype(float)
-                sums = seen.sum(axis=1)
-                step = about["frames"]["step"]
-                assert own["sum"][k] * step == pytest.approx([sums.min(), sums.max()], abs=9 * step)
-                if not sums.any():
-                    assert np.isnan(own["x"][k]).all()
-                    continue
-                places = frames.array.places
-                for found, axis in ((own["x"][k], places.x), (own["y"][k], places.y)):
-                    at = (seen @ axis.reshape(-1))[sums > 0] / sums[sums > 0]
-                    assert found == pytest.approx([at.min(), at.max()], abs=1)
 
 
 @pytest.mark.parametrize("column", [False, True])

@@ -17,7 +17,6 @@ from taxel import Array, Frames, Note, ProblemError, SpikeTrains
 from taxel.detect import Example, Part, Recipe, judge
 from taxel.detect.folds import split
 from taxel.encode import LevelCrossing
-from taxel.options import FullReading
 from taxel.reading import Facts, InMemory, Marks
 from taxel.tasks.labels import references
 
@@ -109,23 +108,6 @@ def test_both_feet_of_a_file_become_sources_left_and_right(
     assert left.frames() == trials[0].frames().between(-np.inf, stop)
 
 
-def test_info_of_a_folder_takes_each_source_as_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "feet").mkdir()
-    taxel.convert(Frames(np.ones((5, 2, 2)), np.arange(5), array=Array(2, 2)), tmp_path / "feet" / "hand.mcap")
-    call(capsys, "convert", write_pedar(tmp_path), tmp_path / "feet" / "walk.mcap")
-    rows = call(capsys, "info", tmp_path / "feet")[1].splitlines()[2:5]
-    assert [row.split("  ")[1] for row in rows] == ["hand.mcap", "walk.mcap left", "walk.mcap right"]
-    code, shown, said = call(capsys, "info", tmp_path / "feet", "--each")
-    assert (code, said) == (0, "")
-    assert [
-        f"{tmp_path / 'feet' / name}: .mcap" in shown for name in ("hand.mcap", "walk.mcap left", "walk.mcap right")
-    ]
-    hand, walk = json.loads(call(capsys, "info", tmp_path / "feet", "--json")[1])
-    assert hand["file"] == str(tmp_path / "feet" / "hand.mcap")
-    assert walk == json.loads(call(capsys, "info", tmp_path / "feet" / "walk.mcap", "--json")[1])
-    assert list(walk["sources"]) == ["left", "right"]
-
-
 def test_a_tare_in_which_something_lay_names_the_source(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     array, quiet = Array(6, 6), np.random.default_rng(4).integers(0, 3, (400, 6, 6)).astype(np.float32)
     pressed = quiet.copy()
@@ -154,16 +136,6 @@ def test_labels_are_of_one_source_or_of_all(tmp_path: Path) -> None:
     assert said == {"left": ["heel", "turn"], "right": ["turn", "toe"]}
     labels = taxel.Labels(tmp_path / "walk.notes.csv")
     assert sorted(labels.times(back.sources["right"])) == ["toe", "turn"]
-
-
-def test_labels_of_a_source_that_is_not_there_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    frames = Frames(np.ones((50, 1, 2)), np.arange(50) * 10_000, unit="N", array=Array(1, 2))
-    taxel.convert(frames, tmp_path / "a.mcap")
-    (tmp_path / "labels.csv").write_text("label,t_us,source\nheel,10000,left\n")
-    labels = tmp_path / "labels.csv"
-    code, _, said = call(capsys, "train", tmp_path / "a.mcap", "--labels", labels, "-o", tmp_path / "r.json")
-    assert code == 2
-    assert "heel at 10000 us names the source left; the recording has board" in said
 
 
 def test_a_side_that_a_layout_states_names_the_source_of_labels(tmp_path: Path) -> None:
@@ -217,21 +189,6 @@ def test_frames_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest.C
     assert call(capsys, "convert", tmp_path / "one.mcap", tmp_path / "timed.mcap", "--rate-hz", "40")[0] == 0
     encode[1] = tmp_path / "timed.mcap"
     assert call(capsys, *encode)[0] == 0
-
-
-def test_a_folder_of_many_trials_becomes_a_folder_of_recordings(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    source, out = tmp_path / "source", tmp_path / "out"
-    source.mkdir()
-    write_pedar(source)
-    write_pedar(source).rename(source / "again.asc")
-    write_pedar(source)
-    assert call(capsys, "convert", source, out)[0] == 0
-    names = sorted(file.name for file in out.iterdir())
-    assert len(names) == len(FullReading().open_trials(source)) == 2
-    assert "again.mcap" in names
-    assert list(taxel.open(out / "again.mcap").sources) == ["left", "right"]
 
 
 def test_the_feet_of_one_recording_share_a_fold() -> None:

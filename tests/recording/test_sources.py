@@ -6,8 +6,6 @@ import pty
 import socket
 import subprocess
 import sys
-import threading
-import time
 import tty
 from pathlib import Path
 from typing import Any
@@ -235,31 +233,6 @@ def test_what_a_line_does_not_hold_is_counted_and_a_missing_value_too(tmp_path: 
     assert imu.verdict.damaged == {"lines_that_could_not_be_read": 9}
     assert imu.verdict.noted == {"missing_values": 3}
     assert "9 lines that could not be read; 3 missing values" in imu.verdict
-
-
-@pytest.mark.parametrize("first", ["t_s,ax\n", ""])
-def test_what_comes_with_the_first_line_is_kept_and_its_writer_lives(tmp_path: Path, first: str) -> None:
-    pipe, said, done = tmp_path / "imu", threading.Event(), threading.Event()
-    os.mkfifo(pipe)
-
-    def write() -> None:
-        with pipe.open("w", buffering=1) as lines:
-            lines.write(first + "0.5,1\n0.75,2\n")
-            for k in range(200):
-                lines.write(f"{k + 1},{k}\n")
-                time.sleep(0.001)
-            said.set()
-            done.wait(60)
-
-    writer = threading.Thread(target=write, daemon=True)
-    writer.start()
-    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "imu.mcap", sources={"imu": f"lines:{pipe}"}) as live:
-        until(lambda: lines(live, "imu") == 202)
-    done.set()
-    assert said.is_set()
-    imu = taxel.open(tmp_path / "imu.mcap").sources["imu"]
-    assert imu.columns == (["ax"] if first else ["column_0", "column_1"])
-    np.testing.assert_array_equal(imu.frames().values[:3, 0, -1], [1, 2, 0])
 
 
 def test_the_command_says_what_came_of_each_source_of_an_input_whose_last_line_lacks_its_end(tmp_path: Path) -> None:
