@@ -51,13 +51,6 @@ def sized(shape: tuple[int, int], seed: int) -> Example:
     return Example(frames, {"contact": t[begins], "lift": t[begins + 30]}, Tare.take(frames, stop_us=1_900_000))
 
 
-def padded(example: Example, shape: tuple[int, int]) -> Frames:
-    source = example.source
-    assert isinstance(source, Frames)
-    wide = [(0, 0), *((0, most - size) for size, most in zip(source.array.shape, shape, strict=True))]
-    return Frames(np.pad(source.values, wide), source.t, unit="counts", array=Array(*shape, pitch_mm=5.0))
-
-
 def test_grids_of_several_sizes_are_padded_at_their_far_edges(tmp_path: Path) -> None:
     examples = [sized(shape, seed) for seed, shape in enumerate([(6, 8), (8, 6), (8, 7)])]
     recipe = Recipe.load("touch", labels=["contact", "lift"], noise_floor=3.0)

@@ -3,12 +3,11 @@
 import os
 import signal
 import time
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 from shell import run
-
-import taxel.information
 
 from .touches import folder
 
@@ -17,7 +16,8 @@ SOON_S = 1.5
 
 
 def test_ctrl_c_ends_the_command_soon(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    answer, stopped = taxel.information.answer, []
+    task = import_module("taxel.tasks.information")
+    answer, stopped = task.answer, []
 
     def interrupted(*trials, progress, **asked):
         def stop(what, done, of):
@@ -28,7 +28,7 @@ def test_ctrl_c_ends_the_command_soon(tmp_path: Path, monkeypatch: pytest.Monkey
 
         return answer(*trials, progress=stop, **asked)
 
-    monkeypatch.setattr(taxel.information, "answer", interrupted)
+    monkeypatch.setattr(task, "answer", interrupted)
     recording, labels = folder(tmp_path, 60)
     asked = ["--window-ms", "60", "--windows", "10", "--periods", "1,10", "--draws", "3", "--taxels", "1"]
     ended = run("information", recording, "--labels", labels, *asked, "--report", tmp_path / "page.html")
