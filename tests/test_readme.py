@@ -6,7 +6,7 @@ from pathlib import Path
 
 import cyclopts
 import pytest
-from pages import README, ROOT, shell_lines
+from printed_pages import README, ROOT, shell_lines
 
 from taxel.cli._commands import command
 from taxel.cli.app import own_commands, rows

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from live.boards import LOOPBACK
 from loopback import free_port
-from pages import README, shell_lines
+from printed_pages import README, shell_lines
 
 DOCS = Path(__file__).parent.parent / "docs"
 PAGE = DOCS / "start.md"
