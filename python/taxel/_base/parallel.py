@@ -15,13 +15,15 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import chdir, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import psutil
 
 from taxel._base.arguments import integer, text
-from taxel._core import DeviceError, ProblemError
+from taxel._base.messages import collected
+from taxel._core import DeviceError, Error, ProblemError
 
 if TYPE_CHECKING:
     import joblib
@@ -38,6 +40,19 @@ _CALLS_A_WORKER = 8
 _SAFE_PATH = "PYTHONSAFEPATH"
 #: Interval at which a worker looks whether its parent runs, s.
 _ASK_EVERY_S = 0.5
+
+
+class Tried(NamedTuple):
+    """Hold what a call returned, or the error by which it failed, and its warnings."""
+
+    result: Any
+    error: Exception | None
+    warnings: tuple[str, ...]
+
+    @property
+    def failure(self) -> str:
+        """Why it failed, in words; "" where it did not."""
+        return "" if self.error is None else str(self.error) or type(self.error).__name__
 
 
 @dataclass(frozen=True)
@@ -117,6 +132,22 @@ class Workers:
                 for results in parallel(calls[first : first + size]):
                     yield from results
 
+    def tried(self, work: Callable[[_T], Any], each: Sequence[_T], show: Callable[[int, int], object]) -> list[Tried]:
+        """Return what each call returned, or why it failed, in their order.
+
+        Parameters
+        ----------
+        work, each
+            As of `run`.
+        show : function
+            Called after each call with its number, and with how many are done.
+        """
+        found: dict[int, Tried] = {}
+        for k, one in self.run(partial(_tried, work), each):
+            found[k] = one
+            show(k, len(found))
+        return [found[k] for k in range(len(each))]
+
     @contextmanager
     def _parallel(self) -> Iterator[joblib.Parallel]:
         """Give a `joblib.Parallel` that uses them, for the time of a ``with`` block."""
@@ -148,6 +179,16 @@ class Workers:
 
 #: This process alone.
 HERE = Workers()
+
+
+def _tried(work: Callable[[Any], Any], one: Any) -> Tried:
+    result, failure = None, None
+    with collected() as warnings:
+        try:
+            result = work(one)
+        except (Error, OSError, MemoryError) as error:
+            failure = error
+    return Tried(result, failure, tuple(warnings))
 
 
 def _numbered(work: Callable[[_T], _R], numbers: Iterable[int], each: Iterable[_T]) -> list[tuple[int, _R]]:

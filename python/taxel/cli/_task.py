@@ -6,7 +6,6 @@ import json as to_json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import partial
 from itertools import chain, repeat
 from pathlib import Path
 from threading import Event, Thread
@@ -17,12 +16,12 @@ from cyclopts import Parameter
 from taxel._base.files import check_writable
 from taxel._base.messages import collected, escaped
 from taxel._base.progress import Announcement, Steps
-from taxel._core import Error, ProblemError
+from taxel._core import ProblemError
 from taxel.cli._say import say
 from taxel.cli.app import WRONG_INPUT
 
 if TYPE_CHECKING:
-    from taxel._base.parallel import Workers
+    from taxel._base.parallel import Tried
     from taxel.recording import Recording
 
 #: Without a terminal a line says the step after so long, then after so long again; the last repeats, s.
@@ -136,37 +135,7 @@ def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     say_warnings(texts)
 
 
-@dataclass(frozen=True)
-class OfFile:
-    """Hold what a command found in one of several files: its result, or why it failed, and the warnings."""
-
-    result: Any
-    failure: str = ""
-    warnings: tuple[str, ...] = ()
-
-
-def _tried(work: Callable[[Path], Any], file: Path) -> OfFile:
-    with collected() as warnings:
-        try:
-            result, failure = work(file), ""
-        except (Error, OSError, MemoryError) as error:
-            result, failure = None, str(error) or type(error).__name__
-    return OfFile(result, failure, tuple(warnings))
-
-
-def over_files(
-    work: Callable[[Path], Any], files: Sequence[Path], workers: Workers, show: Callable[[str, int, int], object]
-) -> list[OfFile]:
-    """Return what a function of a module finds in each file, in their order, whoever computes it."""
-    found: dict[int, OfFile] = {}
-    show(f"{len(files)} files", 0, len(files))
-    for k, one in workers.run(partial(_tried, work), files):
-        found[k] = one
-        show(str(files[k]), len(found), len(files))
-    return [found[k] for k in range(len(files))]
-
-
-def say_failures(files: Sequence[Path], found: Sequence[OfFile]) -> int:
+def say_failures(files: Sequence[Path], found: Sequence[Tried]) -> int:
     """Print the warnings of several files, and which of them failed and why; return an exit code that says so."""
     say_warnings(dict.fromkeys(text for one in found for text in one.warnings))
     failed = {str(file): one.failure for file, one in zip(files, found, strict=True) if one.failure}

@@ -20,7 +20,6 @@ from taxel.cli._task import (
     Output,
     SourceOption,
     of_source,
-    over_files,
     progress,
     say_failures,
 )
@@ -74,7 +73,7 @@ def convert(
     if not target.suffix and len(files) > 1:
         _refuse_twice([file.stem for file in files], target)
         with progress(output.json) as show:
-            found = over_files(work, files, workers, show)
+            found = workers.tried(work, files, lambda k, done: show(str(files[k]), done, len(files)))
         written = [one for of_file in found if not of_file.failure for one in of_file.result]
         failed = [{"source": str(f), "error": one.failure} for f, one in zip(files, found, strict=True) if one.failure]
         output.say({"written": written, "failed": failed}, *_lines(written))

@@ -23,7 +23,7 @@ from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._say import say
-from taxel.cli._task import Output, over_files, progress, say_failures, say_warnings
+from taxel.cli._task import Output, progress, say_failures, say_warnings
 from taxel.cli._topics import list_topics
 from taxel.cli.app import OUTSIDE, App, Flat
 from taxel.clock import doubt
@@ -138,7 +138,7 @@ def _of_files(
 ) -> int:
     """Print the facts of the files of a folder, and which of them cannot be read; return an exit code."""
     with progress(as_json) as show:
-        found = over_files(work, files, workers, show)
+        found = workers.tried(work, files, lambda k, done: show(str(files[k]), done, len(files)))
     facts = [one for of_file in found if not of_file.failure for one in of_file.result]
     if as_json:
         failed = [{"file": str(f), "error": one.failure} for f, one in zip(files, found, strict=True) if one.failure]

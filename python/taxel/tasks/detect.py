@@ -14,7 +14,7 @@ import numpy as np
 from taxel._base.arguments import instance, shown
 from taxel._base.errors import refused
 from taxel._base.messages import collected, counted, warn
-from taxel._base.parallel import Workers
+from taxel._base.parallel import HERE, Workers
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, PlainRule, Readout, Score, drift, recipes, score
@@ -205,13 +205,20 @@ def detect(
             None if truth is None or recording.label in sources else events[k] for k, recording in enumerate(opened)
         ]
         each_one = list(zip(opened, each_labelled, strict=True))
-        workers = Workers() if workers is None else workers
-        found, failed = _in_each(readout, known, options, each_one, workers, update)
-        if not found and failed:
+        workers = instance("workers", HERE if workers is None else workers, Workers)
+        update(f"detecting in {opened[0].title}" if opened else "detecting", 0, 0)
+        one_of = partial(_detected, readout, known, options)
+        tried = workers.tried(one_of, each_one, lambda _, done: update("detecting", done, len(each_one)))
+        for text in (text for one in tried for text in one.warnings):
+            warn(text, stacklevel=2)
+        each = tuple(one.result for one in tried if one.error is None)
+        failed = {
+            recording.title: one.error for recording, one in zip(opened, tried, strict=True) if one.error is not None
+        }
+        if failed and not each:
             raise next(iter(failed.values()))
         for failure in failed.values():
             warn(f"left out: {failure}", stacklevel=2)
-        each = tuple(found)
         scored = [outcome for detected in each if (outcome := detected.outcome).score is not None]
         together = _score_of(scored, options.window_ms) if scored else None
         if together is not None and together.events and many_wrong(together):
@@ -279,57 +286,8 @@ def _unreliable(outcomes: Sequence[Outcome], together: Score, window_ms: float) 
 _One: TypeAlias = tuple[Recording, Mapping[str, Any] | None]
 
 
-def _in_each(
-    readout: Readout | PlainRule,
-    known: Sequence[str],
-    options: DetectOptions,
-    each: Sequence[_One],
-    workers: Workers,
-    update: Progress,
-) -> tuple[list[Detected], dict[str, ProblemError]]:
-    """Return what is detected in recordings, in their order, and why it cannot be in others, by title."""
-    results: dict[int, tuple[Detected | ProblemError, tuple[str, ...]]] = {}
-    for recording, _ in each[:1]:
-        update(f"detecting in {recording.title}", 0, 0)
-    for k, result in instance("workers", workers, Workers).run(partial(_tried, readout, known, options), each):
-        results[k] = result
-        update("detecting", len(results), len(each))
-    found: list[Detected] = []
-    failed: dict[str, ProblemError] = {}
-    for k, (recording, _) in enumerate(each):
-        detected, warned = results[k]
-        for line in warned:
-            warn(line, stacklevel=3)
-        if isinstance(detected, ProblemError):
-            failed[recording.title] = detected
-        else:
-            found.append(detected)
-    return found, failed
-
-
-def _tried(
-    readout: Readout | PlainRule,
-    known: Sequence[str],
-    options: DetectOptions,
-    one: _One,
-) -> tuple[Detected | ProblemError, tuple[str, ...]]:
-    """Return what is detected in a recording, or why it cannot be, and the warnings."""
+def _detected(readout: Readout | PlainRule, known: Sequence[str], options: DetectOptions, one: _One) -> Detected:
     recording, labels = one
-    with collected() as warnings:
-        try:
-            found: Detected | ProblemError = _detected(readout, recording, labels, known, options)
-        except ProblemError as error:
-            found = error
-    return found, tuple(warnings)
-
-
-def _detected(
-    readout: Readout | PlainRule,
-    recording: Recording,
-    labels: Mapping[str, Any] | None,
-    known: Sequence[str],
-    options: DetectOptions,
-) -> Detected:
     if recording.verdict.status in ("damaged", "unfinished", "lost", "nothing arrived"):
         # Detections may lack or have wrong times.
         warn(f"{recording.title}: {recording.verdict}", stacklevel=3)
