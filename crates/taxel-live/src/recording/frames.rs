@@ -1,7 +1,8 @@
 //! Sources of frames: the whole array at each time, as messages that any viewer of MCAP files shows.
 //!
 //! A message is a `foxglove.RawImage` in protobuf: `16UC1` where all values are whole and from 0 to 65 535, else `32FC1`,
-//! in which NaN is a missing value. Its time stamp is the board's time, exact to the us.
+//! in which NaN is a missing value; a preview without a value above 255 is `mono8`. Its time stamp is the board's time, exact
+//! to the us.
 
 use prost::Message;
 use serde::{Deserialize, Serialize};
@@ -61,6 +62,8 @@ pub struct Frames {
 /// How the values of a frame are encoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameEncoding {
+    /// `mono8`: whole numbers from 0 to 255.
+    Byte,
     /// `16UC1`: whole numbers from 0 to 65 535.
     Whole,
     /// `32FC1`: any number, and NaN.
@@ -79,6 +82,7 @@ impl FrameEncoding {
 
     fn name(self) -> &'static str {
         match self {
+            Self::Byte => "mono8",
             Self::Whole => "16UC1",
             Self::Float => "32FC1",
         }
@@ -86,6 +90,7 @@ impl FrameEncoding {
 
     fn bytes(self) -> usize {
         match self {
+            Self::Byte => 1,
             Self::Whole => 2,
             Self::Float => 4,
         }
@@ -124,6 +129,7 @@ struct Timestamp {
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 pub(super) fn message(source: &str, t_us: i64, columns: u16, values: &[f32], encoding: FrameEncoding) -> Vec<u8> {
     let data = match encoding {
+        FrameEncoding::Byte => values.iter().map(|&value| value as u8).collect(),
         FrameEncoding::Whole => values.iter().flat_map(|&value| (value as u16).to_le_bytes()).collect(),
         FrameEncoding::Float => values.iter().flat_map(|value| value.to_le_bytes()).collect(),
     };
@@ -153,7 +159,8 @@ impl Frames {
 
     fn read(&mut self, message: &[u8], rows: u16, columns: u16) -> Option<()> {
         let image = RawImage::decode(message).ok()?;
-        let encoding = [FrameEncoding::Whole, FrameEncoding::Float].into_iter().find(|e| e.name() == image.encoding)?;
+        let all = [FrameEncoding::Byte, FrameEncoding::Whole, FrameEncoding::Float];
+        let encoding = all.into_iter().find(|encoding| encoding.name() == image.encoding)?;
         let row = usize::from(columns) * encoding.bytes();
         let fits = (image.width, image.height, image.step as usize) == (columns.into(), rows.into(), row);
         if !fits || image.data.len() != row * usize::from(rows) {
@@ -162,6 +169,7 @@ impl Frames {
         let Timestamp { seconds, nanos } = image.timestamp.unwrap_or_default();
         self.t.push(seconds.checked_mul(1_000_000)?.checked_add(i64::from(nanos).div_euclid(1000))?);
         match encoding {
+            FrameEncoding::Byte => self.values.extend(image.data.iter().copied().map(f32::from)),
             FrameEncoding::Whole => {
                 let words = image.data.chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]]));
                 self.values.extend(words.map(f32::from));

@@ -355,7 +355,9 @@ impl SourceWriter {
             return Err(problem!("preview of {} taxels: must be {}", ticks.len(), self.taxels).into());
         }
         let values: Vec<f32> = ticks.iter().map(|&ticks| ticks.into()).collect();
-        let preview = message(&self.name, t_us, self.columns, &values, FrameEncoding::Whole);
+        let is_small = ticks.iter().all(|&ticks| ticks <= u8::MAX.into());
+        let encoding = if is_small { FrameEncoding::Byte } else { FrameEncoding::Whole };
+        let preview = message(&self.name, t_us, self.columns, &values, encoding);
         self.push(Topic::Pressure, at_ns, 0, &preview)
     }
 
