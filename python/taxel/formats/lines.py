@@ -41,9 +41,13 @@ def has_marks(line: str) -> bool:
     >>> [has_marks(line) for line in ("1,2", "10:00:00 PM,2", "0.1 [2, 3]", "1 -> 2", "a: 3", "1,2.5N")]
     [False, False, True, True, True, True]
     """
-    return any(mark in line for mark in "[](){}<>\"'") or any(
-        mark.search(line) is not None for mark in (_ARROW, _NAME, UNIT_BEHIND)
-    )
+    is_marked = any(mark in line for mark in "[](){}<>\"'") or _ARROW.search(line) or _NAME.search(line)
+    return bool(is_marked) or (_may_have_units(line) and UNIT_BEHIND.search(line) is not None)
+
+
+def _may_have_units(text: str) -> bool:
+    """Return whether a text has a letter or a per cent sign, as most lines of numbers have not: to look takes long."""
+    return text.lower() != text.upper() or "%" in text
 
 
 @dataclass(frozen=True)
@@ -152,9 +156,7 @@ def read_line(line: str, kind: str = "marked", separator: str = ",", decimal: st
     cells, names = list[str](), list[str]()
     first, *pairs = _NAME.split(_DAY.sub(r"\1T", _ARROW.sub(" ", line)))
     for name, text in zip(["", *pairs[::2]], [first, *pairs[1::2]], strict=True):
-        # Most lines have no letters but those of names, and are read as they arrive.
-        has_units = text.lower() != text.upper() or "%" in text
-        bare: str = UNIT_BEHIND.sub("", text) if has_units else text
+        bare: str = UNIT_BEHIND.sub("", text) if _may_have_units(text) else text
         found = tuple(filter(None, _BETWEEN[decimal].split(bare.translate(_MARKS))))
         cells += found
         names += [f"{name}[{k}]" if name and len(found) > 1 else name for k in range(len(found))]

@@ -34,7 +34,7 @@ ISO = "iso"
 _CLOCK = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+|:\d{3})?|[.,]\d+)?"
 _DATE = r"(?:\d{4}-\d\d-\d\d|\d{1,2}\.\d{1,2}\.\d{4})"
 #: The half of the day of a clock of twelve hours, and the day with slashes before it, which is month, day and year.
-_HALF = r" ?([AP])\.?M\.?"
+_HALF, _ENDS = r" ?([AP])\.?M\.?", ("M", "m", ".")
 _HALF_DAY = re.compile(
     rf"(?:(\d{{1,2}})/(\d{{1,2}})/(\d{{4}}),? +|({_DATE}[T ]))?({_CLOCK}){_HALF}", re.ASCII | re.IGNORECASE
 )
@@ -63,12 +63,9 @@ def is_time(cell: str) -> bool:
     >>> is_time("2024-05-01T10:00:00.25"), is_time("01.05.2024 10:00:00,25"), is_time("10:00:00"), is_time("10.5")
     (True, True, True, False)
     """
-    return _IS_TIME.fullmatch(cell) is not None or _half_day(cell) is not None
-
-
-def _half_day(cell: str) -> re.Match[str] | None:
-    """Return the parts of a time with AM or PM; None of others, most of which their end tells."""
-    return _HALF_DAY.fullmatch(cell) if cell[-1:] in ("M", "m", ".") else None
+    if ":" not in cell:
+        return False
+    return _IS_TIME.fullmatch(cell) is not None or (cell[-1:] in _ENDS and _HALF_DAY.fullmatch(cell) is not None)
 
 
 def is_day(cell: str) -> bool:
@@ -91,7 +88,7 @@ def seconds_of(cell: str) -> float:
     >>> seconds_of("1/2/1970 12:00:30 AM"), seconds_of("01.01.1970 1:00:00.5 PM"), seconds_of("1:00 am")
     (86430.0, 46800.5, 3600.0)
     """
-    if half := _half_day(cell):
+    if cell[-1:] in _ENDS and (half := _HALF_DAY.fullmatch(cell)):
         month, day, year, other, clock, of_day = half.groups()
         date = f"{day}.{month}.{year} " if month else other or ""
         hour = clock.partition(":")[0]
