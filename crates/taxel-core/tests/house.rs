@@ -44,7 +44,7 @@ const FLOORS: [(&str, &[&[&str]]); 6] = [
     (
         "taxel-panel",
         &[
-            &["activity", "block", "change_file", "columns", "frame_values", "readout_encoders"],
+            &["activity", "block", "change_file", "columns", "frame_values"],
             &["event_rate", "history", "load"],
             &["state"],
             &["index"],

@@ -9,7 +9,7 @@ use crossbeam_channel as channel;
 use serde_json::{Value, json};
 use taxel_core::Array;
 use taxel_core::detect::Detector;
-use taxel_core::encode::{self, Tare};
+use taxel_core::encode;
 use taxel_core::held::UNKNOWN;
 use taxel_core::problem;
 use taxel_core::rest::ValueSteps;
@@ -17,7 +17,7 @@ use taxel_core::wire::Registers;
 use taxel_live::capture::{FIREWALL, Origin};
 use taxel_live::clock::Offset;
 use taxel_live::locked::lock;
-use taxel_live::pipeline::{Counters, Handle, LiveOptions, OutputDetection, Piece, StatedTare, ViewerEvents};
+use taxel_live::pipeline::{Counters, Handle, LiveOptions, OutputDetection, Piece, ViewerEvents};
 use taxel_live::recording::now_ns;
 use taxel_live::{Error, Result};
 
@@ -25,7 +25,6 @@ use crate::activity::Activity;
 use crate::block::Block;
 use crate::columns::{COLUMN_US, COLUMNS_US, SPAN};
 use crate::index::{Index, Kept};
-use crate::readout_encoders::ReadoutEncoders;
 use crate::shown::sensor;
 use crate::state::{ArrayState, Keyframe, Sensor};
 
@@ -72,8 +71,6 @@ pub struct LiveSource {
     activity: Mutex<Activity>,
     /// The labels of the readout that runs.
     labels: Option<Vec<String>>,
-    /// The encoders of that readout, without a tare that is measured.
-    encoders: ReadoutEncoders,
     /// The latest detections, oldest first, for clients that connect later.
     latest_detections: Mutex<VecDeque<OutputDetection>>,
     /// Events that found no room in the queue from the pipeline.
@@ -109,18 +106,12 @@ struct SilentTime {
     behind_us: i64,
 }
 
-/// The labels and the encoders of a live source's readout; a plain rule has no encoder. A tare that is measured is not known yet.
-fn labels_and_encoders(options: &LiveOptions) -> taxel_core::Result<Option<(Vec<String>, ReadoutEncoders)>> {
-    let Some(readout) = &options.readout else { return Ok(None) };
-    Ok(Some(match (Detector::from_json(readout)?, &options.tare) {
-        (Detector::PlainRule(rule), _) => (rule.labels.into_iter().flatten().collect(), ReadoutEncoders::default()),
-        (Detector::Readout(readout), tare) => {
-            let encoder = match tare {
-                Some(StatedTare::Saved(tare)) => readout.encoder.with_tare(&Tare::from_json(tare)?),
-                _ => readout.encoder,
-            };
-            (readout.neurons.into_keys().collect(), encoder.into())
-        }
+/// The labels of a live source's readout.
+fn labels(options: &LiveOptions) -> taxel_core::Result<Option<Vec<String>>> {
+    let detector = options.readout.as_deref().map(Detector::from_json).transpose()?;
+    Ok(detector.map(|detector| match detector {
+        Detector::PlainRule(rule) => rule.labels.into_iter().flatten().collect(),
+        Detector::Readout(readout) => readout.neurons.into_keys().collect(),
     }))
 }
 
@@ -154,7 +145,7 @@ impl LiveSource {
     fn new(handle: Handle) -> Result<Self> {
         let noise_floor = handle.registers().noise_floor;
         let options = handle.options();
-        let (labels, encoders) = labels_and_encoders(options)?.unzip();
+        let labels = labels(options)?;
         let sensor = Arc::new(Sensor::new(options.array.clone(), noise_floor.into(), None));
         let blank = Keyframe::blank(sensor.array.len());
         // Enough for all that a view of the past can show, at the widest columns too.
@@ -164,7 +155,6 @@ impl LiveSource {
             activity: Mutex::new(Activity::new(&sensor.array)),
             index: Arc::new(Index::new(sensor, Kept::Latest { us: REACH_US, bytes: REACH_BYTES })),
             labels,
-            encoders: encoders.unwrap_or_default(),
             handle,
             latest_detections: Mutex::default(),
             missing: AtomicU64::new(0),
@@ -200,7 +190,6 @@ impl LiveSource {
             "sources": self.handle.source_names(),
             "frames": frames,
             "readout": self.labels,
-            "readout_encoders": self.encoders().names(),
         })
     }
 
@@ -259,19 +248,6 @@ impl LiveSource {
     /// The steps of the values; ticks of a board.
     fn value_steps(&self) -> ValueSteps {
         self.handle.frame_values().map_or(ValueSteps { size: 1.0, zero: 0 }, |(_, steps, _)| steps)
-    }
-
-    /// The encoders of the readout that runs, with its tare where that is known.
-    pub(crate) fn encoders(&self) -> ReadoutEncoders {
-        match self.handle.tare() {
-            Some(tare) => self.encoders.with_tare(&tare),
-            None => self.encoders.clone(),
-        }
-    }
-
-    /// Whether the readout's tare is being measured.
-    pub(crate) fn measures_tare(&self) -> bool {
-        self.handle.counters().readout.taring
     }
 
     /// The `counters` message, with rates since the last call; a frame takes `frame_us` where that is known.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use taxel_core::encode::Encoder;
 use taxel_core::problem;
 use taxel_live::Result;
 use taxel_live::pipeline::TaxelChange;
@@ -10,7 +11,6 @@ use crate::block::Block;
 use crate::columns::{COLUMN_US, LATE_US, SPAN, TimeColumns, column_of};
 use crate::history::TaxelHistory;
 use crate::index::Index;
-use crate::readout_encoders::ViewEncoder;
 use crate::spikes::EncodedSpikes;
 use crate::state::{ArrayState, FORGET, Keyframe};
 
@@ -25,7 +25,7 @@ pub struct ViewOptions {
     /// The taxel whose history is shown.
     pub watched: Option<u32>,
     /// The encoder whose spikes are shown.
-    pub encoder: Option<ViewEncoder>,
+    pub encoder: Option<Encoder>,
 }
 
 impl ViewOptions {

@@ -1,23 +1,18 @@
-//! Spikes that an encoder makes of the changes in a view: one by one, and counted by column of time.
+//! Spikes that an encoder makes of the changes in a view, counted by row and column of time.
 
 use std::ops::Range;
 use std::sync::Arc;
 
-use serde_json::{Value, json};
-use taxel_core::encode::Stream;
-use taxel_core::{Array, Error, Events, Hint, Intensities, Spike, SpikeKind, problem};
+use taxel_core::encode::{Encoder, Stream};
+use taxel_core::{Array, Error, Events, Hint, Intensities, Spike, problem};
 
 use crate::columns::{TimeColumns, column_of};
 use crate::frame_values::Frames;
 use crate::index::Index;
-use crate::readout_encoders::ViewEncoder;
 use crate::state::{Keyframe, Sensor};
 use taxel_core::held::{UNKNOWN, as_events};
 use taxel_live::Result;
 use taxel_live::pipeline::TaxelChange;
-
-/// Maximum number of spikes in a message.
-const MOST: usize = 4096;
 
 /// Maximum number of changes converted at a time, which bounds the temporary memory.
 const PIECE: usize = 1 << 16;
@@ -25,8 +20,6 @@ const PIECE: usize = 1 << 16;
 /// An encoder applied to the changes of a board, or to the frames of each source.
 #[derive(Clone)]
 pub(crate) struct EncodedSpikes {
-    name: String,
-    of_readout: bool,
     sensor: Arc<Sensor>,
     /// One of a board; of frames one a source.
     encoders: Vec<SourceEncoder>,
@@ -35,9 +28,8 @@ pub(crate) struct EncodedSpikes {
     column_us: i64,
     /// Spike counts of each row by column of time.
     raster: TimeColumns,
-    /// Spikes that no message has had yet.
+    /// Spikes that are not counted yet.
     pending: Vec<Spike>,
-    left_out: usize,
     /// Why the encoder stopped.
     failed: Option<Error>,
 }
@@ -57,8 +49,7 @@ impl EncodedSpikes {
     /// # Errors
     ///
     /// `Core(Problem)` where the encoder does not fit a sensor, or frames have no times.
-    pub(crate) fn new(encoder: &ViewEncoder, sensor: &Arc<Sensor>, column_us: i64, from: &Keyframe) -> Result<Self> {
-        let ViewEncoder { encoder, name, of_readout } = encoder;
+    pub(crate) fn new(encoder: &Encoder, sensor: &Arc<Sensor>, column_us: i64, from: &Keyframe) -> Result<Self> {
         let sensors: Vec<&Array> = match &sensor.frames {
             Some(Frames { number_us: Some(_), .. }) => {
                 let text = "spikes need times, but these frames have only numbers: state the frame rate";
@@ -69,21 +60,18 @@ impl EncodedSpikes {
         };
         let (mut encoders, mut first) = (vec![], 0);
         for sensor in sensors {
-            let stream = encoder.stream(sensor).map_err(|error| error.in_part(&format!("encoder {name}")))?;
-            let trains = u32::try_from(stream.trains()).map_err(|_| problem!("encoder {name}: too many trains"))?;
+            let stream = encoder.stream(sensor).map_err(of_encoder)?;
+            let trains = u32::try_from(stream.trains()).map_err(|_| of_encoder(problem!("too many trains")))?;
             encoders.push(SourceEncoder { stream, first, rows: sensor.rows.into() });
             first += trains;
         }
         let mut spikes = Self {
-            name: name.clone(),
-            of_readout: *of_readout,
             sensor: Arc::clone(sensor),
             encoders,
             held: from.held.clone(),
             column_us,
             raster: TimeColumns::new(&sensor.array, 0, 0),
             pending: vec![],
-            left_out: 0,
             failed: None,
         };
         if let Some(t) = from.latest {
@@ -122,7 +110,7 @@ impl EncodedSpikes {
 
     /// Encodes the next changes.
     pub(crate) fn push(&mut self, changes: &[TaxelChange]) {
-        let (from, sensor) = (self.pending.len(), Arc::clone(&self.sensor));
+        let sensor = Arc::clone(&self.sensor);
         match &sensor.frames {
             Some(frames) => {
                 for together in changes.chunk_by(|change, next| change.t == next.t) {
@@ -131,7 +119,7 @@ impl EncodedSpikes {
             }
             None => changes.chunks(PIECE).for_each(|piece| self.push_events(&self.events(piece))),
         }
-        self.count(from);
+        self.count();
     }
 
     /// Encodes the frames of one time, of each source that has one.
@@ -169,27 +157,26 @@ impl EncodedSpikes {
         let (from, encoder) = (self.pending.len(), &mut self.encoders[source]);
         let done = work(&mut *encoder.stream, &mut self.pending);
         self.pending[from..].iter_mut().for_each(|spike| spike.train += encoder.first);
-        self.failed = done.err().map(|error| error.in_part(&format!("encoder {}", self.name)));
+        self.failed = done.err().map(of_encoder);
     }
 
     /// Informs the encoder that no change before `t` (us) will follow.
     pub(crate) fn advance(&mut self, t: i64) {
-        let from = self.pending.len();
         for source in 0..self.encoders.len() {
             self.encode(source, |stream, out| {
                 stream.advance(t, out);
                 Ok(())
             });
         }
-        self.count(from);
+        self.count();
     }
 
-    /// Counts the pending spikes from index `from` on in their columns; only the newest stay pending.
+    /// Counts the pending spikes in their columns.
     #[allow(clippy::cast_possible_truncation)]
-    fn count(&mut self, from: usize) {
+    fn count(&mut self) {
         let rows = usize::from(self.sensor.array.rows);
-        self.pending[from..].sort_by(|a, b| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
-        for spike in &self.pending[from..] {
+        self.pending.sort_by(|a, b| a.t.total_cmp(&b.t));
+        for spike in self.pending.drain(..) {
             let column = column_of((spike.t * 1000.0).floor() as i64, self.column_us);
             // The trains of a source are assigned to its rows evenly: with one train per taxel that is the row of the taxel.
             let next = self.encoders.partition_point(|encoder| encoder.first <= spike.train);
@@ -200,9 +187,6 @@ impl EncodedSpikes {
             self.raster.extend_to(column);
             self.raster.count(column, std::iter::once((row, spike.value >= 0.0)));
         }
-        let more = self.pending.len().saturating_sub(MOST);
-        self.pending.drain(..more);
-        self.left_out += more;
     }
 
     /// Appends these columns of time, one byte per row.
@@ -219,30 +203,6 @@ impl EncodedSpikes {
         self.failed.as_ref()
     }
 
-    /// The `spikes` message of the pending spikes, if there are any.
-    pub(crate) fn message(&mut self) -> Option<Value> {
-        if self.pending.is_empty() {
-            return None;
-        }
-        let stream = &self.encoders.first()?.stream;
-        let trains: usize = self.encoders.iter().map(|encoder| encoder.stream.trains()).sum();
-        let message = json!({
-            "type": "spikes",
-            "encoder": self.name,
-            "of_readout": self.of_readout,
-            "trains": trains,
-            "signed": stream.kind() == SpikeKind::Signed,
-            "latency_ms": stream.latency_ms(),
-            "t_ms": self.pending.iter().map(|spike| spike.t).collect::<Vec<_>>(),
-            "train": self.pending.iter().map(|spike| spike.train).collect::<Vec<_>>(),
-            "value": self.pending.iter().map(|spike| spike.value).collect::<Vec<_>>(),
-            "left_out": self.left_out,
-        });
-        self.pending.clear();
-        self.left_out = 0;
-        Some(message)
-    }
-
     fn events(&self, changes: &[TaxelChange]) -> Events {
         let valued = changes.iter().any(|change| change.ticks != UNKNOWN);
         Events {
@@ -257,4 +217,8 @@ impl EncodedSpikes {
             ..Events::empty(self.sensor.array.clone())
         }
     }
+}
+
+fn of_encoder(error: Error) -> Error {
+    error.in_part("encoder")
 }

@@ -7,7 +7,7 @@ mod playback;
 
 use std::sync::Arc;
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use taxel_core::encode::Encoder;
 use taxel_core::held::UNKNOWN;
 use taxel_core::problem;
@@ -18,7 +18,6 @@ use crate::columns::{COLUMN_US, COLUMNS_US, Curve, MISSING, is_column};
 use crate::index::Index;
 use crate::live_source::LiveSource;
 use crate::player::{Player, ViewOptions};
-use crate::readout_encoders::{ReadoutEncoders, ViewEncoder};
 use crate::spikes::EncodedSpikes;
 use crate::state::Keyframe;
 use delivered::Delivered;
@@ -49,10 +48,6 @@ pub struct View {
     position: Position,
     playback: Playback,
     options: ViewOptions,
-    /// The encoder that the client has requested.
-    requested_encoder: Option<Map<String, Value>>,
-    /// The encoders of the readout that reads the recording.
-    recording_encoders: ReadoutEncoders,
     /// Where the window of columns ends, us; `None`: at the time of the view.
     window_us: Option<i64>,
     delivered: Delivered,
@@ -76,8 +71,6 @@ impl View {
             position: Position::Following(Box::default()),
             playback: Playback::paused(),
             options: ViewOptions::plain(COLUMN_US),
-            requested_encoder: None,
-            recording_encoders: ReadoutEncoders::default(),
             window_us: None,
             delivered: Delivered::nothing(),
             dirty: true,
@@ -217,7 +210,7 @@ impl View {
             watched: self.options.watched,
             column_us: self.options.column_us,
         };
-        self.write_spikes();
+        self.check_encoder();
         let needs_rest = |rests: u64| self.delivered.needs_rest(rests, moves != 0);
         let (bytes, last, rests) = match &mut self.position {
             Position::Following(following) => following.frame(self.live.as_ref()?, about, needs_rest),
@@ -237,8 +230,8 @@ impl View {
         Some((bytes, std::mem::take(&mut self.texts)))
     }
 
-    /// Writes the `spikes` message, where the encoder has made any since the last frame.
-    fn write_spikes(&mut self) {
+    /// Goes on without an encoder that has stopped.
+    fn check_encoder(&mut self) {
         let of_view = match &mut self.position {
             Position::Following(following) => following.spikes(),
             Position::At(Some(position)) => {
@@ -247,12 +240,9 @@ impl View {
             }
             Position::At(None) => return,
         };
-        let Some(spikes) = of_view else { return };
-        let (message, failed) = (spikes.message(), spikes.failed().cloned());
-        self.texts.extend(message.map(|message| message.to_string()));
-        if let Some(error) = failed {
+        if let Some(error) = of_view.as_ref().and_then(EncodedSpikes::failed).cloned() {
             *of_view = None;
-            (self.options.encoder, self.requested_encoder) = (None, None);
+            self.options.encoder = None;
             self.warn(&error.into());
         }
     }
@@ -270,9 +260,6 @@ impl View {
     /// Moves the view to a time.
     fn go(&mut self, t: i64) -> Result<()> {
         let index = self.index()?;
-        if let Err(error) = self.choose_encoder(&index) {
-            self.warn(&error);
-        }
         // For the past of a live source at wide columns, the shared state has them all.
         let live = self.live.as_ref().filter(|_| self.recording.is_none() && self.options.column_us > COLUMN_US);
         let whole = live.map(|live| {
@@ -314,8 +301,7 @@ impl View {
 
     /// Shows the newest state of the live source from now on.
     fn follow_newest(&mut self) {
-        (self.recording, self.window_us) = (None, None);
-        self.recording_encoders = ReadoutEncoders::default();
+        (self.recording, self.window_us, self.options.encoder) = (None, None, None);
         self.playback.pause();
         self.begin_following();
     }
@@ -323,48 +309,10 @@ impl View {
     fn begin_following(&mut self) {
         self.restart();
         self.position = Position::Following(Box::default());
-        let (Ok(index), Some(live)) = (self.index(), self.live.clone()) else { return };
-        if let Err(error) = self.choose_encoder(&index) {
-            self.warn(&error);
-        }
+        let Some(live) = self.live.clone() else { return };
         match Following::begin(&live, &self.options) {
             Ok(following) => self.position = Position::Following(Box::new(following)),
             Err(error) => self.warn(&error),
-        }
-    }
-
-    /// Chooses the encoder that the client has requested, of the readout that reads what is shown; none where it does not
-    /// encode what an index holds.
-    fn choose_encoder(&mut self, index: &Index) -> Result<()> {
-        self.options.encoder = None;
-        let Some(request) = self.requested_encoder.take() else { return Ok(()) };
-        let live = self.live.as_ref().filter(|_| self.recording.is_none());
-        let encoder = match live {
-            Some(live) => ViewEncoder::requested(&request, &live.encoders())?,
-            None => ViewEncoder::requested(&request, &self.recording_encoders)?,
-        };
-        let blank = Keyframe::blank(index.sensor.array.len());
-        let stream =
-            EncodedSpikes::new(&encoder, &index.sensor, COLUMN_US, &blank).and_then(|spikes| spikes.check(index));
-        if stream.is_err() && encoder.of_readout && live.is_some_and(|live| live.measures_tare()) {
-            let name = encoder.name;
-            return Err(problem!(
-                "encoder {name}: the readout is still measuring its tare; choose the encoder again after it"
-            )
-            .into());
-        }
-        stream?;
-        (self.options.encoder, self.requested_encoder) = (Some(encoder), Some(request));
-        Ok(())
-    }
-
-    /// This is the encoder of the readout that reads the recording from now on; none of a plain rule.
-    pub fn set_readout(&mut self, encoder: Option<Encoder>) {
-        self.recording_encoders = encoder.map_or_else(ReadoutEncoders::default, ReadoutEncoders::from);
-        if self.requested_encoder.is_some()
-            && let Err(error) = self.reopen()
-        {
-            self.warn(&error);
         }
     }
 
@@ -400,18 +348,19 @@ impl View {
         self.reopen()
     }
 
-    /// Makes spikes by this encoder from now on, or none.
+    /// Makes spikes by this encoder of what is shown from now on, or none.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where there is no such encoder, or it does not encode what is shown.
-    pub fn encode(&mut self, encoder: Option<Map<String, Value>>) -> Result<()> {
-        self.requested_encoder = None;
-        if encoder.is_some() {
+    /// `Core(Problem)` where it does not encode what is shown: then no encoder does.
+    pub fn encode(&mut self, encoder: Option<Encoder>) -> Result<()> {
+        self.options.encoder = None;
+        if let Some(encoder) = &encoder {
             let index = self.index()?;
-            self.requested_encoder = encoder;
-            self.choose_encoder(&index)?;
+            let blank = Keyframe::blank(index.sensor.array.len());
+            EncodedSpikes::new(encoder, &index.sensor, COLUMN_US, &blank)?.check(&index)?;
         }
+        self.options.encoder = encoder;
         self.reopen()
     }
 
@@ -511,77 +460,19 @@ impl View {
         Ok(())
     }
 
-    /// Shows a recording at its beginning, paused.
+    /// Shows a recording at its beginning, paused, without an encoder.
     ///
     /// # Errors
     ///
     /// `File` or `Core` where the recording cannot be read.
     pub fn show(&mut self, index: Arc<Index>) -> Result<()> {
         self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < index.sensor.array.len());
-        (self.recording, self.window_us) = (Some(Arc::clone(&index)), None);
-        self.recording_encoders = ReadoutEncoders::default();
+        (self.recording, self.window_us, self.options.encoder) = (Some(Arc::clone(&index)), None, None);
         self.playback.pause();
         match index.range() {
             Some((first, _)) => self.go(first)?,
             None => self.position = Position::At(None),
         }
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use serde_json::json;
-    use taxel_core::encode::{ChangeEvents, Composite, Fa1};
-
-    use super::*;
-    use crate::events::tests::{indexed, recorded};
-
-    /// The `spikes` message of the next frame, and whether it is of the readout's encoder.
-    fn spikes(view: &mut View) -> (Value, bool) {
-        let (_, texts) = view.frame(false).unwrap();
-        let mut message: Value = serde_json::from_str(&texts[0]).unwrap();
-        let of_readout = message["of_readout"].take();
-        (message, of_readout.as_bool().unwrap())
-    }
-
-    fn encode(view: &mut View, encoder: Value) -> (Value, bool) {
-        view.encode(encoder.as_object().cloned()).unwrap();
-        spikes(view)
-    }
-
-    #[test]
-    fn an_encoder_by_its_name_alone_is_the_readout_s() {
-        let path = recorded("readout-encoder", 3);
-        let (index, _) = indexed(&path, u64::MAX);
-        let last = index.range().unwrap().1;
-        let mut view = View::new(None);
-        view.show(index).unwrap();
-        view.seek(last).unwrap();
-        let coarse = Encoder::ChangeEvents(ChangeEvents { noise_floor: 20.0, ..ChangeEvents::default() });
-        let by_name = || json!({ "name": "change_events" });
-        let (defaults, of_readout) = encode(&mut view, by_name());
-        assert!(!of_readout);
-        let (stated, _) = encode(&mut view, json!(coarse));
-        assert_ne!(stated, defaults);
-        assert_eq!(encode(&mut view, by_name()), (defaults, false));
-        // A readout that reads from now on gives its parameters without another request.
-        view.set_readout(Some(coarse.clone()));
-        assert_eq!(spikes(&mut view), (stated.clone(), true));
-        // Stated parameters are those of the request.
-        assert!(!encode(&mut view, json!(Encoder::ChangeEvents(ChangeEvents::default()))).1);
-        // A part of a composite, and the whole.
-        let parts = [("on", coarse), ("afferent", Encoder::Fa1(Fa1::default()))];
-        let parts = parts.map(|(name, part)| (name.to_owned(), part)).into();
-        let composite = Encoder::Composite(Composite { parts });
-        assert_eq!(ReadoutEncoders::from(composite.clone()).names(), ["change_events", "composite", "fa1"]);
-        view.set_readout(Some(composite.clone()));
-        assert_eq!(encode(&mut view, by_name()), (stated, true));
-        let (whole, _) = encode(&mut view, json!(composite));
-        assert_eq!(encode(&mut view, json!({ "name": "composite" })), (whole, true));
-        view.set_readout(None);
-        let (_, texts) = view.frame(false).unwrap();
-        assert!(texts[0].contains("needs a readout with several encoders"));
-        std::fs::remove_file(&path).unwrap();
     }
 }

@@ -72,7 +72,7 @@ mod _core {
     #[pymodule_export]
     use crate::nouns::{check_events, check_spikes, split_by_sign};
     #[pymodule_export]
-    use crate::panel::{PanelLive, PanelRecording, PanelView, panel_encoders, panel_limits};
+    use crate::panel::{PanelLive, PanelRecording, PanelView, panel_limits};
     #[pymodule_export]
     use crate::recording::{
         DecodedDatagrams, RecordingReader, RecordingWriter, Remarks, Samples, clock_doubt, clock_lines,

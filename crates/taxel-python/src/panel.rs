@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use taxel_core::encode::Encoder;
 use taxel_core::held::UNKNOWN;
 use taxel_core::rest::Value as _;
@@ -52,12 +52,6 @@ fn activity_out<'py>(py: Python<'py>, sensor: &taxel_core::Array, activity: Acti
 #[pyfunction]
 pub fn panel_limits() -> Plain<Value> {
     Plain(taxel_panel::limits())
-}
-
-/// The names of an encoder (JSON) and of its parts.
-#[pyfunction]
-pub fn panel_encoders(encoder: &str) -> PyResult<Vec<String>> {
-    Ok(taxel_panel::encoder_names(Encoder::from_json(encoder).map_err(core)?))
 }
 
 /// A live source as the panel shows it, received in a thread of its own. Messages are JSON.
@@ -307,19 +301,10 @@ impl PanelView {
         self.with(py, |view| view.watch(taxel))
     }
 
-    /// Makes spikes by an encoder (JSON) from now on, or none.
+    /// Makes spikes of what is shown by an encoder (JSON) from now on, or none.
     fn encode(&self, py: Python<'_>, encoder: Option<&str>) -> PyResult<()> {
-        let encoder: Option<Map<String, Value>> = encoder.map(|text| parsed("encoder", text)).transpose()?;
-        self.with(py, |view| view.encode(encoder))
-    }
-
-    /// The encoder (JSON) of the readout that reads the recording from now on; none of a plain rule.
-    fn set_readout(&self, py: Python<'_>, encoder: Option<&str>) -> PyResult<()> {
         let encoder = encoder.map(Encoder::from_json).transpose().map_err(core)?;
-        self.with(py, |view| {
-            view.set_readout(encoder);
-            Ok(())
-        })
+        self.with(py, |view| view.encode(encoder))
     }
 
     /// Columns of this width, us, that end at a time or at that of the view.

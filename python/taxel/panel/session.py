@@ -18,6 +18,7 @@ from taxel import _core
 from taxel._base.errors import refused
 from taxel._core import ProblemError
 from taxel.device import ports
+from taxel.encode import Encoder
 from taxel.labels import Note
 from taxel.live.lines import preview
 from taxel.panel.declared import Request, Time, line, long_request, request, requests_of, whole
@@ -78,6 +79,10 @@ class Session:
         self.view = _core.PanelView(hub.source)
         #: The recording that is shown; None: the live source.
         self.shown: Shown | None = None
+        #: The encoder of the readout that reads this recording, with the tare that it read with.
+        self._readout: Encoder | None = None
+        #: The encoder that was asked for.
+        self._asked: dict[str, Any] | None = None
         #: Frames that may be sent; none while a request is answered, so that a frame shows what was answered before it.
         self.credits, self.answers = 0, False
         self._advancing: asyncio.Task[None] | None = None
@@ -220,10 +225,33 @@ class Session:
         """Send spikes of this encoder (JSON as `Encoder.to_json` writes it) of what this view shows; null for none.
 
         A name without parameters is that of the encoder of the readout that reads what is shown, with its parameters
-        and its tare, where the readout has one of this name; else the parameters are the defaults.
+        and its tare, where the readout has an encoder of this name; else the parameters are the defaults. `spikes`
+        follows, and again when the readout or the recording is another one.
         """
         with at_field("encoder", whole=True):
-            await in_thread(self.view.encode, None if encoder is None else json.dumps(encoder))
+            await self._encode(encoder)
+
+    async def _encode(self, asked: dict[str, Any] | None) -> None:
+        self._asked = None
+        of_readout = self._hub.encoder() if self.shown is None else self._readout
+        encoder = None
+        if asked is not None and of_readout is not None and asked == {"name": of_readout.name}:
+            encoder = of_readout
+        elif asked is not None:
+            encoder = Encoder.from_json(json.dumps(asked))
+        await in_thread(self.view.encode, None if encoder is None else encoder.to_json())
+        self._asked = asked
+        if encoder is not None:
+            about = {"encoder": encoder.name, "of_readout": encoder is of_readout, "latency_ms": encoder.latency_ms}
+            await self.say({"type": "spikes", **about})
+
+    async def encode_again(self) -> None:
+        """Make spikes as they were asked for, of another readout or of what is shown now."""
+        if self._asked is not None:
+            try:
+                await self._encode(self._asked)
+            except _core.Error as error:
+                await self.say({"type": "warning", "text": str(error)})
 
     @request
     async def zoom(self, column_us: Annotated[int, whole(1, 2**40)], end_us: Time | None = None) -> None:
@@ -264,6 +292,7 @@ class Session:
         """Follow the live source; leaves a recording."""
         await in_thread(self.view.follow)
         self.shown = None
+        await self.encode_again()
         await self._say_transport()
 
     @request
@@ -285,7 +314,7 @@ class Session:
         except (OSError, _core.Error) as error:
             trouble = reason(error)
         await in_thread(self.view.show, shown.recording)
-        self.shown = shown
+        self.shown, self._readout = shown, None
         opened = {
             "type": "opened",
             "name": shown.name,
@@ -298,6 +327,7 @@ class Session:
         await self._say_transport()
         if trouble is not None:
             await self.say({"type": "warning", "text": trouble})
+        await self.encode_again()
 
     @long_request
     async def values(self, t_us: Time) -> None:
@@ -532,10 +562,10 @@ class Session:
             return await self._hub.read_out(path)
         labels, encoder, found = await in_thread(self._hub.training.detect, shown.path, shown.asked, path)
         if self.shown is shown:
-            await in_thread(self.view.set_readout, encoder)
+            self._readout = encoder
+            await self.encode_again()
         message = {"type": "detections", "source": shown.name, "readout": readout, "labels": labels}
-        names = [] if encoder is None else _core.panel_encoders(encoder)
-        await self.say(message | {"encoders": names, "detections": found})
+        await self.say(message | {"encoder": None if encoder is None else encoder.name, "detections": found})
         return None
 
     def _needed(self, action: str) -> Shown:

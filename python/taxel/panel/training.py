@@ -14,6 +14,7 @@ from taxel._base.child_process import ChildProcess
 from taxel._base.progress import Steps
 from taxel._core import ProblemError
 from taxel.detect import Readout, load
+from taxel.encode import Encoder
 from taxel.panel.shown_files import Opening, ShownFiles
 
 #: Code with which a task ends that was stopped.
@@ -132,13 +133,13 @@ class Training:
 
     def detect(
         self, recording: Path, trial: str | None, readout: Path
-    ) -> tuple[list[str], str | None, list[dict[str, Any]]]:
+    ) -> tuple[list[str], Encoder | None, list[dict[str, Any]]]:
         """Detect by a readout in a recording or its trial.
 
         Returns
         -------
-        tuple of list of str, str or None, and list of dict
-            The readout's labels; its encoder, as JSON, with the tare that it read with (none for several sensors, each
+        tuple of list of str, Encoder or None, and list of dict
+            The readout's labels; its encoder, with the tare that it read with (none for several sensors, each
             of which has its own); the detections in the order in which they are known.
         """
         from taxel.tasks import detect  # noqa: PLC0415  the command line starts quickly
@@ -157,6 +158,6 @@ class Training:
         ]
         return (
             list(loaded.labels),
-            None if encoder is None else encoder.to_json(),
+            encoder,
             sorted(found, key=itemgetter("known_us")),
         )

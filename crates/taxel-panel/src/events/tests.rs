@@ -13,7 +13,6 @@ use taxel_core::wire::{Command, Registers};
 use super::*;
 use crate::columns::{COLUMN_US, SPAN, column_of};
 use crate::player::{Player, ViewOptions};
-use crate::readout_encoders::ViewEncoder;
 use crate::spikes::EncodedSpikes;
 use crate::state::ArrayState;
 use crate::view::frame::{About, write};
@@ -121,7 +120,7 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
             let us = [COLUMN_US, 500, 64_000][turn % 3];
             // With this floor every change counts, so that the held value is the one that was sent last.
             let spiking = ChangeEvents { noise_floor: 0.5, ..ChangeEvents::default() };
-            let spiking = ViewEncoder::from(Encoder::ChangeEvents(spiking));
+            let spiking = Encoder::ChangeEvents(spiking);
             let options =
                 ViewOptions { watched: Some(WATCHED), encoder: Some(spiking.clone()), ..ViewOptions::plain(us) };
             let mut player = Player::open(&index, t, &options, None).unwrap();

@@ -28,7 +28,7 @@ import { Timeline } from "./timeline.js";
 import { Training } from "./training.js";
 import { View } from "./view.js";
 import { TimeWindow } from "./window.js";
-import { beginning, begun, counted, numbering, short } from "./words.js";
+import { beginning, begun, numbering, short } from "./words.js";
 
 /** @typedef {import("./messages.js").Message} Message */
 /** @typedef {import("./messages.js").Hello} Hello */
@@ -243,7 +243,7 @@ function receive(message) {
       return training.progress(message.text);
     case "detections":
       if (message.source === player.transport.source) {
-        view.offer(message.encoders);
+        view.offer(message.encoder);
         training.reads = message.readout;
         showDetections(recorded(message.detections), message.labels);
       }
@@ -290,8 +290,8 @@ function showZeroed() {
 }
 
 /** @param {import("./messages.js").Spikes} spikes @returns {string} */
-function spikesInfo({ encoder, of_readout, latency_ms, left_out }) {
-  return `${encoder.replaceAll("_", " ")}, ${of_readout ? "parameters of the readout" : "default parameters"}, latency ${latency_ms.toFixed(1)} ms${left_out ? `, ${counted(left_out, "spike")} not shown` : ""}`;
+function spikesInfo({ encoder, of_readout, latency_ms }) {
+  return `${encoder.replaceAll("_", " ")}, ${of_readout ? "parameters of the readout" : "default parameters"}, latency ${latency_ms.toFixed(1)} ms`;
 }
 
 /** @param {Hello} message */
@@ -303,7 +303,7 @@ function greet(message) {
   board.greet(message);
   view.greet(message);
   if (!opened) {
-    view.offer(message.readout_encoders);
+    view.offer(message.readout_encoder);
     showUnits();
   }
   labels.offer(message.readout ?? []);
@@ -401,7 +401,7 @@ function open(message) {
   part("files", HTMLSelectElement).value = message.name;
   labels.choose(message.name, message.frames?.trial);
   view.choose(message.name);
-  view.offer([]);
+  view.offer(null);
   showDetections(recorded(message.detections), [...new Set(message.detections.map(({ label }) => label))].sort());
   notes.choose(message.notes);
   server.send({ type: "overview" });
@@ -429,7 +429,7 @@ function move(transport) {
     player.reach = counters?.reach_us ?? null;
     labels.choose(recorder.status?.state === "recording" ? recorder.status.file : null);
     view.choose(null);
-    view.offer(hello?.readout_encoders ?? []);
+    view.offer(hello?.readout_encoder ?? null);
     showDetections(detections.live, hello?.readout ?? []);
     showRegisters();
     server.send({ type: "overview" });

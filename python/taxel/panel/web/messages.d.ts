@@ -235,8 +235,8 @@ export interface Hello {
   open: string | null;
   /** The labels of the readout that runs. */
   readout: string[] | null;
-  /** The names of its encoders; empty without a readout, and of a plain rule. */
-  readout_encoders: string[];
+  /** The name of its encoder; null without a readout, and of a plain rule. */
+  readout_encoder: string | null;
   /** The names of the encoders. */
   encoders: string[];
   /** Width of a column of time, us. */
@@ -330,20 +330,13 @@ export interface Detection {
   slope_mv_per_ms: number | null;
 }
 
-/** With a frame, after `encode`: the spikes since the last message; after a seek those of the stretch that is shown. An encoder that begins in the middle begins with the held values. */
+/** After `encode`, and again when the encoder is another one: that of another readout. */
 export interface Spikes {
   type: "spikes";
   encoder: string;
   /** Whether its parameters are those of the readout that reads what is shown; else they are those of the request, and the defaults. */
   of_readout: boolean;
-  trains: number;
-  signed: boolean;
   latency_ms: number;
-  t_ms: number[];
-  train: number[];
-  value: number[];
-  /** Number of the others, where there are more than the 4096 newest. */
-  left_out: number;
 }
 
 /** All taxels of the live source that were zeroed, each as it was last; sent when that has changed. */
@@ -408,8 +401,8 @@ export interface Detections {
   readout: string;
   /** The readout's, in its order. */
   labels: string[];
-  /** The names of the readout's encoders; empty of a plain rule. */
-  encoders: string[];
+  /** The name of the readout's encoder; null of a plain rule. */
+  encoder: string | null;
   detections: FoundDetection[];
 }
 

@@ -58,11 +58,11 @@ export class View {
     part("live-view", HTMLElement).hidden = !hello.live;
   }
 
-  /** Offers the encoders. @param {string[]} readout the names of those of the readout that reads what is shown */
+  /** Offers the encoders. @param {string | null} readout the name of that of the readout that reads what is shown */
   offer(readout) {
-    const names = [...new Set([...this.encoders, ...readout])];
+    const names = [...new Set([...this.encoders, ...(readout ? [readout] : [])])];
     const { value } = this.encoder;
-    this.encoder.replaceChildren(make("option", { value: "" }, "changes"), ...names.map((name) => make("option", { value: name }, `${readout.includes(name) ? "readout: " : "spikes: "}${name.replaceAll("_", " ")}`)));
+    this.encoder.replaceChildren(make("option", { value: "" }, "changes"), ...names.map((name) => make("option", { value: name }, `${name === readout ? "readout: " : "spikes: "}${name.replaceAll("_", " ")}`)));
     this.encoder.value = names.includes(value) ? value : "";
     if (!this.encoder.value) this.show(false);
   }
