@@ -6,14 +6,11 @@ import { counted, rounded } from "./words.js";
 /** @typedef {import("./messages.js").ArrayInfo} ArrayInfo */
 /** @typedef {import("./messages.js").FrameSourceInfo} FrameSourceInfo */
 /** @typedef {[number, number]} Taxel column and row */
-/** @typedef {{ words: Uint32Array, levels: Float32Array }} Colours by taxel a pixel, and its height from 0 to 1 */
 
 /** Room around the outermost places of a sensor, in the distance between neighbours. */
 const MARGIN = 0.75;
 /** Size of a place's dot in the distance between neighbours. */
 const DOT = 0.62;
-/** Height of the least bar, so that a channel without load is seen, as a share of all. */
-const LEAST_BAR = 0.02;
 
 /** What all sensors have: rows, columns, and the sources that stand side by side. */
 class Sensor {
@@ -24,17 +21,14 @@ class Sensor {
     this.rows = array.rows;
     this.columns = array.columns;
     this.exists = array.exists;
+    const all = Array.from({ length: this.rows * this.columns }, (_, k) => /** @type {Taxel} */ ([k % this.columns, Math.floor(k / this.columns)]));
+    /** Those that exist, row by row. */
+    this.taxelsThatExist = all.filter((taxel) => this.has(...taxel));
   }
 
   /** @param {number} x @param {number} y @returns {boolean} */
   has(x, y) {
     return x >= 0 && y >= 0 && x < this.columns && y < this.rows && (!this.exists || this.exists[y * this.columns + x] === "1");
-  }
-
-  /** @returns {Taxel[]} those that exist, row by row */
-  get taxelsThatExist() {
-    const all = Array.from({ length: this.rows * this.columns }, (_, k) => /** @type {Taxel} */ ([k % this.columns, Math.floor(k / this.columns)]));
-    return all.filter((taxel) => this.has(...taxel));
   }
 
   /** @param {number} x @returns {FrameSourceInfo | undefined} the source that a column is of, where there are several */
@@ -92,7 +86,7 @@ class Sensor {
 
 /** Taxels in rows and columns: one pixel each. */
 class Grid extends Sensor {
-  kind = /** @type {const} */ ("grid");
+  kind = /** @type {"grid" | "channels"} */ ("grid");
   axes = /** @type {[string, string]} */ (["column", "row"]);
 
   /** @param {ArrayInfo} array @param {FrameSourceInfo[]} sources */
@@ -141,8 +135,8 @@ class Grid extends Sensor {
     return this.mm ? " mm" : "";
   }
 
-  /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours */
-  paint(canvas, context, { words }) {
+  /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Uint32Array} words colours by taxel a pixel */
+  paint(canvas, context, words) {
     const { rows, columns, pixels } = this;
     if (canvas.width !== columns || canvas.height !== rows) [canvas.width, canvas.height] = [columns, rows];
     pixels.set(words);
@@ -227,8 +221,8 @@ class Placed extends Sensor {
     return this.places.unit ? ` ${this.places.unit}` : ", units of the file";
   }
 
-  /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours */
-  paint(canvas, context, { words }) {
+  /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Uint32Array} words colours by taxel a pixel */
+  paint(canvas, context, words) {
     const { width, height, ratio } = fitted(canvas);
     const { near, places } = this;
     const unit = this.scaled() * width;
@@ -247,57 +241,18 @@ class Placed extends Sensor {
   }
 }
 
-/** Channels: neither pitch nor places, so that they have no map, centre or area, only a bar each. */
-class Channels extends Sensor {
-  kind = /** @type {const} */ ("channels");
-  axes = /** @type {[string, string]} */ (["", ""]);
-  limits = /** @type {[number, number]} */ ([0, 1]);
-  aspect = 6;
+/** Channels: neither pitch nor places, so that they have no centre and no area, only a cell each. */
+class Channels extends Grid {
+  kind = /** @type {"grid" | "channels"} */ ("channels");
 
   /** @param {Taxel} taxel within its source @returns {string} its number */
   numbered([x, y]) {
     return `channel ${Math.max(x, y)}`;
   }
 
-  /** @returns {number[]} the places of those that exist */
-  get existing() {
-    return Array.from({ length: this.count }, (_, k) => k).filter((k) => !this.exists || this.exists[k] === "1");
-  }
-
-  /** @returns {number} how many bars have room */
-  get count() {
-    return Math.max(this.rows, this.columns);
-  }
-
-  /** @param {Taxel} taxel @returns {[number, number]} */
-  place([x, y]) {
-    return [(Math.max(x, y) + 0.5) / this.count, 0.5];
-  }
-
-  /** @param {number} across @returns {Taxel} */
-  at(across) {
-    const k = Math.max(0, Math.min(this.count - 1, Math.floor(across * this.count)));
-    const taxel = /** @type {Taxel} */ (this.columns > 1 ? [k, 0] : [0, k]);
-    // Between two sources lies an empty column.
-    return this.has(...taxel) ? taxel : this.moved(taxel, [-1, 0]);
-  }
-
   /** @returns {string} */
   centre() {
     return "";
-  }
-
-  /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2D} context @param {Colours} colours */
-  paint(canvas, context, { words, levels }) {
-    const { width, height, ratio } = fitted(canvas);
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, width, height);
-    const wide = width / this.count;
-    for (const k of this.existing) {
-      const high = Math.max(LEAST_BAR, levels[k]) * height;
-      context.fillStyle = css(words[k]);
-      context.fillRect(k * wide + Math.min(1, wide / 8), height - high, Math.max(1, wide - Math.min(2, wide / 4)), high);
-    }
   }
 }
 

@@ -1,7 +1,6 @@
 // The lanes, one above the other: all share one time. A new lane is an entry of LANES and what draws it: the block on the page, its element, and
 // what the cursor says come from the entry.
 
-import { Channels } from "./channels.js";
 import { make, part, themed, write } from "./dom.js";
 import { movable } from "./layout.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
@@ -24,6 +23,7 @@ import { rounded, integer } from "./words.js";
  * @property {{ unit: string, step: number, zero: number, frames: boolean }} values their unit, the size of a tick in it, ticks of the value 0, and whether they are of frames
  * @property {{ unit: string, step: number }} sums unit of the sum of the values, and size of a tick in it
  * @property {number | null} gap_us how long frames of a live source may be away until the curves have a gap; null: however long
+ * @property {number} top ticks above rest that fill the room of a channel's curve
  * @property {boolean} encoded whether the raster shows spikes
  * @property {string} spikes encoder and latency
  */
@@ -50,8 +50,12 @@ const RIGHT = 14;
 const GRID_PX = 96;
 /** Steps between the numbers of an axis of counts. */
 const WHOLE = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000];
-/** Up to this many channels have a curve each. */
+/** Up to this many channels have a curve each, and so many a name of so many letters beside it. */
 const MOST_CHANNELS = 64;
+const NAMED = 8;
+const LETTERS = 7;
+/** Part of its room that a channel's curve takes. */
+const ROOM = 0.94;
 /** Colours of the sums of several sources, by their names in style.css. */
 const COLOURS = ["more", "less", "label", "good"];
 
@@ -70,11 +74,11 @@ const axis = (scale, stroke) => ({
   ticks: { show: false },
   values: (_, marks) => marks.map((mark) => (mark >= 10_000 ? `${mark / 1000}k` : String(mark))),
 });
-/** @param {string} stroke @param {string} scale @param {number[]} [dash] @returns {uPlot.Series} */
+/** @param {string | (() => string)} stroke @param {string} scale @param {number[]} [dash] @returns {uPlot.Series} */
 const line = (stroke, scale, dash) => ({ stroke, scale, width: 1.25, points: { show: false }, ...(dash ? { dash } : {}) });
 /**
  * Curves that are drawn from least to greatest.
- * @param {string[]} strokes the colour of each
+ * @param {(string | (() => string))[]} strokes the colour of each
  * @param {string} scale
  * @param {(number[] | undefined)[]} [dashes]
  * @returns {{ series: uPlot.Series[], bands: uPlot.Band[] }}
@@ -110,6 +114,20 @@ function centreAt({ sensor }, values) {
   return pressed.length ? pressed.join(", ") + sensor.unit : "nothing pressed";
 }
 
+/**
+ * Names of the curves of channels: of several sources each at its first one; else of all, or of many only of the first and the last.
+ * @param {import("./geometry.js").Geometry} sensor
+ * @returns {string[]}
+ */
+function namesOf({ array, columns, sources, taxelsThatExist: taxels }) {
+  const named = taxels.map(([x, y], k) => {
+    if (sources.length > 1) return sources.find(({ left }) => left === x)?.name ?? "";
+    const few = array.names !== undefined && taxels.length <= NAMED;
+    return few || k === 0 || k === taxels.length - 1 ? array.names?.[y * columns + x] || String(k) : "";
+  });
+  return named.map((name) => (name.length > LETTERS ? `${name.slice(0, LETTERS - 1)}…` : name));
+}
+
 /** The lanes, from top to bottom. @type {readonly Lane[]} */
 export const LANES = [
   {
@@ -121,10 +139,26 @@ export const LANES = [
     painter: (element) => new Raster(element),
   },
   {
-    name: "channels", label: "Curve of each channel over time, one above the other", kind: "raster", least: 96,
-    fits: ({ sensor }) => sensor.kind === "channels" && sensor.count <= MOST_CHANNELS,
+    name: "channels", label: "Curve of each channel over time, one above the other", kind: "tall", least: 96,
+    fits: ({ sensor }) => sensor.kind === "channels" && sensor.rows * sensor.columns <= MOST_CHANNELS,
     heading: () => ["Channels ", swatch("more"), " ", output({ id: "channels-scale", class: "dim" })],
-    painter: (element) => new Channels(element),
+    says: ({ values: { step, unit }, top }) => [`each up to ${rounded(top * step)} ${unit}`],
+    plan: (shown) => {
+      const { sensor } = shown();
+      const [line, chosen, dim] = ["more", "less", "dim"].map(themed);
+      const taxels = sensor.taxelsThatExist;
+      return {
+        scales: { channels: { range: () => [-taxels.length, 0] } },
+        ...extents(taxels.map((taxel) => () => (String(taxel) === String(shown().taxel) ? chosen : line)), "channels"),
+        axes: [{ ...axis("channels", dim), grid: { show: false }, splits: () => taxels.map((_, k) => -k - 0.5), values: () => namesOf(sensor) }],
+      };
+    },
+    at: ({ sensor, top }, { channels, channel_count: all }, column) =>
+      sensor.taxelsThatExist.flatMap(([x, y], k) => {
+        const at = 2 * (column * all + y * sensor.columns + x);
+        const [low, high] = [channels[at], channels[at + 1]];
+        return low > high ? [null, null] : [(ROOM * low) / top - k - 1, (ROOM * high) / top - k - 1];
+      }),
   },
   {
     name: "taxel", label: "History of the watched taxel", least: 72,

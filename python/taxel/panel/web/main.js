@@ -158,7 +158,7 @@ function shown() {
   const newtons = opened?.frames?.newtons ?? null;
   // The sum of the values is a force where they are in N, or where it is known of a pressure.
   const sums = newtons === null ? { unit: values.unit, step: values.step } : { unit: "N", step: newtons };
-  return { sensor, taxel, named: maps.named(), values, sums, gap_us: gapOfFrames(), encoded: view.spikes, spikes };
+  return { sensor, taxel, named: maps.named(), values, sums, gap_us: gapOfFrames(), top: timeline?.channelTop() ?? 1, encoded: view.spikes, spikes };
 }
 
 /** Lists the recordings, with the labels as the page knows them. */

@@ -1,4 +1,4 @@
-// Two maps side by side: pressure above rest, and change; of channels, which have no map, a bar each.
+// Two maps side by side: pressure above rest, and change; of channels, which have no map, a cell each.
 
 import { UNKNOWN, changeWords, pressureWords, word } from "./colours.js";
 import { entitle, ground, make, part, write } from "./dom.js";
@@ -98,8 +98,6 @@ export class Maps {
     this.change = new Map2D("change");
     this.geometry = geometry({ rows: 1, columns: 1, pitch_mm: null, name: "", exists: null }, []);
     this.known = "";
-    /** Height of each taxel's bar, where bars are drawn. */
-    this.levels = new Float32Array(0);
     this.floor = 0;
     /** @type {[number, number] | null} */
     this.taxel = null;
@@ -152,7 +150,6 @@ export class Maps {
     for (const map of [this.pressure, this.change]) map.size(this.geometry);
     this.name();
     if (rows !== this.rows || columns !== this.columns) {
-      this.levels = new Float32Array(this.rows * this.columns);
       this.rest = new Uint16Array(this.rows * this.columns).fill(UNKNOWN_VALUE);
       this.frame = null;
     }
@@ -221,21 +218,19 @@ export class Maps {
           onPressure[from] = onChange[from] = 0;
           continue;
         }
-        this.levels[from] = 0;
         if (pressure[from] === UNKNOWN_VALUE) {
           unknown++;
           onPressure[from] = ground[(x + y) & 1];
         } else {
           const above = rest[from] === UNKNOWN_VALUE ? 0 : pressure[from] - rest[from];
-          this.levels[from] = above > floor ? Math.min(1, above / scale) : 0;
-          onPressure[from] = pressureWord[Math.round(255 * this.levels[from])];
+          onPressure[from] = pressureWord[above > floor ? Math.min(255, Math.round((255 * above) / scale)) : 0];
         }
         const moves = change ? Math.max(-127, Math.min(127, (127 * change[from]) / changes)) : 0;
         onChange[from] = changeWord[128 + Math.round(moves)];
       }
     }
     for (const { canvas, context, words } of [this.pressure, this.change]) {
-      if (canvas.clientWidth) this.geometry.paint(canvas, context, { words, levels: this.levels });
+      if (canvas.clientWidth) this.geometry.paint(canvas, context, words);
     }
     this.info.unknown = unknown;
     const watched = this.taxel ? this.taxel[1] * columns + this.taxel[0] : -1;

@@ -11,6 +11,8 @@ import { numbering, seconds, short } from "./words.js";
 
 /** Columns that are stored; the window shows one less at most, as it need not begin where a column does. */
 export const SPAN = 1250;
+/** Ticks above rest that fill the room of a channel at least. */
+const LEAST_TOP = 8;
 /** Steps between the numbers of the axis, of each power of ten. */
 const STEPS = [1, 2, 5];
 
@@ -136,6 +138,18 @@ export class Timeline {
       if (history) this.history.set(history.subarray(3 * i, 3 * i + 3), 3 * column);
       else this.history.fill(UNKNOWN_VALUE, 3 * column, 3 * column + 3);
     }
+  }
+
+  /** @returns {number} ticks above rest that the greatest channel reaches in the window, eight at least */
+  channelTop() {
+    const [first, last] = this.columns ?? [0, -1];
+    const width = 2 * this.channel_count;
+    let top = LEAST_TOP;
+    for (let number = width ? first - 1 : last + 1; number <= last; number++) {
+      const column = this.known(number);
+      if (column >= 0) for (let at = column * width + 1; at < (column + 1) * width; at += 2) top = Math.max(top, this.channels[at]);
+    }
+    return top;
   }
 
   /** @returns {number} how many sources have curves of their own; 0: one for all */
