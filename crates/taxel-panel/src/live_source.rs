@@ -221,24 +221,6 @@ impl LiveSource {
         lock(&self.activity).clone()
     }
 
-    /// Makes the held values the rest of all taxels, or tracks it from them on.
-    ///
-    /// # Errors
-    ///
-    /// `Core(Problem)` before the first value.
-    pub fn rest(&self, now: bool) -> Result<()> {
-        let mut state = lock(&self.state);
-        let held = state.held().to_vec();
-        match now {
-            true if held.iter().all(|&held| held == UNKNOWN) => {
-                return Err(problem!("no events have arrived yet").into());
-            }
-            true => state.set_rest(held),
-            false => state.track_rest(),
-        }
-        Ok(())
-    }
-
     /// The `overview` message of the past that can be viewed.
     pub fn overview(&self) -> Value {
         let columns = lock(&self.state).columns().clone();

@@ -452,18 +452,7 @@ impl ArrayState {
 
     /// Sets the rest of all taxels; [`UNKNOWN`] for those whose first value it is.
     pub fn set_rest(&mut self, rest: Vec<u16>) {
-        self.replace_rest(rest, None);
-    }
-
-    /// Tracks the rest of all taxels from their held values on.
-    pub fn track_rest(&mut self) {
-        let held = self.held().to_vec();
-        let tracked = tracked_from(self.sensor.array.columns.into(), &held);
-        self.replace_rest(held, Some(Box::new(tracked)));
-    }
-
-    fn replace_rest(&mut self, rest: Vec<u16>, tracked: Option<Box<TrackedRest>>) {
-        (self.rest.values, self.rest.tracked) = (Rest::measured(rest), tracked);
+        (self.rest.values, self.rest.tracked) = (Rest::measured(rest), None);
         self.rest.changes += 1;
         self.sum_above_rest();
     }

@@ -111,11 +111,6 @@ impl PanelLive {
         Ok(())
     }
 
-    /// Makes the held values the rest of all taxels (`now`), or tracks it from them on.
-    fn rest(&self, py: Python<'_>, now: bool) -> PyResult<()> {
-        enter(py, |_| self.0.rest(now))
-    }
-
     /// Begins to record into a new .mcap.
     fn record(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let record = Record { path, compression: Compression::None, overwrite: false };

@@ -1,17 +1,14 @@
-"""Writes layout files, and that readings fall into one that a person may have written."""
+"""Writes layout files."""
 
 from __future__ import annotations
 
 import json
-import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
 from taxel._base.errors import unreadable
-from taxel._core import ProblemError
 from taxel.array import Places
 from taxel.formats.layout import Layout, advice
 
@@ -75,36 +72,6 @@ def refuse_to_choose(path: Path, why: str, choices: Mapping[str, Layout]) -> NoR
     error = unreadable(f"{why}; {right}:", path)
     error.args = (*error.args, "\n".join(lines).rstrip())
     raise error
-
-
-def with_falls(path: Path, text: str) -> str:
-    """Return the text of a layout file that states that readings fall with pressure; all else stays, comments too.
-
-    Parameters
-    ----------
-    path : Path
-        The file, for errors.
-    text : str
-
-    Raises
-    ------
-    FormatError : the text is not a layout, before or with this key
-    ProblemError : it is written so that only a person can change it
-
-    Examples
-    --------
-    >>> print(with_falls(Path("a.toml"), "unit = 'N'  # newton"), end="")
-    falls = true
-    unit = 'N'  # newton
-    """
-    Layout.of_text(path, text)
-    own, *tables = re.split(r"^(?=[ \t]*\[)", text, maxsplit=1, flags=re.MULTILINE)
-    changed, count = re.subn(r"^[ \t]*falls[ \t]*=.*$", "falls = true", own, flags=re.MULTILINE)
-    made = "".join([changed if count else f"falls = true\n{own}", *tables])
-    Layout.of_text(path, made)
-    if tomllib.loads(made) != tomllib.loads(text) | {"falls": True}:
-        raise ProblemError(f"{path}: taxel cannot edit this layout file; write falls in it with a text editor")
-    return made
 
 
 def _written(value: object) -> str:

@@ -121,11 +121,6 @@ class Folder:
         files.sort(key=lambda file: -file[2])
         return files[:_MOST_LISTED], sorted(readouts)[:_MOST_LISTED]
 
-    def forget(self, path: Path) -> None:
-        """Read a file anew when it is opened next."""
-        self.files.forget()
-        self._open = {key: shown for key, shown in self._open.items() if shown.path != path}
-
     async def open(self, name: str, trial: str | None) -> Shown:
         """Return a recording, indexed once however many clients show it.
 

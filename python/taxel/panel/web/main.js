@@ -69,14 +69,6 @@ new ResizeObserver(() => (lanesDue = true)).observe(part("lanes", HTMLElement));
 const board = new Board(server, failed);
 const sensor = new Sensor(server);
 const view = new View(server, settings, failed, (taxel) => maps.point(taxel), showLanes);
-part("turn-values", HTMLButtonElement).onclick = () => {
-  const name = opened?.name;
-  server.request({ type: "invert" }).then(() => {
-    if (!name) return;
-    reread = name;
-    ask(name);
-  }, failed);
-};
 const recorder = new Recorder(server, failed, () => showTab("record"));
 const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, mistakes: mistakes.shown, notes: notes.withTime, cut: view.cut }));
 
@@ -94,8 +86,6 @@ let registers = null;
 let zeroed = [];
 /** The recording that is being opened. @type {string | null} */
 let opening = null;
-/** The recording that is read anew, in another way. */
-let reread = "";
 /** Encoder and latency of the spikes in the raster. */
 let spikes = "";
 /** Why the last one was not opened. */
@@ -377,9 +367,8 @@ function showRegisters() {
 
 /** @param {Opened} message */
 function open(message) {
-  const again = reread !== message.name && opened?.name === message.name && opened.frames?.trial === message.frames?.trial;
+  const again = opened?.name === message.name && opened.frames?.trial === message.frames?.trial;
   opened = message;
-  reread = "";
   player.transport = { ...player.transport, source: message.name, state: "paused" };
   player.reach = message.start_us === null || message.stop_us === null ? null : [message.start_us, message.stop_us];
   player.t_us = message.start_us;

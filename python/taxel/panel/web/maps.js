@@ -97,7 +97,7 @@ export class Maps {
     this.pressure = new Map2D("pressure");
     this.change = new Map2D("change");
     this.geometry = geometry({ rows: 1, columns: 1, pitch_mm: null, name: "", exists: null }, []);
-    this.known = "";
+    this.made = "";
     this.floor = 0;
     /** @type {[number, number] | null} */
     this.taxel = null;
@@ -141,9 +141,9 @@ export class Maps {
 
   /** @param {import("./messages.js").ArrayInfo} array @param {FrameSourceInfo[]} sources that stand side by side in it */
   size(array, sources) {
-    const known = JSON.stringify([array, sources]);
-    if (known === this.known) return;
-    this.known = known;
+    const made = JSON.stringify([array, sources]);
+    if (made === this.made) return;
+    this.made = made;
     const { rows, columns } = this;
     this.geometry = geometry(array, sources);
     this.sources = sources;
@@ -172,6 +172,12 @@ export class Maps {
 
   get columns() {
     return this.geometry.columns;
+  }
+
+  /** @returns {[number, number][]} the taxels that have a value */
+  get known() {
+    const { pressure } = this.frame ?? {};
+    return this.geometry.taxelsThatExist.filter(([x, y]) => pressure && pressure[y * this.columns + x] !== UNKNOWN_VALUE);
   }
 
   /** Makes the colours again, after the theme has changed. */
@@ -337,8 +343,8 @@ export class Maps {
         map.marks.append(mark);
       };
       for (const kind of /** @type {const} */ (["dead", "stuck", "noisy"])) for (const taxel of this.health?.[kind] ?? []) put(taxel, kind);
-      // Marks on all taxels, as "Zero all" makes them, would tell nothing.
-      const marked = this.zeroed.length < this.geometry.taxelsThatExist.length ? this.zeroed : [];
+      // Marks on most taxels, as "Zero all" makes them, would tell nothing.
+      const marked = 2 * this.zeroed.length <= this.geometry.taxelsThatExist.length ? this.zeroed : [];
       for (const { taxel, rest } of marked) put(taxel, "zeroed", `, rests at ${rest} ${this.values.unit}`);
       map.sources.replaceChildren(...(this.sources.length > 1 ? this.sources.map((source) => this.nameOf(source)) : []));
     }

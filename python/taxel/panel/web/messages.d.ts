@@ -529,12 +529,6 @@ export interface WatchRequest {
   taxel: [number, number] | null;
 }
 
-export interface RestRequest {
-  type: "rest";
-  id?: number;
-  how: "now" | "lowest";
-}
-
 export interface ZeroRequest {
   type: "zero";
   id?: number;
@@ -748,11 +742,6 @@ export interface DisconnectRequest {
   id?: number;
 }
 
-export interface InvertRequest {
-  type: "invert";
-  id?: number;
-}
-
 export type Message =
   | Hello
   | Registers
@@ -782,7 +771,6 @@ export type Message =
 export type Request =
   | CreditRequest
   | WatchRequest
-  | RestRequest
   | ZeroRequest
   | EncodeRequest
   | ZoomRequest
@@ -812,5 +800,4 @@ export type Request =
   | PortsRequest
   | GuessRequest
   | ConnectRequest
-  | DisconnectRequest
-  | InvertRequest;
+  | DisconnectRequest;

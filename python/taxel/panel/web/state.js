@@ -46,7 +46,7 @@ function fall(opened) {
   if (!opened || !falling.length) return "";
   const names = falling.length < sources.length ? ` of ${falling.join(", ")}` : "";
   const file = `${opened.name.replace(/\.[^.]+$/, "")}.layout.toml`;
-  return `The values${names} fall from their rest, so no pressure is shown. If smaller values mean more pressure, invert the values. This writes “falls = true” into ${file} beside the recording, which every command reads.`;
+  return `The values${names} fall from their rest, so no pressure is shown. If smaller values mean more pressure, write “falls = true” into ${file} beside the recording, and open it again: every command reads this file.`;
 }
 
 /** What lay on a sensor while its rest was taken may hide there. @param {Opened | null} opened @returns {string} */
@@ -89,18 +89,15 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
           : ["live", "Live"];
   const cannotZero = source !== null || !hello?.live || state !== "following";
   part("zero", HTMLButtonElement).hidden = cannotZero;
-  // A board sends what changes: before its first event the value of a taxel is not known.
-  part("zero-all", HTMLButtonElement).hidden = cannotZero || !hello.lines;
+  part("zero-all", HTMLButtonElement).hidden = cannotZero;
   const pill = part("state", HTMLElement);
   pill.dataset.state = recording && kind !== "lost" ? "recording" : kind;
   write(part("state-word", HTMLElement), recording && kind !== "lost" ? `${word === "Live" ? "" : `${word}, `}Recording ${recording.file ?? ""}` : word);
   const doubt = (connected && (opened ? opened.pace : counters?.pace)?.doubt) || "";
   const nothing = connected && source === null && !hello?.live;
   const banner = part("silence", HTMLElement);
-  const falling = connected && fall(opened);
-  const text = [silent?.text, sentence(doubt), nothing && refused, connected && preload(opened), falling].filter(Boolean).join(" ");
+  const text = [silent?.text, sentence(doubt), nothing && refused, connected && preload(opened), connected && fall(opened)].filter(Boolean).join(" ");
   write(part("silence-text", HTMLElement), text);
-  part("turn-values", HTMLButtonElement).hidden = !falling;
   banner.hidden = !text;
   banner.dataset.state = silent ? "silent" : "doubt";
   const subject = !connected ? why : opening !== null ? `reading ${opening} …` : source !== null ? source : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";

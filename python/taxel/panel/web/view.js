@@ -41,8 +41,6 @@ export class View {
     this.encoders = [];
     this.encoder = part("encoder", HTMLSelectElement);
     this.encoder.onchange = () => this.encode();
-    part("rest-now", HTMLButtonElement).onclick = () => this.rest("now");
-    part("rest-lowest", HTMLButtonElement).onclick = () => this.rest("lowest");
     part("look", HTMLButtonElement).onclick = () => this.look();
     part("cut-from", HTMLButtonElement).onclick = () => this.cutHere?.(0);
     part("cut-to", HTMLButtonElement).onclick = () => this.cutHere?.(1);
@@ -55,7 +53,6 @@ export class View {
   /** @param {Hello} hello */
   greet(hello) {
     this.encoders = hello.encoders;
-    part("live-view", HTMLElement).hidden = !hello.live;
   }
 
   /** Offers the encoders. @param {string | null} readout the name of that of the readout that reads what is shown */
@@ -83,11 +80,6 @@ export class View {
   show(spikes) {
     this.spikes = spikes;
     this.changed();
-  }
-
-  /** @param {"now" | "lowest"} how */
-  rest(how) {
-    return this.server.request({ type: "rest", how }).catch(this.failed);
   }
 
   look() {
