@@ -11,7 +11,7 @@ from typing import Any
 
 from taxel import _core
 from taxel._base.errors import refused
-from taxel.panel.shown_files import Opening, ShownFiles
+from taxel.panel.shown_files import FileState, Opening, ShownFiles, state_of
 from taxel.panel.threads import in_thread
 
 #: Recordings and readouts in a list.
@@ -38,7 +38,8 @@ class Shown:
     recording : PanelRecording
     contents : dict
         What the message `opened` says of it.
-    size : int, bytes
+    state : FileState
+        That of the file when it was read.
     index_ms : float, ms
         How long reading it took.
     """
@@ -49,7 +50,7 @@ class Shown:
     trial: str
     recording: _core.PanelRecording
     contents: dict[str, Any]
-    size: int
+    state: FileState
     index_ms: float
 
     @property
@@ -112,7 +113,7 @@ class Folder:
                 continue
             try:
                 if self._opening.is_recording(file):
-                    files.append((file.name, _size(file), file.stat().st_mtime_ns))
+                    files.append((file.name, state_of(file).size, file.stat().st_mtime_ns))
                 elif file.suffix == ".json" and _begins_as_readout(file):
                     readouts.append(file.name)
             except OSError:
@@ -140,10 +141,10 @@ class Folder:
     def _known(self, path: Path, trial: str | None) -> Shown | None:
         """Return a recording that was opened and is as it was."""
         known = self._open.get((path, trial))
-        return None if known is None or known.size != _size(path) else known
+        return None if known is None or known.state != state_of(path) else known
 
     def _index(self, name: str, path: Path, trial: str | None) -> Shown:
-        begun, size = time.monotonic(), _size(path)
+        begun, state = time.monotonic(), state_of(path)
         viewed = self.files.read(path, trial, by_options=path.name == self._asked)
         frames = viewed.contents["frames"] or {}
         return Shown(
@@ -153,16 +154,9 @@ class Folder:
             frames.get("trial") or "",
             viewed.recording,
             viewed.contents,
-            size,
+            state,
             1e3 * (time.monotonic() - begun),
         )
-
-
-def _size(path: Path) -> int:
-    """Return the size of a recording, bytes: of a bag that is a folder that of its files."""
-    if not path.is_dir():
-        return path.stat().st_size
-    return sum(file.stat().st_size for file in path.iterdir() if file.is_file())
 
 
 def _begins_as_readout(file: Path) -> bool:

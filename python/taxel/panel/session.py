@@ -318,7 +318,7 @@ class Session:
         opened = {
             "type": "opened",
             "name": shown.name,
-            "bytes": shown.size,
+            "bytes": shown.state.size,
             "index_ms": shown.index_ms,
             **shown.contents,
         }

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from taxel import _core
 from taxel._base.limits import available
 from taxel._core import UNKNOWN, FormatError, ProblemError
 from taxel.array import Array
+from taxel.formats.layout import Layout
 from taxel.frames import Frames
 from taxel.labels import Labels, beside, by_clock
 from taxel.options import FullReading
@@ -169,14 +170,30 @@ def judged(activity: _core._Activity) -> dict[str, Any]:
     }
 
 
+class FileState(NamedTuple):
+    """Hold what is another once a recording or its layout file was written: the size, bytes, and when that was, ns."""
+
+    size: int
+    written_ns: int
+    layout_ns: int
+
+
+def state_of(path: Path) -> FileState:
+    """Return the state of a recording; the size of a bag that is a folder is that of its files."""
+    layout = Layout.beside(path)
+    files = path.iterdir() if path.is_dir() else [path]
+    size = sum(file.stat().st_size for file in files if file.is_file())
+    return FileState(size, path.stat().st_mtime_ns, 0 if layout is None else layout.stat().st_mtime_ns)
+
+
 class ShownFiles:
     """Read recordings for the panel."""
 
     def __init__(self, opening: Opening | None = None) -> None:
         self._opening = Opening() if opening is None else opening
         self._lock = threading.Lock()
-        #: The trials of the file with several that was read last, by its path and the time of its last change.
-        self._trials: tuple[tuple[Path, int], list[Recording]] | None = None
+        #: The trials of the file with several that was read last, by its path and state.
+        self._trials: tuple[tuple[Path, FileState], list[Recording]] | None = None
 
     def opened(self, path: Path, trial: str | None) -> tuple[Recording, list[str]]:
         """Return a recording of a file, and the names of its trials if it has several.
@@ -186,7 +203,7 @@ class ShownFiles:
         FormatError : no recording
         ProblemError : no trial of that name
         """
-        key = path, path.stat().st_mtime_ns
+        key = path, state_of(path)
         with self._lock:
             known = self._trials
         recordings = known[1] if known is not None and known[0] == key else list(self._opening.open(path))
