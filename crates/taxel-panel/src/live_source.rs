@@ -11,7 +11,6 @@ use taxel_core::Array;
 use taxel_core::detect::Detector;
 use taxel_core::encode;
 use taxel_core::held::UNKNOWN;
-use taxel_core::problem;
 use taxel_core::rest::ValueSteps;
 use taxel_core::wire::Registers;
 use taxel_live::capture::{FIREWALL, Origin};

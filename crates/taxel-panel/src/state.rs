@@ -122,8 +122,6 @@ struct CurrentRest {
     first_quiet: Option<Vec<f64>>,
     /// When it is tracked next, us.
     track_at: Option<i64>,
-    /// Number of changes.
-    changes: u64,
 }
 
 /// The largest recent change of each taxel, ticks, decaying.
@@ -208,7 +206,6 @@ impl ArrayState {
                 tracked,
                 first_quiet: None,
                 track_at: from.latest.map(next_track),
-                changes: 1,
             },
             floor: sensor.floor,
             sum_floor: frames.map_or(sensor.floor, |frames| frames.sum_floor),
@@ -340,11 +337,10 @@ impl ArrayState {
     /// Makes the first value of a taxel its rest, which is tracked from there.
     #[inline]
     fn begin_rest(&mut self, taxel: usize, ticks: u16) {
-        if self.rest.values.follow(taxel, ticks) {
-            self.rest.changes += 1;
-            if let Some(tracked) = &mut self.rest.tracked {
-                tracked.begin(taxel, ticks.into());
-            }
+        if self.rest.values.follow(taxel, ticks)
+            && let Some(tracked) = &mut self.rest.tracked
+        {
+            tracked.begin(taxel, ticks.into());
         }
     }
 
@@ -382,7 +378,6 @@ impl ArrayState {
             }
         }
         if changed {
-            self.rest.changes += 1;
             self.sum_above_rest();
         }
     }
@@ -446,14 +441,12 @@ impl ArrayState {
     pub fn zero(&mut self, taxel: usize, rest: u16) {
         let above = self.above(taxel);
         self.rest.values.set(taxel, rest);
-        self.rest.changes += 1;
         self.change_above_rest(taxel, above, self.above(taxel));
     }
 
     /// Sets the rest of all taxels; [`UNKNOWN`] for those whose first value it is.
     pub fn set_rest(&mut self, rest: Vec<u16>) {
         (self.rest.values, self.rest.tracked) = (Rest::measured(rest), None);
-        self.rest.changes += 1;
         self.sum_above_rest();
     }
 
@@ -500,11 +493,6 @@ impl ArrayState {
     /// Value of each taxel at rest.
     pub fn rest(&self) -> &[u16] {
         self.rest.values.values()
-    }
-
-    /// Number of changes of the rest.
-    pub fn rests(&self) -> u64 {
-        self.rest.changes
     }
 
     /// The largest recent change of each taxel, ticks, decaying.

@@ -206,26 +206,21 @@ impl View {
             flags: restart | live | moves | if records { RECORDS } else { 0 },
             number: self.number,
             from: self.delivered.from(),
-            with_rest: false,
             watched: self.options.watched,
             column_us: self.options.column_us,
         };
         self.check_encoder();
-        let needs_rest = |rests: u64| self.delivered.needs_rest(rests, moves != 0);
-        let (bytes, last, rests) = match &mut self.position {
-            Position::Following(following) => following.frame(self.live.as_ref()?, about, needs_rest),
+        let (bytes, last) = match &mut self.position {
+            Position::Following(following) => following.frame(self.live.as_ref()?, about),
             Position::At(position) => {
                 let SourcePosition { player, window } = &mut **position.as_mut()?;
-                let rests = Some(player.state.rests()).filter(|rests| needs_rest(*rests));
-                let about = About { with_rest: rests.is_some(), ..about };
                 window.iter_mut().for_each(|window| window.state.update_curve());
                 player.state.update_curve();
                 let beside = window.as_ref().unwrap_or(player);
-                let (bytes, last) = frame::write(&player.state, &beside.state, &beside.watched, about);
-                (bytes, last, rests)
+                frame::write(&player.state, &beside.state, &beside.watched, about)
             }
         };
-        self.delivered.frame(last, self.options.column_us, rests);
+        self.delivered.frame(last, self.options.column_us);
         self.number = self.number.wrapping_add(1);
         Some((bytes, std::mem::take(&mut self.texts)))
     }
@@ -288,7 +283,6 @@ impl View {
             self.restart();
         }
         self.position = Position::At(Some(Box::new(position?)));
-        self.delivered.invalidate_rest();
         self.dirty = true;
         Ok(())
     }

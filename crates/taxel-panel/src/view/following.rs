@@ -71,24 +71,16 @@ impl Following {
         &mut self.narrow.as_mut().map_or(&mut self.watched, |narrow| &mut narrow.watched).spikes
     }
 
-    /// Frame of the shared state, its last column, and the number of its rest where it contains it.
-    pub(super) fn frame(
-        &mut self,
-        live: &LiveSource,
-        about: About,
-        needs_rest: impl FnOnce(u64) -> bool,
-    ) -> (Vec<u8>, i64, Option<u64>) {
+    /// Frame of the shared state, and its last column.
+    pub(super) fn frame(&mut self, live: &LiveSource, about: About) -> (Vec<u8>, i64) {
         let mut state = lock(&live.state);
         state.update_curve();
-        let rests = Some(state.rests()).filter(|rests| needs_rest(*rests));
-        let about = About { with_rest: rests.is_some(), ..about };
-        let (bytes, last) = match &mut self.narrow {
+        match &mut self.narrow {
             Some(narrow) => {
                 narrow.state.update_curve();
                 frame::write(&state, &narrow.state, &narrow.watched, about)
             }
             None => frame::write(&state, &state, &self.watched, about),
-        };
-        (bytes, last, rests)
+        }
     }
 }

@@ -30,7 +30,6 @@ pub(crate) struct About {
     pub(crate) number: u32,
     /// The first column of time that the client lacks.
     pub(crate) from: i64,
-    pub(crate) with_rest: bool,
     pub(crate) watched: Option<u32>,
     /// Width of a column of time, us.
     pub(crate) column_us: i64,
@@ -79,9 +78,7 @@ pub(crate) fn write(state: &ArrayState, beside: &ArrayState, watched: &Watched, 
     if let Some(history) = &watched.history {
         section(&mut out, 4, &|out| history.write(range.clone(), out));
     }
-    if about.with_rest {
-        section(&mut out, 5, &|out| values(state.rest(), out));
-    }
+    section(&mut out, 5, &|out| values(state.rest(), out));
     if let Some(spikes) = &watched.spikes {
         section(&mut out, 6, &|out| spikes.write(range.clone(), out));
     }

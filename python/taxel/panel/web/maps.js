@@ -111,8 +111,6 @@ export class Maps {
     this.zeroed = [];
     /** @type {Frame | null} */
     this.frame = null;
-    /** @type {Uint16Array} */
-    this.rest = new Uint16Array(0);
     this.pressureScale = new Scale(20);
     /** Ticks of the full colour. */
     this.top = this.pressureScale.top;
@@ -150,7 +148,6 @@ export class Maps {
     for (const map of [this.pressure, this.change]) map.size(this.geometry);
     this.name();
     if (rows !== this.rows || columns !== this.columns) {
-      this.rest = new Uint16Array(this.rows * this.columns).fill(UNKNOWN_VALUE);
       this.frame = null;
     }
     this.health = null;
@@ -192,7 +189,6 @@ export class Maps {
   /** @param {Frame} frame */
   take(frame) {
     this.frame = frame;
-    if (frame.rest) this.rest = frame.rest;
   }
 
   /**
@@ -200,10 +196,10 @@ export class Maps {
    * @param {number} now_ms
    */
   draw(now_ms) {
-    const { frame, rows, columns, rest, floor } = this;
+    const { frame, rows, columns, floor } = this;
     const { exists } = this.geometry;
-    if (!frame?.pressure || frame.rows !== rows || frame.columns !== columns) return;
-    const { pressure, change } = frame;
+    if (!frame?.pressure || !frame.rest || frame.rows !== rows || frame.columns !== columns) return;
+    const { pressure, change, rest } = frame;
     let most = 0;
     let moved = 0;
     for (let i = 0; i < pressure.length; i++) {
