@@ -758,15 +758,9 @@ class ConeXProblem:
 
 # panel: views of a live source or a recording; messages are JSON
 
-#: The array; events of each taxel, and those in the direction of the one before; indices of touched taxels, and five
-#: counts of touches of each; number of different values, and least and greatest held value (-1: unknown).
-_Activity = tuple[
-    _Array,
-    NDArray[np.uint32],
-    NDArray[np.uint32],
-    NDArray[np.uint32],
-    tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.int32]] | None,
-]
+#: The array; events of each taxel, and those in the direction of the one before; five counts of touches of each; the
+#: greatest value that it held, ticks.
+_Activity = tuple[_Array, NDArray[np.uint32], NDArray[np.uint32], NDArray[np.uint32], NDArray[np.uint16]]
 
 def panel_limits() -> dict[str, Any]: ...
 

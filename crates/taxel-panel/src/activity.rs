@@ -13,13 +13,10 @@ pub struct Activity {
     pub events: Vec<u32>,
     /// Events of the same direction as the taxel's previous event: a touch causes such events, noise at the floor hardly any.
     pub moved: Vec<u32>,
-    /// Number of different values in the taxel's events: 0, 1, or 2 for more.
-    pub values: Vec<u8>,
-    /// Least and greatest held value, ticks; [`UNKNOWN`] and 0 before the first event.
-    pub range: Vec<(u16, u16)>,
+    /// The greatest value that the taxel held, ticks.
+    pub greatest: Vec<u16>,
     /// Touches of each taxel, and what it did.
     pub touches: TouchCounts,
-    first: Vec<u16>,
     up: Vec<bool>,
 }
 
@@ -32,9 +29,7 @@ impl Activity {
             touches: TouchCounts::new(array, f64::NO_REST),
             events: vec![0; taxels],
             moved: vec![0; taxels],
-            values: vec![0; taxels],
-            range: vec![(UNKNOWN, 0); taxels],
-            first: vec![UNKNOWN; taxels],
+            greatest: vec![0; taxels],
             up: vec![false; taxels],
         }
     }
@@ -52,21 +47,12 @@ impl Activity {
         }
         self.up[taxel] = change.up;
         self.events[taxel] = self.events[taxel].saturating_add(1);
-        if change.ticks == UNKNOWN {
-            return;
-        }
-        if self.values[taxel] == 0 {
-            (self.values[taxel], self.first[taxel]) = (1, change.ticks);
-        } else if self.first[taxel] != change.ticks {
-            self.values[taxel] = 2;
-        }
     }
 
-    /// Updates the range of held values, unless the value is unknown.
+    /// Notes a held value, unless it is unknown.
     pub(super) fn set_held(&mut self, taxel: usize, ticks: u16) {
         if ticks != UNKNOWN {
-            let (least, greatest) = self.range[taxel];
-            self.range[taxel] = (least.min(ticks), greatest.max(ticks));
+            self.greatest[taxel] = self.greatest[taxel].max(ticks);
         }
     }
 }

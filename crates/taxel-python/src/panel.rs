@@ -9,7 +9,6 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde_json::{Value, json};
 use taxel_core::encode::Encoder;
-use taxel_core::held::UNKNOWN;
 use taxel_core::rest::Value as _;
 use taxel_core::wire::Registers;
 use taxel_live::clock::BoardClock;
@@ -26,26 +25,14 @@ use taxel_border::errors::{ProblemError, core};
 use taxel_border::parameters::{Plain, parsed};
 
 /// Counts by which unhealthy taxels are found: the sensor, the events of each taxel, those in the direction of the one before,
-/// touches, and with intensities the number of different values and the least and the greatest held, -1 where unknown.
-type ActivityOut<'py> = (
-    ArrayParts,
-    Bound<'py, PyArray1<u32>>,
-    Bound<'py, PyArray1<u32>>,
-    TouchesOut<'py>,
-    Option<(Bound<'py, PyArray1<u8>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<i32>>)>,
-);
+/// touches, and the greatest value that it held.
+type ActivityOut<'py> =
+    (ArrayParts, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>, TouchesOut<'py>, Bound<'py, PyArray1<u16>>);
 
 fn activity_out<'py>(py: Python<'py>, sensor: &taxel_core::Array, activity: Activity) -> ActivityOut<'py> {
-    let known = activity.range.iter().any(|&(least, _)| least != UNKNOWN);
-    // Python has -1 for what is unknown.
-    let range = |&(least, greatest): &(u16, u16)| match least {
-        UNKNOWN => (-1_i32, -1_i32),
-        _ => (least.into(), greatest.into()),
-    };
-    let (least, greatest): (Vec<_>, Vec<_>) = activity.range.iter().map(range).unzip();
-    let values = known.then(|| (array(py, activity.values), array(py, least), array(py, greatest)));
     let touches = from_touches(py, &activity.touches);
-    (from_array(sensor), array(py, activity.events), array(py, activity.moved), touches, values)
+    let (events, moved) = (array(py, activity.events), array(py, activity.moved));
+    (from_array(sensor), events, moved, touches, array(py, activity.greatest))
 }
 
 /// What every panel says at first.

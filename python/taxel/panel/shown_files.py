@@ -154,9 +154,8 @@ class Opening:
 
 def judged(activity: _core._Activity) -> dict[str, Any]:
     """Return the numbers of taxels, active and untested ones, and the dead, stuck and noisy ones."""
-    array, events, moved, touches, values = activity
+    array, events, moved, touches, greatest = activity
     sensor = Array._from_parts(array)
-    greatest = np.zeros(sensor.shape) if values is None else values[2]
     active, repeated, most = (
         np.asarray(column, np.int64).reshape(sensor.shape) for column in (events, moved, greatest)
     )
