@@ -93,12 +93,12 @@ impl<'a> SteppedFrames<'a> {
             if frame.iter().all(|&ticks| ticks == UNKNOWN) {
                 continue;
             }
-            let (mut plain, mut weighted) = (0_u64, 0_u64);
+            let mut sum = 0_u64;
             for ((&ticks, &rest), &taxel) in frame.iter().zip(self.rest(k)).zip(&self.taxels) {
                 let above = u64::from(above_noise(ticks, rest, sum_floor));
-                (plain, weighted) = (plain + above, weighted.wrapping_add(weights.weighed(taxel, above)));
+                sum = sum.wrapping_add(weights.weighed(taxel, above));
             }
-            noise.take(t, weights.sum(plain, weighted).into());
+            noise.take(t, weights.sum(sum).into());
         }
         noise.most(floor.into()) as u32
     }

@@ -7,9 +7,8 @@ use crate::columns::{Curve, NOTHING};
 /// Sums over taxels, modulo 2^64: a decrease wraps, and the sums are right.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Load {
+    /// By their weights.
     sum: u64,
-    /// The sum by weight, where the taxels do not count alike.
-    weighted: u64,
     /// The sum over the taxels that are loaded, and that times their coordinates.
     loaded: u64,
     loaded_x: u64,
@@ -30,8 +29,7 @@ impl Load {
     ) {
         let less = |now: u16, before: u16| u64::from(now).wrapping_sub(before.into());
         let more = less(now, before);
-        self.sum = self.sum.wrapping_add(more);
-        self.weighted = self.weighted.wrapping_add(weights.weighed(taxel, more));
+        self.sum = self.sum.wrapping_add(weights.weighed(taxel, more));
         let loaded = |above: u16| if above > floor { above } else { 0 };
         let (before, now) = (loaded(before), loaded(now));
         let ((x, y), more) = (at.get(taxel), less(now, before));
@@ -47,7 +45,7 @@ impl Load {
         if self.sum == 0 {
             return NOTHING;
         }
-        let sum = weights.sum(self.sum, self.weighted);
+        let sum = weights.sum(self.sum);
         let loaded = if sum > noise { self.loaded } else { 0 };
         let (x, y) = at.centre(loaded, self.loaded_x, self.loaded_y);
         Curve { sum, area: self.area, x, y }

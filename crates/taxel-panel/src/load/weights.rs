@@ -41,16 +41,16 @@ impl Weights {
         (Self(Some(Uneven { weights, divisor })), Some(newtons * divisor as f64 / f64::from(LARGEST)))
     }
 
-    /// What `steps` more at a taxel add to the weighted sum, modulo 2^64; nothing where all count alike.
+    /// What `steps` more at a taxel add to the weighted sum, modulo 2^64.
     #[inline(always)]
     pub(crate) fn weighed(&self, taxel: usize, steps: u64) -> u64 {
-        self.0.as_ref().map_or(0, |uneven| steps.wrapping_mul(uneven.weights[taxel].into()))
+        self.0.as_ref().map_or(steps, |uneven| steps.wrapping_mul(uneven.weights[taxel].into()))
     }
 
-    /// The sum that is shown, of the plain one and the weighted one.
+    /// The sum that is shown of the weighted one.
     #[allow(clippy::cast_possible_truncation)]
-    pub(crate) fn sum(&self, plain: u64, weighted: u64) -> u32 {
-        let sum = self.0.as_ref().map_or(plain, |weights| (weighted + weights.divisor / 2) / weights.divisor);
+    pub(crate) fn sum(&self, weighted: u64) -> u32 {
+        let sum = self.0.as_ref().map_or(weighted, |weights| (weighted + weights.divisor / 2) / weights.divisor);
         sum.min(u32::MAX.into()) as u32
     }
 }
@@ -73,7 +73,7 @@ mod tests {
         let (weights, newtons) = Weights::new(&array, "kPa");
         let weighted = weights.weighed(0, 41).wrapping_add(weights.weighed(1, 5));
         // 41 kPa on 50 mm2 and 5 kPa on 200 mm2 are 3.05 N.
-        let force = f64::from(weights.sum(46, weighted)) * newtons.expect("a force");
+        let force = f64::from(weights.sum(weighted)) * newtons.expect("a force");
         assert!((force - 3.05).abs() < 1e-9, "{force}");
         for (array, unit, force) in [
             (feet(Some(vec![50.0, 50.0, 9e9]), Some(PlaceUnit::Mm)), "kPa", Some(0.05)),
@@ -84,7 +84,7 @@ mod tests {
             (Array::unmeasured(2, 3, "mat"), "kPa", None),
         ] {
             let (weights, newtons) = Weights::new(&array, unit);
-            assert_eq!((weights.weighed(1, 5), weights.sum(45, 0), newtons), (0, 45, force));
+            assert_eq!((weights.weighed(1, 5), weights.sum(45), newtons), (5, 45, force));
         }
     }
 }
