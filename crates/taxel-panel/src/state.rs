@@ -469,16 +469,6 @@ impl ArrayState {
         first.iter().zip(lowest).map(less).collect()
     }
 
-    /// Copies rest and noise floor from another state of the same source, where they differ.
-    pub fn copy_rest(&mut self, from: &Self) {
-        if self.floor != from.floor || self.rest.values != from.rest.values {
-            (self.floor, self.sum_floor) = (from.floor, from.sum_floor);
-            self.rest.values.clone_from(&from.rest.values);
-            self.rest.tracked.clone_from(&from.rest.tracked);
-            self.sum_above_rest();
-        }
-    }
-
     /// Sets the noise floor: ticks above rest that count as none.
     pub fn set_noise_floor(&mut self, floor: u16) {
         (self.floor, self.sum_floor) = (floor, floor);

@@ -103,7 +103,7 @@ impl View {
     #[must_use]
     pub fn moves(&self) -> bool {
         let follows = self.is_following() && self.live.is_some();
-        self.playback.is_playing() || follows && (self.options.is_narrow() || self.options.encoder.is_some())
+        self.playback.is_playing() || follows && self.options.encoder.is_some()
     }
 
     fn is_following(&self) -> bool {
@@ -152,10 +152,10 @@ impl View {
 
     // ------------------------------------------------------------------------------------------ frames
 
-    /// Moves a playing view on, decodes narrow columns and encodes; returns whether it has arrived at the end of its recording.
+    /// Moves a playing view on, and encodes; returns whether it has arrived at the end of its recording.
     pub fn advance(&mut self) -> bool {
         if let (Position::Following(following), Some(live)) = (&mut self.position, &self.live)
-            && let Err(error) = following.update(live, &self.options)
+            && let Err(error) = following.read(live)
         {
             self.warn(&error);
         }
@@ -188,7 +188,7 @@ impl View {
             let received = live.received();
             self.dirty |= std::mem::replace(&mut self.received, received) != received;
             self.delivered.note_source_restarts(lock(&live.state).restarts);
-            if self.dirty && self.options.watched.is_some() && !self.options.is_narrow() {
+            if self.dirty && self.options.watched.is_some() {
                 following.read(live).ok()?;
             }
         }
@@ -303,6 +303,8 @@ impl View {
     fn begin_following(&mut self) {
         self.restart();
         self.position = Position::Following(Box::default());
+        // Of what all clients share there are no narrower ones.
+        self.options.column_us = self.options.column_us.max(COLUMN_US);
         let Some(live) = self.live.clone() else { return };
         match Following::begin(&live, &self.options) {
             Ok(following) => self.position = Position::Following(Box::new(following)),
@@ -358,7 +360,8 @@ impl View {
         self.reopen()
     }
 
-    /// Shows columns of this width, us, which end at a time or, without one, at that of the view.
+    /// Shows columns of this width, us, which end at a time or, without one, at that of the view. Those of a view that follows are
+    /// [`COLUMN_US`] wide at least.
     ///
     /// # Errors
     ///

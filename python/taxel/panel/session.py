@@ -255,7 +255,7 @@ class Session:
 
     @request
     async def zoom(self, column_us: Annotated[int, whole(1, 2**40)], end_us: Time | None = None) -> None:
-        """Send columns of time of this width, for this view: 125 us times a power of two.
+        """Send columns of time of this width, for this view: 125 us times a power of two; 4 ms or more if it follows.
 
         With `end_us`, in a view that does not follow the newest, the columns end there, wherever the view's time is,
         and stay until the next `zoom`; a view that plays beyond takes them along. Without it they end at the view's

@@ -49,10 +49,10 @@ export class TimeWindow {
     this.asked = null;
   }
 
-  /** @param {number} span_us @returns {number} width of the columns that show it, us */
-  columnFor(span_us) {
+  /** @param {Timeline} timeline @returns {number} width of the columns that show its window, us; all that follow share those of 4 ms */
+  columnFor({ span_us, following }) {
     const [least, most] = this.limits() ?? [4000, 4000];
-    let column_us = least;
+    let column_us = following ? 4000 : least;
     while (column_us < most && (SPAN - 1) * column_us < span_us) column_us *= 2;
     return column_us;
   }
@@ -145,7 +145,7 @@ export class TimeWindow {
     for (;;) {
       const timeline = this.timeline();
       if (!timeline?.window) break;
-      const column_us = this.columnFor(timeline.span_us);
+      const column_us = this.columnFor(timeline);
       const [from, to] = timeline.window;
       let end_us = null;
       if (!timeline.following) {
