@@ -221,7 +221,7 @@ function receive(message) {
       return;
     case "recorder":
       recorder.take(message);
-      if (player.transport.source === null) labels.choose(message.state === "recording" || message.state === "finishing" ? message.file : null);
+      if (player.transport.source === null) labels.choose(recorder.file);
       return writeState();
     case "recordings":
       recordings = message;
@@ -372,29 +372,16 @@ function open(message) {
   player.transport = { ...player.transport, source: message.name, state: "paused" };
   player.reach = message.start_us === null || message.stop_us === null ? null : [message.start_us, message.stop_us];
   player.t_us = message.start_us;
-  strip.overview = null;
-  showUnits();
   resize(message.array);
-  if (!again) cursor.second_us = null;
   timeWindow.forget();
-  if (!again) turnTo(message);
+  if (!again) cursor.second_us = null;
   if (timeline && !again) {
     timeline.following = false;
     timeWindow.showBeginning(message.touch_us);
     // It opens on something: the first touch.
     if (message.touch_us !== null) player.seek(message.touch_us);
   }
-  training.choose(message.name, message.frames?.trial);
-  maps.health = null;
-  showZeroed();
-  part("files", HTMLSelectElement).value = message.name;
-  labels.choose(message.name, message.frames?.trial);
-  view.choose(message.name);
-  view.offer(null);
-  showDetections(recorded(message.detections), [...new Set(message.detections.map(({ label }) => label))].sort());
-  notes.choose(message.notes);
-  server.send({ type: "overview" });
-  showRegisters();
+  showSource(again);
   player.show();
   writeState();
 }
@@ -405,25 +392,32 @@ function move(transport) {
   player.take(transport);
   if (transport.source === null && (opened || changed)) {
     opened = null;
-    showUnits();
-    strip.overview = null;
     timeline = null;
-    training.choose(null);
-    if (hello?.array) resize(hello.array);
-    turnTo(null);
-    maps.health = null;
-    showZeroed();
-    part("files", HTMLSelectElement).value = "";
-    notes.choose([]);
     player.reach = counters?.reach_us ?? null;
-    labels.choose(recorder.status?.state === "recording" ? recorder.status.file : null);
-    view.choose(null);
-    view.offer(hello?.readout_encoder ?? null);
-    showDetections(detections.live, hello?.readout ?? []);
-    showRegisters();
-    server.send({ type: "overview" });
+    if (hello?.array) resize(hello.array);
+    showSource(false);
   }
   writeState();
+}
+
+/** Shows the recording that is open, or the live source. @param {boolean} again whether it was shown before */
+function showSource(again) {
+  const trial = opened?.frames?.trial;
+  strip.overview = null;
+  showUnits();
+  if (!again) turnTo(opened);
+  training.choose(opened?.name ?? null, trial);
+  maps.health = null;
+  showZeroed();
+  part("files", HTMLSelectElement).value = opened?.name ?? "";
+  labels.choose(opened ? opened.name : recorder.file, trial);
+  view.choose(opened?.name ?? null);
+  view.offer(opened ? null : (hello?.readout_encoder ?? null));
+  notes.choose(opened?.notes ?? []);
+  if (opened) showDetections(recorded(opened.detections), [...new Set(opened.detections.map(({ label }) => label))].sort());
+  else showDetections(detections.live, hello?.readout ?? []);
+  showRegisters();
+  server.send({ type: "overview" });
 }
 
 /** @param {import("./detections.js").Detection[]} shown of the live source newest first @param {string[]} labels in the order of their readout */

@@ -39,6 +39,11 @@ export class Recorder {
     };
   }
 
+  /** @returns {string | null} the file that is being recorded */
+  get file() {
+    return this.status !== null && this.busy ? this.status.file : null;
+  }
+
   get busy() {
     return this.status !== null && this.status.state !== "idle";
   }
