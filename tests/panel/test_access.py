@@ -135,7 +135,6 @@ def test_many_visitors_half_of_whom_never_read_cost_no_event_and_no_frame_of_ano
             counters = page.until("counters")
             assert counters["viewers"] == 64
             assert counters["lost"]["kernel"] == counters["lost"]["queue"] == 0
-            assert counters["reach_bytes"] < 512 << 20
     finally:
         for visitor in visitors:
             visitor.socket.socket.close()

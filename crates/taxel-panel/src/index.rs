@@ -228,11 +228,6 @@ impl Index {
         self.store().changes
     }
 
-    /// Memory in use, bytes.
-    pub(crate) fn bytes(&self) -> usize {
-        self.store().bytes
-    }
-
     /// Number of events over time: start and width of a bin (us), counts.
     pub(crate) fn event_rate(&self) -> (i64, i64, Vec<u64>) {
         let store = self.store();

@@ -22,7 +22,7 @@ use taxel_live::{Error, Result};
 
 use crate::activity::Activity;
 use crate::block::Block;
-use crate::columns::{COLUMN_US, COLUMNS_US, SPAN};
+use crate::columns::{COLUMN_US, COLUMNS_US};
 use crate::index::{Index, Kept};
 use crate::shown::sensor;
 use crate::state::{ArrayState, Keyframe, Sensor};
@@ -247,13 +247,11 @@ impl LiveSource {
         };
         json!({
             "type": "counters",
-            "at_ns": now_ns(),
             "seconds": now.seconds,
             "board_us": now.board.board_us,
             "events": now.decoding.events,
             "events_per_s": rate(|counters| counters.decoding.events),
             "bytes_per_s": rate(|counters| counters.capture.bytes),
-            "datagrams_per_s": rate(|counters| counters.capture.datagrams),
             "frames_per_s": frames_per_s,
             "arrival": now.arrival(now_ns()),
             "pace": now.board.pace,
@@ -269,11 +267,9 @@ impl LiveSource {
             "queue": now.capture.waiting,
             "latency": { "decode": now.decode_latency, "report": now.report_latency },
             "wire_version": now.decoding.wire_version,
-            "marked_start": now.board.marked_start,
             "taring": now.readout.taring,
             "detections": now.readout.detections,
             "reach_us": self.index.range(),
-            "reach_bytes": self.index.bytes(),
             "ended": self.handle.is_over(),
         })
     }
@@ -424,10 +420,7 @@ fn message_of(output: &OutputDetection) -> String {
         "type": "detection",
         "label": detection.label,
         "t_us": detection.t,
-        "known_us": detection.known,
-        "reported_us": reported_us,
         "latency_us": reported_us - detection.known,
-        "slope_mv_per_ms": (!detection.slope.is_nan()).then_some(detection.slope),
     })
     .to_string()
 }
@@ -440,6 +433,5 @@ pub fn limits() -> Value {
         "encoders": encode::NAMES,
         "column_us": COLUMN_US,
         "columns_us": COLUMNS_US,
-        "time_columns": SPAN,
     })
 }

@@ -22,7 +22,7 @@ use crate::spikes::EncodedSpikes;
 use crate::state::Keyframe;
 use delivered::Delivered;
 use following::Following;
-use frame::{About, FOLLOWS, LIVE, MOVES, RECORDS, RESTART};
+use frame::{About, FOLLOWS, MOVES, RESTART};
 use playback::Playback;
 
 /// Where in its source a view is.
@@ -55,8 +55,6 @@ pub struct View {
     dirty: bool,
     /// What the live source had received when the last frame was made.
     received: u64,
-    /// Number of the next frame.
-    number: u32,
     /// Messages to the client that go with its next frame.
     texts: Vec<String>,
 }
@@ -75,7 +73,6 @@ impl View {
             delivered: Delivered::nothing(),
             dirty: true,
             received: 0,
-            number: 0,
             texts: vec![],
         }
     }
@@ -182,8 +179,8 @@ impl View {
         !more
     }
 
-    /// The next frame, and messages that go with it; `None` where there is nothing new to show. `records`: something is recorded.
-    pub fn frame(&mut self, records: bool) -> Option<(Vec<u8>, Vec<String>)> {
+    /// The next frame, and messages that go with it; `None` where there is nothing new to show.
+    pub fn frame(&mut self) -> Option<(Vec<u8>, Vec<String>)> {
         if let (Position::Following(following), Some(live)) = (&mut self.position, &self.live) {
             let received = live.received();
             self.dirty |= std::mem::replace(&mut self.received, received) != received;
@@ -196,15 +193,13 @@ impl View {
             return None;
         }
         let restart = if self.delivered.is_restart() { RESTART } else { 0 };
-        let live = if self.recording.is_none() { LIVE } else { 0 };
         let moves = match self.position {
             Position::Following(_) => MOVES | FOLLOWS,
             Position::At(_) if self.playback.is_playing() => MOVES,
             Position::At(_) => 0,
         };
         let about = About {
-            flags: restart | live | moves | if records { RECORDS } else { 0 },
-            number: self.number,
+            flags: restart | moves,
             from: self.delivered.from(),
             watched: self.options.watched,
             column_us: self.options.column_us,
@@ -221,7 +216,6 @@ impl View {
             }
         };
         self.delivered.frame(last, self.options.column_us);
-        self.number = self.number.wrapping_add(1);
         Some((bytes, std::mem::take(&mut self.texts)))
     }
 

@@ -259,14 +259,14 @@ impl PanelView {
     }
 
     /// The next frame, and messages that go with it; None where nothing is new, or another thread works on the view.
-    fn frame<'py>(&self, py: Python<'py>, records: bool) -> PyResult<Option<(Bound<'py, PyBytes>, Vec<String>)>> {
+    fn frame<'py>(&self, py: Python<'py>) -> PyResult<Option<(Bound<'py, PyBytes>, Vec<String>)>> {
         let frame = enter(py, |_| {
             let mut view = match self.view.try_lock() {
                 Ok(view) => view,
                 Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
                 Err(TryLockError::WouldBlock) => return Ok::<_, taxel_core::Error>(None),
             };
-            let frame = view.frame(records);
+            let frame = view.frame();
             self.moves.store(view.moves(), Ordering::Relaxed);
             Ok(frame)
         })?;

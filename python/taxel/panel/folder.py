@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import re
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -40,8 +39,6 @@ class Shown:
         What the message `opened` says of it.
     state : FileState
         That of the file when it was read.
-    index_ms : float, ms
-        How long reading it took.
     """
 
     name: str
@@ -51,7 +48,6 @@ class Shown:
     recording: _core.PanelRecording
     contents: dict[str, Any]
     state: FileState
-    index_ms: float
 
     @property
     def us(self) -> int:
@@ -144,7 +140,7 @@ class Folder:
         return None if known is None or known.state != state_of(path) else known
 
     def _index(self, name: str, path: Path, trial: str | None) -> Shown:
-        begun, state = time.monotonic(), state_of(path)
+        state = state_of(path)
         viewed = self.files.read(path, trial, by_options=path.name == self._asked)
         frames = viewed.contents["frames"] or {}
         return Shown(
@@ -155,7 +151,6 @@ class Folder:
             viewed.recording,
             viewed.contents,
             state,
-            1e3 * (time.monotonic() - begun),
         )
 
 

@@ -138,7 +138,7 @@ class Session:
     async def send_frame(self) -> None:
         """Send a frame, if there is a new one; what takes long before it is done in another thread."""
         self._unread = (0, 0.0)
-        made = self.view.frame(self._hub.recorder.is_busy or bool(self._hub.board.registers["record"]))
+        made = self.view.frame()
         if made is not None:
             frame, texts = made
             self.credits -= 1
@@ -319,7 +319,6 @@ class Session:
             "type": "opened",
             "name": shown.name,
             "bytes": shown.state.size,
-            "index_ms": shown.index_ms,
             **shown.contents,
         }
         await self.say(opened)

@@ -153,7 +153,7 @@ class Opening:
 
 
 def judged(activity: _core._Activity) -> dict[str, Any]:
-    """Return the numbers of taxels, active and untested ones, and the dead, stuck and noisy ones."""
+    """Return the numbers of taxels and untested ones, and the dead, stuck and noisy ones."""
     array, events, moved, touches, greatest = activity
     sensor = Array._from_parts(array)
     active, repeated, most = (
@@ -163,7 +163,6 @@ def judged(activity: _core._Activity) -> dict[str, Any]:
     named_taxels = result.named()
     return {
         "taxels": sensor.taxels if sensor.exists is None else int(np.count_nonzero(sensor.exists)),
-        "active": int(np.count_nonzero(active)),
         **{kind: named_taxels[kind] for kind in ("dead", "stuck", "noisy")},
         "untested": int(np.count_nonzero(result.untested)),
     }
@@ -251,7 +250,7 @@ class ShownFiles:
             for kind, taxels in result.named().items():
                 if kind in found:
                     found[kind] += [(x + left, y) for x, y in taxels]
-        return {"taxels": array.taxels, "active": array.taxels, **found, "untested": untested}
+        return {"taxels": array.taxels, **found, "untested": untested}
 
     def cut(self, path: Path, trial: str | None, out: Path, start_us: int, stop_us: int) -> list[str]:
         """Write a stretch of a recording to a new file; return what that file cannot hold."""
@@ -284,7 +283,7 @@ def _board(path: Path) -> Viewed | None:
         reader = _core.RecordingReader(path)
     except (_core.Error, OSError):
         return None
-    header, _, rebuilt = reader.about()
+    header, *_ = reader.about()
     if header.get("frames") is not None:
         return None
     shown, remarks, pace = _core.PanelRecording.of_board(reader, path.parent, available() // _MEMORY_SHARE)
@@ -293,12 +292,11 @@ def _board(path: Path) -> Viewed | None:
         shown,
         Verdict._of({"file": remarks.condition}),
         ((note["t_us"], note["text"], "") for note in remarks.notes),
-        ((label, t, known, "") for _, label, t, known, *_ in remarks.detections),
+        ((label, t, "") for _, label, t, *_ in remarks.detections),
         registers=None if values is None else Registers._of_file(values, Array._from_geometry(header["array"])),
         zeroed=((each["x"], each["y"], each["t"], each["rest"], each["before"]) for _, each in remarks.zeroings),
-        markers=remarks.markers,
     )
-    return Viewed(shown, contents | {"unfinished": rebuilt["unfinished"], "pace": pace})
+    return Viewed(shown, contents | {"pace": pace})
 
 
 def _events(recording: Recording) -> Viewed:
@@ -317,10 +315,9 @@ def _events(recording: Recording) -> Viewed:
         shown,
         _verdict(recording),
         ((note.t, note.text, "") for note in recording.notes if (note.t, note.text) not in labels),
-        ((found.label, found.t, found.known, "") for found in recording.detections),
+        ((found.label, found.t, "") for found in recording.detections),
         registers=registers,
         zeroed=((each.x, each.y, each.t, each.rest, each.before) for each in recording.zeroings),
-        markers=events.markers,
     )
     return Viewed(shown, contents)
 
@@ -329,11 +326,10 @@ def _contents(
     recording: _core.PanelRecording,
     verdict: str,
     notes: Iterable[tuple[int | None, str, str]],
-    detections: Iterable[tuple[str, int, int, str]],
+    detections: Iterable[tuple[str, int, str]],
     *,
     registers: Registers | None = None,
     zeroed: Iterable[tuple[int, int, int, float, float | None]] = (),
-    markers: Iterable[tuple[int, bool]] = (),
 ) -> dict[str, Any]:
     """Return what the message `opened` says of a recording, of which these are the notes and the detections.
 
@@ -343,25 +339,22 @@ def _contents(
     verdict : str
         Empty if it is unknown.
     notes : (time in us or None, text, source)
-    detections : (label, time, time at which it was known, us; and which of several sensors it is of)
+    detections : (label, time in us, which of several sensors it is of)
     registers : Registers, optional
     zeroed : (column, row, time in us, rest, rest before)
-    markers : (time in us, whether it is a start)
     """
     us = recording.times()[2]
     return {
         **recording.opened(),
         "verdict": verdict,
-        "unfinished": False,
         "pace": None,
         "registers": None if registers is None else registers._held,
         "frame_us": None if registers is None else registers.frame_us,
-        "markers": [{"t_us": t * us, "start": start} for t, start in markers],
         "notes": [{"t_us": None if t is None else t * us, "text": text, "source": source} for t, text, source in notes],
         "zeroed": [{"taxel": (x, y), "t_us": t, "rest": rest, "before": before} for x, y, t, rest, before in zeroed],
         "detections": [
-            {"label": label, "t_us": t * us, "known_us": known * us, "source": source}
-            for label, t, known, source in itertools.islice(detections, _MOST_DETECTIONS)
+            {"label": label, "t_us": t * us, "source": source}
+            for label, t, source in itertools.islice(detections, _MOST_DETECTIONS)
         ],
     }
 
@@ -390,7 +383,7 @@ def _frames(recording: Recording) -> Viewed:
     labels = _labels_beside(recording, begin_us)
     notes = {note for note in notes if note[:2] not in labels}
     each = sources.items() if len(sources) > 1 else [("", sensor) for sensor in sources.values()]
-    found = ((d.label, d.t, d.known, name) for name, sensor in each for d in sensor.detections)
+    found = ((d.label, d.t, name) for name, sensor in each for d in sensor.detections)
     sorted_notes = sorted(notes, key=lambda note: (note[0] or 0, note[1]))
     read_frames = ReadFrames(array._parts(), parts, units.pop(), None if us == 1 else us)
     shown = _core.PanelRecording.of_frames(read_frames, recording.path.parent, available() // _MEMORY_SHARE)

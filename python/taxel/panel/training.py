@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import threading
 from collections.abc import Iterator
-from operator import itemgetter
 from pathlib import Path
 from subprocess import PIPE
 from typing import Any
@@ -151,13 +150,7 @@ class Training:
         if encoder is not None and len(detected) == 1 and detected[0].rest is not None:
             encoder = encoder.with_tare(detected[0].rest.tare)
         names = [each.recording.label or "" if len(detected) > 1 else "" for each in detected]
-        found = [
-            {"label": found.label, "t_us": found.t, "known_us": found.known, "source": name}
-            for each, name in zip(detected, names, strict=True)
-            for found in each.outcome.found
-        ]
-        return (
-            list(loaded.labels),
-            encoder,
-            sorted(found, key=itemgetter("known_us")),
-        )
+        found = [(found, name) for each, name in zip(detected, names, strict=True) for found in each.outcome.found]
+        found.sort(key=lambda one: one[0].known)
+        messages = [{"label": found.label, "t_us": found.t, "source": name} for found, name in found]
+        return list(loaded.labels), encoder, messages

@@ -82,7 +82,7 @@ pub(crate) fn indexed(path: &Path, memory: u64) -> (Arc<Index>, Vec<TaxelChange>
 
 /// Raster and curves of a frame, and of which columns they are.
 fn shown(player: &mut Player, us: i64) -> (std::ops::Range<i64>, Vec<u8>, Vec<u8>) {
-    let about = About { flags: 0, number: 0, from: i64::MIN, watched: Some(WATCHED), column_us: us };
+    let about = About { flags: 0, from: i64::MIN, watched: Some(WATCHED), column_us: us };
     player.state.update_curve();
     let (bytes, _) = write(&player.state, &player.state, &player.watched, about);
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;

@@ -51,7 +51,7 @@ fn a_minute_is_stored_and_a_view_of_the_past_equals_what_was_decoded() {
         let player = Player::open(&index, t, &ViewOptions::plain(COLUMN_US), None).unwrap();
         assert_eq!(player.state.held(), held_at(&all, t, taxels).0, "at {t} us");
     }
-    assert!(index.bytes() < 16 << 20);
+    assert!(index.store().bytes < 16 << 20);
     // Whoever read up to a block that is forgotten goes on with the values held after the gap.
     let block = index.next(&mut 3).unwrap().unwrap();
     assert_eq!(block.held.unwrap(), {

@@ -1,7 +1,5 @@
 //! A frame in the bytes that clients receive: protocol.md, *Frames*.
 
-use taxel_live::recording::now_ns;
-
 use crate::columns::{COLUMN_US, Curve, Curves, SPAN, column_of};
 use crate::frame_values::RestSource;
 use crate::player::Watched;
@@ -15,10 +13,8 @@ const SECTIONS: usize = 64;
 const SECTION_COUNT: usize = 10;
 
 /// The flags of the header.
-pub(crate) const LIVE: u16 = 1;
 pub(crate) const MOVES: u16 = 2;
 pub(crate) const RESTART: u16 = 4;
-pub(crate) const RECORDS: u16 = 8;
 pub(crate) const FOLLOWS: u16 = 16;
 const REST_GIVEN: u16 = 32;
 const REST_QUIET: u16 = 64;
@@ -27,7 +23,6 @@ const REST_QUIET: u16 = 64;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct About {
     pub(crate) flags: u16,
-    pub(crate) number: u32,
     /// The first column of time that the client lacks.
     pub(crate) from: i64,
     pub(crate) watched: Option<u32>,
@@ -112,10 +107,8 @@ pub(crate) fn write(state: &ArrayState, beside: &ArrayState, watched: &Watched, 
         RestSource::None => 0,
     };
     put(6, &(about.flags | rest).to_le_bytes());
-    put(8, &about.number.to_le_bytes());
     put(14, &array.columns.to_le_bytes());
     put(16, &state.latest.unwrap_or(i64::MIN).to_le_bytes());
-    put(24, &now_ns().to_le_bytes());
     put(32, &state.events.to_le_bytes());
     put(40, &about.watched.unwrap_or(u32::MAX).to_le_bytes());
     put(48, &range.start.to_le_bytes());

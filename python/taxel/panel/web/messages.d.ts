@@ -40,7 +40,6 @@ export interface FileInfo {
 export interface FoundDetection {
   label: string;
   t_us: number;
-  known_us: number;
   /** Which of several sensors it is of; empty of a single one. */
   source: string;
 }
@@ -134,12 +133,6 @@ export interface Lost {
   readout: number;
   /** Events that only the panel's curves and its past lack: its held values are right again within 0.1 s. */
   panel: number;
-}
-
-/** A marker of the board's own recording. */
-export interface Marker {
-  t_us: number;
-  start: boolean;
 }
 
 /** A label without a detection of the neuron, or a detection without a label. */
@@ -243,8 +236,6 @@ export interface Hello {
   column_us: number;
   /** The narrowest and the widest that `zoom` takes, us. */
   columns_us: [number, number];
-  /** Columns of time in a frame, at most. */
-  time_columns: number;
 }
 
 /** The registers that the board holds, or is assumed to hold; at the beginning and after every change. */
@@ -287,14 +278,12 @@ export interface Field {
 /** Counts of the live source, 4 times a second; what is not known is null. */
 export interface Counters {
   type: "counters";
-  at_ns: number;
   /** Since the source began. */
   seconds: number;
   board_us: number | null;
   events: number;
   events_per_s: number | null;
   bytes_per_s: number | null;
-  datagrams_per_s: number | null;
   /** Follows from the registers; null where they are neither known nor stated. */
   frames_per_s: number | null;
   /** Whether datagrams arrive. */
@@ -306,12 +295,10 @@ export interface Counters {
   queue: number;
   latency: Latency;
   wire_version: number;
-  marked_start: boolean | null;
   taring: boolean;
   detections: number;
   /** From and to where a live view may seek (60 s, or what 512 MB hold), us; null before the first event. */
   reach_us: [number, number] | null;
-  reach_bytes: number;
   viewers: number;
   /** Whether the source has ended, by an error or its owner. */
   ended: boolean;
@@ -322,12 +309,8 @@ export interface Detection {
   type: "detection";
   label: string;
   t_us: number;
-  known_us: number;
-  reported_us: number;
   /** From known to reported, us. */
   latency_us: number;
-  /** How steeply the potential crosses the threshold; null for a rule. */
-  slope_mv_per_ms: number | null;
 }
 
 /** After `encode`, and again when the encoder is another one: that of another readout. */
@@ -422,7 +405,6 @@ export interface Opened {
   frames: FrameRecording | null;
   /** What was lost; empty where a file of frames does not say. */
   verdict: string;
-  unfinished: boolean;
   /** Of events, where something lay in the quiet stretch that the rest is first taken from, as of a source of frames. */
   preload_at: string;
   /** The pace of the recorded arrivals, where the recording holds them. */
@@ -430,12 +412,9 @@ export interface Opened {
   registers: Record<string, boolean | number> | null;
   /** How long a frame takes, where the recording holds the registers. */
   frame_us: number | null;
-  markers: Marker[];
   notes: RecordedNote[];
   zeroed: Zeroing[];
   detections: FoundDetection[];
-  /** How long reading it took. */
-  index_ms: number;
 }
 
 /** Events, and the greatest sum of ticks above rest, over time, for the strip: 1000 bins at most. */
@@ -475,8 +454,6 @@ export interface Health {
   type: "health";
   source: string | null;
   taxels: number;
-  /** Taxels with events. */
-  active: number;
   /** That did nothing while they were touched, and hold 0 as far as is known. */
   dead: [number, number][];
   /** That did nothing while they were touched, and hold another value. */

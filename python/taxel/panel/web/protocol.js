@@ -10,10 +10,8 @@ export const MISSING = 0xffffffff;
 /**
  * A frame, its sections as views of its bytes (little-endian, as every machine that runs browsers); null: not there.
  * @typedef {object} Frame
- * @property {boolean} live
  * @property {boolean} moves
  * @property {boolean} restart
- * @property {boolean} recording
  * @property {boolean} following
  * @property {number} rows
  * @property {number} columns
@@ -66,10 +64,8 @@ export function readFrame(buffer) {
     return bounds && new kind(buffer, bounds[0], bounds[1] / kind.BYTES_PER_ELEMENT);
   };
   return {
-    live: (flags & 1) !== 0,
     moves: (flags & 2) !== 0,
     restart: (flags & 4) !== 0,
-    recording: (flags & 8) !== 0,
     following: (flags & 16) !== 0,
     restFrom: flags & 32 ? "given" : flags & 64 ? "quiet" : "none",
     rows: view.getUint16(12, true),
