@@ -37,7 +37,7 @@ impl Activity {
     /// Counts a change. A repaired one only updates the held value: states of version 2 also report dead taxels.
     pub fn count(&mut self, change: &TaxelChange) {
         let taxel = change.taxel as usize;
-        self.set_held(taxel, change.ticks);
+        self.hold(taxel, change.ticks);
         self.touches.event(change.t, taxel, change.ticks, change.up, !change.repaired);
         if change.repaired {
             return;
@@ -49,8 +49,12 @@ impl Activity {
         self.events[taxel] = self.events[taxel].saturating_add(1);
     }
 
-    /// Notes a held value, unless it is unknown.
-    pub(super) fn set_held(&mut self, taxel: usize, ticks: u16) {
+    /// Notes the values that the taxels hold.
+    pub(super) fn set_held(&mut self, held: &[u16]) {
+        held.iter().enumerate().for_each(|(taxel, &ticks)| self.hold(taxel, ticks));
+    }
+
+    fn hold(&mut self, taxel: usize, ticks: u16) {
         if ticks != UNKNOWN {
             self.greatest[taxel] = self.greatest[taxel].max(ticks);
         }

@@ -241,7 +241,7 @@ impl Index {
         rate.bins()
     }
 
-    /// Counts by which dead, stuck and noisy taxels of a recording are found.
+    /// Counts by which dead, stuck and noisy taxels are found.
     ///
     /// # Errors
     ///
@@ -249,8 +249,9 @@ impl Index {
     pub fn activity(&self) -> Result<Activity> {
         let mut activity = Activity::new(&self.sensor.array);
         let (begin, mut next) = self.open(i64::MIN)?;
-        begin.held.iter().enumerate().for_each(|(taxel, &ticks)| activity.set_held(taxel, ticks));
+        activity.set_held(&begin.held);
         while let Some(block) = self.next(&mut next)? {
+            block.held.iter().for_each(|(held, _)| activity.set_held(held));
             block.changes.iter().for_each(|change| activity.count(change));
         }
         Ok(activity)

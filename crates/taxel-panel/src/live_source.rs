@@ -20,7 +20,6 @@ use taxel_live::pipeline::{Counters, Handle, LiveOptions, OutputDetection, Piece
 use taxel_live::recording::now_ns;
 use taxel_live::{Error, Result};
 
-use crate::activity::Activity;
 use crate::block::Block;
 use crate::columns::{COLUMN_US, COLUMNS_US};
 use crate::index::{Index, Kept};
@@ -66,8 +65,8 @@ pub struct LiveSource {
     /// What else can be done with the pipeline.
     pub handle: Handle,
     pub(crate) state: Mutex<ArrayState>,
-    pub(crate) index: Arc<Index>,
-    activity: Mutex<Activity>,
+    /// What can be viewed of its past.
+    pub index: Arc<Index>,
     /// The labels of the readout that runs.
     labels: Option<Vec<String>>,
     /// The latest detections, oldest first, for clients that connect later.
@@ -151,7 +150,6 @@ impl LiveSource {
         let columns = REACH_US / COLUMN_US;
         Ok(Self {
             state: Mutex::new(ArrayState::new(&sensor, &blank, COLUMN_US, columns)),
-            activity: Mutex::new(Activity::new(&sensor.array)),
             index: Arc::new(Index::new(sensor, Kept::Latest { us: REACH_US, bytes: REACH_BYTES })),
             labels,
             handle,
@@ -213,11 +211,6 @@ impl LiveSource {
     pub fn announce(&self, registers: Registers) {
         self.handle.announce_registers(registers);
         lock(&self.state).set_noise_floor(registers.noise_floor.into());
-    }
-
-    /// Counts by which dead, stuck and noisy taxels are found.
-    pub fn activity(&self) -> Activity {
-        lock(&self.activity).clone()
     }
 
     /// The `overview` message of the past that can be viewed.
@@ -296,8 +289,6 @@ impl LiveSource {
         // How the rest is tracked takes more memory than all else of a keyframe.
         let key = key.then(|| Keyframe { latest: since, tracked: None, ..state.keyframe() });
         state.apply(&block.changes);
-        let mut activity = lock(&self.activity);
-        block.changes.iter().for_each(|change| activity.count(change));
         self.index.push(key, block).expect("nothing is written to a file");
     }
 

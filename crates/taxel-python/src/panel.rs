@@ -14,7 +14,7 @@ use taxel_core::wire::Registers;
 use taxel_live::clock::BoardClock;
 use taxel_live::pipeline::Record;
 use taxel_live::recording::{Compression, Condition};
-use taxel_panel::{Activity, FrameRest, FrameSource, FramesOfSource, Index, Kept, LiveSource, View};
+use taxel_panel::{FrameRest, FrameSource, FramesOfSource, Index, Kept, LiveSource, View};
 
 use crate::held::{TouchesOut, from_touches};
 use crate::live::Live;
@@ -29,10 +29,11 @@ use taxel_border::parameters::{Plain, parsed};
 type ActivityOut<'py> =
     (ArrayParts, Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>, TouchesOut<'py>, Bound<'py, PyArray1<u16>>);
 
-fn activity_out<'py>(py: Python<'py>, sensor: &taxel_core::Array, activity: Activity) -> ActivityOut<'py> {
+fn activity_of<'py>(py: Python<'py>, index: &Index) -> PyResult<ActivityOut<'py>> {
+    let activity = enter(py, |_| index.activity())?;
     let touches = from_touches(py, &activity.touches);
     let (events, moved) = (array(py, activity.events), array(py, activity.moved));
-    (from_array(sensor), events, moved, touches, array(py, activity.greatest))
+    Ok((from_array(&index.sensor.array), events, moved, touches, array(py, activity.greatest)))
 }
 
 /// What every panel says at first.
@@ -115,9 +116,8 @@ impl PanelLive {
     }
 
     /// Counts by which unhealthy taxels are found.
-    fn activity<'py>(&self, py: Python<'py>) -> ActivityOut<'py> {
-        let activity = py.detach(|| self.0.activity());
-        activity_out(py, self.0.array(), activity)
+    fn activity<'py>(&self, py: Python<'py>) -> PyResult<ActivityOut<'py>> {
+        activity_of(py, &self.0.index)
     }
 }
 
@@ -198,8 +198,7 @@ impl PanelRecording {
         if self.0.sensor.frames.is_some() {
             return Ok(None);
         }
-        let activity = enter(py, |_| self.0.activity())?;
-        Ok(Some(activity_out(py, &self.0.sensor.array, activity)))
+        activity_of(py, &self.0).map(Some)
     }
 }
 
