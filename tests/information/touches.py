@@ -8,6 +8,11 @@ ARRAY = taxel.Array(4, 4, name="small")
 #: From touch to touch, us.
 APART_US = 400_000
 
+#: A table of trials of `ordered(24)`.
+GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
+    f"touches.npz,{100_000 + 400_000 * k},{'ab'[k % 2]},{200_000 + 400_000 * k},{'uvwxyz'[k % 6]}\n" for k in range(24)
+)
+
 
 def ordered(trials, gap_ms=3.0, seed=0, before=None):
     """Two taxels that are touched one after the other: the label is which comes first.

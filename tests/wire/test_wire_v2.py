@@ -212,24 +212,6 @@ def test_differences_joined_in_mid_stream_say_what_is_right_or_nothing(seed):
     assert at > 0 or unknown == 0
 
 
-def test_the_boards_totals_close_the_sums():
-    board, decoder, lost = Board(Registers(wire_version=2)), Decoder(), 0
-    draw, made, status_lost = random.Random(2), 0, 0
-    for k in range(12_000):
-        for d in board.frame(np.full(4096, 20 if k % 500 else 40, np.uint16)):
-            made += 1
-            if draw.random() < 0.1:
-                lost += 1
-                status_lost += d[1] == 0x24
-                continue
-            decoder.push(d)
-    status, counts = decoder.status, decoder.counts
-    assert status is not None
-    assert status.datagrams < made
-    assert counts.intact + lost == made
-    assert lost - 50 <= counts.missing <= lost
-
-
 @pytest.mark.parametrize("first", [0, 5])
 def test_what_the_board_counted_as_dropped_is_lost_though_no_flag_came(first, tmp_path):
     """Where datagrams with the flag were lost, or the board sets none; before the first totals nothing is known."""
