@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import io
 from pathlib import Path
 
@@ -24,61 +23,6 @@ def npz(**columns: object) -> bytes:
     file = io.BytesIO()
     np.savez(file, **columns)
     return file.getvalue()
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "said"),
-    [
-        (
-            "a.mcap",
-            gzip.compress(b"x", mtime=0),
-            "byte 0: starts with 1F 8B 08 00, not with the MCAP magic",
-        ),
-        ("a.mcap", b"", "byte 0: the file ends inside the MCAP magic"),
-        ("a.mcap", b"\x89MCA", "byte 4: the file ends inside the MCAP magic"),
-        ("a.mcap", b"hello, world", "byte 0: starts with 68 65 6C 6C, not with the MCAP magic"),
-        ("a.mcap", npz(t=[1]), "starts with 50 4B 03 04, not with the MCAP magic"),
-        ("a.npz", b"t_us,x,y,p\n", "the .npz file is damaged or not complete"),
-        ("a.npz", npz(t=[1])[:40], "the .npz file is damaged or not complete"),
-        ("a.npz", npz(t=[1], x=[2]), "y is missing; must contain t, x, y, p (events) or values, t (frames), "),
-        ("a.npz", npz(t=[1], x=[2], y=[3], p=[True, False]), "p"),
-        ("a.npz", npz(t=[1], x=[2], y=[3], p=[True], array="{"), "a.npz, array: "),
-        ("a.npz", npz(t=[1], x=[2], y=[3], p=[True], about="{}"), "was written by an earlier version of taxel"),
-        ("a.npz", npz(t=[1], values=np.zeros((2, 3, 3))), "t has shape"),
-        ("a.csv", b"\x89PNG\r\n", "contains no table of numbers"),
-        ("a.csv", b"", "the file is empty; must be a recording"),
-        ("a.csv", b"time,x,y\n", "contains no table of numbers"),
-        ("a.csv", b"\xff\xfe\x00", "not text in UTF-16 (truncated data); save it as UTF-8"),
-        ("a.csv", b"t_us,x,y,p,colour\n", "line 1: 'colour' after p"),
-        ("a.csv", b"t_us,x,y,p\n1,2,3\n", "1 line with too few cells (line 2)"),
-        ("a.csv", b"t_us,x,y,p\n1,2,3,1\n5,6,abc,1\n", "line 3: 1 of 2 lines are no frames"),
-        ("a.csv", b"t_us,x,y,p\n\n1,2,3,1\n\n5,6,,1\n", "line 5: y is nan"),
-        ("a.csv", b"t_us,x,y,p\n1,2,3,2\n", "line 2: p is 2; must be 0 or 1"),
-        ("a.csv", b"t_us,x,y,p\n1,-2,3,0\n", "line 2: x is -2"),
-        (
-            "a.csv",
-            b"t_us,x,y,p,intensity\n1,2,3,0,70000\n",
-            "intensity is 70000; must be a whole number from 0 to 65535",
-        ),
-        ("a.csv", b"t_us,x0y0,x0y0\n0,1,2\n", "column 'x0y0' appears twice"),
-        ("a.csv", b"t_us,x0y0,heel\n0,1,2\n", "column 'heel' must be named like x3y5"),
-        ("a.csv", b"t_us,x0y0\n0,1\n1,2,3\n", "line 3"),
-        ("a.csv", b"t_us,x9999y9999\n0,1\n", "most are missing"),
-        ("a.txt", b"hello", "contains no table of numbers"),
-        ("a.h5", b"\x89HDF\r\n\x1a\n", "the HDF5 file is damaged or not complete"),
-        ("a.h5", b"hello", "the HDF5 file is damaged or not complete"),
-        ("a.bag", b"#ROSBAG V2.0", "is a ROS bag; choose one of its topics, or write [ros] in a layout file"),
-    ],
-)
-def test_a_wrong_file_is_one_line_with_place_and_remedy(tmp_path: Path, name: str, content: bytes, said: str) -> None:
-    path = tmp_path / name
-    path.write_bytes(content)
-    with pytest.raises(FormatError) as caught:
-        taxel.open(path)
-    text = str(caught.value)
-    assert said in text
-    assert name in text
-    assert "\n" not in text
 
 
 def test_a_missing_file_and_a_folder_are_refused_where_one_recording_is_opened(tmp_path: Path) -> None:

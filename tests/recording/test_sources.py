@@ -178,28 +178,6 @@ def test_the_command_line_shows_and_writes_one_source(
     assert unknown.stderr == f"taxel: --source up: {several[0]} contains only right, left, imu, given\n"
 
 
-@pytest.mark.parametrize(
-    ("sources", "said"),
-    [
-        ({"imu": "nowhere"}, "must be [NAME=]board:HOST:PORT, serial:PLACE, lines:PATH"),
-        ({"imu": "given"}, "needs columns=A:B:C"),
-        ({"imu": "given,columns=a:a"}, "two columns have this name"),
-        ({"imu": "given,columns=t_us"}, "have no column of values"),
-        ({"board": "given,columns=a"}, "two sources have this name"),
-        ({"a b": "given,columns=a"}, "a name must have at most 64 letters, digits"),
-        ({"imu": 3}, "source imu is 3"),
-        (["imu"], "source 'imu': must be"),
-        ({"imu": "given,columns=a,speed=3"}, "has no option 'speed'"),
-        ({"imu": "given,columns=a,rate=3"}, "rate is only for frames: add array=ROWSxCOLUMNS"),
-    ],
-)
-def test_a_source_that_is_none_is_refused_and_leaves_no_file(tmp_path: Path, sources: object, said: str) -> None:
-    with pytest.raises(taxel.ProblemError) as refused:
-        Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "no.mcap", sources=sources)  # type: ignore[arg-type]
-    assert said in str(refused.value)
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_source_needs_a_recording_that_can_hold_it_and_its_place(tmp_path: Path) -> None:
     with pytest.raises(taxel.ProblemError, match="source imu: taxel can only record this source"):
         Live(0, host=LOOPBACK, sources={"imu": "given,columns=a"})
