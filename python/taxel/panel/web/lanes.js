@@ -33,7 +33,6 @@ import { rounded, integer } from "./words.js";
  * @typedef {object} Lane
  * @property {string} name of its elements: `NAME-block` with a heading, and `NAME-lane`
  * @property {string} label what it is, for those who hear the page
- * @property {number} least height that it needs with its heading, CSS pixels
  * @property {string} [kind] class of its block and of its element in style.css
  * @property {(shown: Shown) => boolean} [fits] whether it has anything to show of this source; without it: of all
  * @property {(shown: Shown, sources: string[]) => (Node | string)[]} heading
@@ -131,7 +130,7 @@ function namesOf({ array, columns, sources, taxelsThatExist: taxels }) {
 /** The lanes, from top to bottom. @type {readonly Lane[]} */
 export const LANES = [
   {
-    name: "raster", label: "Raster of events by row over time", kind: "raster", least: 96,
+    name: "raster", label: "Raster of events by row over time", kind: "raster",
     // The values of frames and of channels say more than their changes.
     fits: ({ encoded, values, sensor }) => encoded || (!values.frames && sensor.kind !== "channels"),
     heading: ({ encoded }) =>
@@ -139,7 +138,7 @@ export const LANES = [
     painter: (element) => new Raster(element),
   },
   {
-    name: "channels", label: "Curve of each channel over time, one above the other", kind: "tall", least: 96,
+    name: "channels", label: "Curve of each channel over time, one above the other", kind: "tall",
     fits: ({ sensor }) => sensor.kind === "channels" && sensor.rows * sensor.columns <= MOST_CHANNELS,
     heading: () => ["Channels ", swatch("more"), " ", output({ id: "channels-scale", class: "dim" })],
     says: ({ values: { step, unit }, top }) => [`each up to ${rounded(top * step)} ${unit}`],
@@ -161,7 +160,7 @@ export const LANES = [
       }),
   },
   {
-    name: "taxel", label: "History of the watched taxel", least: 72,
+    name: "taxel", label: "History of the watched taxel",
     heading: () => ["Taxel ", make("span", {}, "least to greatest, last"), " ", output()],
     says: ({ values: { unit, step, zero } }, { taxel }) => (taxel === null ? [] : [`${rounded((taxel - zero) * step)} ${unit}`]),
     plan: (shown) => {
@@ -179,7 +178,7 @@ export const LANES = [
       history[3 * column + 2] === UNKNOWN_VALUE ? [] : Array.from(history.subarray(3 * column, 3 * column + 3), (ticks) => (ticks - zero) * step),
   },
   {
-    name: "force", label: "Sum of the values, or force", least: 72,
+    name: "force", label: "Sum of the values, or force",
     heading: ({ sums }, sources) => [
       make("b", { id: "force-title" }, sums.unit === "N" ? "Force" : "Sum"),
       " ",
@@ -194,7 +193,7 @@ export const LANES = [
     at: ({ sums: { step } }, timeline, column) => timeline.drawn.flatMap((curve) => ends(timeline.sumIn(column, curve), step)),
   },
   {
-    name: "area", label: "Number of taxels pressed", kind: "low", least: 54,
+    name: "area", label: "Number of taxels pressed", kind: "low",
     fits: ({ sensor }) => sensor.kind !== "channels",
     heading: () => ["Area ", swatch("less"), " ", output({ id: "area-now" })],
     says: (shown, values) => [areaAt(shown, values)],
@@ -202,7 +201,7 @@ export const LANES = [
     at: (_, timeline, column) => ends(timeline.areaIn(column)),
   },
   {
-    name: "centre", label: "Centre of pressure", kind: "low", least: 62,
+    name: "centre", label: "Centre of pressure", kind: "low",
     fits: ({ sensor }) => sensor.kind !== "channels",
     heading: ({ sensor: { axes: [across, down] } }, sources) =>
       // Of several sources each value has the name of its axis.

@@ -15,6 +15,8 @@ import { counted, quantity, rounded } from "./words.js";
 
 /** How long the largest value holds the scale, ms. */
 const HOLD_MS = 10_000;
+/** Up to so many zeroed taxels are marked: marks of more, as "Zero all" makes them, would hide the map. */
+const MOST_ZEROED = 64;
 
 /** The largest value lately: it holds for ten seconds, so that colours stay comparable. */
 class Scale {
@@ -339,8 +341,7 @@ export class Maps {
         map.marks.append(mark);
       };
       for (const kind of /** @type {const} */ (["dead", "stuck", "noisy"])) for (const taxel of this.health?.[kind] ?? []) put(taxel, kind);
-      // Marks on most taxels, as "Zero all" makes them, would tell nothing.
-      const marked = 2 * this.zeroed.length <= this.geometry.taxelsThatExist.length ? this.zeroed : [];
+      const marked = this.zeroed.length <= MOST_ZEROED && this.zeroed.length < this.geometry.taxelsThatExist.length ? this.zeroed : [];
       for (const { taxel, rest } of marked) put(taxel, "zeroed", `, rests at ${rest} ${this.values.unit}`);
       map.sources.replaceChildren(...(this.sources.length > 1 ? this.sources.map((source) => this.nameOf(source)) : []));
     }
