@@ -8,9 +8,8 @@ use pyo3::Borrowed;
 use pyo3::prelude::*;
 use taxel_core::array::{Pitch, PlaceUnit, Places};
 use taxel_core::wire::Columns;
-use taxel_core::{Array, Events, EventsView, FramesView, IntensitiesView, Marker, SpikeKind, SpikeTrains, Stop};
+use taxel_core::{Array, Events, EventsView, FramesView, IntensitiesView, Marker, SpikeKind, SpikeTrains};
 
-use crate::enter::enter;
 use crate::errors::{ProblemError, core};
 
 /// The entries of a one-dimensional array, in place.
@@ -212,10 +211,7 @@ impl FromPyObject<'_, '_> for SpikesIn {
         let offsets = to_offsets(&offsets)?;
         let times = slice("times", &times)?;
         let values = (SpikeKind::named(&kind).map_err(core)?, values.as_ref().map(|v| slice("values", v)).transpose()?);
-        let copy = |interrupt: Stop<'_>| SpikeTrains::copy_of(times, offsets, values, (start, stop), interrupt);
-        // A copy of few spikes costs less than releasing the GIL.
-        let few = times.len() < MANY_SPIKES;
-        if few { copy(Stop::never()).map_err(core) } else { enter(object.py(), copy) }.map(Self)
+        SpikeTrains::copy_of(times, offsets, values, (start, stop)).map_err(core).map(Self)
     }
 }
 
@@ -223,9 +219,6 @@ impl FromPyObject<'_, '_> for SpikesIn {
 pub fn to_patterns(patterns: Vec<SpikesIn>) -> Vec<SpikeTrains> {
     patterns.into_iter().map(|SpikesIn(pattern)| pattern).collect()
 }
-
-/// Number of spikes from which they are copied without the GIL, so that Ctrl-C can interrupt the copy.
-const MANY_SPIKES: usize = 1 << 20;
 
 /// Spike trains as Python gets them: the same parts, as new arrays.
 pub type SpikesOut<'py> =

@@ -1,9 +1,5 @@
 //! Spike trains: times of spikes, by train.
 
-use std::cmp::{Ordering, Reverse};
-use std::collections::BinaryHeap;
-use std::collections::binary_heap::PeekMut;
-
 use crate::{Result, Stop, problem};
 
 /// Converts a time of the wire, us, to that of neurons, ms.
@@ -144,20 +140,14 @@ impl SpikeTrains {
     ///
     /// # Errors
     ///
-    /// `Problem` as [`SpikeTrains::check`]; `Interrupted` if the caller stops it.
+    /// `Problem` as [`SpikeTrains::check`].
     pub fn copy_of(
         times: &[f64],
         offsets: Vec<usize>,
         (kind, values): (SpikeKind, Option<&[f32]>),
         (start, stop): (f64, f64),
-        interrupt: Stop<'_>,
     ) -> Result<Self> {
-        let mut copy = Vec::with_capacity(times.len());
-        for piece in times.chunks(BETWEEN_CHECKS) {
-            interrupt.check()?;
-            copy.extend_from_slice(piece);
-        }
-        let trains = Self { times: copy, offsets, kind, values: values.map(<[f32]>::to_vec), start, stop };
+        let trains = Self { times: times.to_vec(), offsets, kind, values: values.map(<[f32]>::to_vec), start, stop };
         trains.check()?;
         Ok(trains)
     }
@@ -192,28 +182,21 @@ impl SpikeTrains {
             value: self.values.as_ref().map_or(1.0, |v| v[k]),
         };
         let mut all: Vec<Spike> = Vec::with_capacity(self.times.len());
-        if self.times.len() <= BETWEEN_CHECKS {
-            all.extend(
-                (0..self.len())
-                    .flat_map(|n| (self.offsets[n]..self.offsets[n + 1]).map(move |k| (n, k)))
-                    .map(|(n, k)| spike(n, k)),
-            );
-            all.sort_by(|a, b| a.t.total_cmp(&b.t));
-            return Ok(all);
-        }
-        // Trains are merged instead of sorted, because a sort of this many spikes could not be interrupted.
-        let next = |n: usize, k: usize| (k < self.offsets[n + 1]).then(|| Reverse((Ordered(self.times[k], n), k)));
-        let mut heads: BinaryHeap<_> = (0..self.len()).filter_map(|n| next(n, self.offsets[n])).collect();
-        while let Some(mut head) = heads.peek_mut() {
-            if all.len().is_multiple_of(BETWEEN_CHECKS) {
-                stop.check()?;
+        // Parts of the window are sorted one by one, because one sort of very many spikes could not be interrupted.
+        let parts = self.times.len() / BETWEEN_CHECKS + 1;
+        let mut next = self.offsets.clone();
+        for part in 1..=parts {
+            stop.check()?;
+            let share = part as f64 / parts as f64;
+            let end = if part < parts { self.start + share * (self.stop - self.start) } else { f64::INFINITY };
+            let from = all.len();
+            for (n, first) in next.iter_mut().enumerate().take(self.len()) {
+                let rest = &self.times[*first..self.offsets[n + 1]];
+                let until = *first + rest.partition_point(|&t| t < end);
+                all.extend((*first..until).map(|k| spike(n, k)));
+                *first = until;
             }
-            let Reverse((Ordered(_, n), k)) = *head;
-            all.push(spike(n, k));
-            match next(n, k + 1) {
-                Some(following) => *head = following,
-                None => drop(PeekMut::pop(head)),
-            }
+            all[from..].sort_by(|a, b| a.t.total_cmp(&b.t));
         }
         Ok(all)
     }
@@ -252,26 +235,8 @@ impl SpikeTrains {
     }
 }
 
-/// Number of spikes that are copied, sorted or merged between two checks for Ctrl-C.
+/// Number of spikes that are sorted between two checks for Ctrl-C, where they are spread evenly.
 const BETWEEN_CHECKS: usize = 1 << 18;
-
-/// A number and an index, ordered by the number, then by the index.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Ordered(pub(crate) f64, pub(crate) usize);
-
-impl Eq for Ordered {}
-
-impl Ord for Ordered {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.0.total_cmp(&other.0).then(self.1.cmp(&other.1))
-    }
-}
-
-impl PartialOrd for Ordered {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
 
 /// [`SpikeTrains::check`] for borrowed columns.
 ///
