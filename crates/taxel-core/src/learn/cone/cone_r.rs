@@ -194,36 +194,19 @@ impl ConeRProblem {
             points += more;
         }
         neuron.check_rows(points)?;
-        let asked = targets.iter().zip(silence).zip(ends);
-        let asked = asked.map(|((targets, silence), end)| PatternDemand { targets, silence: silence.as_deref(), end });
-        Self::lay_out(parameters, patterns, asked, stop)
+        let mut problem = Self::without_patterns(parameters, patterns[0].len());
+        for (((pattern, targets), silence), end) in patterns.iter().zip(targets).zip(silence).zip(ends) {
+            problem.push(pattern, PatternDemand { targets, silence: silence.as_deref(), end }, stop)?;
+        }
+        Ok(problem)
     }
 
-    /// Computes the rows of a first pattern, which the caller has checked; `push` adds the others.
-    pub(crate) fn of_first_pattern(
-        parameters: &ConeR,
-        pattern: &SpikeTrains,
-        asked: PatternDemand<'_>,
-        stop: Stop<'_>,
-    ) -> Result<Self> {
-        Self::lay_out(parameters, std::slice::from_ref(pattern), [asked].into_iter(), stop)
-    }
-
-    fn lay_out<'a>(
-        parameters: &ConeR,
-        patterns: &[SpikeTrains],
-        asked: impl Iterator<Item = PatternDemand<'a>>,
-        stop: Stop<'_>,
-    ) -> Result<Self> {
+    /// No rows yet, for `push`.
+    pub(crate) fn without_patterns(parameters: &ConeR, trains: usize) -> Self {
         let unit = parameters.neuron.unit();
         let base = parameters.in_units(unit);
-        let margin = Margin { height: base.margin, slope: 0.0 };
-        let mut statement = Statement::new(&base.neuron, margin, unit, patterns[0].len());
-        for (pattern, PatternDemand { targets, silence, end }) in patterns.iter().zip(asked) {
-            statement.push(pattern, targets, silence, end, stop)?;
-        }
-        let rows = Relaxed::new(&statement, base.delta_t(), stop)?;
-        Ok(Self { base, patterns: patterns.to_vec(), statement, rows })
+        let statement = Statement::new(&base.neuron, Margin { height: base.margin, slope: 0.0 }, unit, trains);
+        Self { rows: Relaxed::new(&statement), base, patterns: vec![], statement }
     }
 
     /// Adds a pattern, which the caller has checked; if the caller stops it, nothing changes.

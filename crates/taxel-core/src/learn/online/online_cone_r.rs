@@ -16,7 +16,7 @@ use crate::{Result, SpikeTrains, Stop, problem};
 pub struct OnlineConeR {
     parameters: ConeR,
     window: usize,
-    problem: Option<ConeRProblem>,
+    problem: ConeRProblem,
     /// The number of patterns added so far.
     added: usize,
     last: Option<(Vec<f64>, Shares)>,
@@ -40,7 +40,8 @@ impl OnlineConeR {
     pub fn new(parameters: &ConeR, window: usize) -> Result<Self> {
         parameters.check()?;
         Self::WINDOW.check(&window)?;
-        Ok(Self { parameters: parameters.clone(), window, problem: None, added: 0, last: None })
+        let problem = ConeRProblem::without_patterns(parameters, 0);
+        Ok(Self { parameters: parameters.clone(), window, problem, added: 0, last: None })
     }
 
     /// The number of patterns in the window.
@@ -52,7 +53,7 @@ impl OnlineConeR {
     /// The number of rows in the window that require silence.
     #[must_use]
     pub fn silent_rows(&self) -> usize {
-        self.problem.as_ref().map_or(0, ConeRProblem::silent_rows)
+        self.problem.silent_rows()
     }
 
     /// Adds a pattern with its targets (ms) and the windows in which silence counts (ms; `None`: everywhere) to the
@@ -73,25 +74,21 @@ impl OnlineConeR {
         check_example(&parameters.neuron, self.added, pattern, targets)?;
         check_silence(self.added, silence)?;
         let (end, points) = parameters.end_of(self.added, pattern, targets)?;
-        let asked = PatternDemand { targets, silence, end };
-        let rows = self.problem.as_ref().map_or(0, ConeRProblem::silent_and_free_rows);
-        parameters.neuron.check_rows(rows as f64 + points)?;
-        if let Some(problem) = &mut self.problem {
-            problem.check_trains(self.added, pattern)?;
-            let silent = problem.silent_and_free_rows();
-            problem.push(pattern, asked, stop)?;
-            let rows = problem.silent_and_free_rows() - silent;
-            if let Some((_, shares)) = &mut self.last {
-                shares.make_room(silent, rows);
+        if self.added == 0 {
+            self.problem = ConeRProblem::without_patterns(parameters, pattern.len());
+        }
+        let problem = &mut self.problem;
+        let silent = problem.silent_and_free_rows();
+        parameters.neuron.check_rows(silent as f64 + points)?;
+        problem.check_trains(self.added, pattern)?;
+        problem.push(pattern, PatternDemand { targets, silence, end }, stop)?;
+        let rows = problem.silent_and_free_rows() - silent;
+        let gone = (self.added >= self.window).then(|| problem.drop_first());
+        if let Some((_, shares)) = &mut self.last {
+            shares.make_room(silent, rows);
+            if let Some((rows, targets)) = gone {
+                shares.drop_first(rows, problem.silent_and_free_rows(), targets);
             }
-            if self.added >= self.window {
-                let (rows, targets_gone) = problem.drop_first();
-                if let Some((_, shares)) = &mut self.last {
-                    shares.drop_first(rows, problem.silent_and_free_rows(), targets_gone);
-                }
-            }
-        } else {
-            self.problem = Some(ConeRProblem::of_first_pattern(parameters, pattern, asked, stop)?);
         }
         self.added += 1;
         Ok(())
@@ -103,9 +100,10 @@ impl OnlineConeR {
     ///
     /// `Problem` for a window without a pattern.
     pub fn fit(&mut self, progress: &mut dyn FnMut(Round), stop: Stop<'_>) -> Result<ConeRFit> {
-        let Some(problem) = &self.problem else {
+        if self.added == 0 {
             return Err(problem!("the window is empty: add a pattern first"));
-        };
+        }
+        let problem = &self.problem;
         let start = self.last.as_ref().map(|(weights, shares)| (weights.as_slice(), Some(shares)));
         let fit = problem.fit_counting(&self.parameters, &[], start, Some(problem.patterns() - 1), progress, stop)?;
         self.last = Some((fit.fit.weights.clone(), fit.multipliers.clone()));

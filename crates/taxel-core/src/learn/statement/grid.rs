@@ -4,8 +4,6 @@
 //! numbers per pattern), and one backward sweep computes a weighted sum of all rows. CONE-X searches for points at
 //! which silence is violated, CONE-R sums the violations.
 
-use std::borrow::Cow;
-
 use super::peak::{SilencePeak, exceeds};
 use super::rows::{Example, Statement, is_lost};
 use crate::neuron::{AfterSpike, Grid, GridTime, KernelSum, Shape, Step};
@@ -82,17 +80,16 @@ impl Steps {
 }
 
 impl SilentRows {
+    /// No rows yet.
+    pub(crate) fn none(statement: &Statement) -> Self {
+        let (shape, step_ms) = (statement.shape, statement.neuron.step_ms);
+        let steps = Steps::new(shape, step_ms);
+        Self { lanes: vec![], trains: statement.trains, shape, step_ms, steps, limit: vec![] }
+    }
+
     /// Computes the grid rows of each pattern of a statement, from its start to the end of its silence.
     pub(crate) fn new(statement: &Statement, stop: Stop<'_>) -> Result<Self> {
-        let (shape, step_ms) = (statement.shape, statement.neuron.step_ms);
-        let mut rows = Self {
-            lanes: vec![],
-            trains: statement.trains,
-            shape,
-            step_ms,
-            steps: Steps::new(shape, step_ms),
-            limit: vec![],
-        };
+        let mut rows = Self::none(statement);
         for pattern in 0..statement.examples.len() {
             stop.check()?;
             rows.push(statement, pattern, stop)?;
@@ -170,16 +167,12 @@ impl SilentRows {
     }
 
     /// These rows for inputs whose values have no sign.
-    pub(crate) fn unsigned_rows(&self) -> Cow<'_, Self> {
-        let is_negative = |input: &GridInput| input.a < 0.0 || input.b < 0.0;
-        if !self.lanes.iter().any(|lane| lane.inputs.iter().any(is_negative)) {
-            return Cow::Borrowed(self);
-        }
+    pub(crate) fn unsigned_rows(&self) -> Self {
         let mut rows = self.clone();
         for input in rows.lanes.iter_mut().flat_map(|lane| &mut lane.inputs) {
             (input.a, input.b) = (input.a.abs(), input.b.abs());
         }
-        Cow::Owned(rows)
+        rows
     }
 
     /// The number of rows, including points without a requirement.

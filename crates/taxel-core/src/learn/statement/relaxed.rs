@@ -25,27 +25,25 @@ pub(crate) struct Relaxed {
 }
 
 impl Relaxed {
-    /// Computes the rows of a statement; B evaluates the potential `delta_t` ms after the targets.
-    pub(crate) fn new(statement: &Statement, delta_t: f64, stop: Stop<'_>) -> Result<Self> {
-        let (neuron, trains) = (&statement.neuron, statement.trains);
-        let targets = Arc::new(Targets::new(statement, delta_t, stop)?);
-        Ok(Self {
-            theta_0: neuron.theta_0,
-            touch: neuron.touch(),
-            trains,
-            gram: Arc::new(targets.gram(stop)?),
-            targets,
-            silent: SilentRows::new(statement, stop)?,
-        })
+    /// No rows yet, for a statement without patterns.
+    pub(crate) fn new(statement: &Statement) -> Self {
+        Self {
+            theta_0: statement.neuron.theta_0,
+            touch: statement.neuron.touch(),
+            trains: statement.trains,
+            targets: Arc::new(Targets::none(statement.trains)),
+            silent: SilentRows::none(statement),
+            gram: Arc::new(vec![0.0; statement.trains * statement.trains]),
+        }
     }
 
-    /// Adds the rows of the statement's last pattern; if the caller stops it, nothing changes.
+    /// Adds the rows of the statement's last pattern, in which B evaluates the potential `delta_t` ms after the
+    /// targets; if the caller stops it, nothing changes.
     pub(crate) fn push(&mut self, statement: &Statement, delta_t: f64, stop: Stop<'_>) -> Result<()> {
         let (pattern, before) = (statement.examples.len() - 1, self.targets.len());
-        let mut targets = Targets::clone(&self.targets);
-        targets.push(statement, pattern, delta_t, stop)?;
+        let targets = Targets::of_pattern(statement, pattern, delta_t, stop)?;
         self.silent.push(statement, pattern, stop)?;
-        self.targets = Arc::new(targets);
+        Arc::make_mut(&mut self.targets).append(targets);
         for k in before..self.targets.len() {
             self.targets.add_square(k, 1.0, Arc::make_mut(&mut self.gram).as_mut_slice());
         }

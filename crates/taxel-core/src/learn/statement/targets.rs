@@ -29,41 +29,43 @@ pub(crate) struct TargetRow<'a> {
 }
 
 impl Targets {
+    /// No targets yet.
+    pub(crate) fn none(trains: usize) -> Self {
+        Self { trains, names: vec![], times: vec![], thresholds: vec![], at: vec![], behind: vec![] }
+    }
+
     /// The target rows of all patterns of a statement, and the rows `delta_t` ms after them.
     pub(crate) fn new(statement: &Statement, delta_t: f64, stop: Stop<'_>) -> Result<Self> {
-        let mut targets = Self {
-            trains: statement.trains,
-            names: vec![],
-            times: vec![],
-            thresholds: vec![],
-            at: vec![],
-            behind: vec![],
-        };
+        let mut targets = Self::none(statement.trains);
         for pattern in 0..statement.examples.len() {
-            targets.push(statement, pattern, delta_t, stop)?;
+            targets.append(Self::of_pattern(statement, pattern, delta_t, stop)?);
         }
         Ok(targets)
     }
 
-    /// Adds the rows of one pattern.
-    pub(crate) fn push(&mut self, statement: &Statement, pattern: usize, delta_t: f64, stop: Stop<'_>) -> Result<()> {
-        let mut row = vec![0.0; self.trains];
-        let mut new = Self { names: vec![], times: vec![], thresholds: vec![], at: vec![], behind: vec![], ..*self };
-        for target in 0..statement.examples[pattern].targets.len() {
+    /// The rows of one pattern.
+    pub(crate) fn of_pattern(statement: &Statement, pattern: usize, delta_t: f64, stop: Stop<'_>) -> Result<Self> {
+        let mut row = vec![0.0; statement.trains];
+        let mut new = Self::none(statement.trains);
+        for (target, &time) in statement.examples[pattern].targets.iter().enumerate() {
             stop.check()?;
             new.names.push((pattern, target));
-            new.times.push(statement.examples[pattern].targets[target]);
+            new.times.push(time);
             new.thresholds.push(statement.state_into(Row::Target { pattern, target }, &mut row)?);
             new.at.extend_from_slice(&row);
             statement.behind_into(pattern, target, delta_t, &mut row)?;
             new.behind.extend_from_slice(&row);
         }
+        Ok(new)
+    }
+
+    /// Adds the rows of another pattern.
+    pub(crate) fn append(&mut self, mut new: Self) {
         self.names.append(&mut new.names);
         self.times.append(&mut new.times);
         self.thresholds.append(&mut new.thresholds);
         self.at.append(&mut new.at);
         self.behind.append(&mut new.behind);
-        Ok(())
     }
 
     /// `B'B` of the rows after the targets, by columns.
