@@ -83,7 +83,7 @@ fn gap(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], bare: bool) 
             return Ok(None);
         }
         let limit = statement.state_into(name, &mut row)? + if bare { statement.margin_of(name) } else { 0.0 };
-        statement.sizes_into(name, &row, &mut terms)?;
+        statement.sizes_into(name, &mut terms)?;
         for (((g, s), a), size) in sum.iter_mut().zip(&mut size).zip(&row).zip(&terms) {
             *g += multiplier * a;
             *s += (multiplier * size).abs();

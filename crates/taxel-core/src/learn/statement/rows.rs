@@ -300,10 +300,20 @@ impl Statement {
 
     /// Computes a row's `coefficients`, one per train, and returns its limit.
     pub(crate) fn state_into(&self, row: Row, coefficients: &mut [f64]) -> Result<f64> {
+        self.state_with(row, |value| value, coefficients)
+    }
+
+    /// The sizes of the terms that rounding of a row's coefficients depends on: the coefficients with all values of the
+    /// inputs made positive, because those of one train may cancel.
+    pub(crate) fn sizes_into(&self, row: Row, sizes: &mut [f64]) -> Result<()> {
+        self.state_with(row, f32::abs, sizes).map(drop)
+    }
+
+    fn state_with(&self, row: Row, value: impl Fn(f32) -> f32, coefficients: &mut [f64]) -> Result<f64> {
         match row {
             Row::Target { pattern, target } => {
                 let (example, t) = self.target(pattern, target)?;
-                self.sum(example, t, &example.targets[..target], |state| state.b, coefficients);
+                self.sum(example, t, &example.targets[..target], |state| state.b, value, coefficients);
                 Ok(self.threshold(example, t))
             }
             Row::Slope { pattern, target } => {
@@ -314,7 +324,7 @@ impl Statement {
                 }
                 let (example, t) = self.target(pattern, target)?;
                 let slope = |state| -self.shape.slope(state);
-                self.sum(example, t, &example.targets[..target], slope, coefficients);
+                self.sum(example, t, &example.targets[..target], slope, value, coefficients);
                 let falls = (self.threshold(example, t) - self.neuron.theta_0) / self.neuron.tau_rec();
                 Ok(falls - self.margin.slope)
             }
@@ -322,32 +332,10 @@ impl Statement {
                 let example = self.example(pattern)?;
                 self.check_silent(pattern, t)?;
                 let fired = example.targets.partition_point(|&target| target < t);
-                self.sum(example, t, &example.targets[..fired], |state| state.b, coefficients);
+                self.sum(example, t, &example.targets[..fired], |state| state.b, value, coefficients);
                 Ok(self.threshold(example, t) - self.margin_at(example, t))
             }
         }
-    }
-
-    /// The sizes of the terms that rounding of a row's `coefficients` depends on: of a graded pattern, whose inputs of
-    /// one train may cancel, their coefficients with all values made positive.
-    pub(crate) fn sizes_into(&self, row: Row, coefficients: &[f64], sizes: &mut [f64]) -> Result<()> {
-        let (Row::Target { pattern, .. } | Row::Slope { pattern, .. } | Row::Silence { pattern, .. }) = row;
-        if self.example(pattern)?.inputs.iter().all(|input| input.value == 1.0) {
-            sizes.copy_from_slice(coefficients);
-            return Ok(());
-        }
-        let mut example = self.examples[pattern].clone();
-        for input in &mut example.inputs {
-            input.value = input.value.abs();
-        }
-        let row = match row {
-            Row::Target { target, .. } => Row::Target { pattern: 0, target },
-            Row::Slope { target, .. } => Row::Slope { pattern: 0, target },
-            Row::Silence { t, .. } => Row::Silence { pattern: 0, t },
-        };
-        let mut positive = Self::new(&self.neuron, self.margin, self.unit, self.trains);
-        positive.examples.push(example);
-        positive.state_into(row, sizes).map(drop)
     }
 
     /// The row of B(w) (6.10): the coefficients `delta_t` ms after a target, and the threshold at the target, mV.
@@ -374,7 +362,7 @@ impl Statement {
         let (example, t) = self.target(pattern, target)?;
         let t_behind = t + delta_t;
         let earlier = &example.targets[..target];
-        self.sum(example, t_behind, earlier, |state| state.b, coefficients);
+        self.sum(example, t_behind, earlier, |state| state.b, |value| value, coefficients);
         Ok(self.threshold(example, t))
     }
 
@@ -468,7 +456,15 @@ impl Statement {
 
     /// Sums `part` of the kernels' states at `t` by train over the inputs before `t`, given spikes at the `earlier`
     /// targets only.
-    fn sum(&self, example: &Example, t: f64, earlier: &[f64], part: impl Fn(KernelSum) -> f64, out: &mut [f64]) {
+    fn sum(
+        &self,
+        example: &Example,
+        t: f64,
+        earlier: &[f64],
+        part: impl Fn(KernelSum) -> f64,
+        value: impl Fn(f32) -> f32,
+        out: &mut [f64],
+    ) {
         out.fill(0.0);
         let inputs = example.before(t);
         let age = self.neuron.ages(example.start, t);
@@ -484,7 +480,7 @@ impl Statement {
                     part(self.shape.after(self.shape.input(), age(at)))
                 };
             }
-            out[input.train as usize] += f64::from(input.value) * state;
+            out[input.train as usize] += f64::from(value(input.value)) * state;
         }
     }
 }
