@@ -7,7 +7,7 @@ mod steps;
 mod tracked;
 mod value;
 
-pub use baseline::{Baseline, FAR_NOISE, FAR_S, HELD_S, NEAR_S, stands_out_from};
+pub use baseline::{Baseline, FAR_NOISE, FAR_S, HELD_S, NEAR_S, Waiting, stands_out_from};
 pub use noise::FrameNoise;
 pub use preload::{LOADED_TICKS, preload, preload_text};
 pub use steps::ValueSteps;

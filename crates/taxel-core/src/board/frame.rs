@@ -123,7 +123,7 @@ impl Board {
     fn taxel(&mut self, at: u64, (x, y): (u16, u16), read: FrameReading<'_>, sink: &mut impl FnMut(&[u8]) -> bool) {
         let registers = self.active;
         let taxel = self.array.index(x, y);
-        if !self.comparators.changed[taxel] || !self.exists(taxel) {
+        if !self.comparators.changed[taxel] || !self.array.has(taxel) {
             return;
         }
         let (value, before) = (read.ticks[taxel].min(registers.ramp), self.comparators.values[taxel]);
@@ -148,7 +148,7 @@ impl Board {
         if any {
             for taxel in (0..ticks.len()).filter(|&taxel| self.comparators.changed[taxel]) {
                 let (x, y) = ((taxel % columns) as u16, (taxel / columns) as u16);
-                if x >= registers.lines || !self.exists(taxel) {
+                if x >= registers.lines || !self.array.has(taxel) {
                     continue;
                 }
                 let after = u64::from(x) * u64::from(registers.line_period);
@@ -220,15 +220,10 @@ impl Board {
             return;
         }
         let Self { link, array, comparators, .. } = self;
-        let exists = |taxel: usize| array.exists.as_ref().is_none_or(|exists| exists[taxel]);
         let taxels = (0..array.rows)
             .map(|y| ((x, y), array.index(x, y)))
-            .filter(|&(_, taxel)| exists(taxel))
+            .filter(|&(_, taxel)| array.has(taxel))
             .map(|(position, taxel)| (position, comparators.values[taxel]));
         link.with_packer(|packer| packer.states(now, taxels));
-    }
-
-    fn exists(&self, taxel: usize) -> bool {
-        self.array.exists.as_ref().is_none_or(|exists| exists[taxel])
     }
 }

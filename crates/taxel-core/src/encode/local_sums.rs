@@ -3,7 +3,7 @@
 use super::blocks::{BLOCK, Block, in_blocks};
 use super::loaded::Paired;
 use super::tare::Tare;
-use crate::rest::{Baseline, FAR_NOISE, Value, stands_out_from};
+use crate::rest::{Baseline, FAR_NOISE, Value, Waiting, stands_out_from};
 use crate::vectors::wide;
 use crate::{Array, Result};
 
@@ -21,59 +21,38 @@ const LANES: usize = 16;
 /// of any taxel lie at the same distances.
 #[derive(Debug, Clone)]
 struct CellGrid {
+    array: Array,
     rows: usize,
+    columns: usize,
     /// Distance from a cell to the one below it.
     stride: usize,
     /// Number of cells, whole blocks.
     cells: usize,
-    /// Neighbouring taxels that exist, in a row.
-    runs: Vec<TaxelRun>,
-}
-
-/// Existing taxels next to each other in a row.
-#[derive(Debug, Clone, Copy)]
-struct TaxelRun {
-    /// The first one's index in the array.
-    taxel: usize,
-    cell: usize,
-    len: usize,
 }
 
 impl CellGrid {
     fn new(array: &Array) -> Self {
         let (rows, columns) = (usize::from(array.rows), usize::from(array.columns));
         let stride = columns + 1;
-        let mut runs: Vec<TaxelRun> = vec![];
-        for taxel in 0..array.len() {
-            if array.exists.as_ref().is_some_and(|exists| !exists[taxel]) {
-                continue;
-            }
-            let cell = (taxel / columns + 1) * stride + taxel % columns + 1;
-            match runs.last_mut() {
-                Some(run) if run.cell + run.len == cell && run.taxel + run.len == taxel => run.len += 1,
-                _ => runs.push(TaxelRun { taxel, cell, len: 1 }),
-            }
-        }
         // The last row's sums are computed in whole lanes, beyond the border below it.
         let cells = ((rows + 2) * stride + 2 + LANES).next_multiple_of(BLOCK);
-        Self { rows, stride, cells, runs }
+        Self { array: array.clone(), rows, columns, stride, cells }
+    }
+
+    /// The cell of the taxel with this index in the array.
+    fn cell(&self, taxel: usize) -> usize {
+        (taxel / self.columns + 1) * self.stride + taxel % self.columns + 1
     }
 
     /// The cell of each existing taxel with its index in the array.
     fn taxels(&self) -> impl Iterator<Item = (usize, usize)> {
-        self.runs.iter().flat_map(|run| (0..run.len).map(|k| (run.cell + k, run.taxel + k)))
+        (0..self.array.len()).filter(|&taxel| self.array.has(taxel)).map(|taxel| (self.cell(taxel), taxel))
     }
 
-    /// The cell of the taxel with this index in the array, if it exists.
-    fn cell(&self, taxel: usize) -> Option<usize> {
-        let run = self.runs.iter().find(|run| (run.taxel..run.taxel + run.len).contains(&taxel))?;
-        Some(run.cell + taxel - run.taxel)
-    }
-
-    /// Copies the values of a frame into the cells of the existing taxels.
+    /// Copies the values of a frame into the cells.
     fn spread(&self, frame: &[f32], cells: &mut [f32]) {
-        for run in &self.runs {
-            cells[run.cell..][..run.len].copy_from_slice(&frame[run.taxel..][..run.len]);
+        for (row, values) in frame.chunks_exact(self.columns).take(self.rows).enumerate() {
+            cells[self.cell(row * self.columns)..][..self.columns].copy_from_slice(values);
         }
     }
 }
@@ -269,9 +248,7 @@ pub(super) struct LocalSums {
     noise: CellNoise,
     sides: Vec<Side>,
     values: Vec<f32>,
-    /// Cells that have been 0 since the first value: they have no value yet, and count as at rest.
-    waiting: Vec<usize>,
-    begun: bool,
+    waiting: Waiting,
 }
 
 impl LocalSums {
@@ -300,21 +277,13 @@ impl LocalSums {
         for &tau in running_us {
             sides.push(Side::new(&grid, &noise, Baseline::running(grid.cells, tau), 4.0, true));
         }
-        Ok(Self { values: vec![0.0; grid.cells], grid, noise, sides, waiting: vec![], begun: false })
+        Ok(Self { values: vec![0.0; grid.cells], grid, noise, sides, waiting: Waiting::default() })
     }
 
     /// Reads the values of all taxels, row by row, at `t` us; gives `each` the sums above the rest, then those above each running mean.
     pub(super) fn take(&mut self, t: i64, frame: &[f32], mut each: impl FnMut(SumPair)) {
         self.grid.spread(frame, &mut self.values);
-        let (values, rest) = (&mut self.values, self.sides[0].baseline.values());
-        if !self.begun {
-            self.waiting = self.grid.taxels().map(|(cell, _)| cell).filter(|&cell| values[cell] == 0.0).collect();
-            self.begun = true;
-        }
-        self.waiting.retain(|&cell| values[cell] == 0.0);
-        for &cell in &self.waiting {
-            values[cell] = if rest[cell] == f64::NO_REST { 0.0 } else { rest[cell] as f32 };
-        }
+        self.waiting.fill(&mut self.values, self.sides[0].baseline.values());
         for side in &mut self.sides {
             each(side.take(t, &self.values, &self.grid, &self.noise));
         }
@@ -322,7 +291,10 @@ impl LocalSums {
 
     /// Sets the rest of the taxel with this index in the array, if it exists.
     pub(super) fn set_rest(&mut self, taxel: usize, rest: f64) {
-        let Some(cell) = self.grid.cell(taxel) else { return };
+        if !self.grid.array.has(taxel) {
+            return;
+        }
+        let cell = self.grid.cell(taxel);
         if self.noise.sd[cell].is_none() {
             self.noise = self.noise.with(cell, &self.grid);
         }
@@ -336,7 +308,7 @@ impl LocalSums {
 
     /// The rest of the taxel with this index in the array; `None` if it is not known.
     pub(super) fn rest(&self, taxel: usize) -> Option<f64> {
-        let cell = self.grid.cell(taxel)?;
+        let cell = self.grid.cell(taxel);
         self.noise.sd[cell].map(|_| self.sides[0].baseline.values()[cell])
     }
 }

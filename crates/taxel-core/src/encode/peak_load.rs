@@ -1,7 +1,7 @@
 //! The largest deviation of a taxel from a tracked rest, in units of its own noise, with what several taxels add.
 
 use super::tare::Tare;
-use crate::rest::{Baseline, FAR_NOISE, Value};
+use crate::rest::{Baseline, FAR_NOISE, Value, Waiting};
 use crate::vectors::{LANES, wide};
 use crate::{Array, Result};
 
@@ -32,9 +32,7 @@ pub(super) struct PeakLoad {
     per_noise: Vec<f32>,
     least: f64,
     values: Vec<f32>,
-    /// Taxels that have been 0 since the first value: they have no value yet, and count as at rest.
-    waiting: Vec<usize>,
-    begun: bool,
+    waiting: Waiting,
 }
 
 impl PeakLoad {
@@ -49,21 +47,13 @@ impl PeakLoad {
             far[taxel] = (FAR_NOISE * noise) as f32;
         }
         let baseline = Baseline::tracked(rest.values().to_vec(), far);
-        Ok(Self { baseline, per_noise, least, values: vec![0.0; array.len()], waiting: vec![], begun: false })
+        Ok(Self { baseline, per_noise, least, values: vec![0.0; array.len()], waiting: Waiting::default() })
     }
 
     /// Reads the values of all taxels, row by row, at `t` us; returns the peak.
     pub(super) fn take(&mut self, t: i64, held: &[f32]) -> f64 {
         self.values.copy_from_slice(&held[..self.per_noise.len()]);
-        if !self.begun {
-            self.waiting = (0..self.values.len()).filter(|&taxel| self.values[taxel] == 0.0).collect();
-            self.begun = true;
-        }
-        let (values, rest) = (&mut self.values, self.baseline.values());
-        self.waiting.retain(|&taxel| values[taxel] == 0.0);
-        for &taxel in &self.waiting {
-            values[taxel] = if rest[taxel] == f64::NO_REST { 0.0 } else { rest[taxel] as f32 };
-        }
+        self.waiting.fill(&mut self.values, self.baseline.values());
         let (above, per_noise) = (self.baseline.take(t, &self.values), &self.per_noise[..]);
         // Those behind the last whole group stand in one of their own, beside zeros.
         let grouped = above.len() / LANES * LANES;

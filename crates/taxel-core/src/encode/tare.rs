@@ -171,7 +171,7 @@ impl Zeroing {
     /// `Problem`, naming the taxel.
     pub fn check(&self, array: &Array) -> Result<()> {
         let Self { x, y, rest, .. } = *self;
-        if x >= array.columns || y >= array.rows || array.exists.as_ref().is_some_and(|e| !e[array.index(x, y)]) {
+        if x >= array.columns || y >= array.rows || !array.has(array.index(x, y)) {
             let (rows, columns) = (array.rows, array.columns);
             return Err(problem!(
                 "taxel at row {y}, column {x}: does not exist in this array of {rows} x {columns} taxels"
@@ -315,10 +315,9 @@ impl TareBuilder {
         for (integral, &held) in self.integrals.iter_mut().zip(self.held.values()) {
             integral.extend(stop, held);
         }
-        let exists = |taxel: usize| self.array.exists.as_ref().is_none_or(|e| e[taxel]);
         let of_each = |measure: fn(&Integral) -> Option<f64>| -> Vec<Option<f64>> {
-            let known = (0..).zip(&self.integrals).map(|(taxel, integral)| (exists(taxel), integral));
-            known.map(|(exists, integral)| measure(integral).filter(|_| exists)).collect()
+            let of = |(taxel, integral)| measure(integral).filter(|_| self.array.has(taxel));
+            self.integrals.iter().enumerate().map(of).collect()
         };
         let (rest, noise) = (of_each(Integral::mean), of_each(Integral::deviation));
         if rest.iter().all(Option::is_none) {
