@@ -53,15 +53,7 @@ impl LoadCurve {
         }
         let last = events.t.iter().copied().chain(events.markers.iter().map(|marker| marker.t)).max().unwrap_or(0);
         stream.advance(last + SILENCE_US + LONGEST_REACH_US, &mut changes);
-        let empty = Self {
-            quantity: Quantity::Area,
-            changes: vec![],
-            frame_times: vec![],
-            clock,
-            period_us: frames.period_us,
-            last,
-        };
-        Ok(empty.each(quantities, changes))
+        Ok(Self::of_each(quantities, &changes, &[], clock, frames.period_us, last))
     }
 
     /// Each of several quantities in a recording of frames, which last `frame_us`, or by default their median distance;
@@ -91,18 +83,24 @@ impl LoadCurve {
             stream.push_frame(t, frame, &mut changes)?;
         }
         let last = frames.t.last().copied().unwrap_or(0);
-        let empty =
-            Self { quantity: Quantity::Area, changes: vec![], frame_times: frames.t.to_vec(), clock, period_us, last };
-        Ok(empty.each(quantities, changes))
+        Ok(Self::of_each(quantities, &changes, frames.t, clock, period_us, last))
     }
 
-    /// One curve like this for each quantity, whose changes are a train.
-    fn each(&self, quantities: &[Quantity], changes: Vec<Spike>) -> Vec<Self> {
-        let mut curves: Vec<Self> = quantities.iter().map(|&quantity| Self { quantity, ..self.clone() }).collect();
-        for change in changes {
-            curves[change.train as usize].changes.push(Spike { train: 0, ..change });
-        }
-        curves
+    /// A curve for each quantity, whose changes are a train.
+    fn of_each(
+        quantities: &[Quantity],
+        changes: &[Spike],
+        frame_times: &[i64],
+        clock: FrameClock,
+        period_us: f64,
+        last: i64,
+    ) -> Vec<Self> {
+        let of = |(train, &quantity): (u32, &Quantity)| {
+            let changes = changes.iter().filter(|change| change.train == train);
+            let changes = changes.map(|&change| Spike { train: 0, ..change }).collect();
+            Self { quantity, changes, frame_times: frame_times.to_vec(), clock, period_us, last }
+        };
+        (0..).zip(quantities).map(of).collect()
     }
 
     /// The quantity's changes: their times, ms, and what it is after each.
@@ -133,13 +131,7 @@ impl LoadCurve {
     ///
     /// `Problem` for another quantity.
     pub fn at_age(&self, age_ms: f64) -> Result<Vec<Decision>> {
-        if self.quantity != Quantity::Area {
-            return Err(problem!(
-                "ages"; " need a curve of the quantity area, because touches begin by area: this curve has another \
-                         quantity"
-            ));
-        }
-        Ok(self.run(Limits::at_age(0, f64::INFINITY, age_ms), self.changes.iter()))
+        self.of_touches("ages", Limits::at_age(0, f64::INFINITY, age_ms))
     }
 
     /// Every touch as it ends, with its duration, ms, as it is compared with a
@@ -149,13 +141,17 @@ impl LoadCurve {
     ///
     /// `Problem` for another quantity than the area.
     pub fn at_end(&self) -> Result<Vec<Decision>> {
+        self.of_touches("ends", Limits::at_end(f64::INFINITY))
+    }
+
+    fn of_touches(&self, what: &str, limits: Limits) -> Result<Vec<Decision>> {
         if self.quantity != Quantity::Area {
             return Err(problem!(
-                "ends"; " need a curve of the quantity area, because touches end by area: this curve has another \
-                         quantity"
+                what; " need a curve of the quantity area, because touches begin and end by area: this curve has \
+                       another quantity"
             ));
         }
-        Ok(self.run(Limits::at_end(f64::INFINITY), self.changes.iter()))
+        Ok(self.run(limits, self.changes.iter()))
     }
 
     fn run<'a>(&self, limits: Limits, changes: impl Iterator<Item = &'a Spike>) -> Vec<Decision> {
