@@ -140,7 +140,7 @@ impl Decoder {
     ///
     /// # Errors
     ///
-    /// `Problem` if the columns have less room than [`Self::most_rows`] requires, in which case nothing is read;
+    /// `Problem` if the columns have less room than [`most_rows`] requires, in which case nothing is read;
     /// `Interrupted` if asked to stop.
     pub fn fill(
         &mut self,
@@ -152,7 +152,7 @@ impl Decoder {
     ) -> Result<()> {
         /// Bytes between two checks of `stop`: some milliseconds of work.
         const PIECE: usize = 16 << 20;
-        columns.check_room(bytes.len(), self.most_rows(bytes.len()))?;
+        columns.check_room(bytes.len(), most_rows(bytes.len()))?;
         for piece in bytes.chunks(PIECE) {
             stop.check()?;
             self.decode(piece, arrived, columns);
@@ -184,7 +184,7 @@ impl Decoder {
         if total != Some(bytes.len()) {
             return Err(problem!("lengths"; ": each must be 0 or more, and their sum {} bytes", bytes.len()));
         }
-        columns.check_room(bytes.len(), self.most_rows(bytes.len()))?;
+        columns.check_room(bytes.len(), most_rows(bytes.len()))?;
         self.release(columns);
         let mut rest = bytes;
         for piece in lengths.chunks(PIECE) {
@@ -198,12 +198,6 @@ impl Decoder {
         }
         self.as_new();
         Ok(())
-    }
-
-    /// Most rows that the next `bytes` bytes can complete.
-    #[must_use]
-    pub fn most_rows(&self, bytes: usize) -> usize {
-        (self.have + bytes) / WORD_BYTES + 1
     }
 
     /// Marks the end of a datagram: a change whose intensity has not arrived gets none, and is appended.
