@@ -8,9 +8,6 @@ use super::threshold::OutputSpike;
 use crate::allowed::one_weight_a_train;
 use crate::{Result, SpikeKind, SpikeTrains, Stop, problem};
 
-/// The number of grid points between two checks for Ctrl-C.
-const POINTS_A_LOOK: f64 = 65_536.0;
-
 impl Neuron {
     /// Starts the neuron at `start` ms with its threshold multiplied by `threshold`.
     ///
@@ -44,34 +41,10 @@ impl Neuron {
             if k % 4096 == 0 {
                 stop.check()?;
             }
-            self.advance(&mut stream, trains.start, spike.t, &mut out, stop)?;
             stream.push(*spike, &mut out)?;
         }
-        self.advance(&mut stream, trains.start, trains.stop, &mut out, stop)?;
         stream.advance(trains.stop, &mut out);
         Ok(out)
-    }
-
-    /// Advances a stream on a grid towards `to` in pieces, checking for Ctrl-C; the caller advances the last piece.
-    fn advance(
-        &self,
-        stream: &mut NeuronStream,
-        start: f64,
-        to: f64,
-        out: &mut Vec<OutputSpike>,
-        stop: Stop<'_>,
-    ) -> Result<()> {
-        if self.time == Time::Continuous {
-            return Ok(());
-        }
-        let stretch = POINTS_A_LOOK * self.step_ms;
-        let mut next = ((stream.now() - start) / stretch).floor() + 1.0;
-        while start + next * stretch < to {
-            stop.check()?;
-            stream.advance(start + next * stretch, out);
-            next += 1.0;
-        }
-        Ok(())
     }
 
     /// The potential at `times` (ms, ascending), given that the neuron fired at `spikes` (ms, ascending); mV.

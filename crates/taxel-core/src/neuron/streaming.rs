@@ -75,11 +75,6 @@ impl NeuronStream {
         }
     }
 
-    /// The present time of the stream, ms.
-    pub(super) fn now(&self) -> f64 {
-        self.now
-    }
-
     /// The present potential by 6.7 (0 in the refractory time), mV.
     #[must_use]
     pub fn potential(&self) -> f64 {
