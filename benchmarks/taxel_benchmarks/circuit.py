@@ -1,16 +1,14 @@
-"""One frame's exact network of 64 x 64 taxels: against NumPy's dense solves, and with wires against SciPy's sparse one.
+"""One frame's exact network of 64 x 64 taxels: against NumPy's dense solves.
 
-Peers without wire resistance: ``numpy.linalg.solve`` of all 128 lines' balances with a right-hand side a read column,
-and of the 64 that are left when the read columns' lines, which only taxels join, are eliminated. With it (8192
-voltages): ``scipy.sparse.linalg.splu`` of the same matrix. Voltages are compared. All in one thread.
+Peers: ``numpy.linalg.solve`` of all 128 lines' balances with a right-hand side a read column,
+and of the 64 that are left when the read columns' lines, which only taxels join, are eliminated. Voltages
+are compared. All in one thread.
 
-Peer: `numpy.linalg.solve`, of all lines and of half, and SciPy's `splu`. Unit: CPU seconds a frame. Goal: not slower
+Peer: `numpy.linalg.solve`, of all lines and of half. Unit: CPU seconds a frame. Goal: not slower
 than any, and the same voltages.
 """
 
 import numpy as np
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
 
 from taxel.simulate.circuit import Fabric, VirtualGround
 from taxel_benchmarks._goals import at_most, not_slower
@@ -20,7 +18,6 @@ from taxel_benchmarks._rounds import measured
 PAIRS = {
     "numpy.linalg.solve": ("taxel", "numpy.linalg.solve"),
     "numpy.linalg.solve, half the lines": ("taxel", "numpy.linalg.solve, half the lines"),
-    "scipy splu, with wires": ("taxel, with wires", "scipy splu, with wires"),
 }
 
 
@@ -63,28 +60,6 @@ def eliminated(lines, g_us):
     return np.clip(lines.gain * (lines.v_trans - inputs), 0, lines.rail_v)
 
 
-def sparse(lines, g_us):
-    """Return the outputs by SciPy, with wires."""
-    n, m = g_us.shape
-    g = 1e-6 * g_us
-    source, sense, switch = ends(lines)
-    rows = np.arange(n * m).reshape(n, m)
-    columns = rows + n * m
-    wire = 1 / lines.wire_ohm
-    first, second = 1 / (1 / sense + lines.wire_ohm), 1 / (1 / switch + lines.wire_ohm)
-    pairs = [(rows, columns, g), (rows[:, 1:], rows[:, :-1], wire), (columns[1:], columns[:-1], wire)]
-    p, q, c = (np.concatenate([np.broadcast_to(one[k], one[0].shape).ravel() for one in pairs]) for k in range(3))
-    held = np.r_[rows[:, 0], columns[0]]
-    at = np.r_[p, q, p, q, held], np.r_[p, q, q, p, held]
-    a = csc_array((np.r_[c, c, -c, -c, np.full(n, first), np.full(m, second)], at), shape=(2 * n * m,) * 2)
-    b = np.zeros((2 * n * m, m))
-    b[rows[:, 0]] = first * source
-    b[columns[0]] = second * lines.v_trans * (1 - np.eye(m))
-    factor = splu(a, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    into = first * (source - factor.solve(b)[rows[:, 0]])
-    return np.clip(source - into / sense + 1e3 * lines.feedback_kohm * into, 0, lines.rail_v)
-
-
 def goals(result):
     """Return the goals with what a result reached."""
     apart = {f"{name}: largest difference, V": one for name, one in result["largest difference, V"].items()}
@@ -95,19 +70,16 @@ def run(*, quick):
     """Measure; quick: 16 x 16, few rounds."""
     size, rounds = (16, 3) if quick else (64, 25)
     g = pressed(size)
-    plain, wired = VirtualGround(), VirtualGround(wire_ohm=0.5)
+    plain = VirtualGround()
     apart = {
-        "without wires": float(np.abs(plain.volts(g) - dense(plain, g)).max()),
+        "all lines": float(np.abs(plain.volts(g) - dense(plain, g)).max()),
         "half the lines": float(np.abs(plain.volts(g) - eliminated(plain, g)).max()),
-        "with wires": float(np.abs(wired.volts(g) - sparse(wired, g)).max()),
     }
     found = measured(
         {
             "taxel": lambda: plain.volts(g),
             "numpy.linalg.solve": lambda: dense(plain, g),
             "numpy.linalg.solve, half the lines": lambda: eliminated(plain, g),
-            "taxel, with wires": lambda: wired.volts(g),
-            "scipy splu, with wires": lambda: sparse(wired, g),
         },
         PAIRS,
         rounds=rounds,

@@ -80,7 +80,6 @@ CALLS = {
     "sensor": lambda _: play([Silence(100.0)], seed=1, sensor={"exponent": 2.0}),
     "flaw": lambda _: Flaws(dead=2.0),
     "adaptive ramp": lambda _: AdaptiveRamp(steepest=600),
-    "wire": lambda _: VirtualGround(wire_ohm=1e-5),
     "conductance": lambda _: VirtualGround().volts([[1.0, -2.0]]),
     "no line": lambda _: Divider().volts(np.zeros((2, 0))),
     "step of a ramp": lambda _: Converter(ramp=200),

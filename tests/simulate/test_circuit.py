@@ -22,19 +22,13 @@ def solved(
 ) -> Any:
     """What the sense lines give, by the plainest nodal analysis: one unknown a node, no structure used.
 
-    Nodes: each crossing's on its sense line and on its driven line (one for the line without wires), and of each sense
-    line its end and the amplifier's output.
+    Nodes: each line, and of each sense line the amplifier's output.
     """
     rows, columns = g_us.shape
     of = ground or divider
     ends = np.arange(rows)
     outputs, switches = ends + rows, np.arange(columns) + 2 * rows
-    sense, driven = np.repeat(ends[:, None], columns, 1), np.repeat(switches[None], rows, 0)
     count = 2 * rows + columns
-    if of.wire_ohm:
-        sense = count + np.arange(g_us.size).reshape(rows, columns)
-        driven = sense + g_us.size
-        count += 2 * g_us.size
     a, b = np.zeros((count, count)), np.zeros(count)
 
     def tie(p: int, q: int, conductance: float) -> None:
@@ -43,10 +37,7 @@ def solved(
             a[m, n] -= conductance
 
     for i, k in np.ndindex(rows, columns):
-        tie(sense[i, k], driven[i, k], 1e-6 * g_us[i, k])
-        if of.wire_ohm:
-            tie(sense[i, k], sense[i, k - 1] if k else ends[i], 1 / of.wire_ohm)
-            tie(driven[i, k], driven[i - 1, k] if i else switches[k], 1 / of.wire_ohm)
+        tie(ends[i], switches[k], 1e-6 * g_us[i, k])
     idle, there = (ground.v_trans, 0.0) if ground is not None else (0.0, divider.supply_v)
     for k in range(columns):
         volts = there if k == read else idle
@@ -89,7 +80,6 @@ def test_virtual_ground_equals_a_plain_nodal_solve(seed, rows, columns):
         v_trans=random.uniform(0.2, 2.5),
         gain=10.0 ** random.uniform(1, 6) if seed % 3 else None,
         switch_ohm=random.choice([0.0, 2.5, 300.0]),
-        wire_ohm=random.choice([0.0, 0.5, 40.0]),
         rail_v=1e9,
     )
     wanted = every(g, ground=lines)
@@ -103,16 +93,14 @@ def test_dividers_equal_a_plain_nodal_solve(seed, rows, columns):
     lines = Divider(
         resistor_kohm=10.0 ** random.uniform(-1, 3),
         switch_ohm=random.choice([0.0, 20.0]),
-        wire_ohm=random.choice([0.0, 0.5, 40.0]),
     )
     assert lines.volts(g) == pytest.approx(every(g, divider=lines), rel=2e-6, abs=1e-9)
 
 
 @pytest.mark.skipif(shutil.which("ngspice") is None, reason="ngspice is not installed")
-@pytest.mark.parametrize("wire_ohm", [0.0, 12.0])
-def test_ngspice_agrees_on_eight_by_eight(tmp_path: Path, wire_ohm: float):
+def test_ngspice_agrees_on_eight_by_eight(tmp_path: Path):
     g = drawn(8, 8, 8) + 1e-3
-    lines = VirtualGround(gain=2e3, switch_ohm=30.0, wire_ohm=wire_ohm, rail_v=1e9)
+    lines = VirtualGround(gain=2e3, switch_ohm=30.0, rail_v=1e9)
     read = 5
     parts = ["* eight rows under virtual ground, column 5 read", f"VT t 0 {lines.v_trans}"]
     number = iter(range(10_000))
@@ -124,11 +112,7 @@ def test_ngspice_agrees_on_eight_by_eight(tmp_path: Path, wire_ohm: float):
         parts.append(f"E{i} o{i} 0 t r{i}x {lines.gain}")
         resistor(f"o{i}", f"r{i}x", 1e3 * lines.feedback_kohm)
         for k in range(8):
-            row, column = (f"r{i}_{k}", f"c{i}_{k}") if wire_ohm else (f"r{i}x", f"c{k}")
-            resistor(row, column, 1e6 / g[i, k])
-            if wire_ohm:
-                resistor(row, f"r{i}_{k - 1}" if k else f"r{i}x", wire_ohm)
-                resistor(column, f"c{i - 1}_{k}" if i else f"c{k}", wire_ohm)
+            resistor(f"r{i}x", f"c{k}", 1e6 / g[i, k])
     for k in range(8):
         resistor(f"c{k}", "0" if k == read else "t", lines.switch_ohm)
     wanted = " ".join(f"v(o{i})" for i in range(8))

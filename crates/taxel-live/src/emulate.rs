@@ -209,9 +209,8 @@ impl Emulator {
             while let Some(command) = run.next_command(frame) {
                 self.board.command(&command.to_bytes());
             }
-            // A request to stop is not an error here; the loop checks for it.
-            if !last && !self.read_taxels(&mut ticks, since_us, stop)? {
-                continue;
+            if !last {
+                self.read_taxels(&mut ticks, since_us)?;
             }
             if frame == 0 && self.options.arms {
                 self.board.arm(&ticks)?;
@@ -252,18 +251,15 @@ impl Emulator {
         Ok(())
     }
 
-    /// From what the taxels feel to what the board reads of them, through the circuit and the flaws; false where it was stopped.
-    fn read_taxels(&mut self, ticks: &mut [u16], since_us: f64, stop: Stop<'_>) -> Result<bool> {
+    /// From what the taxels feel to what the board reads of them, through the circuit and the flaws.
+    fn read_taxels(&mut self, ticks: &mut [u16], since_us: f64) -> Result<()> {
         if let Some(crossed) = &mut self.crossed {
-            match crossed.read(self.board.registers(), ticks, stop) {
-                Err(taxel_core::Error::Interrupted) => return Ok(false),
-                read => read?,
-            }
+            crossed.read(self.board.registers(), ticks)?;
         }
         if let Some(flawed) = &mut self.flawed {
             flawed.read(since_us, ticks);
         }
-        Ok(true)
+        Ok(())
     }
 
     /// Scans a frame, and sends its datagrams at its end; returns the time then.

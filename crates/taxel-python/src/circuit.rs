@@ -2,8 +2,8 @@
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
+use taxel_core::Result;
 use taxel_core::circuit::{Adaptive, Converter, ConverterScan, Divider, Fabric, VirtualGround};
-use taxel_core::{Result, Stop};
 
 use taxel_border::convert::{Column, array, column, slice};
 use taxel_border::enter::enter;
@@ -55,10 +55,10 @@ impl Lines {
         }
     }
 
-    fn volts(&self, rows: usize, columns: usize, conductance_us: &[f64], stop: Stop<'_>) -> Result<Vec<f64>> {
+    fn volts(&self, rows: usize, columns: usize, conductance_us: &[f64]) -> Result<Vec<f64>> {
         match self {
-            Self::Held(lines) => lines.volts(rows, columns, conductance_us, stop),
-            Self::Divided(lines) => lines.volts(rows, columns, conductance_us, stop),
+            Self::Held(lines) => lines.volts(rows, columns, conductance_us),
+            Self::Divided(lines) => lines.volts(rows, columns, conductance_us),
         }
     }
 }
@@ -78,7 +78,7 @@ pub fn circuit_volts<'py>(
         let mut out = vec![];
         for frame in frames.chunks((rows * columns).max(1)) {
             stop.check()?;
-            let volts = lines.volts(rows, columns, frame, stop)?;
+            let volts = lines.volts(rows, columns, frame)?;
             if out.is_empty() {
                 // One frame alone is handed on as it is.
                 out = volts;

@@ -357,13 +357,13 @@ impl WireBoard {
     ) -> PyResult<Vec<Bound<'py, PyBytes>>> {
         let (ticks, mut sent) = (slice("ticks", &ticks)?, vec![]);
         let accepted = accepted.as_ref().map(|accepted| slice("accepted", accepted)).transpose()?;
-        let datagrams = self.0.enter(py, |(board, crossed), stop| {
+        let datagrams = self.0.enter(py, |(board, crossed), _| {
             let mut ticks = Cow::from(ticks);
             // The board refuses a frame of another length.
             if let Some(crossed) = crossed
                 && ticks.len() == crossed.taxels()
             {
-                crossed.read(board.registers(), ticks.to_mut(), stop)?;
+                crossed.read(board.registers(), ticks.to_mut())?;
             }
             board.frame_accepting(&ticks, accepted, |datagram| {
                 let room = sent.len() < most;

@@ -37,7 +37,7 @@ app = App(name="emulate")
 
 
 #: The parts of the circuit that an option sets.
-_LINES, _CONVERTER = ("gain", "switch_ohm", "wire_ohm", "offset_mv"), ("hysteresis_v", "settle_us", "amplifier_us")
+_LINES, _CONVERTER = ("gain", "switch_ohm", "offset_mv"), ("hysteresis_v", "settle_us", "amplifier_us")
 _T = TypeVar("_T")
 
 

@@ -161,8 +161,8 @@ class _Lines(Value):
 class VirtualGround(_Lines):
     """Hold rows by transimpedance amplifiers and columns by switches, all at one voltage; the read column is grounded.
 
-    With ideal parts, each taxel gives ``v_trans (1 + feedback_kohm G)`` by itself. Switches, wires and amplifiers that
-    are not ideal make taxels influence each other: `volts` solves that network exactly.
+    With ideal parts, each taxel gives ``v_trans (1 + feedback_kohm G)`` by itself. Switches and amplifiers that are
+    not ideal make taxels influence each other: `volts` solves that network exactly. Lines have no resistance.
 
     Parameters
     ----------
@@ -176,8 +176,6 @@ class VirtualGround(_Lines):
         Standard deviation of the amplifiers' offsets.
     switch_ohm : float, ohm, from 0 to 1e9
         Resistance of a column's switch; default: that of an ADG734.
-    wire_ohm : float, ohm, from 0 to 1e9
-        Resistance of a line from one taxel to the next, and from its end to the first; 0, or 0.001 or more.
     rail_v : float, V, above 0
         Voltage at which amplifiers saturate; they also saturate at 0 V. The line of one that does counts as held.
     seed : int, 0 or more
@@ -189,9 +187,8 @@ class VirtualGround(_Lines):
 
     Notes
     -----
-    Thesis 4.3.2, figure 4.1. Without wire resistance the solution takes one dense factor with as many unknowns as rows;
-    with it, a sparse one with two voltages for each taxel. The gain is that of slow signals: within 3 us an amplifier
-    has less.
+    Thesis 4.3.2, figure 4.1. The solution takes one dense factor with as many unknowns as rows. The gain is that of
+    slow signals: within 3 us an amplifier has less.
 
     Examples
     --------
@@ -207,15 +204,14 @@ class VirtualGround(_Lines):
     gain: float | None = _GROUND.gain
     offset_mv: float = _GROUND.offset_mv
     switch_ohm: float = _GROUND.switch_ohm
-    wire_ohm: float = _GROUND.wire_ohm
     rail_v: float = _GROUND.rail_v
     seed: int = _GROUND.seed
 
     _kind = "virtual_ground"
 
     def ideal(self) -> Self:
-        """Return the same circuit with ideal amplifiers, switches and wires: no crosstalk."""
-        return type(self)(**{**self._values(), "gain": None, "offset_mv": 0.0, "switch_ohm": 0.0, "wire_ohm": 0.0})
+        """Return the same circuit with ideal amplifiers and switches: no crosstalk."""
+        return type(self)(**{**self._values(), "gain": None, "offset_mv": 0.0, "switch_ohm": 0.0})
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -232,8 +228,6 @@ class Divider(_Lines):
         The other half of the divider (a guess).
     switch_ohm : float, ohm, from 0 to 1e9
         Resistance of a driven line's switch.
-    wire_ohm : float, ohm, from 0 to 1e9
-        Resistance of a line from one taxel to the next, and from its end to the first; 0, or 0.001 or more.
 
     Raises
     ------
@@ -253,7 +247,6 @@ class Divider(_Lines):
     supply_v: float = _DIVIDER.supply_v
     resistor_kohm: float = _DIVIDER.resistor_kohm
     switch_ohm: float = _DIVIDER.switch_ohm
-    wire_ohm: float = _DIVIDER.wire_ohm
 
     _kind = "divider"
 

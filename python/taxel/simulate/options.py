@@ -46,7 +46,7 @@ class EmulateOptions:
     version_2: Version2 | None = None
     circuit: Circuit | None = option(
         None,
-        "Simulate the circuit of shared lines; NAME is one of gain, switch_ohm, wire_ohm, offset_mv, hysteresis_v, "
+        "Simulate the circuit of shared lines; NAME is one of gain, switch_ohm, offset_mv, hysteresis_v, "
         "settle_us, amplifier_us. One value is enough: the whole circuit is simulated, with the usual values for the "
         "other names. The board then reaches about 2.4 kHz.",
     )

@@ -4,7 +4,7 @@ use super::NOT_RETURNED;
 use crate::circuit::{Chain, Converter, ConverterScan, Ramp};
 use crate::contact::Sensor;
 use crate::wire::Registers;
-use crate::{Array, Result, Stop, problem};
+use crate::{Array, Result, problem};
 
 /// Passes frames of trip times through a circuit, one after the other.
 ///
@@ -72,8 +72,8 @@ impl Crossed {
     ///
     /// # Errors
     ///
-    /// `Problem` if the current registers leave the converter no time; `Interrupted`.
-    pub fn read(&mut self, registers: &Registers, ticks: &mut [u16], stop: Stop<'_>) -> Result<()> {
+    /// `Problem` if the current registers leave the converter no time.
+    pub fn read(&mut self, registers: &Registers, ticks: &mut [u16]) -> Result<()> {
         if self.registers != *registers {
             *self = Self::new(self.chain.clone(), registers, &self.array)?;
         }
@@ -82,7 +82,7 @@ impl Crossed {
         for (conductance, &value) in self.conductance_us.iter_mut().zip(&*ticks) {
             *conductance = lines.conductance_us_alone(alone_v(value)).max(0.0);
         }
-        let mut volts = lines.volts(self.array.rows.into(), self.array.columns.into(), &self.conductance_us, stop)?;
+        let mut volts = lines.volts(self.array.rows.into(), self.array.columns.into(), &self.conductance_us)?;
         for ((volts, &conductance), &value) in volts.iter_mut().zip(&self.conductance_us).zip(&*ticks) {
             *volts += alone_v(value) - lines.volts_alone(conductance);
         }
@@ -124,13 +124,7 @@ mod tests {
 
     fn ideal() -> Chain {
         Chain {
-            readout: VirtualGround {
-                gain: None,
-                offset_mv: 0.0,
-                switch_ohm: 0.0,
-                wire_ohm: 0.0,
-                ..VirtualGround::default()
-            },
+            readout: VirtualGround { gain: None, offset_mv: 0.0, switch_ohm: 0.0, ..VirtualGround::default() },
             converter: Converter { hysteresis_v: 0.0, settle_us: 0.0, discharge_us: 0.0, ..Converter::default() },
         }
     }
@@ -140,7 +134,7 @@ mod tests {
         let mut last = vec![];
         for frame in frames {
             last.clone_from(frame);
-            crossed.read(registers, &mut last, Stop::never()).unwrap();
+            crossed.read(registers, &mut last).unwrap();
         }
         last
     }
@@ -185,7 +179,7 @@ mod tests {
         let (fast, slow) = (Registers::preset("5.2 kHz").unwrap(), Registers::preset("2 kHz").unwrap());
         let mut crossed = Crossed::new(ideal(), &fast, &Array::thesis()).unwrap();
         let mut frame = vec![400; 4096];
-        crossed.read(&slow, &mut frame, Stop::never()).unwrap();
+        crossed.read(&slow, &mut frame).unwrap();
         assert_eq!(frame, vec![400; 4096]);
     }
 }

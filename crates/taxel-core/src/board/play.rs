@@ -89,7 +89,7 @@ impl Play {
         let mut first_frame = vec![0; self.array.len()];
         stage.frame(&mut first_frame, stop)?;
         if let Some(crossed) = &mut crossed {
-            crossed.read(&self.registers, &mut first_frame, stop)?;
+            crossed.read(&self.registers, &mut first_frame)?;
         }
         board.arm(&first_frame)?;
         Ok(Armed { board, crossed, stage, commands })
@@ -126,7 +126,7 @@ impl Play {
             if let Some(crossed) = &mut crossed
                 && more
             {
-                crossed.read(&self.registers, ticks, stop)?;
+                crossed.read(&self.registers, ticks)?;
             }
             Ok(more)
         };

@@ -164,7 +164,7 @@ impl Matrix {
 }
 
 /// Why a network was not solved.
-pub(super) fn too_far_apart() -> crate::Error {
+fn too_far_apart() -> crate::Error {
     problem!("the network's conductances differ too much for a solution in float64")
 }
 

@@ -5,20 +5,13 @@ use rand::rngs::StdRng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use super::grid::{Crossbar, LEAST_WIRE_OHM};
+use super::grid::Crossbar;
+use crate::Result;
 use crate::allowed::Range;
 use crate::parameters::parameters;
-use crate::{Result, Stop, problem};
 
-/// Resistances of switches and wires, ohm.
-const LINE: Range = Range::FROM_0.at_most(1e9);
-
-fn check_wire(wire_ohm: f64) -> Result<()> {
-    if wire_ohm > 0.0 && wire_ohm < LEAST_WIRE_OHM {
-        return Err(problem!("wire_ohm"; " is {wire_ohm} ohm: must be 0, or from {LEAST_WIRE_OHM} to 1e9"));
-    }
-    Ok(())
-}
+/// Resistances of switches, ohm.
+const SWITCH: Range = Range::FROM_0.at_most(1e9);
 
 parameters! {
     /// Rows held by transimpedance amplifiers and columns by switches, all at one voltage; the read column is at ground
@@ -35,9 +28,7 @@ parameters! {
         /// How far the amplifiers' offsets differ: standard deviation, mV.
         pub offset_mv: f64 = 0.0, "mV", Range::FROM_0.at_most(1e6);
         /// A column's switch, ohm: an ADG734's (typical).
-        pub switch_ohm: f64 = 2.5, "ohm", LINE;
-        /// A line from one taxel to the next, ohm; 0, or 0.001 or more.
-        pub wire_ohm: f64 = 0.0, "ohm", LINE;
+        pub switch_ohm: f64 = 2.5, "ohm", SWITCH;
         /// Where the amplifiers saturate, V; the lines of those that do count as held.
         pub rail_v: f64 = 5.0, "V", Range::ABOVE_0;
         /// The seed of the offsets.
@@ -52,8 +43,7 @@ impl VirtualGround {
     ///
     /// `Problem`, naming the parameter, its value and what would be right.
     pub fn check(&self) -> Result<()> {
-        self.check_ranges()?;
-        check_wire(self.wire_ohm)
+        self.check_ranges()
     }
 
     /// The amplifier's voltage for one taxel by itself, V, without its rails.
@@ -73,22 +63,16 @@ impl VirtualGround {
     /// # Errors
     ///
     /// As [`Crossbar::currents_ua`].
-    pub fn volts(&self, rows: usize, columns: usize, conductance_us: &[f64], stop: Stop<'_>) -> Result<Vec<f64>> {
+    pub fn volts(&self, rows: usize, columns: usize, conductance_us: &[f64]) -> Result<Vec<f64>> {
         let feedback_ohm = 1e3 * self.feedback_kohm;
         // An amplifier's input is its source V_trans A / (1 + A) behind R_f / (1 + A).
         let share = self.gain.map_or(0.0, |gain| (1.0 + gain).recip());
-        let grid = Crossbar {
-            rows,
-            columns,
-            sense_ohm: feedback_ohm * share,
-            drive_ohm: self.switch_ohm,
-            wire_ohm: self.wire_ohm,
-        };
+        let grid = Crossbar { rows, columns, sense_ohm: feedback_ohm * share, drive_ohm: self.switch_ohm };
         let mut draw = StdRng::seed_from_u64(self.seed);
         let mut normal = || -> f64 { StandardNormal.sample(&mut draw) };
         let offsets = (0..rows).map(|_| 1e-3 * self.offset_mv * normal());
         let source: Vec<f64> = offsets.map(|offset| offset * (1.0 - share) - self.v_trans * share).collect();
-        let mut volts = grid.currents_ua(conductance_us, -self.v_trans, &source, stop)?;
+        let mut volts = grid.currents_ua(conductance_us, -self.v_trans, &source)?;
         let per_ua = 1e-6 * (feedback_ohm - grid.sense_ohm);
         for (row, source) in volts.chunks_exact_mut(columns.max(1)).zip(&source) {
             for volts in row {
@@ -110,9 +94,7 @@ parameters! {
         /// The other half of the divider, kOhm. A guess.
         pub resistor_kohm: f64 = 10.0, "kOhm", Range::ABOVE_0.at_most(1e6);
         /// A driven line's switch, ohm.
-        pub switch_ohm: f64 = 0.0, "ohm", LINE;
-        /// A line from one taxel to the next, ohm; 0, or 0.001 or more.
-        pub wire_ohm: f64 = 0.0, "ohm", LINE;
+        pub switch_ohm: f64 = 0.0, "ohm", SWITCH;
     }
 }
 
@@ -123,8 +105,7 @@ impl Divider {
     ///
     /// As [`VirtualGround::check`].
     pub fn check(&self) -> Result<()> {
-        self.check_ranges()?;
-        check_wire(self.wire_ohm)
+        self.check_ranges()
     }
 
     /// The divider's voltage for one taxel by itself, V.
@@ -139,10 +120,10 @@ impl Divider {
     /// # Errors
     ///
     /// As [`Crossbar::currents_ua`].
-    pub fn volts(&self, rows: usize, columns: usize, conductance_us: &[f64], stop: Stop<'_>) -> Result<Vec<f64>> {
+    pub fn volts(&self, rows: usize, columns: usize, conductance_us: &[f64]) -> Result<Vec<f64>> {
         let sense_ohm = 1e3 * self.resistor_kohm;
-        let grid = Crossbar { rows, columns, sense_ohm, drive_ohm: self.switch_ohm, wire_ohm: self.wire_ohm };
-        let currents = grid.currents_ua(conductance_us, self.supply_v, &vec![0.0; rows], stop)?;
+        let grid = Crossbar { rows, columns, sense_ohm, drive_ohm: self.switch_ohm };
+        let currents = grid.currents_ua(conductance_us, self.supply_v, &vec![0.0; rows])?;
         Ok(currents.iter().map(|current| -1e-6 * sense_ohm * current).collect())
     }
 }
