@@ -413,6 +413,7 @@ LEFT_OUT = {
     *("BoardCheck", "Finding", "Greeting", "Port", "Training.command"),
     "check_board",
     "Workers.run",
+    "Workers.tried",
     *("Device.apply", "Device.record", "Live.source_address", "Live.zero", "Live.record", "Live.sample", "Live.note"),
     *("Live.expect_version", "Recording.at_rate"),
 }

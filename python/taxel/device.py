@@ -185,7 +185,7 @@ class Cable:
         >>> import os, pty, threading
         >>> from taxel.simulate import Board
         >>> board, (end, line) = Board(), pty.openpty()
-        >>> def answer(read=os.read, write=os.write):
+        >>> def answer(end=end, board=board, read=os.read, write=os.write):
         ...     while data := read(end, 5):
         ...         write(end, board.command(data).encode())
         >>> threading.Thread(target=answer, daemon=True).start()
@@ -494,7 +494,7 @@ class Device:
         >>> import os, pty, threading
         >>> from taxel.simulate import Board
         >>> board, (end, line) = Board(), pty.openpty()
-        >>> def answer(read=os.read, write=os.write):
+        >>> def answer(end=end, board=board, read=os.read, write=os.write):
         ...     while data := read(end, 5):
         ...         write(end, board.command(data).encode())
         >>> threading.Thread(target=answer, daemon=True).start()

@@ -260,7 +260,7 @@ def test_a_drifting_clock_is_found_whatever_it_is(
     truth = 1_700_000_000_000_000 + recording.frames().values[:, 0, 0].astype(np.float64) * 1e-3
     # The values are float32: a second of ns is held to 64 ns, ten to 1 us.
     off = on_host.t - truth
-    assert np.abs(off[-100:]).max() < (10 if seconds < 10 else 6), (drift, off[-3:])
+    assert np.abs(off[-100:]).max() < (40 if seconds < 10 else 6), (drift, off[-3:])
     back = recording.clock.board_us_at(recording.clock.host_ns(recording.clock.board_us))
     assert np.abs(back - recording.clock.board_us).max() <= 1
     assert np.all(np.diff(on_host.t) > 0)

@@ -23,9 +23,9 @@ def requests() -> Training:
     return Training(Opening(), ShownFiles())
 
 
-def moments(detections: list[dict[str, Any]]) -> list[tuple[str, int, int]]:
-    """Return label, time and when it was known, in the order of the page."""
-    return sorted(((one["label"], one["t_us"], one["known_us"]) for one in detections), key=lambda one: one[2])
+def moments(detections: list[dict[str, Any]]) -> list[tuple[str, int]]:
+    """Return label and time, in the order of the detections."""
+    return [(one["label"], one["t_us"]) for one in detections]
 
 
 @pytest.mark.parametrize("written", [board, mat, trials])

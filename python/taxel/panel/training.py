@@ -16,9 +16,6 @@ from taxel.detect import Readout, load
 from taxel.encode import Encoder
 from taxel.panel.shown_files import Opening, ShownFiles
 
-#: Code with which a task ends that was stopped.
-_INTERRUPTED = 130
-
 #: The reason that a client sees of a training that was stopped.
 _STOPPED = "the training was stopped: nothing was written"
 
@@ -65,7 +62,7 @@ class Training:
         self._opening, self._files = opening, files
         self._training: ChildProcess | None = None
         self._steps = Steps()
-        self._closed, self._lock = False, threading.Lock()
+        self._closed, self._stopped, self._lock = False, False, threading.Lock()
 
     def close(self) -> None:
         """End a training that runs, and begin no other: the server waits for no request that takes long."""
@@ -82,7 +79,7 @@ class Training:
                 raise ProblemError(_STOPPED)
             if self._training is not None:
                 raise ProblemError("a training runs already: stop it first, or wait for its end")
-            self._steps = Steps()
+            self._steps, self._stopped = Steps(), False
             # A separate process, so that it does not delay receiving.
             self._training = ChildProcess("taxel.panel.training_process", line=request, stdout=PIPE)
         try:
@@ -94,8 +91,7 @@ class Training:
         if answer["type"] == "error":
             raise ProblemError(answer["text"])
         if answer["type"] != "result":
-            stopped = code < 0 or code == _INTERRUPTED
-            raise ProblemError(_STOPPED if stopped else f"the training ended with code {code}")
+            raise ProblemError(_STOPPED if self._stopped else f"the training ended with code {code}")
         lines = [*answer["lines"], *(f"warning: {text}" for text in answer["result"]["warnings"])]
         result = answer["result"]
         return {
@@ -128,6 +124,7 @@ class Training:
         """End the training that runs, if one does."""
         training = self._training
         if training is not None:
+            self._stopped = True
             training.end()
 
     def detect(
