@@ -354,8 +354,8 @@ impl View {
         self.reopen()
     }
 
-    /// Shows columns of this width, us, which end at a time or, without one, at that of the view. Those of a view that follows are
-    /// [`COLUMN_US`] wide at least.
+    /// Shows columns of this width, us, which end at a time or, without one, at that of the view. Those of a view that
+    /// follows are 4 ms wide at least.
     ///
     /// # Errors
     ///
