@@ -140,10 +140,15 @@ pub(super) struct Fa1Afferents {
     blocks: Vec<Fa1Block>,
     /// Buffer for the afferents that may fire at a sample.
     near: Vec<Near>,
+    /// Equation 5.1 for every tick up to the largest so far.
+    table: Vec<[f64; BLOCK]>,
 }
 
 /// Range in which f32 is precise to seven digits, also for products of two values.
 const SOUND: RangeInclusive<f64> = 1e-18..=1e18;
+
+/// Number of different ticks that a word of the wire can hold.
+const TICKS: usize = 65_536;
 
 impl Fa1Afferents {
     pub(super) fn new(parameters: &Fa1) -> Self {
@@ -164,6 +169,34 @@ impl Fa1Afferents {
             most: f64::from((1_u32 << parameters.bits) - 1),
             blocks: vec![],
             near: vec![],
+            table: vec![],
+        }
+    }
+
+    /// Equation 5.1, from the table if all values are whole ticks.
+    #[inline(always)]
+    fn compress(alpha: f64, table: &mut Vec<[f64; BLOCK]>, values: &Block, rho: &mut [f64; BLOCK]) {
+        /// Added to a whole number below 2^23, it leaves that number in the sum's lowest bits.
+        const SHIFT: f32 = 8_388_608.0; // 2^23
+        let (mut odd, mut all) = (0, 0);
+        for &v in values {
+            all |= (v + SHIFT).to_bits();
+            odd |= ((v + SHIFT) - SHIFT).to_bits() ^ v.to_bits();
+            odd |= (v + SHIFT).to_bits() & !(SHIFT.to_bits() | (TICKS as u32 - 1));
+        }
+        if odd == 0 {
+            let last = all as usize % TICKS;
+            while table.len() <= last / BLOCK {
+                let (from, mut rho) = (table.len() * BLOCK, [0.0; BLOCK]);
+                power(&std::array::from_fn(|lane| (from + lane) as f32), alpha, &mut rho);
+                table.push(rho);
+            }
+            let table = &table.as_flattened()[..=last];
+            for (rho, &v) in rho.iter_mut().zip(values) {
+                *rho = table[(v + SHIFT).to_bits() as usize & last];
+            }
+        } else {
+            power(values, alpha, rho);
         }
     }
 
@@ -204,7 +237,7 @@ impl Fa1Afferents {
                 let (block, lane) = (near.channel as usize / BLOCK, near.channel as usize % BLOCK);
                 (values[k], base[k]) = (held[block][lane], self.blocks[block].base[lane]);
             }
-            power(&values, self.alpha, &mut rho);
+            Self::compress(self.alpha, &mut self.table, &values, &mut rho);
             for (k, &Near { channel, theta }) in some.iter().enumerate() {
                 let u = rho[k] - base[k];
                 // If theta is negative, both comparisons hold for a small U, which fires in neither direction.
@@ -264,7 +297,7 @@ impl Rule for Fa1Afferents {
         self.blocks = vec![blank; held.len()];
         for (block, values) in held.iter().enumerate() {
             let mut rho = [0.0; BLOCK];
-            power(values, self.alpha, &mut rho);
+            Self::compress(self.alpha, &mut self.table, values, &mut rho);
             for (lane, (&value, &rho)) in values.iter().zip(&rho).enumerate() {
                 self.reset(block * BLOCK + lane, value, rho, self.theta_0);
             }
@@ -299,7 +332,7 @@ impl Rule for Fa1Afferents {
         }
         let (mut values, mut rho) = ([0.0; BLOCK], [0.0; BLOCK]);
         (values[0], values[1]) = (from, to);
-        power(&values, self.alpha, &mut rho);
+        Self::compress(self.alpha, &mut self.table, &values, &mut rho);
         let (afferent, lane) = (&mut self.blocks[channel / BLOCK], channel % BLOCK);
         // U is exactly 0 if nothing was added: with a threshold of 0 a rounding error would fire.
         if afferent.base[lane] == rho[0] {
