@@ -269,8 +269,8 @@ def _sent(events: Events) -> NDArray[np.bool_]:
 def _at_rest(recording: Recording, registers: Registers) -> NDArray[np.float64]:
     """Return what taxels read at last, in ticks, shape (n, rows, columns), once the ramp was set; 0 where none came."""
     first, last = (int(t) for t in recording.events.t[[0, -1]])
-    set_us = min(_AHEAD * registers.frame_us, (last - first) / 2)
-    begin = max(first + set_us, last - _LAST * registers.frame_us)
+    # A board that answers slowly is given its ramp while it records: its last quarter is after that.
+    begin = last - min(_LAST * registers.frame_us, (last - first) / 4)
     values = recording.between(begin, last + 1).frames(1e6 / registers.frame_us).values.astype(np.float64)
     return np.where(_sent(recording.events), values, 0.0)
 
