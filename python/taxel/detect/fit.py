@@ -444,7 +444,7 @@ def _known(
 def better_by_rule(labels: Sequence[str], neurons: Score, rules: Score) -> tuple[str, ...]:
     """Return the labels that rules detect better than neurons, by scores of both on the same events.
 
-    They have fewer missed and false, or as few and are known earlier at the median.
+    They have fewer missed and false, or as few and are not known later at the median.
     """
 
     def worth(scored: Score, label: str) -> tuple[int, float]:
@@ -453,7 +453,7 @@ def better_by_rule(labels: Sequence[str], neurons: Score, rules: Score) -> tuple
             return 0, np.inf
         return one.rank[0], one.delay.median if one.found else np.inf
 
-    return tuple(label for label in labels if worth(rules, label) < worth(neurons, label))
+    return tuple(label for label in labels if worth(rules, label) <= worth(neurons, label))
 
 
 def _above(recipe: Recipe, noise_floor: float) -> Recipe:
