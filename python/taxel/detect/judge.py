@@ -79,7 +79,7 @@ class Judged:
         What the scores of each example call missed and false.
     by_rule : tuple of str
         The labels that their plain rule detects better than their neuron in all folds: with fewer missed and false, or
-        as few and known earlier. The score of each fold is of what was better inside its training data.
+        as few and not later. The score of each fold is of what was better inside its training data.
     """
 
     scores: tuple[Score, ...]
