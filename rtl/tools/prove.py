@@ -133,7 +133,7 @@ def checked(proof: Proof, mode: str, source: Path = SOURCES, longest: float = 36
     abc = next((ROOT / ".venv-rtl").glob("lib/python3*/site-packages/pyosys/yosys-abc"))
     programs = [f"--{p}={TOOLS / f'yowasp-{q}'}" for p, q in PROGRAMS]
     command = [str(TOOLS / "yowasp-sby"), "-f", *programs, f"--abc={abc}", str(job.relative_to(ROOT))]
-    paths = {"PATH": f"{TOOLS}:/usr/bin:/bin", "HOME": str(Path.home())}
+    paths = {"PATH": f"{TOOLS}:/usr/bin:/bin", "YOWASP_CACHE_DIR": str(TOOLS.parent / "cache")}
     with (folder / f"{mode}.log").open("w") as log:
         process = subprocess.Popen(command, cwd=ROOT, env=paths, stdout=log, stderr=subprocess.STDOUT)
         try:

@@ -63,7 +63,7 @@ BUILDS = (
 
 def run(program: str, *options: str) -> None:
     """Run a tool in the repository's root; what it prints is in the error where it fails."""
-    environment = os.environ | {"HOME": str(Path.home())}
+    environment = os.environ | {"YOWASP_CACHE_DIR": str(TOOLS.parent / "cache")}
     command = [str(TOOLS / program), *options]
     result = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
     if result.returncode:
