@@ -11,8 +11,9 @@ from plain_rules import ARRAY, FLOOR, clocks, events, tare
 
 import taxel
 from taxel import Frames, Neuron, Readout
-from taxel.detect import Example, Part, PlainRule, Recipe, judge, run
-from taxel.detect.fit import Fitter
+from taxel.detect import Example, Part, PlainRule, Recipe, judge, run, score
+from taxel.detect.fit import Fitter, better_by_rule
+from taxel.detections import Detections
 from taxel.encode import ContactArea, LevelCrossing
 
 NEURON = Neuron(tau=0.5, refractory=1.0, kernel="exponential", after_spike="reset", time="grid", step_ms=0.1)
@@ -76,6 +77,27 @@ def test_each_fold_is_scored_by_what_is_better_inside_its_training_data():
     judged = judge(examples, recipe, 4)
     assert judged.by_rule == ("on",)
     assert (judged.neurons.found, judged.plain.together.found, judged.together.found) == (0, 36, 36)
+
+
+@pytest.mark.parametrize(
+    ("neuron", "rule", "earlier", "better"),
+    [
+        ([0, 0, 1, 0, 1, 0, 0, 1], [2, 3, 4, 2, 3, 3, 2, 4], False, "neuron"),
+        ([3, 2, 3, 2], [0, 0, 1, 0], True, "rule"),
+        # One recording shows what may be chance.
+        ([0, 2, 13, 42, 1, 0, 0, 1, 0], [1, 1, 158, 46, 8, 0, 2, 1, 0], True, "rule"),
+        ([1, 0, 2], [1, 0, 2], True, "neuron"),
+        ([1, 0, 2], [1, 0, 2], False, "rule"),
+        ([1], [2], False, "neuron"),
+    ],
+)
+def test_a_neuron_runs_where_it_is_better_beyond_chance_or_as_right_and_earlier(neuron, rule, earlier, better):
+    events = 1_000_000 * np.arange(1, 201)
+    ways = [
+        [score(Detections(["on"] * (200 - n), events[n:], events[n:] + delay), {"on": events}) for n in wrong]
+        for wrong, delay in ((neuron, 1_000), (rule, 2_000 if earlier else 1_000))
+    ]
+    assert better_by_rule(["on"], *ways) == (("on",) if better == "rule" else ())
 
 
 @pytest.mark.filterwarnings("ignore:.*cannot be learnt")

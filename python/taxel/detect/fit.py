@@ -114,8 +114,8 @@ def fit(
     -----
     Target = event + the encoder's latency + the trained delay (thesis 6.5; the delay is ours). The event is the label,
     or where the recipe aligns labels what the sensor felt of it. Which of neuron and rule is better is found by
-    training on each half of the data and detecting in the other: the one with fewer missed and false, and of as many
-    the one that knows earlier.
+    training on each half of the data and detecting in the other: the rule, unless the neuron leaves fewer missed and
+    false by more than two standard errors over the recordings, or as many in each and knows earlier.
 
     Examples
     --------
@@ -260,7 +260,7 @@ class Fitter:
                 found += [self.detected(trained, part) for part in tested]
                 parts_found += tested
         each = ([one.by_neurons for one in found], [one.by_rules for one in found])
-        return better_by_rule(self.labels, *(self.score(way, parts_found) for way in each)) if found else ()
+        return better_by_rule(self.labels, *(self.scores(way, parts_found) for way in each)) if found else ()
 
     def _has_all(self, parts: Sequence[Part]) -> bool:
         """Whether parts have an event of each label."""
@@ -325,6 +325,10 @@ class Fitter:
         """Return the events of a label in parts of the examples, us, ascending."""
         nothing = np.empty(0, np.int64)
         return [np.sort(inside(self.examples[part.example].labels.get(label, nothing), part)) for part in parts]
+
+    def scores(self, found: Sequence[Detections], parts: Sequence[Part]) -> list[Score]:
+        """Return the score of detections in each part of the examples."""
+        return [self.score([detected], [part]) for detected, part in zip(found, parts, strict=True)]
 
     def score(self, found: Sequence[Detections], parts: Sequence[Part]) -> Score:
         """Return the score of detections in parts of the examples, as one."""
@@ -441,19 +445,29 @@ def _known(
     return known
 
 
-def better_by_rule(labels: Sequence[str], neurons: Score, rules: Score) -> tuple[str, ...]:
-    """Return the labels that rules detect better than neurons, by scores of both on the same events.
+def better_by_rule(labels: Sequence[str], neurons: Sequence[Score], rules: Sequence[Score]) -> tuple[str, ...]:
+    """Return the labels that rules detect better than neurons, by scores of both in the same parts of recordings.
 
-    They have fewer missed and false, or as few and are not known later at the median.
+    A neuron is better with fewer missed and false, by more than two standard errors of the paired difference over the
+    parts: what one recording shows may be chance, and the rule is simpler. With as many in each, what knows earlier at
+    the median is better.
     """
 
-    def worth(scored: Score, label: str) -> tuple[int, float]:
-        one = scored.by_label.get(label)
-        if one is None:
-            return 0, np.inf
-        return one.rank[0], one.delay.median if one.found else np.inf
+    def known(scores: Sequence[Score], label: str) -> float:
+        delays = np.concatenate([one.by_label[label].delays_ms for one in scores if label in one.by_label])
+        return float(np.median(delays)) if len(delays) else np.inf
 
-    return tuple(label for label in labels if worth(rules, label) <= worth(neurons, label))
+    def wrong(scores: Sequence[Score], label: str) -> NDArray[np.int64]:
+        return np.array([one.by_label[label].rank[0] if label in one.by_label else 0 for one in scores])
+
+    def by_rule(label: str) -> bool:
+        fewer = wrong(rules, label) - wrong(neurons, label)
+        if not fewer.any():
+            return known(rules, label) <= known(neurons, label)
+        by_chance = np.sqrt(len(fewer)) * np.std(fewer, ddof=1) if len(fewer) > 1 else 0.0
+        return bool(fewer.sum() <= 2.0 * by_chance)
+
+    return tuple(label for label in labels if by_rule(label))
 
 
 def _above(recipe: Recipe, noise_floor: float) -> Recipe:

@@ -78,8 +78,8 @@ class Judged:
     mistakes : tuple of Mistake
         What the scores of each example call missed and false.
     by_rule : tuple of str
-        The labels that their plain rule detects better than their neuron in all folds: with fewer missed and false, or
-        as few and not later. The score of each fold is of what was better inside its training data.
+        The labels that their plain rule detects better than their neuron in all folds, or as well but for chance. The
+        score of each fold is of what was better inside its training data.
     """
 
     scores: tuple[Score, ...]
@@ -185,13 +185,15 @@ def scored(fitter: Fitter, folds: Sequence[Fold], trained: Sequence[Trained]) ->
         for of_fold, parts_found in zip(trained, found, strict=True)
         for one in parts_found
     ]
-    neurons, rules = (fitter.score(each(way), parts) for way in ("by_neurons", "by_rules"))
+    ways = ("by_neurons", "by_rules")
+    neurons, rules = (fitter.score(each(way), parts) for way in ways)
     best = fitter.rules(fitter.whole)
     tuned = {label: rule if rules[label].found else None for label, rule in best.items()}
     own_rules = fitter.rules(fitter.whole, own=True)
     own_score = (own_rules, fitter.score(each("by_own"), parts)) if any(own_rules.values()) else None
     plain = PlainScore(tuned, None if fitter.lacks else rules, own_score, fitter.lacks)
-    better = better_by_rule([label for label in fitter.labels if tuned[label] is not None], neurons, rules)
+    with_rules = [label for label in fitter.labels if tuned[label] is not None]
+    better = better_by_rule(with_rules, *(fitter.scores(each(way), parts) for way in ways))
     joined, truths = _by_example(fitter, parts, chosen)
     scores = tuple(score(*compared, fitter.window_ms) for compared in zip(joined, truths, strict=True))
     together = score_together(joined, truths, fitter.window_ms)
