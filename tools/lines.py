@@ -39,7 +39,7 @@ PRODUCT = {
     "information": (1_300, "information"),
     "simulate": (870, "simulate"),
     "tasks": (1_400, "tasks options"),
-    "live, panel": (2_650, "live panel device board_check"),
+    "live, panel": (2_650, "live panel device serial_ports board_check"),
     "report, demo": (550, "report demo"),
     "command line": (2_000, "cli __main__"),
     "other modules": (0, MODULES),

@@ -17,7 +17,6 @@ from websockets.exceptions import ConnectionClosed
 from taxel import _core
 from taxel._base.errors import refused
 from taxel._core import ProblemError
-from taxel.device import ports
 from taxel.encode import Encoder
 from taxel.labels import Note
 from taxel.live.lines import preview
@@ -28,6 +27,7 @@ from taxel.panel.messages import text_of
 from taxel.panel.refusals import at_field, field_of, reason
 from taxel.panel.shown_files import judged
 from taxel.panel.threads import in_thread
+from taxel.serial_ports import ports
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
