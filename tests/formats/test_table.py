@@ -343,7 +343,7 @@ def test_a_column_of_labels_is_chosen_by_an_option_and_named_where_it_is_a_chann
         ("t_ms,a\n0,1\n10,x\n20,y\n30,z\n40,1\n", "[table]\ntime_column = 1\n", 3),
         ("a,b\n1,2\n", "[table]\ncolumns = ['a', 'b', 'c']", 1),
         ("a b c\nd e f\n", None, None),
-        ('t_s,a\n0.00,"1,201"\n0.01,"1,202"\n', None, None),
+        ("t_ms;a\n0;1,5\n10;1.234,5\n20;2,5\n", "[table]\nseparator = ';'\ndecimal = ','\ntime_column = 1\n", 3),
         ("t_s,a\n" + "0.1,1\n0.2,2\n" * 5 + "t_s,a,b\n" + "0.3,1,2\n0.4,1,2\n" * 5, None, 13),
         ("", None, None),
         ("1,2\n3,4\n", "[table]\nskip_lines = 9", None),

@@ -12,17 +12,27 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from refusal import refused
 
-import taxel
-from taxel import FormatError
-from taxel._base.errors import Place
 from taxel.formats.lines import KINDS, read_line
 from taxel.formats.times import repaired
 
-from .tables import frames, opened
+from .tables import frames, layouts, opened
 
+#: Separators, decimal marks, and marks between thousands.
+FORMS = [
+    *((separator, ".", thousands) for separator in ",;\t" for thousands in ("", ",", "'")),
+    *((separator, ",", thousands) for separator in ";\t" for thousands in ("", ".", "\N{NO-BREAK SPACE}")),
+    (",", ",", "."),
+]
 NUMBERS = st.floats(-1e6, 1e6, width=32).map(lambda value: round(value, 3))
+
+
+def written(number: str, decimal: str, thousands: str, separator: str) -> str:
+    """Return a number like 1,234.5 with other marks, in quotes where one of them is the separator."""
+    text = number.replace(".", "\n").replace(",", thousands).replace("\n", decimal)
+    return f'"{text}"' if separator in text else text
+
+
 WRITERS: dict[str, Callable[[list[str], list[float], list[list[float]]], str]] = {
     "json": lambda names, t, rows: "".join(
         json.dumps({"t": a, "p": row} if len(row) > 1 else {"t": a, names[0]: row[0]}) + "\n"
@@ -38,7 +48,7 @@ WRITERS: dict[str, Callable[[list[str], list[float], list[list[float]]], str]] =
 
 @given(
     data=st.data(),
-    form=st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), *WRITERS]),
+    form=st.sampled_from([*FORMS, *WRITERS]),
     taxels=st.integers(1, 6),
     count=st.integers(8, 30),
     step_ms=st.sampled_from([5, 10, 20, 100]),
@@ -63,10 +73,11 @@ def test_what_was_written_is_read_and_the_printed_layout_reads_it_again(
     if isinstance(form, str):
         head, lines = "", WRITERS[form](names, t, rows).splitlines()
     else:
-        separator, decimal = form
+        separator, *marks = form
         head = separator.join([f"Zeit [{unit}]", *names]) + "\n"
         lines = [
-            separator.join(f"{v}".replace(".", decimal) for v in (a, *row)) for a, row in zip(t, rows, strict=True)
+            separator.join(written(f"{v:,}", *marks, separator) for v in (a, *row))
+            for a, row in zip(t, rows, strict=True)
         ]
     if odd:
         at = data.draw(st.integers(2, count - 1))
@@ -109,16 +120,19 @@ def whole_tables(draw: st.DrawFn) -> tuple[str, list[int], list[list[float]]]:
     count, taxels, step_us = draw(st.integers(24, 40)), draw(st.integers(2, 4)), draw(st.sampled_from([5000, 20_000]))
     rows = draw(st.lists(st.lists(NUMBERS, min_size=taxels, max_size=taxels), min_size=count, max_size=count))
     name, begin, write = TIMES[draw(st.sampled_from([*TIMES]))]
-    separator, decimal = draw(st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")]))
+    separator, decimal, thousands = draw(st.sampled_from(FORMS))
     columns = [(name, [write(step_us * k) for k in range(count)])]
     for k in range(taxels):
-        columns.append((f"Zehe{k}", [f"{row[k]:g}".replace(".", decimal) for row in rows]))
-        rows = [[*row[:k], float(f"{row[k]:g}"), *row[k + 1 :]] for row in rows]
+        cells = [written(f"{row[k]:,}", decimal, thousands, separator) for row in rows]
+        columns.append((f"Zehe{k}", cells))
     beside = [BESIDE[kind] for kind in draw(st.sets(st.sampled_from([*BESIDE]), max_size=3))]
     columns += [(called, list(map(cell, range(count)))) for called, cell in beside]
     columns[0] = (
         name,
-        [cell.replace(".", decimal) if name in ("Zeit [s]", "Zeit [min]", "t") else cell for cell in columns[0][1]],
+        [
+            written(cell, decimal, thousands, separator) if name in ("Zeit [s]", "Zeit [min]", "t") else cell
+            for cell in columns[0][1]
+        ],
     )
     at = draw(st.permutations(range(len(columns))))
     order = [k for k in at if not 1 <= k <= taxels]
@@ -197,9 +211,26 @@ def test_any_line_has_cells_with_a_name_each_or_is_none(line: str, kind: str, de
     assert found is None or len(found.cells) == len(found.names)
 
 
-@pytest.mark.parametrize("cells", ['"1,{0}","1.234,{1}"', '"1,200","2,10{1}.5"', '"1,200","2,10{1}"'])
-def test_quoted_numbers_that_may_be_thousands_are_refused(tmp_path: Path, cells: str) -> None:
-    lines = [f"{10 * k},{cells.format(k % 7, k % 5)}" for k in range(20)]
-    (tmp_path / "a.csv").write_text("\n".join(["time_ms,a,b", *lines]) + "\n")
-    with refused(FormatError, place=Place("a.csv")):
-        taxel.open(tmp_path / "a.csv")
+@pytest.mark.parametrize(
+    ("separator", "line", "first"),
+    [
+        (",", '"1,{a}"|"1.234,{b}"', [1.0, 1234.0]),
+        (",", '"1,200"|"2,10{b}.5"', [1200.0, 2100.5]),
+        (";", "98{b}|1.23{a},5", [980.0, 1230.5]),
+        (",", '"1,200"|"2,10{b}"', ["1.2", "1200"]),
+        (";", "1.200|2.10{b}", ["1.2", "1200"]),
+        ("\t", "1,200|2,10{b}", ["1.2", "1200"]),
+        (";", "{c:,}|5", ["970", "970"]),
+        (",", '"1,200"|{b}.5', ["1200"]),
+    ],
+)
+def test_thousands_are_read_where_marks_show_them_and_asked_about_where_they_may_be_decimals(
+    tmp_path: Path, separator: str, line: str, first: list[Any]
+) -> None:
+    lines = [f"{10 * k}|{line.format(a=k % 7, b=k % 5, c=970 + 7 * k)}" for k in range(20)]
+    text = "\n".join(["time_ms|a|b", *lines, ""]).replace("|", separator)
+    if isinstance(first[0], float):
+        assert frames(opened(tmp_path, text))[1][0] == first
+    else:
+        found = [frames(opened(tmp_path, text, layout))[1][0][0] for layout in layouts(tmp_path, text)]
+        np.testing.assert_allclose(found, [float(value) for value in first])

@@ -15,7 +15,7 @@ from taxel._base.limits import VALUE
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.formats.layout import Table
-from taxel.formats.lines import MISSING, is_number, read_line
+from taxel.formats.lines import MISSING, OTHER, WITH_THOUSANDS, is_number, number_of, read_line
 from taxel.formats.times import ISO, UNITS_US, is_time, seconds_of
 
 
@@ -171,19 +171,20 @@ class Form:
             return seconds_of(cell.strip("\"'"))
         if column not in self._numbers or cell in self.missing:
             return math.nan
-        return float(cell.replace(",", ".") if self.table.decimal == "," else cell)
+        return number_of(cell, self.table.decimal, self.table.thousands)
 
     def _odd(self, cells: Sequence[str]) -> str:
         """Return what is odd about the cells of a line; "" if nothing is."""
-        decimal = self.table.decimal
-        if not any(is_number(cell, decimal) or is_time(cell) for cell in cells):
+        marks = decimal, thousands = self.table.decimal, self.table.thousands
+        if not any(is_number(cell, *marks) or is_time(cell) for cell in cells):
             return "of text"
         if len(cells) != len(self.names):
             return "with too few cells" if len(cells) < len(self.names) else "with too many cells"
         for k in self._numbers:
             # A reading may be missing, a time may not.
-            if not is_number(cells[k], decimal) and (cells[k] not in self.missing or k in self.columns.times):
-                return "with a cell that is no number"
+            if not is_number(cells[k], *marks) and (cells[k] not in self.missing or k in self.columns.times):
+                has_thousands = thousands is None and is_number(cells[k], decimal, OTHER[decimal])
+                return WITH_THOUSANDS if has_thousands else "with a cell that is no number"
         return "" if all(is_time(cells[k]) for k in self._texts) else "without a time"
 
 

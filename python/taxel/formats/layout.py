@@ -22,7 +22,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array, Places
 from taxel.formats.column_names import AXES
 from taxel.formats.event_camera import Reduction
-from taxel.formats.lines import KINDS
+from taxel.formats.lines import KINDS, THOUSANDS
 from taxel.formats.times import ISO, UNITS_US
 
 
@@ -48,6 +48,8 @@ class Table:
         days with points (01.05.2024 10:15:02,010) too, and, with AM or PM, with slashes, the month first.
     missing : str, optional
         A further cell without a value, beside those of `taxel.formats.lines.MISSING`.
+    thousands : str, optional
+        Character between the thousands of a number: 1.234,5 has "."; default: none.
     leave_out : list of str or int
         The columns that are not taxels, by name or number from 1, which may hold texts. All others are taxels.
     keep : str, optional
@@ -86,6 +88,7 @@ class Table:
     time_column: str | int | None = None
     time_unit: str = "s"
     missing: str | None = None
+    thousands: str | None = None
     leave_out: Sequence[str | int] = ()
     keep: str | None = None
     label_column: str | int | None = None
@@ -102,6 +105,8 @@ class Table:
         if len(text("separator", self.separator)) != 1:
             raise refused("separator", f" is {shown(self.separator)}: must be one character")
         text("decimal", self.decimal, (".", ","))
+        if self.thousands is not None and text("thousands", self.thousands, THOUSANDS) == self.decimal:
+            raise refused("thousands", f" is {shown(self.thousands)}, as decimal is: must be another character")
         text("lines", self.lines, KINDS)
         text("time_unit", self.time_unit, (*UNITS_US, ISO))
         integer("skip_lines", self.skip_lines, 0)

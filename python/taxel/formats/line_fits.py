@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel.formats.column_names import UNIT_BEHIND
-from taxel.formats.lines import MISSING, Line, has_marks, is_number, read_line
+from taxel.formats.lines import MISSING, THOUSANDS, Line, has_marks, is_number, number_of, read_line
 from taxel.formats.times import epoch_of, is_day, is_time
 
 #: Forms that are tried: kind of line, separator, decimal mark.
@@ -25,9 +25,12 @@ _FORMS = [
 ]
 #: A column is of numbers, or of times, if this share of its cells are; a reading must fit this share of all cells.
 _MOST, FITS = 0.6, 0.5
-#: What a program quotes because of the comma in it: a number with a decimal comma, or with thousands.
+#: What a program quotes, as for the comma in it: a number with a decimal comma, or with thousands.
 _QUOTED = re.compile(r'"([^"]*)"')
-_DECIMAL, _THOUSANDS = re.compile(r"[-+]?\d+,\d+"), re.compile(r"[-+]?\d{1,3}(?:[,.]\d{3})+(?:[,.]\d+)?")
+#: A cell of digits with marks between them.
+_MARKED = re.compile(rf"[-+]?\d[\d{''.join(THOUSANDS)}]*", re.ASCII)
+#: A number that may have thousands, or three decimals.
+THOUSAND = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)
 _HEX = re.compile(r"(?:0x)?(?:[0-9A-Fa-f]{2})+")
 _HEX_LETTER = re.compile(r"(?<![\w.])(?:0x)?[0-9]*[A-Fa-f][0-9A-Fa-f]*(?![\w.])")
 
@@ -39,6 +42,7 @@ class Fit:
     kind: str
     separator: str
     decimal: str
+    thousands: str | None
     #: Of each line that is not empty, its number from 0 and its cells.
     lines: Sequence[tuple[int, Line]]
     #: The places in `lines` of those that are frames.
@@ -65,8 +69,9 @@ class Fit:
 
     def numbers(self, column: int) -> NDArray[np.float64]:
         """Return the numbers of a column; NaN for other cells."""
-        cells = [cell.replace(",", ".") if self.decimal == "," else cell for cell in self.cells(column)]
-        return np.array([float(cell) if is_number(cell) else np.nan for cell in cells])
+        marks = self.decimal, self.thousands
+        cells = self.cells(column)
+        return np.array([number_of(cell, *marks) if is_number(cell, *marks) else np.nan for cell in cells])
 
     def ascends(self, column: int) -> bool:
         """Return whether a column ascends as times do, of which some may repeat, wrap or be out of order."""
@@ -100,9 +105,16 @@ def fits_in(
 
 
 def fits_of(
-    lines: Sequence[str], forms: Sequence[tuple[str, str, str]], missing: Sequence[str] = (), wanted: int | None = None
+    lines: Sequence[str],
+    forms: Sequence[tuple[str, str, str]],
+    missing: Sequence[str] = (),
+    wanted: int | None = None,
+    thousands: str | None = None,
 ) -> Iterator[Fit]:
-    """Yield each form that makes columns of numbers of the lines, as many as are wanted where any line has them."""
+    """Yield each form that makes columns of numbers of the lines, as many as are wanted where any line has them.
+
+    Of several forms each finds its mark between thousands.
+    """
     there = [(k, line) for k, line in enumerate(lines) if line.strip(" \t\r,;")]
     few = [line for _, line in there[-40:]]
     for kind, separator, decimal in forms:
@@ -120,7 +132,8 @@ def fits_of(
         if kind != "plain" and cells:
             names = Counter(line.names for _, line in cells).most_common(1)[0][0]
             cells = [(k, line.in_order(names)) for k, line in cells]
-        fit = _fit(kind, separator, decimal, cells, len(there), {*MISSING, *missing}, wanted)
+        mark = _thousands(cells, decimal) if len(forms) > 1 and kind == "plain" else thousands
+        fit = _fit((kind, separator, decimal), mark, cells, len(there), {*MISSING, *missing}, wanted)
         if fit is not None:
             yield fit
 
@@ -133,13 +146,33 @@ def _with_comma(lines: Sequence[str]) -> list[str]:
 def _are_quoted_numbers(lines: Sequence[str]) -> bool:
     """Return whether all that is quoted is one number with a comma each, which a comma does not split."""
     quoted = _with_comma(lines)
-    return bool(quoted) and all(_DECIMAL.fullmatch(cell) or _THOUSANDS.fullmatch(cell) for cell in quoted)
+    return bool(quoted) and all(is_number(cell, ",", ".") or is_number(cell, ".", ",") for cell in quoted)
 
 
 def _are_quoted_decimals(lines: Sequence[str]) -> bool:
-    """Return whether these have decimal commas: 1,234 alone may be a thousand."""
+    """Return whether all of these have decimal commas."""
     quoted = _with_comma(lines)
-    return all(map(_DECIMAL.fullmatch, quoted)) and not all(map(_THOUSANDS.fullmatch, quoted))
+    return bool(quoted) and all(is_number(cell, ",", ".") for cell in quoted)
+
+
+def _thousands(lines: Sequence[tuple[int, Line]], decimal: str) -> str | None:
+    """Return the mark between thousands that lines are sure to have; None where another may be right."""
+    widths = Counter(len(line.cells) for _, line in lines)
+    most = max(widths, key=lambda width: widths[width], default=0)
+    rows = [line.cells for _, line in lines if len(line.cells) == most]
+    columns = [
+        [cell for cell in column if _MARKED.fullmatch(cell) and not is_day(cell)] for column in zip(*rows, strict=True)
+    ]
+    cells = [cell for column in columns for cell in column]
+    has_decimals = any(decimal in cell and is_number(cell, decimal) and not THOUSAND.fullmatch(cell) for cell in cells)
+    for mark in THOUSANDS:
+        with_mark = [[cell for cell in column if mark in cell] for column in columns] if mark != decimal else []
+        fits = [[cell for cell in column if is_number(cell, decimal, mark)] for column in with_mark]
+        # A column of which some numbers have thousands has them in all.
+        if any(fits) and all(fit in ([], column) for fit, column in zip(fits, with_mark, strict=True)):
+            alone = all(THOUSAND.fullmatch(cell) for column in fits for cell in column)
+            return mark if has_decimals or not alone else None
+    return None
 
 
 def _have_units_behind_decimals(lines: Sequence[str]) -> bool:
@@ -150,9 +183,8 @@ def _have_units_behind_decimals(lines: Sequence[str]) -> bool:
 
 
 def _fit(
-    kind: str,
-    separator: str,
-    decimal: str,
+    form: tuple[str, str, str],
+    thousands: str | None,
     lines: Sequence[tuple[int, Line]],
     total: int,
     missing: set[str],
@@ -163,7 +195,7 @@ def _fit(
     def type_of(cell: str) -> str:
         if cell in missing:
             return ""
-        if is_number(cell, decimal):
+        if is_number(cell, form[2], thousands):
             return "number"
         return "time" if is_time(cell) else "day" if is_day(cell) else "text"
 
@@ -194,7 +226,7 @@ def _fit(
         return None
     below = len(lines) - body[0]
     purity = sum(each in ("number", "time", "empty") for each in named) / count * len(body) / below
-    return Fit(kind, separator, decimal, lines, body, named, purity, purity * len(body) / total)
+    return Fit(*form, thousands, lines, body, named, purity, purity * len(body) / total)
 
 
 def _hex(all_lines: Callable[[], Iterable[str]], lines: Sequence[str]) -> tuple[Fit | None, bool]:

@@ -11,6 +11,7 @@ import re
 from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cache
 
 from taxel._base.messages import counted
 from taxel.formats.column_names import UNIT_BEHIND
@@ -19,6 +20,12 @@ from taxel.formats.column_names import UNIT_BEHIND
 KINDS = ("plain", "marked", "json", "hex")
 #: Cells that tables hold where a value is missing.
 MISSING = ("", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "-", "--", "null", "NULL", "None")
+
+#: Marks between the thousands of a number, as countries have them.
+THOUSANDS = (".", ",", "'", "’", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}")
+OTHER = {".": ",", ",": "."}
+#: What is odd about a line with thousands where none are known.
+WITH_THOUSANDS = "with a number with thousands"
 
 _NUMBERS = {
     ".": re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII),
@@ -102,15 +109,38 @@ class OddLines:
         ]
 
 
-def is_number(cell: str, decimal: str = ".") -> bool:
+def is_number(cell: str, decimal: str = ".", thousands: str | None = None) -> bool:
     """Return whether a cell states a number.
 
     Examples
     --------
     >>> is_number("-1.5e3"), is_number("1,5"), is_number("1,5", ","), is_number("1,", ","), is_number("1_000")
     (True, False, True, False, False)
+    >>> is_number("1.234,5", ",", "."), is_number("0.234", ",", "."), is_number("1.23", ",", ".")
+    (True, False, False)
     """
-    return _NUMBERS[decimal].fullmatch(cell) is not None
+    if _NUMBERS[decimal].fullmatch(cell) is not None:
+        return True
+    return thousands is not None and _grouped(decimal, thousands).fullmatch(cell) is not None
+
+
+@cache
+def _grouped(decimal: str, thousands: str) -> re.Pattern[str]:
+    """Return the pattern of a number with marks between all of its thousands."""
+    behind, between = map(re.escape, (decimal, thousands))
+    return re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{between}\d{{3}})+(?:{behind}\d+)?", re.ASCII)
+
+
+def number_of(cell: str, decimal: str, thousands: str | None) -> float:
+    """Return the number that a cell states.
+
+    Examples
+    --------
+    >>> number_of("1.234,5", ",", "."), number_of("-1,234", ".", ",")
+    (1234.5, -1234.0)
+    """
+    bare = cell if thousands is None else cell.replace(thousands, "")
+    return float(bare.replace(",", ".") if decimal == "," else bare)
 
 
 def read_line(line: str, kind: str = "marked", separator: str = ",", decimal: str = ".") -> Line | None:

@@ -25,7 +25,7 @@ from taxel.formats.checks import around
 from taxel.formats.column_names import AXES, axes_of
 from taxel.formats.form import Form
 from taxel.formats.layout import Layout
-from taxel.formats.lines import MISSING, OddLines, is_number
+from taxel.formats.lines import MISSING, OTHER, WITH_THOUSANDS, OddLines, is_number
 from taxel.formats.opened import readers_of, sources_of
 from taxel.formats.table_columns import EVENT_COLUMNS
 from taxel.formats.table_form import form_of
@@ -161,7 +161,8 @@ def read_rows(text: Text, form: Form, *, ends_empty: bool = False) -> Rows:
     FormatError : more of them than may be left out, or no line of numbers
     """
     how = form.table
-    fits = how.lines == "plain" and how.frame_end is None and how.frame_begin is None
+    # To pandas a mark between thousands may be anywhere in a number.
+    fits = how.lines == "plain" and how.frame_end is how.frame_begin is how.thousands is None
     rows = _at_once(text, form, ends_empty) if fits else None
     return _line_by_line(text, form) if rows is None else rows
 
@@ -274,6 +275,9 @@ def _line_by_line(text: Text, form: Form) -> Rows:
         if waiting and how.has_lines:
             rows.begins.append(len(rows.numbers))
             waiting = False
+        if odd == WITH_THOUSANDS:
+            right = f"write thousands = {OTHER[how.decimal]!r} in [table] of the layout, as lines above show none"
+            raise unreadable(f"a number has thousands; {right}", text.path, line=number)
         if odd:
             rows.odd.add(odd, number)
             last = number

@@ -334,6 +334,8 @@ def said_of(draft: Draft, time: int | None) -> Iterator[str]:
     yield kinds.get(table.lines, f"separated by {marks.get(table.separator, table.separator)}")
     if table.decimal == ",":
         yield "decimal commas"
+    if table.thousands is not None:
+        yield f"thousands by {table.thousands!r}"
     if time is not None:
         yield f"time {table.time_column!r} in {table.time_unit}"
     else:

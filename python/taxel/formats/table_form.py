@@ -23,8 +23,8 @@ from taxel.formats import column_names
 from taxel.formats.form import Form
 from taxel.formats.layout import Layout, Table
 from taxel.formats.layout_text import refuse_to_choose
-from taxel.formats.line_fits import FITS, Fit, fits_in, fits_of
-from taxel.formats.lines import is_number, read_line
+from taxel.formats.line_fits import FITS, THOUSAND, Fit, fits_in, fits_of
+from taxel.formats.lines import OTHER, is_number, number_of, read_line
 from taxel.formats.table_columns import (
     Changes,
     Draft,
@@ -88,7 +88,8 @@ def _stated(text: Text, how: Table) -> Form:
     """Return the form of a table that a layout describes."""
     shown_lines = ["" if k < how.skip_lines or how.is_between(line) else line for k, line in enumerate(text.head)]
     missing = () if how.missing is None else (how.missing,)
-    fit = next(fits_of(shown_lines, [(how.lines, how.separator, how.decimal)], missing), None)
+    stated = [(how.lines, how.separator, how.decimal)]
+    fit = next(fits_of(shown_lines, stated, missing, thousands=how.thousands), None)
     line = how.skip_lines + 1
     if fit is None:
         why = f"no line of numbers between separators {how.separator!r}; write what is right in [table] of the layout"
@@ -144,6 +145,7 @@ def _as_it_looks(text: Text, layout: Layout, label_column: str | int | None) -> 
     stated = layout.rows is not None or layout.rate_hz is not None or layout.path != text.path
     draft.set(label_column=label_column)
     time = time_of(draft, is_stated=stated)
+    _ask_of_thousands(draft, time)
     if time is None and draft.table.frame_time is None and not stated:
         _without_times(draft, text)
     taxels = taxels_of(draft, time)
@@ -165,7 +167,10 @@ def _as_it_looks(text: Text, layout: Layout, label_column: str | int | None) -> 
 def _refuse_lines_above(text: Text, fit: Fit) -> None:
     """Refuse a table above which are many lines of numbers in another number of columns."""
     rows = [line.cells for _, line in fit.lines[: fit.body[0]]]
-    odd = sum(len(cells) > 1 and 2 * sum(is_number(cell, fit.decimal) for cell in cells) > len(cells) for cells in rows)
+    odd = sum(
+        len(cells) > 1 and 2 * sum(is_number(cell, fit.decimal, fit.thousands) for cell in cells) > len(cells)
+        for cells in rows
+    )
     if odd > max(FEW_ODD, ODD * len(fit.body)):
         why = f"{odd} lines above have numbers in another number of columns than the {len(fit.body)} from here on"
         raise unreadable(why, text.path, line=fit.first + 1)
@@ -184,7 +189,7 @@ def _decided(draft: Draft, other: Draft) -> Draft:
     if any(other.names):
         return other
     first, second = (counted(each.fit.count, "column") for each in (draft, other))
-    keys = ("separator", "decimal", "skip_lines", "lines")
+    keys = ("separator", "decimal", "thousands", "skip_lines", "lines")
     changes = {key: getattr(other.table, key) for key in keys} | {"time_column": None, "leave_out": []}
     draft.ask(f"{first} or {second}", {first: {}, second: changes})
     return draft
@@ -193,7 +198,8 @@ def _decided(draft: Draft, other: Draft) -> Draft:
 def draft_of(fit: Fit, lines: Sequence[str]) -> Draft:
     """Return the names above a table, and how its lines are read."""
     above = [(k, list(line.cells)) for k, line in fit.lines[: fit.body[0]] if not _is_rule(line.cells)]
-    table = Table(separator=fit.separator, decimal=fit.decimal, lines=fit.kind, skip_lines=fit.first)
+    keys = ("separator", "decimal", "thousands")
+    table = Table(**{key: getattr(fit, key) for key in keys}, lines=fit.kind, skip_lines=fit.first)
     if fit.kind != "plain":
         table = replace(table, separator=fit.separator if fit.kind == "hex" else ",")
         own = fit.lines[fit.body[0]][1].names
@@ -222,6 +228,32 @@ def draft_of(fit: Fit, lines: Sequence[str]) -> Draft:
         return Draft(fit, replace(table, columns=list(names)), names, tuple(map(column_names.unit_of, names)))
     stripped = tuple(unit.strip("[]()") for unit in units[: len(names)]) or tuple(map(column_names.unit_of, names))
     return Draft(fit, replace(table, skip_lines=at_names), names, stripped)
+
+
+def _ask_of_thousands(draft: Draft, time: int | None) -> None:
+    """Ask whether all numbers with a mark have thousands or three decimals, where nothing else in the table says it."""
+    fit, mark, other = draft.fit, draft.fit.thousands or draft.fit.decimal, OTHER[draft.fit.decimal]
+    columns = [[cell for cell in fit.cells(k) if is_number(cell, fit.decimal, fit.thousands)] for k in range(fit.count)]
+    marked = [[cell for cell in column if mark in cell] for column in columns]
+    if fit.kind != "plain" or not any(marked) or not all(THOUSAND.fullmatch(cell) for row in marked for cell in row):
+        return
+    # Numbers below a thousand have no mark, and those with decimals have one.
+    have_both = any(
+        with_mark and any(number_of(cell, ".", None) for cell in column if cell not in with_mark)
+        for column, with_mark in zip(columns, marked, strict=True)
+    )
+    # Where commas are decimal, semicolons separate, and programs in English write commas.
+    is_usual = fit.separator == ";" if mark == "," else fit.separator != ";"
+    example = next(filter(None, marked))[0]
+    if fit.thousands is not None and not have_both:
+        draft.ask(f"{example} may be a thousand", {f"thousands by {mark!r}": {}})
+    elif fit.thousands is None and (have_both or not is_usual):
+        changes = {"decimal": other, "thousands": mark}
+        if time is not None and fit.types[time] == "number" and column_names.time_unit(draft.names[time]) == "":
+            numbers = replace(fit, decimal=other, thousands=mark).numbers(time)
+            changes["time_unit"] = unit_of_times(numbers)[0]
+        why = f"{example} has decimals, or is a thousand"
+        draft.ask(why, {f"decimals by {mark!r}": {}, f"thousands by {mark!r}": changes}, first=True)
 
 
 def _is_rule(cells: Sequence[str]) -> bool:
