@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from hypothesis import given
@@ -146,3 +147,20 @@ def test_a_last_axis_of_one_is_none(tmp_path: Path) -> None:
     frames = np.arange(480.0).reshape(30, 4, 4, 1)
     np.savez(tmp_path / "a.npz", film=frames, t_ms=np.arange(30) * 20)
     np.testing.assert_array_equal(values(opened(tmp_path / "a.npz")), frames[..., 0])
+
+
+@pytest.mark.parametrize("ending", [".npy", ".npz", ".h5"])
+@pytest.mark.filterwarnings("ignore:a")
+def test_an_array_of_records_is_a_table_of_its_fields(tmp_path: Path, ending: str) -> None:
+    kinds = [("t_ms", "<i8"), ("seq", "<u4"), ("state", "S4"), ("palm", [("N", "<f4", (2, 4))])]
+    records, path = np.zeros(30, kinds), tmp_path / f"a{ending}"
+    records["t_ms"], records["seq"], records["state"] = 10 * np.arange(30), np.arange(30), b"rest"
+    records["palm"]["N"] = np.random.default_rng(1).random((30, 2, 4))
+    if ending == ".h5":
+        with h5py.File(path, "w") as file:
+            file["run/walk"] = records
+    else:
+        np.save(path, records) if ending == ".npy" else np.savez(path, walk=records)
+    found = taxel.open(path).frames()
+    np.testing.assert_array_equal(found.values, records["palm"]["N"])
+    assert found.t.tolist() == [10_000 * k for k in range(30)]

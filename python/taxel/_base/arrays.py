@@ -28,6 +28,8 @@ from taxel._core import Error, ProblemError
 if TYPE_CHECKING:
     import h5py
 
+#: The endings of files of arrays.
+ARRAYS = (".npy", ".npz", ".h5", ".hdf5", ".mat")
 #: NumPy's kinds of numbers, and of what else is read: texts and records of numbers.
 _NUMBERS, _OTHERS = "biuf", "UV"
 #: MATLAB's classes of arrays of numbers, as SciPy names them.
@@ -71,6 +73,43 @@ def fields_of(path: str | os.PathLike[str]) -> tuple[str, ...]:
     except Exception:
         return ()
     return tuple(dtype.fields or ())
+
+
+def records_in(path: str | os.PathLike[str]) -> str | None:
+    """Return the name of the array of records of a file that holds nothing else; None of any other file.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> place = Path(tempfile.mkdtemp()) / "a.npz"
+    >>> np.savez(place, walk=np.zeros(3, [("t", "<i8"), ("heel", "<f4")]))
+    >>> records_in(place)
+    'walk'
+    """
+    try:
+        with _stored(Path(path)) as found:
+            only = [name for name, array in found.items() if array.dtype.names and len(found) == 1]
+    except (Error, OSError):
+        return None
+    return only[0] if only else None
+
+
+def columns_of(records: NDArray[Any], above: str = "") -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield the columns of records with their names: those of fields, and the places within them.
+
+    Examples
+    --------
+    >>> fields = [("t", "<i8"), ("palm", [("force", "<f4", 2)])]
+    >>> [name for name, _ in columns_of(np.zeros(3, fields))]
+    ['t', 'palm.force[0]', 'palm.force[1]']
+    """
+    for name in records.dtype.names or ():
+        values = records[name]
+        if values.dtype.names:
+            yield from columns_of(values, f"{above}{name}.")
+            continue
+        for place in np.ndindex(values.shape[1:]):
+            yield above + name + "".join(f"[{k}]" for k in place), values[:, *place]
 
 
 def shapes(path: str | os.PathLike[str], *, with_texts: bool = False) -> dict[str, tuple[int, ...]]:

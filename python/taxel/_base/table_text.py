@@ -12,6 +12,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import IO, Any, cast
 
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.arrays import ARRAYS, columns_of, read_arrays, records_in
 from taxel._base.errors import damaged, unreadable
 from taxel._base.messages import first_line, installing
 
@@ -48,7 +52,7 @@ class Text:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.is_file = path.suffix.lower() not in SHEETS and not self._rows
+        self.is_file = path.suffix.lower() not in (*SHEETS, *ARRAYS) and not self._rows
         self._encoding = ""
         #: Whether the last of the lines that were read has an end.
         self.ends_in_line = True
@@ -134,11 +138,16 @@ class Text:
 
     @cached_property
     def _sheet(self) -> str:
-        """The first sheet with numbers of a spreadsheet, or a table of Parquet, as lines of cells between tabs."""
+        """A table as lines of cells between tabs: a sheet with numbers, one of Parquet, or an array of records."""
         if self._rows:
             return "".join(f"{json.dumps(row)}\n" for row in self._rows)
         import pandas as pd  # noqa: PLC0415  takes long
 
+        if self.path.suffix.lower() in ARRAYS:
+            name = records_in(self.path) or ""
+            records = read_arrays(self.path, [name])[name].ravel()
+            columns = {name: _cells(column) for name, column in columns_of(records)}
+            return str(pd.DataFrame(columns).to_csv(sep="\t", index=False))
         try:
             if self.path.suffix.lower() == ".parquet":
                 table = pd.read_parquet(self.path)
@@ -152,6 +161,12 @@ class Text:
             raise damaged(self.path, f"{self.path.suffix} file", first_line(error)) from None
         largest = max(sheets.values(), key=lambda sheet: sheet.notna().to_numpy().sum(), default=pd.DataFrame())
         return str(largest.map(_cell).to_csv(sep="\t", index=False, header=False))
+
+
+def _cells(column: NDArray[Any]) -> NDArray[Any]:
+    """Return a column of records as tables of text have it: texts without their bytes, 0 and 1."""
+    kinds = {"S": np.str_, "b": np.uint8}
+    return column.astype(kinds.get(column.dtype.kind, column.dtype))
 
 
 def _cell(value: Any) -> Any:

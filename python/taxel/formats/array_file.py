@@ -23,9 +23,6 @@ from taxel.formats.times import in_order, unit_of_times
 from taxel.frames import Frames
 from taxel.reading import InMemory
 
-#: The endings of files of arrays.
-ARRAYS = (".npy", ".npz", ".h5", ".hdf5", ".mat")
-
 
 def read_array_file(path: Path, layout: Layout) -> list[InMemory]:
     """Return a reader of the frames of a file of arrays, of each trial and each axis.

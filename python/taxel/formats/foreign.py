@@ -1,14 +1,10 @@
-"""Files of other programs: those that can be read in two ways, and those that taxel does not read."""
+"""Files of other programs that taxel does not read."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from taxel._base.errors import unreadable
-from taxel._base.table_text import Text
-from taxel.formats.array_file import ARRAYS, look
-from taxel.formats.layout import Layout
-from taxel.formats.table_form import form_of
 
 #: What to save instead of files of other programs that taxel does not read, by their endings.
 CONTAINERS = {
@@ -32,20 +28,6 @@ CONTAINERS = {
     ".pdf": "save the table in it as .csv",
     ".mp4": "taxel reads no films; save the readings as .csv or .npy",
 }
-
-
-def check_foreign(path: Path, layout: Layout | None) -> None:
-    """Refuse a table or arrays that cannot be read, or in two ways, by their beginning.
-
-    Raises
-    ------
-    FormatError : as of `taxel.formats.table.read_table`
-    """
-    how = Layout(path) if layout is None else layout
-    if path.suffix.lower() in ARRAYS:
-        look(path, how)
-    else:
-        form_of(Text(path), how)
 
 
 def refuse_container(path: Path) -> None:

@@ -13,20 +13,22 @@ from typing import TypeAlias
 
 from taxel import _core
 from taxel._base.arguments import checked_path, flag, shown
-from taxel._base.arrays import fields_of, stored_names
+from taxel._base.arrays import ARRAYS, fields_of, records_in, stored_names
 from taxel._base.errors import refused
+from taxel._base.table_text import Text
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats import emed, event_camera, moticon, pedar, tekscan, xdf
-from taxel.formats.array_file import ARRAYS, read_array_file
+from taxel.formats.array_file import look, read_array_file
 from taxel.formats.event_camera import ENDINGS as CAMERA
 from taxel.formats.event_camera import Reduction
-from taxel.formats.foreign import check_foreign, refuse_container
+from taxel.formats.foreign import refuse_container
 from taxel.formats.layout import Layout, advice
 from taxel.formats.ros import is_bag, read_ros
 from taxel.formats.table import ENDINGS as TABLES
 from taxel.formats.table import read_table
+from taxel.formats.table_form import form_of
 from taxel.reading import ENDINGS, Facts, InMemory, Reader
 from taxel.recording.beside import LABELS, is_label_table
 from taxel.recording.layout import check_size
@@ -149,8 +151,8 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
         **{name: Kind(maker.knows, maker.read) for name, maker in MAKERS.items()},
         "event_camera": Kind(event_camera.knows, read_camera),
         "npz": Kind(_is_npz, read_npz),
-        "arrays": Kind(lambda path: _ending(*ARRAYS)(path) and not are_spike_trains(path), read_arrays),
         "table": Kind(_is_table, read_rows),
+        "arrays": Kind(lambda path: _ending(*ARRAYS)(path) and not are_spike_trains(path), read_arrays),
     }.items()
 
 
@@ -187,6 +189,9 @@ def _is_npz(path: Path) -> bool:
 
 
 def _is_table(path: Path) -> bool:
+    """Return whether a file is a table of text or of a spreadsheet, or an array of records."""
+    if _ending(*ARRAYS)(path):
+        return records_in(path) is not None
     return _ending(*TABLES)(path) and not (path.suffix.lower() in _LABELS and is_label_table(path))
 
 
@@ -248,8 +253,10 @@ def check_recording(path: Path, layout: GivenLayout = None) -> None:
             _core.RecordingReader(path)
         case "csv":
             check_head(path)
-        case "table" | "arrays":
-            check_foreign(path, found)
+        case "table":
+            form_of(Text(path), found or Layout(path))
+        case "arrays":
+            look(path, found or Layout(path))
 
 
 def is_folder(path: Path) -> bool:
