@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import reduce
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,6 +35,8 @@ __all__ = ["Topic", "is_bag", "read_ros", "topics"]
 _ROS1, _SQLITE = b"#ROSBAG V", b"SQLite format 3\0"
 #: The first bytes of a .mcap: its magic and the code of the header, before the header's length and its profile.
 _MCAP = b"\x89MCAP0\r\n\x01"
+#: So many messages of a topic are looked at for numbers.
+_FIRST = 1000
 #: A stamp that is further from the bag's time of its message is wrong, ns; stamps count if so many are right.
 _DAY_NS, _MOST = 86_400 * 10**9, 0.9
 IMAGE = "sensor_msgs/msg/Image"
@@ -238,24 +241,37 @@ def topics(path: Path, ros: str | None = None) -> list[Topic]:
 
 
 def _of_topic(bag: Any, topic: str) -> Iterator[Topic]:
-    """Yield the fields of a topic by the first message that has numbers; all are counted."""
+    """Yield the fields of a topic by the first message that has numbers; the bag's index counts all."""
     connections = [connection for connection in bag.connections if connection.topic == topic]
     kind, count = connections[0].msgtype, sum(connection.msgcount for connection in connections)
     if kind not in bag.typestore.fielddefs:
         yield Topic(topic, kind, "", (), "", count, None, f"no definition of {kind}")
         return
-    times, found = list[int](), dict[str, NDArray[Any]]()
-    for connection, at, data in bag.messages(connections):
-        times.append(at)
+    begin, found = None, dict[str, NDArray[Any]]()
+    for connection, at, data in islice(bag.messages(connections), _FIRST):
+        begin = at if begin is None else begin
         try:
-            found = found or _numbers(bag.deserialize(data, connection.msgtype))
+            found = _numbers(bag.deserialize(data, connection.msgtype))
         except FormatError as error:
             yield Topic(topic, kind, "", (), "", count, None, str(error))
             return
-    span = np.ptp(times) / 1e9 if times else 0.0
-    rate = (len(times) - 1) / span if span > 0 else None
+        if found:
+            break
+    span = _last(bag, connections, begin) - begin if found and begin is not None else 0
+    rate = (count - 1) / span * 1e9 if span > 0 else None
     for field, values in found.items():
-        yield Topic(topic, kind, field, values.shape, values.dtype.name, len(times), rate)
+        yield Topic(topic, kind, field, values.shape, values.dtype.name, count, rate)
+
+
+def _last(bag: Any, connections: Sequence[Any], begin: int) -> int:
+    """Return the time of the last message of connections, ns: that of most is near the bag's end."""
+    before = 10**9
+    while True:
+        start = max(bag.end_time - before, begin)
+        times = [at for _, at, _ in bag.messages(connections, start=start)]
+        if times or start == begin:
+            return max(times, default=begin)
+        before *= 4
 
 
 def _chosen(
