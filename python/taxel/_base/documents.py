@@ -44,14 +44,14 @@ def read_text(path: str | os.PathLike[str]) -> str:
     return decoded(path, data)
 
 
-def decoded(path: str | os.PathLike[str], data: bytes) -> str:
-    """Return the text of a file's bytes, UTF-8 with or without BOM, or UTF-16 with one.
+def decoded(path: str | os.PathLike[str], data: bytes, marked: tuple[bytes, str] | None = None) -> str:
+    """Return the text of a file's bytes, UTF-8 with or without BOM, or UTF-16 with one; or as `marked` says.
 
     Raises
     ------
     FormatError : neither (names line and byte)
     """
-    mark, encoding = mark_of(data)
+    mark, encoding = marked or mark_of(data)
     try:
         return data[len(mark) :].decode(encoding)
     except UnicodeDecodeError as error:

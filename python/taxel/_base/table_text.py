@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arrays import ARRAYS, columns_of, read_arrays, records_in
+from taxel._base.documents import mark_of
 from taxel._base.errors import damaged, unreadable
 from taxel._base.messages import first_line, installing
 
-__all__ = ["SHEETS", "TEXTS", "Text", "beginning"]
+__all__ = ["SHEETS", "TEXTS", "Text", "beginning", "marked"]
 
 #: The endings of tables of text, also compressed by gzip, and of tables that pandas reads as a whole.
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".json", ".jsonl", ".ndjson")
@@ -172,6 +173,17 @@ def _cells(column: NDArray[Any]) -> NDArray[Any]:
 def _cell(value: Any) -> Any:
     """Return the cell of a sheet as tables of text have it: dates with times as of ISO 8601."""
     return value.isoformat(sep=" ") if hasattr(value, "isoformat") and hasattr(value, "hour") else value
+
+
+def marked(path: Path, data: bytes) -> tuple[bytes, str]:
+    """Return the byte-order mark of a table's bytes, or none, and their encoding, as of `Text`.
+
+    Raises
+    ------
+    FormatError : no text
+    """
+    mark, encoding = mark_of(data)
+    return (mark, encoding) if mark else (mark, _encoding(path, data).removesuffix("-sig"))
 
 
 def _encoding(path: Path, head: bytes) -> str:

@@ -13,9 +13,10 @@ from typing import BinaryIO, TypeAlias
 
 from filelock import FileLock, Timeout
 
-from taxel._base.documents import decoded, mark_of
+from taxel._base.documents import decoded
 from taxel._base.files import write_whole
 from taxel._base.header_table import lines_of, separator_of
+from taxel._base.table_text import marked
 from taxel._core import FormatError, ProblemError
 from taxel.labels import Note, by_clock, is_from_beginning, rows_of, text_with
 
@@ -66,7 +67,8 @@ class LabelFile:
         FormatError : no table of labels (names the line)
         OSError : it cannot be read
         """
-        rows, _ = rows_of(self.path, lines_of(decoded(self.path, self._text() or b"")))
+        text = self._text() or b""
+        rows, _ = rows_of(self.path, lines_of(decoded(self.path, text, marked(self.path, text))))
         return _in_order(map(self._in_view, rows))
 
     def change(self, edits: Sequence[Edit]) -> tuple[tuple[Edit, ...], tuple[Note, ...]]:
@@ -105,7 +107,8 @@ class LabelFile:
     def _try_to_change(self, edits: Sequence[Edit]) -> tuple[tuple[Edit, ...], tuple[Note, ...]]:
         text = self._text()
         try:
-            lines = lines_of(decoded(self.path, text or b""))
+            mark, encoding = marked(self.path, text or b"")
+            lines = lines_of(decoded(self.path, text or b"", (mark, encoding)))
             found, columns = rows_of(self.path, lines)
         except FormatError as error:
             self._check_unchanged(text)
@@ -118,9 +121,13 @@ class LabelFile:
         if inverse:
             end = next((end for end in ("\r\n", "\r") if lines and lines[0].endswith(end)), "\n")
             separator = separator_of(next((line for line in lines if line.strip()), ""))
-            mark, encoding = mark_of(text or b"")
             in_file = rows.in_file(lambda row: self._in_file(row, counts_from_beginning))
-            new = mark + text_with(in_file, columns, end, separator).encode(encoding)
+            written = text_with(in_file, columns, end, separator)
+            try:
+                new = mark + written.encode(encoding)
+            except UnicodeEncodeError:
+                # Windows-1252 has few letters.
+                new = written.encode()
 
             def write(file: BinaryIO) -> None:
                 file.write(new)
