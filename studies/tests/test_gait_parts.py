@@ -19,13 +19,12 @@ from taxel_studies.gait.pieces import Piece, joined
 def piece(name: str, on: list[list[float]], off: list[list[float]], truth: list[float], stop: float = 1000.0) -> Piece:
     return Piece(
         name=name,
-        unit=name.split("/", maxsplit=1)[0],
         person=name.split("/", maxsplit=1)[0],
         group="patient" if name[0] == "p" else "healthy",
         spikes=SpikeTrains.from_lists([*on, *off], 0.0, stop),
         truth={"contact": np.array(truth)},
         scored=(0.0, stop),
-        sums={"total": (np.arange(0.0, stop, 10.0), np.zeros(int(stop) // 10))},
+        load=(np.arange(0.0, stop, 10.0), np.zeros(int(stop) // 10)),
     )
 
 

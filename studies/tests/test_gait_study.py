@@ -7,7 +7,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from tests.formats.making import interpolated, write_gaitndd
+from tests.formats.making import interpolated
 
 from taxel import FormatError, ProblemError
 from taxel_studies import load
@@ -118,11 +118,3 @@ def test_a_file_that_cannot_be_read_ends_the_study_before_anything_is_reckoned(d
     with pytest.raises(FormatError, match=r"^GaPt99_01\.txt, line"):
         load(name).run(report, size="toy", data=folder, quiet=True)
     assert not list(report.rglob("*.pkl"))
-
-
-def test_a_recording_shorter_than_the_running_range_is_refused(tmp_path):
-    folder = tmp_path / "insole_gaitndd"
-    folder.mkdir()
-    write_gaitndd(folder, "park3", samples=2700)
-    with pytest.raises(FormatError, match=r"^insole_gaitndd/park3 left: lasts 8\.99667 s, and .* want 10 s$"):
-        study(tmp_path, tmp_path / "report")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import ProblemError
-from taxel.detect import Example, Fold, Part, Recipe, Score, judge, score
+from taxel.detect import Example, Fold, Judged, Part, Recipe, Score, judge, score
 from taxel.detections import Detections
 from taxel.encode import Encoder
-from taxel.learn import ConeR
 from taxel.spikes import to_ms, to_us
 from taxel_rules import SKIM
 from taxel_studies.gait import insole, protocols, rules
-from taxel_studies.gait.pieces import Piece, joined
+from taxel_studies.gait.pieces import Piece, Signal, joined
 from taxel_studies.gait.protocols import Scope
 from taxel_studies.gait.sources import SOURCES, Encoded, encoded
 
@@ -46,8 +46,7 @@ def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``tested``: by unit the detections (of SKIM these ``by_threshold``); ``fit``: the attributes of the learner, or
-        the rule's numbers; of a neuron also its ``point``, and the result of that ``inside`` the folds.
+        ``tested``: by row the detections (of SKIM these ``by_threshold``); ``point``: a neuron's, or a rule's numbers.
     """
     source, left_out = params["source"], params["left_out"]
     folder = data / SOURCES[source].folder
@@ -57,13 +56,7 @@ def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
         return _Rows(source, params["event"], scope, encoded(folder, source, encoder), seed)
 
     if params["kind"] == "neuron":
-        # The points of each encoder are one recipe.
-        encoders = {json.dumps(point["encoder"], sort_keys=True): point["encoder"] for point in params["points"]}
-        tries = [
-            _neuron(rows(one), [p for p in params["points"] if p["encoder"] == one], left_out, params)
-            for one in encoders.values()
-        ]
-        return min(tries, key=lambda one: one[0])[1]
+        return _neuron(rows, params["points"], left_out, params)
     if params["kind"] == "skim":
         return _skim(rows(params["point"]["encoder"]), params["point"], left_out, params)
     return _rule(rows(params["encoder"]), params["rule"], left_out, params["train"])
@@ -79,40 +72,34 @@ class _Rows:
     encoding: Encoded
     seed: int
 
-    def _pieces(self, groups: Sequence[int]) -> list[Piece]:
-        """Return the pieces, or stretches of them, of groups."""
-        parts = [part for g in groups for part in self.scope.groups[g]]
+    def pieces(self, group: int) -> list[Piece]:
+        """Return the pieces, or stretches of them, of a group."""
         pieces = self.encoding.pieces
         return [
             pieces[n] if np.isinf(stop) else pieces[n].between(float(to_ms(start)), float(to_ms(stop)))
-            for n, start, stop in parts
+            for n, start, stop in self.scope.groups[group]
         ]
 
-    def tested(self, group: int) -> list[Piece]:
-        """Return the rows of a group."""
-        return self.by_unit(self._pieces([group]))
-
-    def by_unit(self, pieces: list[Piece]) -> list[Piece]:
+    def rows(self, pieces: list[Piece]) -> list[Piece]:
         """Return the rows of pieces: footfalls of a person joined to one row, recordings as they are."""
         if SOURCES[self.source].by_minute:
             return pieces
-        return [joined([p for p in pieces if p.unit == unit], unit) for unit in dict.fromkeys(p.unit for p in pieces)]
+        return [joined([p for p in pieces if p.person == one]) for one in dict.fromkeys(p.person for p in pieces)]
 
     def training(self, without: Sequence[int], size: Mapping[str, int]) -> list[Piece]:
         """Return the training pieces, cut down to so many seconds a piece or footfalls a person."""
-        pieces = self._pieces([g for g in range(len(self.scope.groups)) if g not in without])
+        pieces = [p for g in range(len(self.scope.groups)) if g not in without for p in self.pieces(g)]
         if "seconds" in size:
             return [
                 p.between(p.scored[0], min(p.scored[0] + 1000.0 * size["seconds"], p.scored[1]))
                 for p in pieces
                 if p.scored[1] > p.scored[0]
             ]
-        counts: dict[str, int] = {}
+        counts = Counter[str]()
         chosen = []
         for k in np.random.default_rng([self.seed, 1]).permutation(len(pieces)):
-            person = pieces[k].person
-            counts[person] = counts.get(person, 0) + 1
-            if counts[person] <= size["count"]:
+            counts[pieces[k].person] += 1
+            if counts[pieces[k].person] <= size["count"]:
                 chosen.append(pieces[k])
         return chosen
 
@@ -129,66 +116,40 @@ class _Rows:
 
 
 def _neuron(
-    rows: _Rows, points: list[Any], left_out: int, params: Mapping[str, Any]
-) -> tuple[tuple[float, float], dict[str, Any]]:
-    """Train and test the best of points with one encoder; return the rank that it has inside, and the result."""
-    pieces: list[Piece] = []
+    rows: Callable[[Mapping[str, Any]], _Rows], points: list[Any], left_out: int, params: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Train and test a point; of several the one with the best rank inside the folds, of equal ones the first."""
+    inside: dict[int, tuple[float, float]] = {}
+    for n, point in enumerate(points) if "search" in params else ():
+        here = rows(point["encoder"])
+        folds = [(sorted([left_out, g]), g) for g in range(len(here.scope.groups)) if g != left_out]
+        # One after the first that cannot be learnt, as where two labels are within its refractory time, is left out.
+        with suppress(*([ProblemError] if n else [])):
+            inside[n] = _judged(here, point, folds, params["search"]).together.rank
+    point = points[min(inside, key=lambda n: inside[n], default=0)]
+    here = rows(point["encoder"])
+    judged = _judged(here, point, [([left_out], left_out)], params["train"])
+    tested = zip(judged.scores, here.rows(here.pieces(left_out)), strict=True)
+    return {"tested": {row.name: _plain(one, row) for one, row in tested}, "point": point}
 
-    def fold(without: Sequence[int], size: str, group: int) -> Fold:
-        """Add the pieces of a fold to the examples, and return it."""
-        training, tested = rows.patterns(without, params[size]), rows.tested(group)
+
+def _judged(
+    rows: _Rows, point: Mapping[str, Any], folds: Sequence[tuple[list[int], int]], size: Mapping[str, int]
+) -> Judged:
+    """Train a point once for each group that is tested, without some groups."""
+    pieces: list[Piece] = []
+    parts = []
+    for without, group in folds:
+        training, tested = rows.patterns(without, size), rows.rows(rows.pieces(group))
         first, last = len(pieces), len(pieces) + len(training)
-        pieces.extend([*training, *tested])
+        pieces += [*training, *tested]
         scored = [to_us(np.array(piece.scored)) for piece in tested]
         test = [Part(last + n, float(start), float(stop) + 1) for n, (start, stop) in enumerate(scored)]
-        return Fold([Part(n) for n in range(first, last)], test)
-
-    others = [g for g in range(len(rows.scope.groups)) if g != left_out]
-    inner = [fold(sorted([left_out, g]), "search", g) for g in others] if "search" in params else []
-    outer = fold([left_out], "train", left_out)
-    event, encoder = rows.event, points[0]["encoder"]
+        parts.append(Fold([Part(n) for n in range(first, last)], test))
+    event = rows.event
     examples = [Example(p.spikes, {event: np.rint(to_us(p.truth[event])).astype(np.int64)}) for p in pieces]
-    plans = [Recipe(Encoder.from_json(json.dumps(encoder)), {}, {event: point["learner"]}) for point in points]
-    chosen, inside = _best(plans, examples, inner) if inner else (plans[0], None)
-    judged = judge(examples, chosen, [outer], window_ms=WINDOW_MS)
-    learner = judged.trained[0].learners[event]
-    assert isinstance(learner, ConeR)  # spike trains have no plain rule
-    result = {
-        "tested": {row.unit: _plain(one, row) for row, one in zip(rows.tested(left_out), judged.scores, strict=True)},
-        "fit": _fit_figures(learner, [pieces[n] for n, *_ in outer.train], event),
-        "point": {"encoder": encoder, "learner": dict(chosen.neurons[event])},
-        "inside": None,
-    }
-    if inside is None:
-        return (0, 0.0), result
-    rms_ms = round(inside.rank[1], 3) if np.isfinite(inside.rank[1]) else None
-    return inside.rank, result | {"inside": {"missed": inside.missed, "false": inside.false, "rms_ms": rms_ms}}
-
-
-def _best(plans: Sequence[Recipe], examples: Sequence[Example], folds: Sequence[Fold]) -> tuple[Recipe, Score]:
-    """Return the recipe with the best rank in folds, and its score; of equal ones the first.
-
-    One after the first that cannot be learnt, as where two labels are within its refractory time, is left out.
-    """
-    scored = [(plans[0], judge(examples, plans[0], folds, window_ms=WINDOW_MS).together)]
-    for plan in plans[1:]:
-        with suppress(ProblemError):
-            scored.append((plan, judge(examples, plan, folds, window_ms=WINDOW_MS).together))
-    return min(scored, key=lambda one: one[1].rank)
-
-
-def _fit_figures(cone: ConeR, patterns: list[Piece], event: str) -> dict[str, Any]:
-    return {
-        "targets": int(sum(len(p.truth[event]) for p in patterns)),
-        "seconds_of_walking": round(sum(p.duration for p in patterns) / 1000, 1),
-        "inputs": len(cone.weights_),
-        "silent_rows": cone.silent_rows_,
-        "rounds": cone.rounds_,
-        "rows": cone.rows_,
-        "status": cone.status_,
-        "gap": float(f"{cone.gap_:.2g}"),
-        "unreachable": len(cone.unreachable_),
-    }
+    recipe = Recipe(Encoder.from_json(json.dumps(point["encoder"])), {}, {event: point["learner"]})
+    return judge(examples, recipe, parts, window_ms=WINDOW_MS)
 
 
 def _skim(rows: _Rows, point: Mapping[str, Any], left_out: int, params: Mapping[str, Any]) -> dict[str, Any]:
@@ -200,12 +161,12 @@ def _skim(rows: _Rows, point: Mapping[str, Any], left_out: int, params: Mapping[
     skim.fit([p.spikes for p in patterns], [p.truth[event] + later for p in patterns])
     tested = {
         f"{threshold:g}": {
-            p.unit: _scored(skim.predict([p.spikes], threshold=threshold)[0], p, event, later)
-            for p in rows.tested(left_out)
+            p.name: _scored(skim.predict([p.spikes], threshold=threshold)[0], p, event, later)
+            for p in rows.rows(rows.pieces(left_out))
         }
         for threshold in skim.thresholds
     }
-    return {"by_threshold": tested, "fit": {"rows": skim.rows_, "residual": round(skim.residual_, 3)}}
+    return {"by_threshold": tested}
 
 
 def _scored(spikes: NDArray[np.float64], piece: Piece, event: str, later: float) -> dict[str, Any]:
@@ -232,23 +193,21 @@ def _plain(result: Score, piece: Piece) -> dict[str, Any]:
 
 def _rule(rows: _Rows, rule: str, left_out: int, size: Mapping[str, int]) -> dict[str, Any]:
     """Choose a rule's numbers and offset on the training pieces, by missed + false first, then by error."""
-    event, source = rows.event, SOURCES[rows.source]
-    pieces = rows.training([left_out], size)
-    learned, tested = rows.by_unit(pieces), rows.tested(left_out)
-    levels, name = rows.encoding.levels, source.sums.get(event, "")
-    on = np.arange(len(pieces[0].spikes) // 2).reshape(-1, levels)
+    event, pieces = rows.event, rows.training([left_out], size)
+    learned, tested = rows.rows(pieces), rows.rows(rows.pieces(left_out))
+    on = np.arange(len(pieces[0].spikes) // 2).reshape(-1, rows.encoding.levels)
     if event == "heel_off":
         on = on[insole.HEEL]
 
-    def signals(of: Sequence[Piece]) -> list[rules.Signal]:
-        return [rules.count_of(piece, on.ravel()) if rule == "count" else piece.sums[name] for piece in of]
+    def signals(of: Sequence[Piece]) -> list[Signal]:
+        return [rules.count_of(piece, on.ravel()) if rule == "count" else piece.load for piece in of]
 
-    def times(of: Sequence[rules.Signal], edges: tuple[float, float]) -> list[NDArray[np.float64]]:
+    def times(of: Sequence[Signal], edges: tuple[float, float]) -> list[NDArray[np.float64]]:
         # Contact shows in counts that rise, the others in counts that fall.
         return [rules.detected(signal, *edges, rising=event == "contact") for signal in of]
 
-    most = on.size if rule == "count" else max(float(p.sums[name][1].max()) for p in pieces)
     heard = signals(learned)
+    most = on.size if rule == "count" else max(float(load.max()) for _, load in heard)
     tried: list[tuple[tuple[float, float], dict[str, float], tuple[float, float], float]] = []
     for numbers, on_at, off_at in rules.grid(rule, most):
         found = times(heard, (on_at, off_at))
@@ -260,8 +219,8 @@ def _rule(rows: _Rows, rule: str, left_out: int, size: Mapping[str, int]) -> dic
         tried.append((rank, numbers, (on_at, off_at), offset))
     _, numbers, edges, offset = min(tried, key=lambda one: one[0])
     judged = zip(times(signals(tested), edges), tested, strict=True)
-    units = {p.unit: _scored(t, p, event, offset) for t, p in judged}
-    return {"tested": units, "fit": numbers | {"offset_ms": round(offset, 2)}}
+    units = {p.name: _scored(t, p, event, offset) for t, p in judged}
+    return {"tested": units, "point": numbers | {"offset_ms": round(offset, 2)}}
 
 
 def _offset(times: list[NDArray[np.float64]], pieces: list[Piece], event: str) -> float:

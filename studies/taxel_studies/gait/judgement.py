@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from taxel_studies.gait import insole
@@ -90,12 +90,6 @@ def statements(_p: Parameters, summary: Summary) -> Iterator[Statement]:
 #: How a table of figures is headed; "false a minute" only where there are minutes of walking.
 _HEAD = ("events", "% found", "missed", "false", "% in 10 ms", "error of t, ms", "95 %", "known, ms")
 _BY_MINUTE = "false/min/foot"
-_ABOUT = [
-    [
-        "target",
-        "reference + the encoder's latency + a delay of at most 12 ms; t takes both off again, known does not",
-    ],
-]
 _FLATTERED = (
     "The lists for foot-off (plate, gaitpdb) were changed once after results on the shared people had been seen, so "
     "those two rows are flattered a little on them"
@@ -103,7 +97,7 @@ _FLATTERED = (
 
 
 def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
-    """List every row by event, and people where parameters were chosen inside."""
+    """List every row by event; ``summary.json`` has them by person, and what was chosen inside."""
     yield Table("What was run", ("", ""), _about(summary))
     for source in summary["sources"]:
         for protocol in source["protocols"]:
@@ -112,15 +106,12 @@ def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
 
 def _about(summary: Summary) -> list[list[str]]:
     points = "; ".join(f"{s} {', '.join(map(str, events.values()))}" for s, events in summary["search_points"].items())
-    there = {
-        row["row"] for source in summary["sources"] for protocol in source["protocols"] for row in protocol["rows"]
-    }
-    rows = [
-        *_ABOUT,
-        *([name, about] for name, about in ROWS.items() if name in there),
+    return [
+        ["target", "reference + encoder's latency + delay of at most 12 ms; t takes both off again, known does not"],
+        *([name, about] for name, about in ROWS.items()),
         ["points to choose from, by event", f"{points}. {_FLATTERED}"],
+        ["not here, so skipped", ", ".join(summary["skipped"]) or "none"],
     ]
-    return [*rows, *([["not here, so skipped", ", ".join(summary["skipped"])]] if summary["skipped"] else [])]
 
 
 def _of_protocol(source: Mapping[str, Any], protocol: Mapping[str, Any]) -> Iterator[Table]:
@@ -129,34 +120,13 @@ def _of_protocol(source: Mapping[str, Any], protocol: Mapping[str, Any]) -> Iter
     train, inside = (", ".join(f"{v} {size[k]}" for k, v in protocol[part].items()) for part in ("train", "search"))
     note = (
         f"{source['title']}; {protocol['title']}. Trains on at most {train}, inside the folds {inside}. "
-        f"Truth: {source['truth']} It shows {source['shows'][0].lower()}{source['shows'][1:]} "
-        f"{' '.join(protocol['beside'])}"
+        f"Truth: {source['truth']} It shows {source['shows'][0].lower()}{source['shows'][1:]}"
     )
+    head = ("row", *_HEAD[:4], *([_BY_MINUTE] if by_minute else []), *_HEAD[4:])
     for event in dict.fromkeys(row["event"] for row in protocol["rows"]):
-        listed = [row for row in protocol["rows"] if row["event"] == event]
-        rows = [[row["row"], *_cells(row["figures"], by_minute)] for row in listed]
-        yield Table(f"{place}: {EVENTS[event]}", _head("row", by_minute), rows, note.strip())
+        rows = [[row["row"], *_cells(row["figures"], by_minute)] for row in protocol["rows"] if row["event"] == event]
+        yield Table(f"{place}: {EVENTS[event]}", head, rows, note)
         note = ""
-        for row in _opened(listed):
-            yield from _by_person(f"{place}: {EVENTS[event]}, {row['row']}", row, by_minute)
-
-
-def _opened(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Return the rows to be shown by person: parameters chosen inside; else the study's recipe."""
-    names = {row["row"] for row in rows}
-    return [row for row in rows if row["row"] == ("chosen" if "chosen" in names else "recipe")]
-
-
-def _by_person(title: str, row: Mapping[str, Any], by_minute: bool) -> Iterator[Table]:
-    people = [[person, *_cells(f, by_minute)] for person, f in row["by_person"].items()]
-    yield Table(f"{title}, by person", _head("person", by_minute), people, folded=True)
-    if row["chosen"]:
-        points = [[str(one["folds"]), str(one["point"])] for one in row["chosen"]]
-        yield Table(f"{title}, what was chosen", ("folds", "point"), points, folded=True)
-
-
-def _head(first: str, by_minute: bool) -> tuple[str, ...]:
-    return (first, *_HEAD[:4], *([_BY_MINUTE] if by_minute else []), *_HEAD[4:])
 
 
 def _cells(f: Mapping[str, Any], by_minute: bool) -> list[str]:

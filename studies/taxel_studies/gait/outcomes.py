@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -54,7 +55,7 @@ def tasks(p: Parameters, *, data: Path) -> list[Task]:
                     for row in protocol.rows:
                         # A choice inside a fold leaves out a group more; some labels are no threshold of a sum.
                         if (row != "chosen" or groups > 2) and (
-                            row != "labels' own rule" or event in SOURCES[name].sums
+                            row != "labels' own rule" or event in SOURCES[name].by_threshold
                         ):
                             asked = _asked(name, event, row, protocol, p["points"])
                             listed += [Task(fold | asked, seed=1) for fold in folds(folder, name, protocol)]
@@ -148,28 +149,24 @@ def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
 
 
 def _protocol(protocol: Protocol, ran: Sequence[Row]) -> dict[str, Any]:
-    outcomes = [
-        _row(event, row, here)
-        for event in EVENTS
-        for row in protocol.rows
-        if (here := [r for r in ran if (r.params["event"], r.params["row"]) == (event, row)])
-    ]
     return {
         "protocol": protocol.name,
         "title": protocol.title,
         "train": dict(protocol.train),
         "search": dict(protocol.search),
-        "rows": outcomes,
-        "beside": _beside(outcomes),
+        "rows": [
+            _row(event, row, here)
+            for event in EVENTS
+            for row in protocol.rows
+            if (here := [r for r in ran if (r.params["event"], r.params["row"]) == (event, row)])
+        ],
     }
 
 
 def _row(event: str, row: str, ran: Sequence[Row]) -> dict[str, Any]:
     units = [unit for one in ran for unit in one.result["tested"].values()]
-    chosen = "point" if row == "chosen" else "fit" if row in RULES else ""
     # Each different point once, with the number of folds that chose it, the most frequent first.
-    points = [json.dumps(one.result[chosen], sort_keys=True) for one in ran if chosen]
-    often = sorted(dict.fromkeys(points), key=lambda point: -points.count(point))
+    points = Counter(json.dumps(one.result["point"], sort_keys=True) for one in ran if row in ("chosen", *RULES))
     return {
         "event": event,
         "row": row,
@@ -179,22 +176,9 @@ def _row(event: str, row: str, ran: Sequence[Row]) -> dict[str, Any]:
             person: figures([unit for unit in units if unit["person"] == person])
             for person in sorted({unit["person"] for unit in units})
         },
-        "chosen": [{"folds": points.count(point), "point": json.loads(point)} for point in often],
+        "chosen": [{"folds": folds, "point": json.loads(point)} for point, folds in points.most_common()],
         "cpu_seconds": round(sum(one.seconds for one in ran), 1),
     }
-
-
-def _beside(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Compare the neuron with the count, event by event: by missed + false."""
-    lines = []
-    for event in dict.fromkeys(row["event"] for row in rows):
-        wrong = {
-            row["row"]: row["figures"]["missed"] + row["figures"]["false"] for row in rows if row["event"] == event
-        }
-        if "count" in wrong:
-            neuron = wrong.get("chosen", wrong["recipe"])
-            lines.append(f"{EVENTS[event]}: the neuron has {neuron} missed and false, the count {wrong['count']}.")
-    return lines
 
 
 def _conversion(folder: Path) -> dict[str, Any]:

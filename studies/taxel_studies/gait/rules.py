@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel_studies.gait.pieces import Piece
+from taxel_studies.gait.pieces import Piece, Signal
 
 RULES = {
     "count": "plain rule: sensors (and levels) that are on now, counted, with memory",
@@ -18,9 +18,6 @@ RULES = {
 }
 #: A rule detects nothing for so long after an event, ms.
 DEAD_MS = 250.0
-
-#: What a rule compares with its numbers: times, ms, and the value from each on.
-Signal = tuple[NDArray[np.float64], NDArray[np.float64] | NDArray[np.int64]]
 
 
 def grid(rule: str, most: float) -> list[tuple[dict[str, float], float, float]]:

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taxel import FormatError, ProblemError
+from taxel import ProblemError
 from taxel.array import Array
-from taxel.encode import Encoder, RunningRange
+from taxel.encode import Encoder
 from taxel.frames import Frames
 from taxel.spikes import to_ms
 from taxel_studies.datasets import Trial, data_set, plate
@@ -22,7 +22,6 @@ from taxel_studies.datasets import files as files_of
 from taxel_studies.datasets import trials as trials_of
 from taxel_studies.gait import insole
 from taxel_studies.gait.pieces import Piece
-from taxel_studies.gait.recipes import RULE_ENCODERS
 
 #: Silence before each footfall of the plate, ms: random, so that its length does not reveal when events come.
 SILENCE_MS = (300, 900)
@@ -43,8 +42,10 @@ class Source:
     events : tuple of str
     truth, shows : str
         Where the truth comes from; what it can and cannot show.
-    sums : mapping from event to name of a sum
-        Whose threshold the labels are.
+    by_threshold : tuple of str
+        The events whose labels are thresholds of a sum over the sensors.
+    by_minute : bool
+        Whether it has minutes of walking, not footfalls.
     """
 
     name: str
@@ -53,7 +54,7 @@ class Source:
     events: tuple[str, ...]
     truth: str
     shows: str
-    sums: Mapping[str, str]
+    by_threshold: tuple[str, ...] = ()
     by_minute: bool = True
 
 
@@ -70,7 +71,7 @@ SOURCES = {
             "Whether 92 taxels without a view of the future find what the whole plate shows in hindsight. Not the "
             "ground: the plate starts itself, so contact can never be early, and a sum over all taxels is near perfect "
             "by construction. The placement looks at the first loaded frame and at the person's other footfalls.",
-            {"heel_off": "heel"},
+            ("heel_off",),
             by_minute=False,
         ),
         Source(
@@ -82,7 +83,7 @@ SOURCES = {
             "Contact and off in real walking with turns, healthy and sick, to within a sample of 10 ms. Not the true "
             "time at the ground. The truth is a threshold on the sum of the inputs, so a counter or a sum can be near "
             "perfect.",
-            {"contact": "total", "foot_off": "total"},
+            ("contact", "foot_off"),
         ),
         Source(
             "gaitndd",
@@ -92,7 +93,6 @@ SOURCES = {
             "Step times of the data's authors, derived from this very channel (300 Hz).",
             "Timing against step times that somebody else derived; not against the ground, and not independent of the "
             "channel. Turns and long pauses are in it.",
-            {},
         ),
     )
 }
@@ -117,20 +117,9 @@ def _trials(folder: Path, name: str) -> tuple[Trial, ...]:
 
     Raises
     ------
-    FormatError : a file that breaks its format, or a recording too short to be encoded (names it)
+    FormatError : a file that breaks its format (names it)
     """
-    ranges = [encoder["running_range"] for encoder in RULE_ENCODERS[name].values() if "running_range" in encoder]
-    least_s = max((one.get("window_s", RunningRange().window_s) for one in ranges), default=0.0)
-    read = []
-    for trial in trials_of(data_set(name), folder):
-        lasts_s = (int(trial.frames.t[-1]) - int(trial.frames.t[0])) / 1e6
-        if lasts_s < least_s:
-            raise FormatError(
-                f"{folder.name}/{trial.name}: lasts {lasts_s:g} s, and levels in shares of the running range want "
-                f"{least_s:g} s"
-            )
-        read.append(_boxed(trial) if name == "plate" else trial)
-    return tuple(read)
+    return tuple(_boxed(trial) if name == "plate" else trial for trial in trials_of(data_set(name), folder))
 
 
 def fingerprint(folder: Path, name: str) -> str:
@@ -183,13 +172,12 @@ def _walks(folder: Path, name: str, encoder: Encoder) -> list[Piece]:
         pieces.append(
             Piece(
                 name=trial.name,
-                unit=trial.name,
                 person=trial.person,
                 group=trial.group,
                 spikes=spikes,
                 truth={e: to_ms(times) - start for e, times in trial.truth.items()},
                 scored=(to_ms(trial.scored[0]) - start, to_ms(trial.scored[1]) - start),
-                sums={name: (to_ms(trial.frames.t) - start, column) for name, column in trial.series.items()},
+                load=(to_ms(trial.frames.t) - start, trial.series["total"]) if trial.series else Piece.load,
             )
         )
     return pieces
@@ -217,7 +205,7 @@ def _row(cuts: list[Trial], encoder: Encoder) -> list[Piece]:
     t = np.arange(len(values)) * plate.FRAME_US
     frames = Frames(values[:, None, :], t, unit="counts", array=Array(1, insole.TAXELS, name="insole"))
     spikes = encoder.encode(frames).split_by_sign()
-    total, heel = values.sum(axis=1, dtype=np.float64), values[:, insole.HEEL].sum(axis=1, dtype=np.float64)
+    heel = values[:, insole.HEEL].sum(axis=1, dtype=np.float64)
     pieces = []
     for at, silence, k in zip(begins, silences, order, strict=True):
         start, stop = float(at - silence), float(at + lengths[k])
@@ -229,13 +217,12 @@ def _row(cuts: list[Trial], encoder: Encoder) -> list[Piece]:
         pieces.append(
             Piece(
                 name=cuts[k].name,
-                unit=cuts[k].person,
                 person=cuts[k].person,
                 group="healthy",
                 spikes=_moved(part, -start, stop - start),
                 truth={e: to_ms(times) + at - start for e, times in cuts[k].truth.items()},
                 scored=(0.0, stop - start),
-                sums={"total": (to_ms(t[rows]) - start, total[rows]), "heel": (to_ms(t[rows]) - start, heel[rows])},
+                load=(to_ms(t[rows]) - start, heel[rows]),
             )
         )
     return pieces
