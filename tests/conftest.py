@@ -11,8 +11,8 @@ collect_ignore_glob = ["data/*", "contributing/*"]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the files that look at pages: they take longest, and the last one keeps all others waiting."""
-    items.sort(key=lambda item: "chromium" not in getattr(item, "fixturenames", ()))
+    """Begin with the files that look at pages or type one: they take longest, and the last keeps all others waiting."""
+    items.sort(key=lambda item: not {"chromium", "played"} & set(getattr(item, "fixturenames", ())))
 
 
 @pytest.fixture

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
+import re
+import signal
 import subprocess
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 
 import cyclopts
 import pytest
+from loopback import until
 
 from taxel.cli import main
 from taxel.cli._commands import OWN, command, plugins
@@ -17,10 +22,56 @@ from taxel.cli.app import own_commands
 
 def run(*arguments: object) -> subprocess.CompletedProcess[str]:
     """Run a command in this process; return what a process would."""
-    out, err = io.StringIO(), io.StringIO()
+    return _run(arguments, io.StringIO(), io.StringIO())
+
+
+def _run(arguments: tuple[object, ...], out: io.StringIO, err: io.StringIO) -> subprocess.CompletedProcess[str]:
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as ended:
         main([str(a) for a in arguments])
     return subprocess.CompletedProcess(arguments, int(ended.value.code or 0), out.getvalue(), err.getvalue())
+
+
+def run_beside(
+    beside: Callable[[str], object],
+    *arguments: object,
+    says: str = "listening",
+    ended: signal.Signals | None = signal.SIGINT,
+) -> subprocess.CompletedProcess[str]:
+    """Run a command and, once it `says` a pattern, a function of that in a thread; then a signal ends the command.
+
+    Without a signal it ends by itself.
+    """
+    out, err, over, failed = io.StringIO(), io.StringIO(), threading.Event(), []
+
+    def said() -> str:
+        found = re.search(says, out.getvalue() + err.getvalue())
+        return found[0] if found else ""
+
+    def play() -> None:
+        try:
+            until(lambda: over.is_set() or said())
+            if not over.is_set():
+                beside(said())
+        except BaseException as error:  # it is raised where the command has ended
+            failed.append(error)
+        if ended or failed:
+            os.kill(os.getpid(), ended or signal.SIGINT)
+
+    def stop(*_: object) -> None:
+        if not over.is_set():
+            raise KeyboardInterrupt
+
+    thread, before = threading.Thread(target=play), signal.signal(ended or signal.SIGINT, stop)
+    thread.start()
+    try:
+        done = _run(arguments, out, err)
+    finally:
+        over.set()
+        thread.join()
+        signal.signal(ended or signal.SIGINT, before)
+    if failed:
+        raise failed[0]
+    return done
 
 
 def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:

@@ -1,7 +1,6 @@
 """Errors of the command line name the option that was typed, in one line; exit codes are those of the docs."""
 
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -32,34 +31,6 @@ def test_the_help_has_a_whole_line_for_each_command_in_the_order_of_the_work(cap
     way = ("record", "info", "train", "detect", "bench")
     assert sorted(way, key=order.index) == [*way]
     assert "..." not in call(capsys, "device", "--help")[1].partition("Commands:")[2]
-
-
-PRINTS_COMMANDS = """
-import sys
-from taxel.cli import main
-try:
-    main(sys.argv[1:])
-finally:
-    loaded = {name.rpartition(".")[2] for name in sys.modules if name.startswith("taxel.cli.")}
-    shared = {"app", "console"}
-    print(*sorted(name for name in loaded - shared if not name.startswith("_")), file=sys.stderr)
-    print(*sorted({"taxel_studies", "taxel_benchmarks", "scipy", "matplotlib"} & sys.modules.keys()), file=sys.stderr)
-"""
-
-
-@pytest.mark.parametrize(
-    ("arguments", "loaded"),
-    [
-        (["--help"], ""),
-        (["trian"], ""),
-        (["device", "show", "--help"], "device"),
-    ],
-)
-def test_a_command_is_imported_only_when_it_is_used(arguments: list[str], loaded: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", PRINTS_COMMANDS, *arguments], capture_output=True, text=True, check=False
-    )
-    assert done.stderr.splitlines()[-2:] == [loaded, ""], done.stderr
 
 
 @pytest.fixture

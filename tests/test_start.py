@@ -9,7 +9,6 @@ import contextlib
 import os
 import re
 import shlex
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +17,7 @@ import pytest
 from live.boards import LOOPBACK
 from loopback import free_port
 from printed_pages import README, shell_lines
+from shell import run, run_beside
 
 DOCS = Path(__file__).parent.parent / "docs"
 PAGE = DOCS / "start.md"
@@ -32,41 +32,31 @@ WAY = [
 
 
 class Shell:
-    """Types lines of a page in a folder, over loopback and a free port."""
+    """Types lines of a page in the current folder, over loopback and a free port."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder, self.port = folder, free_port()
+    def __init__(self) -> None:
+        self.port = free_port()
 
     def arguments(self, line: str) -> list[str]:
         # Ctrl-C ends what listens: a busy machine may need longer than a page says.
         line = line.replace("--port 5208", f"--port {self.port}").replace("--seconds 20", "--seconds 600")
         words = shlex.split(line, comments=True)[1:]
         receives = words[0] in ("record", "live") and "--source" not in words
-        here = ["--host", LOOPBACK] if receives else []
-        return [sys.executable, "-m", "taxel", *words, *here]
+        return [*words, *(["--host", LOOPBACK] if receives else [])]
 
     def run(self, line: str) -> str:
-        done = subprocess.run(
-            self.arguments(line), cwd=self.folder, capture_output=True, text=True, timeout=120, check=False
-        )
+        done = run(*self.arguments(line))
         assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
         return done.stdout
 
     def beside(self, line: str, other: str) -> str:
-        """Start a command that listens, run the other beside it, then press Ctrl-C."""
-        with subprocess.Popen(
-            self.arguments(line), cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        ) as process:
-            try:
-                assert process.stderr is not None
-                assert any("listening" in said for said in process.stderr), line
-                self.run(other)
-                process.send_signal(signal.SIGINT)
-                said, error = process.communicate(timeout=60)
-            finally:
-                process.kill()
-        assert process.returncode == 0, f"{line}\n{said}\n{error}"
-        return said
+        """Run a command that listens and, beside it, a process of the other, then press Ctrl-C."""
+        board = [sys.executable, "-m", "taxel", *self.arguments(other)]
+        done = run_beside(
+            lambda _: subprocess.run(board, capture_output=True, timeout=120, check=True), *self.arguments(line)
+        )
+        assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
+        return done.stdout
 
 
 def blocks(page: Path) -> list[tuple[str, str]]:
@@ -85,16 +75,13 @@ def command(line: str) -> str:
     return re.sub(r"\s+#.*| --report \S+", "", line).strip()
 
 
-@pytest.fixture(scope="module")
-def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
-    """What the page says was done: the folder, and what each of its commands printed."""
-    folder, by_line, printed = tmp_path_factory.mktemp("start"), {}, ""
-    shell = Shell(folder)
+def play(shell: Shell, by_line: dict[str, str]) -> None:
+    """Do what the page says in the current folder; keep what each of its commands printed."""
+    printed = ""
     for language, text in blocks(PAGE):
         lines = text.splitlines()
         if language == "python":
-            with contextlib.chdir(folder):
-                exec(compile(text, PAGE.name, "exec"), {"__name__": "start"})
+            exec(compile(text, PAGE.name, "exec"), {"__name__": "start"})
         elif language == "text":
             said = {" ".join(line.split()) for line in printed.splitlines()}
             for line in lines:
@@ -107,6 +94,14 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, st
         else:
             by_line |= {command(line): shell.run(line) for line in lines}
             printed = "".join(by_line[command(line)] for line in lines)
+
+
+@pytest.fixture(scope="module")
+def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
+    """What the page says was done: the folder, and what each of its commands printed."""
+    folder, by_line = tmp_path_factory.mktemp("start"), {}
+    with contextlib.chdir(folder):
+        play(Shell(), by_line)
     return folder, by_line
 
 

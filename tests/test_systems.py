@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import json
 import os
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from live.boards import held
 from loopback import free_port, until
 from recording.making import some_events
 from shell import run
@@ -53,15 +53,6 @@ def test_texts_are_read_with_the_line_ends_of_every_system(tmp_path: Path, end: 
     assert taxel.open(tmp_path / "events.csv").events.t.tolist() == events.t.tolist()
     assert taxel.open(tmp_path / "frames.csv").frames().values.tolist() == frames.values.tolist()
     assert [note.t for note in Labels(tmp_path / "walk.notes.csv").rows] == [5, 9]
-
-
-def test_a_console_that_lacks_a_character_shows_it_escaped(tmp_path: Path) -> None:
-    taxel.convert(some_events(20), tmp_path / "walk ä ł.mcap")
-    variables = {**os.environ, "PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
-    command = [sys.executable, "-m", "taxel", "info", "walk ä ł.mcap"]
-    done = subprocess.run(command, cwd=tmp_path, env=variables, capture_output=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "walk ä \\u0142.mcap".encode("cp1252") in done.stdout
 
 
 @on_windows
@@ -108,13 +99,6 @@ def test_ctrl_break_stops_as_ctrl_c_does(monkeypatch: pytest.MonkeyPatch) -> Non
     assert signal.getsignal(signal.SIGBREAK) == before
 
 
-def held_events(file: Path) -> int:
-    """Return how many events a recording that is being written holds so far."""
-    with contextlib.suppress(FileNotFoundError, taxel.FormatError):
-        return len(taxel.open(file).events)
-    return 0
-
-
 @on_windows
 def test_a_recording_is_complete_after_ctrl_break(tmp_path: Path) -> None:
     port = free_port()
@@ -128,7 +112,7 @@ def test_a_recording_is_complete_after_ctrl_break(tmp_path: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
         until((tmp_path / "walk.mcap").exists)
         board.sendto(taxel.wire.encode(some_events(20)), ("127.0.0.1", port))
-    until(lambda: held_events(tmp_path / "walk.mcap") == 20)
+    until(lambda: held(tmp_path / "walk.mcap") == 20)
     process.send_signal(getattr(signal, "CTRL_BREAK_EVENT", 0))
     assert process.wait(60) == 0
     recording = taxel.open(tmp_path / "walk.mcap")

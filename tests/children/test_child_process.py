@@ -8,10 +8,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import psutil
 import pytest
 from loopback import until
 
+import taxel
 from taxel._base.child_process import ChildProcess
 
 #: A child that is hard to end; it says its number first.
@@ -65,29 +67,29 @@ def test_a_parent_ends_its_child_when_it_likes(here: Path) -> None:
     assert child.end() == child.returncode
 
 
-def test_a_child_has_its_words_its_line_and_its_exit_code(here: Path) -> None:
-    program(here, "import sys; print(sys.argv[1:], __name__, input(), sys.stdin.read()); sys.exit(7)")
-    with ChildProcess("program", ["a b", 5, here], line="heard", stdout=subprocess.PIPE) as child:
-        assert child.stdout is not None
-        said = child.stdout.read()
-    assert said == f"{['a b', '5', str(here)]} __main__ heard \n"
-    assert child.returncode == 7
-
-
-def test_a_child_runs_no_code_of_the_current_folder(here: Path) -> None:
+def test_a_child_has_its_words_its_line_and_its_exit_code_and_runs_no_code_of_the_current_folder(here: Path) -> None:
     for name in ("typing", "random", "runpy", "json", "sitecustomize", "usercustomize", "numpy", "taxel"):
         (here / f"{name}.py").write_text(f"open({str(here / 'RAN')!r}, 'w')")
-    program(here, "import json, sys; print(json.dumps(sys.path))")
-    with ChildProcess("program", stdout=subprocess.PIPE) as child:
+    program(
+        here,
+        "import json, sys; print(json.dumps([sys.argv[1:], __name__, input(), sys.stdin.read(), sys.path])); exit(7)",
+    )
+    with ChildProcess("program", ["a b", 5, here], line="heard", stdout=subprocess.PIPE) as child:
         assert child.stdout is not None
-        path = json.loads(child.stdout.read())
+        *said, path = json.loads(child.stdout.read())
+    assert said == [["a b", "5", str(here)], "__main__", "heard", ""]
+    assert child.returncode == 7
     assert not {"", ".", str(here)} & {*path}
     assert not (here / "RAN").exists()
 
 
-def test_a_command_runs_no_code_of_the_current_folder(here: Path) -> None:
+def test_a_command_runs_no_code_of_the_current_folder_and_escapes_what_a_console_lacks(here: Path) -> None:
     for name in ("sitecustomize", "numpy", "cyclopts", "h5py", "taxel", "pathlib"):
         (here / f"{name}.py").write_text(f"open({str(here / 'RAN')!r}, 'w')")
+    taxel.convert(taxel.Frames(np.zeros((3, 2, 2)), [0, 1, 2]), here / "walk ä ł.npz")
     variables = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    subprocess.run([Path(sys.executable).with_name("taxel"), "--version"], env=variables, check=True)
+    variables |= {"PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
+    command = [Path(sys.executable).with_name("taxel"), "info", "walk ä ł.npz"]
+    done = subprocess.run(command, env=variables, capture_output=True, check=True)
+    assert "walk ä \\u0142.npz".encode("cp1252") in done.stdout
     assert not (here / "RAN").exists()

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import signal
 import socket
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
-from urllib.parse import urlsplit
+from typing import Any
 
 import numpy as np
 import pytest
-from draws import mixed
+from live.boards import held
 from loopback import free_port, until
 
 import taxel
@@ -22,10 +20,10 @@ from taxel import Array
 
 from .marked import ENDS, TAXEL, WITHIN_S, Marked
 
-#: All ends, of which one signal stands for those that are handled alike, where each takes long.
-EACH = [
-    pytest.param(end, marks=() if end in ("kill", "SIGINT", "closed terminal") else pytest.mark.slow) for end in ENDS
-]
+
+def ends(*quick: str) -> list[Any]:
+    """All ends of a command, of which some are quick; each starts processes."""
+    return [pytest.param(end, marks=() if end in quick else pytest.mark.slow) for end in ENDS]
 
 
 def files(folder: Path) -> dict[str, int]:
@@ -56,14 +54,7 @@ def datagrams(count: int = 20) -> list[bytes]:
     return [taxel.wire.encode(events[k : k + 1]) for k in range(count)]
 
 
-def held(file: Path) -> int:
-    """Return how many events a recording that is being written holds so far."""
-    with contextlib.suppress(FileNotFoundError, taxel.FormatError):
-        return len(taxel.open(file).events)
-    return 0
-
-
-@pytest.mark.parametrize("end", EACH)
+@pytest.mark.parametrize("end", ends("kill", "SIGINT", "closed terminal"))
 def test_a_recording_is_closed_however_the_command_is_stopped(tmp_path: Path, end: str) -> None:
     port = free_port()
     command = [TAXEL, "record", "walk.mcap", "--host", "127.0.0.1", "--port", port, "--array", "4x4"]
@@ -89,7 +80,7 @@ def test_a_demo_ends_with_the_board_that_it_plays(tmp_path: Path, end: str) -> N
         check_end(one, end, 130)
 
 
-@pytest.mark.parametrize("end", EACH)
+@pytest.mark.parametrize("end", ends("kill"))
 def test_workers_of_a_study_end_with_it(tmp_path: Path, end: str) -> None:
     words = ["study", "fig6.9", "--jobs", 2, "--report", "report"]
     with Marked(tmp_path / "here", TAXEL, *words, on_terminal=end == "closed terminal") as one:
@@ -120,21 +111,19 @@ def test_a_request_that_takes_long_does_not_abort_a_server_that_ends(tmp_path: P
         "program()\n"
     )
     pytest.importorskip("websockets")
-    from panel.protocol import Client
+    from panel.protocol import Client, door
 
     with Marked(tmp_path, sys.executable, "-P", script) as one:
         one.until(lambda it: (it.folder / "out").read_text().endswith("\n"))
         shown = json.loads((tmp_path / "out").read_text())
-        url = urlsplit(shown["url"])
-        with Client(SimpleNamespace(address=(url.hostname, url.port), token=shown["token"])) as page:
+        with Client(door(shown["url"])) as page:
             page.send(type="open", id=1, name="b.csv")
             assert not one.ended_within(WITHIN_S)
     assert one.code() == 0, one.said()
 
 
-@pytest.mark.parametrize(
-    "ignored", [signal.SIGHUP, *(pytest.param(one, marks=pytest.mark.slow) for one in (signal.SIGTERM, signal.SIGINT))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("ignored", [signal.SIGHUP, signal.SIGTERM, signal.SIGINT])
 def test_a_signal_that_was_ignored_at_the_start_stays_ignored(tmp_path: Path, ignored: signal.Signals) -> None:
     """As by nohup, or in the background of a shell."""
     begin = (
@@ -152,7 +141,10 @@ def test_a_signal_that_was_ignored_at_the_start_stays_ignored(tmp_path: Path, ig
         check_end(one, "SIGTERM" if ignored != signal.SIGTERM else "SIGINT", 3)
 
 
-@pytest.mark.parametrize(("after_s", "number"), mixed([0.1, 0.2, 0.5], [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]))
+@pytest.mark.parametrize("after_s", [0.2, *(pytest.param(after_s, marks=pytest.mark.slow) for after_s in (0.1, 0.5))])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, *(pytest.param(one, marks=pytest.mark.slow) for one in (signal.SIGTERM, signal.SIGHUP))]
+)
 def test_a_command_is_stopped_quietly_while_it_loads(tmp_path: Path, after_s: float, number: signal.Signals) -> None:
     """At any moment: it has ended by the default of the system, or says so by its exit code."""
     with Marked(tmp_path, TAXEL, "live", "--panel", "--host", "127.0.0.1", "--port", 0) as one:

@@ -1,8 +1,6 @@
 """Learners keep scikit-learn's manners, tried against scikit-learn itself; laws run over the registry of learners."""
 
 import pickle
-import subprocess
-import sys
 import warnings
 from pathlib import Path
 
@@ -91,12 +89,10 @@ def test_a_search_over_a_pipeline_finds_touches_in_recordings():
     assert search.score(recordings, targets) == 1.0
 
 
-def test_tags_are_asked_by_scikit_learn_alone():
+def test_tags_are_those_that_scikit_learn_asks_for():
     tags = sklearn.utils.get_tags(ConeX())
     assert tags.requires_fit
     assert tags.estimator_type is None
-    code = "import sys, taxel; taxel.learn.ConeX(); assert not any(name.startswith('sklearn') for name in sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
 
 
 def test_a_fit_without_weights_says_so_where_it_is_used():

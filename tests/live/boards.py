@@ -1,13 +1,14 @@
-"""Boards that tests play, programs that they run, and how they wait for them."""
+"""Boards that tests play, what is recorded of them, and how they wait for them."""
 
+import contextlib
 import socket
-import subprocess
-import sys
 import time
+from pathlib import Path
 
 import numpy as np
 from loopback import until
 
+import taxel
 from taxel import Array, Events, Neuron, Readout, wire
 from taxel.encode import ChangeEvents
 from taxel.live import Live
@@ -66,17 +67,11 @@ def wait_for(live: Live, decoded: int) -> None:
     until(lambda: live.counters["decoded"] >= decoded)
 
 
-def command(*arguments: object) -> list[str]:
-    return [sys.executable, "-m", "taxel", *map(str, arguments)]
-
-
-def listening(process: subprocess.Popen[str]) -> None:
-    """Wait until a command says that it listens."""
-    assert process.stderr is not None
-    for line in process.stderr:
-        if "listening" in line:
-            return
-    raise AssertionError("ended before it listened")
+def held(file: Path) -> int:
+    """Return how many events a recording that is being written holds so far."""
+    with contextlib.suppress(FileNotFoundError, taxel.FormatError):
+        return len(taxel.open(file).events)
+    return 0
 
 
 def spikes_of(events: Events) -> list[tuple[int, int, float]]:

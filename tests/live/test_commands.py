@@ -2,33 +2,31 @@
 
 import json
 import signal
-import subprocess
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from loopback import free_port
-from shell import run
+from loopback import free_port, until
+from shell import run, run_beside
 
 import taxel
 from taxel import Events
 
-from .boards import LOOPBACK, SMALL, command, listening, play, presses, touch
+from .boards import LOOPBACK, SMALL, held, play, presses, touch
 
 
 @pytest.mark.parametrize("ended", [signal.SIGINT, signal.SIGTERM])
 def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(ended: signal.Signals, tmp_path: Path) -> None:
     port, file, events = free_port(), tmp_path / "walk.mcap", presses(3)
     arguments = ("record", file, "--host", LOOPBACK, "--port", port, "--array", "4x4")
-    with subprocess.Popen(command(*arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        listening(process)
+
+    def board(_: str) -> None:
         play(events, port)
-        time.sleep(0.3)
-        process.send_signal(ended)
-        said, _ = process.communicate(timeout=60)
-    assert process.returncode == 0
-    assert said.splitlines()[-1].startswith("nothing lost after arrival")
+        until(lambda: held(file) == len(events))
+
+    done = run_beside(board, *arguments, ended=ended)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1].startswith("nothing lost after arrival")
     assert taxel.open(file).verdict.status == "complete after arrival"
     np.testing.assert_array_equal(taxel.open(file).events.to_numpy(), events.to_numpy())
     again = run(*arguments)
@@ -37,25 +35,23 @@ def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(ended: s
     assert again.stderr.strip().splitlines() == [said]
 
 
-def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path) -> None:
+def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     port, events = free_port(), presses(5)
     moved = np.diff(events.intensity.astype(int), prepend=0)
     said = Events(events.t, events.x, events.y, moved >= 0, array=SMALL, intensity=np.abs(moved))
     touch().save(tmp_path / "touch.json")
     files = ["--readout", tmp_path / "touch.json", "--record", tmp_path / "live.mcap", "--report", tmp_path / "report"]
-    arguments = command("live", *files, "--host", LOOPBACK, "--port", port, "--array", "4x4", "--json")
-    # The datagrams' times do not follow the board's pace: the guard prevents the host's clock from advancing time here.
-    arguments += ["--guard-frames", "1e6", "--differences"]
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
-        while not (tmp_path / "live.mcap").exists():
-            assert process.poll() is None
-            time.sleep(0.02)
+    arguments = ["live", *files, "--host", LOOPBACK, "--port", port, "--array", "4x4", "--json"]
+
+    def board(_: str) -> None:
         play(said, port)
-        assert process.stdout is not None
-        lines = [json.loads(process.stdout.readline()) for _ in range(4)]
-        process.send_signal(signal.SIGINT)
-        lines += [json.loads(line) for line in process.stdout]
-    assert process.returncode == 0
+        until(lambda: held(tmp_path / "live.mcap") == len(said))
+
+    # The datagrams' times do not follow the board's pace: the guard prevents the host's clock from advancing time here.
+    done = run_beside(board, *arguments, "--guard-frames", "1e6", "--differences")
+    assert done.returncode == 0, done.stderr
+    # A thread of the compiled part writes them.
+    lines = [json.loads(line) for line in capfd.readouterr().out.splitlines()]
     assert "Live detections, recorded to" in (tmp_path / "report" / "report.html").read_text()
     keys = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired"}
     assert [set(line) for line in lines] == [keys | {"reported_us", "reported_ns"}] * 5

@@ -3,28 +3,38 @@
 import json
 import os
 import socket
-import subprocess
 import time
 from pathlib import Path
 
 import numpy as np
-from loopback import free_port
+from loopback import free_port, until
+from shell import run, run_beside
 
 import taxel
 from taxel.live import Live
 
-from .boards import LOOPBACK, SMALL, command, play, presses, touch, wait_for
+from .boards import LOOPBACK, SMALL, play, presses, touch, wait_for
 
 LONG_BEFORE_ANY = {"guard_frames": 1e6}
 KEYS = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired", "reported_us", "reported_ns"}
 
 
-def test_a_source_takes_what_its_bits_and_taxels_can_hold() -> None:
+def test_what_a_source_takes_arrives(tmp_path: Path) -> None:
+    """Whole values and floats, as a grid or flat, up to the greatest that its bits can hold."""
+    array = taxel.Array(2, 3)
     for bits in (1, 12, 16):
-        source = taxel.live.Source(taxel.Array(2, 3), 100.0, bits=bits, to="127.0.0.1:9")
-        most = 2**bits - 1
-        for held in (np.full((2, 3), most), np.full(6, float(most)), np.zeros((2, 3), np.uint8)):
-            source.push(held)
+        record, most = tmp_path / f"{bits}.mcap", 2**bits - 1
+        pushed = [np.full((2, 3), most), np.zeros(6), np.arange(6, dtype=np.uint16).reshape(2, 3) % 2 * most]
+        with Live(0, host=LOOPBACK, array=array, record=record) as live:
+            to = f"{LOOPBACK}:{live.address[1]}"
+            source = taxel.live.Source(array, 100.0, bits=bits, noise_floor=0, to=to)
+            sent = sum(source.push(frame) for frame in pushed)
+            until(lambda sent=sent: live.counters["events"] == sent)
+        events, shown = taxel.open(record).events, np.zeros((2, 3), int)
+        for frame, t in zip(pushed, np.unique(events.t), strict=True):
+            now = events[events.t == t]
+            shown[now.y, now.x] = now.intensity
+            np.testing.assert_array_equal(shown, frame.reshape(2, 3).astype(int) >> source.shift)
 
 
 def listen(send: object, record: Path) -> Live:
@@ -103,32 +113,21 @@ def test_taxel_live_sends_and_says_what_was_lost(tmp_path: Path) -> None:
     port, pipe = free_port(), tmp_path / "nobody"
     os.mkfifo(pipe)
     touch().save(tmp_path / "touch.json")
+    heard = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind((LOOPBACK, 0))
         other.settimeout(30)
-        arguments = command("live", "--readout", tmp_path / "touch.json", "--array", "4x4", "--host", LOOPBACK)
-        arguments += [
-            "--port",
-            str(port),
-            "--send",
-            f"lines+udp:{LOOPBACK}:{other.getsockname()[1]}",
-            "--send",
-            f"lines:{pipe}",
-            "--guard-frames",
-            "1e6",
-        ]
-        with subprocess.Popen([*arguments, "--seconds", "6"], stderr=subprocess.PIPE, text=True) as process:
-            assert process.stderr is not None
-            while "listening" not in process.stderr.readline():
-                assert process.poll() is None
+
+        def board(_: str) -> None:
             play(presses(3), port)
-            line = json.loads(other.recv(65_536))
-            told = process.stderr.read()
-    assert set(line) == KEYS
-    assert f"taxel: 3 of 3 lines not sent to lines:{pipe}: no reader" in told
-    assert process.returncode == 3
-    said = subprocess.run(
-        command("live", "--send", "lines+udp:127.0.0.1:9"), capture_output=True, text=True, check=False
-    )
+            heard.extend(json.loads(other.recv(65_536)) for _ in range(3))
+
+        receivers = ["--send", f"lines+udp:{LOOPBACK}:{other.getsockname()[1]}", "--send", f"lines:{pipe}"]
+        listens = ["--array", "4x4", "--host", LOOPBACK, "--port", port, "--guard-frames", "1e6"]
+        done = run_beside(board, "live", "--readout", tmp_path / "touch.json", *listens, *receivers)
+    assert [set(line) for line in heard] == [KEYS] * 3
+    assert f"taxel: 3 of 3 lines not sent to lines:{pipe}: no reader" in done.stderr
+    assert done.returncode == 3
+    said = run("live", "--send", "lines+udp:127.0.0.1:9")
     assert said.stderr == "taxel: nothing to do: give --readout FILE to detect, or --panel to show the board\n"
     assert said.returncode == 2

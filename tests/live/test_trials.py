@@ -1,25 +1,22 @@
 """Trial after trial from one receiver: each begins with what the taxels hold, and nothing is lost between two."""
 
 import json
-import signal
 import socket
-import subprocess
-import sys
 import threading
-import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 from loopback import free_port, until
+from shell import run_beside
 
 import taxel
 from taxel import Events, wire
 from taxel.live import Live
 
-from .boards import LOOPBACK, SMALL
+from .boards import LOOPBACK, SMALL, held
 
 #: The value that each taxel receives once, before all else.
 REST = 40 + np.arange(16)
@@ -94,23 +91,20 @@ def assert_follow_each_other(trials: list[Path]) -> None:
     assert seen == list(range(seen[0], seen[0] + len(seen)))
 
 
-def record(port: int, *arguments: object) -> list[str]:
-    said = ["record", *arguments, "--host", LOOPBACK, "--port", port, "--array", "4x4"]
-    return [sys.executable, "-m", "taxel", *map(str, said)]
+def record(port: int, *arguments: object) -> list[object]:
+    return ["record", *arguments, "--host", LOOPBACK, "--port", port, "--array", "4x4"]
 
 
 def test_trials_that_follow_each_other_lose_nothing_and_know_what_was_held(tmp_path: Path) -> None:
     port = free_port()
     arguments = record(port, tmp_path / "step.mcap", "--length", 0.25, "--countdown", 0, "--trials", 4, "--json")
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
-        until((tmp_path / "step1.mcap").exists)
-        with board(port):
-            said, _ = process.communicate(timeout=60)
-    assert process.returncode == 0
+    with ExitStack() as playing:
+        done = run_beside(lambda _: playing.enter_context(board(port)), *arguments, ended=None)
+    assert done.returncode == 0, done.stderr
     trials = [tmp_path / f"step{n}.mcap" for n in (1, 2, 3, 4)]
     assert sorted(tmp_path.iterdir()) == trials
     assert_follow_each_other(trials)
-    lines = [json.loads(line) for line in said.splitlines()]
+    lines = [json.loads(line) for line in done.stdout.splitlines()]
     assert [line["path"] for line in lines] == [str(path) for path in trials]
     for line, path in zip(lines, trials, strict=True):
         counters, capture = line["counters"], line["counters"]["capture"]
@@ -153,14 +147,13 @@ def test_what_came_between_two_trials_is_in_neither_and_is_known_to_the_next(tmp
 def test_ctrl_c_ends_the_trial_that_runs_well(tmp_path: Path) -> None:
     port = free_port()
     arguments = record(port, tmp_path / "step.mcap", "--length", 0.3, "--countdown", 0, "--json")
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
-        until((tmp_path / "step1.mcap").exists)
+
+    def play(_: str) -> None:
         with board(port):
-            until((tmp_path / "step3.mcap").exists)
-            time.sleep(0.05)
-            process.send_signal(signal.SIGINT)
-            process.communicate(timeout=60)
-    assert process.returncode == 0
+            until(lambda: held(tmp_path / "step3.mcap"))
+
+    done = run_beside(play, *arguments)
+    assert done.returncode == 0, done.stderr
     trials = sorted(tmp_path.iterdir())
     assert len(trials) >= 3
     assert_follow_each_other(trials)

@@ -16,6 +16,7 @@ from loopback import free_port
 from tests.panel.browser import PATIENCE, running
 
 import taxel
+from taxel.live import Live
 from taxel.panel import Panel
 
 #: Pixels of a map, as a text that changes when the picture does.
@@ -73,6 +74,17 @@ def shown(browser: Any, file: Path, **how: Any) -> Iterator[Any]:
         is_in(page, "replay")
         shows(page, "clock", r"\d")
         yield page
+
+
+@contextmanager
+def followed(browser: Any, folder: Path, *receives: Any, **given: Any) -> Iterator[tuple[Live, Any]]:
+    """Listen with these arguments and show that in a browser, by a panel in this process; yield both."""
+    with (
+        Live(*receives, host="127.0.0.1", record_later=True, **given) as live,
+        Panel(live, folder=folder) as panel,
+        opened(browser, panel.url) as page,
+    ):
+        yield live, page
 
 
 def is_in(page: Any, state: str, name: str = "state") -> None:

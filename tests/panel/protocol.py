@@ -7,6 +7,8 @@ import socket
 import struct
 import time
 from contextlib import contextmanager
+from types import SimpleNamespace
+from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 import pytest
@@ -23,6 +25,16 @@ client = pytest.importorskip("websockets.sync.client")
 
 #: Timeout for an event on a busy machine, s.
 SOON = 60.0
+
+
+#: Where a command says that its panel is.
+ADDRESS = r"http://127\.0\.0\.1:\d+/#\S+"
+
+
+def door(address):
+    """The place of a panel and its token, which its address holds."""
+    url = urlsplit(address)
+    return SimpleNamespace(address=(url.hostname, url.port), token=parse_qs(url.fragment)["token"][0])
 
 
 class Client:

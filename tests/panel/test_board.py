@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from urllib.parse import urlsplit
-
 import numpy as np
 import pytest
-from panel.browser import running
 from panel.protocol import (
+    ADDRESS,
     Client,
+    door,
     head,
     page_of_a_board,
     say,
     section,
 )
+from shell import run_beside
 
 import taxel
 import taxel.device
@@ -31,16 +30,15 @@ def test_the_ports_of_the_machine_are_told(panel):
 
 
 def test_the_command_stays_while_a_page_begins_its_board_anew(tmp_path):
-    with running("live", "--panel", "--port", "0", "--host", "127.0.0.1", folder=tmp_path) as server:
-        url = urlsplit(server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
-        with Client(
-            SimpleNamespace(address=(url.hostname, url.port), token=url.fragment.removeprefix("token="))
-        ) as page:
+    def look(said):
+        with Client(door(said)) as page:
             for _ in range(4):
                 # The command checks for changes every tenth of a second, so each request may coincide with a check.
                 assert page.ask("disconnect")["type"] == "done"
-        # No datagram arrived; the exit code reports only that.
-        assert server.end() == 3, "".join([*server.said, *iter(server.lines.get, "")])
+
+    listens = ("--port", 0, "--host", "127.0.0.1", "--folder", tmp_path)
+    # No datagram arrived; the exit code reports only that.
+    assert run_beside(look, "live", "--panel", *listens, says=ADDRESS).returncode == 3
 
 
 @pytest.mark.parametrize("version", [1, 2])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from loopback import free_port
 from tests.panel.browser import Process, running
-from tests.panel.protocol import Client
+from tests.panel.protocol import ADDRESS, Client, door
 
 import taxel
 
@@ -19,14 +19,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
 
 #: Delay after which received data must be in the file, on a quiet machine; a busy one may take a few times as long.
 KEPT_US = 100_000
-
-
-def door(server: Process) -> SimpleNamespace:
-    """Return where a panel is, and its token, from what its command printed."""
-    host, port, token = re.fullmatch(
-        r"http://([\d.]+):(\d+)/#token=(\w+)", server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")
-    ).groups()  # type: ignore[union-attr]
-    return SimpleNamespace(address=(host, int(port)), token=token)
 
 
 def rss_bytes(server: Process) -> int:
@@ -52,7 +44,7 @@ def test_whoever_is_killed_what_was_recorded_is_there(dies: str, turn: int, tmp_
     with (
         running("live", "--panel", *here, folder=tmp_path) as server,
         running("emulate", "--port", port, "--seed", str(turn), folder=tmp_path) as board,
-        Client(door(server)) as page,
+        Client(door(server.wait_for(f"({ADDRESS})"))) as page,
     ):
         page.send(type="credit", n=2)
         while not page.until("counters")["events"]:
@@ -106,7 +98,7 @@ def test_memory_is_bounded_and_nothing_is_lost_over_time(tmp_path: Path) -> None
         running("live", "--panel", *here, folder=tmp_path) as server,
         running("emulate", "--port", port, "--seed", "1", folder=tmp_path),
     ):
-        at = door(server)
+        at = door(server.wait_for(f"({ADDRESS})"))
         pages = [Client(at) for _ in range(6)]
         try:
             for k, page in enumerate(pages):

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import contextmanager
-from types import SimpleNamespace
-from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
 from formats import bags
 from formats.bags import PALM
 from formats.making import write_icub
-from panel.browser import running
-from panel.protocol import Client, opened, values_at
-from shell import call
+from panel.protocol import ADDRESS, Client, door, opened, values_at
+from shell import call, run_beside
 
 import taxel
 from taxel import Array, Calibration, Frames
@@ -39,16 +35,6 @@ def shown(path, **options):
     """A client of a panel with options, in this process."""
     with Panel(path, options=FullReading(**options)) as panel, Client(panel) as page:
         yield page
-
-
-@contextmanager
-def viewed(folder, *words):
-    """A client of the panel of `taxel view`."""
-    with running("view", *map(str, words), "--no-open", "--json", folder=folder) as server:
-        said = json.loads(server.wait_for(r"(\{.*\})"))
-        url = urlsplit(said["url"])
-        with Client(SimpleNamespace(address=(url.hostname, url.port), token=said["token"])) as page:
-            yield page
 
 
 def test_a_folder_of_bags_is_shown_by_options_that_hold_for_each(capsys, tmp_path):
@@ -138,12 +124,17 @@ def test_frames_are_in_the_unit_of_a_calibration(capsys, tmp_path):
     taxel.convert(frames, tmp_path / "press.npz")
     calibration = Calibration.table(Array(2, 2), [100], [5], unit="N", date="2026-11-23")
     calibration.save(tmp_path / "of another name.json")
-    with viewed(tmp_path, "press.npz", "--calibration", "of another name.json") as page:
-        about = opened(page, "press.npz")
-        assert about["frames"]["unit"] == "N"
-        values, _ = values_at(page, about, 20_000)
-        assert np.allclose(values, calibration.apply(frames).values[2], atol=about["frames"]["step"])
-        assert [one["rest"] for one in about["frames"]["sources"]] == ["given"]
+
+    def look(said: str) -> None:
+        with Client(door(said)) as page:
+            about = opened(page, "press.npz")
+            assert about["frames"]["unit"] == "N"
+            values, _ = values_at(page, about, 20_000)
+            assert np.allclose(values, calibration.apply(frames).values[2], atol=about["frames"]["step"])
+            assert [one["rest"] for one in about["frames"]["sources"]] == ["given"]
+
+    given = (tmp_path / "press.npz", "--calibration", tmp_path / "of another name.json")
+    assert run_beside(look, "view", *given, "--no-open", says=ADDRESS).returncode == 0
     taxel.convert(Frames(np.zeros((2, 3, 2)), [0, 1000], unit="counts", array=Array(3, 2)), tmp_path / "other.npz")
     words = (tmp_path / "other.npz", "--calibration", tmp_path / "of another name.json", "--seconds", 1)
     code, _, errors = call(capsys, "view", *words)

@@ -14,14 +14,13 @@ import numpy as np
 import pytest
 from discs import recipe, tare, touches
 from loopback import free_port
-from tests.panel.browser import PATIENCE, running
 from tests.panel.pages import (
     FOLLOWS,
     PIXELS,
     clock,
+    followed,
     is_in,
     live,
-    opened,
     page,
     press,
     recording,
@@ -34,6 +33,8 @@ from tests.panel.protocol import word
 
 import taxel
 from taxel.detect import Example, fit
+from taxel.simulate import Replay, emulate
+from taxel.wire import Registers
 
 __all__ = ["live", "page", "recording", "replay"]
 
@@ -47,68 +48,53 @@ NAMELESS = """() => [...document.querySelectorAll("button, input, select, canvas
 
 def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, tmp_path: Path) -> None:
     readout = fit([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe())
-    readout.save(tmp_path / "touch.json")
-    tare().save(tmp_path / "tare.json")
     events, truth = touches(11)
-    taxel.convert(events, tmp_path / "played.mcap")
-    port = str(free_port())
-    given = ("--readout", "touch.json", "--tare", "tare.json", "--array", "8x8")
-    with (
-        running("live", "--panel", "--port", port, "--host", "127.0.0.1", *given, folder=tmp_path) as server,
-        opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
-    ):
+    found: list[taxel.Detection] = []
+    given = {"readout": readout, "tare": tare(), "array": taxel.Array(8, 8), "say": found.append}
+    with followed(chromium, tmp_path, 0, **given) as (live, page):
         is_in(page, FOLLOWS)
         shows(page, "detections-none", "^None yet")
         press(page, "5")
         assert page.locator("#encoder option[value=contact_area]").inner_text() == "readout: contact area"
         page.locator("#encoder").select_option("contact_area")
-        with running("emulate", "--replay", "played.mcap", "--port", port, folder=tmp_path) as board:
-            board.process.wait(PATIENCE)
-
-        def printed() -> list[tuple[str, str]]:
-            return re.findall(r"^ +([\d.]+) s +(contact|lift) ", server.heard(), re.MULTILINE)
-
+        emulate("{}:{}".format(*live.address), Replay(events), registers=Registers(array=events.array))
         wanted = sorted(truth["contact"] + truth["lift"])
-        until(lambda: len(printed()) >= len(wanted), "the board has been heard to its end")
-        # What the command prints of the last frames may come later than on the page.
-        until(lambda: page.locator("#detection-count").inner_text() == str(len(printed())), "the page has each of them")
-        # The page lists the detections of the terminal, the latest first, with the time and the latency of each.
+        until(lambda: len(found) >= len(wanted), "the board has been heard to its end")
+        until(lambda: page.locator("#detection-count").inner_text() == str(len(found)), "the page has each of them")
+        # The page lists the detections, the latest first, with the time and the latency of each.
         rows = page.locator("#detection-list li").all_inner_texts()
         assert all(re.search(r"\d+\.\d{3} s\s+(at once|-?\d[\d.]* (µs|ms|s))$", row) for row in rows), rows
         names = [re.match(r"\w+", row.strip()).group() for row in rows]  # type: ignore[union-attr]
         at = np.array([float(re.findall(r"([\d.]+) s", row)[0]) for row in rows])
-        assert names[::-1] == [name for _, name in printed()]
-        assert np.diff(at[::-1]) == pytest.approx(np.diff([float(time) for time, _ in printed()]), abs=0.0021)
+        assert names[::-1] == [one.label for one in found]
+        assert at[::-1] == pytest.approx([one.t / 1e6 for one in found], abs=0.0011)
         until(lambda: page.locator("#latency").inner_text() != "–", "latency is counted")
         shows(page, "spikes-info", "^contact area, parameters of the readout, latency")
         page.locator("#detection-list button").last.click()
         is_in(page, "held")
         # Where the view is at rest: one that follows leaves them behind.
         until(lambda: page.locator("#detection-marks span").count() > 0, "detections are marked")
-    # If the machine delays the emulated board, detections that were output too early are in the list too, and counted
-    # there.
-    if " late" not in server.heard():
-        assert names == ["lift", "contact"] * 6
-        assert np.diff(at[::-1]) * 1e6 == pytest.approx(np.diff(wanted), abs=4000)
+        # If the machine delays the emulated board, detections that were output too early are in the list too, and
+        # counted there.
+        if not live.counters["late"]:
+            assert names == ["lift", "contact"] * 6
+            assert np.diff(at[::-1]) * 1e6 == pytest.approx(np.diff(wanted), abs=4000)
 
 
 def test_what_does_not_arrive_is_said(chromium: Any, tmp_path: Path) -> None:
-    port = str(free_port())
-    how = ("--panel", "--port", port, "--host", "127.0.0.1", "--array", "4x4", "--rate-hz", "500", "--bits", "12")
-    with (
-        running("live", *how, folder=tmp_path) as server,
-        opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
-    ):
+    port = free_port()
+    source = taxel.live.Source(taxel.Array(4, 4), 500.0, bits=12, to=f"127.0.0.1:{port}")
+    given = {"array": source.array, "registers": source.registers}
+    with followed(chromium, tmp_path, port, **given) as (_, page):
         shows(page, "silence", rf"^Nothing has arrived at UDP 127\.0\.0\.1:{port} so far")
         shows(page, "state-word", "^Nothing arrives$")
         shows(page, "frames", "^–$")
         # Version 1 has no heartbeats: quiet.
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
-            board.sendto(word(1_000_000, 1, 1, 50), ("127.0.0.1", int(port)))
+            board.sendto(word(1_000_000, 1, 1, 50), ("127.0.0.1", port))
         shows(page, "silence", r"^Quiet: nothing has arrived for .*, since 1\.000 s by the clock of the board")
         shows(page, "state-word", "^Quiet$")
         # Version 2 sends them: lost.
-        source = taxel.live.Source(taxel.Array(4, 4), 500.0, bits=12, to=f"127.0.0.1:{port}")
         for k in range(200):
             source.push(np.full((4, 4), 100 if k < 20 else 300))
             time.sleep(0.002)

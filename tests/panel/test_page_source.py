@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.panel.browser import running
-from tests.panel.pages import is_in, opened, press, shows, until
+from tests.panel.pages import followed, is_in, press, shows, until
 
 import taxel
 import taxel.live
@@ -75,10 +74,7 @@ def is_free(port: Path) -> bool:
 
 def test_a_plug_that_is_pulled_while_recording_is_said_and_is_in_the_verdict(chromium: Any, tmp_path: Path) -> None:
     plug = tmp_path / "mat"
-    with (
-        running("live", "--panel", "--port", "0", "--host", "127.0.0.1", folder=tmp_path) as server,
-        opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
-    ):
+    with followed(chromium, tmp_path, 0) as (_, page):
         with mat(4, 4) as (line, _):
             plug.symlink_to(line)
             connect(page, plug, "4", "4")
@@ -107,7 +103,6 @@ def test_a_plug_that_is_pulled_while_recording_is_said_and_is_in_the_verdict(chr
             page.locator("#sensor-open").click()
             page.locator("#sensor-off").click()
             until(lambda: is_free(plug), "the port is free for other programs")
-            assert server.process.poll() is None
     verdict = taxel.open(tmp_path / "trial1.mcap").verdict
     assert verdict.noted["silences"] == 1
     assert verdict.noted["silent_ms"] >= 1000

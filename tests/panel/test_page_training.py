@@ -9,16 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 from shell import run
-from tests.panel.browser import running
 from tests.panel.pages import (
     clock,
     is_in,
-    live,
     opened,
-    page,
     pixel,
     press,
-    recording,
+    shown,
     shows,
     span,
     still,
@@ -26,10 +23,7 @@ from tests.panel.pages import (
 )
 
 import taxel
-import taxel.device
 from taxel.panel import Panel
-
-__all__ = ["live", "page", "recording"]
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -56,11 +50,7 @@ def test_play_label_train_and_watch_the_new_readout(
     chromium: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     truth, name = mat(tmp_path), "played.npz"
-    with (
-        running("view", name, "--no-open", folder=tmp_path) as server,
-        opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")) as page,
-    ):
-        is_in(page, "replay")
+    with shown(chromium, tmp_path / name) as page:
         shows(page, "detections-none", "No detections in this recording")
         press(page, "Space")
         at = clock(page)

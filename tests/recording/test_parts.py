@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import h5py
@@ -157,10 +155,11 @@ def test_a_shell_counts_the_seconds_of_a_stretch_as_info_does(begin_us: int, tmp
 # notes while recording
 
 
-def test_a_line_on_standard_input_is_a_note_of_the_recording(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
-    command = [sys.executable, "-m", "taxel", "record", path, "--port", "0", "--host", "127.0.0.1", "--seconds", "2"]
-    lines = "heel\n\ntoe off\nlast"
-    said = subprocess.run(command, input=lines, capture_output=True, text=True, check=False)
+def test_a_line_on_standard_input_is_a_note_of_the_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, typed = tmp_path / "a.mcap", tmp_path / "typed"
+    typed.write_text("heel\n\ntoe off\nlast")
+    with typed.open() as lines:
+        monkeypatch.setattr("sys.stdin", lines)
+        said = run("record", path, "--port", 0, "--host", "127.0.0.1", "--seconds", 1)
     assert "each line on standard input is saved as a note" in said.stderr
     assert [n.text for n in taxel.open(path).notes] == ["heel", "toe off", "last"]

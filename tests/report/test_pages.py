@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import json
-import os
 import re
-import subprocess
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from tests.panel.browser import installed
+from tests.panel.browser import started_chromium
+from tests.panel.pages import opened
 
 from taxel.report.page import render
 from taxel.report.svg import INK, STYLE, picture
+
+__all__ = ["started_chromium"]
 
 
 def axes_of(**how):
@@ -90,31 +90,17 @@ def test_a_page_needs_nothing_but_itself():
     assert "prefers-color-scheme: dark" in text
 
 
-def opened(text, tmp_path, width=800):
-    """Return a page as a browser of this width, px, holds it after some seconds."""
-    place = tmp_path / "page.html"
-    place.write_text(text, encoding="utf-8")
-    asked = [
-        "--headless",
-        f"--window-size={width},900",
-        "--disable-gpu",
-        "--virtual-time-budget=4000",
-        f"--user-data-dir={tmp_path / 'profile'}",
-    ]
-    asked += ["--no-sandbox"] * (os.geteuid() == 0)
-    command = [installed(), *asked, "--dump-dom", place.as_uri()]
-    return subprocess.run(command, check=True, capture_output=True, text=True, timeout=120).stdout
+#: How wide the window, all that it shows, and each figure are, px.
+WIDTHS = """() => [innerWidth, document.documentElement.scrollWidth,
+    ...[...document.querySelectorAll(".picture svg")].map(e => Math.round(e.getBoundingClientRect().width))]"""
 
 
 @pytest.mark.parametrize("width", [1400, 500])
-def test_a_browser_shows_figures_as_large_as_they_were_drawn_and_no_page_is_too_wide(tmp_path, width):
-    measured = (
-        "<p id=said></p><script>document.getElementById('said').textContent = JSON.stringify([innerWidth, "
-        "document.documentElement.scrollWidth, ...[...document.querySelectorAll('.picture svg')].map((e) => "
-        "Math.round(e.getBoundingClientRect().width))])</script></body>"
-    )
-    seen = opened(page(*some()).replace("</body>", measured), tmp_path, width)
-    inner, wide, *shown = json.loads(re.search(r'<p id="said">(.*?)</p>', seen)[1])
+def test_a_browser_shows_figures_as_large_as_they_were_drawn_and_no_page_is_too_wide(chromium, tmp_path, width):
+    place = tmp_path / "page.html"
+    place.write_text(page(*some()), encoding="utf-8")
+    with opened(chromium, place.as_uri(), width=width) as seen:
+        inner, wide, *shown = seen.evaluate(WIDTHS)
     assert wide <= inner == width
     # 6.4 and 12 inches of 96 pixels, which a narrow window makes smaller down to 34 rem.
     least, room = 34 * 16, shown[1]
