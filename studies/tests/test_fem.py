@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from taxel import ProblemError
 from taxel_studies.fem import (
     DRAGON_SKIN_10,
     Course,
@@ -64,17 +63,6 @@ def test_uniaxial_stretch_has_its_closed_form(stretch):
     slope = float(DRAGON_SKIN_10.slope(np.array(stretch**2 + 2 / stretch - 3)))
     stress = DRAGON_SKIN_10.stress(np.array([stretch, 0, 0, stretch**-0.5]))
     np.testing.assert_allclose(stress, [2 * slope * (stretch - stretch**-2), 0, 0, 0], atol=1e-12)
-
-
-def test_stability_ends_where_the_nominal_stress_of_a_simple_test_peaks():
-    """Of Table 5.2 at a stretch of 14.4 on one axis, 10.2 on two (found apart, by other code)."""
-    assert DRAGON_SKIN_10.limit == pytest.approx(min(14.4**2 + 2 / 14.4, 2 * 10.2**2 + 10.2**-4) - 3, rel=0.01)
-    assert Yeoh.of_modulus(50).limit == math.inf
-
-
-def test_a_stretch_beyond_stability_is_refused():
-    with pytest.raises(ProblemError, match="loses stability; press less deep"):
-        press(Indentation(silicone=Yeoh(3600, 0, -60_000), depth_mm=0.8, **COARSE))
 
 
 # Assembly
@@ -131,7 +119,6 @@ def test_the_base_gives_back_what_presses_to_rounding(slanted):
     length = np.gradient(slanted.x_mm)
     length[[0, -1]] /= 2
     np.testing.assert_allclose(slanted.pressure_kpa @ length, slanted.reaction[:, 1], atol=1e-6)
-    np.testing.assert_allclose(slanted.shear_kpa @ length, slanted.reaction[:, 0], atol=1e-6)
     assert slanted.reaction[-1, 0] > 1 < slanted.reaction[-1, 1]
 
 

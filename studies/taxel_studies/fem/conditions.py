@@ -53,10 +53,6 @@ def paths(conditions: Iterable[Condition], **settings: Any) -> list[Indentation]
     conditions : iterable of Condition
     **settings
         Of `Indentation`: what the conditions leave open (``mesh_mm=0.05``).
-
-    Raises
-    ------
-    ProblemError : a parameter that is invalid
     """
     deepest: dict[tuple[float, float, float], float] = {}
     for c in conditions:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from taxel import ProblemError
 from taxel_studies.fem.material import Yeoh
 from taxel_studies.fem.mesh import Mesh
 
@@ -47,7 +46,6 @@ class Solids:
         self._quads = np.concatenate([mesh.quads + k for (mesh, _), k in zip(bodies, self.first, strict=False)])
         ends = np.cumsum([0, *(len(mesh.quads) for mesh, _ in bodies)])
         self._parts = [(slice(a, b), law) for a, b, (_, law) in zip(ends[:-1], ends[1:], bodies, strict=True)]
-        self._limits = [law.limit for _, law in bodies]
         slopes, weights = _gradients(self.nodes[self._quads], _CORNERS / np.sqrt(3))
         # Per element (16, 8): the gradient's four entries at four points from the eight displacements.
         self._b = np.zeros((len(self._quads), 4, 4, 8))
@@ -90,17 +88,6 @@ class Solids:
         values = np.bincount(self._slot, stiffness.ravel(), len(self._indices))
         size = 2 * len(self.nodes)
         return force, sparse.csc_array((values, self._indices, self._pointers), shape=(size, size))
-
-    def check(self, u: NDArray[np.float64]) -> None:
-        """Raise `ProblemError` where a solid is stretched to where its law loses stability."""
-        f = self.gradient(u)
-        for (part, law), limit in zip(self._parts, self._limits, strict=True):
-            most = law.stretched(f[part])
-            if most > limit:
-                raise ProblemError(
-                    f"a solid of c10 {law.c10_pa:g}, c20 {law.c20_pa:g} and c30 {law.c30_pa:g} Pa is stretched to "
-                    f"I1 - 3 = {most:.2g}: beyond {limit:.2g} its law loses stability; press less deep"
-                )
 
     def energy(self, u: NDArray[np.float64]) -> float:
         """Return the energy of a displacement, uJ by mm of thickness (mN mm)."""
