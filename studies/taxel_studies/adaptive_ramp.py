@@ -107,7 +107,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         before = scans.volts[max(0, int(np.searchsorted(sampled_us, tap)) - 1), y, x]
         after = np.flatnonzero((sampled_us >= tap) & (scans.volts[:, y, x] > before + SEEN_V))
         late.append(float(sampled_us[after[0]] - tap) if len(after) else float("nan"))
-    result: dict[str, Any] = {
+    return {
         "rms_mv": {phase: 1e3 * float(np.sqrt(s / max(1, n))) for phase, (s, n) in squares.items()},
         "late_us": late,
         "frames_a_s": {
@@ -115,14 +115,6 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
             "gross": float(np.median(1e6 / (columns * line_us[np.searchsorted(scans.t_us, taps + 2e3)]))),
         },
     }
-    if seed == 0:
-        near = (scans.t_us > taps[0] - 2e3) & (scans.t_us < taps[0] + 1e3 * params["tap_ms"] + 6e3)
-        result["course"] = {
-            "t_ms": (1e-3 * (sampled_us[near] - taps[0])).round(4).tolist(),
-            "volts": scans.volts[near, y, x].round(5).tolist(),
-            "ramp": scans.ramp[near].tolist(),
-        }
-    return result
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
@@ -136,7 +128,6 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
             "late_us": float(np.nanmedian(late)),
             "unseen": int(np.isnan(late).sum()),
             "frames_a_s": {phase: float(np.median([one["frames_a_s"][phase] for one in here])) for phase in PHASES},
-            "course": next((one["course"] for one in here if "course" in one), None),
         }
     return summary
 
@@ -212,29 +203,15 @@ def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
     )
 
 
-def draw(p: Parameters, summary: Summary) -> Figure:
-    """Draw the two errors against each other, and a tap as the adaptive ramp and the gentlest read it."""
-    figure, (left, middle, right) = subplots(11, 3.8, 1, 3)
+def draw(_p: Parameters, summary: Summary) -> Figure:
+    """Draw the two errors against each other."""
+    figure, ax = subplots(6, 4)
     for name, one in summary["ramps"].items():
         own = name == "adaptive"
         at = (one["rms_mv"]["fine"], one["rms_mv"]["gross"])
-        left.plot(*at, "o" if own else "s", color="C3" if own else "C0")
-        left.annotate(name if own else f"{name} ticks", at, (0, 6), textcoords="offset points", ha="center")
-    left.set(xlabel="fine control, mV rms", ylabel="taps, mV rms")
-    logarithmic(left, x=[1, 2, 5, 10, 20, 50], y=[20, 30, 50, 70, 100])
-    left.margins(0.25, 0.2)
-    for name, colour in (("adaptive", "C3"), (str(max(p["ramps"])), "C0")):
-        course = summary["ramps"][name]["course"]
-        middle.step(
-            course["t_ms"],
-            course["volts"],
-            where="post",
-            color=colour,
-            label=name if name == "adaptive" else f"{name} ticks",
-        )
-    middle.set(xlabel="time since a tap, ms", ylabel="what the host holds, V")
-    middle.legend(fontsize="small")
-    course = summary["ramps"]["adaptive"]["course"]
-    right.step(course["t_ms"], course["ramp"], where="post", color="C3")
-    right.set(xlabel="time since a tap, ms", ylabel="ramp, ticks")
+        ax.plot(*at, "o" if own else "s", color="C3" if own else "C0")
+        ax.annotate(name if own else f"{name} ticks", at, (0, 6), textcoords="offset points", ha="center")
+    ax.set(xlabel="fine control, mV rms", ylabel="taps, mV rms")
+    logarithmic(ax, x=[1, 2, 5, 10, 20, 50], y=[20, 30, 50, 70, 100])
+    ax.margins(0.25, 0.2)
     return figure

@@ -142,11 +142,10 @@ def tell(section: dict[str, Any]) -> None:
     if not console.is_terminal:
         console.width = 10_000  # a file breaks and cuts nothing
     for shown in section["tables"]:
-        if not shown["folded"]:
-            say("", shown["title"])
-            table = Table(box=None, pad_edge=False)
-            for k, name in enumerate(shown["head"]):
-                table.add_column(name, justify="right" if k else "left", no_wrap=not k, overflow="fold")
-            for row in shown["rows"]:
-                table.add_row(*row)
-            console.print(table)
+        say("", shown["title"])
+        table = Table(box=None, pad_edge=False)
+        for k, name in enumerate(shown["head"]):
+            table.add_column(name, justify="right" if k else "left", no_wrap=not k, overflow="fold")
+        for row in shown["rows"]:
+            table.add_row(*row)
+        console.print(table)

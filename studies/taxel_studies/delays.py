@@ -1,4 +1,9 @@
-"""The gain of learnt delays: copies of every input, chosen from by l1, beside one random delay an input."""
+"""The gain of learnt delays: copies of every input, chosen from by l1, beside one random delay an input.
+
+Delays found by a linear programme are not new: Rostro-Gonzalez, Vasquez, Cessac and Viéville 2010 (hal
+inria-00455415) find weights at each delay, in discrete time, for a whole network. Here silence holds at every instant,
+weights have bounds, and a least l1 norm selects.
+"""
 
 from __future__ import annotations
 
@@ -38,8 +43,6 @@ TOY: dict[str, Any] = {"realisations": 2, "inputs": [40], "copies": [3], "shares
 SIZES = {"toy": TOY}
 #: A weight below this counts as 0, mV: a millionth of the bound.
 NONE = 3e-7
-#: The share of gaitndd's foot-offs within 10 ms, %, without selection of delays (notes to the gait study).
-GAIT = {"without": 82, "with copies from 0 to 50 ms": 57}
 
 
 def arms(p: Parameters) -> list[str]:
@@ -176,20 +179,6 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
                 bool(known[most]["by_weight"] > known["none"]["by_weight"]),
                 "so what the copies buy is the choice of delays, and not the number of weights alone",
             )
-    yield Statement(
-        "Delays found by a linear programme are not new.",
-        "Rostro-Gonzalez, Vasquez, Cessac and Viéville 2010 (hal inria-00455415): weights at each delay, "
-        "in discrete time, for a whole network",
-        "here with silence at every instant, bounds, and a least l1 norm that selects",
-        None,
-    )
-    yield Statement(
-        "Copies without selection hurt on recordings.",
-        "not in the thesis",
-        "gaitndd, foot-off within 10 ms: " + ", ".join(f"{value} % {name}" for name, value in GAIT.items()),
-        None,
-        "measured once with CONE-R and l2 when the gait recipes were sought; not rerun here",
-    )
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

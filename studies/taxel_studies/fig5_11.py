@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from scipy.spatial.distance import cdist
 
 from taxel.array import Array
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 from taxel_studies import dropped, kept_bits
 from taxel_studies.dropped import LENGTH_MS, REGION, distances_of
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Table, Task, grid, listed
+from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, grid, listed
 
 WHERE = "thesis 5.6.3 and 5.6.4, figures 5.11 to 5.13"
 PROTOCOL = (
@@ -25,7 +24,7 @@ PROTOCOL = (
     "printed), and compared by the Euclidean norm over taxels and time that 5.12's left side names; each drop is "
     "named by most of its 5 nearest others (the thesis gives no number). Bits of these answers, corrected by "
     "Panzeri and Treves. Tau and sigma are searched at each period on the same drops, as in the thesis. Beside "
-    "it: sampling begun at any phase, and the absolute differences of 5.10 as printed, at the best tau and sigma."
+    "it: sampling begun at any phase, at the best tau and sigma."
 )
 
 PARAMETERS: dict[str, Any] = {
@@ -35,7 +34,6 @@ PARAMETERS: dict[str, Any] = {
     "sigmas_mm": [1.0, 2.0, 3.0, 4.0, 5.0],
     "neighbours": 5,
     "times_ms": [0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0],
-    "absolute_ms": [1.0, 5.0],
     "seed": 1,
 }
 #: A fifth of the drops and of the search, none at every frame: about a minute of one core.
@@ -52,7 +50,6 @@ TOY: dict[str, Any] = {
     "sigmas_mm": [2.0],
     "neighbours": 3,
     "times_ms": [5.0, 50.0],
-    "absolute_ms": [20.0],
 }
 SIZES = {"coarse": COARSE, "toy": TOY}
 #: The parameters of a drop, in the words of figure 5.12.
@@ -91,7 +88,6 @@ def realise(params: dict[str, Any], _seed: int, kept: Kept) -> Any:
     kernel = dropped.smoothed(REGION, pitch, sigma)
     late = _spikes(params, kept, aligned=False)[0]
     any_phase = dropped.spatial_grams(late, period, tau, [kernel], [whole])[0][0]
-    absolute = absolute_distances(spikes, period, tau, kernel) if period in params["absolute_ms"] else None
     ends = [_samples_before(t, period, whole) for t in params["times_ms"]]
     every = sorted({*ends, whole})
     by_end = dict(zip(every, dropped.spatial_grams(spikes, period, tau, [kernel], every)[0], strict=True))
@@ -102,30 +98,10 @@ def realise(params: dict[str, Any], _seed: int, kept: Kept) -> Any:
         "sigma_mm": sigma,
         "searched": sorted([tau, by_sigma] for tau, by_sigma in searched.items()),
         "any_phase_bits": _bits(distances_of(any_phase), y, params)["bits"],
-        "absolute_bits": None if absolute is None else _bits(absolute, y, params)["bits"],
         **_bits(distances_of(by_end[whole]), y, params, by=True),
         "events": round(float(spikes.sum()) / len(spikes), 1),
         "times": [[t, times[end]] for t, end in zip(params["times_ms"], ends, strict=True)],
     }
-
-
-def absolute_distances(
-    spikes: NDArray[np.uint8], period_ms: float, tau: float, kernel: NDArray[np.float32]
-) -> NDArray[np.float64]:
-    """Return the distances of all patterns as 5.10 and 5.12 are printed: absolute differences, summed over samples.
-
-    Parameters are those of `dropped.spatial_grams`.
-    """
-    count, samples, layers, taxels = spikes.shape
-    state = np.zeros((count, layers, taxels), np.float32)
-    decay = np.float32(np.exp(-period_ms / tau))
-    total = np.zeros((count, count))
-    for k in range(samples):
-        state *= decay
-        state += spikes[:, k]
-        smooth = (state.reshape(-1, taxels) @ kernel).reshape(count, -1)
-        total += cdist(smooth, smooth, "cityblock")
-    return total
 
 
 def _samples_before(time_ms: float, period_ms: float, most: int) -> int:
@@ -212,17 +188,6 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
         bool(lines[-1]["bits"] > lines[-1]["any_phase_bits"]),
         size,
     )
-    printed = [line for line in lines if line["absolute_bits"] is not None]
-    if printed:
-        yield Statement(
-            "5.10 and 5.12 as printed (absolute differences) instead of the Euclidean distance (ours).",
-            "none",
-            ", ".join(
-                f"{line['absolute_bits'] - line['bits']:+.2f} bits at {_ms(line['period_ms'])}" for line in printed
-            ),
-            None,
-            "at the Euclidean one's best tau and sigma",
-        )
     yield from _by_parameter(best, lines[-1], size)
     yield from _by_time(lines, size)
 
@@ -271,19 +236,6 @@ def _by_time(lines: list[dict[str, Any]], size: str) -> Iterator[Statement]:
         + f" for {wanted:.2f} bits",
         bool(holds),
         f"that is {PLATEAU:.0%} of the most that periods up to 2 ms reach in {LENGTH_MS:g} ms; {size}",
-    )
-
-
-def tables(p: Parameters, summary: Summary) -> Iterator[Table]:
-    """Return the search as a table, period by period."""
-    yield from (
-        Table(
-            f"bits at a period of {_ms(line['period_ms'])} by tau and sigma",
-            ["tau", *(f"{sigma:g} mm" for sigma in p["sigmas_mm"])],
-            [[f"{tau:g} ms", *(f"{b:.2f}" for b in bits)] for tau, bits in line["searched"]],
-            folded=True,
-        )
-        for line in summary["lines"]
     )
 
 

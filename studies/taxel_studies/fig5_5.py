@@ -22,8 +22,7 @@ PROTOCOL = (
     "Table 5.3's constants, theta_0 from the largest pressure of all; linear discriminants on the rasters, ten "
     "folds; bits of their answers, corrected by Panzeri and Treves. Samples of a condition are shifts of one "
     "course, so what is measured is interpolation, as in the thesis. Alpha is searched over the thesis' 13 values "
-    "at 2 ms and longer, below that around the best of those. A sample of rest comes before the first. At .2 ms "
-    "(the thesis' own step) only the first 20 ms are sampled, at the alpha of the shortest period."
+    "at 2 ms and longer, below that around the best of those. A sample of rest comes before the first."
 )
 
 PARAMETERS: dict[str, Any] = {
@@ -34,8 +33,6 @@ PARAMETERS: dict[str, Any] = {
     "search_from_ms": 2.0,
     "times_ms": [5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 100.0],
     "even_ms": 1.0,
-    "part_period_ms": 0.2,
-    "part_until_ms": 20.0,
     "seed": 1,
 }
 TOY: dict[str, Any] = {
@@ -45,7 +42,6 @@ TOY: dict[str, Any] = {
     "alphas": [0.7, 1.0],
     "search_from_ms": 10.0,
     "times_ms": [20.0, 100.0],
-    "part_period_ms": 2.5,
 }
 SIZES = {"coarse": {**indented.COARSE, "samples": 100, "alphas": [0.3, 0.5, 0.7, 0.9, 1.1]}, "toy": TOY}
 #: The parameters of a contact, in the words of figure 5.6.
@@ -61,15 +57,15 @@ AROUND_100_HZ = (50.0, 200.0)
 shared = indented.shared
 
 
-def _one(p: Parameters, period_ms: float, alpha: float | None = None, *, part: bool = False) -> Task:
-    """Name the realisation of a period and alpha; without alpha, of the best; or of the beginning, in part."""
-    return Task({**p, "period_ms": period_ms, "alpha": alpha, "part": part})
+def _one(p: Parameters, period_ms: float, alpha: float | None = None) -> Task:
+    """Name the realisation of a period and alpha; without alpha, of the best."""
+    return Task({**p, "period_ms": period_ms, "alpha": alpha})
 
 
 def tasks(p: Parameters) -> list[Task]:
-    """List the search over alpha at the longer periods; then one realisation a period; then the part."""
+    """List the search over alpha at the longer periods; then one realisation a period."""
     search = [_one(p, period, alpha) for period in _long(p) for alpha in p["alphas"]]
-    return [*search, *(_one(p, period) for period in sorted(p["periods_ms"])), _one(p, p["part_period_ms"], part=True)]
+    return [*search, *(_one(p, period) for period in sorted(p["periods_ms"]))]
 
 
 def _long(p: Parameters) -> list[float]:
@@ -102,10 +98,6 @@ def realise(params: dict[str, Any], _seed: int, kept: Kept) -> dict[str, Any]:
 
     if p["alpha"] is not None:
         return indented.bits_of(indented.sampled(contacts, FA1(alpha=p["alpha"], **settings), p)[1], p["samples"])
-    if p["part"]:
-        alpha, until = result(min(p["periods_ms"]))["alpha"], p["part_until_ms"]
-        x, sums = indented.sampled(contacts, FA1(alpha=alpha, **settings), p, until)
-        return {"period_ms": period, "alpha": alpha, "times": _by_time(x, sums, p, until)}
     by_alpha = searched(p, period, lambda *at: float(result(*at)["bits"]))
     alpha = max(by_alpha, key=lambda one: by_alpha[one])
     encoder = FA1(alpha=alpha, **settings)
@@ -126,27 +118,25 @@ def realise(params: dict[str, Any], _seed: int, kept: Kept) -> dict[str, Any]:
             for name in VARIED
             if len({getattr(c, name) for c in conditions}) > 1
         },
-        "times": _by_time(x, sums, p, max(p["times_ms"])),
+        "times": _by_time(x, sums, p),
     }
 
 
-def _by_time(x: NDArray[Any], sums: FoldSums, p: Parameters, until_ms: float) -> list[list[float]]:
+def _by_time(x: NDArray[Any], sums: FoldSums, p: Parameters) -> list[list[float]]:
     """Return the bits of what was there by each time."""
     varies, taxels, period = indented.varying(x, sums.folds), SamplingGrid().taxels, p["period_ms"]
     return [
         [t, indented.bits_of(sums, p["samples"], features=k)["bits"] if varies[:k].any() else 0.0]
         for t in p["times_ms"]
-        if t <= until_ms and (k := round(t / period) * taxels) and abs(k * period - t * taxels) < 1e-6
+        if (k := round(t / period) * taxels) and abs(k * period - t * taxels) < 1e-6
     ]
 
 
 def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     """List the bits by period, alpha and question."""
-    *lines, part = (row.result for row in rows if row.params["alpha"] is None)
     contacts = indented.contacts(p, kept)
     return {
-        "lines": lines,
-        "part": part,
+        "lines": [row.result for row in rows if row.params["alpha"] is None],
         "conditions": len(contacts.conditions),
         "left_out": [[c.diameter_mm, c.modulus_kpa, c.depth_mm, c.angle_deg] for c in contacts.left_out],
     }
@@ -185,7 +175,6 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     )
     yield from _by_parameter(short, long, size)
     yield from _judged_by_time(lines, size)
-    yield _finer(short, summary["part"], p["part_until_ms"], size)
 
 
 def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> Iterator[Statement]:
@@ -221,20 +210,6 @@ def _judged_by_time(lines: list[dict[str, Any]], size: str) -> Iterator[Statemen
             not slow or slow[0] >= 40,
             f"for the {early:.2f} bits that .5 ms has at 10 ms; {size}",
         )
-
-
-def _finer(short: dict[str, Any], part: dict[str, Any], until_ms: float, size: str) -> Statement:
-    """Compare the beginning of a contact, sampled at a shorter period, with the shortest one at the same alpha."""
-    theirs = dict(map(tuple, short["times"]))
-    beside = [(t, bits, theirs[t]) for t, bits in part["times"] if t in theirs]
-    at = f"at {short['period_ms']:g} ms"
-    return Statement(
-        f"A period of {part['period_ms']:g} ms, of the first {until_ms:g} ms of a contact only (ours).",
-        "none",
-        ", ".join(f"{bits:.2f} bits ({other:.2f} {at}) by {t:g} ms" for t, bits, other in beside),
-        None,
-        f"alpha {part['alpha']:g}, that of the shortest period; {size}",
-    )
 
 
 def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:

@@ -83,20 +83,15 @@ def _way(one: Condition | Indentation) -> _Way:
     return one.diameter_mm, one.modulus_kpa, one.angle_deg
 
 
-def rasters(
-    of: Contacts, encoder: FA1, *, samples: int, seed: int, until_ms: float | None = None
-) -> NDArray[np.int8] | NDArray[np.int16]:
-    """Return the spikes of the afferents in each condition's samples, (conditions * samples, steps * taxels), by step.
-
-    Of the whole contact, or of its beginning until a time.
-    """
+def rasters(of: Contacts, encoder: FA1, *, samples: int, seed: int) -> NDArray[np.int8] | NDArray[np.int16]:
+    """Return the spikes of each condition's samples, (conditions * samples, steps * taxels), by step."""
     grid = SamplingGrid()
-    steps = grid.steps(encoder.period_ms) if until_ms is None else round(until_ms / encoder.period_ms)
+    steps = grid.steps(encoder.period_ms)
     raster = np.zeros((len(of.conditions), samples, steps, grid.taxels), np.int8 if encoder.bits < 8 else np.int16)
     t = np.round(np.arange(steps + 1) * encoder.period_ms * 1000).astype(np.int64)
     for k, c in enumerate(of.conditions):
         drawn = seed * len(of.conditions) + k
-        values = grid.draw(of.courses[_way(c)], c.depth_mm, encoder.period_ms, samples, seed=drawn)[:, : steps + 1]
+        values = grid.draw(of.courses[_way(c)], c.depth_mm, encoder.period_ms, samples, seed=drawn)
         spikes = encoder.encode(Frames(values.transpose(1, 0, 2), t, unit="kPa"))
         assert spikes.values is not None  # FA-1's spikes have signs
         train = np.repeat(np.arange(len(spikes)), np.diff(spikes.offsets))
@@ -105,11 +100,9 @@ def rasters(
     return raster.reshape(len(of.conditions) * samples, -1)
 
 
-def sampled(
-    of: Contacts, encoder: FA1, p: Mapping[str, Any], until_ms: float | None = None
-) -> tuple[NDArray[Any], FoldSums]:
+def sampled(of: Contacts, encoder: FA1, p: Mapping[str, Any]) -> tuple[NDArray[Any], FoldSums]:
     """Return the rasters of a study's samples, and their sums by condition and by one of ten folds."""
-    x = rasters(of, encoder, samples=p["samples"], seed=p["seed"], until_ms=until_ms)
+    x = rasters(of, encoder, samples=p["samples"], seed=p["seed"])
     y = np.repeat(np.arange(len(of.conditions)), p["samples"])
     return x, FoldSums(x, y, folds(y, count=10, seed=p["seed"]))
 

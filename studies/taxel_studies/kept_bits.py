@@ -51,7 +51,7 @@ def by_period_parameter_and_time(
 
     Parameters
     ----------
-    summary : of a study; what was sampled in part (``summary["part"]``) is in the third
+    summary : of a study
     figures : the thesis' numbers of the three
     curves : of the first figure, what each curve of bits is called
     named : of the second, what each parameter is called
@@ -72,7 +72,7 @@ def by_period_parameter_and_time(
             for name in lines[0]["by"]:
                 ax.plot(periods, shares(lines, name), "o-", label=named[name])
         else:
-            for line in (*([summary["part"]] if "part" in summary else []), *lines):
+            for line in lines:
                 ax.plot(*zip(*line["times"], strict=True), ".-", label=f"{line['period_ms']:g} ms")
         logarithmic(ax, x=times_ms if k == 2 else periods)
         ax.set(xlabel=f"ms since {since}" if k == 2 else "sampling period, ms", ylabel=label, title=f"figure {title}")

@@ -133,15 +133,12 @@ class Table:
         The first cell names the row.
     note : str
         An explanation below it.
-    folded : bool
-        Shown on the page only where it is opened, and not by the command.
     """
 
     title: str
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
     note: str = ""
-    folded: bool = False
 
 
 #: What a module must define to be a study, and what it may define.

@@ -48,20 +48,6 @@ def test_inner_products_give_the_distances_of_metrics(tau, sigma):
     np.testing.assert_allclose(dropped.distances_of(gram), wanted, atol=2e-3 * wanted.max())
 
 
-def test_absolute_differences_are_5_10_and_5_12_as_printed():
-    tau, sigma, pitch = 0.7, 2.0, 2.67
-    spikes, _ = patterns()
-    found = fig5_11.absolute_distances(spikes, PERIOD_MS, tau, dropped.smoothed(SIDE, pitch, sigma))
-    past = PERIOD_MS * np.subtract.outer(np.arange(spikes.shape[1]), np.arange(spikes.shape[1]))
-    in_time = np.where(past >= 0, np.exp(-np.maximum(past, 0) / tau), 0)
-    row, column = np.divmod(np.arange(SIDE * SIDE), SIDE)
-    apart = pitch * np.hypot(np.subtract.outer(row, row), np.subtract.outer(column, column))
-    in_space = np.exp(-apart / sigma) + np.eye(SIDE * SIDE)  # a train counts twice at its own taxel
-    g = np.einsum("ts,psln,nm->ptlm", in_time, spikes, in_space)
-    wanted = np.abs(g[:, None] - g[None]).sum((2, 3, 4))
-    np.testing.assert_allclose(found, wanted, rtol=1e-4, atol=1e-4)
-
-
 def test_at_every_frame_the_events_are_the_boards(fallen):
     """The encoder on the readings that the host holds gives the events that the board sent, one by one."""
     assert fallen.ticks.shape == (4, 1 + FRAMES, REGION * REGION)
@@ -99,7 +85,6 @@ def test_search_first_then_a_look_at_each_periods_best(tmp_path):
         bits = {tau: by_sigma[0] for tau, by_sigma in found["searched"]}
         assert list(bits) == [0.4, 1.0]
         assert found["bits"] == bits[found["tau_ms"]] == max(bits.values())
-        assert (found["absolute_bits"] is None) == (found["period_ms"] not in p["absolute_ms"])
 
 
 def test_own_neighbours_are_those_of_scikit_learn():
