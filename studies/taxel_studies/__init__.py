@@ -50,7 +50,6 @@ STUDIES = {
     "fa1": "which properties of FA-1 are worth keeping, in bits and in events",
     "stdp": "a neuron finds a pattern that repeats in its inputs, without labels",
     "rivals": "how many spike times each rule learns, beside CONE-X",
-    "tempotron": "which loads the Tempotron solves, and in how many epochs",
     "fig6.15": "SKIM against CONE on the gait recordings, in the same folds",
 }
 

@@ -1,4 +1,4 @@
-"""The comparison of rules that learn times, and the Tempotron's capacity: protocols, search, summary."""
+"""The comparison of rules that learn times: protocols, search, summary."""
 
 import numpy as np
 import pytest
