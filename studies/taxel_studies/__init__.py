@@ -44,7 +44,6 @@ STUDIES = {
     "fig6.11": "how the weights are distributed, trained without noise and with it",
     "delays": "what learnt delays buy: copies of every input, chosen from by l1",
     "gait": "gait events by one neuron an event, on published walking recordings (6.12 to 6.14)",
-    "touch": "which of two spheres fell, learnt from labels alone",
     "asynchronous": "an array whose taxels compare by themselves: bits of a touch, and what they cost",
     "receptors": "what SA-1, FA-1, SA-2 and FA-2 answer to: phases of a ramp-and-hold, thresholds against frequency",
     "fa1": "which properties of FA-1 are worth keeping, in bits and in events",

@@ -76,7 +76,6 @@ CPU_SECONDS = {
     "gait": ("full", 352),
     "rivals": ("full", 2437),
     "stdp": ("full", 2520),
-    "touch": ("full", 795),
 }
 
 

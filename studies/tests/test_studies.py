@@ -28,7 +28,7 @@ ON_RECORDINGS = [name for name in STUDIES if load(name).data]
 DATA = Path(os.environ["TAXEL_DATA"]) if "TAXEL_DATA" in os.environ else None
 KEPT = Path(__file__).parents[2] / "benchmarks" / "results" / "figures" / "toy"
 #: The longest of toy size, which take half as long as all others together.
-LONGEST = ("touch", "asynchronous", "fig4.8", "drops")
+LONGEST = ("asynchronous", "fig4.8", "drops")
 EACH = [pytest.param(name, marks=pytest.mark.slow if name in LONGEST else ()) for name in MADE_HERE]
 
 
