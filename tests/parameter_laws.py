@@ -1,6 +1,5 @@
 """Laws of classes with parameters: each takes a class, or a class and the name of a parameter with a range."""
 
-import ast
 import copy
 import inspect
 import math
@@ -8,7 +7,6 @@ import pickle
 import re
 import sys
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 import pytest
@@ -139,41 +137,10 @@ def a_wrong_value_changes_nothing(kind):
         one.get_params(deep=2)
 
 
-def python_types_no_default_of_a_parameter(kind):
-    """A constructor's default is read from the compiled part: `_DEFAULT.tau`, never a number, a word or None."""
-    typed = []
-    path = Path(inspect.getsourcefile(kind))
-    tree = ast.parse(path.read_text())
-    (held,) = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef) and node.name == kind.__name__]
-    for node in held.body:
-        name = node.target.id if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) else ""
-        if name not in inspect.signature(kind).parameters or node.value is None:
-            continue
-        read = isinstance(node.value, ast.Attribute) and isinstance(node.value.value, ast.Name)
-        if not (read and node.value.attr == name):
-            typed.append(f"{path.name}: {kind.__name__}.{name} = {ast.unparse(node.value)}")
-    assert not typed
-
-
-def python_compares_no_parameter_with_a_number(kind):
-    """Ranges are checked in the compiled part: no Python class compares one of its parameters with a number."""
-    typed = []
-    path = Path(inspect.getsourcefile(kind))
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Compare):
-            sides = [node.left, *node.comparators]
-            own = any(isinstance(s, ast.Attribute) and s.attr in inspect.signature(kind).parameters for s in sides)
-            if own and any(isinstance(s, ast.Constant) and isinstance(s.value, int | float) for s in sides):
-                typed.append(f"{path.name}: {ast.unparse(node)}")
-    assert not typed
-
-
 OF_A_KIND = [
     the_signature_shows_what_the_compiled_part_has,
     the_words_of_a_choice_are_the_compiled_part_s,
     parameters_go_round,
     a_wrong_value_changes_nothing,
-    python_compares_no_parameter_with_a_number,
-    python_types_no_default_of_a_parameter,
 ]
 OF_A_RANGE = [a_value_outside_its_range_is_refused, the_documentation_says_the_table_s_range_and_unit]

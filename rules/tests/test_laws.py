@@ -22,7 +22,7 @@ import taxel_rules
 from taxel import SpikeTrains
 from taxel._base.parameters import Parameters
 from taxel_rules import _rules
-from taxel_rules._epochs import EpochLearner, Status
+from taxel_rules._epochs import Status
 
 ROOT = Path(__file__).parents[1]
 PUBLIC = nonsense.public_of([taxel_rules])
@@ -94,14 +94,9 @@ def test_a_rule_has_the_manners_of_a_learner(law: Any, name: str) -> None:
 
 
 @each_kind
-@pytest.mark.parametrize("law", parameters.OF_A_KIND[:-1])
+@pytest.mark.parametrize("law", parameters.OF_A_KIND)
 def test_parameters_are_defined_once(law: Any, kind: type[Parameters]) -> None:
     law(kind)
-
-
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if not issubclass(kind, EpochLearner)])
-def test_python_types_no_default_of_a_parameter_but_those_of_a_rule_by_epochs(kind: type[Parameters]) -> None:
-    parameters.python_types_no_default_of_a_parameter(kind)
 
 
 @pytest.mark.parametrize(("kind", "name"), parameters.ranged(KINDS))

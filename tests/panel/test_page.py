@@ -48,13 +48,6 @@ def test_every_part_that_the_program_looks_for_is_in_the_page() -> None:
             assert set(names.split()) <= set(ids), f"{attribute}={names}"
 
 
-def test_every_module_is_imported() -> None:
-    code = {file.name: file.read_text() for file in WEB.glob("*.js")}
-    named = {name for text in code.values() for name in re.findall(r'\bfrom "\./([\w-]+\.js)"', text)}
-    named |= set(re.findall(r'<script type="module" src="([\w-]+\.js)"', (WEB / "index.html").read_text()))
-    assert sorted(code.keys() - named) == [], "no module imports it, nor does the page"
-
-
 def test_the_page_asks_nobody_else_for_anything() -> None:
     for name in SERVED:
         if not name.endswith("LICENSE") and name != "vendor/uPlot.js":

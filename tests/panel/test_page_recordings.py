@@ -177,7 +177,18 @@ def test_a_click_anywhere_in_the_row_makes_a_label_and_a_handle_moves_it(replay:
     shows(replay, "label-count", "^5 label")
     replay.locator("#notice-offer").click()
     shows(replay, "label-count", "^6 label")
+    a_key_takes_back_a_change(replay)
     a_stretch_is_cut_out(replay, recording)
+
+
+def a_key_takes_back_a_change(replay: Any) -> None:
+    """But in a field, where the key is the field's own."""
+    replay.locator("#label-name").fill("new")
+    replay.locator("#label-name").press("Control+z")
+    press(replay, "m")
+    shows(replay, "label-count", "^7 label")
+    press(replay, "Control+z")
+    shows(replay, "label-count", "^6 label")
 
 
 def a_stretch_is_cut_out(replay: Any, recording: Path) -> None:

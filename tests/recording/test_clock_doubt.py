@@ -6,11 +6,13 @@ import json
 from pathlib import Path
 
 import pytest
+from panel.protocol import Client, opened
 from shell import run
 
 from taxel.cli.board import counters_line, doubts
 from taxel.clock import doubt
 from taxel.live import Live
+from taxel.panel import Panel
 
 from .pauses import CAUSE, recorded
 
@@ -29,14 +31,18 @@ def test_info_says_which_clocks_cannot_be(tmp_path: Path, drift_ppm: float, dela
     file = recorded(tmp_path / "board.mcap", drift_ppm, delay_s)
     facts = json.loads(run("info", file, "--json").stdout)
     page = run("info", file).stdout
+    with Panel(file) as panel, Client(panel) as client:
+        pace = opened(client, file.name)["pace"]
     if abs(drift_ppm) < 20_000 and not delay_s:
         assert facts["drift_ppm"] == pytest.approx(drift_ppm, abs=5)
+        assert pace["drift_ppm"] == pytest.approx(drift_ppm, rel=0.01, abs=5)
     if said is None:
-        assert (facts["clock_doubt"], CAUSE in page) == (None, False)
+        assert (facts["clock_doubt"], CAUSE in page, pace["doubt"]) == (None, False, None)
     else:
         assert said in facts["clock_doubt"]
         assert facts["clock_doubt"] in page
         assert CAUSE in page
+        assert CAUSE in pace["doubt"]
 
 
 def test_the_border_is_between_the_worst_oscillators_and_what_cannot_be() -> None:

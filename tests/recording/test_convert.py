@@ -157,32 +157,3 @@ def test_a_taxel_beyond_six_bits_is_refused_by_the_wire(tmp_path: Path) -> None:
     with pytest.raises(ProblemError, match="65536 positions"):
         taxel.convert(huge, tmp_path / "b.mcap")
     assert not (tmp_path / "b.mcap").exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        ((3, "a.npz"), "source is 3"),
-        ((None, "a.npz"), "source is None"),
-        (("E", 7), "target is 7"),
-        (("E", b"a.npz"), "target is b'a.npz'"),
-        (("E", "a.xyz"), "ends in '.xyz'; must end in one of .mcap, .lsa, .npz, .csv"),
-        (("E", "a"), "ends in 'nothing'"),
-        (("E", "a.mcap", {"compression": "gzip"}), "compression is 'gzip'"),
-        (("E", "a.mcap", {"compression": None}), "compression is None"),
-        (("E", "a.npz", {"frames_hz": 0}), "frames_hz is 0"),
-        (("E", "a.npz", {"frames_hz": "fast"}), "frames_hz is 'fast'"),
-        (("E", "a.npz", {"frames_hz": float("nan")}), "frames_hz is nan"),
-        (("F", "a.npz", {"frames_hz": 10}), "the times of frames are not changed"),
-        (("E", "a.npz", {"overwrite": "yes"}), "overwrite is 'yes'"),
-    ],
-)
-def test_nonsense_is_one_clear_error(tmp_path: Path, arguments: tuple, said: str) -> None:
-    source, target, *more = arguments
-    source = {"E": some_events(5), "F": some_frames()}.get(source, source) if isinstance(source, str) else source
-    target = tmp_path / target if isinstance(target, str) else target
-    with pytest.raises(ProblemError) as caught:
-        taxel.convert(source, target, **(more[0] if more else {}))
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)
-    assert not list(tmp_path.iterdir())

@@ -10,7 +10,6 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from refusal import refused
 
 import taxel
 from taxel.wire import PRESETS, Registers
@@ -106,9 +105,3 @@ def rule_numbers(text):
 def _warnings(values):
     held = taxel._core.registers_preset(PRESETS[0]) | values
     return taxel._core.registers_warnings(json.dumps(held))
-
-
-def test_a_field_that_does_not_fit_is_refused_alike():
-    for name, value in (("lines", 65), ("lines", 257), ("wire_version", 3)):
-        with refused(taxel.DeviceError, argument=name):
-            Registers(**{name: value})
