@@ -66,7 +66,7 @@ def draw_recording(browser: Any) -> None:
 
 def draw_board(browser: Any) -> None:
     """Draw the emulated board while it runs."""
-    shell = Shell(Path.cwd())
+    shell = Shell()
     port = str(shell.port)
     with (
         seen(browser, Path.cwd(), "live", "--panel", "--host", "127.0.0.1", "--port", port) as page,
@@ -89,7 +89,7 @@ def draw_board(browser: Any) -> None:
 
 def main() -> None:
     """Walk the board's commands of the page, and draw both pictures."""
-    shell = Shell(Path.cwd())
+    shell = Shell()
     for language, text in blocks(PAGE):
         lines = text.splitlines()
         if language or not ("ball.mcap" in text or "touch.json" in text):

@@ -8,6 +8,7 @@ import os
 import signal
 import socket
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.live.boards import LOOPBACK, SMALL, command, listening, play, presses, touch, wait_for
+from tests.live.boards import LOOPBACK, SMALL, play, presses, touch, wait_for
 
 import taxel
 from taxel import DeviceError, ProblemError
@@ -135,14 +136,15 @@ def test_rerun_hears_what_a_board_holds(tmp_path: Path, port: int) -> None:
     from loopback import free_port
 
     udp, events = free_port(), presses(3)
-    words = command("show", f"board:{LOOPBACK}:{udp},array=4x4", f"rerun:{LOOPBACK}:{port}")
+    words = (sys.executable, "-m", "taxel", "show", f"board:{LOOPBACK}:{udp},array=4x4", f"rerun:{LOOPBACK}:{port}")
 
     def shown() -> list[int]:
         """What the taxel that is pressed held last."""
         return [int(image(row)[2, 1]) for _, row in rows(tmp_path).get("/pressure", [])[-1:]]
 
     with receiver(tmp_path, port), subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as show:
-        listening(show)
+        assert show.stderr is not None
+        assert any("listening" in line for line in show.stderr)
         play(events, udp)
         eventually(lambda: shown() == [int(events.intensity[-1])])
         show.send_signal(signal.SIGINT)
