@@ -216,6 +216,7 @@ def test_one_line_says_how_it_was_read_and_what_was_left_out(tmp_path: Path, tex
         ("t_ms,hand,a\n0,1,5\n10,2,7\n20,1,5\n", ['by = "hand"', 'leave_out = ["hand"]']),
         ("t,l0_x,l0_y,l0_z,l1_x,l1_y,l1_z\n0,1,2,30,4,5,60\n", ['axis = "z"', 'axis = "all"', 'axis = "shear"']),
         (JSON_AXES, ['axis = "z"', 'axis = "all"', 'axis = "shear"']),
+        ("t_ms;a;b\n0;0,5;0.513\n10;0,6;0.5\n", ['leave_out = ["a"]']),
         ("t_ms,a [N],b [V]\n0,1,2\n10,3,4\n", None),
         ("t_ms,a [N],b [kPa]\n0,1,2\n10,3,4\n", ['unit = "N"', 'unit = "kPa"']),
         ("t_ms,a\n" + "0,1\n0,2\n10,3\n10,4\n20,5\n20,6\n30,7\n30,8\n", ["", "frame_lines = 2"]),

@@ -16,7 +16,7 @@ from taxel.formats.column_names import time_unit
 from taxel.formats.form import places_of
 from taxel.formats.layout import Table
 from taxel.formats.line_fits import Fit
-from taxel.formats.lines import MISSING
+from taxel.formats.lines import MISSING, OTHER, is_number
 from taxel.formats.times import ISO, unit_of_times
 
 #: So many lines show that an unnamed column ascends as times do, and that one counts lines.
@@ -197,6 +197,12 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[str]:
     if kind == "day":
         yield "a date"
     if kind == "text":
+        other = OTHER[fit.decimal]
+        if cells and all(is_number(cell, other, fit.decimal) for cell in cells):
+            called, marks = draft.called(column), ("points", "commas")
+            why = f"decimal {marks[other == ',']} in column {called}, {marks[other == '.']} in others"
+            draft.ask(f"{why}; save it with one", {f"without {called}": {}})
+            yield "decimal marks that others have not"
         in_turn = 3 * sum(a != b for a, b in pairwise(cells)) > len(cells)
         is_whole = len(cells) == len(fit.body) and not column_names.is_label(name)
         is_key = is_whole and few and (column_names.is_key(name) or (in_turn and len(set(cells)) > 1))
