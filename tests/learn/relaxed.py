@@ -170,7 +170,8 @@ def drawn(seed):
     """A fit with options, bounds, windows and examples of every kind, its examples and its windows."""
     random = np.random.default_rng([77, seed])
     one = lambda *values: values[random.integers(len(values))]  # noqa: E731
-    trains, kernel = int(random.integers(1, 15)), one("alpha", "alpha", "double_exponential", "exponential")
+    trains = int(random.integers(1, 15)) * one(1, 1, 8)
+    kernel = one("alpha", "alpha", "double_exponential", "exponential")
     shape = (int(random.integers(1, 4)), int(random.integers(1, 4)))
     patterns, targets = stated.examples(seed, trains, *shape, whole_ms=one(True, False), first=20.0)
     kind = one("unsigned", "unsigned", "positive", "signs")

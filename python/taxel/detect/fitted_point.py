@@ -143,8 +143,10 @@ class Inputs:
         neuron = cone._on_grid()
         neuron.set_params(theta_0=run_threshold * neuron.theta_0)
         found = wrong = 0
-        for train, times in zip(self.trains, self.given, strict=True):
-            t = np.rint(to_us(neuron.run(cone.weights_, train) - shift_ms)).astype(np.int64)
+        for train, times, part in zip(self.trains, self.given, self.parts, strict=True):
+            spikes = neuron.run(cone.weights_, train.lasting(train.stop + SILENCE_MS))
+            t = np.rint(to_us(spikes - shift_ms)).astype(np.int64)
+            t = t[(t >= part.start) & (t < part.stop)]
             if (pairs := tally(t, t, times, round(to_us(WINDOW_MS)))) is not None:
                 found += len(pairs.detected)
                 wrong += len(pairs.missed_events) + len(pairs.false_detections)

@@ -239,6 +239,10 @@ fn record_marks_the_stream_once_each_way() {
     assert_eq!(words(&play(&mut board, &[0; 4096])), [Word::Marker { stamp: 1, start: true }]);
     board.record(false);
     assert_eq!(words(&play(&mut board, &[0; 4096])), [Word::Marker { stamp: 3, start: false }]);
+    // A reset discards what was not sent.
+    board.record(true);
+    board.reset().unwrap();
+    assert!(play(&mut board, &[0; 4096]).is_empty());
 }
 
 #[test]

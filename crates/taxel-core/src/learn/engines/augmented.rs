@@ -56,7 +56,7 @@ const FINER: usize = 3;
 /// Bounds wider than this many times the weights that the targets need do not set the scale of the weights.
 const FAR: f64 = 30.0;
 /// The number of rounds with little progress after which the search ends.
-const STALLED: usize = 12;
+const STALLED: usize = 20;
 
 /// A start: the weights of a similar fit, and its multipliers.
 #[derive(Debug, Clone, Default)]
