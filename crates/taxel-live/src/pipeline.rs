@@ -116,7 +116,9 @@ impl Live {
 
     /// Starts the pipeline; `part` writes it into the recording of another one.
     fn begin(options: LiveOptions, sinks: Vec<Box<dyn Sink>>, part: Option<SourceWriter>) -> Result<Self> {
-        for (name, frames) in [("guard_frames", options.guard_frames), ("gap_frames", options.gap_frames)] {
+        for (name, frames) in
+            [("guard_frames", options.guard_frames.unwrap_or_default()), ("gap_frames", options.gap_frames)]
+        {
             if !(frames.is_finite() && frames >= 0.0) {
                 return Err(problem!(name; " is {frames}: must be 0 or more and finite").into());
             }

@@ -116,7 +116,12 @@ fn readout_of(encoder: &str, cell: TrainedNeuron) -> Readout {
 fn options(record: Option<&Scratch>) -> LiveOptions {
     let record = record.map(|s| s.0.clone());
     // A machine too slow for real time holds frames back: here the host's clock moves nothing on, so no event is late.
-    LiveOptions { record, compression: "lz4".to_owned(), guard_frames: 1e9, ..defaults::options(&Array::thesis(), ANY) }
+    LiveOptions {
+        record,
+        compression: "lz4".to_owned(),
+        guard_frames: Some(1e9),
+        ..defaults::options(&Array::thesis(), ANY)
+    }
 }
 
 fn reading(readout: &Readout, options: LiveOptions) -> LiveOptions {
@@ -238,7 +243,7 @@ fn a_recording_has_ten_previews_a_second() {
 
 #[test]
 fn in_silence_time_moves_on_by_the_hosts_clock() {
-    let live = Live::open(reading(&readout(20.0), LiveOptions { guard_frames: 5.0, ..options(None) }), vec![])
+    let live = Live::open(reading(&readout(20.0), LiveOptions { guard_frames: Some(5.0), ..options(None) }), vec![])
         .expect("a port");
     // Two frames are all that ever comes; the potential crosses some ms after them.
     let mut frames = 0;

@@ -36,7 +36,13 @@ impl Drop for Scratch {
 fn options(array: &Array, registers: Registers, record: Option<&Scratch>) -> LiveOptions {
     let record = record.map(|s| s.0.clone());
     // The host's clock moves nothing on.
-    LiveOptions { record, compression: "lz4".to_owned(), registers, guard_frames: 1e9, ..defaults::options(array, ANY) }
+    LiveOptions {
+        record,
+        compression: "lz4".to_owned(),
+        registers,
+        guard_frames: Some(1e9),
+        ..defaults::options(array, ANY)
+    }
 }
 
 /// The datagrams of frames in which a square comes and goes.

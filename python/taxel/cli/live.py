@@ -136,12 +136,12 @@ def live(*, options: Any, typed: Flat[_LiveArguments] = _LiveArguments()) -> int
             # Detections that the readout made while `stop` ran.
             _drain(last, None if lines else say)
     if typed.report is not None and trained is not None and summary.path is not None:
-        printed = list(_summary_lines(summary, options["guard_frames"]))
+        printed = list(_summary_lines(summary))
         given = rest if summary.tare is None else summary.tare
         _report(typed.report, trained, summary, given, printed, overwrite=options["overwrite"])
         console.print(f"report: {typed.report / 'report.html'}")
     _report_unsent(summary)
-    say(*_summary_lines(summary, options["guard_frames"]), err=lines)
+    say(*_summary_lines(summary), err=lines)
     return exit_code(summary, pipeline.array)
 
 
@@ -228,7 +228,7 @@ def _report(
     write_detections(folder, readout, [outcome], title=title, printed=printed, overwrite=overwrite)
 
 
-def _summary_lines(summary: Summary, guard_frames: float) -> Iterator[str]:
+def _summary_lines(summary: Summary) -> Iterator[str]:
     """Yield what was detected, received and lost."""
     counters = summary.counters
     yield f"{counted(counters['detections'], 'detection')}, {received(counters)} in {counters['seconds']:.1f} s"
@@ -236,7 +236,7 @@ def _summary_lines(summary: Summary, guard_frames: float) -> Iterator[str]:
         yield f"from known to output: {delays(counters['report_latency'])}"
     if counters["wrong"]:
         wrong = counted(counters["wrong"], "detection")
-        yield f"{wrong} output too early: events arrived more than {guard_frames:g} frames late"
+        yield f"{wrong} output too early: events arrived late (--guard-frames waits longer)"
     if counters["late"]:
         yield f"{counted(counters['late'], 'event')} arrived out of order: read out on arrival, and recorded"
     if counters["events_dropped"]:

@@ -77,8 +77,11 @@ class StatedOptions:
     )
     compression: str = option("none", "Compression of a .mcap: none, lz4 or zstd.", commands="record")
     overwrite: bool = option(False, "Replace output files that exist already.", commands="live record")
-    guard_frames: float = option(
-        5.0, "How far, in frames, a readout stays behind the host's clock while no events arrive.", least=0
+    guard_frames: float | None = option(
+        None,
+        "How far, in frames, a readout stays behind the host's clock while no events arrive. Default: 3; 5 of a source "
+        "of numbers.",
+        least=0,
     )
     gap_frames: float = option(
         1.0,

@@ -94,8 +94,9 @@ class Live:
         Compression of a .mcap: none, lz4 or zstd.
     overwrite : bool
         Replace output files that exist already.
-    guard_frames : float, 0 or more
-        How far, in frames, a readout stays behind the host's clock while no events arrive.
+    guard_frames : float, 0 or more, optional
+        How far, in frames, a readout stays behind the host's clock while no events arrive. Default: 3; 5 of a source of
+        numbers.
     gap_frames : float, 0 or more
         With version 2 of the wire: how many frames to wait at a gap in the sequence: the data may only be late.
     lines : bool

@@ -4,17 +4,21 @@ use std::time::Duration;
 
 use taxel_core::Events;
 use taxel_core::held::Held;
-use taxel_core::wire::{DatagramInfo, Decoder, SenderDecoder};
+use taxel_core::wire::{DatagramInfo, Decoder, STAMP_US, SenderDecoder};
 
 use super::counters::Counters;
 use super::options::LiveOptions;
 use super::readout_queue::QuietUntil;
 use crate::capture::Datagram;
 use crate::clock::{BoardClock, Offset, Pace, leaves};
+use crate::recording::now_ns;
 
 /// Shortest interval at which the readout's time is advanced during silence; if frames are longer, it is advanced once
 /// per frame.
 const TICK: Duration = Duration::from_micros(500);
+
+/// How far the readout stays behind the host's clock in a silence, unless that is stated, frames.
+const GUARD_FRAMES: f64 = 3.0;
 
 pub(super) struct DecodeStage {
     decoder: SenderDecoder,
@@ -114,7 +118,7 @@ impl DecodeStage {
             held: Held::unknown(options.array.len()),
             latest: None,
             frame_us: options.registers.frame_us(),
-            guard_frames: options.guard_frames,
+            guard_frames: options.guard_frames.unwrap_or(GUARD_FRAMES),
             gap_frames: options.gap_frames,
             has_intensities: false,
             decoded: 0,
@@ -263,22 +267,33 @@ impl DecodeStage {
         self.frame_us = frame_us;
     }
 
-    /// The interval at which the readout's time is advanced during silence; only for version 1, which has no promises.
+    /// How long to wait for data before the readout's time is advanced; only for version 1, which has no promises. Until the
+    /// guard of the latest events has passed, nothing more is known of them.
     pub(super) fn tick(&self) -> Option<Duration> {
-        (self.decoder.version() == 1).then(|| TICK.max(Duration::from_secs_f64(self.frame_us * 1e-6)))
+        if self.decoder.version() != 1 {
+            return None;
+        }
+        // A spike comes a little after the event that causes it.
+        let guard_ns = 1000 * (self.guard_us().min(i64::from(u32::MAX)) + STAMP_US / 2);
+        let guarded_ns = self.sent.map_or(0, |(_, arrived_ns)| arrived_ns + guard_ns - now_ns());
+        let interval = TICK.max(Duration::from_secs_f64(self.frame_us * 1e-6));
+        Some(u64::try_from(guarded_ns).map_or(interval, Duration::from_nanos))
     }
 
     /// The board's time before which everything has arrived, if nothing arrived until `until_ns`: the latest datagram's, and as
     /// much as has passed since on the host's clock. A sender that lags its own clock is not assumed to have caught up.
-    #[allow(clippy::cast_possible_truncation)]
     pub(super) fn quiet_until(&self, until_ns: Option<i64>) -> Option<QuietUntil> {
         if self.decoder.version() != 1 {
             return None;
         }
-        let guard = (self.guard_frames * self.frame_us) as i64;
         let (board_us, host_ns) = self.sent?;
         let since = Offset { board_us, host_ns, ..self.clock.offset().unwrap_or_default() };
         // Events of a frame are sent at its end: all events before the start of the frame that ends now have arrived.
-        Some(QuietUntil::ByHostClock(since.board_us(until_ns?) - self.frame_us() - guard))
+        Some(QuietUntil::ByHostClock(since.board_us(until_ns?) - self.frame_us() - self.guard_us()))
+    }
+
+    #[allow(clippy::cast_possible_truncation)]
+    fn guard_us(&self) -> i64 {
+        (self.guard_frames * self.frame_us) as i64
     }
 }

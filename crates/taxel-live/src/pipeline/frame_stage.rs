@@ -18,6 +18,10 @@ use crate::clock::{BoardClock, Pace};
 /// Shortest interval at which the readout's time is advanced while no frames arrive.
 const TICK: Duration = Duration::from_micros(500);
 
+/// How far the readout stays behind the host's clock in a silence, unless that is stated, frames: some serial adapters hold
+/// bytes back for 16 ms.
+const GUARD_FRAMES: f64 = 5.0;
+
 /// Number of differences between frames from which the noise is measured.
 const NOISE_FRAMES: usize = 32;
 
@@ -48,12 +52,12 @@ pub(super) struct FrameStage {
 }
 
 impl FrameStage {
-    pub(super) fn new(layout: &FrameLayout, guard_frames: f64) -> Self {
+    pub(super) fn new(layout: &FrameLayout, guard_frames: Option<f64>) -> Self {
         let array = &layout.array;
         Self {
             frame_us: layout.frame_us,
             waited: layout.waited,
-            guard_frames,
+            guard_frames: guard_frames.unwrap_or(GUARD_FRAMES),
             taxels: array.len(),
             columns: array.columns.into(),
             frames: FrameBlock::default(),

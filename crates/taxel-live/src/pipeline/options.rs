@@ -49,8 +49,8 @@ pub struct LiveOptions {
     pub compression: String,
     /// Replace output files that exist already.
     pub overwrite: bool,
-    /// How far, in frames, a readout stays behind the host's clock while no events arrive.
-    pub guard_frames: f64,
+    /// How far, in frames, a readout stays behind the host's clock while no events arrive; each kind of source has a default.
+    pub guard_frames: Option<f64>,
     /// With version 2 of the wire: how many frames to wait at a gap in the sequence.
     pub gap_frames: f64,
     /// Print one line of JSON for each detection.

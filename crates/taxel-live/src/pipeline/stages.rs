@@ -24,7 +24,7 @@ use crate::capture::Batch;
 use crate::locked::lock;
 use crate::recording::{BoardChange, BoardChangeKind, LOW_RATE_EVERY, now_ns};
 
-/// Longest wait for datagrams when the readout's time does not depend on silence.
+/// Longest wait for datagrams.
 const IDLE: Duration = Duration::from_millis(20);
 
 /// Time for which datagrams are gathered during a recording without a readout: this costs half the CPU.
@@ -65,7 +65,7 @@ impl SourceStage {
         }
     }
 
-    /// The interval at which the readout's time is advanced during silence.
+    /// How long to wait for data before the readout's time is advanced, if it depends on silence.
     fn tick(&self) -> Option<Duration> {
         match self {
             Self::Board(decode) => decode.tick(),
@@ -167,7 +167,7 @@ impl Stages {
     fn step(&mut self) -> Result<()> {
         let tick = if self.readout.is_on() { self.source.tick() } else { None };
         let mut batch = std::mem::take(&mut self.batch);
-        if self.shared.receiver.receive(&mut batch, tick.unwrap_or(IDLE))? {
+        if self.shared.receiver.receive(&mut batch, tick.map_or(IDLE, |tick| tick.min(IDLE)))? {
             self.process(&batch)?;
             self.record.with(|recording| recording.batch(&batch))?;
         } else {
