@@ -74,13 +74,6 @@ def held(file: Path) -> int:
     return 0
 
 
-def spikes_of(events: Events) -> list[tuple[int, int, float]]:
-    """The spikes of a recording."""
-    trains = ChangeEvents().encode(events)
-    numbers = np.repeat(np.arange(len(trains)), np.diff(trains.offsets))
-    return sorted(zip(np.round(trains.times * 1000).astype(int), numbers, trains.values, strict=True))
-
-
 def above_rest(events: Events) -> np.ndarray:
     """What the taxels hold at last above their first values, which are the rest (more than the noise floor of 3)."""
     held, rest = np.zeros(SMALL.shape, int), np.zeros(SMALL.shape, int)

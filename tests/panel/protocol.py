@@ -119,7 +119,7 @@ def head(frame):
     names = ("magic", "bytes", "flags", "number", "rows", "columns", "t_us", "made_ns", "events", "watched")
     names += ("column_us", "first", "count", "none")
     values = struct.unpack_from("<4sHHIHHqqQIIqII", frame)
-    sections = struct.unpack_from("<20I", frame, 64)
+    sections = struct.unpack_from("<18I", frame, 64)
     return dict(zip(names, values, strict=True)), list(zip(sections[::2], sections[1::2], strict=True))
 
 
@@ -192,31 +192,3 @@ def values_at(page, about, t_us):
     ticks[ticks == UNKNOWN] = np.nan
     of = about["frames"]
     return (ticks - of["zero"]) * of["step"], frame
-
-
-def spikes_up_to(page, t_us):
-    """Move a view to a time; return the header of its frame, and its spikes by column of time and row."""
-    assert page.ask("seek", t_us=t_us)["type"] == "done"
-    page.send(type="credit", n=2)
-    while head(frame := page.until("frame"))[0]["t_us"] != t_us or not len(section(frame, 6, "u1")):
-        pass
-    about = head(frame)[0]
-    return about, section(frame, 6, "u1").reshape(about["count"], about["rows"])
-
-
-def raster_of(spikes, about, trains):
-    """The same of spikes, each a time (ms), a train and a value."""
-    counts = np.zeros((2, about["count"], about["rows"]), int)
-    for t, train, value in spikes:
-        column = int(t * 1000) // about["column_us"] - about["first"]
-        if 0 <= column < about["count"]:
-            counts[int(value < 0), column, train * about["rows"] // trains] += 1
-    ups, downs = np.minimum(counts, 15)
-    return ups | downs << 4
-
-
-def trains_of(trains):
-    """The spikes of trains: time (ms), train, value."""
-    numbers = np.repeat(np.arange(len(trains)), np.diff(trains.offsets))
-    values = np.ones(len(trains.times)) if trains.values is None else trains.values
-    return list(zip(trains.times.tolist(), numbers.tolist(), values.tolist(), strict=True))

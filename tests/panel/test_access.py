@@ -81,7 +81,6 @@ NONSENSE = [
     '{"type":"set","values":{"noise_floor":5}}',
     '{"type":"set","values":{"speed":5}}',
     '{"type":"play","speed":NaN}',
-    '{"type":"encode","encoder":{"name":"none"}}',
     '{"type":"change","changes":[{"new":{"label":"a","t_us":5,"source":"","trial":""}}]}',
     '{"type":"stop"}',
     '{"type":"cut","start_us":0,"stop_us":1,"name":"x.mcap"}',

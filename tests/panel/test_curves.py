@@ -139,7 +139,7 @@ def follows(recorded, loads_of, zooms):
                                 greatest * (step if k == 0 else 1),
                             ) == pytest.approx(expected, **close), (key, number)
                 # What the frame says of its time, and what is said of any time that is asked for.
-                now = section(frame, 9, CURVE)[0].item()
+                now = section(frame, 6, CURVE)[0].item()
                 at_now = curves[np.searchsorted(t, shown_us, side="right") - 1]
                 expected = [at_now[0] / step if k == 0 else at_now[k] for k in range(4)]
                 if not np.isnan(at_now[0]):

@@ -106,7 +106,6 @@ def test_memory_is_bounded_and_nothing_is_lost_over_time(tmp_path: Path) -> None
                 if k % 2:
                     # A client that requests everything, including narrow columns, and never reads.
                     page.send(type="zoom", column_us=125)
-                    page.send(type="encode", encoder={"name": "fa1"})
                     page.send(type="credit", n=8)
             with Client(at) as page:
                 page.send(type="credit", n=2)

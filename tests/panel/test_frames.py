@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 from formats.making import write_icub, write_pedar
@@ -13,10 +11,7 @@ from panel.protocol import (
     head,
     held_in,
     opened,
-    raster_of,
     section,
-    spikes_up_to,
-    trains_of,
     values_at,
 )
 
@@ -89,38 +84,6 @@ def test_both_feet_stand_side_by_side(tmp_path):
     assert [[note.text for note in one.notes] for one in again] == [["heel", "turn"], ["turn"]]
     part = taxel.open(tmp_path / "cut.mcap")
     assert part.sources["right"].frames() == right.between(0, 100_000)
-
-
-@pytest.mark.parametrize(
-    "encoder",
-    [
-        taxel.encode.LevelCrossing([30.0, 60.0]),
-        taxel.encode.ChangeEvents(noise_floor=5.0, bits=3),
-        taxel.encode.ThresholdIzhikevich([40.0]),
-    ],
-    ids=lambda encoder: encoder.name,
-)
-def test_spikes_of_frames_are_those_of_the_encoder(tmp_path, encoder):
-    frames = frames_of(fractions=False)
-    taxel.convert(frames, tmp_path / "mat.mcap")
-    expected = trains_of(encoder.encode(frames))
-    assert len(expected) > 30
-    with Panel(tmp_path / "mat.mcap") as panel, Client(panel) as page:
-        opened(page, "mat.mcap")
-        page.send(type="credit", n=2)
-        assert page.ask("encode", encoder=json.loads(encoder.to_json()))["type"] == "done"
-        # Whatever was shown before, a view has the spikes up to its time.
-        for t_us in (int(frames.t[-1]), 1_500_007, 2_200_007):
-            there = [one for one in expected if one[0] <= t_us / 1000]
-            about, raster = spikes_up_to(page, t_us)
-            assert np.array_equal(raster, raster_of(there, about, encoder.trains(frames.array)))
-        if encoder.name == "level_crossing":
-            # Narrow columns begin 1.8 s after the beginning: the encoder begins there or before, with the frame before.
-            assert page.ask("zoom", column_us=125)["type"] == "done"
-            about, raster = spikes_up_to(page, 2_200_007)
-            late = slice(2_100_000 // 125 - about["first"], None)
-            assert about["column_us"] == 125
-            assert np.array_equal(raster[late], raster_of(there, about, encoder.trains(frames.array))[late])
 
 
 def test_frames_without_times_are_numbered(tmp_path):

@@ -1,4 +1,4 @@
-"""The page of a recording: its time axis and numbers, spikes, cuts and labels, in a real browser."""
+"""The page of a recording: its time axis and numbers, cuts and labels, in a real browser."""
 
 from __future__ import annotations
 
@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.panel.pages import (
-    PIXELS,
     clock,
     pixel,
     press,
     recording,
     replay,
-    settled,
     shown,
     shows,
     span,
@@ -84,7 +82,7 @@ def cursors_say_numbers(page: Any, values: np.ndarray) -> None:
     until(lambda: page.locator("#second-line").is_hidden(), "it is taken away")
 
 
-def test_the_lanes_zoom_and_scroll_and_show_the_spikes_of_an_encoder(replay: Any) -> None:
+def test_the_lanes_zoom_and_scroll(replay: Any) -> None:
     still(replay)
     box = replay.locator("#raster").bounding_box()
     replay.mouse.move(pixel(replay, 5.2), box["y"] + 5)
@@ -116,13 +114,6 @@ def test_the_lanes_zoom_and_scroll_and_show_the_spikes_of_an_encoder(replay: Any
     until(lambda: span(replay)[1] - span(replay)[0] < 10, "no longer than the recording")
     press(replay, "End", "5")
     until(lambda: clock(replay) > 9, "the end")
-    still(replay)
-    changes = settled(replay, "raster")
-    replay.locator("#encoder").select_option("change_events")
-    shows(replay, "spikes-info", "change events, default parameters, latency")
-    until(lambda: replay.evaluate(PIXELS, "raster") != changes, "the raster is of spikes")
-    replay.locator("#encoder").select_option("")
-    until(lambda: replay.evaluate(PIXELS, "raster") == changes, "and of changes again")
 
 
 def test_a_click_anywhere_in_the_row_makes_a_label_and_a_handle_moves_it(replay: Any, recording: Path) -> None:

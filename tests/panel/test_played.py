@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pytest
 from loopback import until
-from panel.protocol import EXTENT, SOON, Client, head, raster_of, section
-from tests.live.boards import LOOPBACK, SMALL, above_rest, force, play, presses, spikes_of, touch, wait_for
+from panel.protocol import EXTENT, SOON, Client, head, section
+from tests.live.boards import LOOPBACK, SMALL, above_rest, force, play, presses, touch, wait_for
 
 import taxel
 from taxel.live import Live
@@ -30,18 +30,15 @@ def test_a_recording_is_played_to_its_end(tmp_path):
     with Panel(tmp_path / "one.mcap") as panel, Client(panel) as page:
         assert page.ask("open", name="one.mcap")["type"] == "done"
         opened = page.since_asked("opened", name="one.mcap")
-        assert page.ask("encode", encoder={"name": "change_events"})["type"] == "done"
         page.send(type="credit", n=2)
         assert page.ask("play", speed=5.0)["type"] == "done"
         while not page.frames or head(page.frames[-1])[0]["t_us"] < recording.events.t[-1]:
             page.next()
-    spikes = {}
     for frame in page.frames:
         found = section(frame, 5, "<u2").astype(int)
         rest = found if len(found) else rest
         first = head(frame)[0]["first"]
         sums |= {(first + k) * 4000: one["sum"].tolist() for k, one in enumerate(section(frame, 3, EXTENT))}
-        spikes |= {first + k: row for k, row in enumerate(section(frame, 6, "u1").reshape(-1, SMALL.rows))}
     assert np.array_equal(shown(page.frames[-1], rest), above_rest(recording.events))
     times = np.array([t for t in sorted(sums) if t + 4000 <= recording.events.t[-1]])
     assert np.all(np.diff(times) == 4000)
@@ -50,9 +47,6 @@ def test_a_recording_is_played_to_its_end(tmp_path):
         force(recording.events, np.arange(t + 1, t + 4001, 100)) for t in np.maximum(times, recording.events.t[0])
     ]
     assert [sums[t] for t in times] == [[min(each), max(each)] for each in inside]
-    about = {"first": min(spikes), "count": len(spikes), "rows": SMALL.rows, "column_us": 4000}
-    expected = [(t / 1000, train, value) for t, train, value in spikes_of(recording.events)]
-    assert np.array_equal(np.stack([spikes[k] for k in sorted(spikes)]), raster_of(expected, about, SMALL.taxels))
     assert sorted(found["t_us"] for found in opened["detections"]) == sorted(d.t for d in recording.detections)
     assert [note["text"] for note in opened["notes"]] == ["here"]
 

@@ -26,7 +26,7 @@ def test_a_frame_shows_what_came(live, panel):
             pass
         frame = page.frames[-1]
         about, sections = head(frame)
-        assert (about["magic"], about["bytes"], about["rows"], about["columns"]) == (b"TXF1", 144, 64, 64)
+        assert (about["magic"], about["bytes"], about["rows"], about["columns"]) == (b"TXF1", 136, 64, 64)
         assert all(start % 8 == 0 for start, _ in sections)
         pressure = section(frame, 0, "<u2").reshape(64, 64)
         assert pressure[5, 3] == 90

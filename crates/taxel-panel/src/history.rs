@@ -25,6 +25,11 @@ impl TaxelHistory {
         Self { taxel, column_us, first: (first, held), last: held, columns: VecDeque::new() }
     }
 
+    /// Applies the next changes.
+    pub fn push(&mut self, changes: &[TaxelChange]) {
+        changes.iter().for_each(|change| self.apply(change));
+    }
+
     /// Applies a change; those of other taxels are ignored.
     pub fn apply(&mut self, change: &TaxelChange) {
         if change.taxel != self.taxel || change.ticks == UNKNOWN {

@@ -17,7 +17,6 @@ mod live_source;
 mod load;
 mod player;
 mod shown;
-mod spikes;
 mod state;
 mod view;
 

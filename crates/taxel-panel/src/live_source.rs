@@ -9,7 +9,6 @@ use crossbeam_channel as channel;
 use serde_json::{Value, json};
 use taxel_core::Array;
 use taxel_core::detect::Detector;
-use taxel_core::encode;
 use taxel_core::held::UNKNOWN;
 use taxel_core::rest::ValueSteps;
 use taxel_core::wire::Registers;
@@ -421,7 +420,6 @@ fn message_of(output: &OutputDetection) -> String {
 pub fn limits() -> Value {
     json!({
         "firewall": FIREWALL,
-        "encoders": encode::NAMES,
         "column_us": COLUMN_US,
         "columns_us": COLUMNS_US,
     })

@@ -2,20 +2,17 @@
 
 use std::sync::Arc;
 
-use taxel_core::encode::Encoder;
 use taxel_core::problem;
 use taxel_live::Result;
-use taxel_live::pipeline::TaxelChange;
 
 use crate::block::Block;
 use crate::columns::{COLUMN_US, LATE_US, SPAN, TimeColumns, column_of};
 use crate::history::TaxelHistory;
 use crate::index::Index;
-use crate::spikes::EncodedSpikes;
 use crate::state::{ArrayState, FORGET, Keyframe};
 
-/// Maximum number of changes that are decoded only for the history of a taxel and the spikes of an encoder.
-pub(crate) const HISTORY_CHANGES: u64 = 2_000_000;
+/// Maximum number of changes that are decoded only for the history of a taxel.
+const HISTORY_CHANGES: u64 = 2_000_000;
 
 /// What a view shows of a source.
 #[derive(Debug, Clone)]
@@ -24,47 +21,23 @@ pub struct ViewOptions {
     pub column_us: i64,
     /// The taxel whose history is shown.
     pub watched: Option<u32>,
-    /// The encoder whose spikes are shown.
-    pub encoder: Option<Encoder>,
 }
 
 impl ViewOptions {
-    /// Columns of `column_us` without history and spikes.
+    /// Columns of `column_us` without history.
     pub fn plain(column_us: i64) -> Self {
-        Self { column_us, watched: None, encoder: None }
+        Self { column_us, watched: None }
     }
 
     /// Whether the columns are narrower than those that are stored of a whole source.
     pub fn is_narrow(&self) -> bool {
         self.column_us < COLUMN_US
     }
-}
 
-/// What one client sees beside the state: the history of a taxel, and the spikes of an encoder.
-#[derive(Clone, Default)]
-pub(crate) struct Watched {
-    pub(crate) history: Option<TaxelHistory>,
-    pub(crate) spikes: Option<EncodedSpikes>,
-}
-
-impl Watched {
-    /// Begins with what the array held before the changes that follow.
-    pub(crate) fn new(options: &ViewOptions, index: &Index, from: &Keyframe) -> Result<Self> {
-        let history = options
-            .watched
-            .map(|taxel| TaxelHistory::new(taxel, from.held[taxel as usize], from.latest, options.column_us));
-        let encode = |encoder| EncodedSpikes::new(encoder, &index.sensor, options.column_us, from);
-        Ok(Self { history, spikes: options.encoder.as_ref().map(encode).transpose()? })
-    }
-
-    /// Applies the next changes.
-    pub(crate) fn push(&mut self, changes: &[TaxelChange]) {
-        if let Some(history) = &mut self.history {
-            changes.iter().for_each(|change| history.apply(change));
-        }
-        if let Some(spikes) = &mut self.spikes {
-            spikes.push(changes);
-        }
+    /// The history of the watched taxel, which begins with what the array held before the changes that follow.
+    pub(crate) fn history(&self, from: &Keyframe) -> Option<TaxelHistory> {
+        let begin = |taxel| TaxelHistory::new(taxel, from.held[taxel as usize], from.latest, self.column_us);
+        self.watched.map(begin)
     }
 }
 
@@ -73,7 +46,8 @@ pub struct Player {
     index: Arc<Index>,
     /// The state at this time.
     pub state: ArrayState,
-    pub(crate) watched: Watched,
+    /// The history of the watched taxel.
+    pub(crate) history: Option<TaxelHistory>,
     /// The changes that were read last, how many of them were applied, and the number of the next block.
     block: Block,
     applied: usize,
@@ -87,24 +61,24 @@ impl Player {
     ///
     /// # Errors
     ///
-    /// As [`Index::open`] and [`Index::next`]; `Core(Problem)` where the encoder does not fit the array, or the frames.
+    /// As [`Index::open`] and [`Index::next`]; `Core(Problem)` for a recording without events.
     pub fn open(index: &Arc<Index>, t: i64, options: &ViewOptions, whole: Option<&Arc<TimeColumns>>) -> Result<Self> {
         let (first, last) =
             index.range().ok_or_else(|| problem!("nothing to show: the recording contains no events"))?;
         let t = t.clamp(first, last);
         let whole = whole.or(index.whole.as_ref()).filter(|_| !options.is_narrow());
         let (unit_us, span) = (options.column_us.min(COLUMN_US), SPAN * options.column_us);
-        let needs_changes = options.watched.is_some() || options.encoder.is_some();
-        let decodes = whole.is_none() || needs_changes && index.changes_between(t - span, t) <= HISTORY_CHANGES;
+        let decodes =
+            whole.is_none() || options.watched.is_some() && index.changes_between(t - span, t) <= HISTORY_CHANGES;
         let before = if decodes { span } else { 0 };
         let (from, next) = index.open(t.saturating_sub(before.max(FORGET * COLUMN_US) + LATE_US))?;
         let mut state = ArrayState::new(&index.sensor, &from, unit_us, span / unit_us);
         if let (Some(whole), Some(latest)) = (whole, from.latest) {
             state = state.after(Arc::clone(whole), column_of(latest + LATE_US, unit_us));
         }
-        let watched = Watched::new(options, index, &from)?;
+        let history = options.history(&from);
         let mut player =
-            Self { index: Arc::clone(index), state, watched, block: Block::default(), applied: 0, next, t };
+            Self { index: Arc::clone(index), state, history, block: Block::default(), applied: 0, next, t };
         player.advance(t)?;
         Ok(player)
     }
@@ -117,10 +91,6 @@ impl Player {
     pub fn advance(&mut self, t: i64) -> Result<bool> {
         let last = self.index.range().map_or(t, |(_, last)| last);
         self.follow(t.min(last))?;
-        if let Some(spikes) = self.watched.spikes.as_mut().filter(|_| t >= last) {
-            // All events of the last time stamp have been applied too.
-            spikes.advance(last + 1);
-        }
         Ok(t < last)
     }
 
@@ -135,16 +105,13 @@ impl Player {
             let now = ahead.iter().position(|change| change.t > t).unwrap_or(ahead.len());
             let (now, later) = ahead.split_at(now);
             self.state.apply(now);
-            self.watched.push(now);
+            self.history.iter_mut().for_each(|history| history.push(now));
             self.applied += now.len();
             if !later.is_empty() || !self.read()? {
                 break;
             }
         }
         self.state.advance(t);
-        if let Some(spikes) = &mut self.watched.spikes {
-            spikes.advance(t);
-        }
         self.t = self.t.max(t);
         Ok(())
     }

@@ -8,7 +8,6 @@ mod playback;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
-use taxel_core::encode::Encoder;
 use taxel_core::held::UNKNOWN;
 use taxel_core::problem;
 use taxel_live::Result;
@@ -18,8 +17,6 @@ use crate::columns::{COLUMN_US, COLUMNS_US, Curve, MISSING, is_column};
 use crate::index::Index;
 use crate::live_source::LiveSource;
 use crate::player::{Player, ViewOptions};
-use crate::spikes::EncodedSpikes;
-use crate::state::Keyframe;
 use delivered::Delivered;
 use following::Following;
 use frame::{About, FOLLOWS, MOVES, RESTART};
@@ -99,8 +96,7 @@ impl View {
     /// Whether [`View::advance`] has work to do before the next frame.
     #[must_use]
     pub fn moves(&self) -> bool {
-        let follows = self.is_following() && self.live.is_some();
-        self.playback.is_playing() || follows && self.options.encoder.is_some()
+        self.playback.is_playing()
     }
 
     fn is_following(&self) -> bool {
@@ -149,13 +145,8 @@ impl View {
 
     // ------------------------------------------------------------------------------------------ frames
 
-    /// Moves a playing view on, and encodes; returns whether it has arrived at the end of its recording.
+    /// Moves a playing view on; returns whether it has arrived at the end of its recording.
     pub fn advance(&mut self) -> bool {
-        if let (Position::Following(following), Some(live)) = (&mut self.position, &self.live)
-            && let Err(error) = following.read(live)
-        {
-            self.warn(&error);
-        }
         let Some(t) = self.playback.now() else { return false };
         let moved = self.position().and_then(|position| {
             // A window that the view leaves moves with it.
@@ -204,7 +195,6 @@ impl View {
             watched: self.options.watched,
             column_us: self.options.column_us,
         };
-        self.check_encoder();
         let (bytes, last) = match &mut self.position {
             Position::Following(following) => following.frame(self.live.as_ref()?, about),
             Position::At(position) => {
@@ -212,28 +202,11 @@ impl View {
                 window.iter_mut().for_each(|window| window.state.update_curve());
                 player.state.update_curve();
                 let beside = window.as_ref().unwrap_or(player);
-                frame::write(&player.state, &beside.state, &beside.watched, about)
+                frame::write(&player.state, &beside.state, beside.history.as_ref(), about)
             }
         };
         self.delivered.frame(last, self.options.column_us);
         Some((bytes, std::mem::take(&mut self.texts)))
-    }
-
-    /// Goes on without an encoder that has stopped.
-    fn check_encoder(&mut self) {
-        let of_view = match &mut self.position {
-            Position::Following(following) => following.spikes(),
-            Position::At(Some(position)) => {
-                let SourcePosition { player, window } = &mut **position;
-                &mut window.as_mut().unwrap_or(player).watched.spikes
-            }
-            Position::At(None) => return,
-        };
-        if let Some(error) = of_view.as_ref().and_then(EncodedSpikes::failed).cloned() {
-            *of_view = None;
-            self.options.encoder = None;
-            self.warn(&error.into());
-        }
     }
 
     // ------------------------------------------------------------------------------------------ moving
@@ -289,7 +262,7 @@ impl View {
 
     /// Shows the newest state of the live source from now on.
     fn follow_newest(&mut self) {
-        (self.recording, self.window_us, self.options.encoder) = (None, None, None);
+        (self.recording, self.window_us) = (None, None);
         self.playback.pause();
         self.begin_following();
     }
@@ -335,22 +308,6 @@ impl View {
             return Err(problem!("taxel"; ": must be [x, y] on {rows} rows x {columns} columns, or null").into());
         }
         self.options.watched = taxel.and_then(|(x, y)| u32::try_from(array.index(x, y)).ok());
-        self.reopen()
-    }
-
-    /// Makes spikes by this encoder of what is shown from now on, or none.
-    ///
-    /// # Errors
-    ///
-    /// `Core(Problem)` where it does not encode what is shown: then no encoder does.
-    pub fn encode(&mut self, encoder: Option<Encoder>) -> Result<()> {
-        self.options.encoder = None;
-        if let Some(encoder) = &encoder {
-            let index = self.index()?;
-            let blank = Keyframe::blank(index.sensor.array.len());
-            EncodedSpikes::new(encoder, &index.sensor, COLUMN_US, &blank)?.check(&index)?;
-        }
-        self.options.encoder = encoder;
         self.reopen()
     }
 
@@ -451,14 +408,14 @@ impl View {
         Ok(())
     }
 
-    /// Shows a recording at its beginning, paused, without an encoder.
+    /// Shows a recording at its beginning, paused.
     ///
     /// # Errors
     ///
     /// `File` or `Core` where the recording cannot be read.
     pub fn show(&mut self, index: Arc<Index>) -> Result<()> {
         self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < index.sensor.array.len());
-        (self.recording, self.window_us, self.options.encoder) = (Some(Arc::clone(&index)), None, None);
+        (self.recording, self.window_us) = (Some(Arc::clone(&index)), None);
         self.playback.pause();
         match index.range() {
             Some((first, _)) => self.go(first)?,

@@ -8,7 +8,6 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde_json::{Value, json};
-use taxel_core::encode::Encoder;
 use taxel_core::rest::Value as _;
 use taxel_core::wire::Registers;
 use taxel_live::clock::BoardClock;
@@ -21,7 +20,7 @@ use crate::live::Live;
 use crate::recording::{RecordingReader, Remarks};
 use taxel_border::convert::{ArrayParts, EventsIn, array, from_array, slice, to_array};
 use taxel_border::enter::enter;
-use taxel_border::errors::{ProblemError, core};
+use taxel_border::errors::ProblemError;
 use taxel_border::parameters::{Plain, parsed};
 
 /// Counts by which unhealthy taxels are found: the sensor, the events of each taxel, those in the direction of the one before,
@@ -252,7 +251,7 @@ impl PanelView {
         self.moves.load(Ordering::Relaxed)
     }
 
-    /// Plays on, decodes narrow columns, encodes; returns whether the end of a recording was reached.
+    /// Plays on, decodes narrow columns; returns whether the end of a recording was reached.
     fn advance(&self, py: Python<'_>) -> PyResult<bool> {
         self.with(py, |view| Ok(view.advance()))
     }
@@ -280,12 +279,6 @@ impl PanelView {
     /// Sends the history of a taxel (column, row) from now on, or none.
     fn watch(&self, py: Python<'_>, taxel: Option<(u16, u16)>) -> PyResult<()> {
         self.with(py, |view| view.watch(taxel))
-    }
-
-    /// Makes spikes of what is shown by an encoder (JSON) from now on, or none.
-    fn encode(&self, py: Python<'_>, encoder: Option<&str>) -> PyResult<()> {
-        let encoder = encoder.map(Encoder::from_json).transpose().map_err(core)?;
-        self.with(py, |view| view.encode(encoder))
     }
 
     /// Columns of this width, us, that end at a time or at that of the view.

@@ -16,7 +16,6 @@ from taxel._core import ProblemError
 from taxel.detect import PlainRule, Readout, load
 from taxel.detect.board import differences
 from taxel.device import Cable
-from taxel.encode import Encoder
 from taxel.frames import Frames
 from taxel.live import Live
 from taxel.panel.board import Board
@@ -49,9 +48,6 @@ class Client(Protocol):
 
     async def send_frame(self) -> None:
         """Send a frame, if there is a new one."""
-
-    async def encode_again(self) -> None:
-        """Make spikes as they were asked for, of another readout or of what is shown now."""
 
     def waiting(self) -> int:
         """Return how many bytes wait for the client."""
@@ -221,16 +217,6 @@ class Hub:
         await self.say(self.hello())
         await self.say(self.registers())
         await self.say(self.zeroed())
-        for session in list(self.sessions):
-            await session.encode_again()
-
-    def encoder(self) -> Encoder | None:
-        """Return the encoder of the readout that runs, with its tare where that is known; none of a plain rule."""
-        readout = None if self._live is None else self._live._options.readout
-        if self._live is None or not isinstance(readout, Readout):
-            return None
-        tare = self._live.tare or self._live._options.tare
-        return readout.encoder.with_tare(tare) if isinstance(tare, Tare) else readout.encoder
 
     async def read_source(self, source: str) -> None:
         """Receive another source, as `sources` of `taxel.live.Live` names it, with all other options unchanged."""
@@ -373,7 +359,6 @@ class Hub:
         """Return what the panel shows, sent again when any of it changes."""
         nothing = dict.fromkeys(("array", "udp", "lines", "source", "frames", "readout"))
         live = {**nothing, "sources": []} if self.source is None else self.source.about()
-        encoder = self.encoder()
         return {
             "type": "hello",
             "protocol": 1,
@@ -382,7 +367,6 @@ class Hub:
             "folder": str(self.folder.path),
             "open": self.opened,
             **live,
-            "readout_encoder": None if encoder is None else encoder.name,
             **_core.panel_limits(),
         }
 

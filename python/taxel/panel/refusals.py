@@ -26,11 +26,11 @@ def field_of(error: Exception) -> str | None:
 
 
 @contextlib.contextmanager
-def at_field(name: str, *, whole: bool = False) -> Iterator[None]:
-    """Note the key at fault where an error names none of the request; or, of a `whole` object, in any case."""
+def at_field(name: str) -> Iterator[None]:
+    """Note the key at fault where an error names none of the request."""
     try:
         yield
     except (OSError, _core.Error) as error:
-        if whole or getattr(error, "argument", None) is None:
+        if getattr(error, "argument", None) is None:
             error.field = name  # type: ignore[union-attr]
         raise

@@ -17,7 +17,6 @@ from websockets.exceptions import ConnectionClosed
 from taxel import _core
 from taxel._base.errors import refused
 from taxel._core import ProblemError
-from taxel.encode import Encoder
 from taxel.labels import Note
 from taxel.live.lines import preview
 from taxel.panel.declared import Request, Time, line, long_request, request, requests_of, whole
@@ -79,10 +78,6 @@ class Session:
         self.view = _core.PanelView(hub.source)
         #: The recording that is shown; None: the live source.
         self.shown: Shown | None = None
-        #: The encoder of the readout that reads this recording, with the tare that it read with.
-        self._readout: Encoder | None = None
-        #: The encoder that was asked for.
-        self._asked: dict[str, Any] | None = None
         #: Frames that may be sent; none while a request is answered, so that a frame shows what was answered before it.
         self.credits, self.answers = 0, False
         self._advancing: asyncio.Task[None] | None = None
@@ -221,39 +216,6 @@ class Session:
         await in_thread(self.view.watch, taxel)
 
     @request
-    async def encode(self, encoder: dict[str, Any] | None) -> None:
-        """Send spikes of this encoder (JSON as `Encoder.to_json` writes it) of what this view shows; null for none.
-
-        A name without parameters is that of the encoder of the readout that reads what is shown, with its parameters
-        and its tare, where the readout has an encoder of this name; else the parameters are the defaults. `spikes`
-        follows, and again when the readout or the recording is another one.
-        """
-        with at_field("encoder", whole=True):
-            await self._encode(encoder)
-
-    async def _encode(self, asked: dict[str, Any] | None) -> None:
-        self._asked = None
-        of_readout = self._hub.encoder() if self.shown is None else self._readout
-        encoder = None
-        if asked is not None and of_readout is not None and asked == {"name": of_readout.name}:
-            encoder = of_readout
-        elif asked is not None:
-            encoder = Encoder.from_json(json.dumps(asked))
-        await in_thread(self.view.encode, None if encoder is None else encoder.to_json())
-        self._asked = asked
-        if encoder is not None:
-            about = {"encoder": encoder.name, "of_readout": encoder is of_readout, "latency_ms": encoder.latency_ms}
-            await self.say({"type": "spikes", **about})
-
-    async def encode_again(self) -> None:
-        """Make spikes as they were asked for, of another readout or of what is shown now."""
-        if self._asked is not None:
-            try:
-                await self._encode(self._asked)
-            except _core.Error as error:
-                await self.say({"type": "warning", "text": str(error)})
-
-    @request
     async def zoom(self, column_us: Annotated[int, whole(1, 2**40)], end_us: Time | None = None) -> None:
         """Send columns of time of this width, for this view: 125 us times a power of two; 4 ms or more if it follows.
 
@@ -292,7 +254,6 @@ class Session:
         """Follow the live source; leaves a recording."""
         await in_thread(self.view.follow)
         self.shown = None
-        await self.encode_again()
         await self._say_transport()
 
     @request
@@ -314,7 +275,7 @@ class Session:
         except (OSError, _core.Error) as error:
             trouble = reason(error)
         await in_thread(self.view.show, shown.recording)
-        self.shown, self._readout = shown, None
+        self.shown = shown
         opened = {
             "type": "opened",
             "name": shown.name,
@@ -326,7 +287,6 @@ class Session:
         await self._say_transport()
         if trouble is not None:
             await self.say({"type": "warning", "text": trouble})
-        await self.encode_again()
 
     @long_request
     async def values(self, t_us: Time) -> None:
@@ -543,12 +503,9 @@ class Session:
         shown = self.shown
         if shown is None:
             return await self._hub.read_out(path)
-        labels, encoder, found = await in_thread(self._hub.training.detect, shown.path, shown.asked, path)
-        if self.shown is shown:
-            self._readout = encoder
-            await self.encode_again()
+        labels, found = await in_thread(self._hub.training.detect, shown.path, shown.asked, path)
         message = {"type": "detections", "source": shown.name, "readout": readout, "labels": labels}
-        await self.say(message | {"encoder": None if encoder is None else encoder.name, "detections": found})
+        await self.say(message | {"detections": found})
         return None
 
     def _needed(self, action: str) -> Shown:

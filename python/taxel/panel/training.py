@@ -12,8 +12,7 @@ from typing import Any
 from taxel._base.child_process import ChildProcess
 from taxel._base.progress import Steps
 from taxel._core import ProblemError
-from taxel.detect import Readout, load
-from taxel.encode import Encoder
+from taxel.detect import load
 from taxel.panel.shown_files import Opening, ShownFiles
 
 #: The reason that a client sees of a training that was stopped.
@@ -127,27 +126,21 @@ class Training:
             self._stopped = True
             training.end()
 
-    def detect(
-        self, recording: Path, trial: str | None, readout: Path
-    ) -> tuple[list[str], Encoder | None, list[dict[str, Any]]]:
+    def detect(self, recording: Path, trial: str | None, readout: Path) -> tuple[list[str], list[dict[str, Any]]]:
         """Detect by a readout in a recording or its trial.
 
         Returns
         -------
-        tuple of list of str, Encoder or None, and list of dict
-            The readout's labels; its encoder, with the tare that it read with (none for several sensors, each
-            of which has its own); the detections in the order in which they are known.
+        tuple of list of str, and list of dict
+            The readout's labels; the detections in the order in which they are known.
         """
         from taxel.tasks import detect  # noqa: PLC0415  the command line starts quickly
 
         loaded = load(readout)
         opened, _ = self._files.opened(recording, trial)
         detected = detect(loaded, opened).each
-        encoder = loaded.encoder if isinstance(loaded, Readout) else None
-        if encoder is not None and len(detected) == 1 and detected[0].rest is not None:
-            encoder = encoder.with_tare(detected[0].rest.tare)
         names = [each.recording.label or "" if len(detected) > 1 else "" for each in detected]
         found = [(found, name) for each, name in zip(detected, names, strict=True) for found in each.outcome.found]
         found.sort(key=lambda one: one[0].known)
         messages = [{"label": found.label, "t_us": found.t, "source": name} for found, name in found]
-        return list(loaded.labels), encoder, messages
+        return list(loaded.labels), messages

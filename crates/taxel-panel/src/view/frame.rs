@@ -2,15 +2,15 @@
 
 use crate::columns::{COLUMN_US, Curve, Curves, SPAN, column_of};
 use crate::frame_values::RestSource;
-use crate::player::Watched;
+use crate::history::TaxelHistory;
 use crate::state::ArrayState;
 
 /// Bytes of the header.
-const HEADER: usize = 144;
+const HEADER: usize = 136;
 
 /// Where the table of sections begins, and how many there are.
 const SECTIONS: usize = 64;
-const SECTION_COUNT: usize = 10;
+const SECTION_COUNT: usize = 9;
 
 /// The flags of the header.
 pub(crate) const MOVES: u16 = 2;
@@ -30,8 +30,13 @@ pub(crate) struct About {
     pub(crate) column_us: i64,
 }
 
-/// A frame of a state, and its last column. The columns are those of another state `beside` it, or its own.
-pub(crate) fn write(state: &ArrayState, beside: &ArrayState, watched: &Watched, about: About) -> (Vec<u8>, i64) {
+/// A frame of a state, with the history of the watched taxel, and its last column. The columns are those of another state `beside` it, or its own.
+pub(crate) fn write(
+    state: &ArrayState,
+    beside: &ArrayState,
+    history: Option<&TaxelHistory>,
+    about: About,
+) -> (Vec<u8>, i64) {
     let (taxels, array, columns) = (state.held().len(), &state.sensor.array, beside.columns());
     let (rows, unit_us) = (usize::from(array.rows), about.column_us.min(COLUMN_US));
     let last = beside.latest.map_or(i64::MIN, |t| column_of(t, about.column_us));
@@ -70,23 +75,20 @@ pub(crate) fn write(state: &ArrayState, beside: &ArrayState, watched: &Watched, 
     };
     let curves: Vec<Curves> = shown.clone().map(curves).collect();
     section(&mut out, 3, &|out| curves.iter().for_each(|curves| curves.sums[0].write(out)));
-    if let Some(history) = &watched.history {
+    if let Some(history) = history {
         section(&mut out, 4, &|out| history.write(range.clone(), out));
     }
     section(&mut out, 5, &|out| values(state.rest(), out));
-    if let Some(spikes) = &watched.spikes {
-        section(&mut out, 6, &|out| spikes.write(range.clone(), out));
-    }
+    section(&mut out, 6, &|out| {
+        for Curve { sum, area, x, y } in state.curves() {
+            [sum, area, x.to_bits(), y.to_bits()].iter().for_each(|word| out.extend(word.to_le_bytes()));
+        }
+    });
     section(&mut out, 7, &|out| {
         let channels = curves.iter().flat_map(|curves| &curves.channels);
         channels.for_each(|(least, greatest)| values(&[*least, *greatest], out));
     });
     section(&mut out, 8, &|out| curves.iter().flat_map(|curves| &curves.sums[1..]).for_each(|sum| sum.write(out)));
-    section(&mut out, 9, &|out| {
-        for Curve { sum, area, x, y } in state.curves() {
-            [sum, area, x.to_bits(), y.to_bits()].iter().for_each(|word| out.extend(word.to_le_bytes()));
-        }
-    });
     let mut put = |at: usize, bytes: &[u8]| out[at..at + bytes.len()].copy_from_slice(bytes);
     put(0, b"TXF1");
     // The protocol's fields are as wide as the largest array and section need.

@@ -10,8 +10,6 @@ import { rounded, integer } from "./words.js";
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 /** @typedef {import("./timeline.js").Values} Values */
-/** @typedef {{ draw: (timeline: Timeline, shown: Shown) => string, colour?: () => void }} Painter `draw` returns what the heading says;
- *   `colour` is called before it, and for each theme */
 /** @typedef {{ scales: uPlot.Scales, series: uPlot.Series[], axes: uPlot.Axis[], bands?: uPlot.Band[] }} Plan of the curves, without the axis of time */
 
 /**
@@ -24,8 +22,6 @@ import { rounded, integer } from "./words.js";
  * @property {{ unit: string, step: number }} sums unit of the sum of the values, and size of a tick in it
  * @property {number | null} gap_us how long frames of a live source may be away until the curves have a gap; null: however long
  * @property {number} top ticks above rest that fill the room of a channel's curve
- * @property {boolean} encoded whether the raster shows spikes
- * @property {string} spikes encoder and latency
  */
 
 /**
@@ -39,7 +35,7 @@ import { rounded, integer } from "./words.js";
  * @property {(shown: () => Shown, sources: string[]) => Plan} [plan]
  * @property {(shown: Shown, timeline: Timeline, column: number) => (number | null)[]} [at] values of all series in a column
  * @property {(shown: Shown, values: Values) => string[]} [says] texts of the outputs in its heading
- * @property {(element: HTMLElement) => Painter} [painter]
+ * @property {(element: HTMLElement) => Raster} [painter]
  */
 
 /** Room for the numbers on the left, and for half a number of the axis of time on the right, CSS pixels; as in style.css. */
@@ -132,9 +128,8 @@ export const LANES = [
   {
     name: "raster", label: "Raster of events by row over time", kind: "raster",
     // The values of frames and of channels say more than their changes.
-    fits: ({ encoded, values, sensor }) => encoded || (!values.frames && sensor.kind !== "channels"),
-    heading: ({ encoded }) =>
-      encoded ? ["Raster spikes of ", output({ id: "spikes-info", class: "dim" })] : ["Raster ", make("span", {}, swatch("more"), " more ", swatch("less"), " less, by row")],
+    fits: ({ values, sensor }) => !values.frames && sensor.kind !== "channels",
+    heading: () => ["Raster ", make("span", {}, swatch("more"), " more ", swatch("less"), " less, by row")],
     painter: (element) => new Raster(element),
   },
   {
@@ -278,8 +273,8 @@ export class Lanes {
   renew() {
     const { sources } = this;
     const shown = this.shown();
-    const { sensor, sums, encoded } = shown;
-    const key = JSON.stringify([this.settings.theme, sensor.kind, sensor.limits, sensor.axes, sums.unit, encoded, sources]);
+    const { sensor, sums } = shown;
+    const key = JSON.stringify([this.settings.theme, sensor.kind, sensor.limits, sensor.axes, sums.unit, sources]);
     if (this.made === key) return;
     this.made = key;
     const grid = { stroke: themed("grid"), width: 1 };
@@ -288,7 +283,7 @@ export class Lanes {
     for (const item of this.all) {
       const { lane, heading, element, painter } = item;
       heading.replaceChildren(...lane.heading(shown, sources));
-      painter?.colour?.();
+      painter?.colour();
       item.plot?.destroy();
       if (!lane.plan) continue;
       const { scales, series, axes, bands } = lane.plan(this.shown, sources);
@@ -334,10 +329,9 @@ export class Lanes {
     this.span_s = timeline.span_us / 1e6;
     this.splits = timeline.ticks(part("lanes", HTMLElement).clientWidth / GRID_PX).map(({ share }) => share * this.span_s);
     const gaps = shown.gap_us !== null && columns ? timeline.gaps(columns[0] - 1, columns[1], shown.gap_us) : new Set();
-    for (const { lane, block, heading, painter, plot } of this.all) {
+    for (const { lane, block, painter, plot } of this.all) {
       if (block.hidden) continue;
-      const drawn = painter?.draw(timeline, shown) ?? "";
-      if (painter) for (const output of heading.querySelectorAll("output")) write(output, drawn);
+      painter?.draw(timeline);
       if (!plot || !lane.at || !columns || !window) continue;
       // A column more on the left, so that curves begin at the edge.
       const numbers = Array.from({ length: columns[1] - columns[0] + 2 }, (_, i) => columns[0] - 1 + i);

@@ -68,7 +68,7 @@ divide(settings);
 new ResizeObserver(() => (lanesDue = true)).observe(part("lanes", HTMLElement));
 const board = new Board(server, failed);
 const sensor = new Sensor(server);
-const view = new View(server, settings, failed, (taxel) => maps.point(taxel), showLanes);
+const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
 const recorder = new Recorder(server, failed, () => showTab("record"));
 const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections: detections.shown, mistakes: mistakes.shown, notes: notes.withTime, cut: view.cut }));
 
@@ -86,8 +86,6 @@ let registers = null;
 let zeroed = [];
 /** The recording that is being opened. @type {string | null} */
 let opening = null;
-/** Encoder and latency of the spikes in the raster. */
-let spikes = "";
 /** Why the last one was not opened. */
 let refused = "";
 /** Whether the server is connected, and why not. */
@@ -108,7 +106,6 @@ function showConnection(state, why) {
   if (state === "open") {
     // The server knows nothing of the view after a new connection.
     if (maps.taxel) watch(maps.taxel);
-    view.encode();
     timeWindow.forget();
     timeWindow.ask();
   }
@@ -148,7 +145,7 @@ function shown() {
   const newtons = opened?.frames?.newtons ?? null;
   // The sum of the values is a force where they are in N, or where it is known of a pressure.
   const sums = newtons === null ? { unit: values.unit, step: values.step } : { unit: "N", step: newtons };
-  return { sensor, taxel, named: maps.named(), values, sums, gap_us: gapOfFrames(), top: timeline?.channelTop() ?? 1, encoded: view.spikes, spikes };
+  return { sensor, taxel, named: maps.named(), values, sums, gap_us: gapOfFrames(), top: timeline?.channelTop() ?? 1 };
 }
 
 /** Lists the recordings, with the labels as the page knows them. */
@@ -215,10 +212,6 @@ function receive(message) {
       lanesDue = true;
       if (player.transport.source === null) showDetections(detections.live, hello?.readout ?? []);
       return;
-    case "spikes":
-      spikes = spikesInfo(message);
-      lanesDue = true;
-      return;
     case "recorder":
       recorder.take(message);
       if (player.transport.source === null) labels.choose(recorder.file);
@@ -233,7 +226,6 @@ function receive(message) {
       return training.progress(message.text);
     case "detections":
       if (message.source === player.transport.source) {
-        view.offer(message.encoder);
         training.reads = message.readout;
         showDetections(recorded(message.detections), message.labels);
       }
@@ -279,11 +271,6 @@ function showZeroed() {
   maps.mark();
 }
 
-/** @param {import("./messages.js").Spikes} spikes @returns {string} */
-function spikesInfo({ encoder, of_readout, latency_ms }) {
-  return `${encoder.replaceAll("_", " ")}, ${of_readout ? "parameters of the readout" : "default parameters"}, latency ${latency_ms.toFixed(1)} ms`;
-}
-
 /** @param {Hello} message */
 function greet(message) {
   const first = hello === null;
@@ -291,11 +278,7 @@ function greet(message) {
   player.live = message.live;
   if (message.array && player.transport.source === null) resize(message.array);
   board.greet(message);
-  view.greet(message);
-  if (!opened) {
-    view.offer(message.readout_encoder);
-    showUnits();
-  }
+  if (!opened) showUnits();
   labels.offer(message.readout ?? []);
   showAssumed();
   showRegisters();
@@ -412,7 +395,6 @@ function showSource(again) {
   part("files", HTMLSelectElement).value = opened?.name ?? "";
   labels.choose(opened ? opened.name : recorder.file, trial);
   view.choose(opened?.name ?? null);
-  view.offer(opened ? null : (hello?.readout_encoder ?? null));
   notes.choose(opened?.notes ?? []);
   if (opened) showDetections(recorded(opened.detections), [...new Set(opened.detections.map(({ label }) => label))].sort());
   else showDetections(detections.live, hello?.readout ?? []);

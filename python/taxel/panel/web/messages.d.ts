@@ -228,10 +228,6 @@ export interface Hello {
   open: string | null;
   /** The labels of the readout that runs. */
   readout: string[] | null;
-  /** The name of its encoder; null without a readout, and of a plain rule. */
-  readout_encoder: string | null;
-  /** The names of the encoders. */
-  encoders: string[];
   /** Width of a column of time, us. */
   column_us: number;
   /** The narrowest and the widest that `zoom` takes, us. */
@@ -313,15 +309,6 @@ export interface Detection {
   latency_us: number;
 }
 
-/** After `encode`, and again when the encoder is another one: that of another readout. */
-export interface Spikes {
-  type: "spikes";
-  encoder: string;
-  /** Whether its parameters are those of the readout that reads what is shown; else they are those of the request, and the defaults. */
-  of_readout: boolean;
-  latency_ms: number;
-}
-
 /** All taxels of the live source that were zeroed, each as it was last; sent when that has changed. */
 export interface Zeroed {
   type: "zeroed";
@@ -384,8 +371,6 @@ export interface Detections {
   readout: string;
   /** The readout's, in its order. */
   labels: string[];
-  /** The name of the readout's encoder; null of a plain rule. */
-  encoder: string | null;
   detections: FoundDetection[];
 }
 
@@ -510,12 +495,6 @@ export interface ZeroRequest {
   type: "zero";
   id?: number;
   taxels: [number, number][];
-}
-
-export interface EncodeRequest {
-  type: "encode";
-  id?: number;
-  encoder: Record<string, unknown> | null;
 }
 
 export interface ZoomRequest {
@@ -725,7 +704,6 @@ export type Message =
   | Presets
   | Counters
   | Detection
-  | Spikes
   | Zeroed
   | Recorder
   | Recordings
@@ -749,7 +727,6 @@ export type Request =
   | CreditRequest
   | WatchRequest
   | ZeroRequest
-  | EncodeRequest
   | ZoomRequest
   | SeekRequest
   | ValuesRequest

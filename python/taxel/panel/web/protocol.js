@@ -29,7 +29,6 @@ export const MISSING = 0xffffffff;
  * @property {Uint16Array | null} history least, greatest, last
  * @property {Uint16Array | null} rest
  * @property {"given" | "quiet" | "none"} restFrom where the rest comes from
- * @property {Uint8Array | null} spikes of the encoder, as the raster
  * @property {Uint16Array | null} channels least and greatest ticks above rest of each channel, column after column
  * @property {Uint32Array | null} sources as `sums`, of each of several sources, column after column
  * @property {Float32Array | null} sourceCentres the same words as floats
@@ -83,11 +82,10 @@ export function readFrame(buffer) {
     centres: words(3, Float32Array),
     history: words(4, Uint16Array),
     rest: words(5, Uint16Array),
-    spikes: words(6, Uint8Array),
+    now: words(6, Uint32Array),
+    nowCentres: words(6, Float32Array),
     channels: words(7, Uint16Array),
     sources: words(8, Uint32Array),
     sourceCentres: words(8, Float32Array),
-    now: words(9, Uint32Array),
-    nowCentres: words(9, Float32Array),
   };
 }

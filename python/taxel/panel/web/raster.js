@@ -1,4 +1,4 @@
-// Ups and downs of each row over time; or an encoder's spikes.
+// Ups and downs of each row over time.
 
 import { fitted, ground, make, themed, write } from "./dom.js";
 
@@ -34,18 +34,14 @@ export class Raster {
     }
   }
 
-  /**
-   * @param {Timeline} timeline
-   * @param {import("./lanes.js").Shown} shown
-   * @returns {string} what the spikes are of
-   */
-  draw(timeline, { encoded, spikes }) {
+  /** @param {Timeline} timeline */
+  draw(timeline) {
     write(this.last, String(timeline.rows - 1));
     const { width, height } = fitted(this.canvas);
     const { columns: shown, window, column_us, span_us, rows } = timeline;
     if (!shown || !window || !width || !height) {
       this.context.clearRect(0, 0, this.canvas.width, this.canvas.height);
-      return spikes;
+      return;
     }
     const [begin, end] = shown;
     const columns = Math.ceil((end - begin + 1) / this.canvas.width);
@@ -55,7 +51,6 @@ export class Raster {
       this.image = new ImageData(wide, high);
       this.pixels = new Uint32Array(this.image.data.buffer);
     }
-    const values = encoded ? timeline.spikes : timeline.raster;
     this.pixels.fill(this.words[0]);
     // Groups begin at whole multiples of their width, so that what is seen moves and does not flicker.
     const group = Math.floor(begin / columns);
@@ -66,7 +61,7 @@ export class Raster {
         const column = timeline.columnOf(k);
         if (k < begin || k > end || timeline.number[column] !== k) continue;
         for (let row = 0; row < rows; row++) {
-          const value = values[column * rows + row];
+          const value = timeline.raster[column * rows + row];
           if (!value) continue;
           const at = gathered === 1 ? row : Math.floor(row / gathered);
           const old = seen[at];
@@ -80,6 +75,5 @@ export class Raster {
     this.context.imageSmoothingEnabled = false;
     const scale = (this.canvas.width * column_us) / span_us;
     this.context.drawImage(this.unscaled, (group * columns - window[0] / column_us) * scale, 0, wide * columns * scale, this.canvas.height);
-    return spikes;
   }
 }

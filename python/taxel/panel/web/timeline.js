@@ -26,7 +26,6 @@ export class Timeline {
     this.rows = rows;
     this.column_us = column_us;
     this.raster = new Uint8Array(SPAN * rows);
-    this.spikes = new Uint8Array(SPAN * rows);
     this.history = new Uint16Array(SPAN * 3);
     /** How many channels have a curve each, and their least and greatest ticks above rest, column after column. */
     this.channel_count = 0;
@@ -112,7 +111,7 @@ export class Timeline {
       const end = (Math.floor(frame.t_us / this.column_us) + 1) * this.column_us;
       this.window = [end - this.span_us, end];
     }
-    const { first, count, raster, spikes, sums, history, channels, sources, now, nowCentres } = frame;
+    const { first, count, raster, sums, history, channels, sources, now, nowCentres } = frame;
     const each = channels && count ? channels.length / count / 2 : this.channel_count;
     if (each !== this.channel_count) [this.channel_count, this.channels] = [each, new Uint16Array(SPAN * each * 2)];
     const several = now ? now.length / 4 : this.curve_count;
@@ -130,8 +129,6 @@ export class Timeline {
       const column = this.columnOf(first + i);
       this.number[column] = first + i;
       if (raster) this.raster.set(raster.subarray(i * this.rows, (i + 1) * this.rows), column * this.rows);
-      if (spikes) this.spikes.set(spikes.subarray(i * this.rows, (i + 1) * this.rows), column * this.rows);
-      else this.spikes.fill(0, column * this.rows, (column + 1) * this.rows);
       if (sums) this.sums.set(sums.subarray(8 * i, 8 * i + 8), 8 * column * several);
       if (sources) this.sums.set(sources.subarray(8 * i * (several - 1), 8 * (i + 1) * (several - 1)), 8 * (column * several + 1));
       if (channels) this.channels.set(channels.subarray(2 * i * each, 2 * (i + 1) * each), 2 * column * each);

@@ -1,10 +1,9 @@
-// The tab of the view: the colour scale, what the raster shows, the health of taxels, and cuts.
+// The tab of the view: the colour scale, the health of taxels, and cuts.
 
 import { make, part, write } from "./dom.js";
 import { counted, seconds } from "./words.js";
 
 /** @typedef {import("./messages.js").Health} Health */
-/** @typedef {import("./messages.js").Hello} Hello */
 /** @typedef {import("./settings.js").Settings} Settings */
 /** @typedef {import("./server.js").Server} Server */
 
@@ -15,15 +14,11 @@ export class View {
    * @param {Settings} settings
    * @param {(error: unknown) => void} failed
    * @param {(taxel: [number, number]) => void} pointed called for a taxel of the list
-   * @param {() => void} changed called when the raster shows something else
    */
-  constructor(server, settings, failed, pointed, changed) {
+  constructor(server, settings, failed, pointed) {
     this.server = server;
     this.failed = failed;
     this.pointed = pointed;
-    this.changed = changed;
-    /** Whether the raster shows spikes, else changes. */
-    this.spikes = false;
     /** @type {[number | null, number | null]} */
     this.cut = [null, null];
     /** Sets an end of the cut where the view is. @type {((end: 0 | 1) => void) | null} */
@@ -37,10 +32,6 @@ export class View {
       top.setAttribute("aria-invalid", String(!(value >= 0)));
       if (value >= 0) settings.set("top", value);
     };
-    /** @type {string[]} */
-    this.encoders = [];
-    this.encoder = part("encoder", HTMLSelectElement);
-    this.encoder.onchange = () => this.encode();
     part("look", HTMLButtonElement).onclick = () => this.look();
     part("cut-from", HTMLButtonElement).onclick = () => this.cutHere?.(0);
     part("cut-to", HTMLButtonElement).onclick = () => this.cutHere?.(1);
@@ -48,38 +39,6 @@ export class View {
       event.preventDefault();
       this.write();
     };
-  }
-
-  /** @param {Hello} hello */
-  greet(hello) {
-    this.encoders = hello.encoders;
-  }
-
-  /** Offers the encoders. @param {string | null} readout the name of that of the readout that reads what is shown */
-  offer(readout) {
-    const names = [...new Set([...this.encoders, ...(readout ? [readout] : [])])];
-    const { value } = this.encoder;
-    this.encoder.replaceChildren(make("option", { value: "" }, "changes"), ...names.map((name) => make("option", { value: name }, `${name === readout ? "readout: " : "spikes: "}${name.replaceAll("_", " ")}`)));
-    this.encoder.value = names.includes(value) ? value : "";
-    if (!this.encoder.value) this.show(false);
-  }
-
-  /** Asks for the spikes of the encoder that is chosen, or for none. */
-  encode() {
-    const { value: name } = this.encoder;
-    if (!name && !this.spikes) return;
-    this.server.request({ type: "encode", encoder: name ? { name } : null }).then(() => this.show(name !== ""), (error) => {
-      // The server encodes nothing any more.
-      this.encoder.value = "";
-      this.show(false);
-      this.failed(error);
-    });
-  }
-
-  /** @param {boolean} spikes whether the raster shows them */
-  show(spikes) {
-    this.spikes = spikes;
-    this.changed();
   }
 
   look() {
