@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -14,7 +14,6 @@ from loopback import until
 
 import taxel
 from taxel._base.child_process import ChildProcess
-from taxel.panel import training_process
 from taxel.panel.training_process import run
 
 from .recordings import board, mat
@@ -33,15 +32,19 @@ def test_steps_are_counted_and_the_last_line_is_the_result(tmp_path: Path) -> No
     assert line["command"] == f"taxel detect RECORDING --readout {out}"
 
 
-def test_errors_are_a_line_and_an_exit_code(monkeypatch, capsys) -> None:
+def test_errors_are_a_line_and_an_exit_code(tmp_path: Path) -> None:
     request = json.dumps({"recording": "none.npz", "open": {}, "out": "r"})
-    monkeypatch.setattr("sys.stdin", io.StringIO(request))
-    monkeypatch.setattr(training_process, "stop_on_signals", lambda: None)
-    with pytest.raises(SystemExit, match="2"):
-        training_process._main()
-    said = capsys.readouterr()
-    line = json.loads(said.out.splitlines()[-1])
-    assert (line["type"], line["kind"], said.err) == ("error", "FileNotFoundError", "")
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", MODULE],
+        input=request,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    line = json.loads(done.stdout.splitlines()[-1])
+    assert (done.returncode, line["type"], line["kind"], done.stderr) == (2, "error", "FileNotFoundError", "")
     assert "none.npz: no such file" in line["text"]
 
 

@@ -56,5 +56,5 @@ def test_readouts_and_detections_are_the_same_from_python_the_shell_and_the_page
         return
     [one] = found["recordings"]
     assert {key: shown[key] for key in one} == one
-    labels, _, detections = requests().detect(place, None, readout)
+    labels, detections = requests().detect(place, None, readout)
     assert (labels, moments(detections)) == (["contact", "lift"], moments(one["detections"]))
