@@ -5,6 +5,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from tests.panel.browser import started_chromium
+
+#: One browser of a process serves all pages.
+__all__ = ["started_chromium"]
 
 #: Scripts that made kept data need packages that are not installed; examples of CONTRIBUTING run where they are added.
 collect_ignore_glob = ["data/*", "contributing/*"]

@@ -1,12 +1,9 @@
-"""A live source and its panel, for the tests of the server; the browser, for those of the page."""
+"""A live source and its panel, for the tests of the server."""
 
 import pytest
-from tests.panel.browser import started_chromium
 
 from taxel.live import Live
 from taxel.panel import Panel
-
-__all__ = ["started_chromium"]
 
 
 @pytest.fixture

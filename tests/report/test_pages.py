@@ -8,13 +8,10 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from tests.panel.browser import started_chromium
 from tests.panel.pages import opened
 
 from taxel.report.page import render
 from taxel.report.svg import INK, STYLE, picture
-
-__all__ = ["started_chromium"]
 
 
 def axes_of(**how):

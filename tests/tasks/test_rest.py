@@ -106,7 +106,7 @@ def test_the_page_takes_the_same_rest_also_where_a_touch_begins_the_recording(tm
     found = detect(rule, taxel.open(tmp_path / "a.npz")).outcomes[0].found
     assert found.t.tolist()[-4:] == [1_200_000, 1_320_000, 2_200_000, 2_320_000]
     page = Training(Opening(), ShownFiles()).detect(tmp_path / "a.npz", None, tmp_path / "rule.json")
-    assert [one["t_us"] for one in page[2]] == found.t.tolist()
+    assert [one["t_us"] for one in page[1]] == found.t.tolist()
 
 
 def test_where_nothing_is_quiet_it_is_refused_with_what_to_give(tmp_path: Path) -> None:
