@@ -29,9 +29,10 @@ impl Lagrangian<'_> {
     pub(super) fn step(&mut self) -> bool {
         let n = self.weights.len();
         let mut curvature = self.curvature();
-        // Hard rows grow so steep that a system over them loses the digits that their certificates need.
-        let few = !self.program.is_hard()
-            && 2 * (curvature.count + if curvature.both_sides > 0.0 { self.behind.len() } else { 0 }) < n;
+        // A system over rows loses digits where these are hard, hence steep, and where no l2 term holds the weights.
+        let exact = !self.program.is_hard() && self.program.objective.l2 > 0.0;
+        let rows = curvature.count + if curvature.both_sides > 0.0 { self.behind.len() } else { 0 };
+        let few = exact && 2 * rows < n;
         if few && curvature.both_sides > 0.0 {
             let root = curvature.both_sides.sqrt();
             curvature.rows.extend(self.program.targets.iter().flat_map(|row| row.behind.iter().map(|v| root * v)));
