@@ -237,3 +237,9 @@ def test_the_repr_of_a_fit_says_how_it_ended() -> None:
     assert repr(stopped).startswith("<ConeX(max_seconds=1e-09): stopped, violation_ ")
     soft = ConeR().fit(*more)
     assert re.fullmatch(r"<ConeR\(\): solved, gap_ \d\.\de-\d+, \d of 4 targets fire>", repr(soft))
+
+
+def test_a_certificate_holds_where_one_bound_is_far():
+    trains = SpikeTrains.from_lists([[50.0], [55.0]], stop=100.0)
+    cone = ConeX(lb=-100.0, ub=0.05).fit([trains], [[65.0]])
+    assert (cone.status_, check_certificate(cone.problem_, cone.certificate_)) == ("infeasible", True)
