@@ -7,6 +7,7 @@ A page asks for them by directives: ``.. studies::``, ``.. commands::``, ``.. ke
 from __future__ import annotations
 
 import importlib
+import inspect
 import json
 import re
 import tomllib
@@ -107,7 +108,9 @@ def study(section: dict[str, Any]) -> list[str]:
 
 
 class Names(FromProgram):
-    """What a module's ``__all__`` names: a table of classes and functions with their first lines, and some constants.
+    """What a module makes public: a table of classes and functions with their first lines, and some constants.
+
+    That is what its ``__all__`` names, else what it defines without an underscore.
 
     The directive ``automodule`` shows the rest, but no constant that was imported from another module.
     """
@@ -117,7 +120,8 @@ class Names(FromProgram):
     def lines(self) -> list[str]:
         """Return table and constants; modules have pages of their own."""
         module = importlib.import_module(self.arguments[0])
-        held = {name: getattr(module, name) for name in module.__all__}
+        defined = [n for n, what in vars(module).items() if n[0] != "_" and inspect.getmodule(what) is module]
+        held = {name: getattr(module, name) for name in getattr(module, "__all__", defined)}
         names = [name for name, what in held.items() if callable(what)]
         own = {name for _, name in ModuleAnalyzer.for_module(module.__name__).find_attr_docs()}
         constants = [
@@ -128,7 +132,15 @@ class Names(FromProgram):
         table = [*head, *(f"   ~{module.__name__}.{name}" for name in names), ""]
         for name in constants:
             long = ["   :no-value:"] if len(repr(held[name])) > LONGEST_VALUE else []
-            table += [f".. autodata:: {module.__name__}.{name}", *long, ""]
+            # Of a value of Python's own types autodata would show the type's docstring.
+            plain = type(held[name]).__module__ == "builtins"
+            value = [f"   :value: {held[name]!r}"] if plain and not long else []
+            table += [
+                f".. {'py:data' if plain else 'autodata'}:: {module.__name__}.{name}",
+                *value,
+                *([] if plain else long),
+                "",
+            ]
         return table
 
 
