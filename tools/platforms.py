@@ -65,34 +65,24 @@ OF_THE_CHECKOUT = {
     "tests/test_command_line.py::test_the_help_has_a_whole_line_for_each_command_in_the_order_of_the_work": "taxel study and "
     "taxel bench are other wheels",
 }
-STARTS = "tests/test_command_line.py::test_ctrl_c_while_it_starts_ends_quietly"
-EARLY = "qemu's vfork does not wait for exec: the test sees its own libraries in the new process and interrupts it too early"
 FILES = "tests/live/test_files.py"
 HELD = "replaces a recording that it has open itself, which Windows refuses"
-OVERWRITES = ("test_any_silence_and_any_start_survive_mcap", "test_what_a_target_cannot_hold_is_said")
 NO_SIGNAL = "needs a signal that Windows does not have"
 IN_A_FIT = "tests/learn/test_cone_x.py::test_control_c_stops_a_fit_at_once_keeps_the_best_so_far_and_then_raises"
 INTERRUPTED = (
-    "tests/learn/test_cone_r.py::test_control_c_stops_a_fit_promptly_and_keeps_the_best_so_far",
-    STARTS,
     IN_A_FIT,
     f"{FILES}::test_a_second_recorder_does_not_take_the_file_of_a_running_one",
 )
 #: Those of each system.
 LEFT_OUT: dict[str, dict[str, str]] = {
     "arm": OF_THE_CHECKOUT
-    | {f"{STARTS}[{after}]": EARLY for after in (0.0, 0.1, 0.3)}
     | {
         IN_A_FIT: "an emulated processor has no first result within the 0.5 s after which it is interrupted",
     },
     "windows": OF_THE_CHECKOUT
-    | {f"tests/recording/test_convert.py::{name}": HELD for name in OVERWRITES}
     | dict.fromkeys(INTERRUPTED, NO_SIGNAL)
     | {
-        f"{FILES}::test_a_full_disk_is_one_clear_error": "fills a disk by Linux' calls",
-        f"{FILES}::test_two_recordings_of_one_program_do_not_share_a_file": "Windows itself refuses the second, in other words",
-        "tests/test_systems.py::test_a_board_is_recorded_and_labelled_in_any_folder[300-characters]": "wine names a path of that "
-        "length that is not there by an error (234) which Python expects of none",
+        "tests/recording/test_convert.py::test_what_a_target_cannot_hold_is_said": HELD,
         "tests/test_systems.py::test_a_recording_is_complete_after_ctrl_break": "wine passes no Ctrl-Break on to another process "
         "where there is no console",
     },
