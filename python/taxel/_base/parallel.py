@@ -9,11 +9,12 @@ import atexit
 import logging
 import os
 import signal
+import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import chdir, contextmanager, suppress
+from contextlib import chdir, contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
@@ -283,6 +284,8 @@ def _ray(jobs: int, scheduler: str | None) -> Iterator[int]:
             raise DeviceError(f"Ray does not start: {' '.join(str(error).split())}") from None
         try:
             register_ray()  # type: ignore[no-untyped-call]
-            yield int(ray.cluster_resources().get("CPU", jobs))  # type: ignore[no-untyped-call]
+            # Ray prints that it runs a call again, however quiet: what a command prints may be read by a program.
+            with redirect_stdout(sys.stderr):
+                yield int(ray.cluster_resources().get("CPU", jobs))  # type: ignore[no-untyped-call]
         finally:
             ray.shutdown()
