@@ -1,11 +1,13 @@
-"""6.9 to 6.11 stated plainly, one sum of kernels at a time: the oracle of the tests of ConeX."""
+"""6.9 to 6.14 stated plainly, every row written out, and handed whole to a cone solver: the oracle of the learners."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from simulator import kernel
 
 from taxel import SpikeTrains
+from taxel.learn import ConeR
 
 
 def counts(cone, s, fired):
@@ -41,8 +43,8 @@ def threshold(cone, t, fired, start):
     return cone.neuron_.theta_0 + (cone.neuron_.theta_plus * np.exp(-since / rec) if since >= -1e-9 else 0.0)
 
 
-def grid_rows(cone, patterns, targets):
-    """Every row of 6.11: at the targets, behind them, at the silent points; and what each asks."""
+def grid_rows(cone, patterns, targets, windows=None):
+    """Every row: at the targets, behind them, at the silent points of the windows; and what each asks."""
     delta = 0.1 * cone.neuron_.tau if cone.delta_t_ms is None else cone.delta_t_ms
     at, behind, theta, silent, limit = [], [], [], [], []
     for p, (pattern, wanted) in enumerate(zip(patterns, targets, strict=True)):
@@ -57,32 +59,102 @@ def grid_rows(cone, patterns, targets):
             t = pattern.start + k * cone.neuron_.step_ms
             if any(e - 1e-9 <= t <= e + cone.neuron_.refractory + 1e-9 for e in wanted):
                 continue
+            asked = None if windows is None else windows[p]
+            if asked is not None and not any(a - 1e-9 <= t <= b + 1e-9 for a, b in asked):
+                continue
             fired = [e for e in wanted if e < t]
             silent.append(row(cone, pattern, t, fired))
             limit.append(threshold(cone, t, fired, pattern.start) - (cone.margin or 0.0))
-    return tuple(np.array(v) for v in (at, behind, theta, silent, limit))
+    at, behind, silent = (np.reshape(v, (len(v), len(patterns[0]))) for v in (at, behind, silent))
+    return at, behind, np.array(theta), silent, np.array(limit)
+
+
+def short(sides, distances):
+    """The distances that count."""
+    return distances if sides == "both" else np.minimum(distances, 0.0)
 
 
 def terms(cone, rows, w):
-    _, behind, theta, _, _ = rows
-    return np.array(
-        [
-            np.abs(w).sum(),
-            np.linalg.norm(w) ** (2 if cone.norm == "square" else 1),
-            ((behind @ w - cone.kappa * theta) ** 2).sum(),
-        ]
-    )
+    at, behind, theta, silent, limit = rows
+    found = [np.abs(w).sum(), np.linalg.norm(w) ** (2 if cone.norm == "square" else 1)]
+    if not isinstance(cone, ConeR):
+        return np.array([*found, ((behind @ w - cone.kappa * theta) ** 2).sum()])
+    found.append((short(cone.sides_b, behind @ w - cone.kappa * theta) ** 2).sum())
+    found.append(np.abs(short(cone.sides_c, at @ w - theta)).sum())
+    return np.array([*found, np.maximum(silent @ w - limit, 0).sum()])
 
 
-def shares(cone, rows):
+def shares(cone, sizes):
     """What each term is multiplied with: its lambda over their sum, over its largest value (6.3.2, 6.3.3)."""
-    n = rows[0].shape[1]
-    most = np.maximum(np.abs(np.broadcast_to(cone.lb, n)), np.abs(np.broadcast_to(cone.ub, n)))
-    high, low = terms(cone, rows, most), terms(cone, rows, -most)
-    largest = np.array([high[0], high[1], low[2]])
-    if cone.divide_b_by == "targets":
-        largest[2] = len(rows[0])
+    most = np.maximum(np.abs(cone.lb), np.abs(cone.ub)) * np.ones(sizes[0].shape[1])
+    low, high = terms(cone, sizes, -most), terms(cone, sizes, most)
+    largest = np.array([*high[:2], *low[2:4], *high[4:]])
+    for k, name in enumerate("bcd"[: len(largest) - 2]):
+        if getattr(cone, f"divide_{name}_by") == "targets":
+            largest[2 + k] = len(sizes[0]) if k < 2 else max(len(sizes[0]), 1)
+    largest[largest == 0.0] = np.inf
     return np.array(cone.lambdas) / max(np.sum(cone.lambdas), 1e-300) / largest
+
+
+def least(cone, rows, c):
+    """Minimise 6.11 or 6.14 over every row at once: w, |w|, |w|_2, B's and C's and D's images as own variables."""
+    clarabel, sparse = pytest.importorskip("clarabel"), pytest.importorskip("scipy.sparse")
+    at, behind, theta, silent, limit = rows
+    (k, n), m = at.shape, len(silent)
+    hard = not isinstance(cone, ConeR)
+    costs = [c @ terms(cone, rows, np.clip(w, cone.lb, cone.ub) * np.ones(n)) for w in (0.0, np.inf)]
+    scale = 1 / (costs[0] or costs[1] or 1.0)
+    c = c * scale
+    # variables: w, a >= |w|, t >= |w|_2, y = behind w - kappa theta; unless the rows are hard, e >= |at w - theta| and
+    # h >= max(silent w - limit, 0). Where only potentials below count, y >= kappa theta - behind w, e >= theta - at w
+    # and 0.
+    one_b, one_c = (not hard and sides == "below" for sides in (getattr(cone, f"sides_{x}", "") for x in "bc"))
+    sizes = np.cumsum([0, n, n, 1, k, *((0, 0) if hard else (k, m))])
+    q, p = np.zeros(sizes[-1]), np.zeros(sizes[-1])
+    q[sizes[1] : sizes[2]] = c[0]
+    p[sizes[3] : sizes[4]] = 2 * c[2]
+    if cone.norm == "square":
+        p[:n] = 2 * c[1]
+    else:
+        q[sizes[2]] = c[1]
+
+    def block(rows, **columns):
+        row = [sparse.csc_matrix((rows, sizes[i + 1] - sizes[i])) for i in range(6)]
+        for name, value in columns.items():
+            row["watyeh".index(name)] = sparse.csc_matrix(value)
+        return sparse.hstack(row)
+
+    eye = np.eye
+    images = (block(k, w=(-1) ** one_b * behind, y=-eye(k)), (-1) ** one_b * cone.kappa * theta)
+    equal, below = ([], [images]) if one_b else ([images], [])
+    if hard:
+        equal.append((block(k, w=at), theta))
+        below.append((block(m, w=silent), limit))
+    else:
+        q[sizes[4] : sizes[5]], q[sizes[5] :] = c[3], c[4]
+        below += [
+            (block(k, w=(1 - one_c) * at, e=-eye(k)), (1 - one_c) * theta),
+            (block(k, w=-at, e=-eye(k)), -theta),
+            (block(m, w=silent, h=-eye(m)), limit),
+            (block(m, h=-eye(m)), np.zeros(m)),
+        ]
+    below += [
+        (block(n, w=eye(n), a=-eye(n)), np.zeros(n)),
+        (block(n, w=-eye(n), a=-eye(n)), np.zeros(n)),
+        (block(n, w=eye(n)), cone.ub * np.ones(n)),
+        (block(n, w=-eye(n)), np.multiply(cone.lb, -np.ones(n))),
+    ]
+    length = [(block(1, t=-eye(1)), np.zeros(1)), (block(n, w=-eye(n)), np.zeros(n))]
+    kinds = {clarabel.ZeroConeT: equal, clarabel.NonnegativeConeT: below, clarabel.SecondOrderConeT: length}
+    cones = [kind(sum(len(v[1]) for v in parts)) for kind, parts in kinds.items() if parts]
+    parts = [*equal, *below, *length]
+    a, b = sparse.vstack([v[0] for v in parts]).tocsc(), np.concatenate([v[1] for v in parts])
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs, settings.tol_gap_rel, settings.tol_feas = 1e-12, 1e-10, 1e-11
+    answer = clarabel.DefaultSolver(sparse.diags(p).tocsc(), q, a, b, cones, settings).solve()
+    w = np.clip(np.array(answer.x[:n]), cone.lb, cone.ub)
+    return (c @ terms(cone, rows, w)) / scale
 
 
 def graded(patterns, seed, values=lambda random, n: random.choice([-1, 1], n) * 10 ** random.uniform(-1, 1, n)):

@@ -11,8 +11,9 @@ import stated
 from draws import seeds
 from making import made
 from refusal import refused
-from relaxed import drawn, shares, sizes, statement, terms
-from relaxed import least as least_of
+from relaxed import drawn, sizes
+from stated import grid_rows, shares, terms
+from stated import least as least_of
 
 from taxel import NotFittedError, ProblemError, SpikeTrains
 from taxel.learn import ConeR, ConeX, OnlineConeR, Row, check_gap
@@ -56,7 +57,7 @@ def test_what_is_proven_holds_whatever_the_multipliers_and_the_weights(part):
     for seed in range(12 * part, 12 * part + 12):
         cone, patterns, targets, silence = drawn(seed)
         random, trains = np.random.default_rng([78, seed]), len(patterns[0])
-        rows = statement(cone, patterns, targets, silence)
+        rows = grid_rows(cone, patterns, targets, silence)
         factors = shares(cone, sizes(cone, patterns, targets, silence, rows))
 
         def objective(weights, cone=cone, rows=rows, factors=factors):

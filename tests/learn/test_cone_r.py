@@ -9,7 +9,8 @@ import pytest
 from draws import seeds
 from making import lists, made
 from refusal import refused
-from relaxed import drawn, examples, fitted, least, shares, sizes, statement, terms
+from relaxed import drawn, examples, fitted, sizes
+from stated import grid_rows, least, shares, terms
 
 from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeR
@@ -24,7 +25,7 @@ DRAWS = 40
 def test_whatever_the_options_a_fit_is_the_least_of_what_is_stated(part):
     for seed in range(DRAWS * part, DRAWS * (part + 1)):
         cone, patterns, targets, silence = drawn(seed)
-        rows = statement(cone, patterns, targets, silence)
+        rows = grid_rows(cone, patterns, targets, silence)
         factors = shares(cone, sizes(cone, patterns, targets, silence, rows))
         ends = (np.clip(w, cone.lb, cone.ub) * np.ones(len(patterns[0])) for w in (0.0, np.inf))
         size = max(factors @ terms(cone, rows, w) for w in ends)

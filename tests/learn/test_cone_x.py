@@ -8,13 +8,11 @@ from draws import mixed
 from interrupts import ctrl_c_after
 from making import made
 from refusal import refused
-from stated import examples, grid_rows, shares, terms
+from stated import examples, grid_rows, least, shares, terms
 
 from taxel import SpikeTrains
 from taxel.learn import ConeX, check_certificate
 
-clarabel = pytest.importorskip("clarabel")
-sparse = pytest.importorskip("scipy.sparse")
 linprog = pytest.importorskip("scipy.optimize").linprog
 
 
@@ -26,49 +24,6 @@ def feasible(cone, rows):
     found = linprog(np.zeros(n), A_ub=silent, b_ub=limit, A_eq=at, b_eq=theta, bounds=bounds, method="highs")
     assert found.status in (0, 2)
     return found.status == 0
-
-
-def least(cone, rows):
-    """Minimise 6.11 over every row at once: w, |w|, |w|_2, B's images as variables of their own."""
-    at, behind, theta, silent, limit = rows
-    (k, n), m = at.shape, len(silent)
-    c = shares(cone, rows)
-    scale = 1 / np.max(c * np.maximum(terms(cone, rows, np.full(n, 0.1)), 1e-9))
-    c = c * scale
-    sizes = np.cumsum([0, n, n, 1, k])
-    q, p = np.zeros(sizes[-1]), np.zeros(sizes[-1])
-    q[sizes[1] : sizes[2]] = c[0]
-    p[sizes[3] :] = 2 * c[2]
-    if cone.norm == "square":
-        p[:n] = 2 * c[1]
-    else:
-        q[sizes[2]] = c[1]
-
-    def block(rows, **columns):
-        line = [sparse.csc_matrix((rows, sizes[i + 1] - sizes[i])) for i in range(4)]
-        for name, value in columns.items():
-            line["waty".index(name)] = sparse.csc_matrix(value)
-        return sparse.hstack(line)
-
-    eye = np.eye
-    parts = [
-        (block(k, w=at), theta),
-        (block(k, w=behind, y=-eye(k)), cone.kappa * theta),
-        (block(n, w=eye(n), a=-eye(n)), np.zeros(n)),
-        (block(n, w=-eye(n), a=-eye(n)), np.zeros(n)),
-        (block(n, w=eye(n)), np.broadcast_to(cone.ub, n)),
-        (block(n, w=-eye(n)), -np.broadcast_to(cone.lb, n)),
-        (block(m, w=silent), limit),
-        (block(1, t=-eye(1)), np.zeros(1)),
-        (block(n, w=-eye(n)), np.zeros(n)),
-    ]
-    a, b = sparse.vstack([v[0] for v in parts]).tocsc(), np.concatenate([v[1] for v in parts])
-    cones = [clarabel.ZeroConeT(2 * k), clarabel.NonnegativeConeT(4 * n + m), clarabel.SecondOrderConeT(n + 1)]
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs, settings.tol_gap_rel, settings.tol_feas = 1e-11, 1e-9, 1e-10
-    answer = clarabel.DefaultSolver(sparse.diags(p).tocsc(), q, a, b, cones, settings).solve()
-    return (c @ terms(cone, rows, np.array(answer.x[:n]))) / scale
 
 
 OPTIONS = [
@@ -100,11 +55,12 @@ def test_on_the_grid_verdict_and_objective_are_those_of_every_row_handed_whole_t
         assert check_certificate(cone.problem_, cone.certificate_)
         return
     w = cone.weights_
-    value = shares(cone, rows) * terms(cone, rows, w)
+    factors = shares(cone, rows)
+    value = factors * terms(cone, rows, w)
     assert list(cone.parts_.values()) == pytest.approx(list(value), rel=1e-9, abs=1e-15)
     assert cone.objective_ == pytest.approx(value.sum(), rel=1e-12)
-    nothing = 1e-10 * (shares(cone, rows) @ terms(cone, rows, 0 * w))
-    assert cone.objective_ == pytest.approx(least(cone, rows), rel=1e-6, abs=nothing)
+    nothing = 1e-10 * (factors @ terms(cone, rows, 0 * w))
+    assert cone.objective_ == pytest.approx(least(cone, rows, factors), rel=1e-6, abs=nothing)
     assert cone.gap_ <= 1e-8 or cone.gap_ * cone.objective_ <= nothing
     assert np.abs(rows[0] @ w - rows[2]).max() <= 1e-12
     assert (rows[3] @ w - rows[4]).max() <= 1e-12
