@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Literal
 
 import h5py
 import numpy as np
@@ -49,15 +50,30 @@ def values(found: Opened, source: str = "") -> np.ndarray:
 @given(
     shape=st.permutations([30, 4, 5]).map(tuple) | st.permutations([30, 6]).map(tuple),
     time=st.sampled_from(["time_ms", "t_s", "timestamp"]),
+    kind=st.sampled_from(["?", "i1", ">u2", "i4", "u8", "f2", ">f4", "f8"]),
+    order=st.sampled_from("CF"),
+    ending=st.sampled_from([".npz", ".h5"]),
 )
 def test_the_axis_that_has_as_many_as_times_is_the_time(
-    shape: tuple[int, ...], time: str, tmp_path_factory: pytest.TempPathFactory
+    shape: tuple[int, ...],
+    time: str,
+    kind: str,
+    order: Literal["C", "F"],
+    ending: str,
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> None:
-    path = tmp_path_factory.mktemp("axes") / "a.npz"
-    numbers = np.arange(np.prod(shape), dtype=np.float32).reshape(shape)
+    path = tmp_path_factory.mktemp("axes") / f"a{ending}"
+    numbers = (np.arange(np.prod(shape)) % 97).reshape(shape).astype(kind, order)
+    if numbers.dtype.kind == "f":
+        numbers.flat[0] = np.nan
     steps = {"time_ms": 10, "t_s": 0.01, "timestamp": 10_000_000}[time]
     begin = 1_700_000_000_000_000_000 if time == "timestamp" else 0
-    np.savez(path, palm=numbers, **{time: begin + steps * np.arange(30)})
+    arrays = {"palm": numbers, time: begin + steps * np.arange(30)}
+    if ending == ".npz":
+        np.savez(path, **arrays)
+    else:
+        with h5py.File(path, "w") as file:
+            file.update(arrays)
     found = opened(path)
     assert np.diff(found.sources[""].t).tolist() == [10_000] * 29
     assert f"axis {shape.index(30)} (30) is the time" in found.said

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -106,38 +105,6 @@ def test_values_that_fall_as_the_layout_turns_them_name_it(tmp_path: Path, falls
         else "write falls = true in a layout file, "
     )
     assert of_it in shown
-
-
-@pytest.mark.parametrize(
-    ("kind", "stored"),
-    mixed(["?", "i1", ">u2", "i4", "u8", "f2", ">f4", "f8"], [(e, o) for o in "CF" for e in (".npy", ".npz", ".h5")]),
-)
-def test_arrays_of_every_kind_of_number_open(tmp_path: Path, kind: str, stored: tuple[str, Any]) -> None:
-    ending, order = stored
-    values = np.zeros((7, 2, 3), kind, order=order)
-    values[2:5, 1] = 1
-    if np.dtype(kind).kind == "f":
-        values[3, 0, 0] = np.nan
-    place = tmp_path / f"grasp{ending}"
-    if ending == ".npy":
-        np.save(place, values)
-    elif ending == ".npz":
-        np.savez(place, palm=values, t=np.arange(7) / 4)
-    else:
-        import h5py
-
-        with h5py.File(place, "w") as h5:
-            h5["palm"], h5["t"] = values, np.arange(7) / 4
-    with pytest.raises(FormatError, match=r"docs/files\.md") as refused:
-        taxel.open(place)
-    # The lines that the refusal prints are the layout that reads it: the second where the longest axis is not the time.
-    printed = str(refused.value).split("\n# ")[-2 if str(refused.value).count("axes") > 1 and ending != ".npy" else -1]
-    (tmp_path / "grasp.layout.toml").write_text(printed.partition("\n")[2])
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        recording = taxel.open(place)
-    assert recording.timed == (ending != ".npy")
-    np.testing.assert_array_equal(recording.frames().values, values.astype(np.float32))
 
 
 @pytest.mark.parametrize(("at", "named"), [((3, 1, 2), "frame 3, row 1, column 2"), ((3, 5), "frame 3, taxel 5")])
