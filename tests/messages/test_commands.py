@@ -37,7 +37,26 @@ TYPED = [
     ("record", "there.mcap"),
     ("record", "--trials", "3", "a.mcap"),
     ("record",),
+    ("info",),
+    ("info", "walk.npz", "--array", "6 by 6"),
     ("convert", "walk.npz"),
+    ("convert", "walk.npz", "walk.xyz"),
+    ("convert", "walk.npz", "walk.npz"),
+    ("convert", "walk.npz", "nowhere/a.csv"),
+    ("convert", "walk.npz", "a.mcap", "--compression", "gzip"),
+    ("convert", "walk.npz", "a.csv", "--frames", "-3"),
+    ("cut", "walk.npz", "a.npz", "--from", "99"),
+    ("cut", "walk.npz", "a.csv", "--from", "2", "--to", "1"),
+    ("cut", "walk.npz", "a.npz", "--rows", "1-2"),
+    ("calibrate", "walk.npz"),
+    ("calibrate", "walk.npz", "--load", "0"),
+    ("calibrate", "walk.npz", "--load", "3", "--from", "7", "--to", "9"),
+    ("calibrate", "walk.npz", "--load", "3", "--from", "99"),
+    ("calibrate", "walk.npz", "--load", "3", "--to", "-1"),
+    ("calibrate", "walk.npz", "--load", "3"),
+    ("calibrate", "walk.npz", "--load", "3", "--load-unit", "kg"),
+    ("calibrate", "walk.npz", "--from", "1"),
+    ("calibrate", "walk.npz", "--loads", "loads.csv"),
     ("cut", "walk.npz", "a.npz", "-o", "b.npz"),
     ("live", "--readout", "a.json", "--readout=b.json"),
     ("record", "a.mcap", "--bogus"),
@@ -68,6 +87,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     events = taxel.Events(t, t // 1000 % 4, t // 4000 % 4, t % 2000 == 0, array=array, intensity=40 + t // 1000 % 2)
     taxel.convert(events, "walk.npz")
     Path("labels.csv").write_text("label,t_us\ncontact,500000\n")
+    Path("loads.csv").write_text("load,unit,from_s,to_s\n3,kg,1,2\n")
     readout = taxel.Readout(taxel.encode.ContactArea(), {"contact": (taxel.Neuron(tau=0.5), np.ones(10))})
     readout.save("touch.json")
     Path("there.json").write_text("{}")

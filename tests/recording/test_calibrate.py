@@ -71,29 +71,3 @@ def test_a_table_needs_no_load(tmp_path: Path) -> None:
     assert (pressure["unit"], pressure["peak"]["most"]) == ("kPa", 4.0)
     newtons = 1e-3 * taxel.open(path).array.pitch_mm ** 2 * pressure["sum"]["most"]
     assert f"  force               at most {newtons:g} N, at " in run("info", path).stdout
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ((), "table and loads are missing, so there is nothing to calibrate by; give --loads"),
-        (("--load", "0"), "load 1 is 0: must be above 0"),
-        (("--load", "3", "--from", "7", "--to", "9"), "--load: nothing was recorded from 7.0 to 9.0 s"),
-        (("--load", "3", "--from", "99"), "--load: nothing was recorded from 99.0 s to the end"),
-        (("--load", "3", "--to", "-1"), "--load: nothing was recorded before -1.0 s"),
-        (("--load", "3", "--to", "1"), "no taxel reads more than 0.28 counts above its rest"),
-        (("--load", "3", "--load-unit", "kg"), "unit is 'kg': must be one of 'N', 'kPa'"),
-        (("--load", "3", "--each"), "no load determines a single taxel"),
-        (("--from", "1"), "--from and --to give the time of --load: give --load too"),
-        (("--loads", "loads.csv"), "loads.csv, line 2: unit is 'kg'; must be N or kPa"),
-    ],
-)
-def test_what_is_wrong_is_one_line_and_nothing_is_written(tmp_path: Path, options: tuple[str, ...], said: str) -> None:
-    path = tmp_path / "pad.npz"
-    weighed(path)
-    (tmp_path / "loads.csv").write_text("load,unit,from_s,to_s\n3,kg,1,2\n")
-    where = [str(tmp_path / option) if option.endswith(".csv") else option for option in options]
-    done = run("calibrate", path, *where)
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-    assert said in done.stderr
-    assert not (tmp_path / "pad.calibration.json").exists()

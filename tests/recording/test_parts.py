@@ -112,20 +112,6 @@ def test_merge_refuses_what_does_not_go_together(tmp_path: Path) -> None:
             taxel.merge(parts)
 
 
-def test_cut_and_merge_as_a_shell_sees_them(tmp_path: Path) -> None:
-    record(tmp_path / "a.mcap", some_events())
-    events = taxel.open(tmp_path / "a.mcap").events
-    for name, ends in (("one", ("--to", ".02")), ("two", ("--from", ".02"))):
-        said = run("cut", tmp_path / "a.mcap", tmp_path / f"{name}.mcap", *ends, "--json")
-        assert said.returncode == 0, said.stderr
-    said = run("merge", tmp_path / "one.mcap", tmp_path / "two.mcap", "-o", tmp_path / "both.npz")
-    assert said.returncode == 0, said.stderr
-    assert np.array_equal(taxel.open(tmp_path / "both.npz").events.t, events.t)
-    for command, options in (("cut", ("x.npz", "--rows", "1-2")), ("cut", ("x.npz", "--from", "3", "--to", "1"))):
-        said = run(command, tmp_path / "a.mcap", tmp_path / options[0], *options[1:])
-        assert (said.returncode, said.stderr.count("\n")) == (2, 1), said.stderr
-
-
 @pytest.mark.parametrize("begin_us", [0, 5_000_000, 1_795_000_000_000_000])
 def test_a_shell_counts_the_seconds_of_a_stretch_as_info_does(begin_us: int, tmp_path: Path) -> None:
     """From the beginning where times count from 1970; else they are the board's."""
