@@ -21,11 +21,6 @@ EXAMPLES = {
 }
 
 
-def trains_of(encoder, taxels, of):
-    """The numbers of the trains of some taxels."""
-    return taxels
-
-
 @settings(max_examples=60, deadline=None)
 @given(
     seed=seeds,

@@ -68,43 +68,16 @@ def some_rest(rng, array, unknown=0.1):
 @settings(deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
-    levels=st.integers(1, 7),
+    levels=st.sampled_from([0, 1, 3, 7]),
     left_out=st.sets(st.sampled_from(sorted(RANGES)), max_size=3),
     floor=st.sampled_from([0.0, 3.0, 7.5]),
-    tonic=st.sampled_from([None, 300, 500, 7000]),
-)
-def test_moments_are_those_of_numpy_and_scipy(seed, levels, left_out, floor, tonic):
-    rng = np.random.default_rng(seed)
-    array = Array(5, 7, 2.67)
-    tare = some_rest(rng, array)
-    t = 77 + np.cumsum(rng.choice([192, 100, 3333], 150))
-    frames = wander(rng, 150, 35).reshape(150, 5, 7).astype(np.float32)
-    frames[rng.random(150) < 0.1] = 40  # touches end and new ones begin
-    ranges = {name: None if name in left_out else of for name, of in RANGES.items()}
-    encoder = Moments(
-        levels=levels, noise_floor=floor, tonic_ms=None if tonic is None else tonic / 1000, tare=tare, **ranges
-    )
-    spikes = encoder.encode(Frames(frames, t, unit="ticks", array=array))
-    every = oracles.moment_levels(levels, **ranges)
-    assert len(spikes) == encoder.trains(array) == len(every) * (2 if tonic is None else 3)
-    assert not spikes.signed
-    wanted = oracles.moments(t.tolist(), frames, tare.rest, int(t[-1]), floor, 2.67, every, tonic)
-    assert spikes_of(spikes) == wanted
-    assert wanted
-
-
-@settings(deadline=None)
-@given(
-    seed=st.integers(0, 2**32 - 1),
-    levels=st.sampled_from([0, 1, 3]),
-    left_out=st.sets(st.sampled_from(sorted(RANGES)), max_size=3),
     tonic=st.sampled_from([None, 300, 7000]),
     graded=st.booleans(),
     centre=st.booleans(),
     ages=st.lists(st.integers(0, 30_000), max_size=6, unique=True).map(sorted),
 )
-def test_sampled_moments_and_ages_are_those_of_numpy(seed, levels, left_out, tonic, graded, centre, ages):
-    if not (graded or ages):
+def test_moments_and_ages_are_those_of_numpy_and_scipy(seed, levels, left_out, floor, tonic, graded, centre, ages):
+    if not (graded or ages or levels):
         ages = [0]
     rng = np.random.default_rng(seed)
     array = Array(5, 7, 2.67)
@@ -115,23 +88,24 @@ def test_sampled_moments_and_ages_are_those_of_numpy(seed, levels, left_out, ton
     ranges = {name: None if name in left_out else of for name, of in RANGES.items()}
     options = {"levels": levels, "tonic_ms": None if tonic is None else tonic / 1000, "tare": tare, **ranges}
     centre = centre and graded
-    encoder = Moments(graded=graded, centre=centre, ages_ms=[age / 1000 for age in ages] or None, **options)
+    sampled = {"graded": graded, "centre": centre, "ages_ms": [age / 1000 for age in ages] or None}
+    encoder = Moments(noise_floor=floor, **sampled, **options)
     spikes = encoder.encode(Frames(frames, t, unit="ticks", array=array))
     assert spikes.kind == encoder.kind == ("graded" if graded else "unsigned")
     every = oracles.moment_levels(levels, **ranges)
     first = len(every) * (2 if tonic is None else 3)
     shown = [n for n, name in enumerate(["area", "total", "peak", *["displacement_mm"] * 2]) if ranges[name] and graded]
     assert len(spikes) == encoder.trains(array) == first + len(shown) + 4 * centre + len(ages)
-    values = oracles.moment_values(frames, tare.rest, 3.0, 2.67)
-    places = oracles.centre_places(frames, tare.rest, 3.0) if centre else None
+    values = oracles.moment_values(frames, tare.rest, floor, 2.67)
+    places = oracles.centre_places(frames, tare.rest, floor) if centre else None
     wanted = oracles.sampled_moments(t.tolist(), values, shown, ages, first, places)
     assert [spike for spike in spikes_of(spikes) if spike[1] < first] == oracles.moments(
-        t.tolist(), frames, tare.rest, int(t[-1]), 3.0, 2.67, every, tonic
+        t.tolist(), frames, tare.rest, int(t[-1]), floor, 2.67, every, tonic
     )
     found = sorted(spike for spike in spikes_of(spikes) if spike[1] >= first)
     assert [spike[:2] for spike in found] == [spike[:2] for spike in sorted(wanted)]
     assert np.allclose([s[2] for s in found], [s[2] for s in sorted(wanted)], rtol=1e-6, atol=0)
-    assert wanted
+    assert spikes_of(spikes)
 
 
 def test_moments_of_events_are_sampled_every_period_from_the_first_stamp_on():

@@ -20,11 +20,6 @@ EXAMPLES = {
 }
 
 
-def trains_of(encoder, taxels, of):
-    """The numbers of the trains of some taxels."""
-    return taxels
-
-
 @settings(max_examples=2 * settings.default.max_examples, deadline=None)
 @given(seed=seeds, period=st.sampled_from([0.1, 0.25, 0.5, 1.0]))
 def test_sa1_is_its_filter_under_its_threshold(seed, period):

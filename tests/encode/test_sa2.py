@@ -13,11 +13,6 @@ REPAIRED = "read"
 EXAMPLES = {"SA-2": SA2(), "SA-2, faster": SA2(period_ms=0.5, threshold=0.1)}
 
 
-def trains_of(encoder, taxels, of):
-    """The numbers of the trains of some taxels."""
-    return taxels
-
-
 def test_sa2_is_its_filter_under_its_threshold():
     for seed in range(5):
         t, x = smooth(np.random.default_rng(seed), 800, 0.5)
