@@ -24,18 +24,6 @@ def several(seed, count, spikes=5.0):
 
 
 @pytest.mark.parametrize("metric", METRICS)
-def test_each_entry_is_what_the_function_gives(metric):
-    a, b = several(1, 7), several(2, 4)
-    function, parameters = getattr(taxel.metrics, metric), METRICS[metric]
-    across, among = pairwise(metric, a, b, **parameters), pairwise(metric, a, **parameters)
-    assert across.shape == (7, 4)
-    assert np.allclose(across, [[function(x, y, **parameters) for y in b] for x in a], rtol=1e-9, atol=1e-12)
-    assert np.allclose(among, [[function(x, y, **parameters) for y in a] for x in a], rtol=1e-9, atol=1e-12)
-    assert np.array_equal(among, among.T)
-    assert not among.diagonal().any()
-
-
-@pytest.mark.parametrize("metric", METRICS)
 def test_threads_change_no_bit(metric):
     a = several(3, 9)
     one = pairwise(metric, a, threads=1, **METRICS[metric])

@@ -62,15 +62,16 @@ def test_its_function_shows_the_core_s_parameters_and_defaults(name):
 
 @each_metric
 def test_the_same_either_way_and_0_of_itself(name):
-    some = patterns(1)
+    some, others, value = patterns(1), patterns(3)[:2], getattr(metrics, name)
     matrix = metrics.pairwise(name, some, **given(name))
     assert np.allclose(matrix, matrix.T)
     assert not np.diag(matrix).any()
     assert (matrix >= 0).all()
     assert matrix.any()
-    for i, a in enumerate(some):
-        for j, b in enumerate(some):
-            assert getattr(metrics, name)(a, b, **given(name)) == pytest.approx(matrix[i, j], rel=1e-9, abs=1e-12)
+    across = metrics.pairwise(name, some, others, **given(name))
+    for found, of in ((matrix, some), (across, others)):
+        each = [[value(a, b, **given(name)) for b in of] for a in some]
+        np.testing.assert_allclose(found, each, rtol=1e-9, atol=1e-12)
 
 
 @each_metric
