@@ -50,5 +50,14 @@ def right_sides(pattern, targets, fired, factor):
     )
 
 
+def change_and_formula(learner, factor, targets=3, seed=1, weights=(-1, 4)):
+    """The change of drawn weights, the formula of it, and the weights and output spikes."""
+    (pattern,), (wanted,) = patterns(seed, trains=60, count=1, targets=targets, spikes=3)
+    start = np.random.default_rng(seed).uniform(*weights, 60)
+    change, fired = learner.change(start, pattern, wanted)
+    assert len(fired) > 0
+    return change, right_sides(pattern, wanted, fired, factor), start, fired
+
+
 def is_right(targets, fired, within=1.0):
     return len(targets) == len(fired) and bool(np.all(np.abs(np.asarray(targets) - fired) <= within))

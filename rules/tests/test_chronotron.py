@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from rule_examples import kernel, patterns, right_sides, summed
+from rule_examples import change_and_formula, kernel, patterns, summed
 
 from taxel_rules import Chronotron, _rules
 
@@ -78,13 +78,8 @@ def test_time_constants_are_the_membranes_where_they_are_left_out():
 
 @pytest.mark.parametrize("targets", [1, 3])
 def test_i_learning_goes_by_currents_with_the_sign_of_the_weight(targets):
-    (pattern,), (wanted,) = patterns(3, trains=60, count=1, targets=targets, spikes=3)
-    weights = np.random.default_rng(3).uniform(-1, 4, 60)
-    change, fired = Chronotron(rule="I", **GIVEN).change(weights, pattern, wanted)
-
     def current(s):
         return np.where(s >= 0, np.exp(-np.maximum(s, 0) / 5.0), 0.0)
 
-    assert len(fired) > 0
-    expected = np.sign(weights) * right_sides(pattern, wanted, fired, current)
-    assert change == pytest.approx(expected, rel=1e-9, abs=1e-12)
+    change, sides, weights, _ = change_and_formula(Chronotron(rule="I", **GIVEN), current, targets, seed=3)
+    assert change == pytest.approx(np.sign(weights) * sides, rel=1e-9, abs=1e-12)

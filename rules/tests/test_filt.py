@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rule_examples import kernel, patterns, right_sides
+from rule_examples import change_and_formula, kernel, patterns
 
 from taxel_rules import FILT, INST
 
@@ -15,11 +15,8 @@ def factor(s, tau_q=10.0):
 
 @pytest.mark.parametrize("tau_q", [10.0, 3.0])
 def test_the_change_is_the_filtered_kernel_at_targets_less_that_at_spikes(tau_q):
-    (pattern,), (wanted,) = patterns(1, trains=60, count=1, targets=3, spikes=3)
-    weights = np.random.default_rng(1).uniform(-1, 4, 60)
-    change, fired = FILT(tau_q=tau_q).change(weights, pattern, wanted)
-    assert len(fired) > 0
-    assert change == pytest.approx(right_sides(pattern, wanted, fired, lambda s: factor(s, tau_q)), rel=1e-9, abs=1e-12)
+    change, expected, *_ = change_and_formula(FILT(tau_q=tau_q), lambda s: factor(s, tau_q))
+    assert change == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
 def test_the_kernel_is_the_integral_over_the_filtered_spike():

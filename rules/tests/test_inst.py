@@ -2,20 +2,15 @@
 
 import numpy as np
 import pytest
-from rule_examples import kernel, patterns, right_sides
+from rule_examples import change_and_formula, kernel, patterns
 
 from taxel_rules import INST
 
 
 @pytest.mark.parametrize("targets", [1, 3])
 def test_the_change_is_the_potential_of_inputs_at_targets_less_that_at_spikes(targets):
-    (pattern,), (wanted,) = patterns(1, trains=60, count=1, targets=targets, spikes=3)
-    weights = np.random.default_rng(1).uniform(-1, 4, 60)
-    change, fired = INST().change(weights, pattern, wanted)
-    assert len(fired) > 0
-    assert change == pytest.approx(
-        right_sides(pattern, wanted, fired, lambda s: kernel(s, 10.0, 5.0)), rel=1e-9, abs=1e-12
-    )
+    change, expected, *_ = change_and_formula(INST(), lambda s: kernel(s, 10.0, 5.0), targets)
+    assert change == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
 def test_defaults_are_those_of_gardner_and_gruning():
