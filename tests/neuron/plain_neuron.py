@@ -4,57 +4,50 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import brentq
+from simulator import kernel
+
+#: On a grid a potential this far below a level counts as at it, in thresholds.
+AT = 1e-11
 
 
 class Plain:
     """6.4 to 6.8 as they stand, one kernel at a time."""
 
-    def __init__(self, neuron, weights, trains):
-        self.n = neuron
-        pairs = sorted((s, n) for n, train in enumerate(trains) for s in train)
-        self.s = np.array([s for s, _ in pairs])
-        self.w = np.array([weights[n] for _, n in pairs])
-        self.start = trains.start
+    def __init__(self, neuron, weights, trains, share=1.0):
+        self.n, self.start, self.share = neuron, trains.start, share
+        self.s, self.w = trains.times, np.repeat(weights, trains.counts)
+        if trains.kind == "graded":
+            self.w = self.w * trains.values.astype(float)
 
     def potential(self, t, spikes):
         d, alive = t - self.s, self.s < t
         for spike in spikes:
-            end = spike + self.n.refractory
+            end = spike + self.n.refractory + 1e-6
             if self.n.after_spike == "reset":
                 alive &= self.s > end
             if self.n.after_spike == "ignore":
-                alive &= ~((spike < self.s) & (self.s <= end))
-        d = d[alive]
-        return float((self.w[alive] * self.kernel(d)).sum())
-
-    def kernel(self, d):
-        tau = self.n.tau
-        if self.n.kernel == "alpha":
-            return d / tau * np.exp(-d / tau)
-        if self.n.kernel == "exponential":
-            return np.exp(-d / tau)
-        tau_s = tau / 4 if self.n.tau_s is None else self.n.tau_s
-        peak = tau * tau_s / (tau - tau_s) * np.log(tau / tau_s)
-        value = np.exp(-d / tau) - np.exp(-d / tau_s)
-        return value / (np.exp(-peak / tau) - np.exp(-peak / tau_s))
+                alive &= ~((spike + 1e-6 < self.s) & (self.s <= end))
+        return float((self.w[alive] * kernel(self.n, d[alive])).sum())
 
     def threshold(self, t, spikes):
         spike = spikes[-1] if spikes else (self.start if self.n.first_threshold == "printed" else -np.inf)
         since = t - spike - self.n.refractory
         rec = 2 * self.n.tau if self.n.tau_rec is None else self.n.tau_rec
-        return self.n.theta_0 + (self.n.theta_plus * np.exp(-since / rec) if since >= -1e-9 else 0.0)
+        return self.share * (self.n.theta_0 + (self.n.theta_plus * np.exp(-since / rec) if since >= -1e-9 else 0.0))
 
     def above(self, t, spikes):
         return self.potential(t, spikes) - self.threshold(t, spikes)
 
     def run_grid(self, stop, step):
-        spikes = []
+        spikes, armed, at = [], True, AT * self.n.theta_0
         for k in range(int((stop - self.start) / step + 1e-9) + 1):
             t = self.start + k * step
-            if spikes and t <= spikes[-1] + self.n.refractory + 1e-9:
-                continue
-            if self.above(t, spikes) >= 0:
+            potential, level = self.potential(t, spikes), self.threshold(t, spikes)
+            if not armed:
+                armed = potential < self.n.rearm * level - at
+            elif potential >= level - at and not (spikes and t <= spikes[-1] + self.n.refractory + 1e-9):
                 spikes.append(t)
+                armed = self.n.rearm is None
         return spikes
 
     def run_continuous(self, stop):

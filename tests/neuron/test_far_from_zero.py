@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from draws import mixed
+from simulator import kernel
 
 from taxel import Neuron, SpikeTrains
 
@@ -25,10 +26,6 @@ def touching(seed, start, step, after_spike="reset"):
     at = start + k * step
     weights = random.uniform(0.2, 1.0, inputs)
     return neuron, trains, weights, at, k
-
-
-def kernel(neuron, ages):
-    return np.where(ages > 0, ages / neuron.tau * np.exp(-ages / neuron.tau), 0.0)
 
 
 @pytest.mark.parametrize(("start", "step"), mixed([0.0, -1e5, 1e5, 1e7], [0.1, 0.3, 1.0, 0.192]))

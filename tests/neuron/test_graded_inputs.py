@@ -11,16 +11,6 @@ from plain_neuron import Plain
 from taxel import Neuron, SpikeTrains
 
 
-class Graded(Plain):
-    """6.4 to 6.8 as they stand, with the weight of each input times its value."""
-
-    def __init__(self, neuron, weights, trains):
-        super().__init__(neuron, weights, trains)
-        order = np.argsort(trains.times, kind="stable")
-        assert np.array_equal(self.s, trains.times[order])
-        self.w = (np.repeat(weights, trains.counts) * trains.values.astype(float))[order]
-
-
 @st.composite
 def problems(draw, decades=6):
     """A neuron, weights and graded trains: values over twelve decades, some inputs 1e-10 ms apart."""
@@ -51,7 +41,7 @@ def problems(draw, decades=6):
 @given(problems())
 def test_potentials_are_sums_of_weight_times_value_times_kernel(problem):
     neuron, weights, trains = problem
-    plain, times = Graded(neuron, weights, trains), np.linspace(0, 150, 60)
+    plain, times = Plain(neuron, weights, trains), np.linspace(0, 150, 60)
     found = neuron.potential(weights, trains, times)
     for t, potential in zip(times, found, strict=True):
         size = np.abs(plain.w[plain.s < t]).sum()
@@ -62,7 +52,7 @@ def test_potentials_are_sums_of_weight_times_value_times_kernel(problem):
 @given(problems())
 def test_spikes_are_those_of_the_plain_sums(problem):
     neuron, weights, trains = problem
-    plain = Graded(neuron, weights, trains)
+    plain = Plain(neuron, weights, trains)
     fired = neuron.run(weights, trains)
     for k, t in enumerate(fired):
         # At each spike the potential has come to the threshold; between spikes it is below it.

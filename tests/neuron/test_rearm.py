@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plain_neuron import Plain
 from refusal import refused
 
 import taxel
@@ -15,40 +16,6 @@ from taxel import Neuron, SpikeTrains
 from taxel.detect import Readout, run
 from taxel.encode import LevelCrossing
 from taxel.learn import ConeX
-
-#: A potential this far below a level counts as at it, in thresholds.
-AT = 1e-11
-
-
-def simulated(neuron: Neuron, weights: np.ndarray, trains: SpikeTrains, threshold: float) -> list[float]:
-    """Each grid point in turn: the potential as a sum over all inputs, whether it arms the neuron, whether it fires."""
-    at, size = trains.times, np.repeat(weights, trains.counts)
-    if trains.kind == "graded":
-        size = size * trains.values
-    start, armed, fired = trains.start, True, []
-    tau_rec = 2 * neuron.tau if neuron.tau_rec is None else neuron.tau_rec
-    for k in range(int((trains.stop - start) / neuron.step_ms + 1e-9) + 1):
-        t = start + k * neuron.step_ms
-        counts = at < t
-        for spike in fired:
-            end = spike + neuron.refractory + 1e-6
-            if neuron.after_spike == "reset":
-                counts &= at > end
-            if neuron.after_spike == "ignore":
-                counts &= (at <= spike + 1e-6) | (at > end)
-        d = (t - at[counts]) / neuron.tau
-        potential = (size[counts] * (np.exp(-d) if neuron.kernel == "exponential" else d * np.exp(-d))).sum()
-        last = fired[-1] if fired else (start if neuron.first_threshold == "printed" else None)
-        level = neuron.theta_0
-        if last is not None and t - last - neuron.refractory >= -1e-9:
-            level += neuron.theta_plus * np.exp(-(t - last - neuron.refractory) / tau_rec)
-        level *= threshold
-        if not armed:
-            armed = potential < neuron.rearm * level - AT * neuron.theta_0
-        elif potential >= level - AT * neuron.theta_0 and not (fired and t <= fired[-1] + neuron.refractory + 1e-9):
-            fired.append(t)
-            armed = neuron.rearm is None
-    return fired
 
 
 @st.composite
@@ -94,7 +61,7 @@ def problems(draw: st.DrawFn) -> tuple[Neuron, np.ndarray, SpikeTrains, float]:
 def test_a_neuron_fires_as_the_simulator_does(problem: tuple[Neuron, np.ndarray, SpikeTrains, float]) -> None:
     neuron, weights, trains, threshold = problem
     assert neuron.run(weights, trains, threshold=threshold) == pytest.approx(
-        simulated(neuron, weights, trains, threshold), abs=1e-9
+        Plain(neuron, weights, trains, threshold).run_grid(trains.stop, neuron.step_ms), abs=1e-9
     )
 
 
