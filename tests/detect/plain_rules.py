@@ -2,6 +2,7 @@
 
 import math
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 from hypothesis import strategies as st
@@ -206,6 +207,18 @@ kinds = st.builds(
     st.sampled_from([0.0, 0.1, 0.192, 0.5, 1.0, 40.0]),
 )
 clocks = st.sampled_from([(192.0, 1), (192.0, 2), (48.0, 1), (48.0, 2), (499.84, 1), (1000.0, 2)])
+
+
+def in_pieces(stream, source, data):
+    """What a stream says of pieces, between which time may be advanced to anywhere before what follows."""
+    cuts, parts = sorted(data.draw(st.sets(st.integers(0, len(source))))), []
+    for start, stop in pairwise([0, *cuts, len(source)]):
+        parts.append(stream.push(source[start:stop]))
+        if 0 < stop < len(source) and data.draw(st.booleans()):
+            latest, following = int(source.t[:stop].max()), int(source.t[stop:].min())
+            if following > latest:
+                parts.append(stream.advance(data.draw(st.integers(latest, following))))
+    return [*parts, stream.advance(int(source.t.max()) + 2_000_000)]
 
 
 def expected(rule, source, frame_us, version=1):

@@ -1,13 +1,11 @@
 """A readout that detects a label by its neuron or by its plain rule: what runs, its file, and what is better."""
 
-from itertools import pairwise
-
 import discs
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plain_rules import ARRAY, FLOOR, clocks, events, tare
+from plain_rules import ARRAY, FLOOR, clocks, events, in_pieces, tare
 
 import taxel
 from taxel import Frames, Neuron, Readout
@@ -45,15 +43,7 @@ def test_pieces_give_what_the_whole_gives_and_each_label_what_its_way_gives(sour
             assert whole[label] == found[label]
     assert len(whole) == sum(map(len, alone))
     assert (np.diff(whole.known) >= 0).all()
-    stream, parts = chosen.stream(frame_us=frame_us, wire_version=version, tare=tare()), []
-    cuts = sorted(data.draw(st.sets(st.integers(0, len(source)))))
-    for start, stop in pairwise([0, *cuts, len(source)]):
-        parts.append(stream.push(source[start:stop]))
-        if 0 < stop < len(source) and data.draw(st.booleans()):
-            latest, following = int(source.t[:stop].max()), int(source.t[stop:].min())
-            if following > latest:
-                parts.append(stream.advance(data.draw(st.integers(latest, following))))
-    parts.append(stream.advance(int(source.t.max()) + 2_000_000))
+    parts = in_pieces(chosen.stream(frame_us=frame_us, wire_version=version, tare=tare()), source, data)
     assert [row for part in parts for row in rows(part)][: len(whole)] == rows(whole)
 
 

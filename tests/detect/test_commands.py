@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from discs import recipe, tare, touches
+from discs import tare, touches
 from markupsafe import escape
 from shell import call
 
@@ -96,13 +96,6 @@ def test_a_trained_readout_finds_what_it_never_heard(folder: Path, trained: Path
     more.unlink()
 
 
-def test_the_command_and_the_function_train_the_same(trained: Path) -> None:
-    examples = [taxel.detect.Example(*touches(seed), tare()) for seed in (1, 2)]
-    # The function does not know the recordings that its examples are of.
-    neurons = taxel.Readout.load(trained)._with(training=None, rules={}, by_rule=[])
-    assert neurons == taxel.detect.fit(examples, recipe())._with_rules({})
-
-
 def test_recordings_of_other_arrays_are_left_out_where_one_fits(
     tmp_path: Path, folder: Path, trained: Path, capsys
 ) -> None:
@@ -160,24 +153,6 @@ def test_without_a_recipe_it_starts_from_the_recipe_of_the_unit(tmp_path: Path, 
     walk(tmp_path, 15)  # the running range needs 10 s
     assert call(capsys, *arguments, "--recipe", "gait_channel", "--json")[0] == 0
     assert taxel.Readout.load(out).encoder.running_range is not None
-
-
-def test_without_a_tare_the_rest_is_taken_from_before_the_first_label(folder: Path, capsys, tmp_path: Path) -> None:
-    events = taxel.open(folder / "9.npz").events
-    plan = ("--recipe", folder / "recipe.toml", "--set", "neurons.lift.tau=3.0")
-    arguments = ("train", folder / "9.npz", "--labels", folder / "truth.csv", "--folds", 0, *plan)
-    code, said, _ = call(capsys, *arguments, "-o", tmp_path / "by_itself.json")
-    first = min(row.t for row in taxel.Labels(folder / "truth.csv").rows)
-    assert code == 0
-    assert f"rest: the time before its first label, 0.000 to {first / 1e6 - 0.02:.3f} s; --tare sets another" in said
-    taxel.Tare.take(events, stop_us=first - 20_000).save(tmp_path / "tare.json")
-    assert call(capsys, *arguments, "--tare", tmp_path / "tare.json", "-o", tmp_path / "said.json")[0] == 0
-    assert taxel.Readout.load(tmp_path / "by_itself.json") == taxel.Readout.load(tmp_path / "said.json")
-    (tmp_path / "early.csv").write_text(f"label,t_us\ncontact,{events.t[0] + 5000}\nlift,{events.t[0] + 400_000}\n")
-    code, _, error = call(capsys, "train", folder / "9.npz", "--labels", tmp_path / "early.csv", *plan, "-o", "no.json")
-    assert (code, error.count("\n")) == (2, 1)
-    assert "no label is late enough" in error
-    assert "give --tare SECONDS or FILE" in error
 
 
 def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, capsys, tmp_path: Path) -> None:

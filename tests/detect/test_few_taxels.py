@@ -14,21 +14,29 @@ from taxel.detect import Example, Recipe, fit, judge, recipes, run, score, tune
 from taxel.tasks import DetectOptions, detect, train
 
 
-def single(shape: tuple[int, int], seed: int, count: int = 14, *, times: float = 10.0) -> Example:
-    """Return touches that load one taxel each, so many times its noise."""
+def touched(
+    shape: tuple[int, int], seed: int, noise: float, load: float, *, side: int = 1, count: int = 14, unit: str = "N"
+) -> Example:
+    """Return touches that load `side` x `side` taxels each, somewhere on a sensor."""
     rng = np.random.default_rng(seed)
     begins = 200 + 80 * np.arange(count)
-    values = rng.normal(0.0, 0.1, (int(begins[-1]) + 150, *shape))
+    values = rng.normal(0.0, noise, (int(begins[-1]) + 150, *shape))
     for begin in begins:
-        values[begin : begin + 30, rng.integers(shape[0]), rng.integers(shape[1])] += 0.1 * times
+        y, x = (rng.integers(0, size - side + 1) for size in shape)
+        values[begin : begin + 30, y : y + side, x : x + side] += load
     t = np.arange(len(values)) * 10_000
-    frames = Frames(np.maximum(values, 0.0), t, unit="N", array=Array(*shape))
+    frames = Frames(np.maximum(values, 0.0) if unit == "N" else np.rint(values + 40), t, unit=unit, array=Array(*shape))
     return Example(frames, {"contact": t[begins], "lift": t[begins + 30]}, Tare.take(frames, stop_us=1_900_000))
+
+
+def sized(shape: tuple[int, int], seed: int) -> Example:
+    """Return touches of nine taxels on a grid of one size."""
+    return touched(shape, seed, 0.4, 60.0, side=3, count=8, unit="counts")
 
 
 @pytest.mark.parametrize(("shape", "times"), mixed([(1, 1), (1, 6), (2, 2), (8, 8)], [10.0, 100.0]))
 def test_one_loaded_taxel_is_learnt_on_any_array(shape: tuple[int, int], times: float) -> None:
-    learnt, unseen = single(shape, 1, times=times), single(shape, 2, times=times)
+    learnt, unseen = (touched(shape, seed, 0.1, 0.1 * times) for seed in (1, 2))
     assert recipes.chosen(learnt.source, ["contact", "lift"])[0] == "touch"
     readout = fit([learnt], Recipe.load("touch", labels=["contact", "lift"], noise_floor=0.6))
     assert score(run(readout, unseen.source, tare=unseen.tare), unseen.labels, 50.0).rank[0] <= 1
@@ -36,19 +44,6 @@ def test_one_loaded_taxel_is_learnt_on_any_array(shape: tuple[int, int], times: 
         assert rule is not None
         assert rule.quantity == "peak"
         assert score(run(rule, learnt.source, tare=learnt.tare), {label: learnt.labels[label]}, 50.0).rank[0] <= 1
-
-
-def sized(shape: tuple[int, int], seed: int) -> Example:
-    """Return touches of nine taxels on a grid of one size."""
-    rng = np.random.default_rng(seed)
-    begins = 200 + 80 * np.arange(8)
-    values = 40 + rng.normal(0, 0.4, (int(begins[-1]) + 150, *shape))
-    for begin in begins:
-        y, x = rng.integers(0, shape[0] - 3), rng.integers(0, shape[1] - 3)
-        values[begin : begin + 30, y : y + 3, x : x + 3] += 60
-    t = np.arange(len(values)) * 10_000
-    frames = Frames(np.rint(values), t, unit="counts", array=Array(*shape, pitch_mm=5.0))
-    return Example(frames, {"contact": t[begins], "lift": t[begins + 30]}, Tare.take(frames, stop_us=1_900_000))
 
 
 def test_grids_of_several_sizes_are_padded_at_their_far_edges(tmp_path: Path) -> None:

@@ -1,12 +1,10 @@
 """A plain rule against a loop over frames, written from its documentation; pieces, frames, files, live, tuning."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plain_rules import ARRAY, FLOOR, as_tuples, clocks, events, expected, kinds, played, rules, tare
+from plain_rules import ARRAY, FLOOR, as_tuples, clocks, events, expected, in_pieces, kinds, played, rules, tare
 
 import taxel
 from taxel import Array, Events, Frames
@@ -30,16 +28,7 @@ def test_pieces_give_what_the_whole_gives(source, rule, clock, data):
     frame_us, version = clock
     whole = run(rule, source, frame_us=frame_us, wire_version=version, tare=tare())
     stream = rule.stream(ARRAY, frame_us=frame_us, wire_version=version, tare=tare())
-    cuts = sorted(data.draw(st.sets(st.integers(0, len(source)))))
-    parts = []
-    for start, stop in pairwise([0, *cuts, len(source)]):
-        parts.append(stream.push(source[start:stop]))
-        if stop < len(source) and stop and data.draw(st.booleans()):
-            # Time may be advanced to anywhere before what follows.
-            latest, following = int(source.t[:stop].max()), int(source.t[stop:].min())
-            if following > latest:
-                parts.append(stream.advance(data.draw(st.integers(latest, following))))
-    parts.append(stream.advance(int(source.t.max()) + 2_000_000))
+    parts = in_pieces(stream, source, data)
     joined = sum(parts[1:], parts[0])
     assert joined[: len(whole)] == whole
     # Long after the end of the events a load that stays may have become the rest.

@@ -54,7 +54,8 @@ def test_a_training_takes_the_rest_of_a_detection_and_where_nothing_is_quiet_the
     assert (taken.source, taken.to_dict()["us"]) == ("labels", [begin_us, begin_us + 230_000])
     training = taxel.train(recording, [first], taxel.tasks.TrainOptions(folds=0))
     assert training.command("r.json").endswith("--tare 0.23")
-    with pytest.raises(ProblemError):
+    assert "rest: the time before its first label, 0.000 to 0.230 s; --tare sets" in "\n".join(training.lines())
+    with pytest.raises(ProblemError, match="no label is late enough"):
         rest(recording, labels={"contact": busy.t[[1]]})
 
 
