@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from queue import Queue
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from loopback import free_port
-from tests.panel.browser import PATIENCE, running
+from tests.panel.browser import PATIENCE
 
 import taxel
+from taxel.demo.script import endless
 from taxel.live import Live
 from taxel.panel import Panel
+from taxel.simulate import emulate
 
 #: Pixels of a map, as a text that changes when the picture does.
 PIXELS = "name => document.getElementById(name).toDataURL()"
@@ -147,15 +151,26 @@ def pixel(page: Any, t_s: float) -> float:
 
 @pytest.fixture(scope="module")
 def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
-    """An emulated board with a control line, and a panel that listens to it."""
-    folder = tmp_path_factory.mktemp("live")
-    port = str(free_port())
-    with running("emulate", "--port", port, "--seed", "1", "--control", "0", folder=folder) as board:
-        control = board.wait_for(r"commands are accepted at (\S+)")
-        panel = ("live", "--panel", "--port", port, "--host", "127.0.0.1", "--control", control)
-        with running(*panel, "--folder", str(folder), folder=folder) as server:
-            url = server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")
-            yield SimpleNamespace(url=url, folder=folder)
+    """An emulated board with a control line, and a panel that listens to it, in this process."""
+    folder, over, control = tmp_path_factory.mktemp("live"), threading.Event(), Queue[str]()
+
+    def watch(_: object) -> None:
+        if over.is_set():
+            raise KeyboardInterrupt
+
+    def play(to: str) -> None:
+        with contextlib.suppress(KeyboardInterrupt):
+            emulate(to, endless(1), seed=1, control="127.0.0.1:0", begun=control.put, watch=watch)
+
+    with Live(0, host="127.0.0.1", record_later=True) as live:
+        board = threading.Thread(target=play, args=["{}:{}".format(*live.address)])
+        board.start()
+        try:
+            with Panel(live, control=control.get(timeout=PATIENCE), folder=folder) as panel:
+                yield SimpleNamespace(url=panel.url, folder=folder)
+        finally:
+            over.set()
+            board.join()
 
 
 @pytest.fixture

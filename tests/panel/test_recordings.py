@@ -95,8 +95,10 @@ def test_a_recording_of_the_panel_holds_all_sources_of_the_board(tmp_path):
         Client(panel) as page,
     ):
         live.sample("imu", [1.0, 0.0])
-        page.ask("record", name="walk")
-        page.since_asked("recorder", state="recording")
+        # It goes on when the page that began it is gone.
+        with Client(panel) as gone:
+            gone.ask("record", name="walk")
+        page.until("recorder", state="recording")
         live.sample("imu", [2.0, 0.5])
         sent = send([bytes.fromhex("c000050304")], *live.address, seconds=0.01)["datagrams"]
         page.until("counters", events=sent)
