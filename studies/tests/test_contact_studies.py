@@ -66,8 +66,3 @@ def test_rasters_are_the_encoders_spikes(tmp_path, course):
             wanted[np.round(spikes[taxel] / 2.0).astype(int) - 1, taxel] = message
         np.testing.assert_array_equal(x[4 + sample].reshape(50, 25), wanted)
     assert np.abs(x).max() > 1
-
-
-@pytest.fixture(scope="module")
-def courses(tmp_path_factory):
-    return Kept(tmp_path_factory.mktemp("courses"), "0123abc")

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -117,30 +114,3 @@ def test_what_was_done_before_an_error_is_kept(kept, backend, tmp_path):
     (tmp_path / "stop").unlink()
     rows = run(fails_at_twenty, wanted, kept, quiet=True)
     assert [row.result["y"] for row in rows] == [x * x + 1 for x in range(24)]
-
-
-def test_ctrl_c_ends_promptly(tmp_path):
-    code = (
-        "import time\nfrom pathlib import Path\nfrom taxel_studies.runner import Kept, Task, run\n"
-        "def first_is_quick(p, s):\n    if p['x']:\n        time.sleep(60)\n"
-        "if __name__ == '__main__':\n"
-        f"    kept = Kept(Path({str(tmp_path)!r}) / 'cache', 'c')\n"
-        f"    run(first_is_quick, [Task({{'x': k}}) for k in range(4)], kept, quiet=True)\n"
-    )
-    script = tmp_path / "script.py"
-    script.write_text(code)
-    process = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-
-    def done() -> int:
-        return len(list((tmp_path / "cache").rglob("output.pkl")))
-
-    try:
-        deadline = time.monotonic() + 60
-        while not done() and time.monotonic() < deadline:
-            time.sleep(0.05)
-        os.kill(process.pid, signal.SIGINT)
-        assert process.wait(timeout=60) != 0
-    finally:
-        process.kill()
-        process.wait()
-    assert done() == 1
