@@ -14,20 +14,8 @@ from .touches import GOOD, folder, ordered
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
-QUICK = [
-    "--window-ms",
-    "60",
-    "--periods",
-    "1,10",
-    "--windows",
-    "10",
-    "--draws",
-    "1",
-    "--shuffles",
-    "3",
-    "--taxels",
-    "1",
-]
+COARSE = ["--draws", "1", "--shuffles", "3", "--taxels", "1"]
+QUICK = ["--window-ms", "60", "--periods", "1,10", "--windows", "10", *COARSE]
 
 
 def run(*arguments):
@@ -87,24 +75,7 @@ def test_without_labels_a_recording_is_a_trial_and_its_folder_the_label(tmp_path
         place.mkdir(exist_ok=True)
         taxel.convert(events.between(start, start + 200_000), place / f"{k}.npz")
     recordings = sorted(tmp_path.glob("*/*.npz"))
-    done = run(
-        *recordings,
-        "--window-ms",
-        "20",
-        "--periods",
-        "1,10",
-        "--draws",
-        "1",
-        "--shuffles",
-        "2",
-        "--folds",
-        "4",
-        "--taxels",
-        "1",
-        "--report",
-        tmp_path / "page.html",
-        "--json",
-    )
+    done = run(*recordings, *QUICK, "--folds", 4, "--report", tmp_path / "page.html", "--json")
     assert done.returncode == 0, done.stderr
     said = json.loads(done.stdout)
     assert set(said["labels"]) == {"left-first", "right-first"}
@@ -151,26 +122,7 @@ def test_numbered_frames_are_refused_until_a_rate_is_given(tmp_path):
         assert "rate_hz" in refused.stderr
     assert not (tmp_path / "page.html").exists()
     (tmp_path / "hand" / "layout.toml").write_text("rows = 2\ncolumns = 2\nrate_hz = 100\n")
-    done = run(
-        grasps,
-        "--labels",
-        tmp_path / "l.csv",
-        "--window-ms",
-        "100",
-        "--periods",
-        "10",
-        "--windows",
-        "50",
-        "--draws",
-        "1",
-        "--shuffles",
-        "2",
-        "--taxels",
-        "1",
-        "--folds",
-        "2",
-        "--report",
-        tmp_path / "page.html",
-    )
+    given = ("--labels", tmp_path / "l.csv", "--window-ms", 100, "--periods", 10, "--windows", 50, "--folds", 2)
+    done = run(grasps, *given, *COARSE, "--report", tmp_path / "page.html")
     assert done.returncode == 0, done.stderr
     assert "20 trials" in done.stdout
