@@ -1,14 +1,16 @@
 """Settings of the product's tests: which begin first, and what several of them share."""
 
+from __future__ import annotations
+
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
-from tests.panel.browser import started_chromium
 
-#: One browser of a process serves all pages.
-__all__ = ["started_chromium"]
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 #: Scripts that made kept data need packages that are not installed; examples of CONTRIBUTING run where they are added.
 collect_ignore_glob = ["data/*", "contributing/*"]
@@ -17,6 +19,15 @@ collect_ignore_glob = ["data/*", "contributing/*"]
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the files that look at pages or type one: they take longest, and the last keeps all others waiting."""
     items.sort(key=lambda item: not {"chromium", "played"} & set(getattr(item, "fixturenames", ())))
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Browser]:
+    """Start one browser for all pages of a process."""
+    from tests.panel.browser import started_chromium  # the wheels' tests on other systems see no page
+
+    with started_chromium() as browser:
+        yield browser
 
 
 @pytest.fixture

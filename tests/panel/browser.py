@@ -104,9 +104,9 @@ def running(*arguments: str, folder: Path) -> Iterator[Process]:
         process.end()
 
 
-@pytest.fixture(scope="session", name="chromium")
+@contextmanager
 def started_chromium() -> Iterator[Browser]:
-    """Start the browser once for all tests, with one page for most of them."""
+    """Start the browser, with one page for most tests."""
     with sync_playwright() as started:
         browser = started.chromium.launch(executable_path=installed(), args=FLAGS)
         browser.new_context().new_page()
