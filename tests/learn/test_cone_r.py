@@ -30,7 +30,7 @@ def test_whatever_the_options_a_fit_is_the_least_of_what_is_stated(part):
         ends = (np.clip(w, cone.lb, cone.ub) * np.ones(len(patterns[0])) for w in (0.0, np.inf))
         size = max(factors @ terms(cone, rows, w) for w in ends)
         value = factors * terms(cone, rows, cone.weights_)
-        assert cone.silent_rows_ == len(rows[3]), seed
+        assert np.count_nonzero(np.abs(rows[3]).max(axis=1) > 1e-20) <= cone.silent_rows_ <= len(rows[3]), seed
         assert list(cone.parts_.values()) == pytest.approx(list(value), rel=1e-9, abs=1e-12 * size), seed
         assert cone.objective_ == pytest.approx(value.sum(), rel=1e-12), seed
         assert cone.status_ == "solved", seed
@@ -50,6 +50,22 @@ def test_a_target_out_of_reach_is_named_and_the_rest_is_fitted():
     assert cone.neuron_.potential(cone.weights_, trains, [90.0]) == pytest.approx(
         0.3 + 0.2 * np.exp(-77 / 30), abs=1e-6
     )
+
+
+def test_hours_of_silence_change_nothing():
+    """Points that no input reaches are no rows: their number is bounded, not the time."""
+    first, later = ([20.0, 30.0], [22.0, 31.0], [90.0]), ([15.0], [18.0, 40.0], [19.0, 60.0])
+    hours = 1e8
+    apart = [SpikeTrains.from_lists([list(train) for train in pattern], stop=120.0) for pattern in (first, later)]
+    joined = [[*a, *(hours + t for t in b)] for a, b in zip(first, later, strict=True)]
+    whole = SpikeTrains.from_lists(joined, stop=hours + 120.0)
+    cone = ConeR(lb=-3.0, ub=3.0)
+    in_parts = cone.fit(apart, [[35.0], [45.0]])
+    fitted_whole = made(ConeR, lb=-3.0, ub=3.0).fit([whole], [[35.0, hours + 45.0]])
+    assert fitted_whole.silent_rows_ < 20_000
+    assert fitted_whole.weights_ == pytest.approx(in_parts.weights_, abs=1e-5)
+    with refused(argument="step_ms"):
+        ConeR(neuron=Neuron(tau=1e6)).fit([whole], [[35.0]])
 
 
 def test_a_neuron_that_refires_on_its_training_data_warns_once_and_names_the_option():

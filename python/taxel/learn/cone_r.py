@@ -91,7 +91,7 @@ class ConeR(SpikeLearner):
     rounds_, rows_ : int
         Rounds of multipliers; rows on their kink in the last one.
     silent_rows_ : int
-        Rows of 6.13.
+        Rows of 6.13 at which some input has not decayed.
     unreachable_ : list of (pattern, target)
         Targets at which no weights within the bounds reach the threshold; the other targets are fitted.
     refires_ : int

@@ -81,14 +81,13 @@ impl ConeR {
         self.delta_t_ms.unwrap_or(0.1 * self.neuron.tau)
     }
 
-    /// The end of the silent rows of pattern `p`, ms, and the number of grid points up to it.
+    /// The end of the silent rows of pattern `p`, ms.
     ///
     /// # Errors
     ///
     /// `Problem` if a target, or the pattern's start, is after the horizon.
-    pub(crate) fn end_of(&self, p: usize, pattern: &SpikeTrains, targets: &[f64]) -> Result<(f64, f64)> {
-        let end = end_of(&self.neuron, self.horizon, p, pattern, targets)?;
-        Ok((end, self.neuron.points(pattern.start, end)))
+    pub(crate) fn end_of(&self, p: usize, pattern: &SpikeTrains, targets: &[f64]) -> Result<f64> {
+        end_of(&self.neuron, self.horizon, p, pattern, targets)
     }
 
     /// These parameters with all potentials in units of `unit` mV.
@@ -187,13 +186,9 @@ impl ConeRProblem {
         for (p, windows) in silence.iter().enumerate() {
             check_silence(p, windows.as_deref())?;
         }
-        let (mut ends, mut points) = (Vec::with_capacity(patterns.len()), 0.0);
-        for (p, (pattern, targets)) in patterns.iter().zip(targets).enumerate() {
-            let (end, more) = parameters.end_of(p, pattern, targets)?;
-            ends.push(end);
-            points += more;
-        }
-        neuron.check_rows(points)?;
+        let examples = patterns.iter().zip(targets).enumerate();
+        let ends = examples.map(|(p, (pattern, targets))| parameters.end_of(p, pattern, targets));
+        let ends = ends.collect::<Result<Vec<f64>>>()?;
         let mut problem = Self::without_patterns(parameters, patterns[0].len());
         for (((pattern, targets), silence), end) in patterns.iter().zip(targets).zip(silence).zip(ends) {
             problem.push(pattern, PatternDemand { targets, silence: silence.as_deref(), end }, stop)?;

@@ -185,10 +185,6 @@ impl ConeXProblem {
         let ends = examples().map(|(p, (pattern, targets))| end_of(neuron, horizon(p), p, pattern, targets));
         let ends = ends.collect::<Result<Vec<f64>>>()?;
         stop.check()?;
-        if neuron.time == Time::Grid {
-            let points = patterns.iter().zip(&ends).map(|(pattern, end)| neuron.points(pattern.start, *end)).sum();
-            neuron.check_rows(points)?;
-        }
         let mut statement = Statement::new(neuron, parameters.margin(), unit, trains);
         for (p, (pattern, targets)) in examples() {
             statement.push(pattern, targets, None, ends[p], stop)?;

@@ -73,13 +73,12 @@ impl OnlineConeR {
         let parameters = &self.parameters;
         check_example(&parameters.neuron, self.added, pattern, targets)?;
         check_silence(self.added, silence)?;
-        let (end, points) = parameters.end_of(self.added, pattern, targets)?;
+        let end = parameters.end_of(self.added, pattern, targets)?;
         if self.added == 0 {
             self.problem = ConeRProblem::without_patterns(parameters, pattern.len());
         }
         let problem = &mut self.problem;
         let silent = problem.silent_and_free_rows();
-        parameters.neuron.check_rows(silent as f64 + points)?;
         problem.check_trains(self.added, pattern)?;
         problem.push(pattern, PatternDemand { targets, silence, end }, stop)?;
         let rows = problem.silent_and_free_rows() - silent;

@@ -4,6 +4,9 @@
 //! numbers per pattern), and one backward sweep computes a weighted sum of all rows. CONE-X searches for points at
 //! which silence is violated, CONE-R sums the violations.
 
+use std::iter;
+use std::ops::Range;
+
 use super::peak::{SilencePeak, exceeds};
 use super::rows::{Example, Statement, is_lost};
 use crate::neuron::{AfterSpike, Grid, GridTime, KernelSum, Shape, Step};
@@ -28,19 +31,34 @@ struct Jump {
     inputs: u32,
 }
 
-/// The grid points of one pattern.
+/// Consecutive grid points of one pattern, from an input on until all have decayed.
 #[derive(Debug, Clone)]
 struct Lane {
+    pattern: usize,
+    /// Their points count from the lane's first.
     inputs: Vec<GridInput>,
     /// The jumps, ascending by point.
     jumps: Vec<Jump>,
-    /// The number of the pattern's first row among all rows.
+    /// The number of the lane's first row among all rows.
     first: usize,
     points: usize,
+    /// The number of the lane's first point on the pattern's grid.
+    begin: usize,
     grid: Grid,
 }
 
-/// All silent rows: one for each grid point that is neither a target nor in the refractory time after one.
+impl Lane {
+    /// The time of a point of the lane, ms.
+    fn time(&self, point: usize) -> f64 {
+        self.grid.time((self.begin + point) as f64)
+    }
+}
+
+/// The time constants after which an input is far below the rounding of any potential.
+const DECAYED: f64 = 64.0;
+
+/// All silent rows: one for each grid point that is neither a target nor in the refractory time after one, and at which
+/// some input has not decayed.
 #[derive(Debug, Clone)]
 pub(crate) struct SilentRows {
     lanes: Vec<Lane>,
@@ -103,22 +121,6 @@ impl SilentRows {
         let Example { start, end, targets, .. } = example;
         let grid = Grid::new(*start, self.step_ms);
         let points = neuron.points(*start, *end) as usize;
-        let (mut next, mut limit) = (0, Vec::with_capacity(points));
-        for k in 0..points {
-            if k % 4096 == 0 {
-                stop.check()?;
-            }
-            let t = grid.time(k as f64);
-            while targets.get(next).is_some_and(|&target| target < t) {
-                next += 1;
-            }
-            let fired = next.checked_sub(1).map(|k| targets[k]);
-            limit.push(if example.in_window(t) && statement.is_silent_between(fired, t, targets.get(next).copied()) {
-                neuron.theta_0 + statement.rise(example, fired, t) - statement.margin.height
-            } else {
-                f64::INFINITY
-            });
-        }
         let mut inputs = Vec::with_capacity(example.inputs.len());
         for (k, &Spike { t, train, value }) in example.inputs.iter().enumerate() {
             if k % 4096 == 0 {
@@ -131,39 +133,81 @@ impl SilentRows {
                 let age = grid.between(time, GridTime::at(acts_at)).max(0.0);
                 let mut unit = KernelSum::default();
                 self.shape.add(&mut unit, 1.0, f64::from(value), age);
-                inputs.push(GridInput { point: acts_at as u32, train, a: unit.a, b: unit.b });
+                inputs.push((acts_at as usize, GridInput { point: 0, train, a: unit.a, b: unit.b }));
             }
         }
-        inputs.sort_by_key(|i| i.point);
-        let resets = match neuron.after_spike {
+        inputs.sort_by_key(|&(point, _)| point);
+        // Where the threshold is not above 0, each point is a row.
+        let spans = if neuron.theta_0 <= statement.margin.height {
+            iter::once(0..points).collect()
+        } else {
+            undecayed(&inputs, (DECAYED * neuron.tau / self.step_ms).ceil() as usize, points)
+        };
+        neuron.check_rows((self.limit.len() + spans.iter().map(Range::len).sum::<usize>()) as f64)?;
+        let resets: Vec<usize> = match neuron.after_spike {
             AfterSpike::Reset => {
                 let behind = targets.iter().map(|&t| grid.locate(t).behind());
-                behind.filter(|&point| point < points as f64).map(|point| point as u32).collect()
+                behind.filter(|&point| point < points as f64).map(|point| point as usize).collect()
             }
             AfterSpike::Keep | AfterSpike::Ignore => vec![],
         };
-        let jumps = jumps(&inputs, &resets);
-        self.lanes.push(Lane { inputs, jumps, first: self.limit.len(), points, grid });
+        let (mut lanes, mut limit, mut next) = (vec![], vec![], 0);
+        for Range { start: begin, end } in spans {
+            let first = self.limit.len() + limit.len();
+            for k in begin..end {
+                if k % 4096 == 0 {
+                    stop.check()?;
+                }
+                let t = grid.time(k as f64);
+                while targets.get(next).is_some_and(|&target| target < t) {
+                    next += 1;
+                }
+                let fired = next.checked_sub(1).map(|k| targets[k]);
+                limit.push(
+                    if example.in_window(t) && statement.is_silent_between(fired, t, targets.get(next).copied()) {
+                        neuron.theta_0 + statement.rise(example, fired, t) - statement.margin.height
+                    } else {
+                        f64::INFINITY
+                    },
+                );
+            }
+            let of_lane = {
+                let before = |end: usize| inputs.partition_point(|&(point, _)| point < end);
+                &inputs[before(begin)..before(end)]
+            };
+            let number = |point: usize| (point - begin) as u32;
+            let inputs: Vec<_> =
+                of_lane.iter().map(|&(point, input)| GridInput { point: number(point), ..input }).collect();
+            let resets = resets.iter().filter(|&point| (begin..end).contains(point));
+            let resets: Vec<u32> = resets.map(|&point| number(point)).collect();
+            let jumps = jumps(&inputs, &resets);
+            lanes.push(Lane { pattern, inputs, jumps, first, points: end - begin, begin, grid });
+        }
+        self.lanes.append(&mut lanes);
         self.limit.append(&mut limit);
         Ok(())
     }
 
     /// The pattern of a row, and its time, ms.
     pub(crate) fn name(&self, row: usize) -> (usize, f64) {
-        let pattern = self.lanes.partition_point(|lane| lane.first <= row) - 1;
-        (pattern, self.lanes[pattern].grid.time((row - self.lanes[pattern].first) as f64))
+        let lane = &self.lanes[self.lanes.partition_point(|lane| lane.first <= row) - 1];
+        (lane.pattern, lane.time(row - lane.first))
     }
 
     /// The number of rows of the first pattern, including points without a requirement.
     pub(crate) fn rows_of_first(&self) -> usize {
-        self.lanes.first().map_or(0, |lane| lane.points)
+        self.lanes.iter().take_while(|lane| lane.pattern == 0).map(|lane| lane.points).sum()
     }
 
     /// Removes the rows of the first pattern; the others are renumbered from 0.
     pub(crate) fn drop_first(&mut self) {
-        let gone = self.lanes.remove(0).points;
+        let gone = self.rows_of_first();
         self.limit.drain(..gone);
-        self.lanes.iter_mut().for_each(|lane| lane.first -= gone);
+        self.lanes.retain(|lane| lane.pattern > 0);
+        for lane in &mut self.lanes {
+            lane.first -= gone;
+            lane.pattern -= 1;
+        }
     }
 
     /// These rows for inputs whose values have no sign.
@@ -224,7 +268,7 @@ impl SilentRows {
     /// Finds the worst point of each interval in which the potential exceeds its limit by more than `tolerance`.
     pub(crate) fn broken(&self, weights: &[f64], tolerance: f64) -> Vec<SilencePeak> {
         let (mut found, mut potential) = (vec![], vec![]);
-        for (pattern, lane) in self.lanes.iter().enumerate() {
+        for lane in &self.lanes {
             potential.clear();
             potential.resize(lane.points, 0.0);
             self.potential_of(lane, weights, &mut potential);
@@ -235,7 +279,7 @@ impl SilentRows {
                 if excess <= tolerance {
                     found.extend(worst.take());
                 } else if worst.is_none_or(|w| exceeds(excess, w.excess)) {
-                    worst = Some(SilencePeak { pattern, t: lane.grid.time(k as f64), excess });
+                    worst = Some(SilencePeak { pattern: lane.pattern, t: lane.time(k), excess });
                 }
             }
             found.extend(worst);
@@ -328,6 +372,19 @@ impl SilentRows {
         }
         out
     }
+}
+
+/// The points, of `points`, that are less than `reach` points after some input; the inputs ascend.
+fn undecayed(inputs: &[(usize, GridInput)], reach: usize, points: usize) -> Vec<Range<usize>> {
+    let mut spans: Vec<Range<usize>> = vec![];
+    for &(point, _) in inputs {
+        let end = points.min(point.saturating_add(reach));
+        match spans.last_mut() {
+            Some(last) if point <= last.end => last.end = end,
+            _ => spans.push(point..end),
+        }
+    }
+    spans
 }
 
 /// The points at which the state jumps, from inputs and resets, both ascending.
