@@ -1,7 +1,7 @@
-"""Parts of the documentation that are made from the program: figures, options of commands, keys, requests, names.
+"""Parts of the documentation that are made from the program: figures, options, keys, requests, causes, names.
 
 A page asks for them by directives: ``.. studies::``, ``.. commands::``, ``.. keys::``, ``.. requests::``,
-``.. registers:: TABLE`` and ``.. names:: MODULE``.
+``.. causes::``, ``.. registers:: TABLE`` and ``.. names:: MODULE``.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from docutils.statemachine import StringList
 from sphinx.application import Sphinx
 from sphinx.pycode import ModuleAnalyzer
 
-from taxel._core import registers_fields, registers_preset
+from taxel._core import causes, registers_fields, registers_preset
 from taxel.cli._commands import OWN, plugins
 from taxel.cli._commands import command as imported
 from taxel.cli.app import about, own_commands, rows
@@ -182,6 +182,16 @@ class Requests(FromProgram):
         return table(["request", "keys", ""], rows, "12 38 50")
 
 
+class Causes(FromProgram):
+    """Every cause in a verdict: its words, its key by kind, and what it means."""
+
+    def lines(self) -> list[str]:
+        """Return a table, a row a cause."""
+        recorded = [(key, kind, words[1], meaning) for key, kind, words, meaning in causes() if kind != "live"]
+        rows = [[words, kind, f"``{key}``", meaning.replace("`", "")] for key, kind, words, meaning in recorded]
+        return table(["words", "kind", "key", "meaning"], rows, "30 10 25 35")
+
+
 class Registers(FromProgram):
     """The board's registers: ``fields``, ``rules`` or ``presets``."""
 
@@ -307,6 +317,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.add_directive("commands", Commands)
     app.add_directive("keys", Keys)
     app.add_directive("requests", Requests)
+    app.add_directive("causes", Causes)
     app.add_directive("registers", Registers)
     app.add_directive("names", Names)
     return {"parallel_read_safe": True}

@@ -15,6 +15,18 @@ Status = Literal["complete", "complete after arrival", "unknown", "damaged", "un
 STATUSES: tuple[Status, ...] = get_args(Status)
 
 
+def in_words(counts: Mapping[str, int]) -> str:
+    """Return numbers by cause in the words of a verdict.
+
+    Examples
+    --------
+    >>> in_words({"bytes_skipped": 1, "dropped_by_queue": 1200, "short_events": 0})
+    "1,200 datagrams dropped by taxel's queue, 1 byte skipped"
+    """
+    causes = [(counts.get(key, 0), words) for key, _, words, _ in _core.causes()]
+    return ", ".join(f"{n:,} {words[n != 1]}" for n, words in causes if n)
+
+
 class Verdict(str):
     """State what a recording lost: a line of text with a status, and numbers by cause.
 
@@ -46,58 +58,7 @@ class Verdict(str):
 
     Notes
     -----
-    The causes; the text of the verdict uses the same words, or those in quotes.
-
-    Causes in `lost`:
-
-    - ``dropped_by_board`` ("times that the board dropped events"), ``events_dropped_by_board``: the same losses, by
-      flags and by the board's totals.
-    - ``dropped_by_kernel``: messages; with ``UDP_GRO`` several datagrams each.
-    - ``dropped_by_queue`` ("dropped by taxel's queue"), ``not_recorded`` ("received but not recorded").
-    - ``bytes_in_no_line``: after 65 536 bytes of a line; before the first line, bytes that are not text.
-    - ``lost_on_the_way``: lost or damaged: what the board's numbers lack beyond those dropped; with ``UDP_GRO``, or
-      where the kernel does not count, it may have dropped them.
-    - ``lost_in_file``: datagrams, lines or frames; ``notes_lost_in_file`` (also zeroed taxels),
-      ``detections_lost_in_file``, ``registers_lost_in_file``, ``changes_lost_in_file`` (also resets),
-      ``markers_lost_in_file``, ``held_values_lost_in_file`` (those at the beginning).
-
-    Causes in `damaged`:
-
-    - ``datagrams_damaged``: unusable; they also count as lost on the way.
-    - Version 1, unusable: ``bytes_skipped``, ``short_events``, ``contradictory_kinds``, ``outside_the_array``,
-      ``unpaired_intensities``, ``empty_datagrams``, ``bytes_of_version_1_refused`` (of a board of version 2).
-    - Version 2, unusable: ``taxels_outside_the_array``, ``datagrams_of_an_unknown_kind``, ``malformed_bodies``,
-      ``markers_with_an_unknown_code``, ``differences_from_an_unknown_value``; ``datagrams_with_unknown_flags`` (read).
-    - ``lines_that_could_not_be_read``: of streams of numbers.
-    - ``unknown_causes``: counted by a later version of taxel.
-    - ``datagrams_of_another_board``: version 2: another board's number, or other contents under the same session and
-      number.
-    - ``datagrams_too_late``: by more than 65 536 numbers.
-    - ``datagrams_decoded_again``: version 1: their events are there twice. Without values, only those with several
-      times count.
-    - ``changes_between_senders``: two boards use one port; the real number is larger.
-    - ``events_out_of_order``: version 1: by up to 0.1 s; version 2: by more.
-    - ``jumps_of_time``, ``jumps_of_time_before_it``: version 1: ahead by 1 s or more, after a damaged stamp (6.5536 s
-      late) or a reset; the second: before this trial. Streams of numbers: ahead of arrival by more than a second and a
-      hundredth of the pause.
-    - ``stamps_out_of_order``, ``drifts_from_arrival``: streams: stamps step back, by less than a second; the clock was
-      off by more than a second and a hundredth of the time.
-    - ``bad_chunks``, ``large_chunks``, ``skipped_bytes``, ``torn_bytes``, ``repeated_in_file``: damage in the
-      file; messages there twice are read twice.
-    - ``bytes_after_end`` ("bytes after the end of the recording not read"): something was appended, as by
-      ``cat``: use `taxel.merge`.
-
-    Causes in `noted`:
-
-    - ``datagrams_repeated``: version 2: each counts once.
-    - ``events_repaired`` ("values repaired from the board's refresh"): they differed from the board's.
-    - ``events_overtaken``: version 2: by 0.1 s or less, in the network; times are right.
-    - ``resets`` (of the board), ``changes_of_address``: new address or port, the same or another board.
-    - ``bytes_of_unfinished_lines``: the beginning or the end did not arrive.
-    - ``clock_began_anew`` ("restarts of its clock"), ``missing_values``: streams: back by more than a second, then
-      times by arrival; ``nan``.
-    - ``silences`` ("no frame arrived for a second or more"), ``silent_ms``: of sources of frames.
-    - ``gaps``, ``gaps_us``: number and sum.
+    The page *What the output means* lists all causes with their words, of which the text of a verdict is made.
 
     Examples
     --------

@@ -54,12 +54,11 @@ pub use counters::{
 use frame_input::FrameInput;
 pub use frame_input::{LineCounts, ReadLines};
 pub use handle::Handle;
-use handle::verdict;
 pub use options::{LiveOptions, Record, StatedTare};
 use output::DetectionOutput;
 use readout_queue::ReadoutQueue;
 use running_readout::RunningReadout;
-use running_recording::{RunningRecording, losses};
+use running_recording::RunningRecording;
 use sending::Sending;
 pub use sending::Sent;
 use shared::{PipelineShared, PublishedState, RecordingSlot};
@@ -302,7 +301,7 @@ impl Live {
         let counters = self.counters();
         let recording = lock(&self.shared.recording.running).take();
         let path = recording.map_or(Ok(None), |recording| recording.finish(&counters))?;
-        let verdict = verdict(&self.shared, &counters, &losses(&counters, None));
+        let verdict = self.verdict(&counters);
         self.check()?;
         ended?;
         Ok(LiveSummary { counters, verdict, path, tare: self.tare() })

@@ -29,7 +29,7 @@ pub use frames::{FrameEncoding, FrameProperties, Frames};
 pub use mcap_reader::{Datagrams, DecodedRecording, Message, Reader, Remarks};
 pub use mcap_writer::{SourceWriter, Writer};
 pub use output::OutputFile;
-pub use stream::{LeftOut, Samples, StreamColumns, StreamFaults};
+pub use stream::{Samples, StreamColumns, StreamFaults};
 pub use topic::Topic;
 pub use verdict::{
     Basis, Condition, FileEnding, Found, NOTHING_LOST, Rebuilt, RecordingCounts, RecordingStatus, Verdict,

@@ -16,7 +16,7 @@ use taxel_live::capture::{FIREWALL, Origin};
 use taxel_live::clock::Offset;
 use taxel_live::locked::lock;
 use taxel_live::pipeline::{Counters, Handle, LiveOptions, OutputDetection, Piece, ViewerEvents};
-use taxel_live::recording::now_ns;
+use taxel_live::recording::{Cause, CauseKind, now_ns};
 use taxel_live::{Error, Result};
 
 use crate::block::Block;
@@ -232,7 +232,6 @@ impl LiveSource {
             let (at, before) = before.as_ref()?;
             Some(count(&now).saturating_sub(count(before)) as f64 / at.elapsed().as_secs_f64())
         };
-        let v2 = now.decoding.wire_v2;
         let frames_per_s = match now.lines {
             Some(_) => rate(|counters| counters.decoding.frames),
             None => frame_us.map(|frame_us| 1e6 / frame_us),
@@ -247,15 +246,7 @@ impl LiveSource {
             "frames_per_s": frames_per_s,
             "arrival": now.arrival(now_ns()),
             "pace": now.board.pace,
-            "lost": {
-                "kernel": now.capture.dropped_by_kernel.0,
-                "queue": now.capture.dropped_by_queue,
-                "wire": v2.missing,
-                "damaged": now.decoding.wire.skipped + v2.checksum + v2.short + v2.foreign,
-                "outside": now.decoding.wire.outside + v2.outside,
-                "readout": now.readout.events_dropped,
-                "panel": self.missing.load(Ordering::Relaxed),
-            },
+            "lost": self.losses(&now),
             "queue": now.capture.waiting,
             "latency": { "decode": now.decode_latency, "report": now.report_latency },
             "wire_version": now.decoding.wire_version,
@@ -263,6 +254,21 @@ impl LiveSource {
             "detections": now.readout.detections,
             "reach_us": self.index.range(),
             "ended": self.handle.is_over(),
+        })
+    }
+
+    /// What was lost, by cause; those that are only noted are no losses.
+    fn losses(&self, now: &Counters) -> Value {
+        let verdict = self.handle.verdict(now);
+        let mut counts = verdict.counts;
+        counts[Cause::ReadoutDropped] = now.readout.events_dropped;
+        counts[Cause::ViewDropped] = self.missing.load(Ordering::Relaxed);
+        let lost = |cause: Cause| cause.kind() == CauseKind::Lost || cause == Cause::ReadoutDropped;
+        let shown = counts.iter().filter(|(cause, _)| cause.kind() != CauseKind::Noted);
+        json!({
+            "number": counts.iter().filter(|(cause, _)| lost(*cause)).map(|(_, n)| n).sum::<u64>(),
+            "by_kernel_known": now.capture.dropped_by_kernel.are_known(),
+            "causes": shown.map(|(cause, n)| format!("{n} {}", cause.words(n))).collect::<Vec<_>>(),
         })
     }
 

@@ -16,7 +16,7 @@ use taxel_live::capture::Sender;
 use taxel_live::pipeline::{
     Handle, LineSink, Live as Pipeline, LiveOptions, LiveSummary, OutputDetection, ReadLines, Record, Sink,
 };
-use taxel_live::recording::LeftOut;
+use taxel_live::recording::{Cause, Counts};
 
 use crate::thread_state;
 use crate::threaded::Threaded;
@@ -161,6 +161,7 @@ impl Live {
             let counters = pipeline.counters();
             let mut all = json!(counters);
             all["arrival"] = json!(counters.arrival(taxel_live::recording::now_ns()));
+            all["verdict"] = json!(pipeline.verdict(&counters));
             Ok(Plain(all))
         })
     }
@@ -207,8 +208,8 @@ impl Live {
     }
 
     /// Passes lines of a source of numbers on: the arrival of each frame or line (ns since 1970), the stamps of frames if they
-    /// have any, all values one after the other, the number of lines, of those that could not be read, the lines that were not
-    /// read with their arrival, the bytes in no line and of unfinished lines, why reading fails now, and the time before which
+    /// have any, all values one after the other, the number of lines; of those that could not be read, of bytes in no line and
+    /// of unfinished lines; the lines that were not read with their arrival, why reading fails now, and the time before which
     /// all that arrived was read.
     #[allow(clippy::too_many_arguments)]
     fn lines(
@@ -219,9 +220,8 @@ impl Live {
         stamps: PyReadonlyArray1<'_, f64>,
         values: PyReadonlyArray1<'_, f64>,
         lines: u64,
-        strange: u64,
+        unread_counts: (u64, u64, u64),
         unread: Vec<(i64, String)>,
-        left_out: (u64, u64),
         trouble: Option<String>,
         until_ns: i64,
     ) -> PyResult<()> {
@@ -230,9 +230,12 @@ impl Live {
             stamps: slice("stamps", &stamps)?.to_vec(),
             values: slice("values", &values)?.to_vec(),
             lines,
-            strange,
+            counts: Counts::from([
+                (Cause::Strange, unread_counts.0),
+                (Cause::InNoLine, unread_counts.1),
+                (Cause::UnfinishedLines, unread_counts.2),
+            ]),
             unread,
-            left_out: LeftOut { in_no_line: left_out.0, unfinished: left_out.1 },
             trouble,
             until_ns,
         };

@@ -12,8 +12,8 @@ use taxel_core::encode::Zeroing;
 use taxel_core::{Marker, wire};
 use taxel_live::clock::{self, BoardClock, Offset};
 use taxel_live::recording::{
-    self, Basis, BoardChange, Condition, Counts, FrameEncoding, Header, Reader, RecordingCounts, SourceWriter, Verdict,
-    Writer, WriterOptions,
+    self, Basis, BoardChange, Cause, CauseKind, Condition, Counts, FrameEncoding, Header, Reader, RecordingCounts,
+    SourceWriter, Verdict, Writer, WriterOptions,
 };
 
 use crate::threaded::Threaded;
@@ -375,6 +375,19 @@ pub fn recording_verdict(basis: &str) -> PyResult<Plain<Value>> {
 #[pyfunction]
 pub fn verdict_text(verdict: &str) -> PyResult<String> {
     Ok(parsed::<Verdict>("verdict", verdict)?.text())
+}
+
+/// All causes by which something is lost, damaged or noted: key, kind, words (of one, of several), meaning.
+#[pyfunction]
+pub fn causes() -> Vec<(&'static str, &'static str, (String, String), &'static str)> {
+    let kind = |cause: Cause| match cause.kind() {
+        CauseKind::Lost => "lost",
+        CauseKind::Damaged | CauseKind::File => "damaged",
+        CauseKind::Noted => "noted",
+        CauseKind::Live => "live",
+    };
+    let words = |cause: Cause| (cause.words(1), cause.words(2));
+    Cause::ALL.iter().map(|&cause| (cause.key(), kind(cause), words(cause), cause.meaning())).collect()
 }
 
 /// The damage among a decoder's counts, which are JSON.

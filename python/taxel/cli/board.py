@@ -21,6 +21,7 @@ from taxel.detect import load
 from taxel.live import Summary
 from taxel.live._stated_options import StatedOptions
 from taxel.tare import Tare
+from taxel.verdict import in_words
 from taxel.wire import Registers
 from taxel.wire.registers import QUOTED_PRESETS
 
@@ -175,17 +176,11 @@ def doubts(counters: dict[str, Any]) -> Iterator[str]:
             yield f"{name}: {counts['pace']['doubt']}" if name else counts["pace"]["doubt"]
 
 
-def _in_no_line(summary: Summary) -> bool:
-    """Return whether bytes of a source of lines are in no line."""
-    sources = (summary.counters, *summary.counters["sources"].values())
-    lines = (counts["lines"] if "capture" in counts else counts for counts in sources)
-    return any(counts is not None and counts["bytes_in_no_line"] for counts in lines)
-
-
 def exit_code(summary: Summary, array: Array) -> int:
     """Return the exit code for what was received and lost."""
     unsent = any(counts["lost"] for counts in summary.counters["sent"])
-    if summary.nothing_came or summary.lost or summary.counters["events_dropped"] or unsent or _in_no_line(summary):
+    is_lost = summary.lost or summary.verdict.lost.get("bytes_in_no_line") or summary.counters["events_dropped"]
+    if summary.nothing_came or is_lost or unsent:
         return OUTSIDE
     return WRONG_INPUT if outside(summary.counters, array) else 0
 
@@ -200,12 +195,9 @@ def received(counters: dict[str, Any]) -> str:
 
 def left_out(lines: dict[str, Any]) -> str:
     """Return what is wrong with lines of numbers, in words that follow their number."""
-    parts = (
-        (lines["strange"], "line", "that could not be read"),
-        (lines["bytes_in_no_line"], "byte", "in no line"),
-    )
-    counts = "".join(f", {counted(n, unit)} {where}" for n, unit, where in parts if n)
-    return counts + (f"; {lines['trouble']}" if lines["trouble"] else "")
+    unread = {"lines_that_could_not_be_read": lines["strange"], "bytes_in_no_line": lines["bytes_in_no_line"]}
+    counts = in_words(unread)
+    return f", {counts}" * bool(counts) + (f"; {lines['trouble']}" if lines["trouble"] else "")
 
 
 #: Kinds of lines that are no part of a frame, by their keys in the counters.
@@ -244,28 +236,19 @@ def _unread(counters: dict[str, Any], told: set[tuple[str, str]]) -> Iterator[st
 def counters_line(before: dict[str, Any], now: dict[str, Any]) -> str:
     """Return totals, rates since `before` and losses of a board, or of a source of lines, as one line."""
     passed = max(now["seconds"] - before["seconds"], 1e-9)
-    capture, lines, pace = now["capture"], now["lines"], now["pace"]
+    lines, pace, verdict = now["lines"], now["pace"], now["verdict"]
 
     def flow(count: int, earlier: int, noun: str) -> str:
         return f"{count:,} {noun} ({(count - earlier) / passed:,.0f}/s)"
 
-    by_kernel = capture.get("dropped_by_kernel")
-    lost = {"by taxel's queue": capture["dropped_by_queue"]}
     if lines is not None:
         parts = [flow(lines["lines"], before["lines"]["lines"], "lines")]
         parts.append(flow(now["frames"], before["frames"], "frames"))
-        damaged = lines["strange"] + lines["bytes_in_no_line"]
     else:
-        parts = [
-            flow(capture["datagrams"], before["capture"]["datagrams"], "datagrams"),
-            flow(now["events"], before["events"], "events"),
-        ]
-        first, second = now["wire"], now["wire_v2"]
-        lost |= {"by the kernel": by_kernel or 0, "on the way": second["missing"] * (now["wire_version"] == 2)}
-        damaged = sum(first[name] for name in ("skipped", "contradictory", "outside", "unpaired"))
-        damaged += sum(second[name] for name in ("checksum", "short", "foreign", "malformed", "outside"))
-    parts += [f"lost {count:,} {where}" for where, count in lost.items() if count] or ["nothing lost"]
-    parts += [f"{damaged:,} damaged"] * bool(damaged)
+        parts = [flow(now["capture"]["datagrams"], before["capture"]["datagrams"], "datagrams")]
+        parts.append(flow(now["events"], before["events"], "events"))
+    parts.append(f"LOST: {in_words(verdict['lost'])}" if verdict["lost"] else "nothing lost")
+    parts += [f"damaged: {in_words(verdict['damaged'])}"] * bool(verdict["damaged"])
     if now["board_us"] is not None:
         drift = "" if pace is None else f" ({pace['drift_ppm']:+.1f} ppm{', wrong' * bool(pace['doubt'])})"
         parts.append(f"clock {now['board_us'] / 1e6:.2f} s{drift}")

@@ -397,10 +397,5 @@ def _losses(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
             yield name.replace("_", " "), str(counts[name])
         elif name == "dropped_by_kernel" and name in counts:
             yield name.replace("_", " "), "unknown: the system does not count them"
-    no_loss = {"bytes", "words", "changes", "intensities", "markers", "datagrams", "intact", "events", "states"}
-    no_loss |= {"messages", "frames", "samples"}
-    others = {name: n for name, n in counts.items() if isinstance(n, int) and name not in {*always, *facts["rebuilt"]}}
-    for found in (others, counts.get("decoder", {}), counts.get("decoder_version_2", {}), facts["rebuilt"]):
-        for name, n in found.items():
-            if n and name not in no_loss:
-                yield name.replace("_", " "), str(n)
+    if counts.get("frames_that_could_not_be_read"):
+        yield "frames that could not be read", str(counts["frames_that_could_not_be_read"])

@@ -45,6 +45,7 @@ from taxel.panel import Panel
 from taxel.panel.board import Board
 from taxel.spikes import to_ms
 from taxel.tare import Tare
+from taxel.verdict import in_words
 from taxel.wire import Registers
 
 app = App(name="live")
@@ -240,7 +241,7 @@ def _summary_lines(summary: Summary) -> Iterator[str]:
     if counters["late"]:
         yield f"{counted(counters['late'], 'event')} arrived out of order: read out on arrival, and recorded"
     if counters["events_dropped"]:
-        yield f"{counted(counters['events_dropped'], 'event')} dropped because the readout was too slow"
+        yield in_words({"dropped_before_readout": counters["events_dropped"]})
     yield from doubts(counters)
     if summary.path is not None:
         yield f"recorded to {summary.path}"
@@ -396,5 +397,4 @@ def _state(now: dict[str, Any], place: str) -> str:
     sent = "".join(
         f"\n{counted(counts['lost'], 'line')} not sent to {counts['to']}" for counts in now["sent"] if counts["lost"]
     )
-    dropped = f"\n{counted(now['events_dropped'], 'event')} dropped before the readout" if now["events_dropped"] else ""
-    return (dropped + sent).lstrip()
+    return (in_words({"dropped_before_readout": now["events_dropped"]}) + sent).lstrip()

@@ -404,7 +404,7 @@ class Lines:
         if not self.are_frames:
             # A stream states each line that could not be read.
             passed.strange = 0
-        left_out = (self._left_out[0], self._left_out[1] + passed.unfinished)
+        in_no_line, unfinished = self._left_out
         self._left_out = [0, 0]
         trouble, self._trouble = self._trouble or self._unclear, None
         arrived_ns, stamps, values = passed.arrays(self.stated.turned if self.are_frames else None)
@@ -414,9 +414,8 @@ class Lines:
             stamps,
             values,
             passed.lines,
-            passed.strange,
+            (passed.strange, in_no_line, unfinished + passed.unfinished),
             passed.unread,
-            left_out,
             trouble,
             time.time_ns(),
         )

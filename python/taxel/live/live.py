@@ -250,6 +250,7 @@ class Live:
         `arrived_ns` (when the latest datagram arrived, ns since 1970, or None),
         `heartbeat_us` (the longest interval between heartbeats of a board of version 2, or None), `arrival` (state:
         "nothing", "arriving", "quiet" or "lost"; since_ns, silent_s, heartbeat_us; not of one that has ended),
+        `verdict` (status, lost, damaged, ...: that of a recording of all so far; not of one that has ended),
         `events`, `read_out`, `events_dropped`,
         `late` (events out of order), `detections`, `wrong` (those output in a
         silence that an event then interrupted, later than the guard), `detections_dropped`, `sources` (the counts of

@@ -46,10 +46,7 @@ class Summary:
     @property
     def lost(self) -> int:
         """Number of losses after arrival: messages in the kernel if it counts them, datagrams in the queue."""
-        boards = [self.counters, *(source for source in self.counters["sources"].values() if "capture" in source)]
-        return sum(
-            (board["capture"]["dropped_by_kernel"] or 0) + board["capture"]["dropped_by_queue"] for board in boards
-        )
+        return sum(self.verdict.lost.get(cause, 0) for cause in ("dropped_by_kernel", "dropped_by_queue"))
 
     @property
     def nothing_came(self) -> bool:

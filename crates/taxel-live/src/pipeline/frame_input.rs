@@ -13,7 +13,7 @@ use super::source::FrameLayout;
 use crate::Result;
 use crate::capture::{MessageFeed, Origin, Receiver, ReceiverOptions};
 use crate::locked::lock;
-use crate::recording::{Cause, Found, LeftOut, now_ns};
+use crate::recording::{Cause, Counts, Found, now_ns};
 
 /// Interval at which a caller checks whether there is room for its frames.
 const ROOM_EVERY: Duration = Duration::from_millis(1);
@@ -29,12 +29,10 @@ pub struct ReadLines {
     pub values: Vec<f64>,
     /// Number of lines, with those that could not be read.
     pub lines: u64,
-    /// Number of lines that could not be read.
-    pub strange: u64,
-    /// Lines that were not read, as they came, with their arrival; text before the first numbers counts as none of `strange`.
+    /// What could not be read: lines, bytes in no line, bytes of unfinished lines.
+    pub counts: Counts,
+    /// Lines that were not read, as they came, with their arrival; text before the first numbers is not counted.
     pub unread: Vec<(i64, String)>,
-    /// The bytes that are in no line.
-    pub left_out: LeftOut,
     /// The system's error, if reading fails now.
     pub trouble: Option<String>,
     /// All that arrived before this time, ns since 1970, was read.
@@ -138,8 +136,7 @@ impl FrameInput {
 impl InputState {
     fn push(&mut self, read: &ReadLines, taxels: usize) {
         self.lines += read.lines;
-        self.times.faults.strange_lines(read.strange);
-        self.times.faults.count_left_out(read.left_out);
+        self.times.faults.add(&read.counts);
         if read.trouble.is_some() || !read.arrived_ns.is_empty() {
             // A line that failed is there again where frames arrive.
             self.trouble.clone_from(&read.trouble);
@@ -147,7 +144,7 @@ impl InputState {
         let mut frame = vec![];
         for (k, (values, &arrived_ns)) in read.values.chunks_exact(taxels).zip(&read.arrived_ns).enumerate() {
             let Some(t) = self.times.time(read.stamps.get(k).copied(), arrived_ns) else {
-                self.times.faults.strange();
+                self.times.faults.found.counts[Cause::Strange] += 1;
                 continue;
             };
             self.times.faults.missing(values.iter().copied());

@@ -76,7 +76,7 @@ impl FrameTimes {
     /// What is wrong with the lines until `now_ns` since 1970, as a verdict states it.
     pub(super) fn found(&self, now_ns: i64) -> Found {
         let Silences { count, ns } = self.silences_until(now_ns);
-        let mut found = self.faults.found();
+        let mut found = self.faults.found.clone();
         found.counts.extend([(Cause::Silences, count), (Cause::SilentMs, ns / 1_000_000)]);
         found
     }

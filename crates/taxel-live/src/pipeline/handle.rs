@@ -73,6 +73,12 @@ impl Handle {
         Counters { sources: pipelines.chain(numbers).collect(), ..self.shared.counters() }
     }
 
+    /// What these counts say was lost of each source, or that nothing arrived.
+    #[must_use]
+    pub fn verdict(&self, counters: &Counters) -> Verdict {
+        verdict(&self.shared, counters, &losses(counters, None))
+    }
+
     /// The address on which another board of the recording is received; `None` if there is no such source.
     #[must_use]
     pub fn source_address(&self, name: &str) -> Option<SocketAddr> {
@@ -359,7 +365,7 @@ fn replace_of(shared: &PipelineShared, next: Option<RunningRecording>) -> Result
 }
 
 /// What was lost of each source, or that nothing arrived.
-pub(super) fn verdict(shared: &PipelineShared, counters: &Counters, lost: &RecordingCounts) -> Verdict {
+fn verdict(shared: &PipelineShared, counters: &Counters, lost: &RecordingCounts) -> Verdict {
     let of_source = |counters: &Counters, lost: &RecordingCounts| match &counters.lines {
         None => lost.verdict().doubtful(counters.decoding.totals.doubtful_after),
         Some(lines) => Verdict::of_lines(lost).doubtful(lines.faults.doubtful_after_us),

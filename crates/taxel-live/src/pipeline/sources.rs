@@ -12,7 +12,7 @@ use super::frame_input::{LineCounts, ReadLines};
 use super::record_stage::COUNTS_EVERY;
 use crate::Result;
 use crate::locked::lock;
-use crate::recording::{self, Found, LeftOut, SourceWriter, StreamColumns, StreamFaults, now_ns};
+use crate::recording::{self, Cause, Counts, Found, SourceWriter, StreamColumns, StreamFaults, now_ns};
 
 /// Sources by their names.
 pub(super) type Named<T> = Vec<(String, T)>;
@@ -61,9 +61,10 @@ impl NumberStream {
             self.record(faults, |track, number| track.sample(at_ns, number, values))?;
         }
         for (at_ns, text) in &read.unread {
-            self.record(StreamFaults::strange, |track, number| track.strange_line(*at_ns, number, text))?;
+            let strange = |faults: &mut StreamFaults| faults.found.counts[Cause::Strange] += 1;
+            self.record(strange, |track, number| track.strange_line(*at_ns, number, text))?;
         }
-        self.count_left_out(read.left_out)
+        self.count_left_out(&read.counts)
     }
 
     /// Counts a line with its faults, and records it if a recording runs. Each line belongs to one recording.
@@ -81,13 +82,13 @@ impl NumberStream {
     }
 
     /// Counts bytes that arrived and are in no line; an unfinished recording states them too.
-    fn count_left_out(&self, bytes: LeftOut) -> Result<()> {
-        if bytes == LeftOut::default() {
+    fn count_left_out(&self, bytes: &Counts) -> Result<()> {
+        if bytes.iter().next().is_none() {
             return Ok(());
         }
         let mut current = lock(&self.track);
-        current.faults.count_left_out(bytes);
-        current.all.count_left_out(bytes);
+        current.faults.add(bytes);
+        current.all.add(bytes);
         if let Some(track) = &current.track {
             track.note_left_out();
         }
@@ -95,7 +96,7 @@ impl NumberStream {
             return Ok(());
         }
         current.counted = Some(Instant::now());
-        let counts = losses_of_lines(current.lines - current.before, &current.faults.found());
+        let counts = losses_of_lines(current.lines - current.before, &current.faults.found);
         current.track.as_ref().map_or(Ok(()), |track| track.counts(now_ns(), &counts))
     }
 
@@ -104,7 +105,7 @@ impl NumberStream {
     pub(super) fn record_into(&self, track: Option<SourceWriter>) -> SourceCounts {
         let mut current = lock(&self.track);
         let ended = std::mem::replace(&mut current.track, track);
-        let faults = std::mem::replace(&mut current.faults, StreamFaults::new(&self.stream)).found();
+        let faults = std::mem::replace(&mut current.faults, StreamFaults::new(&self.stream)).found;
         let lines = current.lines - current.before;
         current.before = current.lines;
         drop(current);
@@ -116,7 +117,7 @@ impl NumberStream {
 
     pub(super) fn counts(&self) -> SourceCounts {
         let current = lock(&self.track);
-        let (lines, faults) = (current.lines, current.all.found());
+        let (lines, faults) = (current.lines, current.all.found.clone());
         drop(current);
         self.counts_of(lines, faults)
     }

@@ -17,14 +17,16 @@ pub enum CauseKind {
     File,
     /// Nothing is lost by it.
     Noted,
+    /// Something is not read out, or not shown, live; no recording lacks it.
+    Live,
 }
 
 macro_rules! causes {
-    ($($name:ident $key:literal $kind:ident $words:literal,)*) => {
-        /// A cause: its key in files and in Python, what it says of a recording, and its words in the plural.
+    ($($(#[doc = $meaning:literal])+ $name:ident $key:literal $kind:ident $one:literal $several:literal $rest:literal,)*) => {
+        /// A cause: its key in files and in Python, what it says of a recording, its words, and what they mean.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
         pub enum Cause {
-            $(#[doc = $words] $name,)*
+            $($(#[doc = $meaning])+ $name,)*
         }
 
         impl Cause {
@@ -43,81 +45,147 @@ macro_rules! causes {
                 match self { $(Self::$name => CauseKind::$kind,)* }
             }
 
-            fn words(self) -> &'static str {
-                match self { $(Self::$name => $words,)* }
+            /// The noun of so many, and what is said of it.
+            #[must_use]
+            pub fn words(self, n: u64) -> String {
+                let (noun, rest) = match self { $(Self::$name => (if n == 1 { $one } else { $several }, $rest),)* };
+                format!("{noun} {rest}").trim_end().to_owned()
+            }
+
+            /// What the words mean.
+            #[must_use]
+            pub fn meaning(self) -> &'static str {
+                match self { $(Self::$name => concat!($($meaning),+).trim_start(),)* }
             }
         }
     };
 }
 
 causes! {
-    BoardDropped "dropped_by_board" Lost "times that the board dropped events",
-    EventsDropped "events_dropped_by_board" Lost "events that the board itself counted as dropped",
-    KernelDropped "dropped_by_kernel" Lost "messages dropped by the kernel",
-    QueueDropped "dropped_by_queue" Lost "datagrams dropped by taxel's queue",
-    NotRecorded "not_recorded" Lost "datagrams received but not recorded",
-    InNoLine "bytes_in_no_line" Lost "bytes in no line of numbers",
-    // What the board's numbers lack beyond the datagrams that are counted as dropped.
-    OnTheWay "lost_on_the_way" Lost "datagrams lost or damaged on the way",
-    DataInFile "lost_in_file" Lost "messages of data lost in the file",
-    RegistersInFile "registers_lost_in_file" Lost "register settings lost in the file",
-    MarkersInFile "markers_lost_in_file" Lost "markers lost in the file",
-    NotesInFile "notes_lost_in_file" Lost "notes lost in the file",
-    DetectionsInFile "detections_lost_in_file" Lost "detections lost in the file",
-    HeldInFile "held_values_lost_in_file" Lost "initial states lost in the file",
-    ChangesInFile "changes_lost_in_file" Lost "board changes lost in the file",
-    LinesInFile "unread_lines_lost_in_file" Lost "unread lines lost in the file",
-    BytesSkipped "bytes_skipped" Damaged "bytes skipped",
-    ShortEvents "short_events" Damaged "short events",
-    Contradictory "contradictory_kinds" Damaged "contradictory kinds",
-    Outside "outside_the_array" Damaged "words outside the array",
-    Unpaired "unpaired_intensities" Damaged "unpaired intensities",
-    // Before the latest time: of version 1, and of version 2 those farther before it than a network reorders.
-    OutOfOrder "events_out_of_order" Damaged "events out of order",
-    // Version 1 ahead of the host's clock; streams of numbers ahead of arrival.
-    Jumps "jumps_of_time" Damaged "jumps of time",
-    // Before a recording that began while its board was received: all its times are doubtful.
-    JumpedBefore "jumps_of_time_before_it" Damaged "jumps of time before it",
-    // Version 1 does not number datagrams, so that the events of those that came again are there twice.
-    DecodedAgain "datagrams_decoded_again" Damaged "datagrams decoded again",
-    // From a board that sends version 2.
-    Refused "bytes_of_version_1_refused" Damaged "bytes of version 1 refused",
-    Empty "empty_datagrams" Damaged "empty datagrams",
-    DatagramsDamaged "datagrams_damaged" Damaged "datagrams damaged",
-    // Intact, and of another board than the first.
-    OtherBoard "datagrams_of_another_board" Damaged "datagrams of another board",
-    TooLate "datagrams_too_late" Damaged "datagrams too late",
-    TaxelsOutside "taxels_outside_the_array" Damaged "taxels outside the array",
-    UnknownKind "datagrams_of_an_unknown_kind" Damaged "datagrams of an unknown kind",
-    UnknownFlags "datagrams_with_unknown_flags" Damaged "datagrams with unknown flags",
-    UnknownMarker "markers_with_an_unknown_code" Damaged "markers with an unknown code",
-    Malformed "malformed_bodies" Damaged "malformed bodies",
-    UnknownValue "differences_from_an_unknown_value" Damaged "differences from an unknown value",
-    BetweenSenders "changes_between_senders" Damaged "changes between senders",
-    Strange "lines_that_could_not_be_read" Damaged "lines that could not be read",
-    StampsBack "stamps_out_of_order" Damaged "stamps out of order",
-    Drifts "drifts_from_arrival" Damaged "drifts from arrival",
-    // Written by a later version.
-    Unknown "unknown_causes" Damaged "times by causes that this version does not know",
-    RepeatedInFile "repeated_in_file" Damaged "messages repeated in the file",
-    BadChunks "bad_chunks" File "bad chunks of the file skipped",
-    LargeChunks "large_chunks" File "chunks of the file skipped whose stated size is above 64 MiB",
-    SkippedBytes "skipped_bytes" File "bytes of the file skipped",
-    TornBytes "torn_bytes" File "torn bytes at the end of the file",
-    BytesAfterEnd "bytes_after_end" File "bytes after the end of the recording not read",
-    Repeated "datagrams_repeated" Noted "datagrams repeated",
-    Repaired "events_repaired" Noted "values repaired from the board's refresh",
-    Resets "resets" Noted "resets of the board",
-    ClockAnew "clock_began_anew" Noted "restarts of its clock",
-    Missing "missing_values" Noted "missing values",
-    Overtaken "events_overtaken" Noted "events overtaken by later ones",
-    UnfinishedLines "bytes_of_unfinished_lines" Noted "bytes of unfinished lines",
-    Addresses "changes_of_address" Noted "changes of the sender's address",
-    // No frame of numbers arrived for a second or more.
-    Silences "silences" Noted "silences of a second or more",
-    SilentMs "silent_ms" Noted "milliseconds of silence",
-    Gaps "gaps" Noted "gaps between frames",
-    GapsUs "gaps_us" Noted "microseconds in gaps",
+    /// Flags of the board; the same losses as the next.
+    BoardDropped "dropped_by_board" Lost "time" "times" "that the board dropped events",
+    /// The board's own totals.
+    EventsDropped "events_dropped_by_board" Lost "event" "events" "that the board itself counted as dropped",
+    /// The receive buffer was full; with `UDP_GRO` a message is several datagrams.
+    KernelDropped "dropped_by_kernel" Lost "message" "messages" "dropped by the kernel",
+    /// The queue before the decoder was full.
+    QueueDropped "dropped_by_queue" Lost "datagram" "datagrams" "dropped by taxel's queue",
+    /// Writing failed, as on a full disk.
+    NotRecorded "not_recorded" Lost "datagram" "datagrams" "received but not recorded",
+    /// After 65 536 bytes of a line; before the first line, bytes that are not text.
+    InNoLine "bytes_in_no_line" Lost "byte" "bytes" "in no line of numbers",
+    /// What the board's numbers lack beyond those dropped; with `UDP_GRO`, or where the kernel does not count, the
+    /// kernel may have dropped them.
+    OnTheWay "lost_on_the_way" Lost "datagram" "datagrams" "lost or damaged on the way",
+    /// Datagrams, lines or frames.
+    DataInFile "lost_in_file" Lost "message" "messages" "of data lost in the file",
+    /// Damage of the file.
+    RegistersInFile "registers_lost_in_file" Lost "register setting" "register settings" "lost in the file",
+    /// Damage of the file.
+    MarkersInFile "markers_lost_in_file" Lost "marker" "markers" "lost in the file",
+    /// Damage of the file; also zeroed taxels.
+    NotesInFile "notes_lost_in_file" Lost "note" "notes" "lost in the file",
+    /// Damage of the file.
+    DetectionsInFile "detections_lost_in_file" Lost "detection" "detections" "lost in the file",
+    /// The values that the taxels held at the beginning.
+    HeldInFile "held_values_lost_in_file" Lost "initial state" "initial states" "lost in the file",
+    /// Resets, and changes of the version of the wire.
+    ChangesInFile "changes_lost_in_file" Lost "board change" "board changes" "lost in the file",
+    /// Damage of the file.
+    LinesInFile "unread_lines_lost_in_file" Lost "unread line" "unread lines" "lost in the file",
+    /// Version 1: bytes of no whole word.
+    BytesSkipped "bytes_skipped" Damaged "byte" "bytes" "skipped",
+    /// Version 1: words that the next word or the end cut off.
+    ShortEvents "short_events" Damaged "short event" "short events" "",
+    /// Version 1: words that are an intensity and a marker at once.
+    Contradictory "contradictory_kinds" Damaged "contradictory kind" "contradictory kinds" "",
+    /// Version 1: of taxels that the array does not have.
+    Outside "outside_the_array" Damaged "word" "words" "outside the array",
+    /// Version 1: intensities without their change.
+    Unpaired "unpaired_intensities" Damaged "unpaired intensity" "unpaired intensities" "",
+    /// Events before the latest time: in version 1 by up to 0.1 s; in version 2 by more, farther than a network
+    /// reorders.
+    OutOfOrder "events_out_of_order" Damaged "event" "events" "out of order",
+    /// Version 1: ahead by 1 s or more, after a damaged stamp (6.5536 s late) or a reset. Lines of numbers: ahead of
+    /// arrival by more than a second and a hundredth of the pause.
+    Jumps "jumps_of_time" Damaged "jump" "jumps" "of time",
+    /// Version 1: before this trial; all its times are doubtful.
+    JumpedBefore "jumps_of_time_before_it" Damaged "jump" "jumps" "of time before it",
+    /// Version 1, which does not number datagrams: their events are there twice. Without values, only those with several
+    /// times count.
+    DecodedAgain "datagrams_decoded_again" Damaged "datagram" "datagrams" "decoded again",
+    /// From a board that sends version 2.
+    Refused "bytes_of_version_1_refused" Damaged "byte" "bytes" "of version 1 refused",
+    /// Datagrams without bytes.
+    Empty "empty_datagrams" Damaged "empty datagram" "empty datagrams" "",
+    /// Version 2, unusable: wrong checksum, too short or too long; they also count as lost on the way.
+    DatagramsDamaged "datagrams_damaged" Damaged "datagram" "datagrams" "damaged",
+    /// Version 2, intact: another board's number, or other contents under the same session and number.
+    OtherBoard "datagrams_of_another_board" Damaged "datagram" "datagrams" "of another board",
+    /// Version 2: by more than 65 536 numbers.
+    TooLate "datagrams_too_late" Damaged "datagram" "datagrams" "too late",
+    /// Version 2: events and states of taxels that the array does not have.
+    TaxelsOutside "taxels_outside_the_array" Damaged "taxel" "taxels" "outside the array",
+    /// Version 2: not read.
+    UnknownKind "datagrams_of_an_unknown_kind" Damaged "datagram" "datagrams" "of an unknown kind",
+    /// Version 2: read.
+    UnknownFlags "datagrams_with_unknown_flags" Damaged "datagram" "datagrams" "with unknown flags",
+    /// Version 2: not read.
+    UnknownMarker "markers_with_an_unknown_code" Damaged "marker" "markers" "with an unknown code",
+    /// Version 2: the contents end within a word, or have an offset that is too late.
+    Malformed "malformed_bodies" Damaged "malformed body" "malformed bodies" "",
+    /// Version 2: the event has no value.
+    UnknownValue "differences_from_an_unknown_value" Damaged "difference" "differences" "from an unknown value",
+    /// Two boards use one port; the real number is larger.
+    BetweenSenders "changes_between_senders" Damaged "change" "changes" "between senders",
+    /// Lines of numbers.
+    Strange "lines_that_could_not_be_read" Damaged "line" "lines" "that could not be read",
+    /// Lines of numbers: a stamp steps back, by less than a second.
+    StampsBack "stamps_out_of_order" Damaged "stamp" "stamps" "out of order",
+    /// Lines of numbers: the clock was off by more than a second and a hundredth of the time.
+    Drifts "drifts_from_arrival" Damaged "drift" "drifts" "from arrival",
+    /// Counted by a later version of taxel.
+    Unknown "unknown_causes" Damaged "time" "times" "by a cause that this version does not know",
+    /// Messages that are there twice are read twice.
+    RepeatedInFile "repeated_in_file" Damaged "message" "messages" "repeated in the file",
+    /// Blocks of the file that cannot be read.
+    BadChunks "bad_chunks" File "bad chunk" "bad chunks" "of the file skipped",
+    /// Damage of the file.
+    LargeChunks "large_chunks" File "chunk" "chunks" "of the file skipped whose stated size is above 64 MiB",
+    /// Damage of the file.
+    SkippedBytes "skipped_bytes" File "byte" "bytes" "of the file skipped",
+    /// The recorder was killed, or the file was cut.
+    TornBytes "torn_bytes" File "torn byte" "torn bytes" "at the end of the file",
+    /// Something was appended, as by `cat`: use `taxel.merge`.
+    BytesAfterEnd "bytes_after_end" File "byte" "bytes" "after the end of the recording not read",
+    /// Version 2: each counts once.
+    Repeated "datagrams_repeated" Noted "datagram" "datagrams" "repeated",
+    /// Version 2: they differed from the board's.
+    Repaired "events_repaired" Noted "value" "values" "repaired from the board's refresh",
+    /// Version 2.
+    Resets "resets" Noted "reset" "resets" "of the board",
+    /// Lines of numbers: back by more than a second, then times by arrival.
+    ClockAnew "clock_began_anew" Noted "restart" "restarts" "of its clock",
+    /// Lines of numbers: `nan`.
+    Missing "missing_values" Noted "missing value" "missing values" "",
+    /// Version 2: by 0.1 s or less, in the network; times are right.
+    Overtaken "events_overtaken" Noted "event" "events" "overtaken by later ones",
+    /// The beginning or the end of a line did not arrive.
+    UnfinishedLines "bytes_of_unfinished_lines" Noted "byte" "bytes" "of unfinished lines",
+    /// A new address or port, of the same or another board.
+    Addresses "changes_of_address" Noted "change" "changes" "of the sender's address",
+    /// No frame arrived.
+    Silences "silences" Noted "silence" "silences" "of a second or more",
+    /// The sum of those silences.
+    SilentMs "silent_ms" Noted "millisecond" "milliseconds" "of silence",
+    /// The line of the gaps states them.
+    Gaps "gaps" Noted "gap" "gaps" "between frames",
+    /// The sum of the gaps.
+    GapsUs "gaps_us" Noted "microsecond" "microseconds" "in gaps",
+    /// The queue before the readout was full; the recording has them.
+    ReadoutDropped "dropped_before_readout" Live "event" "events" "dropped before the readout, which was too slow",
+    /// The page's server was too slow; the recording and the readout have them.
+    ViewDropped "missing_in_the_view" Live "event" "events" "missing in the page's curves and past",
 }
 
 /// Causes that the line of the gaps says.
@@ -190,7 +258,7 @@ impl Counts {
     /// The words of all causes of a kind that happened, joined by commas; `None` if none did.
     pub(super) fn words(&self, kinds: &[CauseKind]) -> Option<String> {
         let said = self.iter().filter(|(cause, _)| kinds.contains(&cause.kind()) && !LINE_OF_GAPS.contains(cause));
-        let said: Vec<String> = said.map(|(cause, n)| numbered(n, cause.words())).collect();
+        let said: Vec<String> = said.map(|(cause, n)| format!("{n} {}", cause.words(n))).collect();
         (!said.is_empty()).then(|| said.join(", "))
     }
 
@@ -254,11 +322,4 @@ impl<'de> Deserialize<'de> for Counts {
         }
         Ok(counts)
     }
-}
-
-/// A number and what it counts, which is given in the plural: of 1 the first word that ends in s, its noun, is in the singular.
-fn numbered(n: u64, plural: &str) -> String {
-    let noun = plural.split([' ', ',']).find(|word| n == 1 && word.ends_with('s')).unwrap_or_default();
-    let singular = noun.strip_suffix("ies").map(|stem| format!("{stem}y"));
-    format!("{n} {}", plural.replacen(noun, &singular.unwrap_or(noun.trim_end_matches('s').to_owned()), 1))
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use taxel_core::problem;
 
-use super::causes::Cause;
+use super::causes::{Cause, Counts};
 use super::limits;
 use super::verdict::Found;
 use clock::StreamClock;
@@ -114,7 +114,7 @@ impl<'a> Sampling<'a> {
 
     pub(super) fn push(&mut self, at_ns: i64, number: u64, data: &[u8]) {
         let Some((t, values)) = self.parse(at_ns, data) else {
-            self.faults.strange();
+            self.faults.found.counts[Cause::Strange] += 1;
             return;
         };
         self.samples.arrived_ns.push(at_ns);
@@ -144,25 +144,15 @@ impl<'a> Sampling<'a> {
     }
 
     pub(super) fn finish(self) -> Samples {
-        Samples { found: self.faults.found(), ..self.samples }
+        Samples { found: self.faults.found, ..self.samples }
     }
-}
-
-/// Number of bytes that arrived and that are in no line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct LeftOut {
-    /// Those that cannot be part of a line.
-    pub in_no_line: u64,
-    /// Those of lines whose end did not arrive, or whose beginning did not.
-    pub unfinished: u64,
 }
 
 /// Counts what could not be read of a stream, and what is wrong with its stamps: while it is recorded as in its file.
 #[derive(Debug, Clone)]
 pub struct StreamFaults {
-    strange: u64,
-    missing: u64,
-    left_out: LeftOut,
+    /// What was found so far, as a verdict states it.
+    pub found: Found,
     clock: StreamClock,
 }
 
@@ -176,36 +166,24 @@ impl StreamFaults {
     /// None so far, of lines with stamps in this unit, us, that may have `waited` in a file.
     #[must_use]
     pub fn by_clock(unit_us: f64, waited: bool) -> Self {
-        let clock = StreamClock::new(unit_us, waited);
-        Self { strange: 0, missing: 0, left_out: LeftOut::default(), clock }
+        Self { found: Found::default(), clock: StreamClock::new(unit_us, waited) }
     }
 
-    /// Counts a line that could not be read.
-    pub fn strange(&mut self) {
-        self.strange_lines(1);
-    }
-
-    /// Counts lines that could not be read.
-    pub fn strange_lines(&mut self, lines: u64) {
-        self.strange += lines;
+    /// Adds what a reader of lines counts.
+    pub fn add(&mut self, counts: &Counts) {
+        self.found.counts.extend(counts.iter());
     }
 
     /// Counts the values of a line or a frame that are missing.
     pub fn missing(&mut self, values: impl IntoIterator<Item = f64>) {
-        self.missing += values.into_iter().filter(|value| value.is_nan()).count() as u64;
-    }
-
-    /// Counts bytes that are in no line.
-    pub fn count_left_out(&mut self, bytes: LeftOut) {
-        self.left_out.in_no_line += bytes.in_no_line;
-        self.left_out.unfinished += bytes.unfinished;
+        self.found.counts[Cause::Missing] += values.into_iter().filter(|value| value.is_nan()).count() as u64;
     }
 
     /// The time, us, of a line with this stamp or none that arrived at `at_ns`; none if the stamp is no time.
     pub fn time(&mut self, stamp: Option<f64>, at_ns: i64) -> Option<i64> {
         match stamp {
             None => Some(at_ns.div_euclid(1000)),
-            Some(stamp) => self.clock.time(stamp, at_ns),
+            Some(stamp) => self.clock.time(stamp, at_ns, &mut self.found),
         }
     }
 
@@ -214,22 +192,8 @@ impl StreamFaults {
         let clock = stream.columns.iter().position(|name| Some(name) == stream.time.as_ref());
         match self.time(clock.map(|column| values[column]), at_ns) {
             Some(_) => self.missing(values.iter().copied()),
-            None => self.strange(),
+            None => self.found.counts[Cause::Strange] += 1,
         }
-    }
-
-    /// What was found so far, as a verdict states it.
-    #[must_use]
-    pub fn found(&self) -> Found {
-        let mut found = self.clock.found();
-        let LeftOut { in_no_line, unfinished } = self.left_out;
-        found.counts.extend([
-            (Cause::Strange, self.strange),
-            (Cause::Missing, self.missing),
-            (Cause::InNoLine, in_no_line),
-            (Cause::UnfinishedLines, unfinished),
-        ]);
-        found
     }
 }
 
@@ -409,7 +373,7 @@ mod tests {
         }
         let samples = sampling.finish();
         assert_eq!((&samples.t[..], samples.found.counts[Cause::Strange]), (&[1, 2][..], 4));
-        assert_eq!(live.found(), samples.found);
+        assert_eq!(live.found, samples.found);
     }
 
     #[test]
@@ -425,7 +389,7 @@ mod tests {
         let samples = sampling.finish();
         assert_eq!(samples.values.iter().filter(|value| value.is_nan()).count(), 3);
         assert_eq!((samples.found.counts[Cause::Missing], samples.found.counts[Cause::Strange]), (3, 1));
-        assert_eq!(live.found(), samples.found);
+        assert_eq!(live.found, samples.found);
     }
 
     #[test]

@@ -404,7 +404,7 @@ impl Verdict {
             match cause.kind() {
                 CauseKind::Lost => self.at_worst(RecordingStatus::Lost),
                 CauseKind::Damaged | CauseKind::File => self.at_worst(RecordingStatus::Damaged),
-                CauseKind::Noted => {}
+                CauseKind::Noted | CauseKind::Live => {}
             }
         }
         self

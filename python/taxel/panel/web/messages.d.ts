@@ -117,22 +117,14 @@ export interface LiveFrames {
   begin_us: number;
 }
 
-/** Counts of lost data, by cause. */
+/** What was lost or damaged. */
 export interface Lost {
-  /** Messages; `null` where the system does not count them. */
-  kernel: number | null;
-  /** Datagrams. */
-  queue: number;
-  /** Datagrams of version 2 that never arrived intact. */
-  wire: number;
-  /** Bytes that were not valid words. */
-  damaged: number;
-  /** Taxels outside the array. */
-  outside: number;
-  /** Events that found no room before the readout. */
-  readout: number;
-  /** Events that only the panel's curves and its past lack: its held values are right again within 0.1 s. */
-  panel: number;
+  /** Losses of all causes; damage is none. */
+  number: number;
+  /** Whether the system counts what its kernel drops. */
+  by_kernel_known: boolean;
+  /** Number and words of each cause that happened. */
+  causes: string[];
 }
 
 /** A label without a detection of the neuron, or a detection without a label. */

@@ -1,6 +1,6 @@
 //! The clock of a stream of numbers: its stamps as times, and what arrival shows to be wrong with them.
 
-use super::super::causes::{Cause, Counts};
+use super::super::causes::Cause;
 use super::super::verdict::Found;
 
 /// Range of a counter: whole numbers are assumed to have 32 bits.
@@ -25,12 +25,6 @@ pub struct StreamClock {
     /// The state before a restart or a jump that the next stamp may show to have been one damaged stamp, and whether it
     /// was a restart.
     before: Option<(State, bool)>,
-    resets: u64,
-    back: u64,
-    jumps: u64,
-    drifts: u64,
-    /// The time after which times are doubtful, us.
-    after: Option<i64>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -136,12 +130,12 @@ impl StreamClock {
     /// The clock of stamps in this unit, us, of lines that may have `waited` in a file.
     pub fn new(unit_us: f64, waited: bool) -> Self {
         let state = State { integers: true, added: 0.0, last: None, anchor: None };
-        Self { unit_us, waited, state, before: None, resets: 0, back: 0, jumps: 0, drifts: 0, after: None }
+        Self { unit_us, waited, state, before: None }
     }
 
-    /// Converts a stamp to a time, us; none if it is no time.
+    /// Converts a stamp to a time, us; none if it is no time. What is wrong with it is added to `found`.
     #[allow(clippy::cast_possible_truncation)]
-    pub fn time(&mut self, stamp: f64, at_ns: i64) -> Option<i64> {
+    pub fn time(&mut self, stamp: f64, at_ns: i64, found: &mut Found) -> Option<i64> {
         let stamp_us = stamp * self.unit_us;
         if stamp_us.is_nan() || stamp_us.abs() > FARTHEST_US {
             return None;
@@ -159,8 +153,8 @@ impl StreamClock {
         {
             // The stamp between was damaged, whatever it looked like.
             if anew {
-                self.resets -= 1;
-                self.jumped(state.last);
+                found.counts[Cause::ClockAnew] -= 1;
+                jumped(found, state.last);
             }
             step = state.step(stamp_us, at_ns, self.unit_us);
             self.state = state;
@@ -170,29 +164,29 @@ impl StreamClock {
         match step {
             StampStep::Fits(turns) => self.state.added += turns,
             StampStep::Back => {
-                self.back += 1;
-                self.doubt(stamp_us + state.added - 1.0);
+                found.counts[Cause::StampsBack] += 1;
+                doubt(found, stamp_us + state.added - 1.0);
             }
             StampStep::Anew(lacks) => {
                 self.before = Some((state, true));
                 self.state.added += lacks;
-                self.resets += 1;
+                found.counts[Cause::ClockAnew] += 1;
             }
             StampStep::Ahead => {
                 self.before = Some((state, false));
-                self.jumped(state.last);
+                jumped(found, state.last);
             }
         }
         self.state.integers &= stamp.fract() == 0.0 && (0.0..TURN).contains(&stamp);
         let t = stamp_us + self.state.added;
-        self.compare(state.last, (t, at_ns), anew);
+        self.compare(state.last, (t, at_ns), anew, found);
         self.state.last = Some((t, at_ns));
         Some(t.round() as i64)
     }
 
     /// Compares a time with arrival since the clock began, or began `anew`.
     #[allow(clippy::cast_precision_loss)]
-    fn compare(&mut self, last: Option<(f64, i64)>, now: (f64, i64), anew: bool) {
+    fn compare(&mut self, last: Option<(f64, i64)>, now: (f64, i64), anew: bool, found: &mut Found) {
         let (before, at_ns) = last.unwrap_or(now);
         let passed = now.1.saturating_sub(at_ns) as f64 * 1e-3;
         let anchor = self.state.anchor.get_or_insert(Anchor::new(now));
@@ -200,31 +194,19 @@ impl StreamClock {
             // The host's clock was set back where a line arrives before the one before it.
             *anchor = Anchor::new(now);
         } else if anchor.is_left(now, passed - (now.0 - before)) {
-            let sound = anchor.sound;
-            self.drifts += 1;
-            self.doubt(sound);
+            found.counts[Cause::Drifts] += 1;
+            doubt(found, anchor.sound);
         }
     }
+}
 
-    fn jumped(&mut self, last: Option<(f64, i64)>) {
-        self.jumps += 1;
-        self.doubt(last.map_or(0.0, |(last, _)| last));
-    }
+fn jumped(found: &mut Found, last: Option<(f64, i64)>) {
+    found.counts[Cause::Jumps] += 1;
+    doubt(found, last.map_or(0.0, |(last, _)| last));
+}
 
-    /// Times after this one are doubtful.
-    #[allow(clippy::cast_possible_truncation)]
-    fn doubt(&mut self, after: f64) {
-        self.after = self.after.into_iter().chain([after.round() as i64]).min();
-    }
-
-    /// What is wrong with the stamps so far.
-    pub fn found(&self) -> Found {
-        let counts = Counts::from([
-            (Cause::ClockAnew, self.resets),
-            (Cause::StampsBack, self.back),
-            (Cause::Jumps, self.jumps),
-            (Cause::Drifts, self.drifts),
-        ]);
-        Found { counts, doubtful_after_us: self.after, ..Found::default() }
-    }
+/// Times after this one are doubtful.
+#[allow(clippy::cast_possible_truncation)]
+fn doubt(found: &mut Found, after: f64) {
+    found.doubtful_after_us = found.doubtful_after_us.into_iter().chain([after.round() as i64]).min();
 }
