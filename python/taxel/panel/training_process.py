@@ -57,7 +57,10 @@ def run(request: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
         progress(f"reading {recording}", 0, 0)
         training = train(FullReading(**request["open"]).open_sensors([recording]), progress=progress)
     if not training.learnt:
-        raise ProblemError("; ".join(["no label is learnt, so nothing is written", *training.unreliable()]))
+        why = "; ".join(text.replace("do not rely on this readout: ", "") for text in training.unreliable())
+        raise ProblemError(
+            f"no label is learnt, so nothing is written: {why}. Is each label at its event, and each event labelled?"
+        )
     pictures = [*_pictures(training)]
     training.readout.save(request["out"], overwrite=True)
     found = training.to_dict()

@@ -27,6 +27,6 @@ export function writeCounters(counters) {
   const shown = latency.report?.count ? latency.report : latency.decode;
   put("latency", shown && shown.p50_us !== null && shown.p99_us !== null ? `${integer(shown.p50_us)} / ${integer(shown.p99_us)}` : "–");
   write(part("loss-list", HTMLElement), ...(lost.causes.length ? lost.causes : ["Nothing was lost or damaged."]));
-  put("reach", counters.reach_us ? `the last ${((counters.reach_us[1] - counters.reach_us[0]) / 1e6).toFixed(0)} s can be viewed` : "");
-  put("wire", counters.wire_version ? `wire version ${counters.wire_version}` : "");
+  put("reach", counters.reach_us ? `The last ${((counters.reach_us[1] - counters.reach_us[0]) / 1e6).toFixed(0)} s can be viewed.` : "");
+  put("wire", counters.wire_version ? `Wire version ${counters.wire_version}.` : "");
 }
