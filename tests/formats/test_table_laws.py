@@ -183,15 +183,16 @@ def test_frames_of_lines_below_a_line_of_text_are_read_and_their_layout_reads_th
 
 
 @given(
-    steps=st.lists(st.integers(1, 1000), min_size=3, max_size=40),
-    begin=st.integers(0, 2**32),
+    step=st.integers(1, 1000),
+    before=st.integers(3, 20),
+    after=st.integers(3, 20),
+    into=st.integers(0, 999),
     bits=st.sampled_from([16, 32]),
 )
-def test_a_counter_that_was_full_goes_on(steps: list[int], begin: int, bits: int) -> None:
-    steps = [max(steps)] * len(steps)
-    t = begin % 2**bits + np.cumsum([0, *steps])
-    found = repaired(t % 2**bits)
-    assert (found.t - t).tolist() == [0] * len(t)
+def test_a_counter_that_was_full_goes_on(step: int, before: int, after: int, into: int, bits: int) -> None:
+    """Also where the value behind the last one before that is missing."""
+    t = 2**bits + into % step + step * np.delete(np.arange(-before, after), before)
+    assert repaired(t % 2**bits).t.tolist() == t.tolist()
 
 
 @given(t=st.lists(st.integers(-(2**40), 2**40), max_size=30))
