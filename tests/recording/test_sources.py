@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from live.boards import LOOPBACK, SMALL, play
 from loopback import until
 from shell import run
 
@@ -23,20 +24,11 @@ from taxel.clock import Clock
 from taxel.live import Live
 from taxel.simulate import Board
 
-LOOPBACK = "127.0.0.1"
-SMALL = taxel.Array(4, 4, pitch_mm=2.0, name="small")
-
 
 def presses(n: int, x: int) -> taxel.Events:
     """A taxel rises each 20 ms by one tick more."""
     t = np.arange(n) * 20_000
     return taxel.Events(t, np.full(n, x), np.full(n, 2), np.ones(n, bool), array=SMALL, intensity=np.arange(n) + 60)
-
-
-def play(events: taxel.Events, address: tuple[str, int]) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
-        for t in events.t:
-            link.sendto(taxel.wire.encode(events[events.t == t]), address)
 
 
 def lines(live: Live, name: str) -> int:
@@ -54,8 +46,8 @@ def record_all(path: Path) -> dict[str, taxel.Events]:
     }
     sent = {"right": presses(30, 1), "left": presses(20, 3)}
     with Live(0, host=LOOPBACK, array=SMALL, record=path, name="right", sources=sources) as live:
-        play(sent["right"], live.address)
-        play(sent["left"], live.source_address("left"))
+        play(sent["right"], live.address[1])
+        play(sent["left"], live.source_address("left")[1])
         os.write(ours, b"".join(f"{10 * k}, {k / 8}, {-k}\r\n".encode() for k in range(50)) + b"nonsense\n")
         for k in range(5):
             live.sample("given", [k + 0.5], arrived_ns=1_700_000_000_000_000_000 + k * 1_000_000)
@@ -139,7 +131,7 @@ def test_of_several_boards_none_is_the_files_own(several: tuple[Path, dict[str, 
 def test_of_one_board_and_numbers_the_files_own_is_the_board(tmp_path: Path) -> None:
     path, sent = tmp_path / "one.mcap", presses(10, 2)
     with Live(0, host=LOOPBACK, array=SMALL, record=path, sources={"imu": "given,columns=t_us:ax"}) as live:
-        play(sent, live.address)
+        play(sent, live.address[1])
         live.sample("imu", [7.0, 1.0])
         until(lambda: live.counters["decoded"] == 10)
     recording = taxel.open(path)
