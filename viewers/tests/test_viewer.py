@@ -9,13 +9,13 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from loopback import free_port, until
 from tests.live.boards import LOOPBACK, SMALL, play, presses, touch, wait_for
 
 import taxel
@@ -33,19 +33,9 @@ ENTITIES = ("/events/more", "/events/less", "/pressure", "/force", "/detections"
 rerun = pytest.mark.skipif(not importlib.util.find_spec("rerun"), reason="pip install taxel[rerun]: 500 MB")
 
 
-def eventually(what: Any) -> Any:
-    until = time.monotonic() + SOON
-    while not (found := what()):
-        assert time.monotonic() < until
-        time.sleep(0.01)
-    return found
-
-
 @pytest.fixture
 def port() -> int:
-    with socket.socket() as door:
-        door.bind((LOOPBACK, 0))
-        return int(door.getsockname()[1])
+    return free_port(socket.SOCK_STREAM)
 
 
 def answers(port: int) -> bool:
@@ -65,7 +55,7 @@ def receiver(folder: Path, port: int) -> Iterator[None]:
     words = [str(program), "--bind", LOOPBACK, "--port", str(port), "--save", str(folder / "heard.rrd")]
     process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment)
     try:
-        eventually(lambda: answers(port))
+        until(lambda: answers(port))
         yield
     finally:
         process.kill()
@@ -114,7 +104,7 @@ def test_rerun_hears_a_recording_as_it_is(tmp_path: Path, port: int) -> None:
         with pytest.raises(SystemExit) as ended:
             main(["show", str(tmp_path / "one.mcap"), f"rerun:{LOOPBACK}:{port}"])
         assert ended.value.code == 0
-        kept = eventually(lambda: found if len(found := rows(tmp_path)) == len(ENTITIES) else None)
+        kept = until(lambda: found if len(found := rows(tmp_path)) == len(ENTITIES) else None)
     assert [t for t, _ in kept["/pressure"]] == frames.t.tolist()
     np.testing.assert_array_equal([image(row) for _, row in kept["/pressure"]], frames.values)
     assert [row["Scalars:scalars"][0] for _, row in kept["/force"]] == frames.total().tolist()
@@ -133,8 +123,6 @@ def test_rerun_hears_a_recording_as_it_is(tmp_path: Path, port: int) -> None:
 
 @rerun
 def test_rerun_hears_what_a_board_holds(tmp_path: Path, port: int) -> None:
-    from loopback import free_port
-
     udp, events = free_port(), presses(3)
     words = (sys.executable, "-m", "taxel", "show", f"board:{LOOPBACK}:{udp},array=4x4", f"rerun:{LOOPBACK}:{port}")
 
@@ -146,7 +134,7 @@ def test_rerun_hears_what_a_board_holds(tmp_path: Path, port: int) -> None:
         assert show.stderr is not None
         assert any("listening" in line for line in show.stderr)
         play(events, udp)
-        eventually(lambda: shown() == [int(events.intensity[-1])])
+        until(lambda: shown() == [int(events.intensity[-1])])
         show.send_signal(signal.SIGINT)
         assert show.wait(SOON) == 0
 
