@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from taxel_benchmarks import _rounds, learn_cone_x
+from taxel_benchmarks import _rounds
 
 
 class Clock:
@@ -96,41 +94,3 @@ def test_latencies_of_rounds_are_summed_where_they_count_and_else_the_median() -
         "lost": {"queue": 3},
         "late": {"p50": 2.0, "p50 quartiles": [1.5, 5.5]},
     }
-
-
-def test_a_peer_with_rows_on_demand_gets_those_that_its_solution_breaks() -> None:
-    """The rows that it ends with are enough: the verdict and the least weights are those of all rows."""
-    n, p, held = 20, 3, [np.empty((0, 20))]
-    equal = learn_cone_x.equalities(n, p)
-
-    def solve(rows: Any, limits: Any) -> tuple[str, Any, float]:
-        held[0] = np.concatenate([held[0], rows])
-        most.extend(limits)
-        return answer(held[0], np.array(most))
-
-    def answer(rows: Any, limits: Any) -> tuple[str, Any, float]:
-        found = minimize(
-            lambda w: 0.5 * w @ w,
-            np.zeros(n),
-            jac=lambda w: w,
-            bounds=[(-learn_cone_x.BOUND, learn_cone_x.BOUND)] * n,
-            constraints=[
-                {"type": "eq", "fun": lambda w: equal @ w - learn_cone_x.THETA_0, "jac": lambda w: equal},
-                *([{"type": "ineq", "fun": lambda w: limits - rows @ w, "jac": lambda w: -rows}] if len(rows) else []),
-            ],
-            tol=1e-12,
-        )
-        return "solved", found.x, float(found.fun)
-
-    most: list[float] = []
-    verdict, objective = learn_cone_x.on_demand(n, p, solve)
-    t = np.arange(learn_cone_x.END + 1.0)
-    of = list(zip(*learn_cone_x.draw(n, p), strict=True))
-    limits = np.concatenate([learn_cone_x.limits(target) for _, target in of])
-    rows = np.concatenate([learn_cone_x.kernel(t[:, None] - spikes) for spikes, _ in of])[np.isfinite(limits)]
-    limits = limits[np.isfinite(limits)]
-    _, w, least = answer(rows, limits)
-    assert verdict == "solved"
-    assert 0 < len(held[0]) < len(rows) / 4
-    assert (rows @ w <= limits + 1e-7).all()
-    assert objective == pytest.approx(least, rel=1e-6)
