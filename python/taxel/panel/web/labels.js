@@ -226,7 +226,9 @@ export class Labels {
     this.lane.dataset.hint = this.file ? "Labels: click here to add a label" : "Labels: open or start a recording first";
     const table = this.file ? this.files.get(this.file) : undefined;
     write(part("label-place", HTMLElement), table ? `${labels.length ? "Saved" : "To be saved"} in ${table.path}` : "Open or start a recording, then label its events.");
-    part("train", HTMLButtonElement).disabled = !labels.length;
+    // A training that runs can be stopped, whatever is shown.
+    const train = part("train", HTMLButtonElement);
+    train.disabled = !labels.length && train.dataset.state !== "running";
     // Who has made labels knows how, and needs the room.
     part("label-how", HTMLElement).hidden = labels.length > 0;
     const rows = withChildren(part("label-list", HTMLElement), labels.length, (i) => this.row(i));
