@@ -215,11 +215,9 @@ class Training:
         """Yield the labels that are learnt as kinds of touch, and what ends of touches are called."""
         recipe = self.options.recipe
         if recipe is not None and (kinds := recipes.kinds(recipe, self.readout.labels)):
-            yield (
-                f"{', '.join(kinds)}: learnt as a kind of touch, and detected at an age of the touch; a label of the "
-                f"beginning of a touch must be named {recipes.names_of(recipe, 'contact')}; a label of its end, "
-                f"{recipes.names_of(recipe, 'lift')}"
-            )
+            yield f"{', '.join(kinds)}: learnt as a kind of touch, and detected at an age of the touch"
+            yield f"  a label of the beginning of a touch must be named {recipes.names_of(recipe, 'contact')}"
+            yield f"  a label of its end must be named {recipes.names_of(recipe, 'lift')}"
 
     def _rests(self) -> Iterator[str]:
         """Yield the line of which rests were taken from the recordings."""
@@ -242,7 +240,9 @@ class Training:
             yield f"no plain rule for {label}: none is better than to detect nothing"
         else:
             when = "when the touch ends" if rule.age_ms == "end" else ""
-            yield _line(label, "plain rule", plain.together[label], when) + _RUNS * by_rule
+            better = self.scored.neurons[label].rank[0] < plain.together[label].rank[0]
+            runs = _RUNS + ", as the neuron is better by chance alone" * better
+            yield _line(label, "plain rule", plain.together[label], when) + runs * by_rule
             yield f"  tuned on all: {rule._compared()}"
         if plain.own is not None and (own := plain.own[0][label]) is not None:
             yield _line(label, "the labels' own rule", plain.own[1][label]) + f": {own._compared()}"
