@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import taxel
 from taxel import FormatError
 from taxel.formats.layout import Layout
 from taxel.reading import Facts, InMemory, Reader
-from taxel.recording.kinds import check_recording, is_recording, kind_of, recordings_in
+from taxel.recording.kinds import _from_elsewhere, check_recording, is_recording, kind_of, recordings_in
 
 from .making import some_events, some_frames
 
@@ -108,7 +109,7 @@ def test_a_path_is_the_same_for_whoever_asks(name: str, tmp_path: Path) -> None:
     assert kind_of(path) == expected
     refused = why(lambda: check_recording(path))
     # A file that is damaged is one, and so is a table that can be read in two ways; opening it says what is wrong.
-    is_one = name == "picture" or expected in ("table", "arrays")
+    is_one = name in ("picture", "empty") or expected in ("table", "arrays")
     assert is_recording(path) == (refused is None or is_one)
     if refused is not None:
         assert why(lambda: taxel.open_all(path)) == refused
@@ -160,3 +161,14 @@ def test_a_format_of_another_distribution_is_opened_as_any_other(
     first, second = taxel.open_all(tmp_path)
     assert [first.name, second.name, first.kind] == ["a", "b", "grasp"]
     assert first.frames().values.tolist() == [[[1.0], [2.0]], [[3.0], [4.0]]]
+
+
+def test_a_format_that_does_not_load_is_said_and_taxel_reads_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    points = [EntryPoint("broken", "not_there", "taxel.formats")]
+    monkeypatch.setattr("taxel.recording.kinds.entry_points", lambda group: points)
+    _from_elsewhere.cache_clear()
+    with pytest.warns(UserWarning, match="format broken are not read, as not_there does not load: No module"):
+        assert kind_of(content("a.csv", TABLE)(tmp_path)) == "table"
+    _from_elsewhere.cache_clear()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import sys
+import warnings
 from pathlib import Path
 from typing import NoReturn
 
@@ -25,7 +26,9 @@ def run(app: cyclopts.App, words: list[str], path: str) -> NoReturn:
         say(*page(chosen, path), err=not wants_help)
         sys.exit(0 if wants_help else WRONG_INPUT)
     try:
-        code = app(words, exit_on_error=False, print_error=False, result_action="return_value")
+        with warnings.catch_warnings():
+            warnings.showwarning = _say_warning
+            code = app(words, exit_on_error=False, print_error=False, result_action="return_value")
     except cyclopts.CycloptsError as error:
         _end(said(error, path), WRONG_INPUT)
     except KeyboardInterrupt:
@@ -53,6 +56,11 @@ def run(app: cyclopts.App, words: list[str], path: str) -> NoReturn:
     except MemoryError as error:
         _end(f"this needs more memory than is available ({error})", OUTSIDE)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _say_warning(message: Warning | str, *_where: object) -> None:
+    """Print a warning that the command does not gather, as a line without the place in the code."""
+    say(f"taxel: warning: {message}", err=True)
 
 
 def _end(line: str, code: int, *below: str) -> NoReturn:

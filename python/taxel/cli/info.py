@@ -342,7 +342,7 @@ def _time(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "time", "none: the frames have only numbers; give --rate-hz if a command needs times"
     elif facts["from_us"] is not None:
         begin = _begin_us(facts)
-        yield "board time", f"{facts['from_us'] - begin} to {facts['to_us'] - begin} us ({facts['seconds']:.3f} s)"
+        yield "time", f"{facts['from_us'] - begin} to {facts['to_us'] - begin} us ({facts['seconds']:.3f} s)"
         if begin:
             yield "from", f"{begun(begin)}, {begin} us since 1970"
 

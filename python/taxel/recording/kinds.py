@@ -15,6 +15,7 @@ from taxel import _core
 from taxel._base.arguments import checked_path, flag, shown
 from taxel._base.arrays import ARRAYS, fields_of, records_in, stored_names
 from taxel._base.errors import refused
+from taxel._base.messages import warn
 from taxel._base.table_text import Text
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -158,8 +159,14 @@ def kinds(options: OpenOptions | None = None) -> Iterator[tuple[str, Kind]]:
 
 @cache
 def _from_elsewhere() -> dict[str, Kind]:
-    """Return the formats of other distributions."""
-    return {point.name: point.load() for point in entry_points(group="taxel.formats")}
+    """Return the formats of other distributions; warn of one that does not load."""
+    found = {}
+    for point in entry_points(group="taxel.formats"):
+        try:
+            found[point.name] = point.load()
+        except Exception as error:
+            warn(f"files of the format {point.name} are not read, as {point.value} does not load: {error}")
+    return found
 
 
 def _ending(*endings: str) -> Callable[[Path], bool]:
@@ -245,10 +252,11 @@ def check_recording(path: Path, layout: GivenLayout = None) -> None:
     ------
     FormatError : no recording; an invalid layout file; a table or arrays that can be read in two ways
     """
-    found = layout_of(path, layout)
-    match kind_of(path):
-        case None:
-            raise unknown(path)
+    found, kind = layout_of(path, layout), kind_of(path)
+    if kind is None:
+        raise unknown(path)
+    refuse_empty(path, kind)
+    match kind:
         case "mcap":
             _core.RecordingReader(path)
         case "csv":
@@ -335,13 +343,18 @@ def unknown(path: Path) -> FormatError:
     with open(path, "rb") as file:
         head = file.read(4)
     if not head:
-        return empty(path)
+        return _empty(path)
     describes = advice(path, "describe a table or an array of another program")
     known = f"{', '.join(ENDINGS)}, and of event cameras {', '.join(CAMERA)}"
     begins = " ".join(f"{byte:02X}" for byte in head)
     return FormatError(f"{path}, byte 0: starts with {begins}: not a recording; taxel reads {known}; {describes}")
 
 
-def empty(path: Path) -> FormatError:
-    """Return the error of an empty file."""
+def refuse_empty(path: Path, kind: str) -> None:
+    """Refuse a file without a byte, but for those of a recorder, which has begun."""
+    if path.is_file() and kind not in ("lsa", "mcap") and not path.stat().st_size:
+        raise _empty(path)
+
+
+def _empty(path: Path) -> FormatError:
     return FormatError(f"{path}: the file is empty; must be a recording")

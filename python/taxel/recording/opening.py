@@ -28,7 +28,6 @@ from taxel.recording.kinds import (
     OpenOptions,
     are_spike_trains,
     check_recording,
-    empty,
     files_in,
     is_folder,
     kind_of,
@@ -36,6 +35,7 @@ from taxel.recording.kinds import (
     layout_of,
     natural_order,
     recordings_in,
+    refuse_empty,
     unknown,
 )
 from taxel.recording.layout import apply_layout
@@ -190,8 +190,7 @@ def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[
     kind = kind_of(path)
     if kind is None:
         raise unknown(path)
-    if path.is_file() and kind not in ("lsa", "mcap") and not path.stat().st_size:
-        raise empty(path)
+    refuse_empty(path, kind)
     options.check(path, kind)
     before = path.stat()
     try:

@@ -19,6 +19,7 @@ from taxel._base.messages import collected
 from taxel._base.times import beginning_us
 from taxel._core import FormatError, ProblemError
 from taxel.calibration import Calibration, Load
+from taxel.calibration._loads import UNITS
 from taxel.frames import Frames
 from taxel.options import CalibrateOptions, GivenTare
 from taxel.recording import Recording
@@ -165,6 +166,8 @@ def _read(recording: Recording, tare: GivenTare | None) -> tuple[Frames, NDArray
     if values is None:
         raise ProblemError(f"{recording.path}: contains events without intensities, so there is nothing to calibrate")
     frames, rest, floor = values
+    if frames.unit in UNITS:
+        raise ProblemError(f"{recording.path}: is in {frames.unit} already; only ticks or counts are calibrated")
     if rest.source == "none" and recording.has_events:
         error = ProblemError(
             f"{recording.path}: the values of its taxels at rest are not known, because no half second is quiet"

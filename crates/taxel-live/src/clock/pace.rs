@@ -42,10 +42,14 @@ pub fn doubt(drift_ppm: f64, delay_us: f64, median_us: f64) -> Option<String> {
         wrong.push(format!("a median delay of {:.1} s", median_us / 1e6));
     }
     (!wrong.is_empty()).then(|| {
+        let how = if drift_ppm < -MOST_DRIFT_PPM {
+            "ran faster than its own clock, for example a file that is read at once"
+        } else {
+            "paused or ran slower than its own clock, for example an emulator on a busy machine"
+        };
         format!(
-            "{} is impossible for a clock. Either the sender paused or ran slower than its own clock, for example an \
-             emulator on a busy machine: then its times are right, but they do not match this computer's clock. Or \
-             its stamps were damaged",
+            "{} is impossible for a clock. Either the sender {how}: then its times are right, but they do not match \
+             this computer's clock. Or its stamps were damaged",
             wrong.join(" and ")
         )
     })
