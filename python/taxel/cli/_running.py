@@ -7,7 +7,7 @@ import os
 import sys
 import warnings
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import cyclopts
 
@@ -58,7 +58,7 @@ def run(app: cyclopts.App, words: list[str], path: str) -> NoReturn:
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _say_warning(message: Warning | str, *_where: object) -> None:
+def _say_warning(message: Warning | str, *_where: Any, **_line: Any) -> None:
     """Print a warning that the command does not gather, as a line without the place in the code."""
     say(f"taxel: warning: {message}", err=True)
 
