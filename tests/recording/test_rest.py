@@ -15,20 +15,22 @@ from taxel.recording.analysis.pressure import above_rest, series
 from taxel.recording.analysis.rest import by_unit
 
 
-def noisy(noise: float, seconds: float = 2.0) -> taxel.Events:
-    """A board of 12 x 16 taxels with nothing on it: an event where a value differs by more than 3 from the last one."""
-    rng = np.random.default_rng(7)
-    array = taxel.Array(12, 16)
-    rest = 48 + rng.normal(0, 2, array.shape)
-    last = np.rint(rest)
-    rows = [(0, x, y, True, last[y, x]) for y in range(12) for x in range(16)]
-    for frame in range(1, int(seconds * 5000)):
-        now = np.rint(rest + rng.normal(0, noise, rest.shape))
-        for y, x in np.argwhere(np.abs(now - last) > 3):
-            rows.append((200 * frame, x, y, now[y, x] > last[y, x], now[y, x]))
-            last[y, x] = now[y, x]
+def sent(frames: taxel.Frames) -> taxel.Events:
+    """Return what a board sends of frames: an event where a value differs by more than 3 from the last one."""
+    rows, last = [], np.full(frames.values.shape[1:], np.nan)
+    for at, frame in zip(frames.t, frames.values, strict=True):
+        for y, x in np.argwhere(~(np.abs(frame - last) <= 3)):
+            rows.append((at, x, y, not frame[y, x] < last[y, x], frame[y, x]))
+            last[y, x] = frame[y, x]
     t, x, y, p, ticks = map(np.array, zip(*rows, strict=True))
-    return taxel.Events(t, x, y, p, array=array, intensity=ticks.astype(int))
+    return taxel.Events(t, x, y, p, array=frames.array, intensity=ticks.astype(int))
+
+
+def noisy(noise: float) -> taxel.Events:
+    """Return two seconds of a board of 12 x 16 taxels with nothing on it."""
+    rng, array = np.random.default_rng(7), taxel.Array(12, 16)
+    values = np.rint(48 + rng.normal(0, 2, array.shape) + rng.normal(0, noise, (10_000, *array.shape)))
+    return sent(taxel.Frames(values, 200 * np.arange(10_000), unit="ticks", array=array))
 
 
 def test_a_board_with_nothing_on_it_reads_nothing(tmp_path: Path) -> None:
@@ -94,15 +96,7 @@ def preloaded(
     t = np.arange(len(values)) * (1_000_000 // hz)
     truth = {"contact": [int(t[k]) for k in contacts], "lift": [int(t[k + hz * 3 // 10]) for k in contacts]}
     frames = taxel.Frames(values, t, unit="ticks", array=taxel.Array(8, 10, 2.0))
-    if not events:
-        return frames, truth
-    rows, last = [], np.full(values.shape[1:], np.nan)
-    for at, frame in zip(t, values, strict=True):
-        for y, x in np.argwhere(~(np.abs(frame - last) <= 3)):
-            rows.append((at, x, y, not frame[y, x] < last[y, x], frame[y, x]))
-            last[y, x] = frame[y, x]
-    t, x, y, p, ticks = map(np.array, zip(*rows, strict=True))
-    return taxel.Events(t, x, y, p, array=frames.array, intensity=ticks.astype(int)), truth
+    return sent(frames) if events else frames, truth
 
 
 @pytest.mark.parametrize("until_s", [0.8, 2])
