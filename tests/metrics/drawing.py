@@ -1,5 +1,7 @@
 """Trains and patterns that several tests draw."""
 
+import itertools
+
 import numpy as np
 from hypothesis import strategies as st
 
@@ -26,3 +28,20 @@ def poisson(random, count, spikes, stop=1000.0):
 def pattern(random, trains, spikes, stop=100.0):
     """Draw one pattern."""
     return SpikeTrains.from_lists(poisson(random, trains, spikes, stop), 0.0, stop)
+
+
+def smoothed(train, t, tau):
+    """5.8 at these times."""
+    past = t[:, None] - np.asarray(train, float)[None, :]
+    return np.where(past >= 0, np.exp(-np.maximum(past, 0) / tau), 0.0).sum(1)
+
+
+def pieces(a, b, tau):
+    """Fine points between all steps, and on until nothing is left, and their weights (Gauss and Legendre)."""
+    x, w = np.polynomial.legendre.leggauss(12)
+    steps = np.unique(np.concatenate([a, b]))
+    last = steps[-1] if len(steps) else 0.0
+    edges = np.concatenate([np.linspace(p, q, 40) for p, q in itertools.pairwise(steps)] + [[last]])
+    edges = np.unique(np.concatenate([edges, last + tau * np.linspace(0, 60, 200)]))
+    half = np.diff(edges) / 2
+    return ((edges[:-1] + half)[:, None] + half[:, None] * x).ravel(), (half[:, None] * w).ravel()

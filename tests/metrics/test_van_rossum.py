@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
 import pytest
-from drawing import STOP, times
+from drawing import STOP, pieces, smoothed, times
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,31 +15,13 @@ from taxel.metrics import van_rossum
 taus = st.floats(0.01, 1000)
 
 
-def smoothed(train, t, tau):
-    """5.8 at these times."""
-    past = t[:, None] - np.asarray(train, float)[None, :]
-    return np.where(past >= 0, np.exp(-np.maximum(past, 0) / tau), 0.0).sum(1)
-
-
-def pieces(a, b, tau):
-    """Fine points between all steps, and on until nothing is left, and their weights (Gauss and Legendre)."""
-    x, w = np.polynomial.legendre.leggauss(12)
-    steps = np.unique(np.concatenate([a, b]))
-    last = steps[-1] if len(steps) else 0.0
-    edges = np.concatenate([np.linspace(p, q, 40) for p, q in itertools.pairwise(steps)] + [[last]])
-    edges = np.unique(np.concatenate([edges, last + tau * np.linspace(0, 60, 200)]))
-    half = np.diff(edges) / 2
-    return (edges[:-1] + half)[:, None] + half[:, None] * x, half[:, None] * w
-
-
 @pytest.mark.parametrize("tau", [0.5, 7.0, 300.0])
 def test_it_is_the_integral_that_quadrature_gives(tau):
     random = np.random.default_rng(3)
     for n, m in ((0, 1), (5, 0), (6, 9), (20, 20)):
         a, b = np.sort(random.uniform(0, 100, n)), np.sort(random.uniform(0, 100, m))
         t, w = pieces(a, b, tau)
-        difference = smoothed(a, t.ravel(), tau) - smoothed(b, t.ravel(), tau)
-        square = (difference**2 * w.ravel()).sum()
+        square = ((smoothed(a, t, tau) - smoothed(b, t, tau)) ** 2 * w).sum()
         assert van_rossum(a, b, tau=tau, normalisation="none") == pytest.approx(math.sqrt(square), rel=1e-9)
         assert van_rossum(a, b, tau=tau, normalisation="tau") == pytest.approx(math.sqrt(square / tau), rel=1e-9)
         assert van_rossum(a, b, tau=tau) == pytest.approx(math.sqrt(2 * square / tau), rel=1e-9)

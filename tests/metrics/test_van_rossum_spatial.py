@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from drawing import pattern
+from drawing import pattern, pieces, smoothed
 from refusal import refused
 
 from taxel import Array, SpikeTrains
@@ -15,10 +15,9 @@ from taxel.metrics import van_rossum, van_rossum_spatial
 ARRAY = Array(2, 3, pitch_mm=1.5)
 
 
-def smoothed(x, array, t, tau, sigma, own_train):
+def spread(x, array, t, tau, sigma, own_train):
     """5.11 at these times: one row a taxel."""
-    past = [t[:, None] - train[None, :] for train in x]
-    f = np.array([np.where(p >= 0, np.exp(-np.maximum(p, 0) / tau), 0.0).sum(1) for p in past])
+    f = np.array([smoothed(train, t, tau) for train in x])
     y, column = np.divmod(np.arange(array.rows * array.columns), array.columns)
     d = array.pitch_mm * np.hypot(y[:, None] - y, column[:, None] - column)
     g = np.exp(-d / sigma) @ f + (f if own_train == "twice" else 0)
@@ -27,17 +26,8 @@ def smoothed(x, array, t, tau, sigma, own_train):
 
 def plain(a, b, array, tau, sigma, own_train):
     """Sum over taxels of the integrals of the square, by a fine rule between all steps."""
-    nodes, weights = np.polynomial.legendre.leggauss(12)
-    steps = np.unique(np.concatenate([a.times, b.times]))
-    if not len(steps):
-        return 0.0
-    edges = np.unique(
-        np.concatenate([*np.linspace(steps[:-1], steps[1:], 30).T, steps[-1] + tau * np.arange(0, 60, 0.5)])
-    )
-    half = np.diff(edges) / 2
-    t = ((edges[:-1] + half)[:, None] + half[:, None] * nodes).ravel()
-    w = (half[:, None] * weights).ravel()
-    difference = smoothed(a, array, t, tau, sigma, own_train) - smoothed(b, array, t, tau, sigma, own_train)
+    t, w = pieces(a.times, b.times, tau)
+    difference = spread(a, array, t, tau, sigma, own_train) - spread(b, array, t, tau, sigma, own_train)
     return float((difference**2 @ w).sum())
 
 
