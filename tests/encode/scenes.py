@@ -1,5 +1,7 @@
 """Scenes for the encoders, and spikes as the oracles give them."""
 
+import json
+
 import numpy as np
 
 from taxel import Array, Events, Frames, Tare
@@ -75,3 +77,16 @@ def smooth(rng, n, period):
 
 def of(encoder, t, x):
     return encoder.encode(frames_of(np.rint(t * 1000).astype(int), np.asarray(x)[:, None]))[0]
+
+
+def some_tare(rng, array, noise, holes):
+    """A tare with noise of its own for each taxel, 0 for some; of some taxels nothing is known."""
+    of_each = noise * rng.random(array.shape) * (rng.random(array.shape) < 0.8)
+    readings = rng.normal(rng.uniform(40, 60, array.shape), of_each, (20, *array.shape))
+    there = np.ones(array.shape, bool) if array.exists is None else array.exists
+    readings = np.where(there, readings, 0)
+    tare = json.loads(Tare.take(Frames(readings, 192 * np.arange(20), unit="ticks", array=array)).to_json())
+    unknown = rng.random(there.size) < holes
+    for name in ("rest", "noise"):
+        tare[name] = [None if hole else value for hole, value in zip(unknown, tare[name], strict=True)]
+    return Tare.from_json(json.dumps(tare))

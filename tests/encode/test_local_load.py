@@ -1,17 +1,15 @@
 """Local load against NumPy, written from the definition: quantities in units of each taxel's own noise."""
 
-import json
-
 import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from refusal import refused
 
-from taxel import Array, Frames, Tare
+from taxel import Array, Frames
 from taxel.encode import LocalLoad
 
 from . import scenes
-from .scenes import rest, spikes_of, touch
+from .scenes import rest, some_tare, spikes_of, touch
 
 REPAIRED = "read"
 #: Examples for the laws of all encoders (test_laws.py).
@@ -112,18 +110,6 @@ class Oracle:
         windows = [(now, 0, 3), (now, 2, 10), (of_rest, 0, 10), (of_rest, 0, 50)]
         past = [[mean(self.t, rows, k, *ages) for k in range(len(now))] for rows, *ages in windows]
         return np.concatenate([now, *past, np.ones((len(now), 1))], axis=1)
-
-
-def some_tare(rng, array, noise, holes):
-    """A tare with noise of its own for each taxel, 0 for some; of some taxels nothing is known."""
-    of_each = noise * rng.random(array.shape) * (rng.random(array.shape) < 0.8)
-    readings = rng.normal(rng.uniform(40, 60, array.shape), of_each, (20, *array.shape))
-    readings = np.where(array.exists, readings, 0)
-    tare = json.loads(Tare.take(Frames(readings, 192 * np.arange(20), unit="ticks", array=array)).to_json())
-    unknown = rng.random(array.exists.size) < holes
-    for name in ("rest", "noise"):
-        tare[name] = [None if hole else value for hole, value in zip(unknown, tare[name], strict=True)]
-    return Tare.from_json(json.dumps(tare))
 
 
 @settings(max_examples=settings.default.max_examples // 2, deadline=None)

@@ -1,7 +1,5 @@
 """Moments against NumPy and SciPy: area, total, peak and the way of the centre, through levels in equal ratios."""
 
-import json
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,11 +7,11 @@ from hypothesis import strategies as st
 from refusal import refused
 
 import taxel
-from taxel import Array, Frames, Tare
+from taxel import Array, Frames
 from taxel.encode import Moments
 
 from . import oracles, scenes
-from .scenes import rest, spikes_of, wander
+from .scenes import rest, some_tare, spikes_of, wander
 
 ARRAY = Array(3, 4, 2.0)
 RANGES = {"area": (1, 12), "total": (3.0, 400.0), "peak": (2.0, 90.0), "displacement_mm": (0.1, 5.0)}
@@ -56,15 +54,6 @@ def turned(encoder):
     return np.concatenate([parts[:, order].ravel(), trains[parts.size :]])
 
 
-def some_rest(rng, array, unknown=0.1):
-    """A tare of taxels that rest at fractions of ticks; of some nothing is known."""
-    still = rng.uniform(50, 60, array.shape)
-    tare = Tare.take(Frames(np.stack([still, still]), [0, 1000], unit="ticks", array=array))
-    holes = rng.random(array.shape) < unknown
-    values = [None if hole else value for hole, value in zip(holes.ravel(), tare.rest.ravel().tolist(), strict=True)]
-    return Tare.from_json(json.dumps(json.loads(tare.to_json()) | {"rest": values}))
-
-
 @settings(deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
@@ -81,7 +70,7 @@ def test_moments_and_ages_are_those_of_numpy_and_scipy(seed, levels, left_out, f
         ages = [0]
     rng = np.random.default_rng(seed)
     array = Array(5, 7, 2.67)
-    tare = some_rest(rng, array)
+    tare = some_tare(rng, array, 0.0, 0.1)
     t = 77 + np.cumsum(rng.choice([192, 100, 3333], 150))
     frames = wander(rng, 150, 35).reshape(150, 5, 7).astype(np.float32)
     frames[rng.random(150) < 0.1] = 40  # touches end and new ones begin
