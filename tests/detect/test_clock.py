@@ -37,11 +37,6 @@ def late(random: np.random.Generator) -> tuple[Kinds, list[tuple[float, float, i
     return both([t + 320.0 for t in true], true), [(320.0, 1.0, 40)]
 
 
-def late_in_part(random: np.random.Generator) -> tuple[Kinds, list[tuple[float, float, int]]]:
-    true = edges(random, hold_ms=(300.0, 450.0))
-    return both([t + 210.0 * (t >= true[0][8]) for t in true], true), [(210.0, 1.0, 24)]
-
-
 def jumped(random: np.random.Generator) -> tuple[Kinds, list[tuple[float, float, int]]]:
     true = edges(random, 24)
     return both([t - 1500.0 * (t >= true[0][14]) for t in true], true), [(-1500.0, 1.0, 20)]
@@ -72,7 +67,7 @@ def in_recordings(random: np.random.Generator) -> tuple[Kinds, list[tuple[float,
     return {f"{k}": (np.array([t + 130.0]), np.array([t])) for k, t in enumerate(true)}, [(130.0, 1.0, 30)]
 
 
-SITUATIONS = (late, late_in_part, jumped, of_one_name, of_other_rate, by_hand, in_recordings)
+SITUATIONS = (late, jumped, of_one_name, of_other_rate, by_hand, in_recordings)
 
 
 def off(kinds: Kinds) -> list[ClockFit]:
