@@ -3,9 +3,20 @@
 //! The stages are *receive*, *decode*, *record* and *read out* (`stages`). One thread runs them all, and passes them to
 //! another thread before it calls a sink (`threads`). While a recording runs, which a disk may delay, there are
 //! separate threads for receiving ([`crate::capture`]), for decoding with recording, and for reading out; reading out
-//! also has its own thread if it is slower than the events arrive. The queues between the threads are bounded, and what
-//! does not fit is counted where it was lost. Viewers receive copies ([`Handle::counters`], [`Handle::frame`]) and cannot
-//! slow the pipeline.
+//! also has its own thread if it is slower than the events arrive. Viewers receive copies ([`Handle::counters`],
+//! [`Handle::frame`]) and cannot slow the pipeline.
+//!
+//! The queues between the threads are bounded. They differ in what a full one costs, so that none can stand for another:
+//!
+//! | queue | from, to | bound | when it is full |
+//! |---|---|---|---|
+//! | `capture/queue` | receiving, or a source of frames, to decoding | bytes | datagrams are dropped and counted; a source waits |
+//! | `readout_queue` | decoding to a readout in its own thread | events | events are dropped and counted; silences and zeroings never |
+//! | `output` | who found a detection to who outputs one now | detections | the newest is lost and counted |
+//! | [`Live::next`], [`Handle::detections`] | output to a caller | detections | this caller alone misses the newest |
+//! | `sending` | output to a destination's thread | lines | the newest is lost and counted; late ones too |
+//! | `viewer_queue` | decoding to a viewer | changes | this viewer misses changes, and gets the held values instead |
+//! | `recording/mcap_writer/write_queue` | all threads to the disk | bytes | who records waits, and nothing is lost |
 
 mod counters;
 mod decode_stage;
