@@ -9,6 +9,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import IO, Any, cast
 
@@ -59,11 +60,6 @@ class Text:
         self.ends_in_line = True
 
     @property
-    def source(self) -> Any:
-        """What pandas reads: the path, or a text in memory."""
-        return self.path if self.is_file else io.StringIO(self._sheet)
-
-    @property
     def encoding(self) -> str:
         """The encoding: by a byte-order mark, else UTF-8, else Windows-1252 or Latin-1 if the beginning is none."""
         if not self._encoding:
@@ -72,46 +68,52 @@ class Text:
             self._encoding = _encoding(self.path, head)
         return self._encoding
 
-    def as_latin_1(self) -> None:
-        """Read the text as Latin-1, as a later part of it is not UTF-8."""
+    def as_latin_1(self, error: UnicodeDecodeError) -> None:
+        """Read the text as Latin-1, as a later part of it is not UTF-8.
+
+        Raises
+        ------
+        FormatError : it is of another encoding
+        """
+        if not self.encoding.startswith("utf-8"):
+            why = f"not text in {self.encoding.upper()} ({error.reason}); save it as UTF-8"
+            raise unreadable(why, self.path) from None
         self._encoding = "latin-1"
 
     def lines(self) -> Iterator[str]:
         """Yield all lines without their ends."""
-        if not self.is_file:
-            yield from self._sheet.splitlines()
-            return
-        with self._opened() as text:
-            for line in text:
-                self.ends_in_line = line.endswith("\n")
-                yield line.rstrip("\n")
+        count = 0
+        with self.opened() as text:
+            try:
+                for line in text:
+                    self.ends_in_line = line.endswith("\n")
+                    yield line.rstrip("\n")
+                    count += 1
+                return
+            except UnicodeDecodeError as error:
+                self.as_latin_1(error)
+        yield from islice(self.lines(), count, None)
 
     @cached_property
     def head(self) -> list[str]:
         """The first lines; the last of them is whole, if the text goes on."""
         lines, count = list[str](), 0
-        for line in self._until_damage():
+        for line in self.lines():
             if count > _MORE or (count > _HEAD and len(lines) >= _FEW_LINES):
                 break
             lines.append(line)
             count += len(line) + 1
         return lines
 
-    def _until_damage(self) -> Iterator[str]:
-        try:
-            yield from self.lines()
-        except UnicodeError:
-            self.as_latin_1()
-
     @contextmanager
-    def _opened(self) -> Iterator[io.TextIOWrapper]:
+    def opened(self) -> Iterator[IO[str]]:
+        """Open the text at its first line; a line feed ends each line."""
+        if not self.is_file:
+            yield io.StringIO(self._sheet)
+            return
         errors = "replace" if self.encoding == "cp1252" else "strict"
         with self._bytes() as file, io.TextIOWrapper(file, self.encoding, errors) as text:
-            try:
-                yield text
-            except UnicodeDecodeError as error:
-                why = f"not text in {self.encoding.upper()} ({error.reason}); save it as UTF-8"
-                raise unreadable(why, self.path) from None
+            yield text
 
     @contextmanager
     def _bytes(self) -> Iterator[IO[bytes]]:

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,7 @@ _HEX = re.compile(r"(?:0x)?(?:[0-9A-Fa-f]{2})+")
 _HEX_LETTER = re.compile(r"(?<![\w.])(?:0x)?[0-9]*[A-Fa-f][0-9A-Fa-f]*(?![\w.])")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """Hold the lines of a text as one form reads them."""
 
@@ -63,15 +64,25 @@ class Fit:
         """The number of the first line of numbers, from 0."""
         return self.lines[self.body[0]][0]
 
-    def cells(self, column: int) -> list[str]:
+    @cached_property
+    def _columns(self) -> list[tuple[str, ...]]:
+        return list(zip(*(self.lines[k][1].cells for k in self.body), strict=True))
+
+    @cached_property
+    def _numbers(self) -> dict[int, NDArray[np.float64]]:
+        return {}
+
+    def cells(self, column: int) -> tuple[str, ...]:
         """Return the cells of a column in the lines that are frames."""
-        return [self.lines[k][1].cells[column] for k in self.body]
+        return self._columns[column]
 
     def numbers(self, column: int) -> NDArray[np.float64]:
         """Return the numbers of a column; NaN for other cells."""
-        marks = self.decimal, self.thousands
-        cells = self.cells(column)
-        return np.array([number_of(cell, *marks) if is_number(cell, *marks) else np.nan for cell in cells])
+        if column not in self._numbers:
+            marks = self.decimal, self.thousands
+            numbers = [number_of(cell, *marks) if is_number(cell, *marks) else np.nan for cell in self.cells(column)]
+            self._numbers[column] = np.array(numbers)
+        return self._numbers[column]
 
     def ascends(self, column: int) -> bool:
         """Return whether a column ascends as times do, of which some may repeat, wrap or be out of order."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from array import array
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -25,7 +25,7 @@ from taxel.formats.checks import around
 from taxel.formats.column_names import AXES, axes_of
 from taxel.formats.form import Form
 from taxel.formats.layout import Layout
-from taxel.formats.lines import MISSING, OTHER, WITH_THOUSANDS, OddLines, is_number
+from taxel.formats.lines import MISSING, OTHER, WITH_THOUSANDS, OddLines, is_number, read_line
 from taxel.formats.opened import readers_of, sources_of
 from taxel.formats.table_columns import EVENT_COLUMNS
 from taxel.formats.table_form import form_of
@@ -36,7 +36,7 @@ from taxel.reading import InMemory
 
 ENDINGS = (*TEXTS, *SHEETS)
 #: Cells that pandas converts at once.
-_CELLS = 1 << 22
+_CELLS = 1 << 21
 _NUMBER = re.compile(r"[-+]?\d+(?:[.,]\d+)?")
 #: The least and the largest value of the columns of events.
 _EVENTS = {"x": (0, 65_534), "y": (0, 65_534), "p": (-1, 1), "intensity": (0, 65_535), "repaired": (0, 1)}
@@ -177,8 +177,8 @@ def _at_once(text: Text, form: Form, ends_empty: bool) -> Rows | None:
                 # A line with two cells more.
                 warnings.simplefilter("error", pd.errors.ParserWarning)
                 return _parsed(text, form, ends_empty)
-        except UnicodeDecodeError:
-            text.as_latin_1()
+        except UnicodeDecodeError as error:
+            text.as_latin_1(error)
         except (ValueError, OverflowError, pd.errors.ParserWarning):  # of pandas' parser too
             return None
     return None
@@ -189,39 +189,42 @@ def _parsed(text: Text, form: Form, ends_empty: bool) -> Rows | None:
     import pandas as pd  # noqa: PLC0415  takes long
 
     how, count, taxels, times = form.table, len(form.names), list(form.taxels), list(form.columns.times)
-    beside = _beside(form)
+    beside, mark = _beside(form), how.separator
     # Kinds of numbers that are stated, not found, take pandas half as long again.
     kinds: dict[int, Any] = {k: str for k in beside.values() if k not in times or how.time_unit == ISO}
     missing = list(form.missing)
-    cells = dict.fromkeys(range(count + 1), missing)
+    # Separators may end lines; a later line with more cells than the first is an error to pandas.
+    first = read_line(text.head[form.first], "plain", mark)
+    width = max(count, len(first.cells) if first is not None else 0)
+    cells = dict.fromkeys(range(width), missing)
     if not ends_empty:
         # A cell that is not there is as an empty one to pandas, which then is no number.
         cells[count - 1] = [cell for cell in missing if cell]
     places: Any = slice(taxels[0], taxels[-1] + 1) if taxels[-1] - taxels[0] + 1 == len(taxels) else taxels
-    chunks = pd.read_csv(
-        text.source,
-        sep=r"\s+" if how.separator == " " else how.separator,
-        skiprows=form.first,
-        encoding=text.encoding if text.is_file else None,
-        header=None,
-        names=range(count + 1),
-        index_col=False,
-        dtype=kinds,
-        decimal=how.decimal,
-        na_values=cells,
-        keep_default_na=False,
-        skipinitialspace=True,
-        # An empty line may not be within a frame of so many lines.
-        skip_blank_lines=how.frame_lines is None,
-        chunksize=max(1, _CELLS // (count + 1)),
-        low_memory=False,
-    )
     values, others = list[NDArray[np.float32]](), list[Any]()
     # A value that 32 bits do not hold is infinite.
-    with chunks, np.errstate(over="ignore"):
+    with text.opened() as file, np.errstate(over="ignore"):
+        # Rows that pandas skips take it a third longer, and so do blanks, which no number needs to be without.
+        deque(islice(file, form.first), 0)
+        chunks = pd.read_csv(
+            file,
+            sep=r"\s+" if mark == " " else mark,
+            header=None,
+            names=range(width),
+            index_col=False,
+            dtype=kinds,
+            decimal=how.decimal,
+            na_values=cells,
+            keep_default_na=False,
+            skipinitialspace=mark != " " and any(f"{mark} " in f"{mark}{line}" for line in text.head),
+            # An empty line may not be within a frame of so many lines.
+            skip_blank_lines=how.frame_lines is None,
+            chunksize=max(1, _CELLS // width),
+            low_memory=False,
+        )
         for chunk in chunks:
             part = chunk.iloc[:, places]
-            is_odd = bool(chunk[count].notna().any() or (chunk[count - 1] == "").any())
+            is_odd = bool(chunk.iloc[:, count:].notna().any(axis=None) or (chunk[count - 1] == "").any())
             if is_odd or any(kind.kind not in "iuf" for kind in part.dtypes):
                 return None
             block = part.to_numpy(np.float32)

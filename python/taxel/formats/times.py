@@ -70,7 +70,7 @@ def is_time(cell: str) -> bool:
 
 def is_day(cell: str) -> bool:
     """Return whether a text is a date without a time."""
-    return _IS_DAY.fullmatch(cell) is not None
+    return len(cell) >= _SHORTEST_DATE and _IS_DAY.fullmatch(cell) is not None
 
 
 def seconds_of(cell: str) -> float:
