@@ -155,6 +155,36 @@ ROWS: dict[str, tuple[str, list[int], list[list[float]]]] = {
         [0, 20_000, 40_000],
         [[7], [8], [9]],
     ),
+    "the year first, with slashes": (
+        "time,a\n2024/5/1 10:00:00.5,1\n2024/5/1 10:00:00.6,2\n",
+        [1_714_557_600_500_000, 1_714_557_600_600_000],
+        [[1], [2]],
+    ),
+    "a month by its name": (
+        "time,a\n01-May-2024 10:00:00.5,1\n01-May-2024 10:00:00.6,2\n",
+        [1_714_557_600_500_000, 1_714_557_600_600_000],
+        [[1], [2]],
+    ),
+    "a clock in whole seconds and one in ms": (
+        "LABEL,Time,Millis,F1\n" + "".join(f"DATA,10:00:0{k // 4},{250 * k},{k % 3}\n" for k in range(9)),
+        [250_000 * k for k in range(9)],
+        [[k % 3] for k in range(9)],
+    ),
+    "times of ROS in two columns": (
+        "sec,nsec,p\n" + "".join(f"7,{k}00000000,{k % 3}\n" for k in range(9)),
+        [7_000_000 + 100_000 * k for k in range(9)],
+        [[k % 3] for k in range(9)],
+    ),
+    "a colon behind the time": (
+        "".join(f"0.{k}: Force: {k}.5 N, 2 N\n" for k in range(9)),
+        [100_000 * k for k in range(9)],
+        [[k + 0.5, 2] for k in range(9)],
+    ),
+    "columns of another unit, and a sum": (
+        "Zeit;Ferse;Knie (°);Total Force (N)\n0,00;1;2,5;1\n0,01;3;2,6;3\n",
+        [0, 10_000],
+        [[1], [3]],
+    ),
     "separators at the end": ("t_s,a,b\n0,1,2,\n1,3,4,\n", [0, 1_000_000], [[1, 2], [3, 4]]),
 }
 
@@ -204,6 +234,12 @@ def test_one_line_says_how_it_was_read_and_what_was_left_out(tmp_path: Path, tex
         ("t,l0_x,l0_y,l0_z,l1_x,l1_y,l1_z\n0,1,2,30,4,5,60\n", ['axis = "z"', 'axis = "all"', 'axis = "shear"']),
         (JSON_AXES, ['axis = "z"', 'axis = "all"', 'axis = "shear"']),
         ("t_ms;a;b\n0;0,5;0.513\n10;0,6;0.5\n", ['leave_out = ["a"]']),
+        ("t_ms,a,b\n" + "".join(f"{k},{k % 3},{k % 20} # ok\n" for k in range(30)), ['leave_out = ["b"]']),
+        ("time,a\n0:10,1\n0:20,2\n0:30,1\n", ['time_unit = "iso"']),
+        (
+            "epoch,a\n" + "".join(f"{1717225200123 + k // 2 * 20},{k}\n" for k in range(9)),
+            ['time_column = "epoch"', "frame_lines = 2"],
+        ),
         ("t_ms,a [N],b [V]\n0,1,2\n10,3,4\n", None),
         ("t_ms,a [N],b [kPa]\n0,1,2\n10,3,4\n", ['unit = "N"', 'unit = "kPa"']),
         ("t_ms,a\n" + "0,1\n0,2\n10,3\n10,4\n20,5\n20,6\n30,7\n30,8\n", ["", "frame_lines = 2"]),
@@ -282,9 +318,17 @@ def test_times_rounded_to_seconds_are_spread_at_one_rate(tmp_path: Path) -> None
     assert np.diff(frames(opened(tmp_path, text, rounded))[0]).tolist() == [100_000] * 29
 
 
+ROWS_OF_JSON = [{"t": k / 50, "p": [k, 7]} for k in range(9)]
+
+
 @pytest.mark.parametrize("indent", [None, 1])
-def test_a_document_of_json_that_is_a_list_is_its_lines(tmp_path: Path, indent: int | None) -> None:
-    document = json.dumps([{"t": k / 50, "p": [k, 7]} for k in range(9)], indent=indent)
+@pytest.mark.parametrize(
+    "content",
+    [ROWS_OF_JSON, {"rate": 50, "frames": ROWS_OF_JSON}, {key: [row[key] for row in ROWS_OF_JSON] for key in "tp"}],
+    ids=["rows", "rows within", "columns"],
+)
+def test_a_document_of_json_is_the_rows_in_it(tmp_path: Path, indent: int | None, content: object) -> None:
+    document = json.dumps(content, indent=indent)
     assert frames(opened(tmp_path, document, name="a.json")) == (
         [20_000 * k for k in range(9)],
         [[k, 7] for k in range(9)],
@@ -342,6 +386,8 @@ def test_a_column_of_labels_is_chosen_by_an_option_and_named_where_it_is_a_chann
         ("t_s,a\n0,1e39\n1,2\n", None, 2),
         ("t_s,a\n0,1\n9e99,2\n", None, None),
         ("1,2\n3,4\n\n5,6\n", "[table]\nframe_lines = 3", 4),
+        ('{"a": {"t": 0, "p": [1, 2]}, "b": {"t": 1, "p": [3, 4]}}\n', None, None),
+        ("time,a\n01/02/2024 10:00:00,1\n01/02/2024 10:00:01,2\n", None, None),
     ],
 )
 def test_what_is_no_table_or_another_one_than_its_layout_says_is_refused(
@@ -388,6 +434,9 @@ def test_a_letter_in_latin_1_far_below(tmp_path: Path) -> None:
     rows = "".join(f"{k},{k % 9},ok\n" for k in range(0, 200_000, 10))
     found = opened(tmp_path, f"t_ms,a,note\n{rows}200000,3,müde\n".encode("latin-1"))
     assert len(found.sources[""]) == 20_001
+    marked = "".join(f"t:{k} a:{k % 9}\n" for k in range(0, 200_000, 10))
+    found = opened(tmp_path, f"{marked}t:200000 a:3 müde\n".encode("latin-1"))
+    assert len(found.sources[""]) == 20_000
 
 
 @pytest.mark.parametrize("code", ["utf-16-le", "utf-16-be"])
@@ -412,6 +461,11 @@ def test_spreadsheets_and_parquet_open(tmp_path: Path, ending: str, dates: bool)
     assert np.diff(t).tolist() == [10_000] * 11
     assert t[0] == (1_714_557_600_000_000 if dates else 0)
     assert values == [[k / 4, k] for k in range(12)]
+    if ending == ".parquet" and dates:
+        # Times that are the index, which has no name.
+        named = tmp_path / "b.parquet"
+        table.set_index("time").rename_axis(None).to_parquet(named)
+        assert frames(opened_by(read_table, named, None)) == (t, values)
     assert "note left out: texts" in found.said
     again = opened_by(read_table, path, of_layout(found.layout))
     assert again.sources == found.sources

@@ -129,11 +129,11 @@ class Text:
 
     @cached_property
     def _rows(self) -> list[Any]:
-        """The objects or lists of a document of JSON that is a list of them; none of another file."""
+        """The objects or lists of a document of JSON that is a list of them, or has one; none of another file."""
         if self.path.suffix.lower() != ".json":
             return []
         try:
-            document = json.loads(self.path.read_bytes())
+            document = _rows_in(json.loads(self.path.read_bytes()))
         except ValueError:
             return []
         are_rows = isinstance(document, list) and all(isinstance(row, dict | list) for row in document)
@@ -154,7 +154,7 @@ class Text:
         try:
             if self.path.suffix.lower() == ".parquet":
                 table = pd.read_parquet(self.path)
-                named = table.reset_index() if table.index.name or table.index.nlevels > 1 else table
+                named = table if type(table.index) is pd.RangeIndex else table.reset_index()
                 return str(named.to_csv(sep="\t", index=False))
             sheets = pd.read_excel(self.path, sheet_name=None, header=None, dtype=object)
         except ImportError:
@@ -164,6 +164,15 @@ class Text:
             raise damaged(self.path, f"{self.path.suffix} file", first_line(error)) from None
         largest = max(sheets.values(), key=lambda sheet: sheet.notna().to_numpy().sum(), default=pd.DataFrame())
         return str(largest.map(_cell).to_csv(sep="\t", index=False, header=False))
+
+
+def _rows_in(document: Any) -> Any:
+    """Return the rows of a document of JSON: itself, its only list, or those of its lists, which are columns."""
+    lists = {key: value for key, value in document.items() if isinstance(value, list)} if type(document) is dict else {}
+    if len(lists) < 2:
+        return next(iter(lists.values()), document)
+    same = len({*map(len, lists.values())}) == 1
+    return [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)] if same else document
 
 
 def _cells(column: NDArray[Any]) -> NDArray[Any]:

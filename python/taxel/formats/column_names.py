@@ -23,7 +23,7 @@ _SHORT_UNIT_OF_TIME = "|".join(_UNITS_OF_TIME[unit][k] for unit in ("s", "ms", "
 _TIME = (
     r"t|ts|(?:%|rel|abs|host|device|sample|frame|recv|unix|epoch|system|header)?[ ._]*(?:time|stamp|time[ _]?stamp)s?"
     r"|elapsed(?:[ _]time)?|(?:mess|uhr|system)?zeit(?:stempel|punkt)?|temps|tiempo|tempo|tijd|tid"
-    r"|datetime|date[ _]time|clock|ticks?|millis|micros|ms|msec|us|usec|n(?:ano)?secs?|secs?|seconds|sekunden"
+    r"|datetime|date[ _]time|epoch|clock|ticks?|millis|micros|ms|msec|us|usec|n(?:ano)?secs?|secs?|seconds|sekunden"
 )
 #: Names of columns that hold times, with or without a unit: time, timestamp_us, Time (ms), t [s].
 _TIMES = re.compile(
@@ -62,19 +62,21 @@ _KEYS = re.compile(
 _OTHERS = re.compile(
     r"(?:[agm][ ._]?[xyz])|(?:.*[ ._])?"
     r"(?:acc(?:el(?:eration)?)?|gyro?(?:scope)?|mag(?:netometer)?|imu|temp(?:erature)?|temperatur|"
+    r"(?:total|sum|net|mean|avg|average|summe|gesamt)[ ._-]?(?:force|load|weight|pressure|kraft|last|druck)|"
     r"batt?(?:ery)?|akku|vbat|hum(?:idity)?|lat(?:itude)?|lon(?:gitude)?|quat(?:ernion)?|roll|pitch|yaw|crc|checksum|cop|total|sum|summe)"
     r"(?:[ ._\[(]*(?:x|y|z|w|\d+)[\])]?)?(?:[ ._]?[\[(][^\])]*[\])])?",
     re.IGNORECASE,
 )
 #: A cell that says a unit, as N, [kPa] or (m/s^2).
 _UNITS = re.compile(r"[\[(]?[^\d\s\[\]()]{0,8}[²³2]?[\])]?")
-#: A unit of a force, a pressure or a voltage that ends a name behind a low line or alone: thumb_mN, mV.
+#: A unit of a force, a pressure or a voltage that ends a name behind a low line, "in" or alone: thumb_mN, mV.
 _BARE = r"[mk]?N|kgf?|gf|[hkM]?Pa|m?bar|psi|mmHg|[mµu]?V"
-_BARE_UNIT = re.compile(rf"(?:^|(?<=_))({_BARE})$")
+_BARE_UNIT = re.compile(rf"(?:^|(?<=_)|(?<= in ))({_BARE})$")
 #: A unit behind the number of a cell: 12.3N, 5 ms.
 UNIT_BEHIND = re.compile(rf"(?<=\d) ?({_BARE}|{_SHORT_UNIT_OF_TIME}|min|N/cm[2²]|%|°C|g|mm)(?![\w/])")
 _IN_BRACKETS = re.compile(r"[\[(]\s*([^\s\d\[\]()][^\s\[\]()]{0,7})\s*[\])]$")
 _FORCES = re.compile(r"[mk]?N|kgf?|gf?|[hkM]?Pa|m?bar|psi|N/(?:cm|mm|m)[²2]|mmHg|counts|raw|adc", re.IGNORECASE)
+_OTHER_UNITS = re.compile(r"°[CF]?|deg(?:/s)?|rad(?:/s)?|dps|m/s(?:\^?[2²])?|Hz|bpm", re.IGNORECASE)
 _AXIS = re.compile(r"(.+?)[ _.\-]?[\[(]?([xyzXYZ])[\])]?(?: *[\[(][^\])]*[\])])?")
 _AXIS_OF_LIST = re.compile(r"(.+)\[([012])\]")
 _PLACE = re.compile(r"\D*?(\d+)\D+(\d+)\D*")
@@ -136,9 +138,9 @@ def names_taxels(name: str) -> bool:
     return _OF_TAXELS.fullmatch(last_part(name)) is not None
 
 
-def is_other(name: str) -> bool:
-    """Return whether a column is of another quantity than force or pressure: acc_x, Battery [%]."""
-    return _OTHERS.fullmatch(last_part(name)) is not None
+def is_other(name: str, unit: str = "") -> bool:
+    """Return whether a column is of another quantity than force or pressure: acc_x, Battery [%], a knee in °."""
+    return _OTHERS.fullmatch(last_part(name)) is not None or _OTHER_UNITS.fullmatch(unit) is not None
 
 
 def unit_of(name: str) -> str:

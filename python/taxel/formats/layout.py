@@ -45,7 +45,8 @@ class Table:
         them; default: none.
     time_unit : {"s", "ms", "us", "ns", "min", "h", "iso"}
         "iso": texts as of ISO 8601, dates with times, of UTC where they state no zone, or times of a day;
-        days with points (01.05.2024 10:15:02,010) too, and, with AM or PM, with slashes, the month first.
+        days with points (01.05.2024 10:15:02,010), with slashes and the year first (2024/5/1 10:15:02) and with the
+        month by its name (01-May-2024 10:15:02) too, and, with AM or PM, with slashes, the month first.
     missing : str, optional
         A further cell without a value, beside those of `taxel.formats.lines.MISSING`.
     thousands : str, optional

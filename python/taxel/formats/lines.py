@@ -31,13 +31,13 @@ _NUMBERS = {
     ".": re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII),
     ",": re.compile(r"[+-]?(?:\d+(?:,\d+)?|,\d+)(?:[eE][+-]?\d+)?", re.ASCII),
 }
-_ARROW = re.compile(r"[-=~]+>|:=")
+_ARROW = re.compile(r"[-=~]+>|:=|(?<=\d):(?=\s)")
 _MARKS = str.maketrans(dict.fromkeys("[](){}<>|\"'", " "))
 _BETWEEN = {".": re.compile(r"[\s,;]+"), ",": re.compile(r"[\s;]+")}
 #: A name before a number or a bracket, which a colon or an equals sign ends.
 _NAME = re.compile(r"(?<![\w.])[\"']?([^\W\d][\w.%/-]*(?:\[\d+\])*)[\"']?\s*[:=]\s*(?=[-+.\d\[({\"'])")
 #: The blank between a day and a time, which separates no cells.
-_DAY = re.compile(r"(\d{4}-\d\d-\d\d|\d\d?\.\d\d?\.\d{4}) +(?=\d\d?:\d\d)")
+_DAY = re.compile(r"(\d{4}-\d\d-\d\d|\d{4}/\d\d?/\d\d?|\d\d?\.\d\d?\.\d{4}|\d\d?-[A-Z][a-z]{2}-\d{4}) +(?=\d\d?:\d\d)")
 
 
 def has_marks(line: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,12 +18,14 @@ from taxel.formats.form import places_of
 from taxel.formats.layout import Table
 from taxel.formats.line_fits import Fit
 from taxel.formats.lines import MISSING, OTHER, is_number
-from taxel.formats.times import ISO, unit_of_times
+from taxel.formats.times import ISO, is_of_two_numbers, unit_of_times
 
 #: So many lines show that an unnamed column ascends as times do, and that one counts lines.
 _ASCENDS, _COUNTS = 8, 20
 #: So many different texts are names of sensors, not remarks.
 _KEYS = 16
+#: A number with other text behind it, which is no date, time or address.
+_GLUED = re.compile(r"[-+]?\d+(?:[.,]\d+)?[ \t]*[^\s\d:/.,-]")
 #: Names of the columns of events.
 EVENT_COLUMNS = {"col": "x", "column": "x", "row": "y", "pol": "p", "polarity": "p", "on": "p"}
 #: What is changed in a layout: keys of it or of its table; `left` and `read` are columns more to leave out, or fewer.
@@ -79,9 +82,10 @@ def time_of(draft: Draft, *, is_stated: bool) -> int | None:
             scores[k] = 3 + is_called + 2 * fit.ascends(k)
         elif fit.types[k] == "time":
             scores[k] = 3
-        elif draft.table.frame_time is None and fit.count > 1 and _rises(fit, k) and fit.epoch(k):
+        elif draft.table.frame_time is None and fit.count > 1 and fit.ascends(k) and fit.epoch(k):
             scores[k] = 2
-    column = max(scores, key=lambda k: (scores[k], -k), default=None)
+    # Of two clocks one may be in whole seconds.
+    column = max(scores, key=lambda k: (scores[k], 2 * len(set(fit.cells(k))) > len(fit.body), -k), default=None)
     draft.left.update(dict.fromkeys((k for k in scores if k != column and scores[k] >= 4), "another time"))
     if column is None and draft.table.frame_time is None and not is_stated and fit.kind != "hex":
         column = _unnamed_time(draft)
@@ -89,6 +93,10 @@ def time_of(draft: Draft, *, is_stated: bool) -> int | None:
         return None
     unit = ISO if fit.types[column] == "time" else _unit_of_time(draft, column)
     draft.set(time_column=draft.called(column), time_unit=unit)
+    if unit == ISO and all(map(is_of_two_numbers, fit.cells(column))):
+        example = fit.cells(column)[-1]
+        why = f"{example} may be hours and minutes, or minutes and seconds, which must be written 0:{example:0>5}"
+        draft.ask(why, {"hours and minutes": {}})
     seconds = next((k for k in (column, column - 1) if _has_nanoseconds(draft, k)), None)
     if seconds is None:
         return column
@@ -111,7 +119,8 @@ def _has_nanoseconds(draft: Draft, column: int) -> bool:
 
 def ask_for_lines_of_one_time(draft: Draft, time: int) -> None:
     """Ask whether lines that have the same time are those of one frame."""
-    cells = draft.fit.cells(time)
+    places = places_of(draft.names, "time_column", draft.table.time_column or time + 1)
+    cells = [*zip(*map(draft.fit.cells, places), strict=True)]
     begins = [k for k in range(len(cells)) if k == 0 or cells[k] != cells[k - 1]]
     sizes = set(np.diff(begins).tolist())
     if len(begins) > 2 and len(sizes) == 1 and (size := sizes.pop()) > 1 and not draft.table.has_lines:
@@ -203,6 +212,9 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[str]:
             why = f"decimal {marks[other == ',']} in column {called}, {marks[other == '.']} in others"
             draft.ask(f"{why}; save it with one", {f"without {called}": {}})
             yield "decimal marks that others have not"
+        if not is_time and not few and all(map(_GLUED.match, cells)):
+            called = draft.called(column)
+            draft.ask(f"column {called} has numbers with other text, as {cells[0]!r}", {f"without {called}": {}})
         in_turn = 3 * sum(a != b for a, b in pairwise(cells)) > len(cells)
         is_whole = len(cells) == len(fit.body) and not column_names.is_label(name)
         is_key = is_whole and few and (column_names.is_key(name) or (in_turn and len(set(cells)) > 1))
@@ -222,7 +234,7 @@ def _reasons(draft: Draft, column: int, first: int) -> Iterator[str]:
     if column_names.is_key(name) and whole:
         # Lines of one time may be of many taxels.
         yield _key(draft, column) if few or 2 * len(set(cells)) <= len(cells) else "a counter"
-    yield "another quantity" * column_names.is_other(name)
+    yield "another quantity" * column_names.is_other(name, draft.units[column])
 
 
 def _key(draft: Draft, column: int) -> str:

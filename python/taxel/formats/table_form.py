@@ -45,6 +45,7 @@ _ABOVE_FRAME = re.compile(
     r"(?:[ \t,;:@(\[]+(?:t|time)?[ \t=:]*(?P<time>\d+(?:[.,]\d+)?)[ \t]*(?P<time_unit>[mun]?s)?[)\]]?)?[ \t,;]*",
     re.IGNORECASE,
 )
+_ONE_DOCUMENT = "is one document of JSON; save a line of JSON per frame, or a .csv"
 _PLACE_IN_LIST = re.compile(r"\[\d+\]")
 #: The mark of a comment before names.
 _COMMENT = re.compile(r"(?:#+|(?:[%;!*]|//)+(?=\s|$))\s*")
@@ -123,7 +124,7 @@ def _as_it_looks(text: Text, layout: Layout, label_column: str | int | None) -> 
     """Return the form of a table that fits its first lines best, and the layout that states it."""
     lines = text.head
     if text.path.suffix.lower() == ".json" and not any(read_line(line, "json") for line in lines[:3]):
-        raise unreadable("is one document of JSON; save a line of JSON per frame, or a .csv", text.path)
+        raise unreadable(_ONE_DOCUMENT, text.path)
     begin, units = _begin_of_frames(lines)
     is_begin = [bool(begin) and line.lstrip().startswith(begin) for line in lines]
     shown_lines = ["" if above else line for line, above in zip(lines, is_begin, strict=True)]
@@ -134,6 +135,8 @@ def _as_it_looks(text: Text, layout: Layout, label_column: str | int | None) -> 
     if not fits:
         why = "contains no table of numbers; if it has one, describe it in [table] of a layout file (docs/files.md)"
         raise unreadable(why, text.path)
+    if fits[0].kind == "json" and len(fits[0].lines) == 1:
+        raise unreadable(_ONE_DOCUMENT, text.path)
     _refuse_lines_above(text, fits[0])
     draft = draft_of(fits[0], shown_lines)
     other = next((fit for fit in fits[1:] if _fits_as_well(fit, fits[0], size)), None)
@@ -402,10 +405,12 @@ def _with_size(layout: Layout, draft: Draft, taxels: Sequence[int]) -> Layout:
 
 def _refuse(text: Text, layout: Layout, draft: Draft) -> NoReturn:
     """Refuse a table that can be read in two ways, with the layout of each."""
+    unread = [draft.called(k) for k, why in draft.left.items() if why.startswith("times in")]
+    if unread and draft.table.time_column is None:
+        right = "write them as 2024-05-01T10:00:00.25, or state rate_hz and leave_out in a layout file"
+        raise unreadable(f"column {unread[0]} has times in a form that taxel does not read; {right}", text.path)
     why, choices = draft.asked[0]
     also = "".join(f"; also open: {other}" for other, _ in draft.asked[1:])
-    unread = [draft.names[k] for k, why in draft.left.items() if why.startswith("times in")]
-    also += "".join(f"; {name} has times in a form that taxel does not read" for name in unread)
     ways = f"can be read in {len(choices)} ways ({why})" if len(choices) > 1 else why
     refuse_to_choose(text.path, f"{ways}{also}", {name: _changed(layout, each) for name, each in choices.items()})
 

@@ -32,7 +32,12 @@ UNITS_US = {**FOUND_US, "min": 60e6, "h": 3600e6}
 ISO = "iso"
 
 _CLOCK = r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+|:\d{3})?|[.,]\d+)?"
-_DATE = r"(?:\d{4}-\d\d-\d\d|\d{1,2}\.\d{1,2}\.\d{4})"
+#: The date with hyphens, or with slashes and the year first; with points; with an English month, as MATLAB has it.
+_MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
+_DATE = (
+    r"(?:\d{4}-\d\d-\d\d|\d{4}/\d{1,2}/\d{1,2}|\d{1,2}\.\d{1,2}\.\d{4}"
+    rf"|\d{{1,2}}-(?:{'|'.join(_MONTHS)})-\d{{4}})"
+)
 #: The half of the day of a clock of twelve hours, and the day with slashes before it, which is month, day and year.
 _HALF, _ENDS = r" ?([AP])\.?M\.?", ("M", "m", ".")
 _HALF_DAY = re.compile(
@@ -42,6 +47,9 @@ _IS_TIME = re.compile(rf"(?:{_DATE}[T ])?{_CLOCK}(?:Z|[+-]\d\d:?\d\d)?")
 _IS_DAY = re.compile(_DATE)
 _DAY_US = 86_400_000_000
 _DAY_WITH_POINTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(?:[ T]+(\S+))?", re.ASCII)
+_YEAR_FIRST = re.compile(r"(\d{4})/(\d{1,2})/(\d{1,2})(?=[T ]|$)", re.ASCII)
+_MONTH_BY_NAME = re.compile(rf"(\d{{1,2}})-({'|'.join(_MONTHS)})-(\d{{4}})(?=[T ]|$)", re.ASCII)
+_TWO_NUMBERS = re.compile(r"\d{1,2}:\d\d", re.ASCII)
 _TIME_OF_DAY = re.compile(r"\d?\d:.*|\d{6}(?:[.,+Z-].*)?", re.ASCII)
 #: Minutes and seconds with a fraction, and hours to seconds with milliseconds behind a colon.
 _MINUTES, _COLON_MS = re.compile(r"(?=\d?\d:\d\d[.,])"), re.compile(r"(?<=:\d\d:\d\d):(?=\d{3})")
@@ -68,6 +76,11 @@ def is_time(cell: str) -> bool:
     return _IS_TIME.fullmatch(cell) is not None or (cell[-1:] in _ENDS and _HALF_DAY.fullmatch(cell) is not None)
 
 
+def is_of_two_numbers(cell: str) -> bool:
+    """Return whether a time is of hours and minutes, or as well of minutes and seconds."""
+    return _TWO_NUMBERS.fullmatch(cell) is not None
+
+
 def is_day(cell: str) -> bool:
     """Return whether a text is a date without a time."""
     return len(cell) >= _SHORTEST_DATE and _IS_DAY.fullmatch(cell) is not None
@@ -76,8 +89,9 @@ def is_day(cell: str) -> bool:
 def seconds_of(cell: str) -> float:
     """Return the seconds since 1970, or of the day, of a text of ISO 8601 or a day with points; NaN of any other text.
 
-    Days with points are day, month and year (DIN 5008). Days with slashes are read where AM or PM follows, as month,
-    day and year: else their order differs by country. Without a zone a time is of UTC. Six digits of a fraction count.
+    Days with points are day, month and year (DIN 5008). Days with slashes are read where the year is first, or where AM
+    or PM follows, as month, day and year: else their order differs by country. Without a zone a time is of UTC. Six
+    digits of a fraction count.
 
     Examples
     --------
@@ -87,12 +101,18 @@ def seconds_of(cell: str) -> float:
     (86400.5, 62.5, nan)
     >>> seconds_of("1/2/1970 12:00:30 AM"), seconds_of("01.01.1970 1:00:00.5 PM"), seconds_of("1:00 am")
     (86430.0, 46800.5, 3600.0)
+    >>> seconds_of("1970/1/2 00:00:00.5"), seconds_of("02-Jan-1970 00:00:01")
+    (86400.5, 86401.0)
     """
     if cell[-1:] in _ENDS and (half := _HALF_DAY.fullmatch(cell)):
         month, day, year, other, clock, of_day = half.groups()
         date = f"{day}.{month}.{year} " if month else other or ""
         hour = clock.partition(":")[0]
         return seconds_of(f"{date}{clock}") + 43_200 * ((of_day in "pP") - (hour == "12"))
+    if cell[4:5] == "/":
+        cell = _YEAR_FIRST.sub(r"\3.\2.\1", cell)
+    elif "-" in cell[1:3]:
+        cell = _MONTH_BY_NAME.sub(lambda day: f"{day[1]}.{_MONTHS.index(day[2]) + 1}.{day[3]}", cell)
     colon = cell.find(":")
     if colon == 1 or (colon > 1 and not cell[colon - 2].isdigit()):
         cell = f"{cell[: colon - 1]}0{cell[colon - 1 :]}"
