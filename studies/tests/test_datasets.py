@@ -25,7 +25,8 @@ def test_taxel_opens_a_data_set_by_its_entry_point_with_its_truth_as_notes(name:
     found, opened = list(trials(MODULES[name], tmp_path)), taxel.open_all(path)
     sensors = [source for each in opened for source in each.sources.values()]
     assert [each.kind for each in opened] == [name] * len(opened)
-    assert [each.frames() for each in sensors] == [trial.frames for trial in found]
+    as_opened = plate.begun_unloaded if name == "plate" else lambda trial: trial
+    assert [each.frames() for each in sensors] == [as_opened(trial).frames for trial in found]
     for each, trial in zip(sensors, found, strict=True):
         expected = sorted((int(t), event) for event, times in trial.truth.items() for t in times)
         assert sorted((note.t, note.text) for note in each.notes) == expected
@@ -76,6 +77,15 @@ def test_the_truth_of_the_plate_follows_its_rules_or_a_table(tmp_path: Path) -> 
     first, told = plate.trials(path)
     assert first.truth["contact"] == contact
     assert told.truth["contact"].tolist() == [6000]
+
+
+def test_the_plate_is_opened_unloaded_before_its_first_load(tmp_path: Path) -> None:
+    for trial in plate.trials(making.write_plate(tmp_path)):
+        frames = plate.begun_unloaded(trial).frames
+        loaded = frames.t[frames.values.any(axis=(1, 2))]
+        assert loaded[0] == trial.truth["contact"][0]
+        assert frames.t[0] == loaded[0] - 600_000
+        assert set(np.diff(frames.t).tolist()) == {plate.FRAME_US}
 
 
 @pytest.mark.parametrize("name", ["GaCo99_01.txt", "SiPt01_01.txt.gz"])

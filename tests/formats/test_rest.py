@@ -17,10 +17,11 @@ from taxel.recording.analysis.rest import of_frames
 
 from .making import SHARED
 
-#: Where the rest of each shared recording is known from. The plate's footfalls, here of one subject, begin at contact
-#: and end at foot-off; of gaitndd's single channels, which have an offset, some stood still without a load first.
+#: Where the rest of each shared recording is known from. The plate's footfalls, here of one subject, begin
+#: unloaded, as it starts itself; of gaitndd's single channels, which have an offset, some stood still without a load
+#: first.
 EXPECTED = {
-    "plate": {"none": 60},
+    "plate": {"quiet": 60},
     "insole_gaitpdb": {"unit": 48},
     "insole_moticon": {"unit": 4},
     "insole_fscan": {"unit": 1},

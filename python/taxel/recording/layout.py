@@ -104,7 +104,7 @@ def _apply_layout(source: SourceView, layout: Layout, *, given: bool) -> SourceV
             raise FormatError(
                 f"{layout.path}: zeros_before_s needs times, but {name} has none; to give times, write rate_hz"
             )
-        frames = _after_zeros(frames, layout.zeros_before_s)
+        frames = after_zeros(frames, layout.zeros_before_s)
     turned = was if full is None else full
     return SourceView(same.in_memory(frames, timed=not untimed, turned=turned))
 
@@ -169,7 +169,7 @@ def _read(table: Frames, layout: Layout, full: float | None, name: str, *, stric
     return Frames(values, t, unit=unit, array=table.array)
 
 
-def _after_zeros(frames: Frames, seconds: float) -> Frames:
+def after_zeros(frames: Frames, seconds: float) -> Frames:
     """Return frames with frames of 0 before the first, so long, where the first is loaded; later times stay."""
     if len(frames) < _LEAST or not np.any(frames.values[0]):
         return frames

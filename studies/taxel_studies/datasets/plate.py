@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +18,18 @@ from numpy.typing import NDArray
 
 from taxel import Array, FormatError, Frames
 from taxel.reading import InMemory
+from taxel.recording.layout import after_zeros
 from taxel_studies.datasets import Trial, readers, table
 
-__all__ = ["COLUMN_MM", "FRAME_US", "ROW_MM", "events", "knows", "read", "sensor_rows", "trials"]
+__all__ = ["COLUMN_MM", "FRAME_US", "ROW_MM", "begun_unloaded", "events", "knows", "read", "sensor_rows", "trials"]
 
 #: Time between frames, us.
 FRAME_US = 2000
 #: Pitch of the sensors along the walk and across it, mm: that of the usual footscan plate, inferred from the
 #: interpolation of three rows from two.
 ROW_MM, COLUMN_MM = 7.62, 5.08
+#: So long before its first load the plate is read as unloaded, s: long enough for its rest to be known.
+BEFORE_S = 0.6
 _EVENTS = ("contact", "heel_off", "foot_off")
 
 _SOURCE = (
@@ -44,8 +48,18 @@ def knows(path: Path) -> bool:
 
 
 def read(path: Path, _layout: Any = None) -> list[InMemory]:
-    """Return a reader of each footfall, for `taxel.open`."""
-    return readers(path, "plate", trials(path))
+    """Return a reader of each footfall, for `taxel.open`, each unloaded before it begins."""
+    return readers(path, "plate", map(begun_unloaded, trials(path)))
+
+
+def begun_unloaded(trial: Trial) -> Trial:
+    """Return a footfall with frames of 0 before its first load.
+
+    The plate starts itself at the first load, so that the frames before it, which the file lacks, are 0: without them
+    no sensor would be seen to be loaded at contact, and its rest would not be known.
+    """
+    first = int(trial.frames.values.any(axis=(1, 2)).argmax())
+    return replace(trial, frames=after_zeros(trial.frames[first:], BEFORE_S))
 
 
 def trials(path: Path) -> Iterator[Trial]:
