@@ -164,7 +164,7 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
     --------
     >>> recipe = for_labels(read("gait_plate"), ["Heel-off", "step"])
     >>> {label: neuron["tau"] for label, neuron in recipe["neurons"].items()}
-    {'Heel-off': 70.0, 'step': 40.0}
+    {'Heel-off': 70.0, 'step': 10.0}
     """
     if not {"fits", "other"} & set(values):
         return values
