@@ -53,7 +53,8 @@ def rows(found):
     return list(zip(found.label.tolist(), found.t.tolist(), found.known.tolist(), slopes, strict=True))
 
 
-def test_each_fold_is_scored_by_what_is_better_inside_its_training_data():
+def pressed_channels():
+    """Return examples of two channels that are pressed together, each time as hard."""
     draw, examples = np.random.default_rng(2), []
     for _ in range(4):
         values = np.zeros((600, 1, 2))
@@ -62,11 +63,30 @@ def test_each_fold_is_scored_by_what_is_better_inside_its_training_data():
             values[begin : begin + 20] = 9.0
         frames = Frames(values, 10_000 * np.arange(600), unit="N", array=taxel.Array(1, 2))
         examples.append(Example(frames, {"on": 10_000 * begins}, taxel.Tare.take(frames, stop_us=400_000)))
+    return examples
+
+
+def test_each_fold_is_scored_by_what_is_better_inside_its_training_data():
+    examples = pressed_channels()
     # Levels that nothing reaches: its neuron never fires.
     recipe = Recipe(LevelCrossing([5.0]), {"tau": 2.0, "ub": 0.0, "lb": 0.0, "delay_ms": 1.0})
     judged = judge(examples, recipe, 4)
     assert judged.by_rule == ("on",)
     assert (judged.neurons.found, judged.plain.together.found, judged.together.found) == (0, 36, 36)
+
+
+@pytest.mark.parametrize(("delay_ms", "fits"), [(5.0, 2), (30.0, 0)])
+def test_no_neuron_is_fitted_to_lose_to_a_rule_without_mistakes_that_knows_before_it_may_fire(
+    delay_ms, fits, monkeypatch
+):
+    fitted = []
+    best = Fitter._best
+    monkeypatch.setattr(Fitter, "_best", lambda *how: fitted.append(how[1]) or best(*how))
+    recipe = Recipe(LevelCrossing([5.0]), {"tau": 2.0, "ub": 2.0, "refractory": 100.0, "delay_ms": delay_ms})
+    fitter = Fitter(pressed_channels(), recipe)
+    # A frame is known at its end, 10 ms later.
+    assert fitter.by_rule(fitter.whole) == ("on",)
+    assert fitted == ["on"] * fits
 
 
 @pytest.mark.parametrize(

@@ -206,12 +206,15 @@ class Fitter:
     def fit(self, parts: Sequence[Part] | None = None) -> Trained:
         """Return neurons and rules of parts of the examples, by default of all; the neurons run."""
         parts = self.whole if parts is None else parts
+        return self._fit(parts, self.rules(parts))
+
+    def _fit(self, parts: Sequence[Part], rules: Rules) -> Trained:
+        """Return the neurons of the labels that rules are given for, beside these rules; the neurons run."""
         plan = self._recipe
-        rules = self.rules(parts)
         learners: dict[str, ConeR | TrainedNeuron] = {}
         delays, alignments = {}, {}
         points: dict[str, Mapping[str, Any]] = {}
-        for label in self.labels:
+        for label in rules:
             try:
                 best = self._best(label, parts, rules[label])
             except ProblemError as error:
@@ -251,16 +254,40 @@ class Fitter:
             halves = [fold for fold in split(self.examples, parts, 2) if self._has_all(fold.train)]
         except ProblemError:
             halves = []
+        folds = halves or [Fold(parts, parts)]
+        tuned = [self.rules(fold.train) for fold in folds]
+        sure = self._surely_by_rule(folds, tuned)
+        if not (others := [label for label in self.labels if label not in sure]):
+            return self.labels
         found: list[Found] = []
         parts_found: list[Part] = []
-        for fold in halves or [Fold(parts, parts)]:
+        for fold, rules in zip(folds, tuned, strict=True):
+            compared = {label: rules[label] for label in others}
             with collected(), contextlib.suppress(ProblemError):
-                trained = self.fit(fold.train)
+                trained = self._fit(fold.train, compared)
                 tested = [self.scored(part) for part in fold.test]
                 found += [self.detected(trained, part) for part in tested]
                 parts_found += tested
         each = ([one.by_neurons for one in found], [one.by_rules for one in found])
-        return better_by_rule(self.labels, *(self.scores(way, parts_found) for way in each)) if found else ()
+        better = better_by_rule(others, *(self.scores(way, parts_found) for way in each)) if found else ()
+        return tuple(label for label in self.labels if label in sure or label in better)
+
+    def _surely_by_rule(self, folds: Sequence[Fold], tuned: Sequence[Rules]) -> frozenset[str]:
+        """Return the labels that no neuron detects better than rules do, so that none needs to be fitted.
+
+        A rule makes no mistake in what it did not learn from, and knows before the neuron is trained to fire.
+        """
+        tested = [[self.scored(part) for part in fold.test] for fold in folds]
+        by_rules = [self._by_rules(rules, part) for rules, each in zip(tuned, tested, strict=True) for part in each]
+        score = self.score(by_rules, [part for each in tested for part in each])
+
+        def is_sure(label: str) -> bool:
+            one, (_, delay_ms) = score.by_label[label], self._recipe.learner_of(label)
+            received = self._recipe._received(self._recipe.points_of(label)[0].values)
+            fires_ms = received.latency_ms + delay_ms
+            return not one.rank[0] and len(one.delays_ms) > 0 and bool(np.median(one.delays_ms) <= fires_ms)
+
+        return frozenset(label for label in self.labels if label in score.by_label and is_sure(label))
 
     def _has_all(self, parts: Sequence[Part]) -> bool:
         """Whether parts have an event of each label."""
