@@ -331,6 +331,22 @@ def test_zeros_come_before_a_first_frame_that_is_loaded_and_once(
     assert taxel.open(folder / "again.npz").frames() == led.frames()
 
 
+def test_a_training_on_trials_that_begin_loaded_at_a_label_names_zeros_before(tmp_path: Path) -> None:
+    values = np.zeros((60, 4, 4))
+    values[:30, 1:3, 1:3] = 9.0
+    frames = Frames(values, 10_000 * np.arange(60), unit="N", array=taxel.Array(4, 4))
+    labels = []
+    for name in "abcd":
+        taxel.convert(frames, tmp_path / f"{name}.npz")
+        labels.append({"contact": [0], "lift": [300_000]})
+    warned = taxel.train(taxel.open_all(tmp_path), labels).warnings
+    assert any(line.startswith("4 of 4 recordings begin loaded, at a label") for line in warned)
+    (tmp_path / "layout.toml").write_text("zeros_before_s = 0.6\n")
+    led = taxel.train(taxel.open_all(tmp_path), labels)
+    assert led.score.found == 8
+    assert not any("begin loaded" in line for line in led.warnings)
+
+
 def test_zeros_before_frames_without_times_or_before_events_are_refused(tmp_path: Path) -> None:
     with pytest.raises(
         FormatError, match=r"zeros_before_s needs times, but \S+ has none; to give times, write rate_hz"

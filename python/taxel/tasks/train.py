@@ -155,7 +155,7 @@ def _train(
 
 
 def _check(opened: Sequence[Recording], labelled: Sequence[Mapping[str, NDArray[np.int64]]]) -> None:
-    """Refuse events without intensities; warn of a channel that is one of labels."""
+    """Refuse events without intensities; warn of a channel that is one of labels, and of trials that begin loaded."""
     for each, events in zip(opened, labelled, strict=True):
         table = recorded(each)
         if isinstance(table, Events) and table.intensity is None:
@@ -167,6 +167,19 @@ def _check(opened: Sequence[Recording], labelled: Sequence[Mapping[str, NDArray[
         if len(like) == 1:
             right = "if it holds labels, not readings, leave it out (leave_out in a layout file)"
             warn(f"{each.name}: {like[0]} alone changes with the labels and hardly else; {right}")
+    begun = sum(_begins_with_label(recorded(each), events) for each, events in zip(opened, labelled, strict=True))
+    if 2 * begun > len(opened):
+        warn(
+            f"{begun} of {counted(len(opened), 'recording')} begin loaded, at a label, which no sensor can show: if "
+            "the load began the recording, write zeros_before_s = 0.6 in a layout file, to train and to detect"
+        )
+
+
+def _begins_with_label(table: Events | Frames, events: Mapping[str, NDArray[np.int64]]) -> bool:
+    """Whether the first frame is loaded, and a label is not later."""
+    if not isinstance(table, Frames) or not len(table):
+        return False
+    return bool(np.any(table.values[0])) and any(np.any(times <= table.t[0]) for times in events.values())
 
 
 def _constants(examples: Sequence[Example], update: Progress) -> dict[str, float]:
