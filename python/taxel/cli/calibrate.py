@@ -8,8 +8,10 @@ from typing import Annotated
 from cyclopts import Parameter
 
 import taxel
+from taxel._base.arguments import text
 from taxel._base.files import beside, named
 from taxel._core import ProblemError
+from taxel.calibration._loads import UNITS
 from taxel.cli._task import OutOption, Output, progress, say_warnings
 from taxel.cli.app import App, Flat
 from taxel.options import CalibrateOptions, Reading
@@ -60,6 +62,7 @@ def calibrate(
         raise ProblemError("--from and --to give the time of --load: give --load too")
     if start is not None and stop is not None and start > stop:
         raise ProblemError(f"--from {start} and --to {stop} s: --from must not be after --to")
+    text("load_unit", load_unit, UNITS)
     opened = reading.open_one(recording)
     file = beside(recording, f"{named(recording).stem}.calibration.json") if out is None else out
     output.check(file)

@@ -38,7 +38,7 @@ def convert(
     /,
     target: OutArgument,
     *,
-    frames: Annotated[float | None, Parameter(metavar="HZ")] = None,
+    frames_hz: Annotated[float | None, Parameter(name="--frames", metavar="HZ")] = None,
     part: SourceOption = None,
     compression: str = "none",
     workers: Flat[Workers] = Workers(),
@@ -60,14 +60,14 @@ def convert(
     target
         The new file; its extension gives the format. Without an extension, or for several recordings: a folder, with a
         new .mcap of each recording.
-    frames
+    frames_hz
         Write frames at this rate instead of events (not .lsa).
     compression
         Compression of a .mcap: none, lz4 or zstd.
     """
     from taxel.recording.kinds import is_folder, recordings_in  # noqa: PLC0415  the command line starts quickly
 
-    how: dict[str, Any] = {"frames_hz": frames, "compression": compression, "overwrite": output.overwrite}
+    how: dict[str, Any] = {"frames_hz": frames_hz, "compression": compression, "overwrite": output.overwrite}
     work = partial(_converted, reading, part, how, target)
     files = recordings_in(source, reading.layout) if source.exists() and is_folder(source) else []
     if not target.suffix and len(files) > 1:
