@@ -186,3 +186,15 @@ def test_an_end_of_stream_begins_anew_but_counts_on():
         assert len(decoder.push(oracle.word("change", 60_000, 1, 1))) == 0
         assert decoder.finish().t.tolist() == [6_000_000]
     assert decoder.counts.words == 2
+
+
+def test_events_hold_no_memory_that_can_change_nor_much_for_few():
+    word = bytes.fromhex("c000050304 e000280304")
+    for data in (100 * word, word + bytes(10_000)):
+        events = wire.decode(data)
+        for name in ("t", "x", "y", "p", "intensity", "present"):
+            part, held = getattr(events, name), 0
+            while isinstance(part, np.ndarray):
+                assert not part.flags.writeable, name
+                part, held = part.base, part.nbytes
+            assert held <= 8 * 16 * 2 * len(events), name

@@ -6,9 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.columns import frozen
+from taxel._base.columns import frozen_whole
 from taxel.array import Array
 from taxel.events import Events
 
@@ -16,17 +17,38 @@ from taxel.events import Events
 #: at the first write to each small page costs more than the write itself.
 _LARGE = 1 << 22
 
+#: Below this number of rows, columns are parts of one memory, which is freed as large as it was allocated: the C
+#: library then keeps it for the next piece of a stream. Columns that shrink to what was written return to the system.
+_PIECE = _LARGE // 4
+
+#: Parts of which less than this share was written are copied, so that few events do not hold much memory.
+_LEAST_WRITTEN = 1 / 8
+
 
 def filled(array: Array, rows: int, fill: Callable[[tuple[Any, ...]], _core._Filled]) -> Events:
     """Return the events that `fill` writes into new columns with room for a number of rows."""
-    room = max(rows, _LARGE) if rows >= _LARGE // 4 else rows
-    t = np.empty(room, np.int64)
-    x, y, ticks = np.empty(room, np.uint16), np.empty(room, np.uint16), np.empty(room, np.uint16)
-    p, present = np.empty(room, np.bool_), np.empty(room, np.bool_)
+    t, x, y, ticks, p, present = columns = _parts(rows) if rows < _PIECE else _columns(max(rows, _LARGE))
     written = fill((t, x, y, ticks, p.view(np.uint8), present.view(np.uint8)))
-    for column in (t, x, y, ticks, p, present):
-        # What was not written is freed.
-        column.resize(written["rows"], refcheck=False)
-        frozen(column)
+    n = written["rows"]
+    if rows >= _PIECE:
+        for column in columns:
+            column.resize(n, refcheck=False)
+    elif n < _LEAST_WRITTEN * rows:
+        columns = [column[:n].copy() for column in columns]
+    t, x, y, ticks, p, present = (frozen_whole(column[:n]) for column in columns)
     intensity, stated = (ticks, present) if written["paired"] else (None, None)
     return Events._unchecked(t, x, y, p, array, intensity, stated, written["repaired"], tuple(written["markers"]))
+
+
+def _columns(rows: int) -> list[NDArray[Any]]:
+    """Return columns with a memory each."""
+    return [np.empty(rows, dtype) for dtype in (np.int64, np.uint16, np.uint16, np.uint16, np.bool_, np.bool_)]
+
+
+def _parts(rows: int) -> list[NDArray[Any]]:
+    """Return columns in one memory, the widest first."""
+    memory = np.empty(16 * rows, np.uint8)
+    t = memory[: 8 * rows].view(np.int64)
+    x, y, ticks = (memory[k * rows : (k + 2) * rows].view(np.uint16) for k in (8, 10, 12))
+    p, present = memory[14 * rows : 15 * rows].view(np.bool_), memory[15 * rows :].view(np.bool_)
+    return [t, x, y, ticks, p, present]
