@@ -67,6 +67,22 @@ def test_hundreds_that_say_solved_fire_at_their_targets_and_nowhere_else(kind):
         judged(*KINDS[kind](seed), simulated=kind not in LONG)
 
 
+@pytest.mark.parametrize(
+    ("kind", "seed", "verdict"),
+    [
+        # A spike 1 ns early lowered the next threshold, and moved the next spike by more; or it let an input count.
+        ("before", 54, "solved"),
+        ("close", 622, "solved"),
+        # Silence just before a target was parallel to the target's row to within rounding.
+        ("before", 125, "infeasible"),
+        ("before", 1498, "solved"),
+        ("before", 2226, "solved"),
+    ],
+)
+def test_inputs_within_a_nanosecond_before_a_target_leave_nothing_undecided(kind, seed, verdict):
+    assert judged(*KINDS[kind](seed), simulated=False) == verdict
+
+
 def test_what_is_undecided_at_the_least_margin_is_stopped_and_says_why():
     # One input, and the target at the very top of its kernel: it touches the threshold, and no margin can be kept.
     trains = SpikeTrains.from_lists([[10.0]], stop=60.0)

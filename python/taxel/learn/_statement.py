@@ -17,6 +17,8 @@ from taxel.spikes import SpikeTrains
 
 #: An input this far from the end of a refractory time counts as at it, and a spike this far from its target, ms.
 AT_EDGE = 1e-6
+#: The end of the silence before a target: how long before it, ms, in continuous time and on a grid.
+BEFORE_TARGET, BEFORE_TARGETS_POINT = 0.1 * AT_EDGE, 0.99 * AT_EDGE
 #: Grid points that are computed at once.
 BLOCK = 256
 _Floats = NDArray[np.float64]
@@ -186,7 +188,8 @@ class PatternRows:
     def until(self, t: _Floats) -> _Floats:
         """Return the end of the silence before the next target."""
         target = self.following(t)
-        return np.minimum(target - 0.99 * AT_EDGE, np.nextafter(target, -np.inf))
+        before = BEFORE_TARGETS_POINT if self.on_grid else BEFORE_TARGET
+        return np.minimum(target - before, np.nextafter(target, -np.inf))
 
     def threshold(self, t: _Floats) -> _Floats:
         """Return the threshold at these times (6.8), mV."""

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.errors import refused
 from taxel.learn._checked import checked_examples, fitted
-from taxel.learn._statement import AT_EDGE, PatternRows, pattern_rows
+from taxel.learn._statement import AT_EDGE, BEFORE_TARGET, PatternRows, pattern_rows
 from taxel.learn.cone_r import ConeR
 from taxel.learn.cone_x import ConeX, Margin
 from taxel.spikes import SpikeTrains
@@ -172,6 +172,6 @@ def _instants(rows: PatternRows) -> _Floats:
     counts = np.ceil(_INSTANTS * lengths / tau).astype(np.int64) + 1
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     even = np.repeat(edges[:-1], counts) + within * np.repeat(lengths / counts, counts)
-    before = (targets[:, None] - np.geomspace(AT_EDGE, 1.0, _INSTANTS)).ravel()
+    before = (targets[:, None] - np.geomspace(BEFORE_TARGET, 1.0, _INSTANTS)).ravel()
     t = np.unique(np.concatenate([even, edges[-1:], before]))
     return t[rows.is_silent(t)]

@@ -6,8 +6,8 @@ use super::cone_r::GapMultipliers;
 use super::exact::{Exact, MOST_ROUNDS, Slopes};
 use crate::learn::engines::{DualActiveSet, Multipliers, RowId, SolveOutcome};
 use crate::learn::fit::{Left, Round};
-use crate::learn::statement::{Bounds, Certificate, Norm, Row, SilencePeak, Statement};
-use crate::vectors::dot;
+use crate::learn::statement::{Bounds, Certificate, Norm, Row, SilencePeak};
+use crate::vectors::{add, dot};
 use crate::{Result, Stop, problem};
 
 /// Cuts demand the full margin, but only violations of this share of it are cut: a cut then also settles the instants
@@ -17,6 +17,8 @@ const ASKED_SHARE: f64 = 0.999;
 /// satisfy the worst rows often satisfy the others.
 const ENTER_SHARE: f64 = 0.4;
 const ENTER_LEAST: usize = 100;
+/// A row of silence this close before a target, in `tau`, is nearly parallel to the target's row.
+const BESIDE: f64 = 1e-4;
 /// Proofs of at most this many rows are reduced until every row is needed.
 const FEW: usize = 60;
 
@@ -51,7 +53,7 @@ impl Exact {
             let before = std::mem::replace(&mut weights, working.engine.weights().to_vec());
             let end = match verdict {
                 SolveOutcome::Infeasible(ray) => self
-                    .refutation(name_rows(&working.names, &ray.multipliers), stop)?
+                    .refutation(working.name_rows(&ray.multipliers), stop)?
                     .map_or(RowGenerationEnd::Stopped, RowGenerationEnd::Infeasible),
                 SolveOutcome::Stopped => RowGenerationEnd::Stopped,
                 SolveOutcome::Optimal => {
@@ -61,7 +63,7 @@ impl Exact {
                     progress(Round { round: rounds, rows, objective, left: Left::Broken(broken.len()) });
                     let flat = working.flat(&weights, (1.0 - ASKED_SHARE) * self.statement.margin.slope);
                     let ended = rounds == MOST_ROUNDS || stop.asked();
-                    if !ended && weights != before && working.cut(&self.statement, &broken, &flat)? {
+                    if !ended && weights != before && working.cut(&broken, &flat)? {
                         continue;
                     }
                     // Row generation ends once rounds no longer change the weights; `report` checks whether the rows
@@ -73,7 +75,7 @@ impl Exact {
                     }
                 }
             };
-            let held = name_rows(&working.names, &working.engine.multipliers());
+            let held = working.name_rows(&working.engine.multipliers());
             return Ok(Shortest { weights, held, rounds, end });
         }
     }
@@ -121,7 +123,9 @@ impl Exact {
             };
         }
         let SolveOutcome::Infeasible(ray) = engine.solve(stop)? else { return Ok(None) };
-        Certificate::check(&self.statement, &self.objective.bounds, name_rows(rows, &ray.multipliers))
+        let mut named: Vec<(Row, f64)> = ray.multipliers.iter().map(|&(id, u)| (rows[id.index()], u)).collect();
+        named.sort_by_key(|(row, _)| !matches!(row, Row::Target { .. }));
+        Certificate::check(&self.statement, &self.objective.bounds, named)
     }
 
     /// A lower bound on the l2 term by any multipliers, from the minimum of the Lagrangian of `|w|^2 / 2` within the
@@ -150,23 +154,28 @@ impl Exact {
 }
 
 /// The dual active set with the names of its rows.
-struct Working {
+struct Working<'a> {
+    problem: &'a Exact,
     engine: DualActiveSet,
-    /// The name of each row added so far, by its number.
+    /// The name of each row added so far, by its number; the targets are first.
     names: Vec<Row>,
+    /// The target whose row was subtracted from a row of silence, by the number of that row.
+    beside: HashMap<RowId, usize>,
     /// The keys of the rows in the working set, with their numbers.
     present: HashMap<(u8, usize, u64), RowId>,
     slopes: Slopes,
     row: Vec<f64>,
 }
 
-impl Working {
-    fn new(problem: &Exact, start: &[(Row, f64)]) -> Result<Self> {
+impl<'a> Working<'a> {
+    fn new(problem: &'a Exact, start: &[(Row, f64)]) -> Result<Self> {
         let Exact { statement, targets, .. } = problem;
         let bounds = &problem.objective.bounds;
         let mut working = Self {
+            problem,
             engine: DualActiveSet::new(&bounds.lower, &bounds.upper)?,
             names: vec![],
+            beside: HashMap::new(),
             present: HashMap::new(),
             slopes: Slopes::new(statement)?,
             row: vec![0.0; statement.trains],
@@ -179,34 +188,56 @@ impl Working {
             working.add_slope(k)?;
         }
         if !start.is_empty() {
-            working.start(statement, start)?;
+            working.start(start)?;
         }
         Ok(working)
     }
 
-    fn start(&mut self, statement: &Statement, start: &[(Row, f64)]) -> Result<()> {
+    fn start(&mut self, start: &[(Row, f64)]) -> Result<()> {
         let mut multipliers = Multipliers::new();
+        let mut of_targets = vec![0.0; self.problem.targets.len()];
         for &(row, multiplier) in start {
             if !multiplier.is_finite() {
                 return Err(problem!("start"; ": a multiplier is {multiplier}; must be finite"));
             }
             let id = match (self.present.get(&row.key()), row) {
                 (Some(&id), _) => id,
-                (None, Row::Silence { pattern, t }) if statement.is_asked(pattern, t) => self.add(statement, row)?,
+                (None, Row::Silence { pattern, t }) if self.problem.statement.is_asked(pattern, t) => {
+                    self.add(pattern, t)?
+                }
                 // Rows that this problem does not have are skipped.
                 _ => continue,
             };
-            let least = if matches!(row, Row::Target { .. }) { f64::NEG_INFINITY } else { 0.0 };
-            multipliers.push((id, multiplier.max(least)));
+            match row {
+                Row::Target { .. } => of_targets[id.index()] += multiplier,
+                _ => multipliers.push((id, multiplier.max(0.0))),
+            }
+            if let Some(&k) = self.beside.get(&id) {
+                of_targets[k] += multiplier.max(0.0);
+            }
         }
+        multipliers.extend(self.names.iter().zip(of_targets).map(|(name, u)| (self.present[&name.key()], u)));
         self.engine.start(&multipliers)
     }
 
     /// Adds a row of silence.
-    fn add(&mut self, statement: &Statement, row: Row) -> Result<RowId> {
-        let limit = statement.state_into(row, &mut self.row)?;
+    ///
+    /// Just before a target it is nearly parallel to the target's row: their difference, which is equivalent because
+    /// the target's row holds with equality, keeps its digits when it is scaled to length 1.
+    fn add(&mut self, pattern: usize, t: f64) -> Result<RowId> {
+        let Exact { statement, targets, .. } = self.problem;
+        let row = Row::Silence { pattern, t };
+        let mut limit = statement.state_into(row, &mut self.row)?;
+        let near = |k: &usize| targets.times[*k] - t < BESIDE * statement.neuron.tau;
+        let beside = targets.next(pattern, t).filter(near);
+        if let Some(k) = beside {
+            let target = targets.row(k);
+            add(&mut self.row, -1.0, target.at);
+            limit -= target.threshold;
+        }
         let id = self.engine.inequality(&self.row, limit)?;
         self.name(row, id);
+        self.beside.extend(beside.map(|k| (id, k)));
         Ok(id)
     }
 
@@ -230,7 +261,7 @@ impl Working {
     }
 
     /// Drops rows that are not binding and adds the worst of the violated ones; returns whether any row is new.
-    fn cut(&mut self, statement: &Statement, broken: &[SilencePeak], flat: &[usize]) -> Result<bool> {
+    fn cut(&mut self, broken: &[SilencePeak], flat: &[usize]) -> Result<bool> {
         let mut new: Vec<&SilencePeak> =
             broken.iter().filter(|peak| !self.present.contains_key(&peak.row().key())).collect();
         new.sort_by(|a, b| b.excess.total_cmp(&a.excess));
@@ -242,16 +273,24 @@ impl Working {
             self.present.remove(&self.names[id.index()].key());
         }
         for peak in new {
-            self.add(statement, peak.row())?;
+            self.add(peak.pattern, peak.t)?;
         }
         flat.iter().try_for_each(|&k| self.add_slope(k))?;
         Ok(true)
     }
-}
 
-/// The multipliers with the names of their rows, those of targets first.
-fn name_rows(names: &[Row], multipliers: &[(RowId, f64)]) -> Vec<(Row, f64)> {
-    let mut named: Vec<(Row, f64)> = multipliers.iter().map(|&(id, u)| (names[id.index()], u)).collect();
-    named.sort_by_key(|(row, _)| !matches!(row, Row::Target { .. }));
-    named
+    /// The multipliers with the names of their rows; those of a difference go to both of its rows.
+    fn name_rows(&self, multipliers: &[(RowId, f64)]) -> Vec<(Row, f64)> {
+        let mut of_targets = vec![0.0; self.problem.targets.len()];
+        for (id, u) in multipliers {
+            match self.beside.get(id) {
+                Some(&k) => of_targets[k] -= u,
+                None if id.index() < of_targets.len() => of_targets[id.index()] += u,
+                None => {}
+            }
+        }
+        let others = multipliers.iter().filter(|(id, _)| id.index() >= of_targets.len());
+        let named = of_targets.iter().enumerate().filter(|(_, u)| **u != 0.0).map(|(k, &u)| (self.names[k], u));
+        named.chain(others.map(|&(id, u)| (self.names[id.index()], u))).collect()
+    }
 }

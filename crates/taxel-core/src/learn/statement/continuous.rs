@@ -8,7 +8,7 @@
 use super::peak::{SilencePeak, exceeds};
 use super::rows::{Example, Statement, is_lost, until};
 use crate::Spike;
-use crate::neuron::{AfterSpike, FirstThreshold, KernelSum, Shape, Step, peak, rounding_ms};
+use crate::neuron::{AfterSpike, FirstThreshold, KernelSum, Shape, Step, Time, peak, rounding_ms};
 
 /// A time at which the state or the limit changes.
 #[derive(Debug, Clone, Copy)]
@@ -132,7 +132,7 @@ fn strip(statement: &Statement, example: &Example) -> Strip {
     let mut times = vec![example.start, example.end];
     times.extend(counted.iter().map(|i| i.t));
     for &target in &example.targets {
-        times.extend([target, target - taper.length, until(target), target + neuron.refractory]);
+        times.extend([target, target - taper.length, until(target, Time::Continuous), target + neuron.refractory]);
     }
     if neuron.first_threshold == FirstThreshold::Printed {
         let rise = example.start + neuron.refractory;
@@ -182,5 +182,5 @@ fn asks(statement: &Statement, example: &Example, t: f64, to: f64) -> bool {
         neuron.first_threshold == FirstThreshold::Printed && fired.is_none() && to == example.start + neuron.refractory;
     !rises
         && fired.is_none_or(|target| target + neuron.refractory <= t)
-        && example.next(to).is_none_or(|target| to <= until(target))
+        && example.next(to).is_none_or(|target| to <= until(target, Time::Continuous))
 }

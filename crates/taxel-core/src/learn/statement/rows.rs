@@ -15,9 +15,12 @@ use serde::{Deserialize, Serialize};
 use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, Grid, KernelSum, Neuron, Shape, Time, rounding_ms};
 use crate::{Result, Spike, SpikeTrains, Stop, problem};
 
-/// This close before a target, ms, the target's row and its slope row replace rows of silence, which would be parallel
-/// to the target's row to within rounding. A neuron that crosses its threshold there fires at the target.
-const AT_TARGET: f64 = 0.99 * AT_EDGE;
+/// This close before a target, ms, the target's row and its slope row replace rows of silence, whose multipliers would
+/// be so large that a proof loses its digits. A neuron that crosses its threshold there fires at the target; the share
+/// of `AT_EDGE` is small because an early spike shifts the next ones, through the threshold's rise, by many times more.
+const AT_TARGET: f64 = 0.1 * AT_EDGE;
+/// A grid's point this close before a target, ms, is the target's own.
+const AT_TARGETS_POINT: f64 = 0.99 * AT_EDGE;
 
 /// The identity of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -84,8 +87,12 @@ impl Margin {
 }
 
 /// The end of the silence before a target: far from time 0, neighbouring times are farther apart than `AT_TARGET`.
-pub(crate) fn until(target: f64) -> f64 {
-    (target - AT_TARGET).min(target.next_down())
+pub(crate) fn until(target: f64, time: Time) -> f64 {
+    let before = match time {
+        Time::Continuous => AT_TARGET,
+        Time::Grid => AT_TARGETS_POINT,
+    };
+    (target - before).min(target.next_down())
 }
 
 /// The taper of the margin, in the kernel's own family, so that potential and margin together are one state.
@@ -432,7 +439,7 @@ impl Statement {
             Time::Grid => t <= target + self.neuron.refractory + rounding_ms(t),
             Time::Continuous => t < target + self.neuron.refractory,
         });
-        !free && next.is_none_or(|target| t <= until(target))
+        !free && next.is_none_or(|target| t <= until(target, self.neuron.time))
     }
 
     /// The threshold at `t`, given that the neuron fired at the targets before, mV.
