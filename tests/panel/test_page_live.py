@@ -59,8 +59,10 @@ def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, 
         wanted = sorted(truth["contact"] + truth["lift"])
         until(lambda: len(found) >= len(wanted), "the board has been heard to its end")
         until(lambda: page.locator("#detection-count").inner_text() == str(len(found)), "the page has each of them")
+        listed = page.locator("#detection-list li")
+        until(lambda: listed.count() == len(found), "the page lists each of them")
         # The page lists the detections, the latest first, with the time and the latency of each.
-        rows = page.locator("#detection-list li").all_inner_texts()
+        rows = listed.all_inner_texts()
         assert all(re.search(r"\d+\.\d{3} s\s+(at once|-?\d[\d.]* (µs|ms|s))$", row) for row in rows), rows
         names = [re.match(r"\w+", row.strip()).group() for row in rows]  # type: ignore[union-attr]
         at = np.array([float(re.findall(r"([\d.]+) s", row)[0]) for row in rows])
