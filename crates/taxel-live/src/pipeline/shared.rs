@@ -15,10 +15,10 @@ use super::counters::Counters;
 use super::frame_input::FrameInput;
 use super::options::LiveOptions;
 use super::readout_queue::ReadoutQueue;
-use super::running_recording::RunningRecording;
+use super::running_recording::{EndedRecording, RunningRecording};
 use super::sending::Sent;
 use super::sink::OutputDetection;
-use super::stages::Stages;
+use super::viewer_queue::ViewerEvents;
 use crate::capture::Receiver;
 use crate::latency::{Latencies, Quantiles};
 use crate::locked::lock;
@@ -83,7 +83,25 @@ pub(super) struct PipelineShared {
 }
 
 /// What the decoding thread does between two batches; an error ends the pipeline.
-pub(super) type Request = Box<dyn FnOnce(&mut Stages) -> Result<()> + Send>;
+pub(super) type Request = Box<dyn FnOnce(&mut dyn Decoding) -> Result<()> + Send>;
+
+/// What the decoding thread can be asked for: its stages share this state, which so cannot name them.
+pub(super) trait Decoding {
+    /// Notes a write of the board's registers.
+    fn note_registers(&mut self, registers: &Registers) -> Result<()>;
+
+    /// Notes that the board was set to this version of the wire.
+    fn expect_version(&mut self, version: u8) -> Result<()>;
+
+    /// Adds a viewer of the events.
+    fn add_viewer(&mut self) -> ViewerEvents;
+
+    /// Ends the running recording, and records into this one, if there is one, from the next datagram on.
+    fn switch_recording(&mut self, next: Option<RunningRecording>) -> Result<EndedRecording>;
+
+    /// Makes what these taxels rest at now their rest: where one cannot be zeroed none is.
+    fn zero(&mut self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>>;
+}
 
 impl PipelineShared {
     pub(super) fn published(&self) -> MutexGuard<'_, PublishedState> {
@@ -91,7 +109,7 @@ impl PipelineShared {
     }
 
     /// Has the decoding thread do something, within 20 ms, but not after its end.
-    pub(super) fn request(&self, request: impl FnOnce(&mut Stages) -> Result<()> + Send + 'static) {
+    pub(super) fn request(&self, request: impl FnOnce(&mut dyn Decoding) -> Result<()> + Send + 'static) {
         lock(&self.requests).push(Box::new(request));
         self.requested.store(true, Ordering::Release);
     }
@@ -108,7 +126,7 @@ impl PipelineShared {
     /// That of `work`; `Core(Problem)` if the decoding thread has ended.
     pub(super) fn ask<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&mut Stages) -> Result<T> + Send + 'static,
+        work: impl FnOnce(&mut dyn Decoding) -> Result<T> + Send + 'static,
     ) -> Result<T> {
         let (answer, answered) = channel::bounded(1);
         self.request(move |stages| {

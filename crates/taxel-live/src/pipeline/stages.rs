@@ -17,7 +17,7 @@ use super::readout_stage::ReadoutStage;
 use super::record_stage::RecordStage;
 use super::running_readout::RunningReadout;
 use super::running_recording::{EndedRecording, RunningRecording};
-use super::shared::PipelineShared;
+use super::shared::{Decoding, PipelineShared};
 use super::viewer_queue::{ViewerEvents, ViewerQueue, viewer_queue};
 use crate::Result;
 use crate::capture::Batch;
@@ -243,9 +243,10 @@ impl Stages {
         let requests = std::mem::take(&mut *lock(&self.shared.requests));
         requests.into_iter().try_for_each(|request| request(self))
     }
+}
 
-    /// Notes a write of the board's registers.
-    pub(super) fn note_registers(&mut self, registers: &Registers) -> Result<()> {
+impl Decoding for Stages {
+    fn note_registers(&mut self, registers: &Registers) -> Result<()> {
         if let SourceStage::Board(decode) = &mut self.source {
             decode.set_frame_us(registers.frame_us());
         }
@@ -253,8 +254,7 @@ impl Stages {
         self.record.with(|recording| recording.registers(now_ns(), registers))
     }
 
-    /// Adds a viewer of the events.
-    pub(super) fn add_viewer(&mut self) -> ViewerEvents {
+    fn add_viewer(&mut self) -> ViewerEvents {
         let counters = &self.shared.published().counters;
         let (latest, events) = (counters.board.board_us, counters.decoding.events);
         let (queue, events) = viewer_queue(&self.shared.options.array, self.source.held(), latest, events);
@@ -262,8 +262,7 @@ impl Stages {
         events
     }
 
-    /// Ends the running recording, and records into this one, if there is one, from the next datagram on.
-    pub(super) fn switch_recording(&mut self, next: Option<RunningRecording>) -> Result<EndedRecording> {
+    fn switch_recording(&mut self, next: Option<RunningRecording>) -> Result<EndedRecording> {
         self.record.previews(self.source.count(), self.source.held(), true)?;
         if next.is_some() {
             self.move_to_threads()?;
@@ -276,8 +275,7 @@ impl Stages {
         Ok(ended)
     }
 
-    /// Notes that the board was set to this version of the wire.
-    pub(super) fn expect_version(&mut self, version: u8) -> Result<()> {
+    fn expect_version(&mut self, version: u8) -> Result<()> {
         if let SourceStage::Board(decode) = &mut self.source
             && decode.expect(version)
         {
@@ -287,8 +285,7 @@ impl Stages {
         Ok(())
     }
 
-    /// Makes what these taxels rest at now their rest: where one cannot be zeroed none is.
-    pub(super) fn zero(&mut self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
+    fn zero(&mut self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
         let array = &self.shared.options.array;
         let published = self.shared.published();
         if published.counters.readout.taring {
