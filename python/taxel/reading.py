@@ -39,6 +39,7 @@ __all__ = [
     "Reader",
     "View",
     "Zeroing",
+    "after_zeros",
     "kind_of_file",
 ]  # fmt: skip
 
@@ -47,8 +48,34 @@ Times = Callable[[NDArray[np.int64]], NDArray[np.int64]]
 
 #: taxel's own kinds of files by their endings.
 ENDINGS: dict[str, str] = {".mcap": "mcap", ".lsa": "lsa", ".npz": "npz", ".csv": "csv", ".h5": "h5"}
+#: So many frames show how far apart they are.
+_LEAST = 2
 #: Kinds of files that are no recordings of one format.
 _OTHERS = {"arrays": "file of arrays", "records": "file of events", "table": "table", "ros": "ROS bag"}
+
+
+def after_zeros(frames: Frames, seconds: float) -> Frames:
+    """Return frames with frames of 0 before the first, so long, where the first is loaded; later times stay.
+
+    As a sensor that starts itself at contact, such as a plate, read before it.
+
+    Parameters
+    ----------
+    frames : Frames
+    seconds : float, s
+
+    Examples
+    --------
+    >>> after_zeros(Frames([[[3.0]], [[4.0]]], [0, 10_000]), 0.02).t.tolist()
+    [-20000, -10000, 0, 10000]
+    """
+    if len(frames) < _LEAST or not np.any(frames.values[0]):
+        return frames
+    step = max(1, round(float(np.median(np.diff(frames.t)))))
+    count = max(1, round(seconds * 1e6 / step))
+    t = frames.t[0] + step * np.arange(-count, 0)
+    values = np.concatenate([np.zeros((count, *frames.array.shape), np.float32), frames.values])
+    return Frames(values, np.concatenate([t, frames.t]), unit=frames.unit, array=frames.array)
 
 
 def kind_of_file(kind: str) -> str:

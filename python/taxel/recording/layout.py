@@ -15,6 +15,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats.layout import Layout
 from taxel.frames import Frames
+from taxel.reading import after_zeros
 from taxel.recording.frames import times_at
 from taxel.recording.source import SourceView
 
@@ -169,18 +170,5 @@ def _read(table: Frames, layout: Layout, full: float | None, name: str, *, stric
     return Frames(values, t, unit=unit, array=table.array)
 
 
-def after_zeros(frames: Frames, seconds: float) -> Frames:
-    """Return frames with frames of 0 before the first, so long, where the first is loaded; later times stay."""
-    if len(frames) < _LEAST or not np.any(frames.values[0]):
-        return frames
-    step = max(1, round(float(np.median(np.diff(frames.t)))))
-    count = max(1, round(seconds * 1e6 / step))
-    t = frames.t[0] + step * np.arange(-count, 0)
-    values = np.concatenate([np.zeros((count, *frames.array.shape), np.float32), frames.values])
-    return Frames(values, np.concatenate([t, frames.t]), unit=frames.unit, array=frames.array)
-
-
-#: So many frames show how far apart they are.
-_LEAST = 2
 #: The share by which a rate that a layout says may differ from that of a file's own times.
 _SLACK = 0.05

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import Array, FormatError, Frames
-from taxel.reading import InMemory
-from taxel.recording.layout import after_zeros
+from taxel.reading import InMemory, after_zeros
 from taxel_studies.datasets import Trial, readers, table
 
 __all__ = ["COLUMN_MM", "FRAME_US", "ROW_MM", "begun_unloaded", "events", "knows", "read", "sensor_rows", "trials"]
