@@ -241,7 +241,7 @@ class Training:
         else:
             when = "when the touch ends" if rule.age_ms == "end" else ""
             better = self.scored.neurons[label].rank[0] < plain.together[label].rank[0]
-            runs = _RUNS + ", as the neuron is better by chance alone" * better
+            runs = _RUNS + ", as the neuron may be better by chance" * better
             yield _line(label, "plain rule", plain.together[label], when) + runs * by_rule
             yield f"  tuned on all: {rule._compared()}"
         if plain.own is not None and (own := plain.own[0][label]) is not None:
