@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from shell import call, commands
+from shell import call, commands, run
 
 from taxel.cli._commands import OWN, plugins
 from taxel.cli.app import rows
@@ -74,3 +74,11 @@ def test_an_option_of_one_value_is_refused_where_it_is_given_twice(capsys) -> No
     code, out, error = call(capsys, "train", "a.mcap", "--folds", "2", "--folds=3")
     assert (code, out) == (2, "")
     assert error == "taxel: --folds is given twice; see taxel train --help\n"
+
+
+def test_a_warning_is_a_line_without_its_place_in_the_code(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t_s,b,c\n" + "".join(f"{k / 10},{k % 7},3\n" for k in range(30)))
+    said = run("cut", tmp_path / "a.csv", tmp_path / "b.npz", "--columns", "0:1")
+    assert said.returncode == 0, said.stderr
+    assert said.stderr.startswith("taxel: warning: a.csv: read as ")
+    assert ".py" not in said.stderr
