@@ -138,3 +138,17 @@ def test_what_a_training_missed_is_in_a_table_and_in_the_lanes(chromium: Any, tm
         until(lambda: page.locator("#train-result").is_hidden(), "they go")
         page.locator("#train").click()
         shows(page, "train-text", "stopped")
+
+
+def test_a_training_can_be_stopped_where_no_label_is_left(chromium: Any, tmp_path: Path) -> None:
+    mat(tmp_path)
+    (tmp_path / "played.notes.csv").write_text("label,t_us\ncontact,500000\n")
+    with shown(chromium, tmp_path / "played.npz") as page:
+        press(page, "4")
+        train = page.locator("#train")
+        until(train.is_enabled, "one label is there")
+        train.evaluate("(button) => { button.dataset.state = 'running'; }")
+        press(page, "3")
+        page.locator("#label-list button[aria-label^=delete]").click()
+        until(lambda: page.locator("#label-list li").count() == 0, "it is deleted")
+        assert train.is_enabled()
