@@ -37,7 +37,7 @@ LEVELS = {"N": (5.0, 10.0, 20.0, 30.0, 40.0, 50.0)}
 #: Levels of a count from the data: these quantiles of what loaded taxels read, to two digits; most are low, where loads
 #: begin and end.
 LEVEL_QUANTILES = tuple(np.geomspace(0.01, 0.5, 6).tolist())
-#: Levels of a count in parts of the running range, as of the recipe gait_channel.
+#: Levels of a count in parts of the running range.
 RANGE_LEVELS = (0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.11, 0.15, 0.2, 0.3, 0.45)
 #: Numbers that a count rises to, or falls from.
 COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 24, 32, 48, 64, 96, 128, 192, 256)
