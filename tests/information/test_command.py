@@ -44,6 +44,15 @@ def test_a_recording_and_its_table_give_figures_and_a_page(tmp_path):
     assert page.read_text() == text
 
 
+def test_a_page_is_written_only_where_it_is_asked_for(tmp_path, monkeypatch):
+    recording, labels = folder(tmp_path, 24)
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    done = run(recording, "--labels", labels, *QUICK)
+    assert done.returncode == 0, done.stderr
+    assert sorted(tmp_path.rglob("*")) == before
+
+
 def note(recording, labels):
     """Write notes (label, us) beside a recording."""
     beside(recording).write_text(text_with([Note(label, t, 0) for label, t in labels]))
@@ -52,14 +61,14 @@ def note(recording, labels):
 def test_notes_are_trials_as_rows_of_a_table_are(tmp_path):
     recording, labels = folder(tmp_path, 24)
     rows = [line.split(",")[1:] for line in labels.read_text().splitlines()[1:]]
-    asked = [*QUICK, "--json", "--report", tmp_path / "page.html", "--overwrite"]
+    asked = [*QUICK, "--json"]
     expected = json.loads(run(recording, "--labels", labels, *asked).stdout)
     done = run(recording, "--labels", "notes", *asked)
     assert done.returncode == 2
     assert f"{recording}: has no notes; leave it out, or give a table of trials" in done.stderr
     note(recording, [(label, int(t)) for t, label in rows])
     assert json.loads(run(recording, "--labels", "notes", *asked).stdout) == expected
-    done = run(recording, "--labels", "notes", "--report", tmp_path / "other.html")
+    done = run(recording, "--labels", "notes")
     assert "--window-ms: must say how long the trials are that notes begin" in done.stderr
     note(recording, [("left first", int(rows[0][0])), ("right first", int(rows[0][0]) + 100)])
     done = run(recording, "--labels", "notes", *asked)
@@ -75,7 +84,7 @@ def test_without_labels_a_recording_is_a_trial_and_its_folder_the_label(tmp_path
         place.mkdir(exist_ok=True)
         taxel.convert(events.between(start, start + 200_000), place / f"{k}.npz")
     recordings = sorted(tmp_path.glob("*/*.npz"))
-    done = run(*recordings, *QUICK, "--folds", 4, "--report", tmp_path / "page.html", "--json")
+    done = run(*recordings, *QUICK, "--folds", 4, "--json")
     assert done.returncode == 0, done.stderr
     said = json.loads(done.stdout)
     assert set(said["labels"]) == {"left-first", "right-first"}
@@ -87,8 +96,7 @@ def test_fewer_groups_than_folds_are_the_folds(tmp_path):
     taxel.convert(events, tmp_path / "touches.npz")
     (tmp_path / "labels.csv").write_text(GOOD)
     few = ("--draws", 1, "--shuffles", 1, "--taxels", 1, "--periods", 5, "--folds", 30)
-    asked = ("--labels", tmp_path / "labels.csv", "--report", tmp_path / "page.html", *few)
-    assert run(tmp_path / "touches.npz", *asked).returncode == 0
+    assert run(tmp_path / "touches.npz", "--labels", tmp_path / "labels.csv", *few).returncode == 0
 
 
 def test_groups_are_read_and_other_columns_are_not(tmp_path):
@@ -117,12 +125,11 @@ def test_numbered_frames_are_refused_until_a_rate_is_given(tmp_path):
     assert not recording.timed
     (tmp_path / "l.csv").write_text("t_us,label\n" + "".join(f"{200_000 * k},{'ab'[k % 2]}\n" for k in range(20)))
     for labels in (("--labels", tmp_path / "l.csv"), ("--labels", "notes"), ()):
-        refused = run(grasps, *labels, *QUICK, "--report", tmp_path / "page.html")
+        refused = run(grasps, *labels, *QUICK)
         assert refused.returncode == 2
         assert "rate_hz" in refused.stderr
-    assert not (tmp_path / "page.html").exists()
     (tmp_path / "hand" / "layout.toml").write_text("rows = 2\ncolumns = 2\nrate_hz = 100\n")
     given = ("--labels", tmp_path / "l.csv", "--window-ms", 100, "--periods", 10, "--windows", 50, "--folds", 2)
-    done = run(grasps, *given, *COARSE, "--report", tmp_path / "page.html")
+    done = run(grasps, *given, *COARSE)
     assert done.returncode == 0, done.stderr
     assert "20 trials" in done.stdout

@@ -93,9 +93,7 @@ def test_messages_of_the_command(tmp_path, snapshot):
     for name, (table, arguments) in ASKED.items():
         (tmp_path / "labels.csv").write_text(table)
         quick = [word for option, value in usual.items() if option not in arguments for word in (option, value)]
-        place, report = ("--labels", tmp_path / "labels.csv"), ("--report", tmp_path / "page.html")
-        done = run("information", tmp_path / "touches.npz", *place, *report, *quick, *arguments)
+        done = run("information", tmp_path / "touches.npz", "--labels", tmp_path / "labels.csv", *quick, *arguments)
         assert (done.returncode, done.stderr.count("\n")) == (2, 1), name
         said[name] = done.stderr.replace(str(tmp_path), "DIR").rstrip("\n")
-    assert not (tmp_path / "page.html").exists()
     assert said == snapshot

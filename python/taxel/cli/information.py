@@ -27,7 +27,7 @@ def information(
     /,
     *,
     labels: Annotated[str | None, Parameter(metavar="FILE")] = None,
-    report: Annotated[Path, Parameter(metavar="FILE")] = Path("information.html"),
+    report: Annotated[Path | None, Parameter(metavar="FILE")] = None,
     options: Flat[InformationOptions] = InformationOptions(),
     workers: Flat[Workers] = Workers(),
     reading: Flat[Reading] = Reading(),
@@ -47,9 +47,9 @@ def information(
         begins at the time of the note, and the text of the note is the label. Default: each recording is a trial, and
         its folder's name is the label.
     report
-        The report to write, an .html with pictures.
+        Write a page with the table and a picture to this .html.
     """
-    if report.suffix != ".html":
+    if report is not None and report.suffix != ".html":
         raise ProblemError(f"--report {report}: the name of the report must end in .html")
     output.check(report)
     with progress(output.json) as update:
@@ -58,10 +58,12 @@ def information(
             update(f"reading {path}", 0, 0)
             opened += reading.open_sensors([path])
         result = taxel.tasks.information(opened, labels, options, progress=update, workers=workers)
-        update("drawing", 0, 0)
-        taxel.report.write_information(report, result.answer, overwrite=output.overwrite)
+        if report is not None:
+            update("drawing", 0, 0)
+            taxel.report.write_information(report, result.answer, overwrite=output.overwrite)
     say_warnings(result.warned)
-    output.say({**result.to_dict(), "report": str(report)}, *lines(result.answer), f"written to {report}")
+    written = {} if report is None else {"report": str(report)}
+    output.say(result.to_dict() | written, *lines(result.answer), *(f"report: {page}" for page in written.values()))
 
 
 def lines(answer: Answer) -> list[str]:
