@@ -86,8 +86,6 @@ def _between_commas(number_of: Callable[[str], Any], must: str) -> Callable[[Any
     return read
 
 
-#: How an option is typed that has another name on the command line.
-_TYPED = {"window_ms": "count_ms"}
 #: How the parameters of an encoder or a recipe are typed: ``--set KEY=VALUE``, as often as is needed.
 Settings = Annotated[
     Mapping[str, Any],
@@ -199,7 +197,7 @@ class Reading:
         words: list[str] = []
         for name, value in self.given().items():
             for entry in value if isinstance(value, list | tuple) else [value]:
-                words += [f"--{_TYPED.get(name, name).replace('_', '-')}", str(entry)]
+                words += [f"--{name.replace('_', '-')}", str(entry)]
         return words
 
 
@@ -225,7 +223,7 @@ class FullReading(Reading):
         Read columns A to B - 1 and rows C to D - 1 of an event camera's file, for example 100:420,60:300.
     bin : int, optional
         Side, in pixels of an event camera, of the square that becomes one taxel.
-    window_ms : float, ms, optional
+    count_ms : float, ms, optional
         Read an event camera's file as frames of counts, each over this many ms.
     polarity : str, optional
         Which events of an event camera are read: both (default), on or off.
@@ -234,7 +232,7 @@ class FullReading(Reading):
 
     Examples
     --------
-    >>> FullReading(window_ms=2.5, topic=["/palm"]).words()
+    >>> FullReading(count_ms=2.5, topic=["/palm"]).words()
     ['--topic', '/palm', '--count-ms', '2.5']
     """
 
@@ -244,7 +242,7 @@ class FullReading(Reading):
     ros: Annotated[str | None, Parameter(metavar="NAME")] = None
     region: Annotated[str | None, Parameter(metavar="A:B,C:D")] = None
     bin: Annotated[int | None, Parameter(metavar="PIXELS")] = None
-    window_ms: Annotated[float | None, Parameter(name="--count-ms", metavar="MS")] = None
+    count_ms: Annotated[float | None, Parameter(metavar="MS")] = None
     polarity: Annotated[str | None, Parameter(metavar="NAME")] = None
     rate_hz: Annotated[float | None, Parameter(metavar="HZ")] = None
 

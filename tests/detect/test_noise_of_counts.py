@@ -54,7 +54,7 @@ def test_what_is_no_count_of_the_training_is_refused_before_its_rest(tmp_path: P
     camera = Events([0, 10, 400_000], [1, 2, 3], [0, 1, 1], [True, False, True], array=Array(4, 5))
     taxel.convert(camera, tmp_path / "camera.npz")
     with pytest.raises(
-        ProblemError, match=r"camera.npz: these are events, not counts, .* on events/5 ms: write window_ms = 5 in"
+        ProblemError, match=r"camera.npz: these are events, not counts, .* on events/5 ms: write count_ms = 5 in"
     ):
         detect(rule, taxel.open(tmp_path / "camera.npz"))
     # Never quiet, and in another unit.

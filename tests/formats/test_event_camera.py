@@ -50,7 +50,7 @@ def test_what_faery_writes_is_read_back(kind: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("region", "side", "window_ms", "polarity"),
+    ("region", "side", "count_ms", "polarity"),
     [
         (None, None, 5, None),
         ("3:50,7:41", 1, 0.5, "both"),
@@ -59,28 +59,31 @@ def test_what_faery_writes_is_read_back(kind: str, tmp_path: Path) -> None:
     ],
 )
 def test_counts_are_those_of_events_one_after_the_other(
-    region: str | None, side: int | None, window_ms: float, polarity: str | None, tmp_path: Path
+    region: str | None, side: int | None, count_ms: float, polarity: str | None, tmp_path: Path
 ) -> None:
-    rows, reduction = some_rows(), Reduction(region, side, window_ms, polarity)
+    rows, reduction = some_rows(), Reduction(region, side, count_ms, polarity)
     path = write(tmp_path / "a.raw", rows)
-    frames = taxel.open(path, region=region, bin=side, window_ms=window_ms, polarity=polarity).frames()
+    frames = taxel.open(path, region=region, bin=side, count_ms=count_ms, polarity=polarity).frames()
     assert (frames.values == counted(rows, reduction)).all()
     first = rows[0, 0] // reduction.window_us
     # The time of a frame is its begin: what is detected in it is known at its end.
     assert (frames.t == (first + np.arange(len(frames))) * reduction.window_us).all()
     chosen = {"on": "on ", "off": "off "}.get(polarity or "", "")
-    assert frames.unit == f"{chosen}events/{window_ms:g} ms"
+    assert frames.unit == f"{chosen}events/{count_ms:g} ms"
     assert frames.values.sum() == len(rows) or (region, polarity or "both") != (None, "both")
 
 
-def test_the_layout_and_the_command_line_say_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("count_ms", ["count_ms", "window_ms"])  # the second in older files
+def test_the_layout_and_the_command_line_say_the_same(
+    count_ms: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = write(tmp_path / "a.raw", some_rows())
-    given = taxel.open(path, region="0:32,0:32", bin=4, window_ms=5, polarity="on").frames()
+    given = taxel.open(path, region="0:32,0:32", bin=4, count_ms=5, polarity="on").frames()
     options = ["--region", "0:32,0:32", "--bin", "4", "--count-ms", "5", "--polarity", "on"]
     with pytest.raises(SystemExit, match="0"):
         main(["convert", str(path), str(tmp_path / "b.npz"), *options])
     (tmp_path / "a.layout.toml").write_text(
-        '[event_camera]\nregion = "0:32,0:32"\nbin = 4\nwindow_ms = 5\npolarity = "on"\n'
+        f'[event_camera]\nregion = "0:32,0:32"\nbin = 4\n{count_ms} = 5\npolarity = "on"\n'
     )
     assert given == taxel.open(path).frames() == taxel.open(tmp_path / "b.npz").frames()
     # What is given comes before what the layout says.
@@ -157,14 +160,14 @@ def test_training_on_events_names_what_works_and_a_burst_is_learnt_from_counts(t
         "the events have no intensities, but the recipe touch and its encoders need them: for an event camera"
     ):
         taxel.train(taxel.open(path), labels)
-    training = taxel.train(taxel.open(path, bin=4, window_ms=5), labels)
+    training = taxel.train(taxel.open(path, bin=4, count_ms=5), labels)
     assert training.score["contact"].found == 12
     assert any("recipe event_counts" in line for line in training.lines())
-    frames = taxel.open(path, bin=4, window_ms=5).frames()
+    frames = taxel.open(path, bin=4, count_ms=5).frames()
     assert len(taxel.detect.run(training.readout, frames, tare=taxel.Tare.take(frames, stop_us=500_000))) == 12
     with refused("in events/2 ms, but the readout was trained on events/5 ms"):
-        taxel.detect.run(training.readout, taxel.open(path, bin=4, window_ms=2).frames())
-    on = taxel.open(path, bin=4, window_ms=5, polarity="on").frames()
+        taxel.detect.run(training.readout, taxel.open(path, bin=4, count_ms=2).frames())
+    on = taxel.open(path, bin=4, count_ms=5, polarity="on").frames()
     for detector in (training.readout, taxel.detect.PlainRule("area", 2, unit="events/5 ms")):
         with refused("in on events/5 ms, but the .* was trained on events/5 ms"):
             taxel.detect.run(detector, on, tare=taxel.Tare.take(on, stop_us=500_000))
@@ -199,8 +202,8 @@ def test_weak_bursts_are_learnt_among_hot_pixels_and_noise_that_grows(tmp_path: 
         ({"region": "0:65,0:48"}, "region is '0:65,0:48'"),
         ({"region": "1,2"}, "region is '1,2': must be columns A:B and rows C:D"),
         ({"bin": 0}, "bin is 0"),
-        ({"window_ms": 0.0015}, "window_ms is 0.0015: must be a whole number of us"),
-        ({"window_ms": 0}, "window_ms is 0"),
+        ({"count_ms": 0.0015}, "count_ms is 0.0015: must be a whole number of us"),
+        ({"count_ms": 0}, "count_ms is 0"),
         ({"polarity": "red"}, "polarity is 'red': must be one of 'both', 'on', 'off'"),
     ],
 )
@@ -214,14 +217,14 @@ def test_the_options_are_of_events_without_intensities_alone(tmp_path: Path) -> 
     one = {"array": taxel.Array(4, 4), "intensity": [7]}
     taxel.convert(Events([0], [0], [0], [True], **one), tmp_path / "b.npz")
     for place in (tmp_path / "a.npz", tmp_path, tmp_path / "b.npz"):
-        with refused("region, bin, window_ms and polarity are only for events without intensities"):
+        with refused("region, bin, count_ms and polarity are only for events without intensities"):
             taxel.open_all(place, bin=2)
 
 
 @pytest.mark.parametrize("kind", ["table", "csv", "npz", "mcap"])
-@pytest.mark.parametrize("window_ms", [None, 5])
-def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, window_ms: float | None, tmp_path: Path) -> None:
-    how = {"region": "3:50,7:41", "bin": 4, "window_ms": window_ms, "polarity": "on"}
+@pytest.mark.parametrize("count_ms", [None, 5])
+def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, count_ms: float | None, tmp_path: Path) -> None:
+    how = {"region": "3:50,7:41", "bin": 4, "count_ms": count_ms, "polarity": "on"}
     by_camera = taxel.open(write(tmp_path / "a.raw", some_rows()), **how)
     events = taxel.open(tmp_path / "a.raw").events
     if kind == "table":
@@ -237,7 +240,7 @@ def test_events_of_any_file_are_read_as_those_of_a_camera(kind: str, window_ms: 
         taxel.convert(events, path)
         how["array"] = None if kind == "mcap" else taxel.Array(48, 64)
     read = taxel.open(path, **how)
-    if window_ms is None:
+    if count_ms is None:
         assert (rows_of(read.events) == rows_of(by_camera.events)).all()
         assert read.array.shape == by_camera.array.shape
     else:

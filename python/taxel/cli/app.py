@@ -42,14 +42,8 @@ WRONG_INPUT, OUTSIDE, STOPPED = 2, 3, 130
 #: A frozen dataclass of options: each field is an option, with the text of the docstring.
 Flat = Annotated[_T, Parameter(name="*")]
 
-#: What commands that open recordings take from a layout file, and how the commands that convert name it.
-_OF_LAYOUTS = {
-    "array": "--array",
-    "rate_hz": "--rate-hz",
-    "topic": "--topic",
-    "field": "--field",
-    "window_ms": "--count-ms",
-}
+#: What commands that open recordings take from a layout file, and the command that converts as an option.
+_OF_LAYOUTS = ("array", "rate_hz", "topic", "field", "count_ms")
 #: What stands for a value on a page of help.
 _VALUES = {int: "NUMBER", float: "NUMBER", Path: "FILE"}
 
@@ -172,7 +166,8 @@ def typed(app: cyclopts.App, argument: str, *, with_value: bool) -> str:
     found = options.get(argument)
     if found is None:
         if argument in _OF_LAYOUTS and "layout" in options:
-            return f"{argument} in a layout file, or convert the recording by taxel convert {_OF_LAYOUTS[argument]}"
+            option = argument.replace("_", "-")
+            return f"{argument} in a layout file, or convert the recording by taxel convert --{option}"
         # Parameters of an encoder or a recipe have no options of their own.
         takes_parameters = any("--set" in one.names for one in options.values())
         return f"--set {argument}{'=VALUE' * with_value}" if takes_parameters else argument

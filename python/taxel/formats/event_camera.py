@@ -42,7 +42,7 @@ class Reduction:
         Columns and rows as "A:B,C:D", where B and D are not included; default: the whole sensor.
     bin : int, pixels, 1 or more, optional
         The side of the square of pixels that becomes a taxel; default: 1.
-    window_ms : float, ms, whole us, optional
+    count_ms : float, ms, whole us, optional
         Read frames of counts, one for each window; default: events.
     polarity : {"both", "on", "off"}, optional
         Which events are read; default: both.
@@ -53,13 +53,13 @@ class Reduction:
 
     Examples
     --------
-    >>> Reduction("100:420,60:300", bin=4).bounds(640, 480), Reduction(window_ms=2.5).window_us
+    >>> Reduction("100:420,60:300", bin=4).bounds(640, 480), Reduction(count_ms=2.5).window_us
     ((100, 420, 60, 300), 2500)
     """
 
     region: str | None = None
     bin: int | None = None
-    window_ms: float | None = None
+    count_ms: float | None = None
     polarity: str | None = None
 
     def __post_init__(self) -> None:
@@ -67,10 +67,10 @@ class Reduction:
             _ends(self.region)
         if self.bin is not None:
             integer("bin", self.bin, 1, 65_535)
-        if self.window_ms is not None:
-            window_us = to_us(finite("window_ms", self.window_ms, least=0.001, most=_LONGEST_MS))
+        if self.count_ms is not None:
+            window_us = to_us(finite("count_ms", self.count_ms, least=0.001, most=_LONGEST_MS))
             if round(window_us, 6) % 1:
-                raise ProblemError(f"window_ms is {shown(self.window_ms)}: must be a whole number of us")
+                raise ProblemError(f"count_ms is {shown(self.count_ms)}: must be a whole number of us")
         if self.polarity is not None:
             text("polarity", self.polarity, POLARITIES)
 
@@ -87,13 +87,13 @@ class Reduction:
     @property
     def window_us(self) -> int | None:
         """The window, us; None for events."""
-        return None if self.window_ms is None else round(to_us(self.window_ms))
+        return None if self.count_ms is None else round(to_us(self.count_ms))
 
     @property
     def unit(self) -> str:
         """The unit of counts, which names a chosen polarity: a training on one polarity does not fit the other."""
         chosen = "" if self.polarity in (None, "both") else f"{self.polarity} "
-        return f"{chosen}events/{self.window_ms:g} ms"
+        return f"{chosen}events/{self.count_ms:g} ms"
 
     def bounds(self, columns: int, rows: int) -> tuple[int, int, int, int]:
         """Return first and last (exclusive) column and row of the region on a sensor.
@@ -202,7 +202,7 @@ def reduced(name: str, events: Events, reduction: Reduction) -> Events | Frames:
     begin = first // window_us
     count = last // window_us - begin + 1
     size = f"{count} frames of {array.rows} x {array.columns} taxels"
-    fewer = "for fewer frames, use --region, a larger --bin or a larger --count-ms (in Python: window_ms)"
+    fewer = "for fewer frames, use --region, a larger --bin or a larger --count-ms (in Python: count_ms)"
     check_memory(name, count * (4 * array.rows * array.columns + 8), f"{size} ({fewer}): ")
     values = np.zeros((count, *array.shape), np.float32)
     np.add.at(values, (kept.t // window_us - begin, y, x), np.float32(1))

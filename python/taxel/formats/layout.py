@@ -440,6 +440,8 @@ def _values(document: dict[str, Any]) -> dict[str, Any]:
     for name, value in document.items():
         if name in _TABLES:
             inner = mapping(name, value)
+            if name == "event_camera" and "window_ms" in inner:  # its name in older files
+                inner = {"count_ms" if key == "window_ms" else key: each for key, each in inner.items()}
             _known(name, inner)
             kind = _TABLES[name]
             needed = [] if kind is dict else [f.name for f in fields(kind) if f.default is f.default_factory is MISSING]

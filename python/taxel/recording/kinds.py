@@ -61,7 +61,7 @@ class OpenOptions:
     ros: str | None = None
     region: str | None = None
     bin: int | None = None
-    window_ms: float | None = None
+    count_ms: float | None = None
     polarity: str | None = None
     label_column: str | int | None = None
     differences: bool = False
@@ -69,7 +69,7 @@ class OpenOptions:
     @property
     def reduction(self) -> Reduction:
         """Selection of the events of a camera."""
-        return Reduction(self.region, self.bin, self.window_ms, self.polarity)
+        return Reduction(self.region, self.bin, self.count_ms, self.polarity)
 
     def check(self, path: Path, kind: str) -> None:
         """Refuse what is only for files of another kind.

@@ -67,10 +67,10 @@ def open_one(path: str | os.PathLike[str], options: OpenOptions) -> Recording:
         own `array` if that is a list too.
     ros : str, optional
         For a ROS bag that does not define its messages: a release, for example "humble".
-    region, bin, window_ms, polarity : str, int, float (ms) and str, optional
+    region, bin, count_ms, polarity : str, int, float (ms) and str, optional
         For an event camera's file, or other events without intensities. `region`: columns and rows, for example
         "100:420,60:300", where the last are not included. `bin`: side of the square of pixels that becomes a taxel.
-        `window_ms`: read frames of counts, each over a window of this length, at its beginning. `polarity`: only "on"
+        `count_ms`: read frames of counts, each over a window of this length, at its beginning. `polarity`: only "on"
         or "off" events, or "both".
     label_column : str or int, optional
         For a table: the column, by its name or number from 1, whose value becomes a label where it changes; it is no
@@ -134,7 +134,7 @@ def open_all(path: str | os.PathLike[str], options: OpenOptions) -> list[Recordi
         A folder of recordings of taxel, of ROS bags, or of files of another format; or a file, as for `taxel.open`.
     array, layout, topic, field, ros
         As in `taxel.open`.
-    region, bin, window_ms, polarity, label_column : str, int, float (ms), str and str or int, optional
+    region, bin, count_ms, polarity, label_column : str, int, float (ms), str and str or int, optional
         As in `taxel.open`.
     differences
         As in `taxel.open`.
@@ -215,7 +215,7 @@ def _open_file(path: Path, options: OpenOptions, layout: Layout | None) -> list[
 
 def _no_camera(path: Path) -> ProblemError:
     return ProblemError(
-        f"{path}: region, bin, window_ms and polarity are only for events without intensities, for example of an event "
+        f"{path}: region, bin, count_ms and polarity are only for events without intensities, for example of an event "
         "camera; this file has no such events"
     )
 

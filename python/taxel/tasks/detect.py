@@ -317,10 +317,10 @@ def _check_unit(readout: Readout | PlainRule, recording: Recording) -> None:
     """Refuse a recording in another unit than the readout's, before its rest, which that unit may lack."""
     source = recorded(recording, hold=False)
     if isinstance(source, Events) and source.intensity is None and readout.unit and are_counts(readout.unit):
-        window_ms = readout.unit.removesuffix(" ms").rpartition("/")[2]
+        count_ms = readout.unit.removesuffix(" ms").rpartition("/")[2]
         raise ProblemError(
             f"these are events, not counts, and the {readout._WHAT} was trained on {readout.unit}: "
-            f"write window_ms = {window_ms} in [event_camera] of a layout file, and the bin, region and polarity of "
+            f"write count_ms = {count_ms} in [event_camera] of a layout file, and the bin, region and polarity of "
             "training"
         )
     readout._check_unit(unit_of(source))

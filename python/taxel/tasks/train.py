@@ -161,7 +161,7 @@ def _check(opened: Sequence[Recording], labelled: Sequence[Mapping[str, NDArray[
         if isinstance(table, Events) and table.intensity is None:
             raise ProblemError(
                 "the events have no intensities, but the recipe touch and its encoders need them: for an event camera, "
-                "use frames of counts (window_ms = 5 in [event_camera] of a layout file) and the recipe event_counts"
+                "use frames of counts (count_ms = 5 in [event_camera] of a layout file) and the recipe event_counts"
             )
         like = _like_labels(table, events)
         if len(like) == 1:
