@@ -119,13 +119,8 @@ encoders! {
 
 impl Encoder {
     /// The noise floor above its tare, in the sensor's unit, of a composite the largest; 0 of an encoder without one.
-    pub(crate) fn noise_floor(&self) -> f64 {
-        match self {
-            Self::ContactArea(encoder) => encoder.noise_floor,
-            Self::Moments(encoder) => encoder.noise_floor,
-            Self::Composite(encoder) => encoder.parts.values().map(Self::noise_floor).fold(0.0, f64::max),
-            _ => 0.0,
-        }
+    pub(crate) fn floor_above_tare(&self) -> f64 {
+        self.encoding().floor_above_tare()
     }
 
     /// Parses an encoder from JSON and checks every parameter; missing parameters have their defaults.
@@ -331,6 +326,10 @@ impl Encoding for Composite {
 
     fn latency_ms(&self) -> f64 {
         self.parts.values().map(Encoder::latency_ms).fold(0.0, f64::max)
+    }
+
+    fn floor_above_tare(&self) -> f64 {
+        self.parts.values().map(Encoder::floor_above_tare).fold(0.0, f64::max)
     }
 
     fn set_tare(&mut self, tare: &Tare) {

@@ -244,7 +244,7 @@ impl Readout {
 
     /// The largest noise floor above the tare of what runs, in the sensor's unit; 0 without one.
     pub(super) fn noise_floor(&self) -> f64 {
-        let of_neurons = if self.runs_neurons() { self.encoder.noise_floor() } else { 0.0 };
+        let of_neurons = if self.runs_neurons() { self.encoder.floor_above_tare() } else { 0.0 };
         self.running_rules().map(|rule| rule.floor_above_tare()).fold(of_neurons, f64::max)
     }
 
