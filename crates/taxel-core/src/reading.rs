@@ -1,4 +1,4 @@
-//! Parses JSON into parameters; an error is one line: the path in the text, and what serde says of it.
+//! Parses JSON into parameters; an error is one line: the path in the text, what is there, and what must be.
 
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -10,7 +10,7 @@ use crate::{Error, Place};
 pub struct Unfit {
     /// Path from the outermost name to the innermost, as `neuron.lambdas[2]`; empty for the whole text.
     path: String,
-    /// Why it is not valid.
+    /// Why it is not valid, as it follows the path: ` is 7: must be text`.
     message: String,
     /// The line, counted from 1, of a text that is not JSON.
     line: Option<u64>,
@@ -31,7 +31,7 @@ impl Unfit {
 
     fn text(&self, subject: &str) -> String {
         let colon = if self.path.is_empty() { "" } else { ": " };
-        format!("{subject}{colon}{}: {}", self.path, self.message)
+        format!("{subject}{colon}{}{}", self.path, self.message)
     }
 
     fn placed(&self, error: Error) -> Error {
@@ -46,7 +46,7 @@ impl Unfit {
     pub fn problem(self, subject: &str) -> Error {
         match self.path.find(['.', '[']).map_or((self.path.as_str(), ""), |end| self.path.split_at(end)) {
             ("", _) => self.placed(Error::Problem(self.text(subject).into())),
-            (argument, rest) => Error::argument(argument, &format!("{rest}: {}", self.message)),
+            (argument, rest) => Error::argument(argument, &format!("{rest}{}", self.message)),
         }
     }
 
@@ -67,7 +67,7 @@ pub fn from_text<T: DeserializeOwned>(text: &str) -> Result<T, Unfit> {
     let value = serde_json::from_str(text).map_err(|error| {
         let (line, column, message) = (error.line(), error.column(), error.to_string());
         let why = message.strip_suffix(&format!(" at line {line} column {column}")).unwrap_or(&message);
-        let message = format!("not JSON: {why} (column {column})");
+        let message = format!(": not JSON: {why} (column {column})");
         Unfit { path: String::new(), message, line: Some(line as u64) }
     })?;
     from_value(value)
@@ -89,7 +89,7 @@ pub fn from_value<T: DeserializeOwned>(value: Value) -> Result<T, Unfit> {
             let dot = if path.is_empty() { "" } else { "." };
             path = format!("{path}{dot}{key}");
         }
-        Unfit { path, message, line: None }
+        Unfit { path, message: in_our_words(&message), line: None }
     })
 }
 
@@ -97,6 +97,44 @@ pub fn from_value<T: DeserializeOwned>(value: Value) -> Result<T, Unfit> {
 fn key_of(message: &str) -> Option<&str> {
     let rest = message.strip_prefix("missing field `").or_else(|| message.strip_prefix("unknown field `"))?;
     rest.split('`').next()
+}
+
+/// What serde says of a value, as it follows the path.
+fn in_our_words(message: &str) -> String {
+    if message.starts_with("missing field ") {
+        return " is missing".to_owned();
+    }
+    let Some((found, expected)) = message.rsplit_once(", expected ") else { return format!(": {message}") };
+    let must = match expected.split([' ', '<']).next().unwrap_or_default() {
+        "f64" => "a number".to_owned(),
+        "u8" | "u16" | "u32" => format!("a whole number from 0 to 2^{} - 1", &expected[1..]),
+        "u64" | "usize" | "i32" | "i64" => "a whole number".to_owned(),
+        "struct" | "map" => "a table".to_owned(),
+        _ => match expected {
+            "a boolean" => "true or false".to_owned(),
+            "a string" => "text".to_owned(),
+            "a sequence" => "a list".to_owned(),
+            "a map" => "a table".to_owned(),
+            "string or map" => "a name, or a table with a name and its values".to_owned(),
+            other => other.replace("an array of length", "a list of").replace('`', ""),
+        },
+    };
+    if found.starts_with("unknown field ") {
+        return format!(" is not known: must be {must}");
+    }
+    if let Some(length) = found.strip_prefix("invalid length ") {
+        return format!(" has {length} entries: must be {must}");
+    }
+    let value = found.trim_start_matches("invalid type: ").trim_start_matches("invalid value: ");
+    let value = match value {
+        "sequence" => "a list",
+        "map" => "a table",
+        _ => ["unknown variant ", "string ", "integer ", "floating point ", "boolean "]
+            .iter()
+            .find_map(|kind| value.strip_prefix(kind))
+            .unwrap_or(value),
+    };
+    format!(" is {}: must be {must}", value.trim_matches('`'))
 }
 
 #[cfg(test)]
@@ -130,7 +168,7 @@ mod tests {
         ] {
             let unfit = from_text::<Whole>(&format!("{{{parameters}}}")).unwrap_err();
             assert_eq!(unfit.path, path);
-            assert!(unfit.text("whole").starts_with(&format!("whole: {path}: ")), "{}", unfit.text("whole"));
+            assert!(unfit.text("whole").starts_with(&format!("whole: {path}")), "{}", unfit.text("whole"));
             let name = path.split(['.', '[']).next();
             assert_eq!(unfit.clone().problem("whole").reason().unwrap().argument.as_deref(), name);
             let by_name = unfit.by_name().problem("whole");
