@@ -116,7 +116,7 @@ def test_where_nothing_is_quiet_it_is_refused_with_what_to_give(tmp_path: Path) 
         values[begin : begin + 10, 1:3, 1:3] = 250
     taxel.convert(Frames(values, 10_000 * np.arange(300), unit="counts", array=Array(4, 4)), tmp_path / "a.npz")
     rule = PlainRule("area", 2, noise_floor=40.0)
-    with pytest.raises(ProblemError, match=r"a\.npz: the values .* because no half second is quiet; give tare$"):
+    with pytest.raises(ProblemError, match=r"a\.npz: the values .* and four values is quiet; give tare$"):
         detect(rule, taxel.open(tmp_path / "a.npz"))
     rule.save(tmp_path / "rule.json")
     refused = run("detect", tmp_path / "a.npz", "--readout", tmp_path / "rule.json")

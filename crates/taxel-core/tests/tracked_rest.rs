@@ -46,6 +46,15 @@ fn a_quiet_stretch_is_half_a_second_in_which_no_neighbours_move() {
 }
 
 #[test]
+fn a_quiet_stretch_of_a_slow_sensor_lasts_until_its_fourth_value() {
+    for (rate_hz, end) in [(1, 3_000_000), (2, 1_500_000), (4, 750_000), (5, 600_000)] {
+        let mut rest = TrackedRest::new(8, 3.0, vec![f64::NO_REST; 8]);
+        (0..8).for_each(|k| _ = rest.take(k * 1_000_000 / rate_hz, [50.0; 8]));
+        assert_eq!(rest.quiet(), Some((0, end)), "{rate_hz} Hz");
+    }
+}
+
+#[test]
 fn a_noisy_array_with_nothing_on_it_rests_at_its_mean_and_not_at_its_lowest_value() {
     let mut random = StdRng::seed_from_u64(4);
     for noise in [0.0_f32, 1.2, 3.0] {

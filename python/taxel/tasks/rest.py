@@ -145,7 +145,9 @@ def rest(
         return TakenRest("quiet", quiet, begin_us)
     before = None if labels is None else _before(recorded(recording), labels)
     if before is None:
-        why = "no half second is quiet" + " and no label is late enough" * (labels is not None)
+        why = "no stretch of half a second and four values is quiet" + " and no label is late enough" * (
+            labels is not None
+        )
         error = UnknownRestError(f"{recording.path}: the values of its taxels at rest are not known, because {why}")
         raise helped(error, "tare", "give")
     return TakenRest("labels", _measured(recording, recorded(recording), before), begin_us)

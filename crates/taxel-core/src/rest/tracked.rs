@@ -19,7 +19,7 @@ pub const QUIET_US: i64 = 500_000;
 /// Number of taxels among a taxel and its 8 neighbours that a touch moves at least, on a grid.
 pub const TOUCHED_TOGETHER: usize = 3;
 
-/// The fewest samples of a quiet stretch: fewer do not show that it was quiet.
+/// The fewest samples of a quiet stretch: fewer do not show that it was quiet. At 4 Hz or less they take longer.
 const LEAST_SAMPLES: u32 = 4;
 
 /// The stretch being measured: statistics of each taxel's values less the first one.
@@ -188,7 +188,8 @@ impl TrackedRest {
             _ => self.stretch = Some(RestStretch::new(t, &self.values)),
         }
         self.baseline.take(t, &self.values);
-        if self.stretch.as_ref().is_some_and(|stretch| t - stretch.from >= QUIET_US) {
+        let is_long = |stretch: &RestStretch| t - stretch.from >= QUIET_US && stretch.samples >= LEAST_SAMPLES;
+        if self.stretch.as_ref().is_some_and(is_long) {
             self.end_stretch(t);
         }
         self.baseline.above()
@@ -212,7 +213,7 @@ impl TrackedRest {
         let noise = stretch.noise(self.grid).min(self.noise_floor);
         let far = stands_out_from(FAR_NOISE, noise, self.noise_floor);
         let any = self.known.contains(&true);
-        if stretch.samples < LEAST_SAMPLES || !any || !stretch.is_quiet(far, &self.known, self.grid) {
+        if !any || !stretch.is_quiet(far, &self.known, self.grid) {
             return;
         }
         let first = self.quiet.is_none();

@@ -112,7 +112,8 @@ class Rest:
             "tare": "the given tare",
             "calibration": "the calibration's",
             "unit": "0, because the values are force or pressure",
-            "none": "unknown, because no half second was quiet and without load; to set the rest, give a tare",
+            "none": "unknown, because no stretch of half a second and four values was quiet and without load; "
+            "to set the rest, give a tare",
         }
         text = words.get(self.source, "")
         if self.quiet_us is not None:
