@@ -240,7 +240,8 @@ def _print(summary: Summary, as_json: bool) -> None:
         return
     counters = summary.counters
     if summary.path is not None:
-        say(f"{summary.path}: {counters['seconds']:.1f} s, {received(counters)}{_bytes_and_markers(counters)}")
+        what = f"{received(counters)}{_bytes_and_markers(counters)}"
+        say(f"{summary.path}: {what}, received in {counters['seconds']:.1f} s")
     for name, counts in counters["sources"].items():
         contents = received(counts) if "capture" in counts else f"{counted(counts['lines'], 'line')}{left_out(counts)}"
         say(f"  {name}: {contents}")

@@ -237,7 +237,9 @@ class Lines:
                 raise ProblemError(f"source {self.stated.text!r}: {first_line(error)}") from None
             size = self.array.taxels
             said = [guess, *said] if guess else said
-            if guess:
+            if not form.clocks:
+                said.append("a frame's time is when it arrived")
+            if guess or not form.clocks:
                 rows, columns = self.array.shape
                 self.read_as = f"{self.place}: read as {rows} x {columns} taxels: {'; '.join(said)}"
         elif len(form.clocks) > 1:
