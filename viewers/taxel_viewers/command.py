@@ -42,7 +42,7 @@ def show(
     shows
         A recording; or a source, as taxel live --source names it.
     viewer
-        rerun or rerun:HOST:PORT: a viewer that you have started.
+        A viewer that you have started: rerun, on port 9876 of this computer, or rerun:HOST:PORT.
     tare
         Show values above this rest, a file that Tare.save wrote.
     """
