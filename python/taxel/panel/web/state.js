@@ -1,4 +1,5 @@
-// The header's first words: what is shown, and which board or recording it is; and whether anything arrives.
+// The header's first words: what is shown, and which board or recording it is; whether anything arrives; and doubts, of which the first
+// sentence is seen, and the others where they are asked for.
 
 import { entitle, part, write } from "./dom.js";
 import { counted, seconds, short } from "./words.js";
@@ -96,9 +97,11 @@ export function showState({ connected, why }, { source, state }, hello, opened, 
   const doubt = (connected && (opened ? opened.pace : counters?.pace)?.doubt) || "";
   const nothing = connected && source === null && !hello?.live;
   const banner = part("silence", HTMLElement);
-  const text = [silent?.text, sentence(doubt), nothing && refused, connected && preload(opened), connected && fall(opened)].filter(Boolean).join(" ");
-  write(part("silence-text", HTMLElement), text);
-  banner.hidden = !text;
+  const doubts = [sentence(doubt), nothing && refused, connected && preload(opened), connected && fall(opened)].filter((text) => typeof text === "string");
+  const [first, more] = [0, 1].map((k) => doubts.map((text) => text.split(/(?<=[.?]) (.*)/)[k] ?? ""));
+  write(part("silence-text", HTMLElement), [silent?.text, ...first].filter(Boolean).join(" "));
+  write(part("silence-more", HTMLElement), more.filter(Boolean).join(" "));
+  banner.hidden = !silent && !first.some(Boolean);
   banner.dataset.state = silent ? "silent" : "doubt";
   const subject = !connected ? why : opening !== null ? `reading ${opening} …` : source !== null ? source : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";
   const about = [subject, connected && source !== null && opening === null && opened?.verdict, shape(opened, hello)].filter(Boolean).join(" · ");
