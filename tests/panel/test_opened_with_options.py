@@ -162,6 +162,10 @@ def test_labels_of_a_trial_are_its_own_and_training_takes_the_labelled_trials(ca
         answer = page.ask("train")
         assert answer["type"] == "done", answer
         assert "touch, neuron: " in page.since_asked("trained")["text"]
+        said = [message for message in page.said[page.asked :] if message["type"] in ("training", "trained")]
+        assert said.pop()["type"] == "trained"
+        assert said[0]["text"].startswith(f"reading {file}, after ")
+        assert any("fold 2 of" in message["text"] for message in said), said
         assert page.ask("read_out", readout="ball.csv.readout.json")["type"] == "done"
         found = page.since_asked("detections")["detections"]
         assert len(found) >= 4

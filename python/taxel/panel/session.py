@@ -471,20 +471,20 @@ class Session:
     async def train(self) -> None:
         """Train a readout on the labels of the recording shown, as `taxel train --labels notes` does.
 
-        The readout replaces NAME.readout.json beside the recording. `trained` comes before the answer, when the
-        training has ended. One training runs at a time.
+        The readout replaces NAME.readout.json beside the recording. `training` comes at each step, `trained` before
+        the answer, when the training has ended. One training runs at a time.
         """
         shown = self._needed("train")
         readout, us = readout_of(shown.name), shown.us
-        trained = await in_thread(self._hub.training.train, shown.path, self._hub.folder.file(readout))
+        loop = asyncio.get_running_loop()
+
+        def progress(text: str) -> None:
+            asyncio.run_coroutine_threadsafe(self.say({"type": "training", "text": text}), loop)
+
+        trained = await in_thread(self._hub.training.train, shown.path, self._hub.folder.file(readout), progress)
         mistakes = [mistake | {"t_us": mistake["t_us"] * us} for mistake in trained.pop("mistakes")]
         await self._hub.say(await self._hub.recordings())
         await self.say({"type": "trained", "name": shown.name, "readout": readout, "mistakes": mistakes, **trained})
-
-    @request
-    async def training(self) -> None:
-        """Send `training`: the latest progress of the training that runs, in words; empty where none runs."""
-        await self.say({"type": "training", "text": self._hub.training.progress()})
 
     @request
     async def train_stop(self) -> None:

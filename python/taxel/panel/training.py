@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from subprocess import PIPE
 from typing import Any
@@ -60,7 +60,6 @@ class Training:
     def __init__(self, opening: Opening, files: ShownFiles) -> None:
         self._opening, self._files = opening, files
         self._training: ChildProcess | None = None
-        self._steps = Steps()
         self._closed, self._stopped, self._lock = False, False, threading.Lock()
 
     def close(self) -> None:
@@ -69,8 +68,11 @@ class Training:
             self._closed = True
         self.end()
 
-    def train(self, recording: Path, out: Path) -> dict[str, Any]:
-        """Train on the labels of a recording, and return what the page shows of it, with times as in the file."""
+    def train(self, recording: Path, out: Path, progress: Callable[[str], object]) -> dict[str, Any]:
+        """Train on the labels of a recording, and return what the page shows of it, with times as in the file.
+
+        Each step calls `progress` with how far the training is, in words.
+        """
         options = self._opening.options_of(recording).given()
         request = json.dumps({"recording": str(recording), "open": options, "out": typed(out)})
         with self._lock:
@@ -78,12 +80,12 @@ class Training:
                 raise ProblemError(_STOPPED)
             if self._training is not None:
                 raise ProblemError("a training runs already: stop it first, or wait for its end")
-            self._steps, self._stopped = Steps(), False
+            self._stopped = False
             # A separate process, so that it does not delay receiving.
             self._training = ChildProcess("taxel.panel.training_process", line=request, stdout=PIPE)
         try:
             with self._training:
-                answer = self._answer(self._training)
+                answer = self._answer(self._training, progress)
             code = self._training.returncode
         finally:
             self._training = None
@@ -102,22 +104,20 @@ class Training:
             "pictures": answer["pictures"],
         }
 
-    def _answer(self, training: ChildProcess) -> dict[str, Any]:
+    def _answer(self, training: ChildProcess, progress: Callable[[str], object]) -> dict[str, Any]:
         """Wait until a training has ended, and return the last line that it wrote."""
         assert training.stdout is not None
+        steps = Steps()
         line: dict[str, Any] = {"type": "progress"}
         for written in training.stdout:
             if not written.endswith("\n"):  # it was stopped while it wrote
                 break
             line = json.loads(written)
             if line["type"] == "progress":
-                self._steps.update(line["step"], line["done"], line["of"])
+                steps.update(line["step"], line["done"], line["of"])
+                progress(str(steps))
         training.wait()
         return line
-
-    def progress(self) -> str:
-        """Return how far the training that runs is; empty if none runs."""
-        return str(self._steps) if self._training is not None else ""
 
     def end(self) -> None:
         """End the training that runs, if one does."""

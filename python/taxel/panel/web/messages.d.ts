@@ -350,7 +350,7 @@ export interface Trained {
   pictures: { title: string; svg: string }[];
 }
 
-/** When asked: the latest progress of the training that runs, first after 2 s; empty before, and where none runs. */
+/** To who trains, at each step: how far the training is, in words. */
 export interface Training {
   type: "training";
   text: string;
@@ -592,11 +592,6 @@ export interface TrainRequest {
   id?: number;
 }
 
-export interface TrainingRequest {
-  type: "training";
-  id?: number;
-}
-
 export interface TrainStopRequest {
   type: "train_stop";
   id?: number;
@@ -738,7 +733,6 @@ export type Request =
   | UndoRequest
   | HealthRequest
   | TrainRequest
-  | TrainingRequest
   | TrainStopRequest
   | ReadOutRequest
   | CutRequest

@@ -7,9 +7,6 @@ import { failed, notify } from "./notice.js";
 /** @typedef {import("./messages.js").Trained} Trained */
 /** @typedef {import("./server.js").Server} Server */
 
-/** How often a training that runs is asked how far it is, ms. */
-const ASKED_MS = 3000;
-
 /** The button that trains, what the training prints, and the choice of the readout. */
 export class Training {
   /**
@@ -39,7 +36,6 @@ export class Training {
     this.since = performance.now();
     this.text("");
     this.mistakes.clear();
-    const asking = setInterval(() => this.server.send({ type: "training" }), ASKED_MS);
     this.write();
     try {
       await this.server.request({ type: "train" });
@@ -47,7 +43,6 @@ export class Training {
       this.text(error instanceof Error ? error.message : String(error));
       part("train-text", HTMLElement).classList.add("bad");
     }
-    clearInterval(asking);
     this.since = null;
     this.write();
   }
@@ -68,7 +63,7 @@ export class Training {
 
   /** Shows how far the training that runs is. @param {string} text as the command says it */
   progress(text) {
-    if (this.since !== null && text) this.text(text);
+    if (this.since !== null) this.text(text);
   }
 
   /** @param {Trained} trained */
