@@ -4,12 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := Cargo.toml Cargo.lock $(shell find crates rules -name '*.rs' -o -name Cargo.toml)
 
-.PHONY: help prerequisites setup build released demo browser check test test-studies accept slow lint format registers lock bench docs dist platforms clean
+.PHONY: help prerequisites setup build released demo browser check test test-studies accept slow fuzz lint format registers lock bench docs dist platforms clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
 	@echo "make check  format, lint, types and laws: for every edit"
 	@echo "make test   the product's tests but the slow ones      make slow   the slow ones of all"
+	@echo "make fuzz   any bytes into decoders, boards and readers of files, FUZZ_S=600 s each"
 	@echo "make test-studies  the tests of the distributions beside it  make rtl-test  those of the FPGA logic"
 	@echo "make accept keep the sentences of errors as they are now, in tests/messages"
 	@echo "make lint   format, lint, types, layers     make bench  ratios against peers, to benchmarks/results/"
@@ -42,11 +43,12 @@ $(VENV)/.installed: $(PROJECTS) requirements.lock | prerequisites
 	@$(install) "maturin>=1.16,<2" -r $(VENV)/wanted.txt
 	@touch $@
 
-# One place for each group of extras: $(VENV)/.for-test, .for-lint, .for-docs, .for-dist.
+# One place for each group of extras: $(VENV)/.for-test, .for-lint, .for-docs, .for-dist, .for-fuzz.
 EXTRAS_test := test beside neo nir cluster bench
 EXTRAS_lint := lint
 EXTRAS_docs := docs
 EXTRAS_dist := dist
+EXTRAS_fuzz := fuzz
 $(VENV)/.for-%: $(PROJECTS) requirements.lock | $(VENV)/.installed
 	@echo "taxel: installing what make $* needs"
 	@$(wanted) $(EXTRAS_$*) > $(VENV)/wanted-$*.txt
@@ -100,11 +102,24 @@ test-studies: released $(VENV)/.for-test
 accept: released $(VENV)/.for-test
 	$(BIN)/python -m pytest -q tests/messages --snapshot-update
 
-slow: released $(VENV)/.for-test browser dist
+# Random examples are drawn anew each time; the last lines say which of the kept faults no test catches any more.
+slow: SEED := $(shell date +%s)
+slow: released $(VENV)/.for-test browser dist fuzz
 	cargo test --release --workspace --quiet -- --ignored
+	$(BIN)/python -m pytest -q -m slow --hypothesis-seed=$(SEED)
+	$(BIN)/python -m pytest -q -m slow --hypothesis-seed=$(SEED) rules $(BESIDE)
+	$(BIN)/python tools/faults.py $$(git rev-parse HEAD)
+
+# So many seconds a target: decoders and boards by cargo-fuzz and a nightly compiler, readers of files by atheris.
+FUZZ_S ?= 600
+fuzz: released $(VENV)/.for-fuzz
 	cargo check --manifest-path fuzz/Cargo.toml --quiet
-	$(BIN)/python -m pytest -q -m slow
-	$(BIN)/python -m pytest -q -m slow rules $(BESIDE)
+	@if cargo +nightly fuzz --version >/dev/null 2>&1; then \
+		for target in $$(cargo +nightly fuzz list); do cargo +nightly fuzz run $$target -- -max_total_time=$(FUZZ_S) || exit 1; done; \
+	else echo "make fuzz: leaves out decoders and boards: rustup toolchain install nightly, cargo install cargo-fuzz"; fi
+	@if $(BIN)/python -c 'import atheris' 2>/dev/null; then \
+		mkdir -p fuzz/corpus/readers && $(BIN)/python fuzz/readers.py fuzz/corpus/readers -max_total_time=$(FUZZ_S); \
+	else echo "make fuzz: leaves out readers: atheris has no wheel for this machine"; fi
 
 # Either build of the extension does. Of pydoclint's rules those hold that need no second place for types.
 SOURCES_OF_PYTHON := python rules/taxel_rules studies/taxel_studies benchmarks/taxel_benchmarks bridge/taxel_bridge viewers/taxel_viewers
@@ -194,7 +209,7 @@ rtl-bitstream: $(RTL)/.installed
 
 # Versions that fit all systems and all Pythons that taxel supports; benchmarks' peers, of which one wants an older NumPy, are not among them.
 lock: $(VENV)/.for-dist
-	@$(wanted) $(EXTRAS_test) $(EXTRAS_lint) $(EXTRAS_docs) $(EXTRAS_dist) | $(BIN)/uv pip compile - --universal --python-version 3.11 --no-annotate --no-header --quiet $(UPGRADE) --output-file requirements.lock
+	@$(wanted) $(EXTRAS_test) $(EXTRAS_lint) $(EXTRAS_docs) $(EXTRAS_dist) $(EXTRAS_fuzz) | $(BIN)/uv pip compile - --universal --python-version 3.11 --no-annotate --no-header --quiet $(UPGRADE) --output-file requirements.lock
 	@$(BIN)/python tools/licences.py
 
 # Benchmarks have an environment of their own, taxel beside its peers: these are large, and one wants an older NumPy.

@@ -296,6 +296,10 @@ def main() -> None:
     for name in ROOMS:
         said = [fault.caught[asked.revision] for fault in chosen if fault.room == name]
         print(f"{name:13} {len(said)} faults, {said.count(GONE)} gone, {said.count(None)} not caught")
+    newly = [
+        f for f in chosen if f.caught[asked.revision] is None and any(v not in (None, GONE) for v in f.caught.values())
+    ]
+    sys.exit("\n".join(f"caught before: {f.file}:{f.line} {f.now.strip()}" for f in newly) or None)
 
 
 if __name__ == "__main__":
