@@ -172,7 +172,7 @@ $(RTL)/.installed: rtl/requirements.txt
 rtl-modules: $(RTL)/.installed
 	$(RTL)/bin/python -m pytest -q -n 2 rtl/dv/modules rtl/tools
 
-.PHONY: rtl-tools rtl-modules rtl-registers rtl-lint rtl-test rtl-pair rtl-prove rtl-slow rtl-timing rtl-bitstream
+.PHONY: rtl-tools rtl-modules rtl-registers rtl-lint rtl-quick rtl-test rtl-pair rtl-prove rtl-slow rtl-timing rtl-bitstream
 rtl-tools: $(RTL)/.installed
 
 # The RTL's package of registers, from the registers' one source.
@@ -184,15 +184,17 @@ rtl-lint:
 	@$(PYTHON) rtl/tools/lint.py
 lint: rtl-lint
 
-# All tests of the RTL, on two cores: the modules, and whole frames beside the emulated board, which cargo builds.
-rtl-test: rtl-lint rtl-modules rtl-pair
+# On two cores: the modules, and whole frames beside the emulated board, which cargo builds. The quick half leaves out
+# what compiles the design for many more parameters.
+rtl-quick: PAIRS := -k quick
+rtl-quick rtl-test: rtl-lint rtl-modules rtl-pair
 rtl-pair: $(RTL)/.installed released $(VENV)/.for-test
-	$(BIN)/python -m pytest -q -n 2 rtl/dv/test_*.py -m "not slow"
+	$(BIN)/python -m pytest -q -n 2 rtl/dv/test_*.py -m "not slow" $(PAIRS)
 
 # Proofs without bound; faults drawn anew, which proofs find, or tests of modules, or the pair.
 rtl-prove: $(RTL)/.installed
 	$(RTL)/bin/python rtl/tools/prove.py
-rtl-slow: rtl-prove released $(VENV)/.for-test
+rtl-slow: rtl-test rtl-prove released $(VENV)/.for-test
 	$(BIN)/python -m pytest -q rtl/dv/test_*.py -m slow
 	$(BIN)/python rtl/tools/faults.py
 	$(BIN)/python rtl/tools/faults.py --proofs
