@@ -168,3 +168,56 @@ def test_by_how_much_the_labels_of_one_name_are_off_what_was_felt_is_taken_off(t
     assert training.score.rank[0] == 0
     assert any(line.startswith("contact: labels are ") for line in training.lines())
     assert training.to_dict()["constants_ms"] == training.constants_ms
+
+
+def by_button(seed: int, at: Times, spread_ms: tuple[float, float]) -> Times:
+    """Return when a person's button marked events, us: each is late by another time."""
+    late_us = 1000.0 * np.random.default_rng(seed).uniform(*spread_ms, len(at))
+    return np.sort(at + np.rint(late_us).astype(np.int64))
+
+
+@pytest.mark.parametrize(("spread_ms", "least"), [((-70.0, -20.0), 28), ((80.0, 250.0), 10)])
+def test_labels_of_the_same_hand_are_found_in_another_recording(
+    tmp_path: Path, spread_ms: tuple[float, float], least: int
+) -> None:
+    """Also where they are less off than the window, and where they vary by more than it."""
+    recordings, labels = [], []
+    for seed, name in ((4, "a.npz"), (5, "b.npz")):
+        frames, truth = pressed(seed, 30)
+        taxel.convert(frames, tmp_path / name)
+        recordings.append(taxel.open(tmp_path / name))
+        labels.append({"contact": by_button(seed, truth["contact"], spread_ms), "lift": truth["lift"]})
+    training = taxel.train(recordings[0], labels[:1], taxel.tasks.TrainOptions(folds=0))
+    assert training.constants_ms == {"contact": pytest.approx(sum(spread_ms) / 2, abs=25)}
+    training.readout.save(tmp_path / "touch.json")
+    detected = taxel.tasks.detect(taxel.Readout.load(tmp_path / "touch.json"), recordings[1], labels[1:])
+    assert detected.score is not None
+    assert detected.score["contact"].found >= least
+    [line] = [line for line in detected.warnings if line.startswith("contact: labels are ")]
+    assert line.endswith("as in the training: taken off to score")
+    right = taxel.tasks.detect(training.readout, recordings[1], [pressed(5, 30)[1]])
+    assert not any("taken off" in line for line in right.warnings)
+
+
+def test_labels_that_no_shift_puts_on_loads_are_said_to_be_off(tmp_path: Path) -> None:
+    taxel.convert(pressed(4, 20)[0], tmp_path / "a.npz")
+    other = pressed(6, 20)[1]
+    training = taxel.train(taxel.open(tmp_path / "a.npz"), [other], taxel.tasks.TrainOptions(folds=0))
+    said = [line for line in training.warnings if "by no one shift: are they of this recording, and in time?" in line]
+    assert [line.partition(":")[0] for line in said] == ["contact", "lift"]
+
+
+@pytest.mark.parametrize(
+    ("chosen", "line"),
+    [
+        (slice(0, 20), None),
+        (slice(2, 20), "contact at {0:.3f} s, {1:.3f} s are false: does each lack a label?"),
+    ],
+)
+def test_times_of_lacking_labels_are_said(tmp_path: Path, chosen: slice, line: str | None) -> None:
+    frames, truth = pressed(4, 20)
+    taxel.convert(frames, tmp_path / "a.npz")
+    labels = truth | {"contact": truth["contact"][chosen]}
+    training = taxel.train(taxel.open(tmp_path / "a.npz"), [labels], taxel.tasks.TrainOptions(folds=0))
+    expected = () if line is None else (line.format(*truth["contact"][:2] / 1e6),)
+    assert training.warnings == expected

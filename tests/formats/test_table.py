@@ -212,6 +212,10 @@ def test_a_table_opens_without_a_layout(tmp_path: Path, kind: str) -> None:
         (ROWS["German"][0], ["2 frames of 1 x 3 taxels", "semicolons", "decimal commas", "'Zeit [s]' in s"]),
         (ROWS["rostopic"][0], ["field.header.seq left out: a counter", "field.header.stamp left out: another time"]),
         (ROWS["another unit"][0], ["A [g] left out: in g"]),
+        (
+            "t_ms,heel_lat,heel_med,gps_lat\n0,1,2,50.1\n10,1,3,50.2\n20,2,2,50.3\n",
+            ["1 x 2 taxels", "gps_lat left out: another quantity"],
+        ),
     ],
 )
 def test_one_line_says_how_it_was_read_and_what_was_left_out(tmp_path: Path, text: str, words: list[str]) -> None:

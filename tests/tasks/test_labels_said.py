@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from touching import pressed
 
@@ -32,3 +33,39 @@ def test_a_label_that_the_readout_spells_otherwise_is_said(recording: taxel.Reco
     assert taxel.tasks.detect(rule, recording, [labels]).warnings == ()
     found = taxel.tasks.detect(rule, recording, [{label.capitalize(): t for label, t in labels.items()} | labels])
     assert sum("spelt alike" in text for text in found.warnings) == len(labels)
+
+
+def test_labels_that_are_listed_twice_are_said(recording: taxel.Recording) -> None:
+    rule = PlainRule("area", 2, noise_floor=5.0)
+    labels = pressed(1, begin_s=0.7)[1]
+    twice = labels | {"lift": np.sort(np.concatenate([labels["lift"], labels["lift"] + 20_000]))}
+    [line] = taxel.tasks.detect(rule, recording, [twice]).warnings
+    assert "10 of 20 labels 'lift' are less than 50 ms after another: is each listed once?" in line
+
+
+def test_a_training_says_where_values_fall(tmp_path: Path) -> None:
+    """Of channels a few of which rise, so that something is felt."""
+    frames, labels = pressed(1, begin_s=0.7)
+    values = 50.0 - (frames.values - 50.0).reshape(len(frames), 1, 36)
+    values[300::230, 0, 0] += 20.0
+    taxel.convert(taxel.Frames(values, frames.t, unit="counts"), tmp_path / "a.npz")
+    training = taxel.train(taxel.open(tmp_path / "a.npz"), [labels], taxel.tasks.TrainOptions(folds=0))
+    assert any("write falls = true in a layout file" in line for line in training.warnings)
+
+
+def test_ends_that_a_rule_finds_are_not_said_to_lie_within_touches(tmp_path: Path) -> None:
+    """Two taxels keep a load, as foam does, so that touches seem not to end."""
+    random = np.random.default_rng(1)
+    begins = 100 + 300 * np.arange(12) + random.integers(0, 50, 12)
+    ends = begins + random.integers(100, 200, 12)
+    values = random.normal(50, 0.5, (3800, 6, 6))
+    values[begins[0] :, 0, :2] += 8.0
+    for begin, end in zip(begins, ends, strict=True):
+        values[begin:end, 2:4, 2:4] += 45.0
+    frames = taxel.Frames(values, 10_000 * np.arange(3800), unit="counts", array=taxel.Array(6, 6))
+    taxel.convert(frames, tmp_path / "a.npz")
+    within = begins + random.integers(40, 60, 12)
+    for lift, lines in ((ends, 0), (within, 1)):
+        given = {"contact": 10_000 * begins, "lift": 10_000 * lift}
+        training = taxel.train(taxel.open(tmp_path / "a.npz"), [given], taxel.tasks.TrainOptions(folds=0))
+        assert sum("lie within touches" in line for line in training.warnings) == lines

@@ -351,28 +351,6 @@ def exchanged(kinds: Kinds) -> str:
     return f"{of_other} of {total} labels are where the other of {both} is felt: are the two names exchanged?"
 
 
-def constants_ms(beside: Kinds) -> dict[str, float]:
-    """Return by how much the labels of contacts, and those of lifts, are later than loads begin and end, ms.
-
-    Of each label whose offset is larger than labels are usually off, and the same for most of them; up to 200 ms, as
-    more may be those of other loads.
-
-    Parameters
-    ----------
-    beside : mapping
-        As of `beside_loads`.
-    """
-    constants = {}
-    for label in sorted({label for _, label in beside if recipes.neuron_of("touch", label)}):
-        kinds = {kind: pair for kind, pair in beside.items() if kind[1] == label}
-        fit = next(iter(explain(kinds)), None)
-        if fit is None or fit.rate != 1.0 or not fit.is_off or abs(fit.shift_ms) > REACHES_MS[-1]:
-            continue
-        if fit.explained >= _MOST * sum(len(labels) for labels, _ in kinds.values()):
-            constants[label] = fit.shift_ms
-    return constants
-
-
 def beside_loads(examples: Sequence[Example]) -> dict[tuple[int, str], tuple[_Times, _Times]]:
     """Return the labels of each example, and the begins or ends of loads that they are of.
 
@@ -431,7 +409,19 @@ def _lines(
         option = f" (--shift-ms {-fit.shift_ms:.0f})" if fit.rate == 1.0 and fit.explained >= _MOST * total else ""
         at = _stretch(examples, kinds, fit)
         lines.append(f"{names}: {fit.explained} of {total} labels are {text}, within {fit.reach_ms:.0f} ms{at}{option}")
-    return lines
+    return lines or list(_apart(kinds, where))
+
+
+def _apart(kinds: Kinds, where: str) -> Iterator[str]:
+    """Yield the names of which many labels are off by no one shift, though there are begins or ends for most."""
+    pairs = _pairs(kinds, 0.0, 1.0, REACHES_MS[0])
+    for name in sorted({label for _, label in kinds}):
+        of_name = [kind for kind in kinds if kind[1] == name]
+        total, found = (sum(len(kinds[kind][side]) for kind in of_name) for side in (0, 1))
+        apart = total - sum(len(pairs[kind]) for kind in of_name)
+        if total >= _LEAST and found >= _MOST * total and total - apart < _MOST * total:
+            off = f"{apart} of {total} labels are more than {REACHES_MS[0]:.0f} ms off {where}"
+            yield f"{name}: {off}, by no one shift: are they of this recording, and in time? --window-ms allows more"
 
 
 def _stretch(examples: Sequence[Example], kinds: Mapping[tuple[int, str], Any], fit: ClockFit) -> str:

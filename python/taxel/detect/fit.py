@@ -343,6 +343,11 @@ class Fitter:
         order = np.argsort(t, kind="stable")
         return Detections([labels[k] for k in order], t[order], known[order])
 
+    def constants_ms(self) -> dict[str, float]:
+        """Return by how much the labels of each name are later than what was felt, ms, of those that are."""
+        constants = {} if self._tuning is None else {label: self._tuning.constant_ms(label) for label in self.labels}
+        return {label: ms for label, ms in constants.items() if ms}
+
     def inside_loads(self, labels: Sequence[str]) -> dict[str, int]:
         """Return how many events of each label lie within a load, farther from its begin and end than the window."""
         assert self._tuning is not None

@@ -99,6 +99,11 @@ class Loads:
         return lacks_neighbours(self._examples)
 
     @property
+    def of_touches(self) -> EdgeRule:
+        """The rule of touches: two taxels or more are loaded, or a channel is above its noise."""
+        return EdgeRule("peak", PEAK) if self.are_channels else EdgeRule("area", TOUCH)
+
+    @property
     def are_frames(self) -> bool:
         """Whether all examples are frames."""
         return all(isinstance(example.source, Frames) for example in self._examples)
@@ -240,7 +245,7 @@ def touches(examples: Sequence[Example], noise_floor: float) -> tuple[Loads, Fou
     if not examples or any(example.tare is None or isinstance(example.source, SpikeTrains) for example in examples):
         return None
     loads = Loads(examples, [clock_of(example) for example in examples], noise_floor, reporting(None))
-    return loads, *loads.edges(EdgeRule("peak", PEAK) if loads.are_channels else EdgeRule("area", TOUCH))
+    return loads, *loads.edges(loads.of_touches)
 
 
 def largest(

@@ -351,4 +351,9 @@ def score_rows(named: Iterable[tuple[str, Score | None]]) -> list[str]:
 def many_wrong(scored: Score) -> dict[str, int]:
     """Return how many events are missed and false of each label of which more than 5 % are."""
     scores = (scored.by_label or {scored.label: scored}).items()
-    return {label: part.rank[0] for label, part in scores if max(part.missed, part.false) > _MANY * part.events}
+    return {label: part.rank[0] for label, part in scores if many(max(part.missed, part.false), part.events)}
+
+
+def many(wrong: int, events: int) -> bool:
+    """Whether so many wrong ones of so many events are many: more than 5 %."""
+    return wrong > _MANY * events

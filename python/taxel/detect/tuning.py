@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from taxel._base.arguments import finite, number, several, text
 from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
+from taxel.detect import recipes
 from taxel.detect.examples import Example, check_examples
 from taxel.detect.loads import CHANGES, EdgeRule, FoundTimes, Loads, Stretch, clock_of, lacks
 from taxel.detect.plain_rule import PlainRule
-from taxel.detect.scoring import tally
+from taxel.detect.scoring import many, tally
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: Thresholds of the area, taxels.
@@ -51,6 +52,12 @@ AGES_MS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 16.0, 20.0, 30.0,
 EQUAL_SHARE = 0.002
 #: ... and so many of them within `NEAR_US`, beside one: of few labels one is noise.
 NEAR_US = 10_000
+#: Labels of one name may be so far off what was felt, ms; farther off they are of another clock, or of other loads.
+FAR_MS = 250.0
+#: They are off by one constant where of so many at least this share is within so many ms of it.
+_LEAST, _MOST, _SAME_MS = 8, 0.8, 100.0
+#: ... and with it taken off, so many fewer are missed and false, and that share of the labels.
+_FEWER, _FEWER_SHARE = 3, 0.05
 
 
 class _RuleFit(NamedTuple):
@@ -230,6 +237,39 @@ class Tuning:
         labels_of = [name, None] if edge == 0 else [None, name]
         how: dict[str, Any] = {"labels": labels_of, "noise_floor": self.loads.noise_floor, "unit": self.loads.unit}
         return _Best(fit, PlainRule(**rule._asdict(), **how))
+
+    def constant_ms(self, name: str) -> float:
+        """Return by how much the labels of a name are later than what was felt, ms; 0 where that is not so.
+
+        Where rules miss or invent many, it is that of the begins or ends of loads of which most are within the window
+        once it is taken off; else it is that of touches, of a contact or lift, if it is more than the window.
+        """
+        parts, true = self.loads.whole_examples, self._truth[name]
+        points = list(_points(self.loads, parts, None))
+        wrong = min(len(true), *(best.fit.wrong for best in self._at_edges(name, points, parts)))
+        named = {"contact": (0,), "lift": (1,)}.get(recipes.neuron_of("touch", name) or "")
+        are_many = many(wrong, len(true))
+        if len(true) < _LEAST or not self.loads.have_rest or not (are_many or named):
+            return 0.0
+        # Nearer to another label than to its own an edge says nothing.
+        reach_us = int(min(to_us(FAR_MS + _SAME_MS), np.median(np.diff(true)) / 2))
+        simple = [point for point in points if point.frames == 1 and not point.levels and point.quantity not in CHANGES]
+        window_ms, found = to_ms(self._width_us), [(len(true), np.inf, 0.0)]
+        for point, edge in product(simple if are_many else [self.loads.of_touches], named or (0, 1)):
+            edges = self.loads.edges(point)[edge]
+            pairs = tally(edges.t, edges.known, true, reach_us)
+            if pairs is None or len(pairs.detected) < _MOST * len(true):
+                continue
+            constant = -float(np.median(pairs.errors_ms))
+            off = np.abs(pairs.errors_ms + constant)
+            same, near = (int(np.count_nonzero(off <= ms)) for ms in (_SAME_MS, window_ms))
+            if same >= _MOST * len(true):
+                # What is felt of a label outside the window is missed, but nothing else is felt there.
+                found.append((len(true) - near + len(edges.t) - same, float(np.median(off)), constant))
+        left, _, constant = min(found)
+        few = max(_FEWER, round(_FEWER_SHARE * len(true)))
+        better = left <= wrong - few if are_many else left <= few and abs(constant) > window_ms
+        return constant if better and abs(constant) <= FAR_MS else 0.0
 
     def detected(self, rule: PlainRule | None, label: str, part: Stretch) -> FoundTimes:
         """Return what the rule of a label detects of it in a part of an example, as `taxel.detect.run` finds it."""

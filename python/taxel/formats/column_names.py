@@ -60,10 +60,11 @@ _KEYS = re.compile(
     re.IGNORECASE,
 )
 _OTHERS = re.compile(
-    r"(?:[agm][ ._]?[xyz])|(?:.*[ ._])?"
+    # A lateral sensor of a foot is no latitude.
+    r"(?:[agm][ ._]?[xyz])|(?:g[pn]ss?[ ._])?(?:lat|lon)|(?:.*[ ._])?"
     r"(?:acc(?:el(?:eration)?)?|gyro?(?:scope)?|mag(?:netometer)?|imu|temp(?:erature)?|temperatur|"
     r"(?:total|sum|net|mean|avg|average|summe|gesamt)[ ._-]?(?:force|load|weight|pressure|kraft|last|druck)|"
-    r"batt?(?:ery)?|akku|vbat|hum(?:idity)?|lat(?:itude)?|lon(?:gitude)?|quat(?:ernion)?|roll|pitch|yaw|crc|checksum|cop|total|sum|summe)"
+    r"batt?(?:ery)?|akku|vbat|hum(?:idity)?|latitude|longitude|quat(?:ernion)?|roll|pitch|yaw|crc|checksum|cop|total|sum|summe)"
     r"(?:[ ._\[(]*(?:x|y|z|w|\d+)[\])]?)?(?:[ ._]?[\[(][^\])]*[\])])?",
     re.IGNORECASE,
 )

@@ -30,9 +30,10 @@ from taxel.frames import Frames
 from taxel.options import DetectOptions, GivenTare
 from taxel.recorded import recorded, unit_of
 from taxel.recording import Recording
-from taxel.recording.analysis.rest import FORCE_UNITS, of_frames
+from taxel.recording.analysis.rest import FORCE_UNITS
 from taxel.recording.opening import sensors_of
-from taxel.tasks.info import sensor_line
+from taxel.spikes import to_us
+from taxel.tasks.info import sensor_lines
 from taxel.tasks.labels import GivenLabels, given_labels
 from taxel.tasks.rest import TakenRest, rest
 
@@ -209,7 +210,7 @@ def detect(
         update(f"detecting in {opened[0].title}" if opened else "detecting", 0, 0)
         one_of = partial(_detected, readout, known, options)
         tried = workers.tried(one_of, each_one, lambda _, done: update("detecting", done, len(each_one)))
-        for text in (text for one in tried for text in one.warnings):
+        for text in dict.fromkeys(text for one in tried for text in one.warnings):
             warn(text, stacklevel=2)
         each = tuple(one.result for one in tried if one.error is None)
         failed = {
@@ -302,8 +303,18 @@ def _detected(readout: Readout | PlainRule, known: Sequence[str], options: Detec
     example = Example(recording, true, tare, title.removesuffix(recording.label), title)
     outcome = Outcome(title, example, found)
     scored = score(outcome.compared, true, options.window_ms) if true else None
-    outcome = outcome._replace(score=scored)
-    remarks = [] if scored is not None and scored.events and not many_wrong(scored) else list(_remarks(recording))
+    for label, ms in (readout._parts.get("training") or {}).get("constants_ms", {}).items():
+        # As in the training, if these labels are of the same hand.
+        moved = true | {label: true.get(label, _NONE) - round(to_us(ms))}
+        if scored is None or not len(true.get(label, _NONE)):
+            continue
+        second = score(outcome.compared, moved, options.window_ms)
+        if second.rank < scored.rank:
+            true, scored = moved, second
+            side = "after" if ms > 0 else "before"
+            warn(f"{label}: labels are {abs(ms):.0f} ms {side} what was felt, as in the training: taken off to score")
+    outcome = outcome._replace(example=example._replace(labels=true), score=scored)
+    remarks = [] if scored is not None and scored.events and not many_wrong(scored) else list(sensor_lines(recording))
     if scored is not None and not scored.events:
         remarks.insert(
             0,
@@ -349,12 +360,3 @@ def _naming(recording: str) -> Iterator[None]:
         if not is_of_argument and not str(error).startswith(recording):
             error.args = (f"{recording}: {error.args[0]}", *error.args[1:])
         raise
-
-
-def _remarks(recording: Recording) -> Iterator[str]:
-    """Yield what may keep detections away or make false ones, as ``taxel info`` finds it."""
-    source = recorded(recording, hold=False)
-    if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
-        yield f"rest: {quiet.text(recording.path, recording._turned)}"
-    if line := sensor_line(recording):
-        yield line

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +17,7 @@ from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.analysis.health import health
 from taxel.recording.analysis.pressure import Series, series
+from taxel.recording.analysis.rest import of_frames
 from taxel.recording.analysis.summary import summary
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
@@ -87,9 +89,11 @@ def info(recording: Recording, tare: GivenTare | None = None) -> Info:
     return Info(found.facts, found.pressed, found.tare, tuple(warnings))
 
 
-def sensor_line(recording: Recording) -> str:
-    """Return how many taxels are dead, stuck or noisy, and how many gaps there are, as one line; "" of none."""
+def sensor_lines(recording: Recording) -> Iterator[str]:
+    """Yield that values fall from their rest, and how many taxels are dead, stuck or noisy, and gaps there are."""
     source, parts = recorded(recording, hold=False), []
+    if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
+        yield f"rest: {quiet.text(recording.path, recording._turned)}"
     # Pixels of counts may have no event.
     if not isinstance(source, SpikeTrains) and not (isinstance(source, Frames) and are_counts(source.unit)):
         if isinstance(source, Frames):
@@ -102,7 +106,8 @@ def sensor_line(recording: Recording) -> str:
         parts = [f"{named} of {counted(source.array.taxels, 'taxel')}"] if named else []
     if gaps := recording._gaps:
         parts.append(str(gaps))
-    return f"sensor: {'; '.join(parts)} (taxel info lists them)" if parts else ""
+    if parts:
+        yield f"sensor: {'; '.join(parts)} (taxel info lists them)"
 
 
 def _rest(recording: Recording, tare: GivenTare | None) -> Tare | None:

@@ -20,10 +20,11 @@ from taxel._base.messages import are, counted, warn
 from taxel._base.times import beginning_us, begun
 from taxel._core import ProblemError
 from taxel.detect.examples import early
+from taxel.detect.scoring import many
 from taxel.labels import Labels, Note, beside, by_clock, trial_of
 from taxel.recording import Recording, kind_of_file
 from taxel.recording.cut import span_us
-from taxel.spikes import to_us
+from taxel.spikes import to_ms, to_us
 
 #: A table of labels, or several.
 Tables: TypeAlias = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
@@ -50,6 +51,14 @@ def given_labels(
         names = table_names(source) if are_tables(source) else "given as times"
         error = refused(argument, f" is {names}: names no event in {titles_of(recordings)}")
         raise helped(error, argument, "give") if source == "notes" else error
+    for recording, of_recording in zip(recordings, events, strict=True):
+        for label, times in of_recording.items():
+            again = int(np.count_nonzero(np.diff(times) < _NEAR_US))
+            if many(again, len(times)):
+                warn(
+                    f"{recording.title}: {again} of {len(times)} labels {shown(label)} are less than "
+                    f"{to_ms(_NEAR_US):g} ms after another: is each listed once?"
+                )
     unlabelled = sources_without(source, recordings, events)
     return [moved(each, one, shift_ms) for each, one in zip(events, recordings, strict=True)], unlabelled
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from taxel._base.progress import Announcement, Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import Example, Outcome, Recipe, recipes, score
 from taxel.detect.board import of_training
-from taxel.detect.clock import beside_loads, constants_ms, exchanged, off_loads
+from taxel.detect.clock import beside_loads, exchanged, off_loads
 from taxel.detect.drift import training_data
 from taxel.detect.examples import check_examples, sizes_of
 from taxel.detect.fit import Fitter
@@ -23,15 +24,15 @@ from taxel.detect.floors import TOUCH, held_by_tare, measured_floor
 from taxel.detect.folds import count_of_folds
 from taxel.detect.judge import judge_by, judge_training
 from taxel.detect.readout import run
-from taxel.detect.scoring import many_wrong
+from taxel.detect.scoring import many, many_wrong
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.options import GivenTare, TrainOptions
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.opening import sensors_of
-from taxel.tasks.info import sensor_line
-from taxel.tasks.labels import GivenLabels, given_labels, labelled_trials
+from taxel.tasks.info import sensor_lines
+from taxel.tasks.labels import GivenLabels, few, given_labels, labelled_trials
 from taxel.tasks.rest import TakenRest, UnknownRestError, rest
 from taxel.tasks.train_result import Training
 
@@ -130,26 +131,33 @@ def _train(
         warn(
             f"arrays of {len(sizes)} sizes, the smallest {smallest} taxels, are padded at their far edges to {largest}"
         )
-    constants = _constants(examples, update)
-    examples = [
-        example._replace(
-            labels={label: times - round(1000.0 * constants.get(label, 0.0)) for label, times in example.labels.items()}
-        )
-        for example in examples
-    ]
     plan = options._plan(names, measured_floor(examples))
     assert plan is not None
+    registers = opened[0].registers
+    frame_us = None if registers is None else registers.frame_us
+    fitter_of = partial(Fitter, recipe=plan, window_ms=options.window_ms, frame_us=frame_us, progress=update)
+    fitter = fitter_of(examples)
+    if constants := _constants(fitter, update):
+        examples = [
+            example._replace(
+                labels={
+                    label: times - round(1000.0 * constants.get(label, 0.0)) for label, times in example.labels.items()
+                }
+            )
+            for example in examples
+        ]
+        fitter = fitter_of(examples)
     taken = [one for one in rests if isinstance(one, TakenRest)]
     try:
-        training = _trained(opened, examples, taken, options, plan, update, workers)
+        training = _trained(opened, examples, taken, options, fitter, constants, update, workers)
     except ProblemError as error:
         if off := off_loads(check_examples(examples)):
             error.args = (f"{error.args[0]}; {off[0]}", *error.args[1:])
         raise
     # Where many labels are missed or false, it is said by how much they are off what was felt.
     if many_wrong(training.score):
-        lines = off_loads(check_examples(examples)) + [sensor_line(recording) for recording in opened]
-        for line in list(filter(None, lines))[:_LINES]:
+        lines = off_loads(check_examples(examples)) or list(_mistaken(training))
+        for line in [*lines, *(line for recording in opened for line in sensor_lines(recording))][:_LINES]:
             warn(line)
     return replace(training, unlabelled=unlabelled, constants_ms=constants)
 
@@ -182,16 +190,26 @@ def _begins_with_label(table: Events | Frames, events: Mapping[str, NDArray[np.i
     return bool(np.any(table.values[0])) and any(np.any(times <= table.t[0]) for times in events.values())
 
 
-def _constants(examples: Sequence[Example], update: Progress) -> dict[str, float]:
+def _constants(fitter: Fitter, update: Progress) -> dict[str, float]:
     """Return by how much the labels of each name are later than what was felt, ms; say where two are exchanged."""
-    if any(example.labels_of for example in examples):
+    if any(example.labels_of for example in fitter.examples):
         return {}
-    beside = beside_loads(check_examples(examples))
-    if not (line := exchanged(beside)):
-        return constants_ms(beside)
+    if not (line := exchanged(beside_loads(fitter.examples))):
+        return fitter.constants_ms()
     warn(line)
     update(Announcement(line), 0, 0)
     return {}
+
+
+def _mistaken(training: Training) -> Iterator[str]:
+    """Yield when labels are missed, and when there are detections without one, where most labels are found."""
+    for label, of_label in training.score.by_label.items():
+        if 2 * of_label.missed >= of_label.events:
+            continue
+        for missed, are in ((True, "are missed: is each right?"), (False, "are false: does each lack a label?")):
+            wrong = [one for one in training.scored.mistakes if (one.label, one.is_missed) == (label, missed)]
+            if many(len(wrong), of_label.events):
+                yield f"{label} at {few(f'{one.t / 1e6:.3f} s' for one in wrong)} {are}"
 
 
 def _like_labels(table: Events | Frames, events: Mapping[str, NDArray[np.int64]]) -> list[str]:
@@ -250,10 +268,15 @@ def _examples(
 
 
 def _within_touches(fitter: Fitter) -> Iterator[str]:
-    """Yield the labels of ends of touches that lie within touches, where nothing is learnt."""
-    named = [label for label in fitter.labels if recipes.neuron_of("touch", label) == "lift"]
-    if fitter.lacks or not named:
+    """Yield the labels of ends of touches that lie within touches, where nothing is learnt.
+
+    Where a rule finds them, touches are longer than what it finds the end of, as foam and drift make them.
+    """
+    lifts = [label for label in fitter.labels if recipes.neuron_of("touch", label) == "lift"]
+    if fitter.lacks or not lifts:
         return
+    rules = fitter.rules(fitter.whole)
+    named = [label for label in lifts if rules[label] is None]
     times = {label: np.concatenate(fitter.labels_in(label, fitter.whole)) for label in named}
     for label, count in fitter.inside_loads(named).items():
         if 2 * count > len(times[label]):
@@ -268,14 +291,12 @@ def _trained(
     examples: Sequence[Example],
     rests: Sequence[TakenRest],
     options: TrainOptions,
-    plan: Recipe,
+    fitter: Fitter,
+    constants: Mapping[str, float],
     update: Progress,
     workers: Workers,
 ) -> Training:
     """Return the readout with its scores, held out where that can be, and its outcomes on the training data."""
-    registers = opened[0].registers
-    frame_us = None if registers is None else registers.frame_us
-    fitter = Fitter(examples, plan, window_ms=options.window_ms, frame_us=frame_us, progress=update)
     count, why = options.folds or 0, "folds is 0"
     if options.folds is None:
         count, why = count_of_folds(fitter.examples)
@@ -297,7 +318,8 @@ def _trained(
         scored = judge_training(fitter, trained._replace(readout=by_halves))
     rules = {label: rule for label, rule in scored.plain.rules.items() if rule is not None}
     readout = trained.readout._with_rules(rules, scored.by_rule)
-    readout = readout._with(training=training_data(fitter.examples, scored.together, of_training(examples)))
+    data = training_data(fitter.examples, scored.together, of_training(examples))
+    readout = readout._with(training=data | {"constants_ms": dict(constants)})
     outcomes = []
     for recording, example in zip(opened, examples, strict=True):
         update(f"scoring on {recording.title}", 0, 0)

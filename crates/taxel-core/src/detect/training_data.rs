@@ -14,6 +14,9 @@ pub struct TrainingData {
     pub noise_floor: f64,
     /// By how much detections are later than labels, ms: the median of each label with detections.
     pub error_ms: BTreeMap<String, f64>,
+    /// By how much labels are later than what was felt, ms, of each label of which that was taken off.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub constants_ms: BTreeMap<String, f64>,
     /// What was measured of loads, by feature.
     pub loads: BTreeMap<String, Quantiles>,
     /// The board that sent the data, where its registers are known and were the same in all of them.
@@ -59,8 +62,10 @@ impl TrainingData {
         if !(self.noise_floor >= 0.0 && self.noise_floor.is_finite()) {
             return Err(problem!("training: noise_floor is {}: must be 0 or more, and finite", self.noise_floor));
         }
-        if let Some((label, ms)) = self.error_ms.iter().find(|(_, ms)| !ms.is_finite()) {
-            return Err(problem!("training: error_ms of {label} is {ms}: must be finite"));
+        for (name, by_label) in [("error_ms", &self.error_ms), ("constants_ms", &self.constants_ms)] {
+            if let Some((label, ms)) = by_label.iter().find(|(_, ms)| !ms.is_finite()) {
+                return Err(problem!("training: {name} of {label} is {ms}: must be finite"));
+            }
         }
         for (name, us) in [("frame_us", self.board.as_ref().map(|board| board.frame_us)), ("period_us", self.period_us)]
         {
@@ -93,6 +98,7 @@ mod tests {
         TrainingData {
             noise_floor: 0.5,
             error_ms: BTreeMap::from([("contact".to_owned(), -3.0)]),
+            constants_ms: BTreeMap::from([("contact".to_owned(), 80.0)]),
             loads: BTreeMap::from([("peak".to_owned(), peak)]),
             board: Some(board(192.0)),
             period_us: Some(1e4),
@@ -109,6 +115,7 @@ mod tests {
         for wrong in [
             TrainingData { noise_floor: -1.0, ..data() },
             TrainingData { error_ms: BTreeMap::from([("lift".to_owned(), f64::INFINITY)]), ..data() },
+            TrainingData { constants_ms: BTreeMap::from([("lift".to_owned(), f64::NAN)]), ..data() },
             TrainingData { loads: of(0, vec![1.0, 2.0]), ..data() },
             TrainingData { loads: of(3, vec![1.0]), ..data() },
             TrainingData { loads: of(3, vec![2.0, 1.0]), ..data() },
