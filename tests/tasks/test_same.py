@@ -40,7 +40,7 @@ def test_readouts_and_detections_are_the_same_from_python_the_shell_and_the_page
     assert shell.returncode == 0, shell.stderr
     texts = {(tmp_path / f"{name}.json").read_text() for name in ("python", "shell")}
     if place.is_file():
-        made = requests().train(place, tmp_path / "page.json")
+        made = requests().train(place, tmp_path / "page.json", lambda _: None)
         texts.add((tmp_path / "page.json").read_text())
         assert made["text"].splitlines() == [*training.lines(), *(f"warning: {text}" for text in training.warnings)]
         assert made["next"] == f"taxel detect RECORDING --readout {tmp_path / 'page.json'}"
