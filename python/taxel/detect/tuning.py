@@ -21,8 +21,9 @@ from taxel.spikes import SpikeTrains, to_ms, to_us
 
 #: Thresholds of the area, taxels.
 AREAS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
-#: Thresholds of the total: steps of a ladder with so many a decade, between these quantiles of its values above 0.
-TOTALS_A_DECADE, QUANTILES = 8, (0.0, 0.95)
+#: Thresholds of the total: steps of a ladder with so many a decade, between these quantiles of its values above 0. The
+#: upper quantile of readings is what they are at most.
+STEPS_A_DECADE, QUANTILES = 8, (0.0, 0.95)
 #: Thresholds of local loads, units of noise.
 LOCAL_LOADS = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
 #: Thresholds of the peak, units of noise.
@@ -35,11 +36,9 @@ FRAMES = (1, 2, 5, 10, 20)
 OF_LARGEST, FRAMES_OF_LARGEST = (0.1, 0.25, 0.5, 0.75), (1, 5)
 #: Levels of a count by the unit: thesis 6.5.3.
 LEVELS = {"N": (5.0, 10.0, 20.0, 30.0, 40.0, 50.0)}
-#: Levels of a count from the data: these quantiles of what loaded taxels read, to two digits; most are low, where loads
+#: Levels of a count in parts of the running range, and of what loaded taxels read at most; most are low, where loads
 #: begin and end.
-LEVEL_QUANTILES = tuple(np.geomspace(0.01, 0.5, 6).tolist())
-#: Levels of a count in parts of the running range.
-RANGE_LEVELS = (0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.11, 0.15, 0.2, 0.3, 0.45)
+LEVEL_SHARES = (0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.11, 0.15, 0.2, 0.3, 0.45)
 #: Numbers that a count rises to, or falls from.
 COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 24, 32, 48, 64, 96, 128, 192, 256)
 #: The numbers that it was at most before it, or falls to, as parts of it, beside one less.
@@ -92,15 +91,16 @@ def tune(
     10 ms of their label, and of these the one whose `known` is nearest to it at the median, before as after it: what is
     known earlier responds to something else.
 
-    Of thresholds alike in all else that are equally right it is the middle one.
+    Of thresholds alike in all else that are equally right it is the middle one; so it is of the numbers that a count
+    falls from.
 
-    Tried are thresholds of the area (`AREAS`), of the total (`TOTALS_A_DECADE`), of the local load, its rise and its
+    Tried are thresholds of the area (`AREAS`), of the total (`STEPS_A_DECADE`), of the local load, its rise and its
     fall (`LOCAL_LOADS`) and of the peak (`PEAKS`), with all numbers of frames (`FRAMES`) and releases (`RELEASES`), at
     the onset and at the end of a load; of channels those of peak and total alone. Of frames so are thresholds of total
     and peak with ends at parts of what they were at most (`OF_LARGEST`), and counts of levels that are on: levels by
-    the unit (`LEVELS`), by what loaded taxels read (`LEVEL_QUANTILES`) and in parts of the running range
-    (`RANGE_LEVELS`), of which a load begins where the count rises to one number after it was at most another, and ends
-    likewise, dated at a number between them.
+    the unit (`LEVELS`), and in parts of what loaded taxels read at most and of the running range (`LEVEL_SHARES`), of
+    which a load begins where the count rises to one number after it was at most another, and ends likewise, dated at a
+    number between them.
 
     Two labels are kinds where exactly two are nearer to onsets than to ends, or where there are only two: then
     thresholds of the area at each of `AGES_MS` are tried too, on a logarithmic scale, and thresholds of the duration as
@@ -230,10 +230,9 @@ class Tuning:
         tried = [(point, found) for point in possible if (found := self._found(point).get((name, edge))) is not None]
         rule, fit = EdgeRule("peak", 4.0), _RuleFit(2**62, 0, np.inf, np.inf)
         if tried:
-            k, fit = _best_of(
-                [found for _, found in tried], [point for point, _ in tried], windows, len(self._truth[name])
-            )
-            rule = tried[k][0]
+            rules, outcomes = zip(*tried, strict=True)
+            k, fit = _best_of(outcomes, rules, edge, windows, len(self._truth[name]))
+            rule = rules[k]
         labels_of = [name, None] if edge == 0 else [None, name]
         how: dict[str, Any] = {"labels": labels_of, "noise_floor": self.loads.noise_floor, "unit": self.loads.unit}
         return _Best(fit, PlainRule(**rule._asdict(), **how))
@@ -334,9 +333,9 @@ def _ladder(totals: NDArray[np.float64]) -> tuple[float, ...]:
     totals = totals[totals > 0.0]
     if not len(totals):
         return ()
-    low, high = TOTALS_A_DECADE * np.log10(np.quantile(totals, QUANTILES))
+    low, high = STEPS_A_DECADE * np.log10(np.quantile(totals, QUANTILES))
     steps = np.arange(np.floor(low), np.ceil(high) + 1)
-    return tuple(float(f"{step:.3g}") for step in 10.0 ** (steps / TOTALS_A_DECADE))
+    return tuple(float(f"{step:.3g}") for step in 10.0 ** (steps / STEPS_A_DECADE))
 
 
 def _levels(loads: Loads, parts: Sequence[Stretch]) -> Iterator[tuple[str, tuple[float, ...]]]:
@@ -345,8 +344,11 @@ def _levels(loads: Loads, parts: Sequence[Stretch]) -> Iterator[tuple[str, tuple
     if len(readings):
         if loads.unit in LEVELS:
             yield "count", LEVELS[loads.unit]
-        yield "count", tuple(sorted({float(f"{level:.2g}") for level in np.quantile(readings, LEVEL_QUANTILES)}))
-    yield "range_count", RANGE_LEVELS
+        # On the ladder it is the same for most parts of the same data.
+        steps = np.rint(STEPS_A_DECADE * np.log10(np.quantile(readings, QUANTILES[1])))
+        most = 10.0 ** (steps / STEPS_A_DECADE)
+        yield "count", tuple(float(f"{share * most:.2g}") for share in LEVEL_SHARES)
+    yield "range_count", LEVEL_SHARES
 
 
 def _counts(quantity: str, levels: tuple[float, ...], counts: NDArray[np.float64]) -> Iterator[EdgeRule]:
@@ -380,7 +382,11 @@ def _outcomes(found: FoundTimes, true: NDArray[np.int64], width_us: int) -> _Out
 
 
 def _best_of(
-    several: Sequence[_Outcomes], points: Sequence[EdgeRule], windows: Sequence[tuple[int, int]], labels: int
+    several: Sequence[_Outcomes],
+    points: Sequence[EdgeRule],
+    edge: int,
+    windows: Sequence[tuple[int, int]],
+    labels: int,
 ) -> tuple[int, _RuleFit]:
     """Return the place of the best rule in windows on the one clock, which ascend and have so many labels.
 
@@ -401,12 +407,31 @@ def _best_of(
     def median(of: NDArray[np.float32], k: int) -> float:
         return _median(of[stops[k - 1] if k else 0 : stops[k]])
 
-    nearest = equal[near[equal] == near[equal].max()]
-    best = min(nearest.tolist(), key=lambda k: (median(delays, k), k))
-    if not points[best].levels:
-        alike = [k for k in equal.tolist() if points[k] == points[best]._replace(threshold=points[k].threshold)]
-        best = alike[(len(alike) - 1) // 2]
+    def nearest(several: Sequence[int]) -> int:
+        most = max(near[k] for k in several)
+        return min((k for k in several if near[k] == most), key=lambda k: (median(delays, k), k))
+
+    best = nearest(equal.tolist())
+    alike = [k for k in equal.tolist() if k == best or _are_alike(points[k], points[best], edge)]
+    thresholds = sorted({points[k].threshold for k in alike})
+    middle = thresholds[(len(thresholds) - 1) // 2]
+    best = nearest([k for k in alike if points[k].threshold == middle])
     return best, _RuleFit(int(wrong[best]), int(near[best]), median(delays, best), median(errors, best))
+
+
+def _are_alike(one: EdgeRule, other: EdgeRule, edge: int) -> bool:
+    """Whether rules differ only in their thresholds, which tell noise from loads, but not when a load begins or ends.
+
+    Of a count that is so at ends: from which number it falls, and with it which dates are tried.
+    """
+    if not one.levels:
+        return other == one._replace(threshold=other.threshold)
+    are_of_one_count = (one.quantity, one.levels) == (other.quantity, other.levels)
+    return (
+        edge == 1
+        and are_of_one_count
+        and round(one.threshold * one.release, 1) == round(other.threshold * other.release, 1)
+    )
 
 
 def _is_onset(onset: _Best, end: _Best) -> bool:
