@@ -24,11 +24,11 @@ fuzz_target!(|input: &[u8]| {
         for (k, &value) in values.iter().enumerate() {
             ticks[(k * 7 + frame * 31) % array.len()] = u16::from(value) * 257;
         }
-        let mut taken = 0;
+        let mut taken = 0u32;
         board
             .frame(&ticks, |datagram| {
                 taken += 1;
-                let takes = taken <= takes;
+                let takes = taken <= takes.into();
                 if datagram[0] == v2::MAGIC {
                     assert!(datagram.len() <= DATAGRAM_BYTES && DatagramHeader::read(datagram).is_ok());
                     if takes {

@@ -125,6 +125,20 @@ fn repeated_states_repair_the_values_after_a_loss() {
 }
 
 #[test]
+fn totals_of_a_stranger_may_be_any_number() {
+    let mut decoder = Decoder::new(Array::thesis());
+    let mut events = Events::empty(Array::thesis());
+    for session in 0..3 {
+        let mut datagram = vec![];
+        let header =
+            DatagramHeader { kind: 4, board: 0, sequence: 0, base: 0, session, stride: 6, line: 0, flags: 0, span: 0 };
+        header.write(&[0xff; 40], &mut datagram);
+        decoder.push(&datagram, None, &mut events);
+    }
+    assert_eq!(decoder.counts().events_dropped, u64::MAX);
+}
+
+#[test]
 fn time_goes_on_after_a_reset_which_is_counted() {
     let array = Array::thesis();
     let registers = Registers { wire_version: 2, ..Registers::default() };

@@ -72,7 +72,9 @@ impl Decoder {
             body.chunks_exact(8).map(|b| u64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]));
         let mut next = || totals.next().unwrap_or_default();
         let (frames, events, dropped, datagrams, faults) = (next(), next(), next(), next(), next());
-        self.counts.events_dropped += dropped.saturating_sub(self.dropped_before.unwrap_or(dropped));
+        let since = dropped.saturating_sub(self.dropped_before.unwrap_or(dropped));
+        // A stranger's datagram may say any number.
+        self.counts.events_dropped = self.counts.events_dropped.saturating_add(since);
         self.dropped_before = Some(dropped);
         self.status = Some(BoardTotals { frames, events, dropped, datagrams, faults });
     }
