@@ -100,6 +100,13 @@ def test_a_layout_says_any_order_of_axes(named: str, tmp_path: Path) -> None:
     np.testing.assert_array_equal(values(found), numbers)
 
 
+def test_a_layout_of_the_unit_alone_leaves_the_times(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", pressure=np.ones((9, 2, 3)), time=0.01 * np.arange(9))
+    found = opened(tmp_path / "a.npz", 'unit = "kPa"')
+    assert found.layout.data is not None
+    assert (found.layout.unit, found.layout.data.time, found.layout.data.time_unit) == ("kPa", "time", "s")
+
+
 def test_each_trial_is_a_source_and_each_axis_too(tmp_path: Path) -> None:
     numbers = np.arange(2 * 5 * 4 * 3, dtype=np.float32).reshape(2, 5, 4, 3)
     np.save(tmp_path / "a.npy", numbers)

@@ -153,11 +153,12 @@ def _axes(
     def with_time_at(axis: int) -> Data:
         return replace(how, axes=" ".join([*inner[:axis], "time", *inner[axis:]]))
 
-    if is_said:
-        return with_time_at(0), []
     # Times are an array of their name, of as many as one axis counts.
     counts = {name: math.prod(size) for name, size in stored.items() if time_unit(name) is not None}
     named = next((name for name, count in counts.items() if shape.count(count) == 1), None)
+    # A layout that states the unit alone does not say that there are no times.
+    if is_said and (named is None or layout.data is not None or layout.rate_hz):
+        return with_time_at(0), []
     longest = int(np.argmax(shape))
     if named is None:
         full, said = with_time_at(longest), [f"axis {longest} ({shape[longest]}) is the time"]
