@@ -4,8 +4,6 @@ import json
 import subprocess
 import sys
 
-from shell import call
-
 #: Modules that take a tenth of a second or more to import, or most of the memory.
 SLOW = {"cyclopts", "dask", "h5py", "jinja2", "joblib", "matplotlib", "pandas", "ray", "rich", "scipy", "sklearn"}
 #: One process, which prints what it has loaded after each step.
@@ -44,8 +42,3 @@ def test_what_is_asked_for_is_loaded_and_no_more():
     assert not loaded["info --help"] & {f"taxel.{room}" for room in rooms}
     assert "sklearn" not in loaded["learner"]
     assert "matplotlib" in loaded["plot"] - loaded["learner"]
-
-
-def test_a_misspelt_command_is_answered_with_the_nearest_of_all(capsys):
-    said = "taxel: No such command 'devic'. Did you mean 'device'?; see taxel --help\n"
-    assert call(capsys, "devic") == (2, "", said)

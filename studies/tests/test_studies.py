@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from taxel import ProblemError
 from taxel.cli import main
 from taxel_studies import STUDIES, load
 from taxel_studies.page import write_page
@@ -167,36 +166,3 @@ def test_the_command_prints_json(small, capsys):
     section = json.loads(capsys.readouterr().out)
     assert section["name"] == "fig6.11"
     assert section["parameters"]["realisations"] == 1
-
-
-@pytest.mark.parametrize(
-    ("more", "message"),
-    [
-        (["--size", "huge"], "fig6.11: size is 'huge': must be one of 'full', 'toy'"),
-        (["--set", "kapa=1"], "fig6.11 has no parameter 'kapa': its parameters are"),
-        (["--set", "kappa=wide"], "kappa is 'wide': must be a number, as 1.04"),
-        (["--set", "kappa"], "--set kappa: must be KEY=VALUE"),
-        (["--set", "realisations=0"], "realisations is 0"),
-        (["--jobs", "0"], "jobs is 0"),
-        (["--backend", "slurm"], "backend is 'slurm'"),
-        (["--scheduler", "tcp://127.0.0.1:1"], "scheduler is for the backends"),
-    ],
-)
-def test_nonsense_ends_in_one_line(small, capsys, more, message):
-    words = list(small)
-    if more[0] in words and more[0] != "--set":
-        # An option of one value is given once.
-        k = words.index(more[0])
-        del words[k : k + 2]
-    assert ends([*words, *more]) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1
-
-
-def test_a_parameter_of_another_kind_is_refused():
-    study = load("fig6.11")
-    for changes in ({"kappa": True}, {"trainings": "clean"}, {"trainings": [3]}, {"realisations": 2.5}):
-        with pytest.raises(ProblemError):
-            study.set("toy", **changes)
-    assert study.set("toy", kappa=1)["kappa"] == 1

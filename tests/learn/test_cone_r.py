@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 from draws import seeds
-from making import lists, made
+from making import made
 from refusal import refused
 from relaxed import drawn, examples, fitted, sizes
 from stated import grid_rows, least, shares, terms
@@ -121,36 +121,6 @@ def test_one_layout_serves_all_divisors_and_sides_and_a_fit_of_other_sides_is_a_
         warm = rows.fit(made(ConeR, tau=12.0, **options), start=before)
         assert warm.status_ == "solved"
         assert warm.objective_ == pytest.approx(cold.objective_, rel=2e-6)
-
-
-def test_what_does_not_fit_together_is_one_clear_error():
-    for options, argument in (
-        ({"lb": 0.31, "ub": 0.3}, None),
-        ({"lb": [-1.0, 0.6], "ub": 0.5}, None),
-        ({"lb": [-1.0], "ub": [1.0, 1.0]}, "lb"),
-        ({"lambdas": (1, 2, 3, 4)}, "lambdas"),
-        ({"lambdas": (0, 0, 0, 0, 0)}, "lambdas"),
-    ):
-        with refused(argument=argument):
-            made(ConeR, **options)
-    one = [lists([1.0])]
-    for patterns, targets, argument in (
-        ([], [], "patterns"),
-        (one, [], "targets"),
-        ([lists([], [])], [[5.0]], None),
-        ([*one, lists([1.0], [2.0])], [[5.0], [5.0]], None),
-        (one, [[30.0, 31.5]], None),
-        (one, [[130.0]], None),
-        ([SpikeTrains.from_lists([[1.0]], stop=9.0, values=[[-1.0]])], [[5.0]], None),
-    ):
-        with refused(argument=argument):
-            ConeR().fit(patterns, targets)
-    with refused(argument="weights"):
-        ConeR().fit(one, [[5.0]], start=[1.0, 2.0])
-    with refused():
-        ConeR(ub=[1.0, 1.0]).fit(one, [[5.0]])
-    with refused():
-        ConeR(horizon=50.0).fit(one, [[60.0]])
 
 
 def test_a_target_that_only_negative_weights_reach_is_reachable():

@@ -62,6 +62,7 @@ TYPED = [
     ("record", "a.mcap", "--bogus"),
     ("bogus",),
     ("trian",),
+    ("devic",),
     ("encode", "walk.npz", "s.npz", "--encoder", "level_crossing", "--set", "levels=40"),
     ("encode", "walk.npz", "s.npz", "--encoder", "level_crossing"),
     ("encode", "walk.npz", "s.npz", "--encoder", "fa1", "--set", "alpha=soon"),
@@ -75,6 +76,14 @@ TYPED = [
     ("train", "walk.npz", "--labels", "labels.csv", "-o", "nowhere/x.json"),
     ("train", "walk.npz", "--labels", "labels.csv", "-o", "there.json"),
     ("study", "fig6.1", "--set", "kappa"),
+    ("study", "fig6.11", "--set", "kapa=1"),
+    ("study", "fig6.11", "--set", "kappa=wide"),
+    ("study", "fig6.11", "--set", "realisations=0"),
+    ("study", "fig6.11", "--set", "realisations=2.5"),
+    ("study", "fig6.11", "--size", "huge"),
+    ("study", "fig6.11", "--jobs", "0"),
+    ("study", "fig6.11", "--backend", "slurm"),
+    ("study", "fig6.11", "--scheduler", "tcp://127.0.0.1:1"),
 ]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from refusal import messages
 
 import taxel
-from taxel import Array, Calibration, Detections, Events, Frames, Labels, Load, SpikeTrains, Tare
+from taxel import Array, Calibration, Detections, Events, Frames, Labels, Load, Places, SpikeTrains, Tare
 from taxel._base.errors import helped
 
 ARRAY = Array(2, 2)
@@ -81,17 +81,11 @@ CALLS: dict[str, Callable[[Path], object]] = {
     "pitch": lambda _: Array(5, 5, -1.0),
     "exists": lambda _: Array(5, 5, 1.0, np.ones((4, 5), bool)),
     "pitch unknown": lambda _: Array(2, 2, name="mat").row_mm,
-    "whole times": lambda _: Events([0.5], [0], [0], [1], array=ARRAY),
-    "outside the array": lambda _: Events([0], [2], [0], [1], array=ARRAY),
-    "entries": lambda _: Events([0, 1], [0], [0], [1], array=ARRAY),
-    "sign": lambda _: Events([0], [0], [0], [2], array=ARRAY),
     "no array": lambda _: Events([0], [0], [0], [1], array=None),
     "times of frames": lambda _: Frames(np.zeros((2, 2, 2)), [5, 5]),
     "shape of frames": lambda _: Frames(np.zeros((2, 2)), [0, 1]),
     "unit": lambda _: Frames(np.zeros((1, 2, 2)), [0], unit=""),
-    "window": lambda _: SpikeTrains.from_lists([[7.0]], stop=5.0),
     "order of spikes": lambda _: SpikeTrains.from_lists([[2.0, 1.0]]),
-    "graded values": lambda _: SpikeTrains.from_lists([[1.0]], values=[[0.0]], kind="graded"),
     "train": lambda _: TRAINS.select([2]),
     "merge": lambda _: TRAINS + SpikeTrains.from_lists([[1.0]], values=[[1.0]]),
     "no spike trains": of_text(SpikeTrains.load, "a.npz", "nonsense"),
@@ -114,6 +108,12 @@ CALLS: dict[str, Callable[[Path], object]] = {
     "gain": lambda _: Calibration.table(ARRAY, [1.0], [1.0], unit="N", gain=0.0),
     "rest": lambda _: Calibration.table(ARRAY, [1.0], [1.0], unit="N", rest=[[1.0]]),
     "load": lambda _: Calibration.fit([Load(still(), -1.0)]),
+    "pitch and places": lambda _: Array(1, 2, 1.0, places=Places([0, 1], [0, 0])),
+    "places of other taxels": lambda _: Array(2, 2, places=Places([0, 1, 2], [0, 1, 2])),
+    "lengths of places": lambda _: Places([0, 1, 2], [0, 1, 2, 3]),
+    "unit of places": lambda _: Places([0, 1], [0, 0], unit="inch"),
+    "place missing": lambda _: Array(1, 2, places=Places([0, np.nan], [0, 0])),
+    "area of a place": lambda _: Array(1, 2, places=Places([0, 1], [0, 0], [1.0, 0.0])),
     "unit of a load": lambda _: Calibration.fit([Load(still(), 1.0, "kg")]),
     "readings": lambda _: Calibration.table(ARRAY, [1.0, 1.0], [1.0, 2.0], unit="N"),
     "label times": of_text(Labels, "labels.csv", "label,t_us\na,soon\n"),

@@ -59,22 +59,6 @@ def test_converted_files_keep_all_of_a_sensor(
     assert taxel.open(place).array == array
 
 
-@pytest.mark.parametrize(
-    ("make", "argument"),
-    [
-        (lambda: Array(2, 2, 1.0, places=Places(np.zeros(4), np.zeros(4))), None),
-        (lambda: Array(2, 2, places=Places(np.zeros(3), np.zeros(3))), "places"),
-        (lambda: Places(np.zeros(3), np.zeros(4)), "y"),
-        (lambda: Places(np.zeros(3), np.zeros(3), unit="inch"), "unit"),
-        (lambda: Array(1, 2, places=Places([0.0, np.nan], [0.0, 0.0])), "places"),
-        (lambda: Array(1, 2, places=Places([0.0, 1.0], [0.0, 0.0], [1.0, 0.0])), "places"),
-    ],
-)
-def test_places_that_make_no_sense_are_refused(make: Callable[[], object], argument: str) -> None:
-    with refused(argument=argument):
-        make()
-
-
 def test_area_and_centre_use_both_pitches_and_each_place() -> None:
     values = np.zeros((1, 4, 3))
     values[0, 2, 1], values[0, 0, 0] = 3.0, 1.0
@@ -99,7 +83,6 @@ def test_area_and_centre_use_both_pitches_and_each_place() -> None:
         lambda: taxel.simulate.Layer(array=Array(8, 8, name="mat")),
         lambda: taxel.simulate.Layer(array=Array(8, 8, (2.0, 3.0), name="mat")),
         lambda: taxel.metrics.van_rossum_spatial(_trains(), _trains(), array=Array(2, 2, name="mat")),
-        lambda: Array(2, 2, name="mat").row_mm,
     ],
 )
 def test_what_needs_mm_or_neighbours_refuses_by_name(work: Callable[[], object]) -> None:
