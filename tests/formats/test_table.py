@@ -139,31 +139,11 @@ ROWS: dict[str, tuple[str, list[int], list[list[float]]]] = {
         [0, 10_000, 20_000, 30_000],
         [[k + j for j in range(20)] for k in range(4)],
     ),
-    "t = T": (
-        "".join(f"t = {k / 25:.2f}\n1 2\n3 {k}\n" for k in range(3)),
-        [0, 40_000, 80_000],
-        [[1, 2, 3, 0], [1, 2, 3, 1], [1, 2, 3, 2]],
-    ),
-    "milliseconds behind a colon": (
-        "time,a\n10:00:00:900,1\n10:00:01:000,2\n",
-        [36_000_900_000, 36_001_000_000],
-        [[1], [2]],
-    ),
     "a rule below the names": ("Time(s)  F(N)\n-------  ----\n0.0  1\n0.1  2\n", [0, 100_000], [[1], [2]]),
     "the word time in a name": (
         "PacketCounter\tSampleTimeFine\ta\n65534\t0\t7\n65535\t20\t8\n0\t40\t9\n",
         [0, 20_000, 40_000],
         [[7], [8], [9]],
-    ),
-    "the year first, with slashes": (
-        "time,a\n2024/5/1 10:00:00.5,1\n2024/5/1 10:00:00.6,2\n",
-        [1_714_557_600_500_000, 1_714_557_600_600_000],
-        [[1], [2]],
-    ),
-    "a month by its name": (
-        "time,a\n01-May-2024 10:00:00.5,1\n01-May-2024 10:00:00.6,2\n",
-        [1_714_557_600_500_000, 1_714_557_600_600_000],
-        [[1], [2]],
     ),
     "a clock in whole seconds and one in ms": (
         "LABEL,Time,Millis,F1\n" + "".join(f"DATA,10:00:0{k // 4},{250 * k},{k % 3}\n" for k in range(9)),

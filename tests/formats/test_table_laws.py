@@ -110,6 +110,17 @@ TIMES: dict[str, tuple[str, int, Callable[[int], str]]] = {
     "epoch": ("t", EPOCH_US, lambda us: f"{(EPOCH_US + us) / 1e6:.3f}"),
     "iso": ("timestamp", EPOCH_US, lambda us: (BEGIN + timedelta(microseconds=us)).isoformat(timespec="milliseconds")),
     "day": ("Uhrzeit", 36_000_000_000, lambda us: (BEGIN + timedelta(microseconds=us)).strftime("%H:%M:%S.%f")),
+    "ms behind a colon": (
+        "time",
+        36_000_000_000,
+        lambda us: f"10:{us // 60_000_000:02}:{us // 1_000_000 % 60:02}:{us // 1000 % 1000:03}",
+    ),
+    "year first": ("time", EPOCH_US, lambda us: (BEGIN + timedelta(microseconds=us)).strftime("%Y/%m/%d %H:%M:%S.%f")),
+    "month by name": (
+        "time",
+        EPOCH_US,
+        lambda us: (BEGIN + timedelta(microseconds=us)).strftime("%d-%b-%Y %H:%M:%S.%f"),
+    ),
     "German": ("Zeit", EPOCH_US, lambda us: (BEGIN + timedelta(microseconds=us)).strftime("%d.%m.%Y %H:%M:%S.%f")),
 }
 
@@ -167,7 +178,7 @@ def test_a_table_with_other_columns_in_any_order_is_read_or_asked_and_its_layout
 
 @given(
     values=st.lists(st.lists(st.integers(0, 9), min_size=6, max_size=6), min_size=4, max_size=9),
-    above=st.sampled_from(["Frame {k} ({t:.2f} ms)", "frame {k}, t={t:g}ms", "Bild {k} {t:g} ms"]),
+    above=st.sampled_from(["Frame {k} ({t:.2f} ms)", "frame {k}, t={t:g}ms", "t = {s:.2f}", "Bild {k} {t:g} ms"]),
     separator=st.sampled_from(", ;\t"),
 )
 def test_frames_of_lines_below_a_line_of_text_are_read_and_their_layout_reads_them_again(
@@ -176,7 +187,7 @@ def test_frames_of_lines_below_a_line_of_text_are_read_and_their_layout_reads_th
     text = ""
     for k, frame in enumerate(values):
         lines = [separator.join(map(str, frame[begin : begin + 3])) for begin in (0, 3)]
-        text += "\n".join([above.format(k=k, t=20 * k), *lines]) + "\n"
+        text += "\n".join([above.format(k=k, t=20 * k, s=k / 50), *lines]) + "\n"
     found = opened(tmp_path_factory.mktemp("drawn"), text)
     assert frames(found) == ([20_000 * k for k in range(len(values))], values)
     assert found.sources[""].array.shape == (2, 3)
