@@ -1,11 +1,11 @@
-"""Discriminants against scikit-learn's, from features, from sums by fold and from inner products."""
+"""Discriminants against scikit-learn's, from features and from sums by fold."""
 
 import numpy as np
 import pytest
 from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 from sklearn.neighbors import KNeighborsClassifier
 
-from taxel.information import folds, nested_predictions
+from taxel.information import folds
 from taxel_studies.discriminants import LDA, FoldSums
 from taxel_studies.dropped import distances_of, named_by_neighbours
 
@@ -116,34 +116,3 @@ def test_neighbours_are_scikit_learns():
         clear = ranked[:, -1] > ranked[:, -2]
         assert np.array_equal(ours[clear], votes.argmax(1)[clear])
         assert np.array_equal(ours[~clear], y[np.argmin(apart, axis=1)][~clear])
-
-
-def test_leaving_folds_out_of_one_inverse_is_training_each_anew():
-    """Nested choice and all: against LDA, trained on each training set by itself."""
-    x, y = clouds(120, 400, 4, 21, apart=0.25)
-    grams = [x @ x.T, (x[:, :40] @ x[:, :40].T)]
-    sizes, ridges = [400, 40], (1.0, 0.1)
-    found = nested_predictions(grams, sizes, y, count=5, inner=3, ridges=ridges, seed=3)
-
-    def trained(size, ridge, train, test):
-        gram = x[:, :size] @ x[:, :size].T
-        level = ridge * np.trace(gram - gram.mean(0)) / size
-        part = gram[np.ix_(train, train)]
-        which = np.eye(4)[y[train]]
-        within = np.trace(part) - np.trace((which / which.sum(0)).T @ part @ which)
-        return LDA(ridge=level * size / within).fit(x[train, :size], y[train]).predict(x[test, :size])
-
-    for k in range(5):
-        train, test = np.flatnonzero(found.folds != k), np.flatnonzero(found.folds == k)
-        inner = folds(y[train], count=3, seed=4)
-        right = {}
-        for g, size in enumerate(sizes):
-            for ridge in ridges:
-                right[g, ridge] = sum(
-                    (trained(size, ridge, train[inner != j], train[inner == j]) == y[train[inner == j]]).sum()
-                    for j in range(3)
-                )
-        best = max(right, key=lambda way: right[way])
-        assert found.chosen[k] == best
-        said = trained(sizes[best[0]], best[1], train, test)
-        assert np.array_equal(found.responses[test], said)

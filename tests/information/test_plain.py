@@ -65,17 +65,18 @@ def nested(tables, y, ways, *, groups, seed):
     return said, chosen
 
 
-def cloud(trials, classes, seed):
+def cloud(trials, features, classes, seed):
     random = np.random.default_rng(seed)
     y = random.permutation(np.arange(trials) % classes)
-    far = random.normal(size=(classes, 6))[y]
-    return [far * apart + random.normal(size=(trials, 6)) for apart in (0.4, 0.7)], y
+    far = random.normal(size=(classes, features))[y] * (6 / features) ** 0.5
+    return [far * apart + random.normal(size=(trials, features)) for apart in (0.4, 0.7)], y
 
 
 @settings(deadline=None, max_examples=12)
-@given(st.integers(40, 70), st.integers(2, 4), st.booleans(), st.integers(0, 9))
-def test_nested_predictions_are_those_of_every_fold_trained_anew(trials, classes, grouped, seed):
-    tables, y = cloud(trials, classes, seed)
+@given(st.integers(40, 70), st.sampled_from([6, 90]), st.integers(2, 4), st.booleans(), st.integers(0, 9))
+def test_nested_predictions_are_those_of_every_fold_trained_anew(trials, features, classes, grouped, seed):
+    """Also of more features than trials."""
+    tables, y = cloud(trials, features, classes, seed)
     groups = np.random.default_rng(seed).integers(0, 11, trials) if grouped else None
     if grouped and any(len(np.unique(groups[y == k])) < 8 for k in range(classes)):
         return
