@@ -6,18 +6,13 @@ import re
 import time
 from pathlib import Path
 
+import psutil
 import pytest
+from children.marked import TAXEL, Marked
 from loopback import free_port
-from tests.panel.browser import Process, running
 from tests.panel.protocol import ADDRESS, Client, door
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
-
-
-def rss_bytes(server: Process) -> int:
-    """Return the resident memory of a process."""
-    status = Path(f"/proc/{server.process.pid}/status").read_text()
-    return int(re.search(r"VmRSS:\s+(\d+) kB", status).group(1)) << 10  # type: ignore[union-attr]
 
 
 def while_it_runs(page: Client, seconds: float) -> dict:
@@ -30,13 +25,14 @@ def while_it_runs(page: Client, seconds: float) -> dict:
 
 
 def test_memory_is_bounded_and_nothing_is_lost_over_time(tmp_path: Path) -> None:
-    port = str(free_port())
+    port = free_port()
     here = ("--port", port, "--host", "127.0.0.1", "--folder", ".")
     with (
-        running("live", "--panel", *here, folder=tmp_path) as server,
-        running("emulate", "--port", port, "--seed", "1", folder=tmp_path),
+        Marked(tmp_path / "live", TAXEL, "live", "--panel", *here) as server,
+        Marked(tmp_path / "board", TAXEL, "emulate", "--port", port, "--seed", 1),
     ):
-        at = door(server.wait_for(f"({ADDRESS})"))
+        server.until(lambda one: re.search(ADDRESS, one.said()))
+        at, memory = door(re.findall(ADDRESS, server.said())[0]), psutil.Process(server.pid).memory_info
         pages = [Client(at) for _ in range(6)]
         try:
             for k, page in enumerate(pages):
@@ -49,9 +45,9 @@ def test_memory_is_bounded_and_nothing_is_lost_over_time(tmp_path: Path) -> None
                 page.send(type="credit", n=2)
                 # The ring buffer is full after a minute: from then on memory must be constant.
                 while_it_runs(page, 90.0)
-                early = rss_bytes(server)
+                early = memory().rss
                 counters = while_it_runs(page, 120.0)
-                late = rss_bytes(server)
+                late = memory().rss
                 first, last = counters["reach_us"]
                 assert 60_000_000 <= last - first < 62_000_000
                 assert (counters["lost"]["number"], counters["lost"]["by_kernel_known"]) == (0, True)
