@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
 import subprocess
 import sys
-import time
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +12,6 @@ import pytest
 from shell import run
 
 import taxel
-from taxel._base.parallel import Workers
 
 #: How the work is spread; a cluster takes ten seconds of processor time to start.
 SPREAD = [
@@ -94,16 +89,3 @@ def test_folds_and_bits_do_not_depend_on_who_computes_them(tmp_path: Path, sprea
         alone, spread_out = (run(*command, *given, *how) for how in ((), spread))
         assert spread_out.returncode == 0, spread_out.stderr
         assert json.loads(spread_out.stdout) == json.loads(alone.stdout)
-
-
-@pytest.mark.slow
-def test_ray_says_that_a_worker_died_beside_the_results(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    def killed_once(marker: Path) -> int:
-        if not marker.exists():
-            marker.touch()
-            os.kill(os.getpid(), signal.SIGKILL)
-        return 7
-
-    with suppress(Exception):
-        Workers(2, "ray").tried(killed_once, [tmp_path / name for name in "abc"], lambda done, of: time.sleep(2))
-    assert capsys.readouterr().out == ""

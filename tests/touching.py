@@ -6,25 +6,6 @@ import numpy as np
 
 from taxel import Array, Frames
 
-ARRAY = Array(6, 6, pitch_mm=5.0)
-
-
-def touched(
-    seed: int, count: int = 12, begin_s: float = 2.5, hold_s: tuple[float, float] = (0.1, 0.3)
-) -> tuple[Frames, dict[str, np.ndarray]]:
-    """Return frames at 200 Hz of touches that follow each other irregularly, and when each began and ended, us."""
-    random = np.random.default_rng(seed)
-    begins = begin_s + np.cumsum(random.uniform(0.5, 1.5, count))
-    ends = begins + random.uniform(*hold_s, count)
-    t = np.arange(0, round(1e6 * (ends[-1] + 2)), 5000)
-    values = random.normal(0, 0.002, (len(t), 6, 6))
-    for begin, end in zip(begins, ends, strict=True):
-        y, x = random.integers(1, 4, 2)
-        here = (t >= 1e6 * begin) & (t < 1e6 * end)
-        values[here, y : y + 2, x : x + 2] += random.uniform(0.5, 1.0)
-    labels = {"contact": np.rint(1e6 * begins).astype(np.int64), "lift": np.rint(1e6 * ends).astype(np.int64)}
-    return Frames(values, t, unit="V", array=ARRAY), labels
-
 
 def pressed(
     seed: int, count: int = 10, *, begin_s: float = 1.0, kinds: float = 0.0, still: bool = False

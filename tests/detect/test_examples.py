@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from touching import touched
+from touching import pressed
 
 import taxel
 from taxel import Detections, Tare
@@ -18,7 +18,7 @@ from taxel.detect.floors import held_by_tare
 
 @given(st.integers(0, 1000), st.floats(0, 0.9))
 def test_a_tare_that_ends_in_a_touch_holds_it(seed: int, share: float) -> None:
-    frames, truth = touched(seed, 5, 0.0)
+    frames, truth = pressed(seed, 5, begin_s=0.0)
     begin, end = (int(truth[label][0]) for label in ("contact", "lift"))
     until = int(begin + share * (end - begin))
     (one,) = check_examples([Example(frames, truth, Tare.take(frames, stop_us=until))])

@@ -52,17 +52,6 @@ def test_what_rests_on_repaired_values_is_marked():
             assert list(found.repaired) == expected_
 
 
-RULES = [
-    PlainRule("area", 2),
-    PlainRule("total", 1 / 3, 0.1 + 0.2, 20, labels=("a", None), noise_floor=0.0, tare=tare()),
-    PlainRule("area", 12, age_ms=5, labels=("small", "large")),
-    PlainRule("local_load", 4.0, 0.5, 20),
-    PlainRule("count", 8, 4.5 / 8, levels=[5.0, 10.0], dated_at=6.0),
-    PlainRule("range_count", 3, 0.5, levels=[0.1, 0.2]),
-    PlainRule("total", 30.0, 0.25, of_largest=True),
-]
-
-
 # Counts by running range
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from plain_rules import played
-from touching import touched
+from touching import pressed
 
 import taxel
 from taxel.detect import Example, Fold, Part, Recipe, judge, run, score, tune
@@ -42,12 +42,12 @@ def test_rules_are_tuned_on_the_training_part_of_each_fold_and_scored_on_its_tes
 
 
 def test_there_is_no_rule_where_none_finds_anything_held_out() -> None:
-    frames, truth = touched(1, 6, hold_s=(0.2, 0.3))
+    frames, truth = pressed(1, 6, begin_s=2.5)
     mixed = {"contact": np.r_[truth["contact"][:4], truth["lift"][4:]]}
     middle = float(truth["contact"][4] - 100_000)
     example = Example(frames, mixed, taxel.Tare.take(frames, stop_us=2_000_000))
-    assert tune([example], noise_floor=0.02)["contact"] is not None
-    recipe = replace(RECIPE, encoder=ContactArea(noise_floor=0.02))
+    assert tune([example], noise_floor=3.0)["contact"] is not None
+    recipe = replace(RECIPE, encoder=ContactArea(noise_floor=3.0))
     halves = [Part(0, stop=middle), Part(0, start=middle)]
     judged = judge([example], recipe, [Fold([halves[0]], [halves[1]]), Fold([halves[1]], [halves[0]])])
     assert (judged.plain.together.found, judged.plain.rules) == (0, {"contact": None})

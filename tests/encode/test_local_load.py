@@ -3,7 +3,6 @@
 import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from refusal import refused
 
 from taxel import Array, Frames
 from taxel.encode import LocalLoad
@@ -199,10 +198,3 @@ def test_levels_are_crossed_where_the_largest_sums_of_numpy_cross_them(seed, loc
     assert spikes_of(encoder.encode(frames)) == sorted(expected)
     assert encoder.trains(array) == 2 * len(columns) * len(levels)
     assert (encoder.kind, graded.kind) == ("unsigned", "graded")
-
-
-def test_without_a_tare_nothing_is_encoded():
-    frames = Frames(np.zeros((1, 3, 4)), [0])
-    for call in (lambda x: LocalLoad().stream(x.array), LocalLoad().encode, LocalLoad().values):
-        with refused(argument="tare"):
-            call(frames)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused
 
 import taxel
 from taxel import Array, Frames
@@ -113,9 +112,3 @@ def test_moments_of_events_are_sampled_every_period_from_the_first_stamp_on():
     assert spikes.values.tolist() == pytest.approx([np.log1p(17)] * 5 + [1.0] * 4)
     unsigned = Moments(**options, ages_ms=[0.5, 1.2], tare=tare).encode(events)
     assert (unsigned.kind, list(map(len, unsigned))) == ("unsigned", [2, 2])
-
-
-def test_without_a_tare_nothing_is_encoded():
-    for call in (lambda: Moments().stream(ARRAY), lambda: Moments().encode(Frames(np.zeros((1, 3, 4)), [0]))):
-        with refused(argument="tare"):
-            call()

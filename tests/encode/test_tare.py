@@ -4,11 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusal import refused
 
-import taxel
 from taxel import Array, Frames, Tare
-from taxel._base.errors import Place
 from taxel.encode import SA1, SA2
 
 from .scenes import spikes_of, touch
@@ -48,15 +45,6 @@ def test_a_taxel_that_does_not_exist_has_no_rest():
     tare = Tare.take(Frames(np.ones((2, 1, 2)), [0, 100], array=array))
     assert np.array_equal(tare.rest, [[1.0, np.nan]], equal_nan=True)
     assert repr(tare) == "Tare(1 of 1 taxel, 0 to 100 us)"
-
-
-def test_a_file_that_is_no_tare_is_named(tmp_path):
-    place = tmp_path / "x.json"
-    place.write_bytes(b"\xff\xfe")
-    with refused(taxel.FormatError, place=Place("x.json", line=1)):
-        Tare.load(place)
-    with pytest.raises(FileNotFoundError):
-        Tare.load(tmp_path / "none.json")
 
 
 @pytest.mark.parametrize("encoder", [SA1(period_ms=0.5, threshold=0.01), SA2(threshold=0.01)])

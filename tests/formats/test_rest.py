@@ -101,41 +101,6 @@ def test_values_that_fall_with_pressure_are_said(seed: int, share: float) -> Non
     assert "falls" not in str(risen)
 
 
-def mat(seed: int, sign: int) -> taxel.Frames:
-    """Frames of a mat at 50 Hz that creeps, an offset by taxel, each press held for up to a second."""
-    random, t = np.random.default_rng(seed), np.arange(3000) / 50
-    y, x = np.mgrid[:16, :16]
-    creep = (np.exp(-t / 30) - 1)[:, None, None] * random.uniform(30, 90, (16, 16))
-    values = random.normal(2000, 60, (16, 16)) + creep + random.normal(0, 5, (3000, 16, 16))
-    begins = 1.5
-    for _ in range(22):
-        begins += random.uniform(0.7, 1.4)
-        ends = begins + random.uniform(0.5, 1.1)
-        force = np.exp(random.uniform(np.log(150), np.log(1600)))
-        force *= np.clip(np.minimum(t - begins, ends - t) / 0.06, 0, 1)
-        bump = np.exp(-((y - random.uniform(3, 12)) ** 2 + (x - random.uniform(3, 12)) ** 2) / 5.12)
-        values += sign * force[:, None, None] * bump
-        begins = ends
-    return taxel.Frames(np.round(values), np.arange(3000) * 20_000, unit="counts", array=taxel.Array(16, 16))
-
-
-@pytest.mark.parametrize(("seed", "bad"), [(0, None), (1, 0), (2, 4095), (3, None)])
-def test_presses_that_are_held_fall_too(tmp_path, capsys, seed: int, bad: float | None) -> None:
-    """A quiet stretch within a press sets the tracked rest anew; two bad taxels hide nothing and pretend nothing."""
-    for sign in (1, -1):
-        frames = mat(seed, sign)
-        if bad is not None:
-            values = frames.values.copy()
-            values[100::200, 3, 3:5] = bad
-            frames = taxel.Frames(values, frames.t, unit="counts", array=frames.array)
-        assert of_frames(frames).falls == (sign < 0)
-    taxel.convert(frames, tmp_path / "mat.npz")
-    code, shown, _ = call(capsys, "info", tmp_path / "mat.npz")
-    assert code == 0
-    assert "write falls = true in a layout file" in shown
-    assert "contact area" not in shown
-
-
 def test_encode_train_and_detect_hold_missing_values_and_count_them(tmp_path, capsys) -> None:
     rows = [f"{label},{1_000_000 + 650_000 * k + late}\n" for k in range(12) for label, late in PRESSED]
     (tmp_path / "labels.csv").write_text("label,t_us\n" + "".join(rows))

@@ -31,18 +31,6 @@ def presses(presses: int) -> Events:
     return Events(t, np.full(n, 1), np.full(n, 2), p, array=SMALL, intensity=np.array(ticks))
 
 
-def touches(count: int) -> Events:
-    """Each 40 ms two taxels rise and fall again, one 400 us behind the other."""
-    rows = []
-    for press in range(count):
-        for k in range(20):
-            for x, behind in ((1, 0), (2, 400)):
-                ticks = 20 + 3 * (k if k < 10 else 19 - k)
-                rows.append((press * 40_000 + k * 200 + behind, x, 2, k < 10, ticks))
-    t, x, y, p, ticks = zip(*sorted(rows), strict=True)
-    return Events(t, x, y, p, array=SMALL, intensity=np.array(ticks))
-
-
 def datagrams(events: Events) -> list[bytes]:
     return [wire.encode(events[events.t == t]) for t in np.unique(events.t)]
 
@@ -82,14 +70,3 @@ def above_rest(events: Events) -> np.ndarray:
         held[y, x] = ticks
     above = held - rest
     return np.where(above > 3, above, 0)
-
-
-def force(events: Events, times: np.ndarray) -> list[int]:
-    """Ticks above rest over all taxels just before times: what one taxel of `presses` holds above its first value."""
-    found, n = [], 0
-    for t in times:
-        while n < len(events) and events.t[n] < t:
-            n += 1
-        above = int(events.intensity[n - 1]) - int(events.intensity[0]) if n else 0
-        found.append(above if above > 3 else 0)
-    return found

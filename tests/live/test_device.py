@@ -5,7 +5,6 @@ import os
 import pty
 import socket
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -37,26 +36,14 @@ def serve(board: Board, read: int, write: int, greets: bool = True) -> threading
     return thread
 
 
-@pytest.fixture(params=["serial", "server"])
-def line(request: pytest.FixtureRequest) -> Iterator[tuple[str, Board]]:
-    board = Board()
-    if request.param == "serial":
-        ours, theirs = pty.openpty()
-        serve(board, ours, ours)
-        yield os.ttyname(theirs), board
-        os.close(theirs)
-    else:
-        with socket.create_server(("127.0.0.1", 0)) as server:
-            threading.Thread(target=lambda: serve(board, *(server.accept()[0].detach(),) * 2), daemon=True).start()
-            yield f"127.0.0.1:{server.getsockname()[1]}", board
-
-
-def test_the_floor_is_0_for_a_while_and_the_lines_stay(line: tuple[str, Board]) -> None:
-    place, board = line
-    with Cable(place, timeout=30) as cable:
+def test_the_floor_is_0_for_a_while_and_the_lines_stay() -> None:
+    board, (ours, theirs) = Board(), pty.openpty()
+    serve(board, ours, ours)
+    with Cable(os.ttyname(theirs), timeout=30) as cable:
         with cable.floor(0):
             assert (board.registers.noise_floor, board.registers.lines) == (0, 64)
         assert (board.registers.noise_floor, board.registers.lines) == (3, 64)
+    os.close(theirs)
 
 
 class Unfaithful(Board):

@@ -99,30 +99,6 @@ def test_a_label_replaces_a_note_of_the_recording_and_one_without_a_name_removes
     assert noted(tmp_path, rows) == left
 
 
-@pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
-@pytest.mark.parametrize(
-    ("rows", "separator", "times"),
-    [
-        ([["t_s", "Label"], ["0,21", "Fuß auf"], ["1,0000004", "Abheben"]], ";", [210_000, 1_000_000]),
-        ([["label", "t_ms"], ["Fuß auf", "210,5"], ["Abheben", "1e3"]], "\t", [210_500, 1_000_000]),
-        ([["side", "t_ms", "label"], ["1", "210.5", "Fuß auf"], ["2", "9", "Abheben"]], ",", [210_500, 9_000]),
-        (
-            [["onset", "duration", "trial_type"], ["0.5", "1", "Fuß auf"], ["2", "1", "Abheben"]],
-            ",",
-            [500_000, 2_000_000],
-        ),
-    ],
-)
-def test_a_table_of_another_program_is_read_by_the_names_of_its_columns(
-    tmp_path: Path, rows: list[list[str]], separator: str, times: list[int], code: str
-) -> None:
-    place = tmp_path / "walk.csv"
-    place.write_bytes("".join(separator.join(row) + "\r\n" for row in rows).encode(code))
-    assert [(row.text, row.t) for row in taxel.Labels(place).rows] == list(
-        zip(["Fuß auf", "Abheben"], times, strict=True)
-    )
-
-
 def test_labels_in_a_sheet_are_read(tmp_path: Path) -> None:
     pandas = pytest.importorskip("pandas")
     pytest.importorskip("openpyxl")

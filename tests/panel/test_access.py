@@ -45,11 +45,6 @@ def test_a_foreign_or_nameless_visitor_is_not_let_in(panel):
         ("/", {"Host": f"localhost:{panel.address[1]}"}, 200),
         ("/", {"Host": "localhost:1"}, 421),
         ("/socket", {"Origin": f"http://{host}", **upgrade}, 401),
-        ("/../Cargo.toml", {}, 404),
-        ("/%2e%2e/Cargo.toml", {}, 404),
-        ("//etc/passwd", {}, 404),
-        ("/vendor", {}, 404),
-        ("/index.html/", {}, 404),
     ):
         line = http.client.HTTPConnection(*panel.address, timeout=SOON)
         line.putrequest("GET", path, skip_host="Host" in headers)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from contextlib import contextmanager
 
 import numpy as np
-import pytest
 from formats import bags
 from formats.bags import PALM
 from formats.making import write_icub
@@ -64,59 +63,13 @@ def test_a_layout_and_a_rate_are_those_of_the_page(tmp_path):
     with shown(file, rate_hz=50) as page:
         about = opened(page, file.name)
         assert (about["frames"]["number_us"], about["stop_us"]) == (None, 40_000)
-
-
-def tables(folder):
-    """Write the same frames as tables and arrays of other programs, and the layout that describes them."""
-    folder.mkdir()
-    values = np.random.default_rng(5).integers(0, 1000, (40, 6))
-    np.save(folder / "palm.npy", values)
-    np.savetxt(folder / "palm.txt", values, fmt="%d", delimiter=";")
-    np.savetxt(folder / "palm.txt.gz", values, fmt="%d", delimiter=";")
-    np.savetxt(folder / "palm.dat", values, fmt="%d", delimiter=";")
-    np.savetxt(folder / "palm.csv", values, fmt="%d", delimiter=";")
-    lines = ("rows = 2", "columns = 3", "rate_hz = 100", "[table]", 'separator = ";"')
-    return values.reshape(-1, 2, 3), "\n".join(lines)
-
-
-TABLES = ("palm.csv", "palm.dat", "palm.npy", "palm.txt", "palm.txt.gz")
-
-
-def shown_alike(page, names, values):
-    """Check that the page shows the same frames of each file."""
-    for name in names:
-        about = opened(page, name)
+    values, layout = np.random.default_rng(5).integers(0, 1000, (40, 6)), tmp_path / "said.toml"
+    np.savetxt(tmp_path / "palm.txt", values, fmt="%d", delimiter=";")
+    layout.write_text('rows = 2\ncolumns = 3\nrate_hz = 100\n[table]\nseparator = ";"\n')
+    with shown(tmp_path / "palm.txt", layout=layout) as page:
+        about = opened(page, "palm.txt")
         assert (about["frames"]["count"], about["stop_us"]) == (40, 390_000)
-        shown, _ = values_at(page, about, 200_000)
-        assert np.array_equal(shown, values[20])
-
-
-@pytest.mark.parametrize("beside", [True, False], ids=["beside", "given"])
-def test_tables_and_arrays_of_other_programs_are_shown_by_their_layout(beside, capsys, tmp_path):
-    folder, layout = tmp_path / "tables", tmp_path / "said.toml"
-    values, text = tables(folder)
-    for words, reason in (
-        (folder, "palm.csv: can be read in 2 ways"),
-        (
-            folder / "palm.npy",
-            "layout.toml beside it or another file given as layout (docs/files.md):",
-        ),
-    ):
-        code, _, errors = call(capsys, "view", words, "--no-open", "--seconds", 1)
-        assert code == 2
-        assert reason in errors
-    (folder / "layout.toml" if beside else layout).write_text(text)
-    given = {} if beside else {"layout": layout}
-    for name in TABLES:
-        with Panel(folder / name, options=FullReading(**given)) as panel, Client(panel) as page:
-            shown_alike(page, [name], values)
-    assert [one.name for one in taxel.open_all(folder, **given)] == list(TABLES)
-    (folder / "labels.csv").write_text("recording,label,t_us\npalm,contact,100000\n")
-    (folder / "read me.txt.md").write_text("of the palm")
-    with shown(folder, **given) as page:
-        page.send(type="recordings")
-        assert {one["name"] for one in page.until("recordings")["files"]} == set(TABLES)
-        shown_alike(page, TABLES, values)
+        assert np.array_equal(values_at(page, about, 200_000)[0], values[20].reshape(2, 3))
 
 
 def test_frames_are_in_the_unit_of_a_calibration(capsys, tmp_path):

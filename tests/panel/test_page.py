@@ -24,11 +24,13 @@ SERVED = sorted(
     for file in WEB.rglob("*")
     if file.is_file() and not file.name.endswith((".d.ts", "README.md", "tsconfig.json"))
 )
+#: Paths of no file of the page.
+OUTSIDE = ("../Cargo.toml", "%2e%2e/Cargo.toml", "/etc/passwd", "index.html/")
 
 
 def test_each_file_is_served_as_it_lies_in_the_folder_and_nothing_else(panel: Panel) -> None:
     line = http.client.HTTPConnection(*panel.address, timeout=SOON)
-    for name in (*SERVED, "uPlot.js", "vendor", "BOARD.JS", "vendor/../board.js"):
+    for name in (*SERVED, "uPlot.js", "vendor", "BOARD.JS", "vendor/../board.js", *OUTSIDE):
         line.request("GET", f"/{name}")
         answer = line.getresponse()
         found = answer.read()

@@ -141,12 +141,15 @@ def test_a_taxel_is_zeroed_for_all_and_the_next_recording_begins_with_it(live, t
                 one.until("zeroed")
             (told,) = all_told[-1]["taxels"]
             assert (told["taxel"], told["rest"], told["before"]) == ([3, 5], 90.0, None)
-        # The frame's rest is the new one, and a lower value does not change it.
+        # The frame has its value, and the new rest, which a lower value did not change.
         say(live, word(6000, 3, 5, 80), word(7000, 3, 5, 95))
         heard(live, 4)
         page.send(type="credit", n=8)
-        while not (rest := section(page.until("frame"), 5, "<u2")).size or rest[5 * 64 + 3] != 90:
+        at = 5 * 64 + 3
+        while not (rest := section(page.until("frame"), 5, "<u2")).size or rest[at] != 90:
             page.send(type="credit", n=1)
+        while section(page.frames[-1], 0, "<u2")[at] != 95:
+            page.until("frame")
         assert page.ask("record", name="after")["type"] == "done"
         page.since_asked("recorder", state="recording")
         say(live, word(8000, 3, 5, 99))

@@ -37,10 +37,11 @@ def noted(place: Path) -> list[tuple[str, int | None]]:
         (".txt", TRACK),
         (".txt", TRACK.replace(".", ",")),
         (".txt", "t_s\tLabel\n0.25\theel\n0.75\ttoe\n"),
+        ("_labels.csv", "side,t_ms,label\r\n1,250,heel\r\n2,7.5e2,toe\r\n"),
     ],
 )
 @pytest.mark.parametrize("stem", ["walk", "Gäng Müller 1.5 N"])
-@pytest.mark.parametrize("code", ["utf-8", "cp1252"])
+@pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
 def test_a_table_beside_a_recording_is_its_notes(tmp_path: Path, name: str, content: str, stem: str, code: str) -> None:
     place, table = write(tmp_path / f"{stem}.npz"), tmp_path / f"{stem}{name}"
     table.write_bytes(content.encode(code))

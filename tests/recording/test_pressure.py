@@ -11,9 +11,6 @@ import pytest
 from shell import run
 
 import taxel
-from taxel.reading import Facts, InMemory
-from taxel.recording.analysis.pressure import series
-from taxel.recording.recording import Recording
 
 from .making import pressed
 
@@ -53,26 +50,3 @@ def test_frames_rest_at_zero_and_events_without_intensities_have_no_pressure(tmp
     assert (
         "the name of a table must end in .csv" in run("info", tmp_path / "f.npz", "--table", tmp_path / "f.txt").stderr
     )
-
-
-@pytest.mark.parametrize("spread", [0.0, 1.0, 2.0, 4.0])
-@pytest.mark.parametrize("share", [0.1, 0.5])
-def test_noise_has_no_centre_and_each_press_has_one(spread: float, share: float) -> None:
-    """Presses of 100 counts at random places, so long a share of the time; noise that goes above the floor."""
-    random = np.random.default_rng(round(10 * spread))
-    values, during = random.normal(500.0, spread, (1200, 12, 16)), np.zeros(1200, bool)
-    for begin in range(150, 1150, 100):
-        y, x, press = random.integers(3, 7), random.integers(3, 10), slice(begin, begin + round(100 * share))
-        values[press, y : y + 3, x : x + 3] += 100.0
-        during[press] = True
-    frames = taxel.Frames(np.round(values), np.arange(1200) * 10_000, unit="counts")
-    of = series(Recording.of(InMemory(Facts(array=frames.array), frames)))
-    assert of.rest.source == "quiet"
-    centre = np.stack([of.columns["centre_x_taxels"], of.columns["centre_y_taxels"]], axis=1)
-    has = ~np.isnan(centre).any(axis=1)
-    assert has[during].all()
-    # Where few taxels are above the floor, their number is now and then more than twice that of the quietest stretch.
-    assert np.count_nonzero(has & ~during) <= 1
-    found = centre[during]
-    assert found.min() >= 3.0
-    assert (found <= (12.0, 9.0)).all()

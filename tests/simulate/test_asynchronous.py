@@ -59,17 +59,6 @@ def test_each_step_is_told_when_a_straight_line_reaches_it(seed):
         assert at - 1.02 <= t <= at + 0.02, "whole microseconds"
 
 
-def test_what_a_host_holds_is_within_the_floor_and_steps_are_no_larger():
-    random, array = np.random.default_rng(1), taxel.Array(3, 3)
-    registers = Registers(array=array, wire_version=2, noise_floor=4)
-    board, decoder = Board(registers, array, asynchronous=True), taxel.wire.Decoder(2, array=array)
-    walk = random.integers(0, 151, (200, 9)).astype(np.uint16)
-    for frame in [*walk, walk[-1], walk[-1]]:
-        for datagram in board.frame(frame):
-            decoder.push(datagram)
-    assert (np.abs(decoder.held.ravel() - walk[-1].astype(int)) <= 4).all()
-
-
 def test_a_slow_press_is_told_between_the_frames_of_a_scan():
     """Taxels that rise by a tick each 2 ms: whole frames when scanned, their own times when not."""
     slope_us, frames = 2000.0, 1000

@@ -1,7 +1,6 @@
 """The emulated board against the reference's section 3, read slowly (oracle.py)."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -75,12 +74,3 @@ def test_without_loss_the_decoder_gives_back_what_the_board_held():
         known = ticks != NOT_RETURNED
         assert (held[known] == np.minimum(ticks, 150)[known]).all()
     assert decoder.counts.changes == board.counts["changes"]
-
-
-def test_registers_are_taken_over_at_a_frames_edge():
-    board = Board()
-    for command in Registers().commands_to(Registers.preset("2 kHz")):
-        board.command(command.to_bytes())
-    assert board.time_us == 0
-    board.frame(np.zeros(4096, np.uint16))
-    assert board.time_us == pytest.approx(499.84)

@@ -11,7 +11,7 @@ import tty
 from pathlib import Path
 
 import numpy as np
-from live.boards import LOOPBACK, SMALL, datagrams, play, presses, touch, touches, wait_for
+from live.boards import LOOPBACK, SMALL, datagrams, play, presses, touch, wait_for
 from loopback import until
 from test_before import contents
 
@@ -26,6 +26,18 @@ from taxel.wire import Registers
 
 HERE = Path(__file__).parent
 BEGAN = 1_700_000_000_000_000_000
+
+
+def touches(count: int) -> taxel.Events:
+    """Each 40 ms two taxels rise and fall again, one 400 us behind the other."""
+    rows = []
+    for press in range(count):
+        for k in range(20):
+            for x, behind in ((1, 0), (2, 400)):
+                ticks = 20 + 3 * (k if k < 10 else 19 - k)
+                rows.append((press * 40_000 + k * 200 + behind, x, 2, k < 10, ticks))
+    t, x, y, p, ticks = zip(*sorted(rows), strict=True)
+    return taxel.Events(t, x, y, p, array=SMALL, intensity=np.array(ticks))
 
 
 def written() -> None:
