@@ -7,6 +7,9 @@ ROOT = Path(__file__).parent.parent
 
 
 README = ROOT / "README.md"
+#: What `make` can be asked for.
+_RULES = re.findall(r"^([a-z][\w -]*):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+TARGETS = {target for rule in _RULES for target in rule.split()}
 
 
 def shell_lines(page: Path) -> list[str]:

@@ -11,6 +11,7 @@ import re
 from pathlib import Path
 
 import pytest
+from printed_pages import TARGETS
 
 DOCS = Path(__file__).parent.parent / "docs"
 PAGES = sorted(
@@ -41,7 +42,6 @@ def test_every_python_piece_of_a_page_runs_in_order_and_does_what_the_page_says(
 
 ROOT = DOCS.parent
 PROSE = sorted(page for kind in ("*.md", "docs/*.md", "docs/reference/*.md", "*/README.md") for page in ROOT.glob(kind))
-TARGETS = set(re.findall(r"^([a-z][\w-]*)(?: [\w -]+)?:", (ROOT / "Makefile").read_text(), re.MULTILINE))
 FOLDERS = "benchmarks|bridge|crates|docs|fuzz|python|rtl|rules|studies|tests|tools|viewers"
 _PATH = re.compile(rf"(?<![\w./-])(?:{FOLDERS})/[\w./-]+")
 #: What `make` builds, and a folder of another project.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import cyclopts
 import pytest
-from printed_pages import README, ROOT, shell_lines
+from printed_pages import README, ROOT, TARGETS, shell_lines
 
 from taxel.cli._commands import command
 from taxel.cli.app import own_commands, rows
@@ -26,8 +26,7 @@ CASES = [(page, line) for page in PAGES for line in [*shell_lines(page), *inline
 def test_a_line_to_type_names_a_command_and_options_that_exist(page: Path, line: str) -> None:
     program, *arguments = shlex.split(line.split(" | ", maxsplit=1)[0])
     if program == "make":
-        targets = re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
-        assert {argument for argument in arguments if "=" not in argument} <= set(targets), page
+        assert {argument for argument in arguments if "=" not in argument} <= TARGETS, page
     elif program.endswith("taxel"):
         check(arguments, in_full=line in shell_lines(page))
 
