@@ -17,10 +17,19 @@ from panel.protocol import (
     websockets,
     word,
 )
+from shell import run
 
 import taxel
 from taxel.live import Live, send
 from taxel.panel import Panel
+
+
+def test_a_port_that_is_taken_is_said_with_what_to_do(panel, tmp_path):
+    taxel.convert(taxel.Events([0], [0], [0], [True], array=taxel.Array(2, 2)), tmp_path / "a.npz")
+    host, port = panel.address
+    done = run("view", tmp_path / "a.npz", "--no-open", "--panel-port", port)
+    says = f"taxel: {host}:{port}: address already in use; end the program that listens there, or name another port\n"
+    assert (done.returncode, done.stderr) == (3, says)
 
 
 def test_a_foreign_or_nameless_visitor_is_not_let_in(panel):

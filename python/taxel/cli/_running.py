@@ -75,5 +75,6 @@ def _system_error(error: OSError) -> str:
         if not folder.is_dir():
             return f"{folder}: no such folder"
     if error.filename is not None and error.strerror:
-        return f"{error.filename}: {error.strerror.lower()}"
+        taken = "; end the program that listens there, or name another port" * (error.errno == errno.EADDRINUSE)
+        return f"{error.filename}: {error.strerror.lower()}{taken}"
     return str(error)

@@ -96,7 +96,11 @@ class Server:
         self._hub = hub
         self.token = secrets.token_hex(32)
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        self._socket = socket.create_server((host, port), family=family, backlog=128)
+        try:
+            self._socket = socket.create_server((host, port), family=family, backlog=128)
+        except OSError as error:
+            why = str(error.strerror).partition(" (while ")[0]
+            raise OSError(error.errno, why, f"{host}:{port}") from None
         self.address: tuple[str, int] = self._socket.getsockname()[:2]
         ip = ipaddress.ip_address(self.address[0])
         self._anywhere = ip.is_unspecified
