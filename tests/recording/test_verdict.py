@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
+from shell import run
 
 import taxel
 from taxel import Verdict, _core
@@ -92,6 +93,8 @@ def test_small_messages_that_another_program_left_out_are_lost(
     assert left_out > 0
     assert verdict.lost == ({cause: left_out} if cause else {})
     assert not cut or "not finished" in verdict
+    [received] = [line for line in run("info", tmp_path / "b.mcap").stdout.splitlines() if "  received " in line]
+    assert received.endswith(", when counts were last saved") is bool(cut)
 
 
 def test_datagrams_of_version_1_that_come_again_are_damage_as_their_events_are_there_twice(tmp_path: Path) -> None:

@@ -394,7 +394,9 @@ def _losses(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     always = ("datagrams", "bytes", "received", "dropped_by_kernel", "dropped_by_queue")
     for name in always:
         if counts.get(name) is not None:
-            yield name.replace("_", " "), str(counts[name])
+            # Those of what arrived are counted apart from the recording, and saved now and then.
+            old = ", when counts were last saved" * (facts["truncated"] and name not in ("datagrams", "bytes"))
+            yield name.replace("_", " "), f"{counts[name]}{old}"
         elif name == "dropped_by_kernel" and name in counts:
             yield name.replace("_", " "), "unknown: the system does not count them"
     if counts.get("frames_that_could_not_be_read"):
