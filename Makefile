@@ -189,7 +189,8 @@ lint: rtl-lint
 # On two cores: the modules, and whole frames beside the emulated board, which cargo builds. The quick half leaves out
 # what compiles the design for many more parameters.
 rtl-quick: PAIRS := -k quick
-rtl-quick rtl-test: rtl-lint rtl-modules rtl-pair
+rtl-quick: rtl-test
+rtl-test: rtl-lint rtl-modules rtl-pair
 rtl-pair: $(RTL)/.installed released $(VENV)/.for-test
 	$(BIN)/python -m pytest -q -n 2 rtl/dv/test_*.py -m "not slow" $(PAIRS)
 
