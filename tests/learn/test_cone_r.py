@@ -90,6 +90,15 @@ def test_progress_is_told_round_by_round_and_may_stop_the_fit_by_raising():
         fitted(ConeR(neuron=Neuron(tau=12.0)), patterns, targets, progress=lambda *_: 1 / 0)
 
 
+def test_a_fit_with_more_coefficients_near_threshold_than_are_written_out_is_solved():
+    patterns, targets = examples(14, trains=800, patterns=100, targets=2, duration=1000.0, spikes=2)
+    told = []
+    cone = made(ConeR, tau=190.0, lambdas=(0, 4, 100, 100, 80), divide_b_by="targets", after_spike="reset")
+    fitted(cone, patterns, targets, progress=lambda *round: told.append(round))
+    assert told[0][1] * 800 > 4_000_000
+    assert cone.status_ == "solved"
+
+
 LONG = {"tau": 40.0, "tolerance": 1e-9, "lambdas": (4, 0, 100, 100, 80)}
 
 

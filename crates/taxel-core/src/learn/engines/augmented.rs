@@ -129,6 +129,8 @@ struct Lagrangian<'a> {
     factors: Vec<f64>,
     /// The rows on their smoothed kinks.
     inside: Vec<usize>,
+    /// Whether some of many rows stand for all of them in the curvature: until a round is not solved so.
+    samples: bool,
     hessian: Vec<f64>,
     memory: MemBuffer,
 }
@@ -177,6 +179,8 @@ impl Program<'_> {
             engine.end_round();
             if reached {
                 engine.sharpen();
+            } else {
+                engine.samples = false;
             }
         }
         Found { best, proof, rounds, rows, multipliers: engine.multipliers, stopped }
@@ -262,6 +266,7 @@ impl<'a> Lagrangian<'a> {
             rho: 1.0,
             gradient: vec![0.0; n],
             inside: vec![],
+            samples: !program.is_hard(),
             hessian: vec![0.0; n * n],
             memory: MemBuffer::new(scratch),
         }

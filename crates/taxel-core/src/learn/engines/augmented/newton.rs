@@ -21,6 +21,9 @@ struct Curvature {
     concave: f64,
 }
 
+/// At most so many coefficients of silent rows are written out for a curvature by `samples`: of more rows, some at even
+/// distances stand for all, as neighbouring points of a grid have nearly the same row. Slopes remain those of all rows.
+const WRITTEN: usize = 2_000_000;
 /// How often a direction over rows is refined: the system loses the digits by which steep rows exceed the diagonal.
 const REFINED: usize = 1;
 
@@ -62,13 +65,15 @@ impl Lagrangian<'_> {
         let n = self.weights.len();
         let silent = program.limit.len();
         let kept = self.inside.partition_point(|&k| k < silent);
-        let mut rows = program.silent.coefficients(&self.inside[..kept], n);
+        let apart = if self.samples { (kept * n).div_ceil(WRITTEN).max(1) } else { 1 };
+        let written: Vec<usize> = self.inside[..kept].iter().copied().step_by(apart).collect();
+        let mut rows = program.silent.coefficients(&written, n);
         let [of_silence, of_targets] = self.steep().map(f64::sqrt);
-        rows.iter_mut().for_each(|v| *v *= of_silence);
+        rows.iter_mut().for_each(|v| *v *= of_silence * (apart as f64).sqrt());
         for &k in &self.inside[kept..] {
             rows.extend(program.targets.row(k - silent).at.iter().map(|v| of_targets * v));
         }
-        let mut count = self.inside.len();
+        let mut count = written.len() + self.inside.len() - kept;
         if o.sides_b == Sides::Below {
             let root = (2.0 * o.b).sqrt();
             for (target, _) in program.targets.iter().zip(&self.behind).filter(|(_, behind)| **behind < 0.0) {
