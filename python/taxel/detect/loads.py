@@ -40,11 +40,16 @@ class FoundTimes(NamedTuple):
     known: NDArray[np.int64]
     value: NDArray[np.float64]
 
-    def between(self, windows: Iterable[tuple[int, int]]) -> Self:
+    def between(self, windows: NDArray[np.int64]) -> Self:
         """Return what was found in windows, which ascend."""
-        inside_windows = [np.arange(*np.searchsorted(self.t, window)) for window in windows]
-        inside = np.concatenate(inside_windows) if inside_windows else np.empty(0, np.int64)
+        inside = within(self.t, windows)
         return type(self)(self.t[inside], self.known[inside], self.value[inside])
+
+
+def within(t: NDArray[np.int64], windows: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return which times are in windows, which ascend."""
+    inside: NDArray[np.bool_] = np.searchsorted(windows.reshape(-1), t, side="right") % 2 == 1
+    return inside
 
 
 def clock_of(example: object, frame_us: float | None = None) -> Clock:
@@ -213,14 +218,14 @@ class Loads:
         lasts = np.searchsorted(ends, times + away_us) == np.searchsorted(ends, times - away_us, side="right")
         return int(np.count_nonzero((began > 0) & lasts))
 
-    def windows(self, parts: Iterable[Stretch]) -> list[tuple[int, int]]:
+    def windows(self, parts: Iterable[Stretch]) -> NDArray[np.int64]:
         """Return from when to when parts of the examples last on the one clock, us, ascending."""
         half = APART_US // 2
 
         def edge(k: int, t: float) -> int:
             return k * APART_US + int(np.ceil(np.clip(t + self._shift[k] - k * APART_US, -half, half)))
 
-        return sorted((edge(k, start), edge(k, stop)) for k, start, stop in parts)
+        return np.array(sorted((edge(k, start), edge(k, stop)) for k, start, stop in parts), np.int64)
 
     def off(self, found: FoundTimes, k: int) -> FoundTimes:
         """Return what was found by the clock of example k."""
@@ -230,11 +235,8 @@ class Loads:
         self, found: Iterable[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]]
     ) -> FoundTimes:
         t, known, values = zip(*found, strict=True)
-
-        def shifted(times: Iterable[NDArray[np.int64]]) -> NDArray[np.int64]:
-            return np.concatenate([t + by for t, by in zip(times, self._shift, strict=True)])
-
-        return FoundTimes(shifted(t), shifted(known), np.concatenate(values))
+        by = np.repeat(self._shift, list(map(len, t)))
+        return FoundTimes(np.concatenate(t) + by, np.concatenate(known) + by, np.concatenate(values))
 
 
 def touches(examples: Sequence[Example], noise_floor: float) -> tuple[Loads, FoundTimes, FoundTimes] | None:

@@ -14,7 +14,7 @@ from taxel._base.progress import Progress, reporting
 from taxel._core import ProblemError
 from taxel.detect import recipes
 from taxel.detect.examples import Example, check_examples
-from taxel.detect.loads import CHANGES, EdgeRule, FoundTimes, Loads, Stretch, clock_of, lacks
+from taxel.detect.loads import CHANGES, EdgeRule, FoundTimes, Loads, Stretch, clock_of, lacks, within
 from taxel.detect.plain_rule import PlainRule
 from taxel.detect.scoring import many, tally
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -223,7 +223,7 @@ class Tuning:
         onset, end = (self._best_at(name, edge, points, windows) for edge in (0, 1))
         return onset, end
 
-    def _best_at(self, name: str, edge: int, points: Sequence[EdgeRule], windows: Sequence[tuple[int, int]]) -> _Best:
+    def _best_at(self, name: str, edge: int, points: Sequence[EdgeRule], windows: NDArray[np.int64]) -> _Best:
         """Return the best rule for a label at one edge of loads, in windows on the one clock."""
         # A change of the load begins where the load begins or ends; it ends as it is forgotten.
         possible = [point for point in points if edge == 0 or point.quantity not in CHANGES]
@@ -385,7 +385,7 @@ def _best_of(
     several: Sequence[_Outcomes],
     points: Sequence[EdgeRule],
     edge: int,
-    windows: Sequence[tuple[int, int]],
+    windows: NDArray[np.int64],
     labels: int,
 ) -> tuple[int, _RuleFit]:
     """Return the place of the best rule in windows on the one clock, which ascend and have so many labels.
@@ -395,7 +395,7 @@ def _best_of(
     """
     rule = np.repeat(np.arange(len(several)), [len(outcomes.t) for outcomes in several])
     t, errors, delays = (np.concatenate(column) for column in zip(*several, strict=True))
-    inside = np.searchsorted(np.array(windows, np.int64).reshape(-1), t, side="right") % 2 == 1
+    inside = within(t, windows)
     rule, errors, delays = rule[inside], errors[inside], delays[inside]
     found = np.isfinite(errors)
     wrong, near = (np.bincount(rule[of], minlength=len(several)) for of in (~found, errors <= to_ms(NEAR_US)))
