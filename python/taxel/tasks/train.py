@@ -156,7 +156,10 @@ def _train(
         raise
     # Where many labels are missed or false, it is said by how much they are off what was felt.
     if many_wrong(training.score):
-        lines = off_loads(check_examples(examples)) or list(_mistaken(training))
+        missed = {
+            label for label, of_label in training.score.by_label.items() if 2 * of_label.missed >= of_label.events
+        }
+        lines = off_loads(check_examples(examples), missed) or list(_mistaken(training))
         for line in [*lines, *(line for recording in opened for line in sensor_lines(recording))][:_LINES]:
             warn(line)
     return replace(training, unlabelled=unlabelled, constants_ms=constants)
@@ -202,14 +205,14 @@ def _constants(fitter: Fitter, update: Progress) -> dict[str, float]:
 
 
 def _mistaken(training: Training) -> Iterator[str]:
-    """Yield when labels are missed, and when there are detections without one, where most labels are found."""
+    """Yield when labels are missed, or detections lack one, where most are found; with many of both it is no label."""
     for label, of_label in training.score.by_label.items():
-        if 2 * of_label.missed >= of_label.events:
+        missed, false = (many(count, of_label.events) for count in (of_label.missed, of_label.false))
+        if missed == false or 2 * of_label.missed >= of_label.events:
             continue
-        for missed, are in ((True, "are missed: is each right?"), (False, "are false: does each lack a label?")):
-            wrong = [one for one in training.scored.mistakes if (one.label, one.is_missed) == (label, missed)]
-            if many(len(wrong), of_label.events):
-                yield f"{label} at {few(f'{one.t / 1e6:.3f} s' for one in wrong)} {are}"
+        are = "are missed: is each right?" if missed else "are false: does each lack a label?"
+        wrong = [one for one in training.scored.mistakes if (one.label, one.is_missed) == (label, missed)]
+        yield f"{label} at {few(f'{one.t / 1e6:.3f} s' for one in wrong)} {are}"
 
 
 def _like_labels(table: Events | Frames, events: Mapping[str, NDArray[np.int64]]) -> list[str]:
