@@ -53,15 +53,31 @@ class Count:
         return float(self.above.sum())
 
 
+class BeginArea:
+    """How many loaded taxels have been so since a touch began, or since less than a level after it."""
+
+    def __init__(self, levels):
+        self.levels, self.began, self.levels_of = levels, None, np.zeros(ARRAY.shape, int)
+
+    def at(self, t, held):
+        loaded = beside_loaded(held)
+        self.began = None if not loaded.any() else t if self.began is None else self.began
+        below = 0 if self.began is None else sum(t - self.began < 1000 * level for level in self.levels)
+        self.levels_of = np.where(loaded, np.maximum(self.levels_of, below), 0)
+        return float(self.levels_of.sum())
+
+
+def beside_loaded(held):
+    """Which taxels are loaded, beside a loaded one."""
+    loaded = held >= REST + FLOOR + 0.5
+    around = [loaded[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2].sum() for y, x in np.ndindex(held.shape)]
+    return loaded & (np.reshape(around, held.shape) > 1)
+
+
 def quantity(name, held):
     """The number of loaded taxels beside a loaded one, or the sum of their values above rest."""
-    loaded = held >= REST + FLOOR + 0.5
-    area, total = 0, 0.0
-    for y, x in np.ndindex(held.shape):
-        around = loaded[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]
-        if loaded[y, x] and around.sum() > 1:
-            area, total = area + 1, total + max(float(held[y, x]) - REST, 0.0)
-    return float(area) if name == "area" else float(np.float32(total))
+    loaded = beside_loaded(held)
+    return float(loaded.sum()) if name == "area" else float(np.float32(np.maximum(held[loaded] - REST, 0.0).sum()))
 
 
 def frame_of(t, period_us, stamp_us):
@@ -77,7 +93,9 @@ class ByLoop:
 
     def __init__(self, rule, source, frame_us, version=1, reach_us=0):
         self.frames, name = {}, rule.quantity
-        held, follows = np.zeros(ARRAY.shape), {"local_load": LocalLoad(), "count": Count(rule.levels)}.get(name)
+        of_levels = {"count": Count, "begin_area": BeginArea}
+        held, follows = np.zeros(ARRAY.shape), LocalLoad() if name == "local_load" else None
+        follows = of_levels[name](rule.levels) if name in of_levels else follows
 
         def measured(t, held):
             return t, quantity("area", held), quantity(name, held) if follows is None else follows.at(t, held)
@@ -184,11 +202,13 @@ LOCAL_LOADS = st.sampled_from([0.531, 1.071, 2.133, 3.317, 4.313])
 @st.composite
 def rules(draw):
     """A rule of edges: of any quantity, dated at its threshold or below it, or of its largest value."""
-    name = draw(st.sampled_from(["area", "total", "local_load", "count"]))
+    name = draw(st.sampled_from(["area", "total", "local_load", "count", "begin_area"]))
     drawn = LOCAL_LOADS if name == "local_load" else st.sampled_from([1.0, 2.0, 3.0, 3.5, 4.0, 7.25, 9.0])
     threshold, release, how = draw(drawn), draw(st.sampled_from([0.125, 0.5, 0.75, 1.0])), {}
     if name == "count":
         how["levels"] = draw(st.sampled_from([[1.0], [1.75, 2.5], [0.5, 1.0, 2.0, 6.0]]))
+    if name == "begin_area":
+        how["levels"] = draw(st.sampled_from([[0.05], [0.192, 0.4], [0.1, 1.0, 20.0]]))
     if draw(st.booleans()):
         how["of_largest"] = True
     elif draw(st.booleans()):

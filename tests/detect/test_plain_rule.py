@@ -115,6 +115,23 @@ def test_tuning_finds_a_planted_rule():
             assert (score.missed, score.false) == (0, 0)
 
 
+def test_tuning_finds_when_a_touch_leaves_the_place_where_it_began():
+    """Touches move over a plate from anywhere, equally large all the time, and leave other places as fast."""
+    draw, step, values, lifted = np.random.default_rng(3), 5_000, np.zeros((2_000, 26, 9), np.float32), []
+    for begin in range(100, 1_900, 60):
+        row, column, moves, leaves, ends = draw.integers([0, 0, 9, 28, 36], [3, 5, 13, 35, 51])
+        for k, (first, last) in enumerate(((0, leaves), (6, moves), (moves, ends), (leaves, ends))):
+            values[begin + first : begin + last, row + 6 * k : row + 6 * k + 6, column : column + 4] = 20.0
+        lifted.append((begin + leaves) * step)
+    frames = Frames(values, step * np.arange(len(values)), array=Array(26, 9))
+    example = Example(frames, {"lifted": np.array(lifted)}, taxel.Tare.take(frames, stop_us=400_000))
+    rule = tune([example], window_ms=4.0, noise_floor=FLOOR)["lifted"]
+    assert rule.quantity == "begin_area"
+    assert repr(rule).startswith("PlainRule(lifted: begin area falls to ")
+    score = taxel.detect.score(run(rule, frames, tare=example.tare), {"lifted": lifted}, 4)
+    assert (score.missed, score.false) == (0, 0)
+
+
 def test_tuning_says_none_where_no_rule_is_better_than_nothing():
     example_ = played(1)
     nowhere = Example(example_.source, {"never": np.array([5_000, 5_100, 5_200])}, example_.tare)

@@ -1,5 +1,6 @@
 //! Encodes events or frames as spikes, live or as a whole recording, with identical spikes.
 
+mod begin_area;
 mod blocks;
 mod channel_levels;
 mod channels;

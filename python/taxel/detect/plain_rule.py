@@ -34,15 +34,18 @@ class PlainRule(_Detector):
 
     Parameters
     ----------
-    quantity : {"area", "total", "local_load", "local_rise", "local_fall", "peak", "count", "range_count", "duration"}
+    quantity : {"area", "total", "local_load", "local_rise", "local_fall", "peak", "count", "range_count", \
+"begin_area", "duration"}
         The number of loaded taxels, as `taxel.encode.ContactArea` counts them, each channel alone; the sum of their
         values above rest in the sensor's unit, as `taxel.encode.Moments` adds them; the largest sum over 3 x 3 taxels
         above a rest that follows the sensor, in units of its noise, as of `taxel.encode.LocalLoad` ("largest"), or
         above ("local_rise") or below ("local_fall") their running mean of 50 ms; the largest value of a taxel above
         such a rest, in units of that taxel's noise, with what several add, as of `taxel.encode.Peak`; how many taxels
         are above a level, added up over `levels` above rest in the sensor's unit, or ("range_count") over `levels` in
-        parts of each taxel's running range (`taxel.encode.RunningRange`), which needs no rest; or how long a touch
-        lasts, with the age "end". In single precision.
+        parts of each taxel's running range (`taxel.encode.RunningRange`), which needs no rest; how many of the loaded
+        taxels have been so since a touch began, or since less than a level after it, added up over `levels` in ms: none
+        once it has left the place where it began, as that of a foot whose heel lifts; or how long a touch lasts, with
+        the age "end". In single precision.
     threshold : float, above 0
         Number of taxels, the sensor's unit, units of noise, or ms.
     release : float, above 0, at most 1
@@ -52,7 +55,8 @@ class PlainRule(_Detector):
     age_ms : float, ms, from 0 to 60 000, or "end", optional
         The age of a touch at which it decides.
     levels : sequence of float, above 0, ascending
-        The levels of a count, and of no other quantity. A taxel is above a level until it is below seven tenths of it.
+        The levels of a count and of the begin area, and of no other quantity. A taxel is above a level of a count until
+        it is below seven tenths of it.
     dated_at : float, in the unit of the threshold, from release x threshold to it, optional
         `t` is when the quantity last rose to it before an onset, or fell below it before an end. `known` stays.
     of_largest : bool
@@ -230,15 +234,17 @@ class PlainRule(_Detector):
         return "1 frame" if self.frames == 1 else f"{self.frames} frames"
 
     def _counted(self, *, rises: bool) -> str:
-        """Return what a rule of a count compares, at onsets or at ends."""
+        """Return what a rule of a quantity with levels compares, at onsets or at ends."""
         n, most = ceil(self.threshold), ceil(self.release * self.threshold) - 1
         how = f"rises to {n} after at most {most}" if rises else f"falls to {most} after at least {n}"
         dated = self.dated_at
         at = "" if dated is None else f", dated at {ceil(dated) - (not rises)}"
         frames = "" if self.frames == 1 else f", {self._framed}"
-        unit = " of the range" if self.quantity == "range_count" else f" {escaped(self.unit)}" * (self.unit is not None)
+        units = {"range_count": " of the range", "begin_area": " ms"}
+        unit = units.get(self.quantity, f" {escaped(self.unit)}" * (self.unit is not None))
         levels = ", ".join(f"{level:g}" for level in self.levels)
-        return f"count {how}{at}{frames}; levels {levels}{unit}"
+        name = "begin area" if self.quantity == "begin_area" else "count"
+        return f"{name} {how}{at}{frames}; levels {levels}{unit}"
 
     @property
     def _named_quantity(self) -> str:

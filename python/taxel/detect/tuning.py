@@ -39,6 +39,8 @@ LEVELS = {"N": (5.0, 10.0, 20.0, 30.0, 40.0, 50.0)}
 #: Levels of a count in parts of the running range, and of what loaded taxels read at most; most are low, where loads
 #: begin and end.
 LEVEL_SHARES = (0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.11, 0.15, 0.2, 0.3, 0.45)
+#: Levels of the area where a touch began, ms, each alone.
+BEGIN_LEVELS_MS = (10.0, 20.0, 30.0)
 #: Numbers that a count rises to, or falls from.
 COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 24, 32, 48, 64, 96, 128, 192, 256)
 #: The numbers that it was at most before it, or falls to, as parts of it, beside one less.
@@ -100,7 +102,7 @@ def tune(
     and peak with ends at parts of what they were at most (`OF_LARGEST`), and counts of levels that are on: levels by
     the unit (`LEVELS`), and in parts of what loaded taxels read at most and of the running range (`LEVEL_SHARES`), of
     which a load begins where the count rises to one number after it was at most another, and ends likewise, dated at a
-    number between them.
+    number between them. Of a grid so are the taxels by which a touch began (`BEGIN_LEVELS_MS`).
 
     Two labels are kinds where exactly two are nearer to onsets than to ends, or where there are only two: then
     thresholds of the area at each of `AGES_MS` are tried too, on a logarithmic scale, and thresholds of the duration as
@@ -339,7 +341,7 @@ def _ladder(totals: NDArray[np.float64]) -> tuple[float, ...]:
 
 
 def _levels(loads: Loads, parts: Sequence[Stretch]) -> Iterator[tuple[str, tuple[float, ...]]]:
-    """Yield the levels of counts that are tried, each with its quantity."""
+    """Yield the quantities with levels that are tried."""
     readings = loads.readings(parts) if loads.have_rest else np.empty(0)
     if len(readings):
         if loads.unit in LEVELS:
@@ -349,6 +351,10 @@ def _levels(loads: Loads, parts: Sequence[Stretch]) -> Iterator[tuple[str, tuple
         most = 10.0 ** (steps / STEPS_A_DECADE)
         yield "count", tuple(float(f"{share * most:.2g}") for share in LEVEL_SHARES)
     yield "range_count", LEVEL_SHARES
+    # Few channels begin a touch one by one.
+    if loads.have_rest and not loads.are_channels:
+        for level in BEGIN_LEVELS_MS:
+            yield "begin_area", (level,)
 
 
 def _counts(quantity: str, levels: tuple[float, ...], counts: NDArray[np.float64]) -> Iterator[EdgeRule]:

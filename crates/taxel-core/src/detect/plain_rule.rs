@@ -45,7 +45,7 @@ pub enum NamedAge {
 /// time of the first of these frames; it is `known` when the last one is complete. A frame's quantity is that after its
 /// last event; its time is the stamp with which the quantity passed the threshold. A frame of the input is one frame.
 ///
-/// A count thus rises to n after it was at most r with the threshold n and the release (r + 1) / n, and falls to r after it
+/// A quantity with levels thus rises to n after it was at most r with the threshold n and the release (r + 1) / n, and falls to r after it
 /// was at least n. With `dated_at` `t` is when the quantity last rose to that value, or fell below it; what the rule detects,
 /// and when it is known, stay the same. With `of_largest` the load ends where the quantity is below `release` times its
 /// largest value since the begin, and both it and the threshold are above a rest, which is 0 at first, follows the quantity
@@ -66,7 +66,7 @@ pub struct PlainRule {
     pub release: f64,
     /// The number of frames in a row, 1 or more; 1 with an age.
     pub frames: u32,
-    /// The levels of a count, above 0 and ascending; none of other quantities.
+    /// The levels of a count, or of the area where a touch began, above 0 and ascending; none of other quantities.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<f64>,
     /// The value at which `t` is dated, from `release` times the threshold to the threshold; `None`: onset and end are
@@ -150,7 +150,7 @@ impl PlainRule {
 
     fn check_levels(&self) -> Result<()> {
         if self.quantity.has_levels() == self.levels.is_empty() {
-            return Err(problem!("levels"; " and a count: must be given together"));
+            return Err(problem!("levels"; " and a count, or begin_area: must be given together"));
         }
         for (k, &level) in self.levels.iter().enumerate() {
             above_0("levels", level, "")?;

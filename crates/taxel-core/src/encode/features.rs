@@ -1,5 +1,6 @@
 //! What is computed of the values of all taxels at each stamp, or each frame, and the spikes of its levels and changes.
 
+use super::begin_area::BeginArea;
 use super::channels::Channels;
 use super::driver::{Clock, Driver, Rule, Sample, Trains};
 use super::level_count::LevelCount;
@@ -25,6 +26,8 @@ pub(super) enum Feature {
     Peak(PeakLoad),
     /// The number of levels that the taxels are above.
     Count(LevelCount),
+    /// The number of those by which a touch began.
+    Begin(BeginArea),
 }
 
 impl Feature {
@@ -53,6 +56,7 @@ impl Feature {
             }
             Self::Peak(peak) => values.push(peak.take(now.t, now.held.as_flattened())),
             Self::Count(count) => values.push(count.take(now) as f64),
+            Self::Begin(begin) => values.push(begin.take(now) as f64),
         }
     }
 
@@ -62,6 +66,7 @@ impl Feature {
             Self::Local(sums) => sums.set_rest(taxel, rest),
             Self::Peak(peak) => peak.set_rest(taxel, rest),
             Self::Count(count) => count.set_rest(taxel, rest),
+            Self::Begin(begin) => begin.loaded().set_rest(taxel, rest),
         }
     }
 }
@@ -125,8 +130,10 @@ impl Rule for FeatureRule {
     #[inline(always)]
     fn read(&mut self, channel: usize, _from: f32, to: f32, _repaired: bool) {
         for feature in &mut self.features {
-            if let Feature::Area(loaded) | Feature::Total(loaded) = feature {
-                loaded.take(channel, to);
+            match feature {
+                Feature::Area(loaded) | Feature::Total(loaded) => loaded.take(channel, to),
+                Feature::Begin(begin) => begin.loaded().take(channel, to),
+                _ => {}
             }
         }
     }

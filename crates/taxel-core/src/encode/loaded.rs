@@ -220,6 +220,11 @@ impl Loaded {
         self.paired.area
     }
 
+    /// Whether a taxel counts.
+    pub(super) fn counts(&self, taxel: usize) -> bool {
+        self.paired.counts(taxel)
+    }
+
     /// Sums over the taxels that count, from the values of all taxels; they are added in the order of taxels.
     pub(super) fn sums(&self, held: &[Block]) -> LoadedSums {
         let columns = self.paired.columns;

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::begin_area::BeginArea;
 use super::driver::Trains;
 use super::encoding::Encoding;
 use super::features::{self, Emit, Feature};
@@ -42,6 +43,9 @@ pub enum Quantity {
     /// The same of levels in parts of each taxel's running range, as of [`RunningRange`](super::RunningRange), without
     /// a rest; 0 until its first window is full. Each stamp of events is a sample.
     RangeCount,
+    /// How many of the loaded taxels have been so since a touch began, or since less than a level after it, ms, added up
+    /// over several levels: none once a touch has left the place where it began, as that of a foot whose heel lifts.
+    BeginArea,
     /// How long a touch lasts, ms: the quantity of rules that decide when it ends, which is no load.
     Duration,
 }
@@ -53,10 +57,10 @@ impl Quantity {
         matches!(self, Self::LocalLoad | Self::LocalRise | Self::LocalFall)
     }
 
-    /// Whether it counts levels, which must then be given.
+    /// Whether it counts by levels, which must then be given.
     #[must_use]
     pub fn has_levels(self) -> bool {
-        matches!(self, Self::Count | Self::RangeCount)
+        matches!(self, Self::Count | Self::RangeCount | Self::BeginArea)
     }
 
     /// Starts a stream in which each quantity is a train: a spike for every change, with the new value, in single
@@ -84,7 +88,7 @@ impl Quantity {
                 Self::LocalLoad | Self::LocalRise | Self::LocalFall => {
                     array.check_neighbours("a plain rule by local load")?;
                 }
-                Self::Area | Self::Total | Self::Peak | Self::Count | Self::RangeCount => {}
+                Self::Area | Self::Total | Self::Peak | Self::Count | Self::RangeCount | Self::BeginArea => {}
             }
         }
         let reads = |wanted: &[Self]| several.iter().any(|quantity| wanted.contains(quantity));
@@ -123,6 +127,10 @@ impl Quantity {
         }
         if reads(&[Self::RangeCount]) {
             features.push((Feature::Count(LevelCount::of_range(levels, array.len())?), &[Self::RangeCount]));
+        }
+        if reads(&[Self::BeginArea]) {
+            let begin = BeginArea::new(levels, Loaded::new("plain rule", array, tare, noise_floor)?, array.len());
+            features.push((Feature::Begin(begin), &[Self::BeginArea]));
         }
         let values: Vec<Self> = features.iter().flat_map(|(_, quantities)| quantities.iter().copied()).collect();
         let which = several.iter().filter_map(|quantity| values.iter().position(|value| value == quantity)).collect();
