@@ -45,9 +45,11 @@ def test_a_long_recording_opens_on_its_first_touch_and_cursors_say_its_numbers(c
 
 def opens_on_its_first_touch(page: Any) -> None:
     """Of a long recording ten seconds are shown, with all of it below; times count from its beginning."""
+    until(lambda: 3.0 <= clock(page) < 3.2, "the first touch")
     start, stop = span(page)
     assert stop - start == pytest.approx(10, abs=0.1)
-    assert start < 3.0 <= clock(page) < 3.2 < stop
+    assert start < 3.0
+    assert stop > 3.2
     assert float(page.locator("#strip").get_attribute("aria-valuemax")) == pytest.approx(59.95, abs=0.02)
     shows(page, "clock-more", r"^of 59\.\d{3} s$")
     shows(page, "begun", r"^0 s: \d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.000 UTC$")
