@@ -69,3 +69,4 @@ def test_ends_that_a_rule_finds_are_not_said_to_lie_within_touches(tmp_path: Pat
         given = {"contact": 10_000 * begins, "lift": 10_000 * lift}
         training = taxel.train(taxel.open(tmp_path / "a.npz"), [given], taxel.tasks.TrainOptions(folds=0))
         assert sum("lie within touches" in line for line in training.warnings) == lines
+        assert training.command("foot.json") == "taxel detect RECORDING --readout foot.json"

@@ -190,7 +190,7 @@ class Training:
     def command(self, readout: str) -> str:
         """Return the command that detects by the readout in a file, with the tare, if any, of the training.
 
-        "" if the readout cannot be relied on.
+        "" if it detects no label better than nothing does.
 
         Parameters
         ----------
@@ -202,7 +202,7 @@ class Training:
         ProblemError : no text
         """
         readout = text("readout", readout)
-        if any(self.unreliable()):
+        if not self.learnt:
             return ""
         tare = "FILE" if isinstance(self.options.tare, Tare) else self.options.tare
         before = [taken.tare.stop_us - taken.tare.start_us for taken in self.rests if taken.source == "labels"]
