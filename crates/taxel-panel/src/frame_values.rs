@@ -19,7 +19,8 @@ pub enum RestSource {
 /// What the values of a source's frames are above.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameRest {
-    /// Where it is known from. That of a quiet stretch is tracked from its values on; without any the values are above 0.
+    /// Where it is known from. That of a quiet stretch is tracked from its values on; without any the values are above 0, or
+    /// above the least of a cell where most are negative.
     pub source: RestSource,
     /// The rest of each cell, in the unit; [`Value::NO_REST`](taxel_core::rest::Value::NO_REST) where it is unknown.
     pub values: Vec<f64>,

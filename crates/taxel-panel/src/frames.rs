@@ -110,13 +110,22 @@ impl<'a> SteppedFrames<'a> {
     }
 }
 
+/// What the values of a cell without a rest are above, in steps: 0, or the least of them where most are negative.
+fn base(values: &[f32], cell: usize, cells: usize, steps: ValueSteps) -> u16 {
+    let of_cell = || values.iter().skip(cell).step_by(cells).copied().filter(|value| value.is_finite());
+    let negative = of_cell().filter(|&value| value < 0.0).count();
+    if 2 * negative > of_cell().count() { steps.ticks(of_cell().fold(f32::INFINITY, f32::min)) } else { steps.zero }
+}
+
 /// The rest of a source's cells in steps, each from the frame of this number on: once where it is fixed, else where it moved.
 #[allow(clippy::cast_possible_truncation)]
 fn rests(given: &FrameSource<'_>, steps: ValueSteps) -> Vec<(usize, Vec<u16>)> {
     let FrameRest { source, values, ticks_by_unit, falls, .. } = &given.about.rest;
     let fixed = || vec![(0, values.iter().map(|&value| steps.of_rest(value)).collect())];
     match source {
-        RestSource::None => return vec![(0, vec![steps.zero; values.len()])],
+        RestSource::None => {
+            return vec![(0, (0..values.len()).map(|cell| base(given.values, cell, values.len(), steps)).collect())];
+        }
         RestSource::Given => return fixed(),
         RestSource::Quiet => {}
     }

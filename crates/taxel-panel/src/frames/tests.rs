@@ -61,6 +61,18 @@ fn drawn(random: &mut StdRng, fractions: bool) -> (Vec<i64>, Vec<f32>) {
 }
 
 #[test]
+fn where_most_values_are_negative_they_are_above_the_least() {
+    let of = |values: [f32; 3]| (vec![0, 10_000, 20_000], values.iter().flat_map(|&value| [value; 6]).collect());
+    let index = index(&of([-1800.0, -300.0, 20.0]), &of([1800.0, -300.0, 20.0]));
+    let mut player = Player::open(&index, 20_000, &ViewOptions::plain(COLUMN_US), None).unwrap();
+    player.state.update_curve();
+    let sums: Vec<f64> = player.state.curves().map(|curve| f64::from(curve.sum) * frames(&index).steps.size).collect();
+    for (sum, expected) in sums.iter().zip([6.0 * 1840.0, 6.0 * 1820.0, 6.0 * 20.0]) {
+        assert!((sum - expected).abs() < 12.0, "{sum} {expected}");
+    }
+}
+
+#[test]
 fn at_any_time_the_last_frame_of_each_source_is_shown_with_its_load() {
     let mut random = StdRng::seed_from_u64(7);
     for round in 0..40 {

@@ -84,7 +84,7 @@ const REST_FROM = {
 const REST_OF_FRAMES = {
   given: "above 0",
   quiet: "above the rest of a quiet stretch",
-  none: "rest not known: values as they are",
+  none: "rest not known: values as they are, negative ones above their least",
 };
 
 /** The maps, their colours, the crosshair and the marks of unwell taxels. */
