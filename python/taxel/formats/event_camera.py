@@ -202,7 +202,7 @@ def reduced(name: str, events: Events, reduction: Reduction) -> Events | Frames:
     begin = first // window_us
     count = last // window_us - begin + 1
     size = f"{count} frames of {array.rows} x {array.columns} taxels"
-    fewer = "for fewer frames, use --region, a larger --bin or a larger --count-ms (in Python: count_ms)"
+    fewer = "for fewer frames, use --region, a larger --bin or a larger --count-ms"
     check_memory(name, count * (4 * array.rows * array.columns + 8), f"{size} ({fewer}): ")
     values = np.zeros((count, *array.shape), np.float32)
     np.add.at(values, (kept.t // window_us - begin, y, x), np.float32(1))
