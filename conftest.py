@@ -25,7 +25,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
     signal.signal(signal.SIGHUP, lambda *_: None)
 
-# Tests start taxel a thousand times: each start would compile all of it where nothing compiled may be stored.
+# Each start of taxel by a test would compile all of it where nothing compiled may be stored.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
