@@ -11,7 +11,7 @@ import shell
 
 import taxel
 from taxel.demo.playing import evaluate, play_simulated, shipped
-from taxel.demo.script import TRAINING_SEED
+from taxel.demo.script import TRAINING_SEED, script
 from taxel.simulate import Scene, Silence, play
 
 
@@ -26,14 +26,17 @@ def test_the_demo_scores_scenes_and_leaves_a_report(tmp_path):
     assert f"report: {folder / 'report.html'}" in ended.stdout
     page = (folder / "report.html").read_text()
     assert "2 scenes of seed 5" in page
-    assert page.count('<div class="picture"><svg') >= 4
+    assert page.count('<div class="picture"><svg') >= 8
+    assert page.index("deepest") < page.index("Mbit/s") < page.index(">missed<")
+    assert f"taxel view {folder / 'recording.mcap'}" in page
+    assert taxel.open(folder / "recording.mcap").events == play(script(5, 2), seed=5).events
     again = run("--no-clock", "--scenes", 1, "--folder", folder)
     assert (again.returncode, "exists already" in again.stderr) == (2, True)
     assert (folder / "report.html").read_text() == page
 
 
-def test_the_shipped_readout_finds_every_impact_of_other_scenes():
-    played = play_simulated(shipped(), seed=17, scenes=2)
+def test_the_shipped_readout_finds_every_impact_of_other_scenes(tmp_path):
+    played = play_simulated(shipped(), tmp_path / "a.mcap", seed=17, scenes=2)
     assert (played.outcome.score.missed, played.outcome.score.false, played.plain.missed) == (0, 0, 0)
     for label in ("contact", "lift"):
         assert 0 < np.median(played.outcome.score[label].delays_ms) < 1.5

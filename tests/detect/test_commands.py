@@ -178,8 +178,8 @@ def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, ca
         page.index("On held-out data: these scores count"),
         page.index("On the training data: these scores do not count"),
     )
-    assert page.count("9.npz</td>", held, own) == 2
-    assert page.count("9.npz</td>", own, page.index("Output of the command")) == 2
+    assert page.count("9.npz</td>", held, own) == 1
+    assert page.count("9.npz</td>", own, page.index("Output of the command")) == 1
     assert out.startswith("held out: whole recordings, 3 folds (window 50 ms)\n")
 
 
@@ -190,7 +190,7 @@ def test_a_report_shows_potential_weights_and_the_worst(folder: Path, trained: P
     code, out, _ = call(capsys, *arguments, tmp_path / "with", "--truth", folder / "truth.csv")
     page = (tmp_path / "with" / "report.html").read_text()
     assert (code, f"report: {tmp_path / 'with' / 'report.html'}" in out) == (0, True)
-    assert page.count('<div class="picture"><svg') == 2 * 3 + 2, "potential, errors, weights of each label"
+    assert page.count('<div class="picture"><svg') == 14, "two: the training's loads and labels; of each label four moments, errors, weights"
     assert "<h2>contact</h2>" in page
     assert "The worst" in page
     code, out, _ = call(capsys, *arguments, tmp_path / "without")
@@ -198,7 +198,7 @@ def test_a_report_shows_potential_weights_and_the_worst(folder: Path, trained: P
     *lines, _ = out.splitlines()
     assert (code, len(lines) > 12) == (0, True)
     assert escape("\n".join(lines)) in page
-    assert page.count('<div class="picture"><svg') == 2 * 2 + 1
+    assert page.count('<div class="picture"><svg') == 2 * (4 + 1) + 1
     assert "The worst" not in page
     code, _, error = call(capsys, *arguments, tmp_path / "without")
     assert (code, "exists already" in error) == (2, True)

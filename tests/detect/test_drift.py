@@ -50,5 +50,5 @@ def test_a_readout_keeps_its_training_and_the_report_draws_both(tmp_path: Path, 
     code, _, error = call(capsys, *arguments, "--report", tmp_path / "page")
     assert code == 0, error
     page = (tmp_path / "page" / "report.html").read_text()
-    assert page.count("label minus detection, ms") == 1
+    assert page.count("detection minus label, ms") == 1
     assert page.count("from begin to begin, ms") == 1

@@ -61,7 +61,15 @@ def page(*figures):
 
 def detections(**values):
     """Return the page of some detections."""
-    empty = {"tables": [], "warnings": [], "printed": [], "nearest": [], "beside_training": [], "worst": []}
+    empty = {
+        "tables": [],
+        "warnings": [],
+        "printed": [],
+        "nearest": [],
+        "beside_training": [],
+        "worst": [],
+        "first": [],
+    }
     empty |= {"title": "a page", "judged": "", "readout": "none", "neurons": True, "drawn": {}}
     return render("report/listening.html.j2", **empty | values)
 
@@ -92,14 +100,14 @@ WIDTHS = """() => [innerWidth, document.documentElement.scrollWidth,
     ...[...document.querySelectorAll(".picture svg")].map(e => Math.round(e.getBoundingClientRect().width))]"""
 
 
-@pytest.mark.parametrize("width", [1400, 500])
+@pytest.mark.parametrize("width", [1400, 390])
 def test_a_browser_shows_figures_as_large_as_they_were_drawn_and_no_page_is_too_wide(chromium, tmp_path, width):
     place = tmp_path / "page.html"
     place.write_text(page(*some()), encoding="utf-8")
     with opened(chromium, place.as_uri(), width=width) as seen:
         inner, wide, *shown = seen.evaluate(WIDTHS)
     assert wide <= inner == width
-    # 6.4 and 12 inches of 96 pixels, which a narrow window makes smaller down to 34 rem.
-    least, room = 34 * 16, shown[1]
-    assert shown[0] == min(614, max(least, room))
-    assert (room == least) if width == 500 else (least < room <= 1152)
+    # 6.4 and 12 inches of 96 pixels, which a narrow window makes smaller.
+    assert shown[0] == min(614, shown[1])
+    assert (width < 614) == (shown[0] < 614)
+    assert shown[1] <= min(1152, width)

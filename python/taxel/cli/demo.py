@@ -67,11 +67,11 @@ def demo(
     title = f"taxel demo: {counted(scenes, 'scene')} of seed {seed}"
     say(*[] if as_json else [title])
     with progress(as_json) as update:
+        recording = folder / "recording.mcap"
         if no_clock:
-            played = play_simulated(used, seed=seed, scenes=scenes, progress=update)
+            played = play_simulated(used, recording, seed=seed, scenes=scenes, progress=update)
         else:
             update(f"playing {counted(scenes, 'scene')} in real time", 0, 0)
-            recording = folder / "recording.mcap"
             played = play_live(
                 used, recording, seed=seed, scenes=scenes, said=lambda found: say(*[] if as_json else [_line(found)])
             )
@@ -82,12 +82,14 @@ def demo(
             [played.outcome],
             title=title,
             judged="by the simulated truth, on scenes that the readout was not trained on",
+            touch=played.first_us,
             printed=[*played.lines()],
         )
     if as_json:
-        say(json.dumps({"seed": seed, "scenes": scenes, **played.to_dict(), "report": str(page)}))
+        paths = {"recording": str(recording), "report": str(page)}
+        say(json.dumps({"seed": seed, "scenes": scenes, **played.to_dict(), **paths}))
     else:
-        say(*played.lines(), f"report: {page.resolve()}")
+        say(*played.lines(), f"recording: {recording.resolve()}", f"report: {page.resolve()}")
 
 
 def _line(found: Detection) -> str:

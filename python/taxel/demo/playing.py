@@ -37,10 +37,11 @@ _LISTEN_ON_S = 0.3
 
 @dataclass(frozen=True)
 class Demo:
-    """One run: the detections of a readout, their score by the truth, and that of the plain rule beside it."""
+    """One run: the detections of a readout, their score by the truth, that of the plain rule, and the first impact."""
 
     outcome: Outcome
     plain: Score
+    first_us: tuple[float, float]
     verdicts: tuple[str, ...] = ()
 
     def lines(self) -> Iterator[str]:
@@ -61,14 +62,18 @@ def shipped() -> Readout:
     return Readout.from_json(files("taxel.demo").joinpath("readout.json").read_text(encoding="utf-8"))
 
 
-def play_simulated(readout: Readout, *, seed: int, scenes: int, progress: Progress | None = None) -> Demo:
-    """Play scenes without waiting for the clock, and run the readout on the events."""
+def play_simulated(
+    readout: Readout, recording: Path, *, seed: int, scenes: int, progress: Progress | None = None
+) -> Demo:
+    """Play scenes without waiting for the clock, write the events to a .mcap, and run the readout on them."""
     acts, step = script(seed, scenes), f"playing {counted(scenes, 'scene')} without the clock"
 
     def watch(share: float) -> None:
         reporting(progress)(f"{step}, {share:.0%}", 0, 0)
 
-    return evaluate(play(acts, seed=seed, watch=watch).events, acts, readout)
+    events = play(acts, seed=seed, watch=watch).events
+    taxel.convert(events, recording)
+    return evaluate(events, acts, readout, name=str(recording))
 
 
 def play_live(
@@ -148,4 +153,5 @@ def evaluate(
     by_rule = run(PlainRule("area", 2), events, frame_us=FRAME_US, tare=tare)
     found, by_rule = found[found.t >= start], by_rule[by_rule.t >= start]
     outcome = Outcome(name, Example(events, labels, tare), found, score(found, labels, widths))
-    return Demo(outcome, score(by_rule, labels, widths), tuple(verdicts))
+    first = next(((c.start_us, c.stop_us) for c in contacts), (float(start), float(events.t[-1])))
+    return Demo(outcome, score(by_rule, labels, widths), first, tuple(verdicts))

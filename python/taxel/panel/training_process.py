@@ -79,7 +79,7 @@ def _pictures(training: Training) -> Iterator[dict[str, str]]:
     readout, listened = training.readout, training.outcomes
     with mpl.rc_context(STYLE):
         for title, figure in (
-            ("Each label minus its nearest detection, over time", compared.nearest(listened, readout.labels)),
+            ("Each nearest detection minus its label, over time", compared.nearest(listened, readout.labels)),
             ("Loads of this recording beside those of the training", compared.beside_training(readout, listened)),
         ):
             if figure is not None:

@@ -1,4 +1,4 @@
-"""Two pictures of a report: labels beside their nearest detections over time, and loads beside the training's."""
+"""Two pictures of a report: nearest detections beside their labels over time, and loads beside the training's."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from matplotlib import pyplot as plt
 from taxel._base.messages import escaped
 from taxel.detect import Outcome, PlainRule, Readout, drift
 from taxel.detect.examples import check_examples
+from taxel.report.svg import DETECTED, TRUE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,11 +26,10 @@ _NAMES = {
     "lasts_ms": "lasts, ms",
     "apart_ms": "from begin to begin, ms",
 }
-_HERE, _THERE = "#b5423c", "#2f6690"
 
 
 def nearest(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None:
-    """Draw each label minus its nearest detection over time: an offset, a jump or another rate is seen at once."""
+    """Draw each label's nearest detection minus it over time: an offset, a jump or another rate is seen at once."""
     shown = [outcome for outcome in listened if outcome.score is not None and outcome.score.events][:_MOST]
     if not any(len(outcome.found) for outcome in shown):
         return None
@@ -41,15 +41,15 @@ def nearest(listened: Sequence[Outcome], labels: Sequence[str]) -> Figure | None
             times, found = np.sort(np.asarray(outcome.example.labels.get(label, ()), np.int64)), outcome.found[label].t
             if not len(times) or not len(found):
                 continue
-            apart_ms = (times[:, None] - found[None, :]) / 1e3
+            apart_ms = (found[None, :] - times[:, None]) / 1e3
             least_ms = apart_ms[np.arange(len(times)), np.abs(apart_ms).argmin(axis=1)]
             near = np.abs(least_ms) <= _FAR_MS
             seconds = (times[near] - outcome.begin_us) / 1e6
-            colour = _HERE if k % 2 == 0 else _THERE
+            colour = DETECTED if k % 2 == 0 else TRUE
             axis.plot(seconds, least_ms[near], "o^sD"[k % 4], markersize=3, color=colour, label=escaped(label))
         axis.axhline(0, color="#999999", linewidth=0.8)
         axis.set_title(escaped(outcome.name[-32:]), loc="left", fontsize="small")
-        axis.set_ylabel("label minus detection, ms")
+        axis.set_ylabel("detection minus label, ms")
         if axis.get_legend_handles_labels()[0]:
             axis.legend(loc="upper right", fontsize="small")
     axes[-1, 0].set_xlabel("time, s")
@@ -69,9 +69,9 @@ def beside_training(readout: Readout | PlainRule, listened: Sequence[Outcome]) -
     figure, axes = plt.subplots(2, 3, figsize=(9.0, 4.0), layout="constrained")
     for axis, name in zip(axes.ravel(), shown, strict=False):
         then = np.asarray(data["loads"][name]["values"])
-        axis.plot(then, np.linspace(0.0, 1.0, len(then)), color=_THERE, label="training")
+        axis.plot(then, np.linspace(0.0, 1.0, len(then)), color=TRUE, label="training")
         here = features[name]
-        axis.step(here, np.arange(1, len(here) + 1) / len(here), where="post", color=_HERE, label="here")
+        axis.step(here, np.arange(1, len(here) + 1) / len(here), where="post", color=DETECTED, label="here")
         axis.set_xlabel(_NAMES[name].format(escaped(readout.unit or "")))
     for axis in axes.ravel()[len(shown) :]:
         axis.set_axis_off()

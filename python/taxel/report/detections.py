@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,7 +23,8 @@ from taxel.frames import Frames
 from taxel.recorded import recorded
 from taxel.report import compared
 from taxel.report.page import render
-from taxel.report.svg import INK, STYLE, picture
+from taxel.report.svg import INK, QUIET, STYLE, TRUE, picture
+from taxel.report.touch import marked, of_touch
 from taxel.spikes import SpikeTrains, to_ms, to_us
 
 if TYPE_CHECKING:
@@ -37,7 +38,6 @@ _MISSED_MS = 50.0
 _RESET_MS = 0.002
 #: The end of a recording's name that fits over a picture, letters.
 _TITLE = 32
-_DETECTED, _TRUE, _QUIET = "#b5423c", "#2f6690", "#999999"
 
 
 class _Moment(NamedTuple):
@@ -56,6 +56,7 @@ def write_detections(
     *,
     title: str,
     judged: str = "",
+    touch: tuple[float, float] | None = None,
     held_out: Sequence[Score] = (),
     scored: Judged | None = None,
     warnings: Sequence[str] = (),
@@ -74,6 +75,8 @@ def write_detections(
     title : str
     judged : str
         On what the scores of `listened` are: held-out data, or the readout's own training data.
+    touch : (float, float), us, optional
+        Begin and end of a touch in the first recording, which is drawn first; the recording has events and a tare.
     held_out : list of Score, one per recording, or none
         How readouts trained without each recording, or without parts of it, did on it.
     scored : Judged, optional
@@ -100,6 +103,7 @@ def write_detections(
     target, labels = Path(folder), readout.labels
     moments = {label: _moments(listened, label) for label in labels}
     with mpl.rc_context(STYLE):
+        first = [] if touch is None else _pictures(of_touch(listened[0], *touch))
         compared_with = [compared.nearest(listened, labels), compared.beside_training(readout, listened)]
         drawn = {label: _pictures(_of_label(readout, listened, label, moments[label])) for label in labels}
         nearest, beside_training = ([*_pictures([figure])] for figure in compared_with)
@@ -107,6 +111,7 @@ def write_detections(
         "report/listening.html.j2",
         title=title,
         judged=judged,
+        first=first,
         readout=repr(readout),
         neurons=isinstance(readout, Readout),
         warnings=warnings,
@@ -173,15 +178,15 @@ def _of_label(
     """Yield the pictures of a label: potential around its moments, errors and weights; a rule has only errors."""
     by_neuron = readout if isinstance(readout, Readout) and label not in readout.by_rule else None
     if by_neuron is not None and moments:
-        yield _potential(by_neuron, label, moments)
+        yield from _potential(by_neuron, label, moments)
     errors = [
         outcome.score[label].errors_ms for outcome in listened if outcome.score and label in outcome.score.by_label
     ]
     if sum(map(len, errors)):
-        figure, axis = plt.subplots(figsize=(4.2, 2.2), layout="constrained")
-        axis.hist(np.concatenate(errors), bins=30, color=_TRUE)
-        axis.axvline(0, color=_QUIET, linewidth=0.8)
-        axis.set(xlabel="time minus true, ms", ylabel="events")
+        figure, axis = plt.subplots(figsize=(3.3, 2.2), layout="constrained")
+        axis.hist(np.concatenate(errors), bins=30, color=TRUE)
+        axis.axvline(0, color=QUIET, linewidth=0.8)
+        axis.set(xlabel="detected minus true, ms", ylabel="events")
         yield figure
     if by_neuron is not None:
         yield _weights(by_neuron, label)
@@ -206,14 +211,11 @@ def _moments(listened: Sequence[Outcome], label: str) -> list[_Moment]:
     return sorted(moments, key=lambda moment: -moment.badness)[:_MOMENTS]
 
 
-def _potential(readout: Readout, label: str, moments: list[_Moment]) -> Figure:
-    """Draw potential and threshold around moments, with the detections and the labels."""
+def _potential(readout: Readout, label: str, moments: list[_Moment]) -> Iterator[Figure]:
+    """Draw potential and threshold around each moment, with the detections and the labels."""
     trained = readout.neurons[label]
-    figure, axes = plt.subplots(
-        1, len(moments), figsize=(1.6 + 2.5 * len(moments), 2.6), layout="constrained", squeeze=False, sharey=True
-    )
-    lines: dict[str, Any] = {}
-    for axis, (outcome, t, what, badness) in zip(axes[0], moments, strict=True):
+    for k, (outcome, t, what, badness) in enumerate(moments):
+        figure, axis = plt.subplots(figsize=(3.3, 2.5), layout="constrained")
         # Wide enough for the label and its detection, or for what was felt late of one that has none.
         reach = _AROUND * trained.neuron.tau + trained.delay_ms + (badness if np.isfinite(badness) else _MISSED_MS)
         at, found_ms = to_ms(t), to_ms(outcome.found[label].t)
@@ -225,19 +227,17 @@ def _potential(readout: Readout, label: str, moments: list[_Moment]) -> Figure:
         times = np.concatenate([np.linspace(at - reach, at + reach, 600), (near[:, None] + after).ravel()])
         times = np.unique(times[np.abs(times - at) < reach])
         potential = trained.neuron.potential(trained.weights, trains, times, spikes=crossings + _RESET_MS)
-        (lines["potential"],) = axis.plot(times - at, potential, color=INK, linewidth=1, zorder=3)
+        axis.plot(times - at, potential, color=INK, linewidth=1, zorder=3, label="potential")
         threshold = readout.run_threshold * trained.neuron.theta_0
-        lines["threshold at rest"] = axis.axhline(threshold, color=_QUIET, linewidth=0.8, linestyle=":")
+        axis.axhline(threshold, color=QUIET, linewidth=0.8, linestyle=":", label="threshold at rest")
         true = to_ms(np.asarray(outcome.example.labels.get(label, ()), np.float64))
-        for title, ms, color, style in (("detected", found_ms, _DETECTED, "-"), ("true", true, _TRUE, "--")):
-            for each in ms[np.abs(ms - at) < reach]:
-                lines[title] = axis.axvline(each - at, color=color, linewidth=1.2, linestyle=style)
+        marked(axis, found_ms, true, at, reach, origin=at)
         seconds = f"{(at - to_ms(outcome.begin_us)) / 1000.0:.3f} s"
         axis.set_title(f"{escaped(outcome.name[-_TITLE:])}\n{escaped(f'{what}, {seconds}')}", fontsize=8)
-        axis.set_xlabel("ms from then")
-    axes[0][0].set_ylabel("potential, mV")
-    figure.legend(list(lines.values()), list(lines), loc="outside right upper")
-    return figure
+        axis.set(xlabel="ms from then", ylabel="potential, mV")
+        if k == 0:
+            axis.legend(fontsize="small")
+        yield figure
 
 
 def _trains(readout: Readout, outcome: Outcome) -> SpikeTrains:
@@ -254,9 +254,9 @@ def _trains(readout: Readout, outcome: Outcome) -> SpikeTrains:
 def _weights(readout: Readout, label: str) -> Figure:
     """Draw the weights of all trains that a neuron receives."""
     weights, encoder = np.asarray(readout.neurons[label].weights), readout.encoder_of(label)
-    figure, axis = plt.subplots(figsize=(6.5, 2.2), layout="constrained")
+    figure, axis = plt.subplots(figsize=(5.0, 2.2), layout="constrained")
     axis.bar(np.arange(len(weights)), weights, color=INK)
-    axis.axhline(0, color=_QUIET, linewidth=0.8)
+    axis.axhline(0, color=QUIET, linewidth=0.8)
     parts = f": {', '.join(sorted(encoder.parts))}" if isinstance(encoder, Composite) else ""
     axis.set(xlabel=escaped(f"input: the encoder's trains in their order{parts}"), ylabel="weight, mV")
     return figure

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 #: What pages paint in their own colours, dark or light: text, axes, and lines of no colour of their own; the ground.
 INK, _LINE, _GROUND = "#2b2b2b", "#dedad2", "#fffffe"
 
+#: Colours of what was detected, of what is true, and of lines behind.
+DETECTED, TRUE, QUIET = "#b5423c", "#2f6690", "#999999"
+
 #: The look of all pictures: draw inside ``matplotlib.rc_context(STYLE)``.
 STYLE: Any = {
     "axes.spines.top": False,

@@ -346,7 +346,7 @@ export interface Trained {
   mistakes: Mistake[];
   /** The command that detects by it in a shell; empty if it cannot be relied on. */
   next: string;
-  /** Each label minus its nearest detection over time, and loads beside the training's: files of SVG. */
+  /** Each nearest detection minus its label over time, and loads beside the training's: files of SVG. */
   pictures: { title: string; svg: string }[];
 }
 
