@@ -119,6 +119,9 @@ def test_what_a_training_missed_is_in_a_table_and_in_the_lanes(chromium: Any, tm
         shows(page, "train-judged", "^held out: ")
         table = [row.split("\t") for row in page.locator("#train-rows tr").all_inner_texts()]
         by = {(label or "contact", kind): counts for label, kind, *counts in (tuple(row[:5]) for row in table)}
+        running = page.locator("#train-rows tr.runs").all_inner_texts()
+        assert [", runs" in row for row in running] == [True, True], "one of each label"
+        by = {(label, kind.removesuffix(", runs")): counts for (label, kind), counts in by.items()}
         assert by["contact", "neuron"] == ["7", "1", "1"], table
         assert by["lift", "neuron"][1:] == ["0", "0"], table
         shows(page, "mistake-count", "^1 missed, 1 false$")
@@ -152,3 +155,38 @@ def test_a_training_can_be_stopped_where_no_label_is_left(chromium: Any, tmp_pat
         page.locator("#label-list button[aria-label^=delete]").click()
         until(lambda: page.locator("#label-list li").count() == 0, "it is deleted")
         assert train.is_enabled()
+
+
+def test_on_a_phone_fingers_zoom_the_map_leaves_the_flags_free_and_arrows_move_the_label(
+    chromium: Any, tmp_path: Path
+) -> None:
+    truth = mat(tmp_path)
+    rows = [f"{label},{t}" for label, times in truth.items() for t in times]
+    (tmp_path / "played.notes.csv").write_text("\n".join(["label,t_us", *rows]) + "\n")
+    with shown(chromium, tmp_path / "played.npz", width=390, height=844, has_touch=True) as page:
+        shows(page, "label-count", "^16 labels$")
+        first, last = span(page)
+        page.evaluate("scrollBy(0, 250)")
+        page.wait_for_timeout(400)
+        maps, flags = (page.locator(part).bounding_box() for part in ("#maps", "#label-lane"))
+        assert flags["y"] >= maps["y"] + maps["height"] - 1
+        box, fingers = page.locator("#track").bounding_box(), page.context.new_cdp_session(page)
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] - 20
+
+        def touch(kind: str, *at: float) -> None:
+            points = [{"x": x + by, "y": y, "id": k} for k, by in enumerate(at)]
+            fingers.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+        touch("touchStart", -20)
+        touch("touchStart", -20, 20)
+        for wide in (30, 50, 80):
+            touch("touchMove", -wide, wide)
+        touch("touchEnd")
+        until(lambda: span(page)[1] - span(page)[0] < 0.5 * (last - first), "closer")
+        press(page, "Home", "n")
+        begin = truth["contact"][0] / 1e6
+        said = page.locator(".flag.chosen")
+        until(lambda: f"{begin:.3f}" in (said.get_attribute("aria-label") or ""), "the first label")
+        until(lambda: said.evaluate("flag => flag === document.activeElement"), "its flag has the keyboard")
+        page.keyboard.press("Shift+ArrowRight")
+        until(lambda: f"{begin + 0.1:.3f}" in said.get_attribute("aria-label"), "it is moved")

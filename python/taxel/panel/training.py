@@ -31,6 +31,7 @@ def _scores(result: dict[str, Any]) -> Iterator[dict[str, Any]]:
             yield {
                 "label": label,
                 "is_plain_rule": is_plain_rule,
+                "runs": is_plain_rule == (label in result["by_rule"]),
                 "found": counts["found"],
                 "missed": counts["missed"],
                 "false": counts["false"],

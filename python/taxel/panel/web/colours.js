@@ -17,14 +17,24 @@ const CHANGE = {
   light: [[6, 41, 102], [20, 92, 196], [144, 187, 240], [238, 241, 246], [243, 178, 132], [194, 82, 16], [92, 31, 4]],
 };
 
-/** Names of labels in the order in which they were met: each has one colour on the whole page. @type {string[]} */
-const labels = [];
-const LABEL_COLOURS = ["label-0", "label-1", "label-2", "label-3", "label-4", "label-5"];
+const LABEL_COLOURS = 6;
+/** The number of the colour of each label that was met. @type {Map<string, number>} */
+const labels = new Map();
 
-/** @param {string} label @returns {string} the name of its colour in the theme */
+/**
+ * A label has the same colour in every window, live and in replay: one that its letters choose, or the next that is free.
+ * @param {string} label
+ * @returns {string} the name of its colour in the theme
+ */
 export function labelColour(label) {
-  if (!labels.includes(label)) labels.push(label);
-  return LABEL_COLOURS[labels.indexOf(label) % LABEL_COLOURS.length];
+  let number = labels.get(label);
+  if (number === undefined) {
+    const taken = new Set(labels.values());
+    number = [...label].reduce((sum, letter) => (sum * 31 + letter.charCodeAt(0)) % 65_521, 0) % LABEL_COLOURS;
+    for (let i = 0; i < LABEL_COLOURS && taken.has(number); i++) number = (number + 1) % LABEL_COLOURS;
+    labels.set(label, number);
+  }
+  return `label-${number}`;
 }
 
 /** Gives an element the colour of a label. @param {HTMLElement} element @param {string} label */

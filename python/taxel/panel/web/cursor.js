@@ -30,6 +30,8 @@ export class Cursor {
     this.track = part("track", HTMLElement);
     /** Where a press began, and whether it has become a drag. @type {{ x: number, drags: boolean } | null} */
     this.press = null;
+    /** Where the fingers are that touch the lanes, by pointer. @type {Map<number, number>} */
+    this.fingers = new Map();
     /** The second cursor. @type {number | null} */
     this.second_us = null;
     const lanes = part("lanes", HTMLElement);
@@ -40,6 +42,7 @@ export class Cursor {
       moved();
     };
     lanes.addEventListener("pointermove", (event) => {
+      if (this.fingers.size > 1) return this.pinch(event);
       if (this.press) this.drag(event, lanes);
       point(this.timeAt(event));
     });
@@ -47,8 +50,12 @@ export class Cursor {
     lanes.addEventListener("wheel", (event) => this.turn(event), { passive: false });
     lanes.addEventListener("pointerdown", (event) => {
       const onTime = event.button === 0 && event.target instanceof Element && !event.target.closest(NOT_TIME);
-      this.press = onTime ? { x: event.clientX, drags: false } : null;
+      if (onTime && event.pointerType === "touch") this.fingers.set(event.pointerId, event.clientX);
+      this.press = onTime && this.fingers.size < 2 ? { x: event.clientX, drags: false } : null;
     });
+    for (const over of ["pointerup", "pointercancel"]) {
+      addEventListener(over, (event) => event instanceof PointerEvent && this.fingers.delete(event.pointerId));
+    }
     lanes.addEventListener("pointerup", (event) => {
       const { press } = this;
       this.press = null;
@@ -72,6 +79,18 @@ export class Cursor {
     press.drags = true;
     this.window.scroll(((press.x - event.clientX) / this.track.clientWidth) * timeline.span_us);
     press.x = event.clientX;
+  }
+
+  /** Two fingers that part show less time, around the cursor. @param {PointerEvent} event */
+  pinch(event) {
+    const apart = () => {
+      const [a, b] = this.fingers.values();
+      return Math.max(DRAG, Math.abs(a - b));
+    };
+    const before = apart();
+    if (!this.fingers.has(event.pointerId)) return;
+    this.fingers.set(event.pointerId, event.clientX);
+    this.window.scale(before / apart());
   }
 
   /** @param {MouseEvent} event @returns {number | null} */

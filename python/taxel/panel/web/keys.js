@@ -22,7 +22,7 @@ export const KEYS = [
   { keys: ["s"], shown: "S", text: "put a second cursor at the cursor, or take it away: the time between both is shown", action: "second" },
   { keys: ["l"], shown: "L", text: "follow the board live", action: "live" },
   { keys: ["m"], shown: "M", text: "add a label at the cursor, or without a cursor at the time shown", action: "mark" },
-  { keys: ["n"], shown: "N", text: "go to the next label", action: "nextLabel" },
+  { keys: ["n"], shown: "N", text: "go to the next label; then arrow keys move it", action: "nextLabel" },
   { keys: ["p"], shown: "P", text: "go to the previous label", action: "labelBefore" },
   { keys: ["k"], shown: "K", text: "go to the next mistake of the readout: a missed label or a false detection", action: "nextMistake" },
   { keys: ["j"], shown: "J", text: "go to the previous mistake", action: "mistakeBefore" },

@@ -61,6 +61,8 @@ export class Labels {
     this.chosen = null;
     /** Where it is dragged to. @type {number | null} */
     this.dragged_us = null;
+    /** Whether the flag of the chosen label gets the keyboard's focus when it is up: its arrow keys move it. */
+    this.focuses = false;
     /** The label that is in the form. @type {Label | null} */
     this.edited = null;
     this.name = part("label-name", HTMLInputElement);
@@ -211,7 +213,9 @@ export class Labels {
     const now = this.player.targetTime ?? 0;
     const others = this.labels.filter(({ t_us }) => (by > 0 ? t_us > now : t_us < now));
     const next = by > 0 ? others[0] : others[others.length - 1];
-    if (next) this.goTo(next);
+    if (!next) return;
+    this.focuses = true;
+    this.goTo(next);
   }
 
   /** Deletes the chosen label. */
@@ -303,7 +307,10 @@ export class Labels {
       entitle(flag, "aria-label", name);
       entitle(flag, "title", name);
       paintAs(flag, label.label);
-      if (chosen && this.dragged_us === null && this.lane.contains(document.activeElement)) flag.focus();
+      if (chosen && this.dragged_us === null && (this.focuses || this.lane.contains(document.activeElement))) {
+        this.focuses = false;
+        flag.focus();
+      }
     });
   }
 

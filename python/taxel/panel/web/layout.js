@@ -64,4 +64,7 @@ export function arrangeForWidth() {
   };
   narrow.addEventListener("change", arrange);
   arrange();
+  // The flags stop below the maps, which stay in sight.
+  const [views, maps] = [part("views", HTMLElement), part("maps", HTMLElement)];
+  new ResizeObserver(() => views.style.setProperty("--maps", `${maps.offsetHeight}px`)).observe(maps);
 }

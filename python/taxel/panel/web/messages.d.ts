@@ -85,6 +85,8 @@ export interface LabelScore {
   label: string;
   /** Whether it is the plain rule's. */
   is_plain_rule: boolean;
+  /** Whether it is the one that runs. */
+  runs: boolean;
   /** Number of labels with a detection. */
   found: number;
   /** Number of labels without one. */

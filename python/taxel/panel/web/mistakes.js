@@ -88,9 +88,10 @@ export class Mistakes {
 }
 
 /** @param {LabelScore} score @returns {HTMLElement} */
-function row({ label, is_plain_rule, found, missed, false: wrong, delay_ms }) {
+function row({ label, is_plain_rule, runs, found, missed, false: wrong, delay_ms }) {
   const cell = (/** @type {number} */ count, bad = false) => make("td", { class: bad && count ? "bad" : "" }, integer(count));
   const known = delay_ms === null ? "–" : `${delay_ms < 0 ? "−" : ""}${short(Math.abs(1000 * delay_ms))}`;
   const head = make("th", { scope: "row" }, label);
-  return make("tr", { class: is_plain_rule ? "rule" : "neuron" }, head, make("td", {}, is_plain_rule ? "rule" : "neuron"), cell(found), cell(missed, true), cell(wrong, true), make("td", {}, known));
+  const by = `${is_plain_rule ? "rule" : "neuron"}${runs ? ", runs" : ""}`;
+  return make("tr", { class: `${is_plain_rule ? "rule" : "neuron"} ${runs ? "runs" : ""}` }, head, make("td", {}, by), cell(found), cell(missed, true), cell(wrong, true), make("td", {}, known));
 }
