@@ -6,7 +6,7 @@ import numpy as np
 from stated import examples
 
 from taxel import Neuron, SpikeTrains
-from taxel.learn import ConeX
+from taxel.learn import ConeX, ConeXProblem
 
 LAMBDAS = [(0, 1, 0), (1, 0, 0), (2, 2, 200), (0, 0, 1)]
 
@@ -151,4 +151,40 @@ def lifted(seed):
     return cone, lists, wanted
 
 
-KINDS = {kind.__name__: kind for kind in (usual, before, close, graded_at, paused, grid, lifted)}
+def freed(seed):
+    """Silence that ends at the instant at which the refractory time after the last target does."""
+    random = np.random.default_rng([78, 1, seed])
+    refractory = float(random.choice([0.7, 2.9, 3.0, 8.0]))
+    neuron = drawn_neuron(random, tau=refractory, refractory=refractory, theta_plus=float(random.choice([0.0, 0.05])))
+
+    def near(t):
+        return t - refractory * random.uniform(0, 2)
+
+    cone, patterns, wanted = around(random, neuron, float(random.choice([0.0, -17.1])), near)
+    ends = [own[-1] for own in wanted]
+    lists = [[t[t <= end] for t in pattern] for pattern, end in zip(patterns, ends, strict=True)]
+    patterns = [
+        SpikeTrains.from_lists(one, start=p.start, stop=end + refractory / 2)
+        for one, p, end in zip(lists, patterns, ends, strict=True)
+    ]
+    horizon = None if random.random() < 0.5 else [end + refractory for end in ends]
+    return cone.set_params(horizon=horizon), patterns, wanted
+
+
+def reached(seed):
+    """Bounds that just reach the only target, or miss it by roundings."""
+    random = np.random.default_rng([78, 2, seed])
+    start, step = float(random.choice([0.0, 1000.1])), float(random.choice([0.1, 1.0]))
+    time, own = str(random.choice(["grid", "continuous"])), start + step * int(random.integers(5, 40))
+    kernels = ["alpha", "double_exponential", "exponential"][: 3 if time == "grid" else 2]
+    neuron = drawn_neuron(random, time=time, step_ms=step, kernel=str(random.choice(kernels)))
+    first = max(start, own - 6 * neuron.tau)
+    lists = [np.sort(random.uniform(first, own, random.integers(1, 3))) for _ in range(random.integers(1, 4))]
+    pattern = SpikeTrains.from_lists(lists, start=start, stop=own + step * int(random.choice([1, 20])))
+    coefficients, limit = ConeXProblem(ConeX(neuron=neuron, ub=1.0), [pattern], [[own]]).target(0, 0)
+    most = float(limit / coefficients.sum() * (1 + 10.0 ** random.integers(-16, -8) * random.integers(-3, 4)))
+    margin = 1e-6 if time == "grid" else None
+    return ConeX(neuron=neuron, lb=0.0, ub=most, margin=margin), [pattern], [[own]]
+
+
+KINDS = {kind.__name__: kind for kind in (usual, before, close, graded_at, paused, grid, lifted, freed, reached)}

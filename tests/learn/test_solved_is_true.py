@@ -6,13 +6,13 @@ import warnings
 
 import numpy as np
 import pytest
-from problems import KINDS
+from problems import KINDS, drawn_neuron
 from refusal import refused
 from simulator import misfire
 from stated import examples, row
 
 from taxel import Neuron, SpikeTrains
-from taxel.learn import ConeR, ConeX, check_certificate, check_gap, check_solution
+from taxel.learn import ConeR, ConeX, ConeXProblem, check_certificate, check_gap, check_solution
 
 #: Further problems are tried by `pytest -m slow`. The simulator is slow: it runs so many of the quick ones.
 QUICK, ALL, SIMULATED = 30, 500, 4
@@ -81,6 +81,52 @@ def test_hundreds_that_say_solved_fire_at_their_targets_and_nowhere_else(kind):
 )
 def test_inputs_within_a_nanosecond_before_a_target_leave_nothing_undecided(kind, seed, verdict):
     assert judged(*KINDS[kind](seed), simulated=False) == verdict
+
+
+@pytest.mark.parametrize("time", ["continuous", "grid"])
+def test_the_spikes_of_a_neuron_itself_are_targets_though_they_round(time):
+    """Many are at the end of a refractory time, to a rounding."""
+    said = []
+    for seed in range(60):
+        random = np.random.default_rng([78, 3, seed])
+        (pattern,), _ = examples(
+            seed, trains=int(random.integers(1, 20)), patterns=1, targets=0, whole_ms=seed % 2 == 0
+        )
+        neuron = drawn_neuron(random, time=time)
+        weights = random.normal(0.3, 0.6, len(pattern))
+        own = neuron.run(weights, pattern)
+        if len(own):
+            cone = ConeX(neuron=neuron, lb=-2, ub=2, margin=1e-6 if time == "grid" else None)
+            said.append(judged(cone, [pattern], [own], simulated=False))
+    assert said.count("solved") > 9
+
+
+def test_a_target_beside_the_refractory_time_is_refused():
+    """On a grid a neuron fires only after its end, in continuous time at it."""
+    pattern = SpikeTrains.from_lists([[5.0], [8.0]], stop=60.0)
+    for time, earliest in (("continuous", 23.0), ("grid", 24.0)):
+        cone = ConeX(neuron=Neuron(refractory=3.0, time=time))
+        cone.fit([pattern], [[20.0, earliest]])
+        with refused():
+            cone.fit([pattern], [[20.0, earliest - 1e-6 if time == "continuous" else 23.0 + 1e-10]])
+
+
+def test_what_rounding_leaves_undecided_is_stopped_with_a_reason_and_without_weights():
+    """Inputs of up to 40 time constants before the target, which the bounds on all of them just reach."""
+    without = 0
+    neuron = Neuron(kernel="exponential", time="grid", tau=1.0)
+    for seed in range(12):
+        random = np.random.default_rng([78, 4, seed])
+        pattern = SpikeTrains.from_lists(np.sort(random.integers(0, 40, (30, 2)).astype(float)), stop=60.0)
+        coefficients, limit = ConeXProblem(ConeX(neuron=neuron, ub=1.0), [pattern], [[40.0]]).target(0, 0)
+        cone = ConeX(neuron=neuron, lb=0.0, ub=float(limit / coefficients.sum())).fit([pattern], [[40.0]])
+        if cone.status_ != "infeasible" and not np.isfinite(cone.weights_).all():
+            without += 1
+            assert cone.status_ == "stopped"
+            assert np.isnan(cone.weights_).all()
+            assert np.isinf(cone.violation_)
+            assert "NaN" not in cone.reason_
+    assert without
 
 
 def test_what_is_undecided_at_the_least_margin_is_stopped_and_says_why():

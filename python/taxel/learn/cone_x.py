@@ -234,8 +234,8 @@ class ConeX(SpikeLearner):
         the results about the weights of that fit are gone (`objective_`, `parts_`, `gap_`, `margin_`, `reason_`,
         `violation_`).
     weights_ : float64, shape (trains,), mV
-        The best so far if stopped, which may miss any row; NaN if infeasible, or if only the least margin tried is
-        proven to be.
+        The best so far if stopped, which may miss any row; NaN if infeasible, if only the least margin tried is proven
+        to be, or if rounding left none.
     objective_ : float
         6.11 at these weights; infinite if infeasible.
     parts_ : dict
@@ -336,7 +336,8 @@ class ConeX(SpikeLearner):
         patterns : sequence of SpikeTrains
             The same trains in each, unsigned or graded; signed ones split into ON and OFF.
         targets : sequence of float sequences, ms
-            Target spike times, one list per pattern; empty for a pattern without spikes.
+            Target spike times, one list per pattern; empty for a pattern without spikes. At the end of a refractory time
+            too the potential must equal the threshold (6.9a), though a neuron fires there above it too.
         start : ConeX, optional
             An earlier fit of a similar problem, whose active rows and multipliers are the starting point. The result is
             the same; in continuous time `margin_` may differ.

@@ -118,9 +118,11 @@ def check_solution(cone: ConeX | ConeR, patterns: Sequence[SpikeTrains], targets
 
 def _fired_wrong(cone: ConeX | ConeR, w: _Floats, pattern: SpikeTrains, rows: PatternRows) -> str:
     """Return the first difference between the neuron's own spikes and the targets; "" without any."""
-    fired = cone.neuron_.run(w, pattern.lasting(max(pattern.stop, rows.end)))
     near = 4 * np.spacing(max(abs(rows.start), abs(rows.end))) + (0.0 if rows.on_grid else AT_EDGE)
-    fired = fired[fired <= max([rows.end, *(rows.targets + near)])]
+    # A target at the end itself may be reached just after it.
+    end = max([rows.end, *(rows.targets + near)])
+    fired = cone.neuron_.run(w, pattern.lasting(max(pattern.stop, end)))
+    fired = fired[fired <= end]
     for k, t in enumerate(rows.targets):
         if rows.on_grid and not rows.is_point(float(t)):
             return f"target {k} ({t:g} ms) is between two time steps; a neuron fires only at a time step"

@@ -144,13 +144,16 @@ impl Shape {
     #[must_use]
     #[inline]
     pub fn bound(&self, state: KernelSum) -> f64 {
-        const ONE_OVER_E: f64 = 0.367_879_441_171_442_33;
-        let largest = match self.kernel {
-            Kernel::Alpha => ONE_OVER_E,
-            Kernel::DoubleExponential => 1.0,
-            Kernel::Exponential => 0.0,
-        };
+        let largest = if self.kernel == Kernel::Exponential { 0.0 } else { self.largest() };
         state.b.max(0.0) + state.a.max(0.0) * largest
+    }
+
+    /// The largest value of the kernel.
+    #[must_use]
+    #[inline]
+    pub fn largest(&self) -> f64 {
+        const ONE_OVER_E: f64 = 0.367_879_441_171_442_33;
+        if self.kernel == Kernel::Alpha { ONE_OVER_E } else { 1.0 }
     }
 
     /// The age of an input, ms, from which on its kernel is smaller than the rounding of its largest value.

@@ -272,7 +272,7 @@ impl ConeXProblem {
             && let Some(proof) =
                 Certificate::of_same_inputs(&self.exact.statement, &self.exact.objective.bounds)?.filter(|p| p.at_all)
         {
-            found = self.exact.infeasible_fit(proof, rounds);
+            found = self.exact.fit_without_weights(Some(proof), rounds);
         }
         while self.free_margin && not_at_all(&found) {
             let margin = found.asked.times(SMALLER);
@@ -324,14 +324,14 @@ impl Exact {
     /// Finds the weights at this margin, or a proof that there are none.
     fn solve(&self, start: &[(Row, f64)], progress: &mut dyn FnMut(Round), stop: Stop<'_>) -> Result<ConeXFit> {
         if let Some(certificate) = Certificate::of_one_target(&self.statement, &self.objective.bounds)? {
-            return Ok(self.infeasible_fit(certificate, 0));
+            return Ok(self.fit_without_weights(Some(certificate), 0));
         }
         let Shortest { weights, held, rounds, end } = self.shortest(start, progress, stop)?;
         // The other terms are at least 0, so a bound on the l2 term bounds the objective.
         let (least, proof) = self.bound_of_length(&held)?;
         let best = BestWeights { weights, least, proof, held, rounds };
         Ok(match end {
-            RowGenerationEnd::Infeasible(certificate) => self.infeasible_fit(certificate, rounds),
+            RowGenerationEnd::Infeasible(certificate) => self.fit_without_weights(Some(certificate), rounds),
             RowGenerationEnd::Met if self.objective.l1 > 0.0 || self.objective.b > 0.0 => {
                 let best = self.mix(best, start, progress, stop)?;
                 self.report(best, stop.asked().then_some(ASKED))?
@@ -342,23 +342,25 @@ impl Exact {
         })
     }
 
-    fn infeasible_fit(&self, certificate: Certificate, rounds: usize) -> ConeXFit {
+    /// The result if there are no weights: infeasible with a proof, stopped without.
+    fn fit_without_weights(&self, certificate: Option<Certificate>, rounds: usize) -> ConeXFit {
         let none = f64::INFINITY;
+        let status = if certificate.is_some() { Status::Infeasible } else { Status::Stopped };
         ConeXFit {
             fit: Fit {
-                status: Status::Infeasible,
+                status,
                 weights: vec![f64::NAN; self.statement.trains],
                 objective: none,
                 parts: Parts { l1: none, l2: none, B: none, C: none, D: none },
-                gap: f64::NAN,
+                gap: if status == Status::Infeasible { f64::NAN } else { none },
                 rounds,
             },
             violation: none,
             margin: Margin { height: f64::NAN, slope: f64::NAN },
             asked: self.statement.margin,
-            reason: None,
-            held: certificate.rows.clone(),
-            certificate: Some(certificate),
+            reason: certificate.is_none().then(|| UNDECIDED.to_owned()),
+            held: certificate.as_ref().map_or(vec![], |certificate| certificate.rows.clone()),
+            certificate,
             proof: None,
         }
     }
@@ -366,6 +368,9 @@ impl Exact {
     /// Evaluates the weights over all rows, whichever engine found them.
     fn report(&self, best: BestWeights, cut_short: Option<&str>) -> Result<ConeXFit> {
         let BestWeights { mut weights, least, proof, held, rounds } = best;
+        if weights.iter().any(|w| !w.is_finite()) {
+            return Ok(self.fit_without_weights(None, rounds));
+        }
         let Bounds { lower, upper } = &self.objective.bounds;
         // Rounding can move a weight across its bound.
         for ((w, &l), &u) in weights.iter_mut().zip(lower).zip(upper) {

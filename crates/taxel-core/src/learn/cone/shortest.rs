@@ -51,12 +51,17 @@ impl Exact {
             rounds += 1;
             let verdict = working.engine.solve(stop)?;
             let before = std::mem::replace(&mut weights, working.engine.weights().to_vec());
-            let end = match verdict {
-                SolveOutcome::Infeasible(ray) => self
-                    .refutation(working.name_rows(&ray.multipliers), stop)?
-                    .map_or(RowGenerationEnd::Stopped, RowGenerationEnd::Infeasible),
-                SolveOutcome::Stopped => RowGenerationEnd::Stopped,
-                SolveOutcome::Optimal => {
+            let proof = match &verdict {
+                SolveOutcome::Infeasible(ray) => self.refutation(working.name_rows(&ray.multipliers), stop)?,
+                _ => None,
+            };
+            let end = match proof {
+                Some(proof) => RowGenerationEnd::Infeasible(proof),
+                None if stop.asked() && verdict != SolveOutcome::Optimal || weights.iter().any(|w| !w.is_finite()) => {
+                    RowGenerationEnd::Stopped
+                }
+                // Where rounding leaves some rows undecided, others may refute the problem; `report` checks all.
+                None => {
                     let broken = self.broken(&weights, ASKED_SHARE, self.rounding(&weights));
                     let rows = working.present.len();
                     let objective = self.parts(&weights).sum();
@@ -68,7 +73,7 @@ impl Exact {
                     }
                     // Row generation ends once rounds no longer change the weights; `report` checks whether the rows
                     // are satisfied.
-                    if !ended || (broken.is_empty() && flat.is_empty()) {
+                    if verdict == SolveOutcome::Optimal && (!ended || (broken.is_empty() && flat.is_empty())) {
                         RowGenerationEnd::Met
                     } else {
                         RowGenerationEnd::Stopped

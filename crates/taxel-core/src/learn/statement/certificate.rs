@@ -28,6 +28,9 @@ pub struct Certificate {
     pub text: String,
 }
 
+/// The roundings that a proven gap exceeds: its own, and those of a check that computes the rows again and demands the
+/// same of its gap.
+const TWICE_COMPUTED: f64 = 3.0;
 /// The number of rows that an explanation names, those with the largest terms first.
 const NAMED: usize = 12;
 
@@ -77,13 +80,14 @@ impl Certificate {
 fn gap(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], bare: bool) -> Result<Option<f64>> {
     let trains = statement.trains;
     let [mut sum, mut size, mut row, mut terms] = std::array::from_fn(|_| vec![0.0; trains]);
-    let (mut allowed, mut most) = (0.0, 0.0);
+    let (mut allowed, mut most, mut roundings) = (0.0, 0.0, 0.0_f64);
     for &(name, multiplier) in rows {
         if multiplier < 0.0 && !matches!(name, Row::Target { .. }) {
             return Ok(None);
         }
         let limit = statement.state_into(name, &mut row)? + if bare { statement.margin_of(name) } else { 0.0 };
         statement.sizes_into(name, &mut terms)?;
+        roundings = roundings.max(statement.examples[name.key().1].roundings);
         for (((g, s), a), size) in sum.iter_mut().zip(&mut size).zip(&row).zip(&terms) {
             *g += multiplier * a;
             *s += (multiplier * size).abs();
@@ -95,12 +99,12 @@ fn gap(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], bare: bool) 
         most += s * l.abs().max(u.abs());
     }
     let gap = bounds.range(&sum).0 - allowed;
-    // Each term is rounded once when computed and once in each sum that includes it.
-    let rounding = (rows.len() + trains) as f64 * f64::EPSILON * most;
+    // Each term is rounded when it is computed, and once in each sum that includes it.
+    let rounding = ((rows.len() + trains) as f64 + roundings) * f64::EPSILON * most;
     let strict = bare && statement.neuron.time == Time::Continuous;
     let cancels = strict && allowed == 0.0 && sum.iter().all(|&g| g == 0.0);
     let asks = |&(name, multiplier): &(Row, f64)| multiplier > 0.0 && matches!(name, Row::Silence { .. });
-    Ok((gap > rounding || cancels && rows.iter().any(asks)).then_some(gap))
+    Ok((gap > TWICE_COMPUTED * rounding || cancels && rows.iter().any(asks)).then_some(gap))
 }
 
 fn explain(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: bool) -> Result<String> {

@@ -156,7 +156,9 @@ fn strip(statement: &Statement, example: &Example) -> Strip {
         let mut silence =
             SilenceLimit { t, to: t, theta: neuron.theta_0, rise: 0.0, taper: KernelSum::default(), height: 0.0 };
         let (mut reach, mut least) = (0.0, f64::INFINITY);
-        if let Some(to) = times.get(k + 1).copied().filter(|&to| asks(statement, example, t, to)) {
+        // The last node is an instant by itself: a refractory time may end there.
+        let to = times.get(k + 1).copied().unwrap_or(t);
+        if asks(statement, example, t, to) {
             silence.to = to;
             // The rise just after the node: a target at the node itself has fired.
             silence.rise = statement.rise(example, example.last_target_before(to), t);

@@ -1,6 +1,6 @@
 //! Checks of the arguments of learners.
 
-use crate::neuron::Neuron;
+use crate::neuron::{Neuron, Time, rounding_ms};
 use crate::{Result, SpikeKind, SpikeTrains, problem};
 
 /// Checks the arguments of every learner: one list of targets (ms, ascending) per pattern, and the same trains in each
@@ -66,10 +66,15 @@ pub(crate) fn check_example(neuron: &Neuron, p: usize, pattern: &SpikeTrains, ta
                 targets[k - 1]
             ));
         }
-        if since <= neuron.refractory {
+        // In continuous time a neuron may fire at the end of its refractory time, on a grid from the next point on.
+        let (refused, least) = match neuron.time {
+            Time::Continuous => (since < neuron.refractory - rounding_ms(t), "at least"),
+            Time::Grid => (since <= neuron.refractory + rounding_ms(t), "more than"),
+        };
+        if refused {
             return Err(problem!(
-                "pattern {p}, target {k} ({t} ms): {since} ms after target {}; must be at least the refractory time, \
-                 {} ms",
+                "pattern {p}, target {k} ({t} ms): {since} ms after target {}; must be {least} the refractory time, {} \
+                 ms",
                 k - 1,
                 neuron.refractory
             ));

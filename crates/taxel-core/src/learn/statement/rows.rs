@@ -10,9 +10,11 @@
 //! of its refractory time, from which silence is required at once. On the grid silence is the printed set of points
 //! (6.9b), with one margin.
 
+use std::f64::consts::E;
+
 use serde::{Deserialize, Serialize};
 
-use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, Grid, KernelSum, Neuron, Shape, Time, rounding_ms};
+use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, Grid, Kernel, KernelSum, Neuron, Shape, Time, rounding_ms};
 use crate::{Result, Spike, SpikeTrains, Stop, problem};
 
 /// This close before a target, ms, the target's row and its slope row replace rows of silence, whose multipliers would
@@ -146,6 +148,8 @@ pub(crate) struct Example {
     pub(crate) inputs: Vec<Spike>,
     /// The age of an input, ms, from which on it is smaller than the rounding of the others.
     pub(crate) forgotten: f64,
+    /// The most roundings of a row's coefficient: of a kernel, on a grid of an age, and one for each input of a train.
+    pub(crate) roundings: f64,
 }
 
 /// The end of silence in pattern `p`, ms: the horizon, or the later of the pattern's stop and its last target + `tau`.
@@ -244,12 +248,16 @@ impl Statement {
         stop: Stop<'_>,
     ) -> Result<()> {
         let inputs = pattern.by_time(stop)?;
+        let (fast, scale) = self.fast_and_scale();
+        let ages = if self.neuron.time == Time::Grid { E * (end - pattern.start) / fast } else { 0.0 };
+        let most = (0..pattern.len()).map(|n| pattern.train(n).len()).max().unwrap_or(0);
         self.examples.push(Example {
             start: pattern.start,
             end,
             targets: targets.to_vec(),
             silence: silence.map(<[_]>::to_vec),
             forgotten: self.shape.negligible_age() + self.shape.tau * spread(&inputs).ln(),
+            roundings: 16.0 + scale + ages + most as f64,
             inputs,
         });
         Ok(())
@@ -307,20 +315,41 @@ impl Statement {
 
     /// Computes a row's `coefficients`, one per train, and returns its limit.
     pub(crate) fn state_into(&self, row: Row, coefficients: &mut [f64]) -> Result<f64> {
-        self.state_with(row, |value| value, coefficients)
+        self.state_with(row, |state, _| state.b, |state| -self.shape.slope(state), |value| value, coefficients)
     }
 
-    /// The sizes of the terms that rounding of a row's coefficients depends on: the coefficients with all values of the
-    /// inputs made positive, because those of one train may cancel.
+    /// The sizes of the terms that rounding of a row's coefficients depends on, without the signs of the inputs' values,
+    /// because those of one train may cancel. In continuous time an age is exact to one rounding of itself, on a grid to
+    /// some of the whole span.
     pub(crate) fn sizes_into(&self, row: Row, sizes: &mut [f64]) -> Result<()> {
-        self.state_with(row, f32::abs, sizes).map(drop)
+        let ((fast, scale), shape) = (self.fast_and_scale(), self.shape);
+        let potential = |state: KernelSum, age: f64| match self.neuron.time {
+            Time::Continuous => state.b * (1.0 + age / fast),
+            Time::Grid if state.b > 0.0 => shape.largest(),
+            Time::Grid => 0.0,
+        };
+        let slope = |state: KernelSum| scale * state.a * (1.0 / shape.tau + 1.0 / fast) + state.b / fast;
+        self.state_with(row, potential, slope, f32::abs, sizes).map(drop)
     }
 
-    fn state_with(&self, row: Row, value: impl Fn(f32) -> f32, coefficients: &mut [f64]) -> Result<f64> {
+    /// The shorter time constant of the kernel, ms, and its factor.
+    fn fast_and_scale(&self) -> (f64, f64) {
+        let Shape { kernel, tau, tau_s, scale, .. } = self.shape;
+        if kernel == Kernel::DoubleExponential { (tau_s, scale) } else { (tau, 1.0) }
+    }
+
+    fn state_with(
+        &self,
+        row: Row,
+        potential: impl Fn(KernelSum, f64) -> f64,
+        slope: impl Fn(KernelSum) -> f64,
+        value: impl Fn(f32) -> f32,
+        coefficients: &mut [f64],
+    ) -> Result<f64> {
         match row {
             Row::Target { pattern, target } => {
                 let (example, t) = self.target(pattern, target)?;
-                self.sum(example, t, &example.targets[..target], |state| state.b, value, coefficients);
+                self.sum(example, t, &example.targets[..target], potential, value, coefficients);
                 Ok(self.threshold(example, t))
             }
             Row::Slope { pattern, target } => {
@@ -330,8 +359,7 @@ impl Statement {
                     ));
                 }
                 let (example, t) = self.target(pattern, target)?;
-                let slope = |state| -self.shape.slope(state);
-                self.sum(example, t, &example.targets[..target], slope, value, coefficients);
+                self.sum(example, t, &example.targets[..target], |state, _| slope(state), value, coefficients);
                 let falls = (self.threshold(example, t) - self.neuron.theta_0) / self.neuron.tau_rec();
                 Ok(falls - self.margin.slope)
             }
@@ -339,7 +367,7 @@ impl Statement {
                 let example = self.example(pattern)?;
                 self.check_silent(pattern, t)?;
                 let fired = example.targets.partition_point(|&target| target < t);
-                self.sum(example, t, &example.targets[..fired], |state| state.b, value, coefficients);
+                self.sum(example, t, &example.targets[..fired], potential, value, coefficients);
                 Ok(self.threshold(example, t) - self.margin_at(example, t))
             }
         }
@@ -369,7 +397,7 @@ impl Statement {
         let (example, t) = self.target(pattern, target)?;
         let t_behind = t + delta_t;
         let earlier = &example.targets[..target];
-        self.sum(example, t_behind, earlier, |state| state.b, |value| value, coefficients);
+        self.sum(example, t_behind, earlier, |state, _| state.b, |value| value, coefficients);
         Ok(self.threshold(example, t))
     }
 
@@ -461,14 +489,14 @@ impl Statement {
         }
     }
 
-    /// Sums `part` of the kernels' states at `t` by train over the inputs before `t`, given spikes at the `earlier`
+    /// Sums `part` of the kernels' states and ages at `t` by train over the inputs before `t`, given spikes at the `earlier`
     /// targets only.
     fn sum(
         &self,
         example: &Example,
         t: f64,
         earlier: &[f64],
-        part: impl Fn(KernelSum) -> f64,
+        part: impl Fn(KernelSum, f64) -> f64,
         value: impl Fn(f32) -> f32,
         out: &mut [f64],
     ) {
@@ -484,7 +512,7 @@ impl Statement {
                 state = if is_lost(&self.neuron, earlier, at, t) {
                     0.0
                 } else {
-                    part(self.shape.after(self.shape.input(), age(at)))
+                    part(self.shape.after(self.shape.input(), age(at)), age(at))
                 };
             }
             out[input.train as usize] += f64::from(value(input.value)) * state;
