@@ -18,9 +18,9 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.capacity import DURATION_MS, patterns, satisfied, weakest
 from taxel_studies.mapping import LEARN, TABLE
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, Task, subplots
 
-WHERE = "ours; the thesis has no delays"
+WHERE = "thesis 6.6.3, which names delays and kernels"
 PROTOCOL = (
     "Patterns and targets of 6.4.4: one spike an input on a random whole ms from 1 to 200, class c of C shall fire "
     "once at 200 c / (C + 1) ms. Each input arrives as it is; or put off by one random delay of its own; or "
@@ -140,25 +140,23 @@ def _of(row: Row, inputs: int, asks: str) -> bool:
     return bool(row.params["inputs"] == inputs and row.params["asks"] == asks)
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
-    """Judge what is asked of delays; none of it stands in the thesis, which has no delays."""
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
+    """Judge what 6.6.3 holds possible, and what is asked of it here."""
     lines = {line["arm"]: line for line in summary["lines"]}
     most = f"{max(p['copies'])} copies"
     last = -1  # the most inputs
     plain, random, copied = (lines[arm]["load"][last] for arm in ("none", "random", most))
     loads = ", ".join(f"{arm} {line['load'][last]:g}" for arm, line in lines.items())
     at = f"N = {p['inputs'][last]}"
-    yield Statement(
-        "Copies at several delays let a neuron learn more patterns an input.",
-        "not in the thesis",
-        f"largest load p / N at {at}: {loads}",
+    yield Judgement(
+        107,
+        f"by copies at several delays; largest load p / N at {at}: {loads}",
         bool(copied > plain),
-        f"{max(p['copies'])} times as many weights: a weight bears {copied / max(p['copies']):.2f} patterns with "
-        f"them and {plain:g} without",
+        f"held to be more patterns an input than without; {max(p['copies'])} times as many weights: a weight bears "
+        f"{copied / max(p['copies']):.2f} patterns with them and {plain:g} without",
     )
-    yield Statement(
-        "One fixed random delay an input buys nothing where the inputs' times are random already.",
-        "not in the thesis",
+    yield Judgement(
+        205,
         f"{random:g} beside {plain:g} at {at}",
         bool(random <= plain + p["classes"] / p["inputs"][last]),
         "it costs: fewer inputs arrive before an early target, and what is put off beyond the last one is lost",
@@ -167,14 +165,13 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
         arm: [s for s in line["selected"] if s["inputs"] == p["inputs"][last] and s["by_weight"] is not None]
         for arm, line in lines.items()
     }
-    for share in p["shares"]:
+    for claim, share in zip((206, 207), p["shares"], strict=False):
         here = {arm: next((s for s in some if s["share"] == share), None) for arm, some in chosen.items()}
         known = {arm: s for arm, s in here.items() if s is not None}
         if {"none", most} <= set(known):
             by_arm = ", ".join(f"{arm} {s['by_weight']:.2f} ({s['weights']:.0f} weights)" for arm, s in known.items())
-            yield Statement(
-                f"At a load of {share:g}, l1 over all copies learns with fewer weights than over the inputs alone.",
-                "not in the thesis",
+            yield Judgement(
+                claim,
                 f"patterns a weight at {at}: {by_arm}",
                 bool(known[most]["by_weight"] > known["none"]["by_weight"]),
                 "so what the copies buy is the choice of delays, and not the number of weights alone",

@@ -17,7 +17,7 @@ from taxel.frames import Frames
 from taxel.spikes import SpikeTrains
 from taxel_studies import spike_codes
 from taxel_studies.spike_codes import PERIOD_US, SIDE, drop, drop_tasks, kinds_of, since_contact
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, Table, Task, subplots
 
 WHERE = "thesis 7.2, which asks it"
 PROTOCOL = (
@@ -102,7 +102,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Say of each property what it is worth at the longest window."""
     late = f"{max(p['windows_ms']):g}"
     whole, bottom, top = summary["bits"]["all"][late]
@@ -110,13 +110,13 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     for without, name in list(VARIANTS.items())[1:]:
         bits, low, high = summary["bits"][without][late]
         cost = summary["events"][without][late] / max(events, 1e-9)
-        yield Statement(
-            f"It is to be found out whether FA-1's {name} is worth keeping.",
-            "asked in 7.2, not answered",
-            f"without it {bits - whole:+.2f} bits of {whole:.2f} and {cost:.2f} times the events, {late} ms",
+        yield Judgement(
+            109,
+            f"{bits - whole:+.2f} bits of {whole:.2f} and {cost:.2f} times the events, {late} ms",
             None,
             ("intervals lie apart" if high < bottom or low > top else "intervals overlap")
             + "; of two codes, counts and first spikes, the one with more bits",
+            f"FA-1 without its {name}",
         )
 
 
