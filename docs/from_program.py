@@ -359,6 +359,7 @@ def table(head: list[str], rows: list[list[str]], widths: str) -> list[str]:
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
+    app.add_directive("claims", Claims)
     app.add_directive("studies", Studies)
     app.add_directive("commands", Commands)
     app.add_directive("keys", Keys)
