@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.simulate.circuit import AdaptiveRamp, Converter, Fabric, VirtualGround
-from taxel_studies.study import Judgement, Parameters, Row, Summary, Table, Task, grid, logarithmic, results, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, Task, grid, logarithmic, results, subplots
 
 WHERE = "thesis 4.3.2"
 PROTOCOL = (
@@ -171,31 +171,6 @@ def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
         f"{steep['late_us']:.0f} with the steepest ramp",
         None,
         "it turns steep by what a gentle frame has shown",
-    )
-
-
-def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
-    """List all converters."""
-    yield Table(
-        "By ramp",
-        [
-            "ramp, ticks",
-            "fine control, mV rms",
-            "taps, mV rms",
-            "a tap is seen after, us",
-            "frames/s, fine and tap",
-        ],
-        [
-            [
-                name,
-                f"{one['rms_mv']['fine']:.2f}",
-                f"{one['rms_mv']['gross']:.1f}",
-                f"{one['late_us']:.0f}",
-                f"{one['frames_a_s']['fine']:.0f}, {one['frames_a_s']['gross']:.0f}",
-            ]
-            for name, one in summary["ramps"].items()
-        ],
-        "What a host that holds the last reading of each taxel is wrong by, while pressed and while tapped.",
     )
 
 

@@ -12,7 +12,7 @@ from taxel.events import Events
 from taxel.simulate import Act, Scene, Silence, play, truth
 from taxel.spikes import to_ms
 from taxel_studies.spike_codes import bits, drop_tasks, firsts, kinds_of, latency, relative_latency
-from taxel_studies.study import Judgement, Parameters, Row, Summary, Table, Task, logarithmic, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, Task, logarithmic, subplots
 
 WHERE = "thesis 4.5, 7.2 and Table 7.1"
 PROTOCOL = (
@@ -38,14 +38,6 @@ SIDE, EVENT_BITS = 20, 13
 #: Silence before a scene, ms. The board is not tared, since only changes count.
 BEFORE_MS = 5.0
 ARRAYS = ("scanned", "asynchronous")
-#: The costs of an array, as the table names them.
-COSTS = {
-    "events": "events a touch",
-    "events_a_s": "events/s",
-    "address_kbit_s": "address and sign, kbit/s",
-    "touched_kbit_s": "wire version 2, kbit/s",
-    "rest_kbit_s": "the same at rest",
-}
 
 
 def tasks(p: Parameters) -> list[Task]:
@@ -167,32 +159,6 @@ def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
         None,
         "power is not simulated; a taxel by itself sends each step on the way, a scanned one only where a frame "
         "finds it",
-    )
-
-
-def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
-    """List bits by window, and costs."""
-    shown = {"first": "first-spike latency", "relative": "relative latency"}
-    rows = [
-        [
-            f"{name}, {array}",
-            *(
-                f"{one[code][0]:.2f} ({one[code][1]:.2f} to {one[code][2]:.2f})"
-                for one in summary["bits"][array].values()
-            ),
-        ]
-        for code, name in shown.items()
-        for array in ARRAYS
-    ]
-    head = ["bits", *(f"{window} ms" for window in summary["bits"]["scanned"])]
-    costs = [[array, *(f"{one[name]:.0f}" for name in COSTS)] for array, one in summary["costs"].items()]
-    yield Table("Bits by time since contact", head, rows, f"Of {summary['most']:.2f}; intervals from trials redrawn.")
-    yield Table(
-        "While touched",
-        ["array", *COSTS.values()],
-        costs,
-        "Medians over trials. At rest: the same board untouched for as long (noise, headers, promises). While "
-        "touched: that, and what a scene's bytes have above it, over the time that the ball touches.",
     )
 
 
