@@ -19,7 +19,7 @@ class Claim:
     Attributes
     ----------
     number : int
-        In the order of the thesis; from 201 on of other papers and of our own.
+        It stays with the claim; from 201 on of other papers and of our own.
     at : str
         Section of the thesis; its first figure is the chapter.
     says : str
