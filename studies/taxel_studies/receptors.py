@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from taxel.encode import FA1, FA2, SA1, SA2, Encoder
 from taxel.frames import Frames
-from taxel_studies.study import Judgement, Parameters, Row, Summary, Table, grid, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, grid, subplots
 
 WHERE = "thesis 2.1.5, 3.3 and 7.2, which asks for the types beside FA-1"
 PROTOCOL = (
@@ -142,14 +142,6 @@ def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
             why += "its threshold, raised by each spike, sinks for hundreds of ms"
         ours = f"{first:g} to {last:g} Hz" if first != last else f"{first:g} Hz"
         yield Judgement(claim, ours, bool(low <= last and first <= high), why)
-
-
-def tables(p: Parameters, summary: Summary) -> Iterator[Table]:
-    """List thresholds by frequency."""
-    head = ["Hz", *(f"{f:g}" for f in p["frequencies_hz"])]
-    rows = [[kind, *("-" if a is None else f"{a:.3g}" for a in one["thresholds"])] for kind, one in summary.items()]
-    note = "shares of the range, peak to peak, at which every cycle has a spike; - where the whole range does not do"
-    yield Table("thresholds by frequency", head, rows, note)
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

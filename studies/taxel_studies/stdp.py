@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from taxel.spikes import SpikeTrains
 from taxel_rules import STDP
-from taxel_studies.study import Judgement, Parameters, Row, Summary, Table, Task, grid, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, Task, grid, subplots
 
 WHERE = "thesis 3.6.2, which calls for it; Masquelier, Guyonneau and Thorpe 2008, PLoS ONE 3:e1377"
 PROTOCOL = (
@@ -197,12 +197,6 @@ def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
             f"{middle['strong_in_pattern']:.0f} of {middle['strong']:.0f} weights above 0.5 (median)",
             middle["strong_in_pattern"] >= 0.99 * middle["strong"],
         )
-
-
-def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
-    """List the medians of the runs that succeed."""
-    rows = [[name, "-" if value is None else f"{value:g}"] for name, value in summary["median"].items()]
-    yield Table("runs that succeed, medians", ["what", "value"], rows, f"{summary['good']} of {summary['runs']} runs")
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:
