@@ -1,6 +1,6 @@
 """Keep what a report of studies found for the page of figures: numbers as JSON, pictures drawn from them as SVG.
 
-python docs/figures.py            judges all statements and draws all pictures again
+python docs/figures.py            judges all claims and draws all pictures again
 python docs/figures.py REPORT     takes the numbers of a report (taxel study all --report REPORT) first, with the commit
 
 A report is taken if the commit that is checked out computed it, without local changes. Beside each figure its toy
@@ -46,20 +46,19 @@ def toy_result(name: str, data: Path | None = None) -> dict[str, Any]:
 
 
 def judged(section: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return a study's statements, judged from its numbers."""
-    statements = load(section["name"]).statements(section["parameters"], section["said"])
-    return [asdict(statement) for statement in statements]
+    """Return a study's judgements, made from its numbers."""
+    return [asdict(one) for one in load(section["name"]).judge(section["parameters"], section["said"])]
 
 
 def draw(name: str) -> list[str]:
-    """Judge a study's statements and draw its pictures from its numbers, and name them there."""
+    """Judge a study's claims and draw its pictures from its numbers, and name them there."""
     file = FIGURES / f"{name}.json"
     section = json.loads(file.read_text())
     pictures = drawn(load(name), section["parameters"], section["said"])
     names = [f"{name}.svg"] if len(pictures) == 1 else [f"{name}-{k}.svg" for k in range(1, len(pictures) + 1)]
     for picture, data in zip(names, pictures, strict=True):
         (FIGURES / picture).write_bytes(data)
-    file.write_text(json.dumps(section | {"statements": judged(section), "pictures": names}) + "\n")
+    file.write_text(json.dumps(section | {"judgements": judged(section), "pictures": names}) + "\n")
     return names
 
 

@@ -1,7 +1,7 @@
-"""Parts of the documentation that are made from the program: figures, options, keys, requests, causes, names.
+"""Parts of the documentation that are made from the program: claims, figures, options, keys, requests, causes, names.
 
-A page asks for them by directives: ``.. studies::``, ``.. commands::``, ``.. keys::``, ``.. requests::``,
-``.. causes::``, ``.. registers:: TABLE`` and ``.. names:: MODULE``.
+A page asks for them by directives: ``.. claims::``, ``.. studies::``, ``.. commands::``, ``.. keys::``,
+``.. requests::``, ``.. causes::``, ``.. registers:: TABLE`` and ``.. names:: MODULE``.
 """
 
 from __future__ import annotations
@@ -29,8 +29,10 @@ from taxel.cli.app import about, own_commands, rows
 from taxel.panel.session import REQUESTS
 from taxel.wire import PRESETS
 from taxel_studies import STUDIES
+from taxel_studies.claims import CLAIMS, ERRATA, Verdict, summed, verdicts
 
 ROOT = Path(__file__).resolve().parents[1]
+READINGS = ROOT / "docs" / "readings.md"
 FIGURES = ROOT / "benchmarks" / "results" / "figures"
 KEYS = ROOT / "python" / "taxel" / "panel" / "web" / "keys.js"
 REGISTERS = ROOT / "registers.toml"
@@ -56,15 +58,59 @@ class FromProgram(Directive):
         return node.children
 
 
+class Claims(FromProgram):
+    """Every claim of the thesis with its judgements, chapter by chapter; what contradicts the thesis itself."""
+
+    def lines(self) -> list[str]:
+        """Return a section a chapter."""
+        self.state.document.settings.env.note_dependency(str(FIGURES))
+        self.state.document.settings.env.note_dependency(str(READINGS))
+        found = verdicts(one for section in sections() for one in section["judgements"])
+        refuse(found, READINGS.read_text())
+        lines = [f"Of the claims of the thesis {summed(found)}.", ""]
+        chapters = dict.fromkeys(one.claim.at[0] for one in found)
+        parts = {f"Chapter {n}": [v for v in found if v.claim.at[0] == n and not v.claim.source] for n in chapters}
+        for title, here in {**parts, "Claims of other papers, and ours": [v for v in found if v.claim.source]}.items():
+            head = ["", "claim", "main reading", "others", "ours", "why"]
+            lines += [*heading(title), *table(head, [row(one) for one in here], "5 27 13 7 28 20")]
+        rows = [[f"{one['at']}, T{one['line']}", one["prints"], one["instead"]] for one in ERRATA]
+        return [*lines, *heading("Errata of the thesis"), *table(["where", "prints", "instead"], rows, "20 40 40")]
+
+
+def refuse(found: list[Verdict], readings: str) -> None:
+    """Stop the build at a claim that no study judges, and at a line that fixes a main reading but is no reading."""
+    unjudged = [one.claim.number for one in found if not (one.main or one.others)]
+    stated = {int(line) for line in re.findall(r"\bT(\d+)", readings)}
+    unstated = sorted({line for claim in CLAIMS.values() for line in claim.fixed} - stated)
+    if unjudged or unstated:
+        raise ValueError(f"claims without a judgement: {unjudged}; lines that docs/readings.md lacks: {unstated}")
+
+
+def row(one: Verdict) -> list[str]:
+    """Return a claim's row: number, claim, verdict in the main reading, in how many others it holds, ours, why."""
+    claim, shown = one.claim, [one.main] if one.main else one.others
+    says = f"{claim.says} ({claim.where}{f'; {claim.value}' if claim.value else ''})"
+    verdict = "no line fixes one" if claim.open else VERDICTS[one.main["holds"]] if one.main else "not run"
+    main = verdict + (f": {claim.main} ({', '.join(f'T{line}' for line in claim.fixed)})" if claim.main else "")
+    ours = [f"{j['reading']}: {j['ours']}" if j["reading"] and j is not one.main else j["ours"] for j in shown]
+    why = [claim.open, *dict.fromkeys(j["why"] for j in shown)]
+    return [str(claim.number), says, main, one.beside, "; ".join(ours), "; ".join(filter(None, why))]
+
+
 class Studies(FromProgram):
-    """Every study that was kept: pictures, statements, the command, the numbers."""
+    """Every study that was kept: pictures, judgements, the command, the numbers."""
 
     def lines(self) -> list[str]:
         """Return a section a study."""
         self.state.document.settings.env.note_dependency(str(FIGURES))
-        files = [FIGURES / f"{name}.json" for name in STUDIES]
-        kept = [json.loads(file.read_text()) for file in files if file.exists()]
+        kept = sections()
         return [*times(kept), *(line for section in kept for line in study(section))]
+
+
+def sections() -> list[dict[str, Any]]:
+    """Return what was kept of each study."""
+    files = [FIGURES / f"{name}.json" for name in STUDIES]
+    return [json.loads(file.read_text()) for file in files if file.exists()]
 
 
 def times(kept: list[dict[str, Any]]) -> list[str]:
@@ -102,8 +148,8 @@ def study(section: dict[str, Any]) -> list[str]:
     ]
     for picture in section["pictures"]:
         lines += ["", f".. image:: {where}/{picture}", f"   :alt: {name}: {section['title']}", "   :width: 100%", ""]
-    rows = [[s["says"], s["published"], s["ours"], VERDICTS[s["holds"]], s["why"]] for s in section["statements"]]
-    lines += table(["statement", "published", "ours", "", "why, or under which reading"], rows, "30 15 20 10 25")
+    rows = [[str(j["claim"]), j["reading"], VERDICTS[j["holds"]], j["ours"], j["why"]] for j in section["judgements"]]
+    lines += table(["claim", "reading", "", "ours", "why"], rows, "6 24 10 35 25")
     return [*lines, "", f"**Protocol.** {literal(section['protocol'])}", ""]
 
 
@@ -313,6 +359,7 @@ def table(head: list[str], rows: list[list[str]], widths: str) -> list[str]:
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
+    app.add_directive("claims", Claims)
     app.add_directive("studies", Studies)
     app.add_directive("commands", Commands)
     app.add_directive("keys", Keys)

@@ -17,6 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from taxel_benchmarks._command import benchmarks as known_benchmarks
 from taxel_benchmarks._command import doubts_of
 from taxel_studies import STUDIES
+from taxel_studies.claims import CLAIMS, summed, verdicts
 
 DOCS = Path(__file__).resolve().parent
 BENCHMARKS = DOCS.parent / "benchmarks"
@@ -39,14 +40,12 @@ def results() -> str:
     figures = {(name, row[0]): row[1] for name, row in rows}
     goals = [[name, row[0], row[1], row[3]] for name, row in rows if row[4]]
     missed = [[name, row[0], row[1], row[3]] for name, row in rows if row[4] == VERDICTS[False]]
-    verdicts = {one["name"]: [statement["holds"] for statement in one["statements"]] for one in _studies()}
-    judged = [holds for study in verdicts.values() for holds in study if holds is not None]
+    found = verdicts(judged for one in _studies() for judged in one["judgements"])
     return _template("results.md.j2").render(
         speed=_speed(figures),
         detections=_detections(figures),
-        failing=[name for name, holds in verdicts.items() if False in holds],
-        holds=sum(judged),
-        judged=len(judged),
+        claims=summed(found),
+        failing=[one.claim for one in found if one.main and one.main["holds"] is False and not one.claim.source],
         goals=len(goals),
         reached=len(goals) - len(missed),
         missed=missed,
@@ -138,13 +137,14 @@ def benchmark(file: Path) -> dict[str, Any]:
 
 
 def study(file: Path) -> dict[str, Any]:
-    """Return what the page shows of a study: its statements with our values."""
+    """Return what the page shows of a study: its judgements with our values."""
     section: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-    judged = [one["holds"] for one in section["statements"] if one["holds"] is not None]
-    rows = [[one["says"], one["ours"], VERDICTS[one["holds"]]] for one in section["statements"]]
+    judgements = section["judgements"]
+    judged = [one["holds"] for one in judgements if one["holds"] is not None]
+    rows = [[CLAIMS[j["claim"]].says, j["reading"], j["ours"], VERDICTS[j["holds"]]] for j in judgements]
     return section | {
         "holds": f"{sum(judged)} of {len(judged)}" if judged else "none judged",
-        "table": table("", ["statement", "ours", "holds"], rows),
+        "table": table("", ["claim", "reading", "ours", "holds"], rows),
     }
 
 

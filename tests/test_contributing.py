@@ -13,6 +13,7 @@ from refusal import refused
 import taxel
 import taxel_studies
 from taxel.recording import kinds
+from taxel_studies.claims import CLAIMS, Claim
 
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT / "tests" / "contributing"
@@ -55,8 +56,9 @@ def test_what_contributing_says_of_a_format_is_enough(tmp_path: Path, monkeypatc
 def test_what_contributing_says_of_a_study_is_enough(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(taxel_studies.STUDIES, "quiet", "how many inputs an untrained neuron needs until it fires")
     monkeypatch.setattr(taxel_studies, "__path__", [*taxel_studies.__path__, str(EXAMPLES)])
+    monkeypatch.setitem(CLAIMS, 300, Claim(300, "6.2", "Few weak inputs do not reach the threshold.", source="ours"))
     section = taxel_studies.load("quiet").run(tmp_path, size="toy", quiet=True)
-    assert [statement["holds"] for statement in section["statements"]] == [True]
+    assert [judged["holds"] for judged in section["judgements"]] == [True]
     assert (tmp_path / "quiet" / "figure.svg").exists()
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.simulate.circuit import AdaptiveRamp, Converter, Fabric, VirtualGround
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, grid, logarithmic, results, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, Task, grid, logarithmic, results, subplots
 
 WHERE = "thesis 4.3.2"
 PROTOCOL = (
@@ -132,7 +132,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 4.3.2 says."""
     ramps = dict(summary["ramps"])
     own = ramps.pop("adaptive")
@@ -146,60 +146,31 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
         return max(wrong(one, phase) / min(wrong(other, phase) for other in ramps.values()) for phase in PHASES)
 
     best = min(ramps, key=lambda name: whole(ramps[name]))
-    yield Statement(
-        "A gentle ramp gives high intensity resolution during fine control.",
-        "high resolution",
+    yield Judgement(
+        12,
         f"wrong by {wrong(own, 'fine'):.1f} mV with the adaptive ramp, {wrong(gentle, 'fine'):.1f} with the "
         f"gentlest, {wrong(steep, 'fine'):.1f} with the steepest",
         wrong(own, "fine") <= 1.1 * wrong(gentle, "fine"),
     )
-    yield Statement(
-        "A steep ramp gives responsive feedback during gross movements.",
-        "responsive",
+    yield Judgement(
+        13,
         f"during taps wrong by {wrong(own, 'gross'):.0f} mV with the adaptive ramp, {wrong(gentle, 'gross'):.0f} "
         f"with the gentlest, {wrong(steep, 'gross'):.0f} with the steepest",
         wrong(own, "gross") <= 0.7 * wrong(gentle, "gross"),
         "the host holds the last reading: what moved since is its error",
     )
-    yield Statement(
-        "One ramp that adapts does both.",
-        "held to be possible, not tried",
+    yield Judgement(
+        14,
         f"at most {whole(own):.2f} times as wrong as the best fixed ramp of each phase; the best single fixed one, "
         f"{best} ticks, {whole(ramps[best]):.2f} times",
         whole(own) < whole(ramps[best]),
     )
-    yield Statement(
-        "The first tap after rest is seen as late as a gentle ramp sees it.",
-        "not stated",
+    yield Judgement(
+        201,
         f"{own['late_us']:.0f} us after it begins (median), {gentle['late_us']:.0f} with the gentlest, "
         f"{steep['late_us']:.0f} with the steepest ramp",
         None,
         "it turns steep by what a gentle frame has shown",
-    )
-
-
-def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
-    """List all converters."""
-    yield Table(
-        "By ramp",
-        [
-            "ramp, ticks",
-            "fine control, mV rms",
-            "taps, mV rms",
-            "a tap is seen after, us",
-            "frames/s, fine and tap",
-        ],
-        [
-            [
-                name,
-                f"{one['rms_mv']['fine']:.2f}",
-                f"{one['rms_mv']['gross']:.1f}",
-                f"{one['late_us']:.0f}",
-                f"{one['frames_a_s']['fine']:.0f}, {one['frames_a_s']['gross']:.0f}",
-            ]
-            for name, one in summary["ramps"].items()
-        ],
-        "What a host that holds the last reading of each taxel is wrong by, while pressed and while tapped.",
     )
 
 

@@ -12,7 +12,7 @@ from taxel.events import Events
 from taxel.simulate import Act, Scene, Silence, play, truth
 from taxel.spikes import to_ms
 from taxel_studies.spike_codes import bits, drop_tasks, firsts, kinds_of, latency, relative_latency
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, logarithmic, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, Task, logarithmic, subplots
 
 WHERE = "thesis 4.5, 7.2 and Table 7.1"
 PROTOCOL = (
@@ -38,14 +38,6 @@ SIDE, EVENT_BITS = 20, 13
 #: Silence before a scene, ms. The board is not tared, since only changes count.
 BEFORE_MS = 5.0
 ARRAYS = ("scanned", "asynchronous")
-#: The costs of an array, as the table names them.
-COSTS = {
-    "events": "events a touch",
-    "events_a_s": "events/s",
-    "address_kbit_s": "address and sign, kbit/s",
-    "touched_kbit_s": "wire version 2, kbit/s",
-    "rest_kbit_s": "the same at rest",
-}
 
 
 def tasks(p: Parameters) -> list[Task]:
@@ -124,7 +116,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 4.5 and Table 7.1 expect of an asynchronous array."""
     known, costs = summary["bits"], summary["costs"]
     scanned, alone = (costs[array] for array in ARRAYS)
@@ -142,27 +134,24 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     apart = all(
         known["asynchronous"][soon][code][1] > known["scanned"][soon][code][2] for code in ("first", "relative")
     )
-    yield Statement(
-        "Asynchronous logic at the transducers gives even higher temporal precision.",
-        "higher precision",
+    yield Judgement(
+        108,
         f"first rises of a touch fall on {alone['moments']:.0f} different times of 1 us instead of "
         f"{scanned['moments']:.0f} frames (median)",
         alone["moments"] > 2 * scanned["moments"],
         "what the foam, the fabric and the taxels' spread let through; taxels of one frame in between lie on "
         "straight lines",
     )
-    yield Statement(
-        "Finer times tell more of ball and height.",
-        "not stated",
+    yield Judgement(
+        208,
         f"first-spike latency in {soon} ms: {bits_of(soon, 'first')} bits of {summary['most']:.2f}; relative "
         f"latency: {bits_of(soon, 'relative')}; in {late} ms: {bits_of(late, 'relative')}; the largest gain is "
         f"{gains[most]:+.2f} in {most} ms (relative)",
         apart if p["trials"] >= PARAMETERS["trials"] else None,
         "" if apart else "the intervals overlap in the shortest window, in one code or both",
     )
-    yield Statement(
-        "A fully asynchronous architecture is more efficient.",
-        "even better power and computational efficiencies",
+    yield Judgement(
+        24,
         f"while touched {alone['events_a_s']:.0f} events/s instead of {scanned['events_a_s']:.0f}; with address "
         f"and sign alone {alone['address_kbit_s']:.0f} instead of {scanned['address_kbit_s']:.0f} kbit/s; on "
         f"version 2 of the wire {alone['touched_kbit_s']:.0f} instead of {scanned['touched_kbit_s']:.0f}, of which "
@@ -170,32 +159,6 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
         None,
         "power is not simulated; a taxel by itself sends each step on the way, a scanned one only where a frame "
         "finds it",
-    )
-
-
-def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
-    """List bits by window, and costs."""
-    shown = {"first": "first-spike latency", "relative": "relative latency"}
-    rows = [
-        [
-            f"{name}, {array}",
-            *(
-                f"{one[code][0]:.2f} ({one[code][1]:.2f} to {one[code][2]:.2f})"
-                for one in summary["bits"][array].values()
-            ),
-        ]
-        for code, name in shown.items()
-        for array in ARRAYS
-    ]
-    head = ["bits", *(f"{window} ms" for window in summary["bits"]["scanned"])]
-    costs = [[array, *(f"{one[name]:.0f}" for name in COSTS)] for array, one in summary["costs"].items()]
-    yield Table("Bits by time since contact", head, rows, f"Of {summary['most']:.2f}; intervals from trials redrawn.")
-    yield Table(
-        "While touched",
-        ["array", *COSTS.values()],
-        costs,
-        "Medians over trials. At rest: the same board untouched for as long (noise, headers, promises). While "
-        "touched: that, and what a scene's bytes have above it, over the time that the ball touches.",
     )
 
 

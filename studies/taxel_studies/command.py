@@ -14,6 +14,7 @@ from taxel.cli.app import App, Flat, say
 from taxel.options import Settings
 from taxel.tasks import Workers
 from taxel_studies import DRAWN, FIGURES, STUDIES, load
+from taxel_studies.claims import CLAIMS
 
 app = App(name="study")
 
@@ -128,16 +129,19 @@ def _every(options: StudyOptions, workers: Workers) -> list[str]:
 
 
 def tell(section: dict[str, Any]) -> None:
-    """Print what a study found: its statements and tables."""
+    """Print what a study found: its judgements of claims, and tables."""
     from rich.table import Table  # noqa: PLC0415
 
     from taxel.cli.console import Console  # noqa: PLC0415  the command line starts quickly
 
     say("", f"{section['name']}, size {section['size']}: {section['title']}")
-    for s in section["statements"]:
-        holds = {True: "holds", False: "does not hold", None: "not judged"}[s["holds"]]
-        say(f"- {s['says']} {holds.upper()}" + (f" ({s['why']})" if s["why"] else ""))
-        say(f"    published: {s['published']}", f"    ours: {s['ours']}")
+    for judged in section["judgements"]:
+        claim = CLAIMS[judged["claim"]]
+        holds = {True: "holds", False: "does not hold", None: "not judged"}[judged["holds"]]
+        reading = f" ({judged['reading']}{', main' if judged['reading'] == claim.main else ''})"
+        say(f"- {claim.says} {holds.upper()}" + reading * bool(judged["reading"]))
+        say(f"    {claim.number}: {claim.where}; published: {claim.value or 'none'}", f"    ours: {judged['ours']}")
+        say(*[f"    {judged['why']}"] * bool(judged["why"]))
     console = Console()
     if not console.is_terminal:
         console.width = 10_000  # a file breaks and cuts nothing

@@ -17,7 +17,7 @@ from taxel.frames import Frames
 from taxel_studies import indented
 from taxel_studies.fem import Course, SamplingGrid, Yeoh, bodies, conditions
 from taxel_studies.fem.solids import Solids
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, subplots
+from taxel_studies.study import Judgement, Kept, Parameters, Row, Summary, Task, subplots
 
 WHERE = "thesis 5.4.1 and 5.4.2, figures 5.1 to 5.4, tables 5.1 and 5.2"
 PROTOCOL = (
@@ -146,15 +146,14 @@ def _least_change(rho: NDArray[np.float64], spikes: Any, period: float) -> float
     return least
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 5.4.1 and the captions say."""
     paths = summary["paths"]
     short = [one for one in paths if one["fault"]]
     slanted = [one["asymmetry"] for one in paths if one["angle_deg"]]
     straight = [one["asymmetry"] for one in paths if not one["angle_deg"]]
-    yield Statement(
-        "Table 5.1: every combination of diameter, modulus, depth and angle is simulated.",
-        "300 conditions",
+    yield Judgement(
+        25,
         f"{summary['conditions']} conditions of {len(paths)} paths; {len(paths) - len(short)} reach their depth, "
         f"{sum(one['factorisations'] for one in paths)} matrices solved, {sum(one['cuts'] for one in paths)} steps "
         "halved",
@@ -162,17 +161,15 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
         "; ".join(f"{one['diameter_mm']:g} mm, {one['modulus_kpa']:g} kPa: {one['fault']}" for one in short)
         or f"mesh {p['mesh_mm']:g} mm, steps of {p['step_um']:g} um",
     )
-    yield Statement(
-        "The base gives back what presses, sideways and down (ours, not the thesis').",
-        "to rounding",
+    yield Judgement(
+        202,
         f"within {max(one['unbalanced'] for one in paths):.1e} of the force, over all steps of all paths",
         all(one["unbalanced"] < ROUNDING for one in paths),
         "the sum of the base's reactions against the force on the half disc",
     )
     if slanted and straight:
-        yield Statement(
-            "Figure 5.2b: a contact under a slant deforms the sensor asymmetrically.",
-            "the picture, 10 degrees",
+        yield Judgement(
+            26,
             f"left and right differ by {min(slanted):.3f} to {max(slanted):.3f} of the peak under a slant, by "
             f"{max(straight):.0e} straight down",
             min(slanted) > 0.01 > max(straight),
@@ -180,9 +177,8 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
         )
     drawn = summary["sampled"]
     count = sum(map(len, drawn["times"]))
-    yield Statement(
-        "Figure 5.4: spikes are discharged only when a pressure change above the threshold is sensed.",
-        "the picture",
+    yield Judgement(
+        27,
         f"{count} spikes; the smallest change since the last one is {drawn['least_change']:.3f} theta_0",
         count > 0 and drawn["least_change"] > 0.95,  # 5.5 as printed lets it sink below theta_0 by B theta_0
         f"one sample path at {p['period_ms']:g} ms",

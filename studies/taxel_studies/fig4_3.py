@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from taxel.simulate.circuit import Converter
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, grid, subplots
 
 WHERE = "thesis 4.3.2, figure 4.3"
 PROTOCOL = (
@@ -69,26 +69,23 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 4.3.2 says."""
     for shape, one in summary["shapes"].items():
-        name = "the board's RC ramp" if shape == "rc" else "a linear ramp"
-        yield Statement(
-            f"t_elapsed grows with V_in ({name}).",
-            "grows",
+        reading = "RC ramp" if shape == "rc" else "linear ramp"
+        yield Judgement(
+            10,
             f"grows up to {one['ends_v']:g} V; above that it is the ramp's {p['ramp'] / TICKS_A_US:g} us",
             one["grows"],
+            reading=reading,
         )
-    for shape, one in summary["shapes"].items():
         straight = one["bent_us"] < 1e-3
-        yield Statement(
-            f"The duration of t_elapsed is proportional to the magnitude of V_in ({shape} ramp).",
-            "proportional",
+        yield Judgement(
+            11,
             f"within {1e3 * one['bent_us']:.1f} ns of a straight line",
             straight,
-            ""
-            if straight
-            else "an RC ramp flattens: later voltages are resolved more finely (Appendix 1, 2.2.3 has the RC)",
+            "" if straight else "an RC ramp flattens, so that later voltages are resolved more finely",
+            reading,
         )
 
 

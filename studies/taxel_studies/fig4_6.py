@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from taxel.simulate.circuit import Converter, Fabric, VirtualGround
 from taxel.wire import Registers
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, grid, results, subplots
 
 WHERE = "thesis 4.4.1, figure 4.6"
 PROTOCOL = (
@@ -101,14 +101,13 @@ def _straight(loads: np.ndarray[Any, Any], volts: np.ndarray[Any, Any]) -> float
     return float(np.corrcoef(np.log(loads[below]), volts[below])[0, 1] ** 2)
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 4.4.1 says."""
     lines = {line["v_trans"]: line for line in summary["lines"]}
     high, low = lines[max(lines)], lines[min(lines)]
     full = p["realisations"] >= PARAMETERS["realisations"]
-    yield Statement(
-        f"With V_trans = {high['v_trans']:g} V a load of {SEEN_N:g} N is reliably detected.",
-        f"{SEEN_N:g} N",
+    yield Judgement(
+        15,
         f"{high['gained_v']:.3f} V and {high['gained_ticks']} ticks more than at rest; {100 * high['seen']:.0f} % "
         f"of taxels say so beyond a noise floor of {summary['floor']} ticks, the median one from "
         f"{high['least_n']:.3g} N on",
@@ -116,26 +115,18 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
         "the fabric's law is laid through this figure (0.1 V at 0.02 N), so what is tested is the converter and "
         "how far taxels differ (a guess: 20 %)",
     )
-    yield Statement(
-        f"At {low['v_trans']:g} V it is less sensitive.",
-        "less sensitive",
+    yield Judgement(
+        16,
         f"{low['gained_v']:.3f} V at {SEEN_N:g} N, seen by {100 * low['seen']:.0f} %; the median taxel from "
         f"{low['least_n']:.3g} N on",
         low["least_n"] > high["least_n"],
     )
-    yield Statement(
-        "The price is a reduced dynamic range.",
-        "reduced",
+    yield Judgement(
+        17,
         f"the ramp ends at {high['most_n']:.3g} N ({high['v_trans']:g} V) and {low['most_n']:.3g} N "
         f"({low['v_trans']:g} V); from the least to the most: {high['most_n'] / high['least_n']:.0f} and "
         f"{low['most_n'] / low['least_n']:.0f} times",
         high["most_n"] < low["most_n"],
-    )
-    yield Statement(
-        "V_in over the load is shown on a semi-log scale.",
-        "a curve; its picture is not in the text",
-        f"a straight line over log load explains {100 * high['straight']:.0f} % and {100 * low['straight']:.0f} %",
-        None,
     )
 
 

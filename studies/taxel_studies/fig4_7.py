@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from taxel.simulate.circuit import Converter, Fabric, VirtualGround
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, grid, subplots
 
 WHERE = "thesis 4.4.1, figure 4.7"
 PROTOCOL = (
@@ -74,11 +74,10 @@ def _impact(p: Parameters) -> dict[str, Any]:
     return {"t_us": t.tolist(), "volts": volts.round(6).tolist(), "moved_us": round(float(moved), 3)}
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 4.4.1 says."""
-    yield Statement(
-        "The sensor responds at approximately 50 us.",
-        "50 us",
+    yield Judgement(
+        18,
         f"V_in begins to move {summary['impact']['moved_us']:g} us after the impact",
         None,
         "the fabric's delay is taken over from here, so it is no test; on the board the scan adds 0 to 192 us",
@@ -86,22 +85,22 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     for scan in summary["scans"]:
         worst = max(scan["settles_us"])
         if scan["amplifier_us"] == 0:
-            yield Statement(
-                "V_in settles within 0.2 us while 4 channels are multiplexed at 3 us a column.",
-                f"{SETTLED_US:g} us",
+            yield Judgement(
+                19,
                 f"to {100 * p['settled']:g} % of the step within {worst:.3f} us, in each of the four steps",
                 None if worst <= SETTLED_US + p["every_us"] else False,
                 "the multiplexer's time constant, 0.05 us, is chosen for it, so it is no test; no part states one",
+                "no capacitor across R_f",
             )
         else:
-            yield Statement(
-                f"The same, were the board's 15 pF to lie across R_f ({scan['amplifier_us']:g} us).",
-                "no word of a column's traces in the next",
+            yield Judgement(
+                19,
                 "an unpressed column behind a pressed one reads "
                 + ", ".join(f"{t:.1f}" for t in scan["left_ticks"])
                 + " ticks too many in its four steps",
                 None,
                 "what a lab can measure: none if the capacitors lie elsewhere",
+                f"the board's 15 pF across R_f ({scan['amplifier_us']:g} us)",
             )
 
 

@@ -14,10 +14,10 @@ from taxel.information import confusion_matrix, nested_predictions, panzeri_trev
 from taxel_studies import dropped
 from taxel_studies.dropped import TENNIS, Condition
 from taxel_studies.study import (
+    Judgement,
     Kept,
     Parameters,
     Row,
-    Statement,
     Summary,
     Task,
     grid,
@@ -55,6 +55,8 @@ SLOW_MS = 10.0
 LITTLE, MARKED = 0.5, 0.5
 #: How far from the region's middle the middle of the pressure may lie to be around the first taxel, taxels.
 AROUND = 3.0
+#: The readings of how a slow sampler begins, and their names in the results.
+SAMPLED = {"from the impact on": "bits", "begun at any phase": "any_phase_bits"}
 #: Seed of the phase at which a slow sampler takes its first frame.
 PHASES = 410
 
@@ -118,19 +120,16 @@ def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     }
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 4.4.2 says."""
     lines, most = summary["lines"], float(np.log2(summary["conditions"]))
     size = f"{summary['conditions']} conditions, {p['drops']} drops each"
-    rates = [1000 / line["period_ms"] for line in lines]
-    any_phase = ", ".join(f"{line['any_phase_bits']:.2f}" for line in lines)
     total = np.array(summary["sum"])
     at, over = float(total[total[:, 1].argmax(), 0]), total[:, 1] < 0.1 * total[:, 1].max()
     ended = next((t for (t, _), low in zip(summary["sum"], over, strict=True) if low and t > at), float("inf"))
     apart = float(np.hypot(*summary["middle"]))
-    yield Statement(
-        "Figure 4.8: pressure grows and decays around the taxel that answered first.",
-        "the picture, 8 ms",
+    yield Judgement(
+        20,
         f"largest after {at:.1f} ms, below a tenth of that after {ended:.1f} ms, its middle {apart:.1f} taxels off "
         "the first",
         bool(0 < at < ended < TENNIS.length_ms and apart < AROUND),
@@ -138,32 +137,21 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     )
     slow = [line for line in lines if line["period_ms"] > SLOW_MS]
     fast = [line for line in lines if line["period_ms"] < SLOW_MS]
-    if slow and fast:
-        least, best = max(line["bits"] for line in slow), max(line["bits"] for line in fast)
-        phased = max(line["any_phase_bits"] for line in slow)
-        yield Statement(
-            "Figure 4.10: below 100 Hz little is known of the impact.",
-            "insufficient",
-            f"{listed([line['bits'] for line in lines], rates, place='{:g} Hz')} bits; begun at any phase {any_phase}",
-            least < LITTLE * most,
-            f"little: less than half of {most:.0f} bits; at any phase at most {phased:.2f} below 100 Hz; {size}",
+    for reading, name in SAMPLED.items() if slow and fast else ():
+        least, best = max(line[name] for line in slow), max(line[name] for line in fast)
+        there = [best - line[name] for line in lines if line["period_ms"] == SLOW_MS]
+        shown = listed([line[name] for line in lines], [1000 / line["period_ms"] for line in lines], place="{:g} Hz")
+        yield Judgement(
+            22, f"{shown} bits", least < LITTLE * most, f"little: less than half of {most:.0f} bits; {size}", reading
         )
-        yield Statement(
-            "Figure 4.10: a marked gain above 100 Hz, towards 2 bits.",
-            "the picture; ceiling 2 bits",
-            f"{best - least:+.2f} bits, to {best:.2f} of {most:.0f}{_from_100_hz(lines, best)}",
+        yield Judgement(
+            23,
+            f"{best - least:+.2f} bits, to {best:.2f} of {most:.0f}"
+            + "".join(f"; from 100 Hz itself on {gain:+.2f}" for gain in there),
             best - least > MARKED,
             f"marked: half a bit or more; simulated drops vary as we guess; {size}",
+            reading,
         )
-
-
-def _from_100_hz(lines: list[dict[str, Any]], best: float) -> str:
-    """Return how much of the gain lies above 100 Hz itself, where that was asked."""
-    there = next((line for line in lines if line["period_ms"] == SLOW_MS), None)
-    if there is None:
-        return ""
-    phased = max(line["any_phase_bits"] for line in lines) - there["any_phase_bits"]
-    return f"; from 100 Hz itself on {best - there['bits']:+.2f}, begun at any phase {phased:+.2f}"
 
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import dropped, fig4_8
 from taxel_studies.dropped import TENNIS
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, grid, listed
+from taxel_studies.study import Judgement, Kept, Parameters, Row, Summary, grid, listed
 
 WHERE = "thesis 4.4.2, figure 4.9"
 PROTOCOL = (
@@ -33,6 +33,8 @@ SIZES = {"toy": TOY}
 LENGTH_MS = 20.0
 #: From here on the classes lie clearly apart, Hz.
 CLEAR_HZ = 500.0
+#: The readings of what is mapped, and their names in the results.
+MAPS = {"whole frames from the impact on": "own", "whole frames from any phase on": "any_phase_own"}
 #: How many nearest neighbours in the map count, and what share of one's own class counts as clearly apart.
 NEIGHBOURS, CLEAR = 10, 0.95
 
@@ -71,23 +73,22 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return {"lines": [{"rate_hz": rate, **maps[rate]} for rate in sorted(maps)], "classes": names}
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 4.4.2 says of the maps."""
     lines = summary["lines"]
-    fast = [line["own"] for line in lines if line["rate_hz"] >= CLEAR_HZ]
-    slow = [line["own"] for line in lines if line["rate_hz"] < CLEAR_HZ]
-    if not (fast and slow):
-        return
-    shares = listed([line["own"] for line in lines], [line["rate_hz"] for line in lines], place="{:g} Hz")
-    any_phase = ", ".join(f"{line['any_phase_own']:.2f}" for line in lines)
-    yield Statement(
-        "Figure 4.9: classes lie clearly apart at 500 Hz and above, less so below.",
-        "the picture",
-        f"of the {NEIGHBOURS} nearest in the map are of one's own class: {shares}",
-        bool(min(fast) >= CLEAR and max(slow) < min(fast)),
-        f"clearly: {CLEAR:.0%} or more; by chance {1 / len(summary['classes']):.2f}; sampling begun at any "
-        f"phase instead of at the impact: {any_phase}; {p['drops']} drops a class, perplexity {p['perplexity']:g}",
-    )
+    for reading, name in MAPS.items():
+        fast = [line[name] for line in lines if line["rate_hz"] >= CLEAR_HZ]
+        slow = [line[name] for line in lines if line["rate_hz"] < CLEAR_HZ]
+        if fast and slow:
+            shares = listed([line[name] for line in lines], [line["rate_hz"] for line in lines], place="{:g} Hz")
+            yield Judgement(
+                21,
+                f"of the {NEIGHBOURS} nearest in the map are of one's own class: {shares}",
+                bool(min(fast) >= CLEAR and max(slow) < min(fast)),
+                f"clearly: {CLEAR:.0%} or more; by chance {1 / len(summary['classes']):.2f}; {p['drops']} drops a "
+                f"class, perplexity {p['perplexity']:g}",
+                reading,
+            )
 
 
 def draw(_p: Parameters, summary: Summary) -> Figure:

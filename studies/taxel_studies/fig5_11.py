@@ -14,7 +14,7 @@ from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 from taxel_studies import dropped, kept_bits
 from taxel_studies.dropped import LENGTH_MS, REGION, distances_of
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Task, grid, listed
+from taxel_studies.study import Judgement, Kept, Parameters, Row, Summary, Task, grid, listed
 
 WHERE = "thesis 5.6.3 and 5.6.4, figures 5.11 to 5.13"
 PROTOCOL = (
@@ -58,6 +58,8 @@ VARIED = {"ball_mm": "ball", "height_mm": "height", "slant_deg": "slant"}
 PRINTED = {"period_ms": 1.0, "tau_ms": 0.4, "sigma_mm": 2.0}
 #: What counts as the plateau of figure 5.13, and until when it should be reached at periods up to 2 ms.
 PLATEAU, PLATEAU_MS, FAST_MS = 0.9, 10.0, 2.0
+#: The readings of how tau and sigma are chosen.
+ONE, EACH = "one pair for all periods", "a pair a period"
 #: Above this period the loss should be marked.
 MARKED_MS = 5.0
 #: Bits, and shares of the largest possible bits, that differ by less are alike: one drop of a class of 100 is some .01.
@@ -142,61 +144,75 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return {"lines": sorted(lines, key=lambda line: line["period_ms"]), "conditions": len(dropped.conditions(p))}
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
-    """Judge what 5.6.4 says."""
-    lines, most = summary["lines"], float(np.log2(summary["conditions"]))
-    by = {line["period_ms"]: line for line in lines}
-    periods, bits = list(by), [line["bits"] for line in lines]
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
+    """Judge what 5.6.4 and 5.8 say: with the pair of most bits at any period for all of them, and with each its own.
+
+    What was looked at closely has each period's own pair.
+    """
+    lines = summary["lines"]
+    periods = [line["period_ms"] for line in lines]
     size = f"{summary['conditions']} conditions, {p['drops']} drops each, {p['neighbours']} neighbours"
     best = max(lines, key=lambda line: line["bits"])
-    shorter = [line for line in lines if line["period_ms"] < PRINTED["period_ms"]]
-    less = best["bits"] - max((line["bits"] for line in shorter), default=float("nan"))
-    yield Statement(
-        "Figure 5.11: most information at a period of 1 ms, a little less below it.",
-        "1 ms; ceiling 4.17 bits",
-        f"most at {_ms(best['period_ms'])}: {listed(bits, periods, place='{:g} ms')} bits; ceiling {most:.2f}; "
-        + (f"{less:.3f} less at a shorter period" if shorter else "no shorter period was asked"),
-        bool(best["period_ms"] == PRINTED["period_ms"] and less >= ALIKE) if shorter else None,
-        f"below {ALIKE:g} bits are no loss; {size}; simulated drops vary less than drops by hand, which the thesis "
-        "takes as the reason for its loss below 1 ms",
+    pair = best["tau_ms"], best["sigma_mm"]
+    row = p["sigmas_mm"].index(pair[1])
+    one = [dict(map(tuple, line["searched"]))[pair[0]][row] for line in lines]
+    own = [line["bits"] for line in lines]
+    searched = "searched on the same drops, as in the thesis; our places and noise are not its"
+    if pair[1] == max(p["sigmas_mm"]):
+        searched = f"the best sigma is the widest that was searched; {searched}"
+    beyond = _beyond_printed(p, next((line for line in lines if line["period_ms"] == PRINTED["period_ms"]), None))
+    yield Judgement(
+        36,
+        f"{pair[0]:g} ms, {pair[1]:g} mm at {_ms(best['period_ms'])}; {beyond}",
+        pair == (PRINTED["tau_ms"], PRINTED["sigma_mm"]),
+        searched,
+        ONE,
     )
-    long = [line for line in lines if line["period_ms"] > MARKED_MS]
-    if MARKED_MS in by and long:
-        before, after = best["bits"] - by[MARKED_MS]["bits"], by[MARKED_MS]["bits"] - long[-1]["bits"]
-        yield Statement(
-            "Figure 5.11: a marked loss above 5 ms.",
-            "the picture",
-            f"{before:.2f} bits lost from the best period to 5 ms, {after:.2f} more from there to "
-            f"{_ms(long[-1]['period_ms'])}",
-            bool(after > before and after > 0.5),
-            f"marked: half a bit or more, and more than up to 5 ms; {size}",
-        )
-    yield Statement(
-        "5.6.3: tau .4 ms and sigma 2 mm give most.",
-        "0.4 ms, 2 mm",
-        f"{best['tau_ms']:g} ms, {best['sigma_mm']:g} mm at {_ms(best['period_ms'])}; "
-        + _at_printed(p, by.get(PRINTED["period_ms"])),
-        (best["tau_ms"], best["sigma_mm"]) == (PRINTED["tau_ms"], PRINTED["sigma_mm"]),
-        ("the best sigma is the widest that was searched; " if best["sigma_mm"] == max(p["sigmas_mm"]) else "")
-        + "searched on the same drops, as in the thesis; our places and noise are not its",
-    )
-    yield Statement(
-        "5.8: bits at long periods are too many, as sampling begins at the impact.",
-        "likely",
+    for reading, bits in ((ONE, one), (EACH, own)):
+        yield from _by_period(periods, bits, size, reading)
+    yield Judgement(
+        44,
         listed([line["bits"] - line["any_phase_bits"] for line in lines], periods, "+.2f", "{:g} ms")
         + " bits more than with sampling begun at any time",
         bool(lines[-1]["bits"] > lines[-1]["any_phase_bits"]),
         size,
+        EACH,
     )
-    yield from _by_parameter(best, lines[-1], size)
-    yield from _by_time(lines, size)
+    yield from _by_parameter(lines, size, EACH)
+    yield from _by_time(lines, size, EACH)
+
+
+def _by_period(periods: list[float], bits: list[float], size: str, reading: str) -> Iterator[Judgement]:
+    shown = f"{listed(bits, periods, place='{:g} ms')} bits"
+    best = periods[int(np.argmax(bits))]
+    shorter = [b for period, b in zip(periods, bits, strict=True) if period < PRINTED["period_ms"]]
+    less = max(bits) - max(shorter, default=float("nan"))
+    yield Judgement(
+        37,
+        f"most at {_ms(best)}: {shown}; "
+        + (f"{less:.3f} less at a shorter period" if shorter else "no shorter period was asked"),
+        bool(best == PRINTED["period_ms"] and less >= ALIKE) if shorter else None,
+        f"below {ALIKE:g} bits are no loss; {size}; simulated drops vary less than drops by hand, which the thesis "
+        "takes as the reason for its loss below 1 ms",
+        reading,
+    )
+    if MARKED_MS in periods and periods[-1] > MARKED_MS:
+        at = bits[periods.index(MARKED_MS)]
+        before, after = max(bits) - at, at - bits[-1]
+        yield Judgement(
+            38,
+            f"{before:.2f} bits lost from the best period to 5 ms, {after:.2f} more from there to {_ms(periods[-1])}",
+            bool(after > before and after > 0.5),
+            f"marked: half a bit or more, and more than up to 5 ms; {size}",
+            reading,
+        )
 
 
 def _ms(period: float) -> str:
     return f"{period:g} ms"
 
 
-def _at_printed(p: Parameters, line: dict[str, Any] | None) -> str:
+def _beyond_printed(p: Parameters, line: dict[str, Any] | None) -> str:
     searched = {} if line is None else dict(map(tuple, line["searched"]))
     if line is None or PRINTED["tau_ms"] not in searched or PRINTED["sigma_mm"] not in p["sigmas_mm"]:
         return "the printed point was not asked"
@@ -204,22 +220,23 @@ def _at_printed(p: Parameters, line: dict[str, Any] | None) -> str:
     return f"at 1 ms the printed point has {line['bits'] - bits:.2f} bits less than the best"
 
 
-def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> Iterator[Statement]:
-    lost, words = kept_bits.lost(short, long, VARIED)
-    if len(lost) < len(VARIED):
-        return
-    worst, other = sorted(lost, key=lambda n: -lost[n])[:2]
-    clear = lost[worst] - lost[other] >= ALIKE
-    yield Statement(
-        "Figure 5.12: the ball's radius is the most sensitive to the period.",
-        "radius",
-        words,
-        bool(worst == "ball_mm" and clear),
-        f"{VARIED[worst]} loses most{'' if clear else f', {VARIED[other]} as much within {ALIKE:g}'}; {size}",
-    )
+def _by_parameter(lines: list[dict[str, Any]], size: str, reading: str) -> Iterator[Judgement]:
+    for taken in kept_bits.LOST:
+        lost, words = kept_bits.lost(lines, VARIED, taken)
+        if len(lost) < len(VARIED):
+            return
+        worst, other = sorted(lost, key=lambda n: -lost[n])[:2]
+        clear = lost[worst] - lost[other] >= ALIKE
+        yield Judgement(
+            39,
+            words,
+            bool(worst == "ball_mm" and clear),
+            f"{VARIED[worst]} loses most{'' if clear else f', {VARIED[other]} as much within {ALIKE:g}'}; {size}",
+            f"{reading}, {taken}",
+        )
 
 
-def _by_time(lines: list[dict[str, Any]], size: str) -> Iterator[Statement]:
+def _by_time(lines: list[dict[str, Any]], size: str, reading: str) -> Iterator[Judgement]:
     fast = [line for line in lines if line["period_ms"] <= FAST_MS]
     slow = [line for line in lines if line["period_ms"] > FAST_MS]
     if not fast or not slow:
@@ -228,15 +245,11 @@ def _by_time(lines: list[dict[str, Any]], size: str) -> Iterator[Statement]:
     never = float("inf")
     reached = {line["period_ms"]: next((t for t, bits in line["times"] if bits >= wanted), never) for line in lines}
     latest = max(reached[line["period_ms"]] for line in fast)
-    holds = latest <= PLATEAU_MS and all(reached[line["period_ms"]] >= 2 * latest for line in slow)
-    yield Statement(
-        "Figure 5.13: periods up to 2 ms are near the plateau in under 10 ms; longer ones need twice as long.",
-        "10 ms; twice",
-        "; ".join(f"{_ms(t)}: {'never' if at == never else f'{at:g} ms'}" for t, at in reached.items())
-        + f" for {wanted:.2f} bits",
-        bool(holds),
-        f"that is {PLATEAU:.0%} of the most that periods up to 2 ms reach in {LENGTH_MS:g} ms; {size}",
-    )
+    words = "; ".join(f"{_ms(t)}: {'never' if at == never else f'{at:g} ms'}" for t, at in reached.items())
+    why = f"{PLATEAU:.0%} of the most that periods up to 2 ms reach in {LENGTH_MS:g} ms; {size}"
+    yield Judgement(40, f"{words} for {wanted:.2f} bits", bool(latest <= PLATEAU_MS), why, reading)
+    twice = all(reached[line["period_ms"]] >= 2 * latest for line in slow)
+    yield Judgement(41, f"{words} for {wanted:.2f} bits", twice, why, reading)
 
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:

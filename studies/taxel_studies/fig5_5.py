@@ -14,7 +14,7 @@ from taxel.encode import FA1
 from taxel_studies import indented, kept_bits
 from taxel_studies.discriminants import FoldSums
 from taxel_studies.fem import SamplingGrid
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, Table, Task, listed
+from taxel_studies.study import Judgement, Kept, Parameters, Row, Summary, Table, Task, listed
 
 WHERE = "thesis 5.5.1 and 5.5.3, figures 5.5, 5.6 and 5.8"
 PROTOCOL = (
@@ -142,73 +142,84 @@ def summarise(p: Parameters, rows: Sequence[Row], kept: Kept) -> Summary:
     }
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
-    """Judge what 5.5.1, 5.5.3 and Table 5.3 say."""
-    lines, most = summary["lines"], np.log2(summary["conditions"])
-    bits, periods = ([line[name] for line in lines] for name in ("bits", "period_ms"))
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
+    """Judge what 5.5.1, 5.5.3 and Table 5.3 say: with the alpha of most bits over all periods, and with each period's.
+
+    What was looked at closely has each period's own alpha: of one alpha it is known where that is the same.
+    """
+    lines = summary["lines"]
+    periods = [line["period_ms"] for line in lines]
     size = f"{summary['conditions']} conditions, {p['samples']} samples each, mesh {p['mesh_mm']:g} mm"
-    short, long = lines[0], lines[-1]
-    yield Statement(
-        "Figure 5.5: mutual information falls as the sampling period grows, with a large gap between .5 and 20 ms.",
-        "falls; ceiling 8.23 bits",
-        f"{listed(bits, periods, place='{:g} ms')}; ceiling {most:.2f} bits",
-        bool(all(b <= a + 0.02 for a, b in pairwise(bits)) and bits[0] - bits[-1] > 1),
-        f"alpha {', '.join(format(line['alpha'], 'g') for line in lines)}; {size}",
-    )
-    yield Statement(
-        "Part of the loss at long periods is the jump of the threshold, A T, which grows with them (ours).",
-        "none",
+    by_alpha = [dict(map(tuple, line["searched"])) for line in lines]
+    common = set.intersection(*(set(bits) for bits in by_alpha))
+    one = max(sorted(common), key=lambda alpha: sum(bits[alpha] for bits in by_alpha))
+    alike = [line for line in lines if line["alpha"] == one]
+    readings = {
+        "one alpha for all periods": ([bits[one] for bits in by_alpha], alike, f"alpha {one:g}"),
+        "an alpha a period": (
+            [line["bits"] for line in lines],
+            lines,
+            f"alpha {', '.join(format(line['alpha'], 'g') for line in lines)}",
+        ),
+    }
+    for reading, (bits, close, alpha) in readings.items():
+        yield Judgement(
+            29,
+            f"{listed(bits, periods, place='{:g} ms')}",
+            bool(all(b <= a + 0.02 for a, b in pairwise(bits)) and bits[0] - bits[-1] > 1),
+            f"{alpha}; {size}",
+            reading,
+        )
+        if periods[0] in (line["period_ms"] for line in close):
+            yield _rate(close, reading)
+        yield from _judged_by_time(close, f"{alpha}; {size}", reading)
+        if len(close) == len(lines):
+            yield from _by_parameter(close, f"{alpha}; {size}", reading)
+    yield Judgement(
+        203,
         listed([line["even_bits"] - line["bits"] for line in lines], periods, "+.2f", "{:g} ms")
         + f" bits with A T held at that of {p['even_ms']:g} ms",
         None,
         size,
     )
-    yield Statement(
-        "Table 5.3: the constants give a rate that is biologically plausible.",
-        "around 100 Hz (held to be 50 to 200)",
+
+
+def _rate(lines: list[dict[str, Any]], reading: str) -> Judgement:
+    return Judgement(
+        28,
         ", ".join(
             f"{line['rate_hz']:.0f} ({line['most_rate_hz']:.0f}) Hz at {line['period_ms']:g} ms" for line in lines
         )
         + ": mean over all afferents (of the condition with most)",
         bool(AROUND_100_HZ[0] < max(line["most_rate_hz"] for line in lines) < AROUND_100_HZ[1]),
         "it falls with the period, as one spike raises the threshold by A T theta_0",
-    )
-    yield from _by_parameter(short, long, size)
-    yield from _judged_by_time(lines, size)
-
-
-def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> Iterator[Statement]:
-    lost, words = kept_bits.lost(short, long, VARIED)
-    if not {"diameter_mm", "depth_mm"} <= set(lost):
-        return
-    worst, least = max(lost, key=lambda n: lost[n]), min(lost, key=lambda n: lost[n])
-    yield Statement(
-        "Figure 5.6: radius suffers most from a long period, depth least.",
-        "radius; depth",
-        words,
-        worst == "diameter_mm" and least == "depth_mm",
-        f"{VARIED[worst]} loses most, {VARIED[least]} least; {size}; 5 diameters and slants where the text says 4",
+        reading,
     )
 
 
-def _judged_by_time(lines: list[dict[str, Any]], size: str) -> Iterator[Statement]:
+def _by_parameter(lines: list[dict[str, Any]], why: str, reading: str) -> Iterator[Judgement]:
+    for taken in kept_bits.LOST:
+        lost, words = kept_bits.lost(lines, VARIED, taken)
+        if {"diameter_mm", "depth_mm"} <= set(lost):
+            worst, least = max(lost, key=lambda n: lost[n]), min(lost, key=lambda n: lost[n])
+            for claim, name, found in ((30, "diameter_mm", worst), (31, "depth_mm", least)):
+                ends = f"{VARIED[worst]} loses most, {VARIED[least]} least; {why}"
+                yield Judgement(claim, words, name == found, ends, f"{reading}, {taken}")
+
+
+def _judged_by_time(lines: list[dict[str, Any]], why: str, reading: str) -> Iterator[Judgement]:
     by = {line["period_ms"]: dict(map(tuple, line["times"])) for line in lines}
     if 10.0 in by.get(0.5, {}):
         early = by[0.5][10.0]
-        yield Statement(
-            "Figure 5.8: over 6 bits are there within 10 ms at a period of .5 ms.",
-            "> 6 bits",
-            f"{early:.2f} bits",
-            early > BITS_AT_10_MS,
-            f"{size}; a shallow contact has then moved by 50 um only",
-        )
+        moved = f"{why}; a shallow contact has then moved by 50 um only"
+        yield Judgement(34, f"{early:.2f} bits", early > BITS_AT_10_MS, moved, reading)
         slow = [t for t, bits in by.get(5.0, {}).items() if bits >= early]
-        yield Statement(
-            "Figure 5.8: a period of 5 ms needs 80 ms for as much.",
-            "80 ms (held to be 40 or more)",
+        yield Judgement(
+            35,
             f"{slow[0]:g} ms" if slow else "not within 100 ms",
             not slow or slow[0] >= 40,
-            f"for the {early:.2f} bits that .5 ms has at 10 ms; {size}",
+            f"for the {early:.2f} bits that .5 ms has at 10 ms; {why}",
+            reading,
         )
 
 

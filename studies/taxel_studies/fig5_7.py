@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from taxel.encode import FA1
 from taxel_studies import indented
-from taxel_studies.study import Kept, Parameters, Row, Statement, Summary, grid, logarithmic, subplots
+from taxel_studies.study import Judgement, Kept, Parameters, Row, Summary, grid, logarithmic, subplots
 
 WHERE = "thesis 5.5.2, figure 5.7"
 PROTOCOL = (
@@ -54,7 +54,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     }
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 5.5.2 says."""
     by = {line["event_bits"]: dict(zip(summary["periods_ms"], line["bits"], strict=True)) for line in summary["lines"]}
     few, many = min(by), max(by)
@@ -62,9 +62,8 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     of_each = f"{p['samples']} samples each, alpha {p['alpha']:g}, mesh {p['mesh_mm']:g} mm"
     size = f"{summary['conditions']} conditions, {of_each}"
     gain = {period: by[many][period] - by[few][period] for period in (short, long)}
-    yield Statement(
-        "Figure 5.7: more bits an event raise the information, and only at long periods by much.",
-        "the picture",
+    yield Judgement(
+        32,
         "; ".join(f"{period:g} ms: {bits:+.2f} bits" for period, bits in gain.items())
         + f" from {few} to {many} bits an event",
         bool(gain[long] > 0 and gain[long] > gain[short]),
@@ -72,13 +71,8 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     )
     if {1, 10} <= set(by) and {2.0, 20.0} <= set(summary["periods_ms"]):
         slow, quick = by[10][20.0], by[1][2.0]
-        yield Statement(
-            "20 ms with 10 bits does much worse than 2 ms with 1 bit, at the same data rate.",
-            "much lower",
-            f"{slow:.2f} against {quick:.2f} bits",
-            bool(slow < quick - 0.5),
-            f"much: by half a bit or more; {size}",
-        )
+        much = f"much: by half a bit or more; {size}"
+        yield Judgement(33, f"{slow:.2f} against {quick:.2f} bits", bool(slow < quick - 0.5), much)
 
 
 def draw(_p: Parameters, summary: Summary) -> Figure:

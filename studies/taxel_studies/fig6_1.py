@@ -14,7 +14,7 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE, thresholds
-from taxel_studies.study import Parameters, Statement, Summary, one_task, only_result
+from taxel_studies.study import Judgement, Parameters, Summary, one_task, only_result
 
 WHERE = "thesis 6.3.1, figure 6.1"
 PROTOCOL = (
@@ -75,7 +75,7 @@ def _sum_of_kernels(
 summarise = only_result
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.3.1 and the caption say."""
     times, potential = np.array(summary["times"]), np.array(summary["potential"])
     theta = thresholds(np.array(p["targets"]), p["targets"])
@@ -83,27 +83,17 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     quiet = np.any([(times > t) & (times <= t + TABLE["refractory"]) for t in p["targets"]], axis=0)
     raised = thresholds(np.array([t + TABLE["refractory"] for t in p["targets"]]), p["targets"])
     exact = len(summary["spikes"]) == len(p["targets"])
-    yield Statement(
-        "The membrane potential is the sum of all postsynaptic potentials (6.4, 6.5).",
-        "the printed sum",
-        f"neuron against the printed sum: {summary['worst_of_sum']:.0e} mV at most",
-        summary["worst_of_sum"] < 1e-12,
+    yield Judgement(
+        45, f"neuron against the printed sum: {summary['worst_of_sum']:.0e} mV at most", summary["worst_of_sum"] < 1e-12
     )
-    yield Statement(
-        "A spike is discharged where the potential meets the threshold: U is at it at each target.",
-        "U = theta",
+    yield Judgement(
+        46,
         f"|U - theta| at the targets: {off:.0e} mV; fires at {', '.join(f'{t:.6f}' for t in summary['spikes'])} ms",
         bool(off < 1e-12) and exact and bool(np.max(np.abs(np.subtract(summary["spikes"], p["targets"]))) < 1e-6),
     )
-    yield Statement(
-        "The neuron then holds its resting potential for the absolute refractory period.",
-        f"0 mV for {TABLE['refractory']:g} ms",
-        f"{np.max(np.abs(potential[quiet])):g} mV at most",
-        bool(np.all(potential[quiet] == 0)),
-    )
-    yield Statement(
-        "The threshold rises from theta_0 to theta_0 + theta+ and recovers.",
-        f"{TABLE['theta_0']:g} to {TABLE['theta_0'] + TABLE['theta_plus']:g} mV",
+    yield Judgement(47, f"{np.max(np.abs(potential[quiet])):g} mV at most", bool(np.all(potential[quiet] == 0)))
+    yield Judgement(
+        48,
         f"{raised[0]:g} mV at the end of the first refractory period; the neuron fires at the second target, where "
         f"it has come down to {theta[-1]:.4f} mV",
         exact and bool(np.isclose(raised[0], TABLE["theta_0"] + TABLE["theta_plus"])),

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from taxel_studies import waves
-from taxel_studies.study import Parameters, Statement, Summary, Task
+from taxel_studies.study import Judgement, Parameters, Summary, Task
 from taxel_studies.waves import NOISES, READINGS, TRAINED_AT
 
 WHERE = "thesis 6.4.7, figure 6.10"
@@ -43,37 +43,35 @@ realise = waves.realise
 summarise = waves.summarise
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.4.7 says, in each reading of B."""
-    for reading in p["readings"]:
-        curves = summary["curves"][reading]
-        why = waves.why(reading)
+    for divisor in p["readings"]:
+        curves, reading = summary["curves"][divisor], READINGS[divisor]
         clean = curves["clean"]
         claims = (
-            ("jitter", "dense is better against jitter", True, ANY),
-            ("background", "sparse is better against background", False, ANY),
-            ("shunting", "against weak shunting sparse is worse", True, WEAK),
-            ("shunting", "against strong shunting sparse is better", False, STRONG),
+            (82, "jitter", True, ANY),
+            (83, "background", False, ANY),
+            (84, "shunting", True, WEAK),
+            (85, "shunting", False, STRONG),
         )
         yield from (
-            _compared(f"Noise-free training: {says}.", clean[noise], UNITS[noise], dense_is_better, levels, why)
-            for noise, says, dense_is_better, levels in claims
+            _compared(claim, clean[noise], UNITS[noise], dense_is_better, levels, reading)
+            for claim, noise, dense_is_better, levels in claims
             if noise in clean
         )
         spread = {t: _spread(c) for t, c in (("clean", clean), ("noisy", curves["noisy"]))}
-        yield Statement(
-            "Trained with noise, sparsity matters less.",
-            "results of sparsity were less evident",
+        yield Judgement(
+            86,
             "largest less smallest distance between ratios, mean over levels and noises: "
             f"{spread['clean']:.2f} noise-free, {spread['noisy']:.2f} noisy",
             spread["noisy"] < spread["clean"],
-            why,
+            reading=reading,
         )
 
 
 def _compared(
-    says: str, curve: dict[str, Any], unit: str, dense_is_better: bool, among: tuple[float, float], why: str
-) -> Statement:
+    claim: int, curve: dict[str, Any], unit: str, dense_is_better: bool, among: tuple[float, float], reading: str
+) -> Judgement:
     levels, mean = np.array(curve["levels"], float), np.array(curve["mean"])
     dense, sparse = mean[0], mean[-1]
     here = (levels > among[0]) & (levels <= among[1])
@@ -87,14 +85,13 @@ def _compared(
     crossing = f"; they cross at {', '.join(f'{t:.1f}' for t in turns)} {unit}" if turns else "; they do not cross"
     over = " to ".join(f"{level:g}" for level in sorted({levels[here].min(), levels[here].max()}))
     holds = bool(means[0] < means[1] if dense_is_better else means[1] < means[0])
-    if not holds and len(turns) == 1 and (gain[here][0] > 0) == dense_is_better:
-        why += f": it does below {turns[0]:.1f} {unit}, and above it the other way round"
-    return Statement(
-        says,
-        "dense below sparse" if dense_is_better else "sparse below dense",
+    turned = not holds and len(turns) == 1 and (gain[here][0] > 0) == dense_is_better
+    return Judgement(
+        claim,
         f"mean distance at {over} {unit}: {means[0]:.2f} dense (0 : 4), {means[1]:.2f} sparse (4 : 0){crossing}",
         holds,
-        why,
+        f"it does below {turns[0]:.1f} {unit}, and above it the other way round" if turned else "",
+        reading,
     )
 
 

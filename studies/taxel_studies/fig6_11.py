@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import waves
 from taxel_studies.mapping import LEARN
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, grid, results, subplots
 from taxel_studies.waves import READINGS
 
 WHERE = "thesis 6.4.7, figure 6.11"
@@ -31,6 +31,8 @@ PARAMETERS: dict[str, Any] = {
 }
 TOY: dict[str, Any] = {"realisations": 3, "repetitions": 5}
 SIZES = {"toy": TOY}
+#: The claim of 6.4.7 by training.
+CLAIM_OF = {"clean": 87, "jitter": 88, "background": 89, "shunting": 90}
 #: A mode stands out from its valley by this share of the tallest mode.
 STANDS_OUT = 0.05
 #: Bins with a smaller share are not drawn.
@@ -91,25 +93,21 @@ def modes(shares: NDArray[np.float64]) -> list[int]:
     return places
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.4.7 says, in each reading of B."""
     centres = np.array(summary["centres"])
-    for reading in p["readings"]:
-        why = READINGS[reading]
+    for divisor in p["readings"]:
         for training in p["trainings"]:
-            shares = np.array(summary["shares"][reading][training])
+            shares = np.array(summary["shares"][divisor][training])
             where = [float(centres[k]) for k in modes(shares)]
             ours = "modes at " + ", ".join(f"{w:.3f}" for w in where) + " mV"
-            if training == "clean":
-                says, published = "Trained without noise, the weights have several modes.", "multi-modal"
-                holds = len(where) > 1
-            else:
-                says = f"Trained with {training}, they have one mode, at zero, and fall off from it."
-                published, holds = "unimodal, maximum centred at zero", len(where) == 1 and abs(where[0]) <= p["bin_mv"]
+            holds = len(where) > 1
+            if training != "clean":
+                holds = len(where) == 1 and abs(where[0]) <= p["bin_mv"]
                 behind = shares[centres > 0.5 * p["bin_mv"]]
                 back = 100 * float(np.max(behind - np.minimum.accumulate(behind)))
                 ours += f"; above zero the histogram rises again by {back:.1f} % of the weights at most"
-            yield Statement(says, published, ours, holds, why)
+            yield Judgement(CLAIM_OF[training], ours, holds, reading=READINGS[divisor])
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

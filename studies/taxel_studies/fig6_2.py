@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, listed, results, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, grid, listed, results, subplots
 
 WHERE = "thesis 6.3.2, figure 6.2"
 PROTOCOL = (
@@ -78,27 +78,24 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.3.2 says."""
     all_ = summary["kappas"]
     slopes, rises = [c["slope"] for c in all_], [c["rise"] for c in all_]
-    yield Statement(
-        "The same output spike time is maintained.",
-        "the target",
-        *mapping.exactness(all_),
-    )
-    yield Statement(
-        "The potential crosses the threshold more steeply for kappa > 1.",
-        "steeper",
+    reading = f"B over the number of targets, after a spike “{p['after_spike']}”"
+    yield Judgement(49, *mapping.exactness(all_), reading=reading)
+    yield Judgement(
+        50,
         "mean slope behind the target, mV/ms: " + listed(slopes, p["kappas"], ".4f", "kappa {:g}"),
         bool(np.all(np.diff(slopes) > 0)),
+        reading=reading,
     )
-    yield Statement(
-        "A larger negative change is required to prevent the neuron from spiking.",
-        "robustness to false negatives",
+    yield Judgement(
+        51,
         f"within {DELTA_T:g} ms the potential would come above the threshold by, %: "
         + listed([100 * r for r in rises], p["kappas"], ".1f", "kappa {:g}"),
         bool(np.all(np.diff(rises) > 0)),
+        reading=reading,
     )
 
 

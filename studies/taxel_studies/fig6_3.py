@@ -13,7 +13,7 @@ from taxel.learn import ConeR, ConeX
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.mapping import LEARN, TABLE
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task, grid
+from taxel_studies.study import Judgement, Parameters, Row, Summary, Task, grid
 
 WHERE = "thesis 6.3.4, figure 6.3"
 PROTOCOL = (
@@ -139,7 +139,7 @@ def summarise(_p: Parameters, rows: Sequence[Row]) -> Summary:
     return {row.params["learner"]: row.result for row in rows}
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.3.4 says."""
     x, r = summary["cone_x"], summary["cone_r"]
     surface, axis = np.array(r["objective"]), np.array(r["axis"])
@@ -152,16 +152,14 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     reach = abs(p["bound"])
     broken = float(np.median(surface[~silent])) if (~silent).any() else float("nan")
     along = float(np.median(r["line"]["objective"]))
-    yield Statement(
-        "The objectives are convex surfaces.",
-        "convex",
+    yield Judgement(
+        52,
         f"least second difference along both axes and diagonals: {_bend(np.array(x['objective'])):.0e} (CONE-X), "
         f"{_bend(surface):.0e} (CONE-R), rounded to 1e-6",
         min(_bend(np.array(x["objective"])), _bend(surface)) > -5e-6,
     )
-    yield Statement(
-        "CONE-X: the optimum is the lowest point along the line of the equality that keeps silence and bounds.",
-        "lowest point of the projected line",
+    yield Judgement(
+        53,
         f"learner {x['optimum']:.6f}, lowest of 4001 points of the line {x['line']['least']:.6f}; "
         f"target met to {x['missed_mv']:.0e} mV",
         x["status"] == "solved"
@@ -169,16 +167,14 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
         and x["line"]["least"] - x["optimum"] < 1e-3
         and x["missed_mv"] < 1e-9,
     )
-    yield Statement(
-        "CONE-R: the surface is smallest along the equality.",
-        "smallest along the line",
+    yield Judgement(
+        54,
         f"the lowest of {p['points']} x {p['points']} points misses it by {missed:.4f} mV (a cell: {cell:.4f} mV); "
         f"learner {r['optimum']:.6f} against {surface.min():.6f}, misses it by {r['missed_mv']:.0e} mV",
         missed <= cell and r["optimum"] <= float(surface.min()) + 1e-6,
     )
-    yield Statement(
-        "CONE-R: points that violate the inequalities incur large penalties.",
-        "steep walls",
+    yield Judgement(
+        55,
         f"median objective {broken:.3f} where silence is broken, {along:.3f} along the line (bounds ±{reach:g} mV)",
         broken > 3 * along,
     )

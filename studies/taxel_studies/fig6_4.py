@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, listed, results, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, grid, listed, results, subplots
 from taxel_studies.waves import READINGS
 
 WHERE = "thesis 6.4.1, figure 6.4"
 PROTOCOL = (
     "100 inputs with one spike each, uniform on 0 to 100 ms, one target at 100 ms; Table 6.1, CONE-X in continuous "
-    "time, lambda (0, 2, 100), kappa varied, in both readings of B. The first pattern is drawn; the statements are "
-    "judged over all of them."
+    "time, lambda (0, 2, 100), kappa varied, in both readings of B. The first pattern is drawn; claims are judged "
+    "over all of them."
 )
 
 PARAMETERS: dict[str, Any] = {
@@ -87,31 +87,25 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.4.1 says."""
-    for reading, all_ in summary["readings"].items():
+    for divisor, all_ in summary["readings"].items():
         behind = [c["behind"] for c in all_]
         weights = [c["near_weight"] for c in all_]
-        why = READINGS[reading]
-        yield Statement(
-            "The potential crosses the threshold at 100 ms for every kappa: all sets of solutions are feasible.",
-            "100 ms",
-            *mapping.exactness(all_),
-            why,
-        )
-        yield Statement(
-            "A larger kappa lifts the potential behind the target.",
-            "higher trajectories",
+        reading = f"{READINGS[divisor]}, after a spike “{p['after_spike']}”"
+        yield Judgement(56, *mapping.exactness(all_), reading=reading)
+        yield Judgement(
+            57,
             f"U({p['target'] + DELTA_T:g} ms) in thresholds: " + listed(behind, p["kappas"], ".3f"),
             None not in behind and bool(np.all(np.diff(behind) > 0)),
-            why + ("" if reading == "targets" else ": it does, but by less than kappa asks for"),
+            "" if divisor == "targets" else "it does, but by less than kappa asks for",
+            reading,
         )
-        yield Statement(
-            "It does so by larger weights of the synapses that spike closer to the target.",
-            "increased weights of relevant synapses",
+        yield Judgement(
+            58,
             f"mean weight within {2 * TABLE['tau']:g} ms of it, mV: " + listed(weights, p["kappas"], ".4f"),
             None not in weights and bool(np.all(np.diff(weights) > 0)),
-            why,
+            reading=reading,
         )
 
 

@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 
 from taxel_studies import mapping
 from taxel_studies.mapping import TABLE
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, grid, results, subplots
 
 WHERE = "thesis 6.4.2, figure 6.5"
 PROTOCOL = (
     "As figure 6.4, with kappa 1 and lambda 1 : lambda 2 varied (lambda 3 = 0). The first pattern is drawn; the "
-    "statements are judged over all of them."
+    "claims are judged over all of them."
 )
 
 PARAMETERS: dict[str, Any] = {
@@ -77,35 +77,22 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
-    """Judge what 6.4.2 and the caption say."""
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
+    """Judge what 6.4.2 says."""
     all_ = summary["ratios"]
     zeros = [c["zeros"] for c in all_]
     listed = ", ".join(f"{z:g} at {c['ratio'][0]:g} : {c['ratio'][1]:g}" for z, c in zip(zeros, all_, strict=True))
     dense = next(c for c in all_ if c["ratio"][0] == 0)
     rising = bool(np.all(np.diff(zeros) > 0))
-    yield Statement(
-        "The output spike time remains unchanged.",
-        "100 ms",
-        *mapping.exactness(all_),
-    )
-    yield Statement(
-        "With l2 all synapses contribute; with l1 only the most significant ones.",
-        "sparse for l1, dense for l2",
+    yield Judgement(59, *mapping.exactness(all_))
+    yield Judgement(
+        60,
         f"zero weights of {p['inputs']}: {listed}",
         rising and zeros[0] < 1 and zeros[-1] > 0.9 * p["inputs"],
     )
-    yield Statement("The ratio tunes sparsity.", "sparsity of the solution can be tuned", f"zeros: {listed}", rising)
-    yield Statement(
-        "Caption: sparse solutions are obtained for lambda 2 > lambda 1.",
-        "sparse where l2 weighs more",
-        f"zeros: {listed}",
-        bool(zeros[0] > zeros[-1]),
-        "the caption is the wrong way round: its own text, and the norms, say that l1 is the sparse one",
-    )
-    yield Statement(
-        "Not the synapses nearest to the target are potentiated most, but the most effective ones.",
-        "most effective synapses",
+    yield Judgement(61, f"zeros: {listed}", rising)
+    yield Judgement(
+        62,
         f"the largest weight (l2) spikes {dense['largest_before_ms']:.1f} ms before the target; "
         f"the kernel peaks at {TABLE['tau']:g} ms",
         abs(dense["largest_before_ms"] - TABLE["tau"]) < 0.25 * TABLE["tau"],

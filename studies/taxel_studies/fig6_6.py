@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import mapping
 from taxel_studies.mapping import TABLE, thresholds
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task, grid, results
+from taxel_studies.study import Judgement, Parameters, Row, Summary, Task, grid, results
 
 WHERE = "thesis 6.4.3, figure 6.6"
 PROTOCOL = (
@@ -84,23 +84,17 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(_p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(_p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.4.3 says."""
-    for reading, norms in summary["readings"].items():
-        why = f"after a spike “{reading}”"
+    for after, norms in summary["readings"].items():
+        reading = f"after a spike “{after}”"
         mean = {norm: c["mean_between"] for norm, c in norms.items()}
-        yield Statement(
-            "For all realisations the weights map the trains to the targets.",
-            "100 of 100, both norms",
-            *mapping.exactness(list(norms.values())),
-            why,
-        )
-        yield Statement(
-            "Between output spikes l1 gives the lower potential.",
-            "l1 below l2",
+        yield Judgement(63, *mapping.exactness(list(norms.values())), reading=reading)
+        yield Judgement(
+            64,
             "mean potential, mV: " + ", ".join(f"{norm} {v}" for norm, v in mean.items()),
             bool(mean["l1"] < mean["l2"]) if None not in mean.values() else None,
-            why,
+            reading=reading,
         )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from taxel_studies import capacity
-from taxel_studies.study import Parameters, Row, Statement, Summary, Task, grid, listed, results, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, Task, grid, listed, results, subplots
 
 WHERE = "thesis 6.4.4, figure 6.7"
 PROTOCOL = (
@@ -67,57 +67,55 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return {"lines": lines, "others": capacity.PUBLISHED}
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.4.4 says, in each reading of what remains after a spike, on the grid and in continuous time."""
-    for reading in p["readings"]:
+    for after in p["readings"]:
         for time in p["times"]:
-            lines = [line for line in summary["lines"] if (line["after_spike"], line["time"]) == (reading, time)]
-            yield from _of(
-                p, lines, f"after a spike “{reading}”, " + ("1 ms grid" if time == "grid" else "every instant")
-            )
+            lines = [line for line in summary["lines"] if (line["after_spike"], line["time"]) == (after, time)]
+            reading = f"after a spike “{after}”, " + ("1 ms grid" if time == "grid" else "every instant")
+            yield from _of(p, lines, reading)
     yield from _price(p, summary)
 
 
-def _of(p: Parameters, lines: list[dict[str, Any]], why: str) -> Iterator[Statement]:
+def _of(p: Parameters, lines: list[dict[str, Any]], reading: str) -> Iterator[Judgement]:
     inputs = np.array(p["inputs"])
     load = np.array([line["load"] for line in lines])
     late, bend = inputs >= SATURATED, inputs == BEND
     if not (late.any() and bend.any()):
         ours = listed(load.mean(axis=0), inputs, ".3f", "N = {:g}")
-        yield Statement("The load factor rises and saturates.", "at about 0.3", f"{ours} (mean over C)", None, why)
+        yield Judgement(65, f"{ours} (mean over C)", None, reading=reading)
         return
     saturated, at_bend = load[:, late].mean(axis=1), load[:, bend].mean()
     by_class = listed(saturated, [line["classes"] for line in lines], ".3f", "C = {:g}")
     best = max(capacity.PUBLISHED.values())
-    yield Statement(
-        f"The load factor increases rapidly until about N = {BEND}, thereafter only little.",
-        f"rapid to {BEND}, then incremental",
+    yield Judgement(
+        65,
         f"{load[:, 0].mean():.3f} at N = {inputs[0]}, {at_bend:.3f} at {BEND}, {load[:, -1].mean():.3f} at "
         f"{inputs[-1]} (mean over C)",
         bool(at_bend - load[:, 0].mean() > load[:, -1].mean() - at_bend),
-        why,
+        reading=reading,
     )
-    yield Statement(
-        "It saturates at about 0.3, whatever the number of classes.",
-        "about 0.3",
+    yield Judgement(
+        66,
         f"mean from N = {SATURATED} on: {by_class}",
         bool(np.all(np.abs(saturated - 0.3) <= 0.03) and np.ptp(saturated) <= 0.03),
-        why,
+        "about: within 0.03, which is ours",
+        reading,
     )
-    yield Statement(
-        "It is significantly higher than what others reported.",
-        ", ".join(f"{name} {value:g}" for name, value in capacity.PUBLISHED.items()),
+    yield Judgement(
+        67,
         f"{load[:, -1].min():.3f} or more at N = {inputs[-1]}",
         bool(load[:, -1].min() > best),
-        f"{why}; theirs were got under other criteria",
+        "theirs were got under other criteria",
+        reading,
     )
 
 
-def _price(p: Parameters, summary: Summary) -> Iterator[Statement]:
-    for reading in p["readings"]:
+def _price(p: Parameters, summary: Summary) -> Iterator[Judgement]:
+    for after in p["readings"]:
         lines = {
             time: np.array(
-                [line["p"] for line in summary["lines"] if (line["after_spike"], line["time"]) == (reading, time)]
+                [line["p"] for line in summary["lines"] if (line["after_spike"], line["time"]) == (after, time)]
             )
             for time in p["times"]
         }
@@ -125,12 +123,12 @@ def _price(p: Parameters, summary: Summary) -> Iterator[Statement]:
             grid, exact = lines["grid"].sum(axis=0), lines["continuous"].sum(axis=0)
             large = np.array(p["inputs"]) >= min(BEND, max(p["inputs"]))
             cost = 100 * (1 - exact[large].sum() / max(grid[large].sum(), 1))
-            yield Statement(
-                "Silence at every instant, not only on the grid, costs little capacity (ours, not the thesis').",
-                "none",
+            yield Judgement(
+                204,
                 f"{cost:.1f} % of p over N from {min(BEND, max(p['inputs']))} on",
                 None,
-                f"after a spike “{reading}”; margin {p['margin']:g} mV, slope {p['slope']:g} mV/ms",
+                f"margin {p['margin']:g} mV, slope {p['slope']:g} mV/ms",
+                f"after a spike “{after}”",
             )
 
 

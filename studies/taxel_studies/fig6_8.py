@@ -14,7 +14,7 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies import waves
 from taxel_studies.mapping import LEARN
-from taxel_studies.study import Parameters, Statement, Summary, one_task, only_result, subplots
+from taxel_studies.study import Judgement, Parameters, Summary, one_task, only_result, subplots
 
 WHERE = "thesis 6.4.5, figure 6.8"
 PROTOCOL = (
@@ -86,14 +86,13 @@ def _drawn(trains: SpikeTrains, params: dict[str, Any], end: float) -> list[list
 summarise = only_result
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.4.5 and the caption say."""
     noises = summary["noises"]
     if "jitter" in noises:
         sd = noises["jitter"]["moved_sd_ms"]
-        yield Statement(
-            "Jitter: each spike is moved by a normal deviate of zero mean.",
-            f"sd {p['levels']['jitter']:g} ms",
+        yield Judgement(
+            69,
             f"sd {sd:.2f} ms over {noises['jitter']['count']} spikes; none lost",
             abs(sd - p["levels"]["jitter"]) < 0.1 * p["levels"]["jitter"]
             and noises["jitter"]["count"] == noises["jitter"]["of"],
@@ -101,9 +100,8 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     if "background" in noises:
         n = noises["background"]
         rate = (n["count"] - n["of"]) / waves.INPUTS / (n["stop"] / 1000)
-        yield Statement(
-            "Background: Poisson spikes are added.",
-            f"{p['levels']['background']:g} Hz",
+        yield Judgement(
+            70,
             f"{rate:.2f} Hz an input",
             abs(rate - p["levels"]["background"]) < 0.15 * p["levels"]["background"],
             "the rate is read as one input's",
@@ -111,20 +109,15 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     if "shunting" in noises:
         n = noises["shunting"]
         lost = 100 * (1 - n["count"] / n["of"])
-        yield Statement(
-            "Shunting: spikes are deleted at random.",
-            f"{p['levels']['shunting']:g} %",
-            f"{lost:.2f} %",
-            abs(lost - p["levels"]["shunting"]) < 0.1,
-        )
+        yield Judgement(71, f"{lost:.2f} %", abs(lost - p["levels"]["shunting"]) < 0.1)
     listed = ", ".join(f"{n} {v['distance']:.2f}" for n, v in noises.items())
     worst = max(v["distance"] for v in noises.values())
-    yield Statement(
-        "A robust solution produces the target train despite noise.",
-        "the bottom panel",
+    yield Judgement(
+        72,
         f"distance over {len(summary['targets'])} targets: {summary['clean_distance']:.2f} without noise, {listed}",
         worst < ROBUST * len(summary["targets"]),
-        f"kappa {p['kappa']:g}, B over the number of targets; robust: below {ROBUST:.0%} of silence",
+        f"kappa {p['kappa']:g}; robust: below {ROBUST:.0%} of silence",
+        waves.READINGS["targets"],
     )
 
 

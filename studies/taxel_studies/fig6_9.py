@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from taxel_studies import waves
-from taxel_studies.study import Parameters, Statement, Summary, Task, listed
+from taxel_studies.study import Judgement, Parameters, Summary, Task, listed
 from taxel_studies.waves import NOISES, READINGS
 
 WHERE = "thesis 6.4.5 and 6.4.6, figure 6.9"
@@ -29,6 +29,8 @@ TOY: dict[str, Any] = {
     "kappas": [1.0, 1.08],
 }
 SIZES = {"toy": TOY}
+#: The claims of 6.4.5 and 6.4.6, by training: jitter, shunting, background below 15 Hz and above.
+CLAIMS_OF = {"clean": (73, 74, 75, 76), "noisy": (77, 78, 79, 80)}
 #: A distance a target by which two kappas count as different: one spike lost in twenty.
 SAME = 0.05
 
@@ -45,36 +47,27 @@ realise = waves.realise
 summarise = waves.summarise
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge what 6.4.5 and 6.4.6 say, in each reading of B."""
-    for reading in p["readings"]:
-        curves = summary["curves"][reading]
-        why = waves.why(reading)
-        for training, source in (("clean", "6.4.5"), ("noisy", "6.4.6")):
-            trained = "noise-free training" if training == "clean" else "noisy training"
-            yield from (
-                _larger_is_better(p, curves[training][noise], noise, f"{source}, {trained}", why)
-                for noise in ("jitter", "shunting")
-                if noise in curves[training]
-            )
-            if "background" in curves[training]:
-                yield from _turn(p, curves[training]["background"], f"{source}, {trained}", why)
-        yield _training_helps(p, curves, why)
+    for divisor in p["readings"]:
+        curves, reading = summary["curves"][divisor], READINGS[divisor]
+        for training, claims in CLAIMS_OF.items():
+            here = curves[training]
+            for claim, noise in zip(claims, ("jitter", "shunting"), strict=False):
+                if noise in here:
+                    yield _larger_is_better(p, here[noise], claim, reading)
+            if "background" in here:
+                yield from _turn(p, here["background"], claims[2:], reading)
+        yield _training_helps(p, curves, reading)
 
 
-def _larger_is_better(p: Parameters, curve: dict[str, Any], noise: str, where: str, why: str) -> Statement:
+def _larger_is_better(p: Parameters, curve: dict[str, Any], claim: int, reading: str) -> Judgement:
     mean = np.array(curve["mean"])[:, [k for k, level in enumerate(curve["levels"]) if level]].mean(axis=1)
     holds = bool(mean[-1] < mean[0] - SAME * p["repetitions"] and np.all(np.diff(mean) < SAME * p["repetitions"]))
-    return Statement(
-        f"A larger kappa makes the neuron more robust against {noise} ({where}).",
-        "columns 1 and 3: lower error",
-        "distance, mean over levels: " + listed(mean, p["kappas"], ".1f"),
-        holds,
-        why,
-    )
+    return Judgement(claim, "distance, mean over levels: " + listed(mean, p["kappas"], ".1f"), holds, reading=reading)
 
 
-def _turn(p: Parameters, curve: dict[str, Any], where: str, why: str) -> Iterator[Statement]:
+def _turn(p: Parameters, curve: dict[str, Any], claims: tuple[int, ...], reading: str) -> Iterator[Judgement]:
     mean, levels = np.array(curve["mean"]), np.array(curve["levels"], float)
     gain = mean[0] - mean[-1]
     low, high = (levels > 0) & (levels < 15), levels > 15
@@ -84,23 +77,21 @@ def _turn(p: Parameters, curve: dict[str, Any], where: str, why: str) -> Iterato
         if levels[k] > 0 and gain[k] > 0 >= gain[k + 1]
     ]
     turn = f"; turns at {turns[0]:.0f} Hz" if turns else ""
-    yield Statement(
-        f"Below 15 Hz of background a larger kappa helps ({where}).",
-        "lower error below 15 Hz",
+    yield Judgement(
+        claims[0],
         "distance, mean below 15 Hz: " + listed(mean[:, low].mean(axis=1), p["kappas"], ".1f"),
         bool(gain[low].mean() > SAME * p["repetitions"]),
-        why,
+        reading=reading,
     )
-    yield Statement(
-        f"Above 15 Hz of background a larger kappa hurts ({where}).",
-        "rapid increase after 15 Hz",
+    yield Judgement(
+        claims[1],
         "distance, mean above 15 Hz: " + listed(mean[:, high].mean(axis=1), p["kappas"], ".1f") + turn,
         bool(gain[high].mean() < -SAME * p["repetitions"]),
-        why,
+        reading=reading,
     )
 
 
-def _training_helps(p: Parameters, curves: dict[str, Any], why: str) -> Statement:
+def _training_helps(p: Parameters, curves: dict[str, Any], reading: str) -> Judgement:
     parts, holds = [], True
     for noise, noisy in curves["noisy"].items():
         clean = curves["clean"][noise]
@@ -109,12 +100,12 @@ def _training_helps(p: Parameters, curves: dict[str, Any], why: str) -> Statemen
         gain = 100 * (1 - after / np.maximum(before, 1e-9))
         holds &= bool(np.all(gain[np.array(p["kappas"]) > 1] > 0))
         parts.append(f"{noise} {listed(gain, p['kappas'], '.0f')}")
-    return Statement(
-        "For all values of kappa training with noise is better, in all three noises (6.4.6).",
-        "significant improvement (figure 6.9c)",
+    return Judgement(
+        81,
         "% less distance, mean over levels: " + "; ".join(parts),
         holds,
-        f"{why}; judged for kappa > 1, as 6.10 has it",
+        "judged for kappa > 1, as 6.10 has it",
+        reading,
     )
 
 

@@ -25,12 +25,27 @@ def information(truth: NDArray[Any], answers: NDArray[Any], *wanted: str) -> dic
     return {name: round(float(values[name]), 4) for name in wanted}
 
 
-def lost(short: Mapping[str, Any], long: Mapping[str, Any], named: Mapping[str, str]) -> tuple[dict[str, float], str]:
-    """Return how many bits less there are of each parameter at the longer of two periods, as a share, and in words."""
-    share = {name: shares((short, long), name) for name in named if name in short["by"]}
-    words = "; ".join(f"{named[name]} {a:.2f} to {b:.2f}" for name, (a, b) in share.items())
-    words += f" of the largest possible bits, from {short['period_ms']:g} to {long['period_ms']:g} ms"
-    return {name: a - b for name, (a, b) in share.items()}, words
+#: How much of a parameter is lost from the shortest period on: on average over the curve, or at its end.
+LOST = ("over the whole curve", "from end to end")
+
+
+def lost(lines: Sequence[Mapping[str, Any]], named: Mapping[str, str], taken: str) -> tuple[dict[str, float], str]:
+    """Return how many bits less there are of each parameter at longer periods, as a share, and in words.
+
+    Parameters
+    ----------
+    lines : a result a period, the shortest first
+    named : of each parameter its name
+    taken : of `LOST`
+    """
+    share = {name: shares(lines, name) for name in named if name in lines[0]["by"]}
+    if taken == LOST[0]:
+        less = {name: of[0] - float(np.mean(of[1:])) for name, of in share.items()}
+        words = "; ".join(f"{named[name]} {by:.3f}" for name, by in less.items())
+        return less, f"{words} of the largest possible bits lost on average"
+    words = "; ".join(f"{named[name]} {of[0]:.2f} to {of[-1]:.2f}" for name, of in share.items())
+    words += f" of the largest possible bits, from {lines[0]['period_ms']:g} to {lines[-1]['period_ms']:g} ms"
+    return {name: of[0] - of[-1] for name, of in share.items()}, words
 
 
 def shares(lines: Sequence[Mapping[str, Any]], name: str) -> list[float]:

@@ -1,4 +1,4 @@
-"""The page of all studies: each figure, its statements with our results, and the studies that were not run."""
+"""The page of all studies: each figure, its claims with our results, and the studies that were not run."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 from taxel.report import write_whole
 from taxel.report.page import render
 from taxel_studies import STUDIES
+from taxel_studies.claims import CLAIMS
 from taxel_studies.study import read_section
 
 
@@ -28,5 +29,5 @@ def write_page(report: Path) -> Path:
     FormatError : a file ``summary.json`` in the folder that is not a study's
     """
     sections = {name: read_section(report / name) for name in STUDIES}
-    text = render("page.html.j2", package="taxel_studies", titles=STUDIES, sections=sections)
+    text = render("page.html.j2", package="taxel_studies", titles=STUDIES, sections=sections, claims=CLAIMS)
     return write_whole(report / "index.html", lambda file: file.write(text.encode()), overwrite=True)

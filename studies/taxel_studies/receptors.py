@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from taxel.encode import FA1, FA2, SA1, SA2, Encoder
 from taxel.frames import Frames
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, grid, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, grid, subplots
 
 WHERE = "thesis 2.1.5, 3.3 and 7.2, which asks for the types beside FA-1"
 PROTOCOL = (
@@ -39,8 +39,8 @@ SIZES = {"toy": {"frequencies_hz": [5, 34, 225], "amplitudes": 12}}
 RANGE, HELD = 100.0, 50.0
 #: When the ramp begins, how long the hold lasts, ms.
 BEGIN, HOLD = 200.0, 1000.0
-#: Where least thresholds are published, Hz: from, to.
-LEAST = {"SA-1": (2.0, 10.0), "FA-1": (20.0, 60.0), "FA-2": (200.0, 250.0)}
+#: The claims on where thresholds are least, and where that is, Hz: from, to.
+LEAST = {"SA-1": (209, 2.0, 10.0), "FA-1": (210, 20.0, 60.0), "FA-2": (211, 200.0, 250.0)}
 PHASES = ("before", "rise", "hold", "fall", "after")
 
 
@@ -108,21 +108,20 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return summary
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge phases and frequencies."""
     fast, slow = (f"{ramp:g}" for ramp in (min(p["ramps_ms"]), max(p["ramps_ms"])))
-    expected: dict[str, tuple[str, Callable[[list[int], list[int]], bool]]] = {
-        "SA-1": ("all through the hold, faster while it begins", lambda q, s: min(q[2], s[2]) > 0 and s[4] == 0),
-        "FA-1": ("rise and fall, not the hold", lambda q, s: min(*q[1:4:2], *s[1:4:2]) > 0 and q[2] == s[2] == 0),
-        "SA-2": ("all through the hold", lambda q, s: min(q[2], s[2]) > 0 and s[4] == 0),
-        "FA-2": ("fast rise and fall alone", lambda q, s: min(q[1], q[3]) > 0 and q[2] == 0 and sum(s) == 0),
+    expected: dict[str, tuple[int, Callable[[list[int], list[int]], bool]]] = {
+        "SA-1": (8, lambda q, s: min(q[2], s[2]) > 0 and s[4] == 0),
+        "FA-1": (6, lambda q, s: min(*q[1:4:2], *s[1:4:2]) > 0 and q[2] == s[2] == 0),
+        "SA-2": (9, lambda q, s: min(q[2], s[2]) > 0 and s[4] == 0),
+        "FA-2": (7, lambda q, s: min(q[1], q[3]) > 0 and q[2] == 0 and sum(s) == 0),
     }
     for kind, one in summary.items():
         quick, gentle = one["phases"][fast], one["phases"][slow]
-        says, holds = expected[kind]
-        yield Statement(
-            f"{kind} fires in {says} of a ramp-and-hold.",
-            "Johansson and Flanagan 2009; thesis 3.3",
+        claim, holds = expected[kind]
+        yield Judgement(
+            claim,
             "; ".join(
                 f"ramp of {ramp} ms: " + ", ".join(f"{name} {n}" for name, n in zip(PHASES, q, strict=True))
                 for ramp, q in ((fast, quick), (slow, gentle))
@@ -131,7 +130,7 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
             "spikes by phase"
             + ("; what the raised threshold held back may fire late, as it sinks" if kind == "FA-1" else ""),
         )
-    for kind, (low, high) in LEAST.items():
+    for kind, (claim, low, high) in LEAST.items():
         if kind not in summary or summary[kind]["least_hz"] is None:
             continue
         first, last = summary[kind]["least_hz"]
@@ -141,21 +140,8 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
         if kind == "FA-1":
             why += "; FA-1 of 5.1 to 5.5 never forgets a change, so that slow ones reach it as fast ones do, and "
             why += "its threshold, raised by each spike, sinks for hundreds of ms"
-        yield Statement(
-            f"The threshold of {kind} is least near {np.sqrt(low * high):.0f} Hz.",
-            f"{low:g} to {high:g} Hz",
-            f"{first:g} to {last:g} Hz" if first != last else f"{first:g} Hz",
-            bool(low <= last and first <= high),
-            why,
-        )
-
-
-def tables(p: Parameters, summary: Summary) -> Iterator[Table]:
-    """List thresholds by frequency."""
-    head = ["Hz", *(f"{f:g}" for f in p["frequencies_hz"])]
-    rows = [[kind, *("-" if a is None else f"{a:.3g}" for a in one["thresholds"])] for kind, one in summary.items()]
-    note = "shares of the range, peak to peak, at which every cycle has a spike; - where the whole range does not do"
-    yield Table("thresholds by frequency", head, rows, note)
+        ours = f"{first:g} to {last:g} Hz" if first != last else f"{first:g} Hz"
+        yield Judgement(claim, ours, bool(low <= last and first <= high), why)
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

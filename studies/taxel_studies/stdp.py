@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from taxel.spikes import SpikeTrains
 from taxel_rules import STDP
-from taxel_studies.study import Parameters, Row, Statement, Summary, Table, Task, grid, subplots
+from taxel_studies.study import Judgement, Parameters, Row, Summary, Task, grid, subplots
 
 WHERE = "thesis 3.6.2, which calls for it; Masquelier, Guyonneau and Thorpe 2008, PLoS ONE 3:e1377"
 PROTOCOL = (
@@ -175,16 +175,14 @@ def summarise(_p: Parameters, rows: Sequence[Row]) -> Summary:
     return {"runs": len(rows), "good": len(good), "median": middle, "course": shown["course"]}
 
 
-def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
+def judge(p: Parameters, summary: Summary) -> Iterator[Judgement]:
     """Judge the rate of success and what the neuron learnt."""
     share = 100 * summary["good"] / summary["runs"]
     # Two standard deviations of a count of so many runs.
     give = 200 * np.sqrt(0.96 * 0.04 / summary["runs"])
     enough = p["parts"] * p["seconds"] >= 450 and summary["runs"] >= ENOUGH_RUNS
-    yield Statement(
-        "A neuron finds the pattern: it meets over 98 % of the last 150 s, 10 ms from its start or sooner, and "
-        "fires at nothing else.",
-        f"{PUBLISHED:g} % of 100 runs",
+    yield Judgement(
+        215,
         f"{share:.0f} % of {summary['runs']} runs of {p['parts']} x {p['seconds']} s",
         bool(abs(share - PUBLISHED) <= give + 0.5) if enough else None,
         f"held to be within {give:.0f} %, of {ENOUGH_RUNS} runs or more; how rates wander is stated by the paper "
@@ -192,24 +190,13 @@ def statements(p: Parameters, summary: Summary) -> Iterator[Statement]:
     )
     middle = summary["median"]
     if summary["good"]:
-        yield Statement(
-            "It is found within seconds.",
-            "13.5 s in the paper's example",
-            f"after {middle['found_s']:.1f} s no spike is outside the pattern any more (median)",
-            middle["found_s"] < 60,
-        )
-        yield Statement(
-            "Strong weights are those of inputs that play the pattern.",
-            "all of them",
+        found = f"after {middle['found_s']:.1f} s no spike is outside the pattern any more (median)"
+        yield Judgement(216, found, middle["found_s"] < 60)
+        yield Judgement(
+            217,
             f"{middle['strong_in_pattern']:.0f} of {middle['strong']:.0f} weights above 0.5 (median)",
             middle["strong_in_pattern"] >= 0.99 * middle["strong"],
         )
-
-
-def tables(_p: Parameters, summary: Summary) -> Iterator[Table]:
-    """List the medians of the runs that succeed."""
-    rows = [[name, "-" if value is None else f"{value:g}"] for name, value in summary["median"].items()]
-    yield Table("runs that succeed, medians", ["what", "value"], rows, f"{summary['good']} of {summary['runs']} runs")
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

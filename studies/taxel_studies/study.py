@@ -1,4 +1,4 @@
-"""A study: a protocol, its parameters, the published values as data, a picture, and judged statements."""
+"""A study: a protocol, its parameters, the published values as data, a picture, and judged claims."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from taxel_studies.commit import code_version
 from taxel_studies.runner import Kept, Row, Task, grid, make, run
 
 __all__ = [
+    "Judgement",
     "Kept",
     "Parameters",
     "Row",
     "Section",
-    "Statement",
     "Study",
     "Summary",
     "Table",
@@ -53,7 +53,7 @@ __all__ = [
 
 #: Experiment parameters by name: what JSON can hold.
 Parameters = Mapping[str, Any]
-#: The results of a study, as JSON holds them: enough to judge its statements and to draw its picture.
+#: The results of a study, as JSON holds them: enough to judge claims and to draw its picture.
 Summary = dict[str, Any]
 #: One study's part of the page, as ``summary.json`` holds it.
 Section = dict[str, Any]
@@ -96,27 +96,27 @@ def forecast(names: Sequence[str], size: str, jobs: int) -> str:
 
 
 @dataclass(frozen=True)
-class Statement:
-    """A published statement with its value and ours.
+class Judgement:
+    """A claim of ``claims.toml`` judged by our result, in one reading of it.
 
     Attributes
     ----------
-    says : str
-        The statement, in the source's words or close to them.
-    published : str
-        Its value.
+    claim : int
+        Its number.
     ours : str
     holds : bool, optional
         None: it cannot be judged (the published picture is lost, or too little was run).
     why : str
-        Why it does not hold; or the reading under which it does.
+        Why it does not hold, or what counts as holding.
+    reading : str
+        "" where it has one alone.
     """
 
-    says: str
-    published: str
+    claim: int
     ours: str
     holds: bool | None
     why: str = ""
+    reading: str = ""
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ class Table:
 
 
 #: What a module must define to be a study, and what it may define.
-_REQUIRED = ("WHERE", "PROTOCOL", "PARAMETERS", "SIZES", "tasks", "realise", "summarise", "statements", "draw")
+_REQUIRED = ("WHERE", "PROTOCOL", "PARAMETERS", "SIZES", "tasks", "realise", "summarise", "judge", "draw")
 _OPTIONAL = ("shared", "tables", "DATA")
 
 
@@ -172,7 +172,8 @@ class Study:
         Pure.
     summarise : function of (parameters, rows)
         Plain values for JSON: numbers and curves.
-    statements : function of (parameters, summary)
+    judge : function of (parameters, summary)
+        Judges claims.
     draw : function of (parameters, summary)
         The picture, as the source draws it; or several.
     shared : function of parameters, optional
@@ -192,7 +193,7 @@ class Study:
     tasks: Callable[..., Sequence[Task]]
     realise: Callable[..., Any]
     summarise: Callable[..., Summary]
-    statements: Callable[[Parameters, Summary], Iterable[Statement]]
+    judge: Callable[[Parameters, Summary], Iterable[Judgement]]
     draw: Callable[[Parameters, Summary], Figure | Sequence[Figure]]
     shared: Callable[[Parameters], Sequence[tuple[Any, ...]]] | None = None
     tables: Callable[[Parameters, Summary], Iterable[Table]] | None = None
@@ -303,7 +304,7 @@ class Study:
             "parameters": parameters,
             "changed": sorted(changes or {}),
             "realisations": len(rows),
-            "statements": [asdict(s) for s in self.statements(parameters, summary)],
+            "judgements": [asdict(one) for one in self.judge(parameters, summary)],
             "tables": [asdict(t) for t in self.tables(parameters, summary)] if self.tables is not None else [],
             "said": summary,
             "cpu_seconds": round(sum(row.seconds for row in [*made, *rows]), 1),

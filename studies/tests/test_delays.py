@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from taxel.learn import ConeX
+from taxel.neuron import Neuron
 from taxel_studies import delays
 from taxel_studies.capacity import patterns
+from taxel_studies.mapping import LEARN, TABLE
 
 PARAMS = {"inputs": 40, "classes": 3, "longest_ms": 90.0, "time": "continuous", "arm": "none"}
 
@@ -28,3 +31,15 @@ def test_what_l1_chooses_fires_at_the_targets_and_nowhere_else(arm: str) -> None
     result = delays.realise({**params, "asks": "weights", "share": 0.15}, 1)
     assert result["weights"] == np.count_nonzero(np.abs(cone.weights_) > delays.NONE)
     assert result["heard"] <= result["weights"] < len(cone.weights_)
+
+
+def test_decays_of_one_kind_leave_the_weights_that_cone_leaves_on_the_grid() -> None:
+    params = {"inputs": 60, "classes": 3, "share": 0.15, "asks": "decays", "taus_ms": [TABLE["tau"]]}
+    cone = ConeX(neuron=Neuron(**TABLE, time="grid"), **LEARN, lambdas=(1.0, 0.0, 0.0), horizon=200.0, margin=0.0)
+    cone.fit(*patterns(1, 60, 9, 3))
+    result = delays.realise(params, 1)
+    assert result == {"p": 9, "solved": True, "weights": result["heard"], "heard": result["weights"]}
+    assert result["weights"] == np.count_nonzero(np.abs(cone.weights_) > delays.NONE)
+    more = delays.realise({**params, "taus_ms": [7.5, TABLE["tau"], 30.0]}, 1)
+    assert more["solved"]
+    assert more["heard"] <= more["weights"]

@@ -1,4 +1,4 @@
-"""Figure 6.10: the statements on dense and sparse weights follow from the curves, whichever way they go."""
+"""Figure 6.10: the judgements on dense and sparse weights follow from the curves, whichever way they go."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ def test_the_verdict_is_of_the_levels_asked_about_and_turns_with_the_curves(spar
     levels = [0.0, 1.0, 2.0, 3.0]
     dense = [0.0, 1.0, 1.0, 9.0]
     curve = {"levels": levels, "mean": [dense, [d + sparse_gains for d in dense]]}
-    summary = fig6_10._compared("Dense is better.", curve, "ms", True, (0.5, 2.0), "")
+    summary = fig6_10._compared(82, curve, "ms", True, (0.5, 2.0), "")
     assert summary.holds is (sparse_gains > 0)
     assert f"1.00 dense (0 : 4), {1 + sparse_gains:.2f} sparse" in summary.ours, "the level of 3 is not asked about"
     assert "do not cross" in summary.ours
-    other = fig6_10._compared("Sparse is better.", curve, "ms", False, (0.5, 2.0), "")
+    other = fig6_10._compared(83, curve, "ms", False, (0.5, 2.0), "")
     assert other.holds is (sparse_gains < 0)
 
 

@@ -47,9 +47,9 @@ def test_a_report_of_another_commit_or_beside_local_changes_is_not_kept(
 
 
 @pytest.mark.parametrize("file", sorted(figures.FIGURES.glob("*.json")), ids=lambda file: file.stem)
-def test_statements_are_judged_from_the_numbers_that_stand_beside_them(file: Path) -> None:
+def test_claims_are_judged_from_the_numbers_that_stand_beside_them(file: Path) -> None:
     section = json.loads(file.read_text())
-    assert section["statements"] == figures.judged(section), "run docs/figures.py"
+    assert section["judgements"] == figures.judged(section), "run docs/figures.py"
 
 
 def test_a_run_says_first_how_long_it_takes(

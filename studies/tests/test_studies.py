@@ -1,4 +1,4 @@
-"""Every study at toy size: its statements, its picture, its part of the page; and the command line."""
+"""Every study at toy size: its judgements, its picture, its part of the page; and the command line."""
 
 from __future__ import annotations
 
@@ -18,8 +18,10 @@ import pytest
 
 from taxel.cli import main
 from taxel_studies import STUDIES, load
+from taxel_studies.claims import CLAIMS
 from taxel_studies.page import write_page
 from taxel_studies.runner import Kept
+from taxel_studies.waves import READINGS
 
 #: Studies on recordings have tests of their own; published ones lie elsewhere.
 MADE_HERE = [name for name in STUDIES if not load(name).data]
@@ -55,16 +57,14 @@ def ends(arguments: list[str]) -> int:
 
 
 @pytest.mark.parametrize("name", EACH)
-def test_a_study_of_toy_size_gives_its_statements_and_a_picture(report, first_run, name):
+def test_a_study_of_toy_size_judges_claims_and_gives_a_picture(report, first_run, name):
     assert load(name).name == name
     section = first_run(name)
     assert section["title"] == STUDIES[name]
-    for statement in section["statements"]:
-        assert statement["says"].endswith(".")
-        assert statement["published"]
-        assert statement["ours"]
-        assert statement["holds"] in (True, False, None)
-        assert statement["holds"] is not False or statement["why"]
+    for judged in section["judgements"]:
+        assert judged["claim"] in CLAIMS
+        assert judged["ours"]
+        assert judged["holds"] in (True, False, None)
     assert (report / name / "summary.json").exists()
     for picture in json.loads((report / name / "summary.json").read_text())["pictures"]:
         data = (report / name / picture).read_bytes()
@@ -98,12 +98,9 @@ def test_a_study_gives_its_kept_toy_result(first_run, name):
 
 @pytest.mark.parametrize("name", ["fig6.1", "fig6.2", "fig6.3", "fig6.4", "fig6.5", "fig6.6", "fig6.8", "fig6.9"])
 def test_what_the_thesis_says_holds_at_toy_size(first_run, name):
-    """All but one caption; of 6.9 in the reading of B that gives kappa its power."""
-    for statement in first_run(name)["statements"]:
-        if statement["says"].startswith("Caption"):
-            assert not statement["holds"], statement
-        elif name != "fig6.9" or not statement["why"].startswith("B over B_max"):
-            assert statement["holds"], statement
+    """Of 6.9 in the readings of B that give kappa its power."""
+    for judged in first_run(name)["judgements"]:
+        assert judged["holds"] or (name == "fig6.9" and judged["reading"] == READINGS["B_max"]), judged
 
 
 @pytest.mark.parametrize("name", EACH)
@@ -113,7 +110,7 @@ def test_a_second_run_reckons_nothing_again_and_says_the_same(report, first_run,
     second = load(name).run(report, size="toy", quiet=True)
     assert set((report / "cache").rglob("output.pkl")) == results
     assert second["said"] == first["said"]
-    assert second["statements"] == first["statements"]
+    assert second["judgements"] == first["judgements"]
 
 
 @pytest.mark.parametrize("name", EACH)

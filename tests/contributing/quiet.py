@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
-from taxel_studies.study import Parameters, Row, Statement, Summary, grid, results
+from taxel_studies.study import Judgement, Parameters, Row, Summary, grid, results
 
 WHERE = "after thesis 6.2"
 PROTOCOL = "Trains of one random spike each, all of one small weight; output spikes within 200 ms."
@@ -36,10 +36,10 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     return {str(n): float(np.mean(results(rows, inputs=n))) for n in p["inputs"]}
 
 
-def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Judge whether few inputs leave the neuron silent."""
+def judge(p: Parameters, summary: Summary) -> list[Judgement]:
+    """Judge claim 300: few weak inputs do not reach the threshold."""
     least = summary[str(min(p["inputs"]))]
-    return [Statement("Few weak inputs do not reach the threshold.", "none", f"{least:g} spikes", least == 0)]
+    return [Judgement(300, f"{least:g} spikes", least == 0)]
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

@@ -3,16 +3,16 @@
 The files in the order of their use: `sources` (recordings, their truth, their spikes), `insole` (the cells of an insole
 under a footfall on a plate), `pieces`, `recipes` (all parameters, as data), `rules` (the plain rules beside the
 neuron), `protocols` (which folds), `fits` (one fit and its test), `outcomes` (the fits of a run and their summary),
-`judgement` (statements and tables) and `pictures`.
+`judgement` (claims and tables) and `pictures`.
 """
 
 from taxel_studies.gait.fits import realise
-from taxel_studies.gait.judgement import statements, tables
+from taxel_studies.gait.judgement import judge, tables
 from taxel_studies.gait.outcomes import PARAMETERS, SIZES, summarise, tasks
 from taxel_studies.gait.pictures import draw
 from taxel_studies.gait.sources import SOURCES
 
-__all__ = ["PARAMETERS", "SIZES", "draw", "realise", "statements", "summarise", "tables", "tasks"]
+__all__ = ["PARAMETERS", "SIZES", "draw", "judge", "realise", "summarise", "tables", "tasks"]
 
 WHERE = "thesis 6.5, figures 6.12 to 6.14, Table 6.2"
 PROTOCOL = (
