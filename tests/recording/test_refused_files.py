@@ -120,3 +120,19 @@ def test_a_value_that_a_column_of_events_does_not_hold_is_refused_with_its_place
     with refused(FormatError, place=Place(path.name)) as caught:
         taxel.open(path)
     assert f"{column}[149]" in caught.value.args[0]
+
+
+@pytest.mark.parametrize("name", ["a.json", "a.jsonl", "a.csv"])
+@pytest.mark.parametrize(("begin", "end"), ["[]", ('{"a":', "}")])
+def test_json_of_any_depth_is_refused(name: str, begin: str, end: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(f"{begin * 20_000}1{end * 20_000}\n" * 3)
+    with pytest.raises(FormatError):
+        taxel.open(tmp_path / name)
+
+
+@pytest.mark.parametrize("save", [np.save, np.savez])
+def test_labels_of_an_array_without_records_are_refused(save: Any, tmp_path: Path) -> None:
+    name = "a.npy" if save is np.save else "a.npz"
+    save(tmp_path / name, np.arange(3))
+    with refused(FormatError, place=Place(name)):
+        taxel.Labels(tmp_path / name)
