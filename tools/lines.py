@@ -10,6 +10,7 @@ import argparse
 import json
 import re
 import subprocess
+import sys
 from collections import Counter
 from pathlib import Path
 
@@ -23,40 +24,44 @@ SUFFIXES = {".rs", ".py", ".js", ".mjs", ".css", ".html", ".j2"}
 MODULES = "python/taxel"
 #: The rooms: the goal of this round, and folders or modules.
 PRODUCT = {
-    "taxel-core": (21_000, "crates/taxel-core/src"),
-    "taxel-live": (7_500, "crates/taxel-live/src"),
-    "taxel-panel": (2_000, "crates/taxel-panel/src"),
-    "page": (3_600, "python/taxel/panel/web"),
-    "border": (3_400, "crates/taxel-python/src crates/taxel-border/src"),
-    "nouns": (1_600, "__init__ array event_table events frames spikes tare calibration clock plot"),
-    "labels, wire, neuron": (1_100, "labels detections recorded reading verdict wire neuron"),
-    "_base": (900, "_base"),
-    "formats": (1_250, "formats"),
-    "recording": (2_200, "recording"),
-    "encode, metrics": (730, "encode metrics"),
-    "learn": (1_050, "learn"),
-    "detect": (2_400, "detect"),
-    "information": (1_300, "information"),
-    "simulate": (870, "simulate"),
-    "tasks": (1_400, "tasks options"),
-    "live, panel": (2_650, "live panel device serial_ports board_check"),
-    "report, demo": (550, "report demo"),
-    "command line": (2_000, "cli __main__"),
+    "taxel-core": (23_500, "crates/taxel-core/src"),
+    "taxel-live": (8_300, "crates/taxel-live/src"),
+    "taxel-panel": (2_650, "crates/taxel-panel/src"),
+    "page": (4_200, "python/taxel/panel/web"),
+    "border": (3_450, "crates/taxel-python/src crates/taxel-border/src"),
+    "nouns": (1_950, "__init__ array event_table events frames spikes tare calibration clock plot"),
+    "labels, wire, neuron": (1_170, "labels detections recorded reading verdict wire neuron"),
+    "_base": (1_500, "_base"),
+    "formats": (2_950, "formats"),
+    "recording": (2_850, "recording"),
+    "encode, metrics": (640, "encode metrics"),
+    "learn": (1_070, "learn"),
+    "detect": (2_900, "detect"),
+    "information": (1_580, "information"),
+    "simulate": (940, "simulate"),
+    "tasks": (1_600, "tasks options"),
+    "live, panel": (3_800, "live panel device serial_ports board_check"),
+    "report, demo": (760, "report demo"),
+    "command line": (2_600, "cli __main__"),
     "other modules": (0, MODULES),
 }
 BESIDE = {
-    "studies": (7_500, "studies/taxel_studies"),
+    "studies": (8_000, "studies/taxel_studies"),
     "benchmarks": (3_200, "benchmarks/taxel_benchmarks"),
     "rules": (2_000, "rules/src rules/taxel_rules"),
     "viewers": (120, "viewers/taxel_viewers"),
     "bridge": (150, "bridge/taxel_bridge bridge/zenoh"),
+    "gait": (3_000, "gait/taxel_gait"),
 }
 PLACES = {
     place if "/" in place else f"{MODULES}/{place}": room
     for room, (_, places) in (PRODUCT | BESIDE).items()
     for place in places.split()
 }
-GOALS = {"product": 58_000, "with what stands beside it": 71_000, "tests in Python": 25_000, "words by hand": 28_000}
+#: The product's is 69 000, and 900 for detections in regions.
+GOALS = {"product": 69_900, "with what stands beside it": 86_370, "tests in Python": 25_500, "words by hand": 28_500}
+#: Lines that the product may lose before its numbers must be kept anew: larger ones would hide what grows.
+STALE = 100
 TEST_MODULE = re.compile(r"#\[cfg\(test\)\]\s*(?:pub(?:\(\w+\))?\s+)?mod\s+\w+\s*(;|\{)")
 #: Pages that are built, and what is made in others.
 BUILT = {"measured.md", "results.md"}
@@ -95,7 +100,7 @@ def room_of(file: Path) -> str | None:
 
 
 def counted() -> tuple[Counter[str], Counter[str]]:
-    """Return the lines of each room, and those of the tests in either language."""
+    """Return the lines of each room, and those of the tests in either language, and of the feet's apart."""
     rooms, tests = Counter[str](), Counter[str]()
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
@@ -110,6 +115,7 @@ def counted() -> tuple[Counter[str], Counter[str]]:
             continue
         code, inner = code_lines(ROOT / file)
         language = "tests in Rust" if file.suffix == ".rs" else "tests in Python"
+        language = "tests of gait" if file.parts[0] == "gait" else language
         if "tests" in file.parts or file.name == "tests.rs":
             tests[language] += code + inner
         elif room := room_of(file):
@@ -125,10 +131,14 @@ def words() -> int:
 
 
 def main() -> None:
-    """Print a row for each room and the sums, or the rooms that grew since the numbers were kept."""
+    """Print a row for each room and the sums, or the rooms that grew since; end with 1 where they are kept no longer."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--keep", action="store_true", help="keep the numbers in tools/lines.json")
-    parser.add_argument("--grown", action="store_true", help="print only the rooms that grew since they were kept")
+    parser.add_argument(
+        "--grown",
+        action="store_true",
+        help="print only the rooms that grew since they were kept; 1 where what was kept is too large",
+    )
     asked = parser.parse_args()
     rooms, tests = counted()
     product, beside = (sum(rooms[name] for name in table) for table in (PRODUCT, BESIDE))
@@ -143,6 +153,8 @@ def main() -> None:
         for name in now:
             if now[name] > kept.get(name, 0):
                 print(f"tools/lines.py: {name} grew from {kept.get(name, 0)} to {now[name]}")
+        if product < kept["product"] - STALE:
+            sys.exit(f"tools/lines.py: the product has {product} lines, {kept['product']} kept: run it with --keep")
         return
     print(f"{'':27} {'now':>7} {'kept':>7} {'goal':>7}")
     for name, lines in now.items():

@@ -37,6 +37,8 @@ def test_other_pages_quote_at_most_ten_results_that_stand_on_the_page() -> None:
     ]
     assert 0 < len(quotes) <= 10, quotes
     sections = {part.split("\n")[0].lower().replace(" ", "-"): part for part in RESULTS.split("\n## ")[1:]}
+    # Of detections, those of what runs: the first column of numbers.
+    sections["detections"] = re.sub(r"^(\| .*? \| .*? \|).*", r"\1", sections["detections"], flags=re.MULTILINE)
     for text, heading in quotes:
         numbers = re.findall(r"\d+(?:\.\d+)?", text)
         assert all(re.search(rf"(?<![\d.]){re.escape(number)}(?![\d.])", sections[heading]) for number in numbers), text

@@ -50,6 +50,19 @@ def test_a_damaged_file_is_read_or_one_clear_error(
     assert path.stem in said
 
 
+@pytest.mark.parametrize("how", ["external", "virtual", "link"])
+def test_no_byte_of_another_file_is_read_by_one_of_the_plate(how: str, tmp_path: Path) -> None:
+    path = making.write_plate(tmp_path)
+    with h5py.File(path, "r+") as h5:
+        if how == "link":
+            del h5["img001"]
+            h5["img001"] = h5py.ExternalLink(making.write_plate(tmp_path, "other"), "img001")
+        else:
+            making.elsewhere(h5, "img001", how)
+    with pytest.raises(taxel.FormatError, match="in this file"):
+        taxel.open_all(path)
+
+
 @given(seed=st.integers(0, 2**32 - 1), start=st.integers(0, 8), sensors=st.integers(8, 20))
 def test_interpolated_rows_come_back_within_one_count(seed: int, start: int, sensors: int) -> None:
     rng = np.random.default_rng(seed)

@@ -41,6 +41,22 @@ def footfall(seed: int) -> np.ndarray:
     return np.where(load > 20, load + rng.integers(0, 9, load.shape), 0).astype(np.int64)
 
 
+def elsewhere(file: h5py.File, name: str, how: str) -> None:
+    """Let the values of a data set be those of another file, beside or anywhere."""
+    values = file[name][()]
+    del file[name]
+    if how == "external":
+        place = Path(file.filename).with_name("secret")
+        place.write_bytes(values.tobytes())
+        file.create_dataset(name, values.shape, values.dtype, external=[(str(place), 0, values.nbytes)])
+        return
+    with h5py.File(Path(file.filename).with_name("secret.h5"), "w") as secret:
+        secret["values"] = values
+        layout = h5py.VirtualLayout(values.shape, values.dtype)
+        layout[...] = h5py.VirtualSource(secret["values"])
+    file.create_virtual_dataset(name, layout)
+
+
 def write_plate(folder: Path, person: str = "subj900", count: int = 2) -> Path:
     file = folder / f"{person}.h5"
     with h5py.File(file, "w") as h5:

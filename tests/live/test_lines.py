@@ -6,17 +6,24 @@ import contextlib
 import json
 import os
 import pty
+import shutil
 import socket
+import subprocess
+import sys
 import threading
+import time
 import tty
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
+from children.marked import TAXEL
 from loopback import until
 from shell import call
 
 import taxel
+from taxel import ProblemError
 from taxel.live import Live
 
 LOOPBACK = "127.0.0.1"
@@ -198,3 +205,56 @@ def test_the_rest_of_a_line_amid_which_reading_began_is_no_fault(tmp_path: Path,
     assert (dict(verdict.damaged), dict(verdict.noted)) == ({}, {})
     recording = taxel.open(tmp_path / "a.mcap").sources["imu"]
     assert recording.frames().values[:, 0].tolist() == [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
+
+
+@pytest.mark.parametrize("came", [b"", b"9" * 10_000_000, b"9" * 100, b"\xff\n" * 1000])
+def test_where_no_line_came_it_is_said_how_many_bytes_did(tmp_path: Path, came: bytes) -> None:
+    place, said = tmp_path / "pipe", f"{sum(map(len, came.splitlines()))} bytes arrived"
+    with writing(place, [came]), pytest.raises(ProblemError) as caught:
+        Live(0, host=LOOPBACK, sources=f"lines:{place},array=4x4")
+    assert (said in str(caught.value), "no line arrived" in str(caught.value)) == (bool(came), not came)
+
+
+#: Sets the clock of a program back, as soon as a file is there.
+SET_BACK = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdlib.h>
+#include <sys/time.h>
+#include <time.h>
+#include <unistd.h>
+static long ahead(void) { return access(getenv("SET_BACK"), F_OK) == 0 ? 10 : 0; }
+int clock_gettime(clockid_t which, struct timespec *now) {
+    int (*of_system)(clockid_t, struct timespec *) = dlsym(RTLD_NEXT, "clock_gettime");
+    int failed = of_system(which, now);
+    if (which == CLOCK_REALTIME) now->tv_sec -= ahead();
+    return failed;
+}
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux" or shutil.which("cc") is None, reason="needs a C compiler on Linux")
+def test_a_computers_clock_that_is_set_back_tears_no_lines_apart(tmp_path: Path) -> None:
+    (tmp_path / "back.c").write_text(SET_BACK)
+    shim, place, path, back = (tmp_path / name for name in ("back.so", "pipe", "a.mcap", "is set back"))
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", shim, tmp_path / "back.c", "-ldl"], check=True)
+    os.mkfifo(place)
+    source = f"lines:{place},array=1x2,rate=50"
+    typed = (TAXEL, "record", path, "--host", LOOPBACK, "--source", source, "--seconds", "4")
+    environment = os.environ | {"LD_PRELOAD": str(shim), "SET_BACK": str(back)}
+    with (
+        subprocess.Popen(typed, env=environment, stderr=subprocess.PIPE, text=True) as recording,
+        contextlib.suppress(BrokenPipeError),
+        place.open("wb", buffering=0) as pipe,
+    ):
+        while recording.poll() is None:
+            pipe.write(b"1,2\n")
+            time.sleep(0.02)
+            if path.exists() and path.stat().st_size > 8000:
+                back.touch()
+    assert back.exists()
+    steps_us = np.diff(taxel.open(path).sources["frames"].frames().t)
+    assert len(steps_us) > 60
+    # Lines that waited together have times one after the other, and no others have.
+    assert (steps_us < 1000).mean() < 0.3
+    assert steps_us.max() < 2_000_000

@@ -3,6 +3,7 @@
 import gzip
 import io
 
+import h5py
 import numpy as np
 import pytest
 from refusal import messages
@@ -14,6 +15,13 @@ from taxel import FormatError
 def npz(**columns: object) -> bytes:
     file = io.BytesIO()
     np.savez(file, **columns)
+    return file.getvalue()
+
+
+def h5_of_another_file() -> bytes:
+    file = io.BytesIO()
+    with h5py.File(file, "w") as h5:
+        h5.create_dataset("pressure", (20, 3), "f8", external=[("secret", 0, 480)])
     return file.getvalue()
 
 
@@ -49,6 +57,7 @@ FILES = [
     ("a.txt", b"hello"),
     ("a.h5", b"\x89HDF\r\n\x1a\n"),
     ("a.h5", b"hello"),
+    ("a.h5", h5_of_another_file()),
     ("a.bag", b"#ROSBAG V2.0"),
 ]
 

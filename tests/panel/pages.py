@@ -166,8 +166,9 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
         board = threading.Thread(target=play, args=["{}:{}".format(*live.address)])
         board.start()
         try:
-            with Panel(live, control=control.get(timeout=PATIENCE), folder=folder) as panel:
-                yield SimpleNamespace(url=panel.url, folder=folder)
+            place = control.get(timeout=PATIENCE)
+            with Panel(live, control=place, folder=folder) as panel:
+                yield SimpleNamespace(url=panel.url, folder=folder, control=place)
         finally:
             over.set()
             board.join()

@@ -64,9 +64,12 @@ def test_a_foreign_or_nameless_visitor_is_not_let_in(panel):
         assert answer.status == status, (path, headers)
         assert "default-src 'self'" in answer.headers["Content-Security-Policy"]
         line.close()
-    line = http.client.HTTPConnection(*panel.address, timeout=SOON)
-    line.request("POST", "/", b"")
-    assert line.getresponse().status == 405
+    for method, body, status in (("POST", b"", 405), ("POST", b"x" * 100_000, 400), ("GET", b"x", 400)):
+        line = http.client.HTTPConnection(*panel.address, timeout=SOON)
+        line.request(method, "/", body)
+        answer = line.getresponse()
+        assert (answer.status, "Content-Security-Policy" in answer.headers) == (status, True)
+        line.close()
 
 
 NONSENSE = [

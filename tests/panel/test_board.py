@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from panel.pages import live as by_tcp
 from panel.protocol import (
     ADDRESS,
     Client,
@@ -19,7 +20,9 @@ import taxel
 import taxel.device
 from taxel.detect.board import summary
 from taxel.simulate import Board, Version2
-from taxel.wire import Registers
+from taxel.wire import Command, Registers
+
+__all__ = ["by_tcp"]
 
 
 def test_the_ports_of_the_machine_are_told(panel):
@@ -104,3 +107,26 @@ def test_a_raised_noise_floor_reaches_the_readout_and_is_told_once(tmp_path):
         # Where its registers were read while it measured its own rest, they had a floor of 0.
         assert [("7 ticks" in text, "2 ticks" in text) for text in told[-2:]] == [(True, False), (False, True)]
         assert len(told) <= 3
+
+
+def noticed(page, register, value):
+    """Wait until the page is told of a register's value, and that frames are counted on."""
+    while page.until("registers", known=True)["values"][register] != value:
+        pass
+    page.until("counters")
+
+
+def test_registers_that_another_program_writes_are_noticed(tmp_path):
+    with page_of_a_board(tmp_path, wire_version=2) as (board, _, page):
+        page.until("registers", known=True)
+        with board.one_at_a_time:
+            board.board.command(Command(5, 9 << 8).to_bytes())
+        noticed(page, "noise_floor", 9)
+
+
+def test_a_line_that_another_program_takes_is_opened_again(by_tcp):
+    with Client(door(by_tcp.url)) as page:
+        page.until("registers", known=True)
+        with taxel.device.Device(by_tcp.control) as device:
+            device.set(threshold_rest=17)
+        noticed(page, "threshold_rest", 17)

@@ -107,3 +107,20 @@ def test_several_changes_are_one_request_that_is_done_or_not(walk, table):
         assert held(table).total() == 524
         assert page.ask("undo")["type"] == "done"
         assert held(table).total() == 523
+
+
+@pytest.mark.parametrize("kind", ["pipe", "link that leads nowhere", "folder"])
+def test_labels_are_in_regular_files_alone_and_nobody_waits_for_another(walk, table, kind):
+    elsewhere = walk.with_name("elsewhere")
+    if kind == "pipe":
+        os.mkfifo(table)
+    elif kind == "folder":
+        table.mkdir()
+    else:
+        table.symlink_to(elsewhere)
+    with Panel(walk) as panel, Client(panel) as page, Client(panel) as other:
+        for client in (page, other):
+            assert opened(client) == []
+            assert "no regular file" in client.since_asked("warning")["text"]
+            assert client.mark("heel", 5)["type"] == "refused"
+    assert not elsewhere.exists()

@@ -223,3 +223,20 @@ def test_events_look_the_same_from_any_file(tmp_path):
     for t_us in (2_500_000, 400_000):
         assert len({tuple(shown[name, t_us]) for name in files}) == 1
     assert {file.name for file in tmp_path.iterdir()} == files
+
+
+def test_while_a_recording_runs_no_file_of_another_program_is_opened(live, panel, tmp_path):
+    """Such a file may need all memory of the process that records."""
+    events = taxel.Events([0, 1000], [1, 1], [2, 2], [True, False], array=live.array)
+    for name in ("walk.mcap", "walk.lsa", "walk.csv", "walk.h5"):
+        taxel.convert(events, tmp_path / name)
+    with Client(panel) as page:
+        opened(page, "walk.csv")
+        assert page.ask("record", name="new")["type"] == "done"
+        for name, answer in (("walk.mcap", "done"), ("walk.lsa", "done"), ("walk.h5", "refused")):
+            told = page.ask("open", name=name)
+            assert (told["type"], told.get("field")) == (answer, None if answer == "done" else "name"), name
+        assert ".mcap and .lsa only" in told["reason"]
+        assert page.ask("stop")["type"] == "done"
+        page.since_asked("recorder", state="idle")
+        assert page.ask("open", name="walk.h5")["type"] == "done"

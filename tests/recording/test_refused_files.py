@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 from refusal import refused
+from tests.formats.making import elsewhere
 
 import taxel
 from taxel import FormatError
@@ -18,7 +19,7 @@ from taxel._base import limits
 from taxel._base.arrays import read_arrays, shapes
 from taxel._base.errors import Place
 
-from .making import record, some_events
+from .making import record, some_events, some_frames
 
 
 @pytest.mark.parametrize("values", [np.array([1, "x"], object), np.zeros(3, "M8[s]"), np.zeros(3, complex)])
@@ -75,6 +76,30 @@ def test_a_recording_larger_than_the_memory_is_refused_with_both_sizes(
     assert size > there == 1000
 
 
+@pytest.mark.parametrize("how", ["external", "virtual"])
+@pytest.mark.parametrize("name", ["stranger.h5", "taxel.h5", "matlab.mat"])
+def test_no_byte_of_another_file_is_read_by_a_hdf5_file_or_handed_on(how: str, name: str, tmp_path: Path) -> None:
+    path, out = tmp_path / name, tmp_path / "out.npz"
+    if name == "taxel.h5":
+        taxel.convert(some_frames(20), path)
+    else:
+        with h5py.File(path, "w", userblock_size=512) as h5:
+            h5["values"], h5["t_s"] = np.random.default_rng(1).random((20, 5, 6)), np.arange(20.0)
+        if name.endswith(".mat"):
+            with path.open("r+b") as begun:
+                begun.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM")
+    taxel.convert(taxel.open(path), out)
+    out.unlink()
+    with h5py.File(path, "r+") as h5:
+        elsewhere(h5, "values", how)
+    with refused(FormatError, place=Place(name)) as caught:
+        taxel.open(path).frames()
+    assert "data set values" in caught.value.args[0]
+    with pytest.raises(FormatError):
+        taxel.convert(taxel.open(path), out)
+    assert not out.exists()
+
+
 @pytest.mark.parametrize(
     ("column", "value"), [("t", 0.5), ("x", 65_536), ("y", -1), ("x", np.nan), ("p", 2), ("intensity", 1e300)]
 )
@@ -95,3 +120,19 @@ def test_a_value_that_a_column_of_events_does_not_hold_is_refused_with_its_place
     with refused(FormatError, place=Place(path.name)) as caught:
         taxel.open(path)
     assert f"{column}[149]" in caught.value.args[0]
+
+
+@pytest.mark.parametrize("name", ["a.json", "a.jsonl", "a.csv"])
+@pytest.mark.parametrize(("begin", "end"), ["[]", ('{"a":', "}")])
+def test_json_of_any_depth_is_refused(name: str, begin: str, end: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(f"{begin * 20_000}1{end * 20_000}\n" * 3)
+    with pytest.raises(FormatError):
+        taxel.open(tmp_path / name)
+
+
+@pytest.mark.parametrize("save", [np.save, np.savez])
+def test_labels_of_an_array_without_records_are_refused(save: Any, tmp_path: Path) -> None:
+    name = "a.npy" if save is np.save else "a.npz"
+    save(tmp_path / name, np.arange(3))
+    with refused(FormatError, place=Place(name)):
+        taxel.Labels(tmp_path / name)

@@ -188,8 +188,13 @@ def test_a_merged_verdict_is_the_worst_and_keeps_those_of_its_parts(tmp_path: Pa
     other = tmp_path / "other" / "bad.mcap"
     other.parent.mkdir()
     other.write_bytes((tmp_path / "bad.mcap").read_bytes())
-    twice = taxel.merge([bad, taxel.open(other)], gap_us=10).verdict
+    merged = taxel.merge([bad, taxel.open(other), bad.between(0, middle)], gap_us=10)
+    twice = merged.verdict
     assert (twice.lost, list(twice.parts)) == ({"dropped_by_kernel": 4}, ["bad.mcap", "bad.mcap (2)"])
+    # So have the counts, which a file keeps.
+    taxel.convert(merged, tmp_path / "merged.mcap", overwrite=True)
+    for counts in (merged.counts, taxel.open(tmp_path / "merged.mcap").counts):
+        assert {name: counts[name]["dropped_by_kernel"] for name in twice.parts} == dict.fromkeys(twice.parts, 2)
 
 
 def test_a_verdict_is_text_that_cannot_be_changed_and_survives_a_copy() -> None:
@@ -230,6 +235,9 @@ def test_remarks_and_the_verdict_go_to_a_mcap_and_back(tmp_path: Path) -> None:
     back = taxel.open(tmp_path / "a.mcap")
     assert (back.verdict, back.remarks) == (fine, (*said, "converted from a.bag"))
     assert back.between(0, 5000).remarks == (*said, "converted from a.bag")
+    for kind in ("npz", "h5", "csv"):
+        (lost,) = taxel.convert(back, tmp_path / f"a.{kind}")
+        assert "the remarks" in lost
     # Through another kind and back, each conversion to .mcap adds its line.
     taxel.convert(back, tmp_path / "b.mcap")
     assert taxel.open(tmp_path / "b.mcap").remarks == (*said, "converted from a.bag", "converted from a.mcap")

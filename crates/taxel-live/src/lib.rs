@@ -3,6 +3,7 @@
 pub mod address;
 pub mod clock;
 pub mod error;
+mod host_clock;
 mod kernel_drops;
 mod latency;
 pub mod line_place;

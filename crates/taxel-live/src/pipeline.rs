@@ -58,7 +58,7 @@ use taxel_core::{Stop, problem};
 use crate::capture::Receiver;
 use crate::locked::lock;
 use crate::recording::SourceWriter;
-use crate::{Error, Result, address};
+use crate::{Error, Result, address, host_clock};
 pub use counters::{
     Arrival, ArrivalState, BoardState, Counters, DecodingCounts, LiveSummary, ReadoutCounts, SourceCounts,
 };
@@ -121,6 +121,7 @@ impl Live {
             )
             .into());
         }
+        host_clock::set();
         Self::begin(options, sinks, None)
     }
 

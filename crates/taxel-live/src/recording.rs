@@ -18,12 +18,13 @@ mod stream;
 mod topic;
 mod verdict;
 
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
+pub use crate::host_clock::now_ns;
 pub use causes::{Cause, CauseKind, Counts};
 pub use frames::{FrameEncoding, FrameProperties, Frames};
 pub use mcap_reader::{Datagrams, DecodedRecording, Message, Reader, Remarks};
@@ -347,11 +348,4 @@ pub enum BoardChangeKind {
         /// Whether the host commanded it; else its datagrams showed it.
         asked: bool,
     },
-}
-
-/// The current time of the host's clock, ns since 1970.
-#[must_use]
-pub fn now_ns() -> i64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }

@@ -14,6 +14,12 @@ use taxel_border::enter::{Exclusive, enter};
 use taxel_border::errors::{core, live};
 use taxel_border::parameters::Plain;
 
+/// The current time of the host's clock, which nobody sets while something is received, ns since 1970.
+#[pyfunction]
+pub fn now_ns() -> i64 {
+    taxel_live::recording::now_ns()
+}
+
 /// The serial ports that the system knows.
 #[pyfunction]
 pub fn serial_ports(py: Python<'_>) -> PyResult<Plain<Vec<ports::Port>>> {

@@ -50,7 +50,7 @@ mod _core {
         make_plain_rule, make_readout, readout_run_events, readout_run_frames, score, spread,
     };
     #[pymodule_export]
-    use crate::device::{SerialLine, line_place, serial_ports, status_line};
+    use crate::device::{SerialLine, line_place, now_ns, serial_ports, status_line};
     #[pymodule_export]
     use crate::encode::{
         EncoderStream, check_encoder, check_tare, encode_events, encode_frames, encoder_about, encoder_names,

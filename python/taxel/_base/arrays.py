@@ -197,13 +197,22 @@ def hdf5(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
 
 
 def datasets(file: h5py.File) -> dict[str, h5py.Dataset]:
-    """Return the data sets of a HDF5 file that have values, by their paths; soft and external links are left out."""
+    """Return the data sets of a HDF5 file that have values, by their paths; soft and external links are left out.
+
+    Raises
+    ------
+    FormatError : the values of a data set are in other files, which may be any that the user can read
+    """
     import h5py  # noqa: PLC0415  `hdf5` has loaded it
 
     items: dict[str, object] = {}
     # What is raised within this call is lost.
     file.visititems(items.__setitem__)
-    return {name: item for name, item in items.items() if isinstance(item, h5py.Dataset) and item.shape is not None}
+    found = {name: item for name, item in items.items() if isinstance(item, h5py.Dataset) and item.shape is not None}
+    for name, item in found.items():
+        if item.external or item.is_virtual:
+            raise unreadable(f"data set {name}: its values are in other files; save them in this file", file.filename)
+    return found
 
 
 def write_hdf5(path: str | os.PathLike[str], write: Callable[[h5py.File], object], *, overwrite: bool = False) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,7 +55,7 @@ class HeaderTable:
         rows = tuple(_rows(location, lines))
         line, first = next(iter(rows), (1, ()))
         header = tuple(name.strip() for name in first)
-        repeated = next((name for name in header if name and header.count(name) > 1), None)
+        repeated = next((name for name, count in Counter(header).items() if name and count > 1), None)
         if repeated is not None:
             raise unreadable(f"column {shown(repeated)} appears twice", location, line=line)
         return cls(str(location), header, rows[1:])

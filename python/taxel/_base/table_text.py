@@ -134,7 +134,7 @@ class Text:
             return []
         try:
             document = _rows_in(json.loads(self.path.read_bytes()))
-        except ValueError:
+        except (ValueError, RecursionError):
             return []
         are_rows = isinstance(document, list) and all(isinstance(row, dict | list) for row in document)
         return document if are_rows and len(document) > 1 else []
@@ -147,7 +147,11 @@ class Text:
         import pandas as pd  # noqa: PLC0415  takes long
 
         if self.path.suffix.lower() in ARRAYS:
-            name = records_in(self.path) or ""
+            name = records_in(self.path)
+            if name is None:
+                raise unreadable(
+                    "contains no table; must be one array of records, with a field for each column", self.path
+                )
             records = read_arrays(self.path, [name])[name].ravel()
             columns = {name: _cells(column) for name, column in columns_of(records)}
             return str(pd.DataFrame(columns).to_csv(sep="\t", index=False))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -84,7 +85,9 @@ class Form:
             None if getattr(how, key) is None else place_of(names, key, getattr(how, key))
             for key in ("label_column", "by")
         )
-        left = {place_of(names, "leave_out", column) for column in how.leave_out}
+        counts = Counter(names)
+        at = {name: k for k, name in enumerate(names) if counts[name] == 1}
+        left = {at[column] if column in at else place_of(names, "leave_out", column) for column in how.leave_out}
         twice = next((k for k in times if k in left), None)
         if twice is not None:
             raise ProblemError(f"column {shown(names[twice])} is the time_column, but is also in leave_out")
@@ -195,7 +198,7 @@ def place_of(names: Sequence[str], key: str, column: str | int) -> int:
     ------
     ProblemError : there is no such column
     """
-    if names.count(str(column)) == 1 and isinstance(column, str):
+    if isinstance(column, str) and names.count(column) == 1:
         return names.index(column)
     if isinstance(column, int) or column.isdecimal():
         if not 1 <= int(column) <= len(names):

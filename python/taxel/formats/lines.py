@@ -207,7 +207,7 @@ def _of_json(line: str) -> Line | None:
     """Return the leaves of an object or a list of JSON by their paths."""
     try:
         content = json.loads(line, parse_float=str, parse_int=str, parse_constant=str)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     if not isinstance(content, dict | list):
         return None

@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import islice, pairwise
 from typing import Any, TypeAlias
 
@@ -51,7 +52,11 @@ class Draft:
     def called(self, column: int) -> str | int:
         """Return how a layout names a column: by its name, or, without a name of its own, by its number from 1."""
         name = self.names[column]
-        return name if name and self.names.count(name) == 1 else column + 1
+        return name if name and self._counts[name] == 1 else column + 1
+
+    @cached_property
+    def _counts(self) -> Counter[str]:
+        return Counter(self.names)
 
     def ask(self, why: str, choices: Mapping[str, Changes], *, first: bool = False) -> None:
         """Add a question: what is open, and what each answer changes; the `first` one is printed with its layouts."""

@@ -81,8 +81,8 @@ class LineInput:
             raise
         if data is None:
             self.has_ended = True
-            return self.lines.end(time.time_ns())
-        return self.lines.push(data, time.time_ns())
+            return self.lines.end(_core.now_ns())
+        return self.lines.push(data, _core.now_ns())
 
     def take_cut(self) -> bool | None:
         """Return whether the next line may lack its beginning: then whether that is a loss; once."""

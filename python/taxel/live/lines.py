@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from taxel._base.limits import VALUE
 from taxel._base.messages import counted, first_line
 from taxel._base.text_lines import ArrivedLine
-from taxel._core import Error, ProblemError
+from taxel._core import Error, ProblemError, now_ns
 from taxel.array import Array
 from taxel.formats.form import Form
 from taxel.formats.line_form import form_of_lines, stated_count
@@ -142,7 +142,11 @@ class Lines:
                 return
             if first is None and (self._has_ended or now - begun >= most_s):
                 within = "before the end" if self._has_ended else f"within {now - begun:.0f} s"
-                raise ProblemError(f"{self.place}: no line arrived {within}")
+                self._input.lines.discard()
+                self._leave_out()
+                size = sum(self._left_out) + sum(line.size for line in self._waiting)
+                came = f"{counted(size, 'byte')} arrived {within}, but no line of text that ends"
+                raise ProblemError(f"{self.place}: {came if size else f'no line arrived {within}'}")
             if first is not None and (since >= _WITHIN_S or self._has_ended):
                 self._understood(final=True)
                 return
@@ -419,7 +423,7 @@ class Lines:
             (passed.strange, in_no_line, unfinished + passed.unfinished),
             passed.unread,
             trouble,
-            time.time_ns(),
+            now_ns(),
         )
 
     def _end(self) -> None:

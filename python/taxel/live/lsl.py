@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from collections.abc import Callable
 from typing import Any
 
 from taxel._base.arguments import text
 from taxel._base.limits import VALUE
 from taxel._base.messages import installing, warn
-from taxel._core import Error, ProblemError
+from taxel._core import Error, ProblemError, now_ns
 
 #: How long a stream is searched for, and a sample waited for, s.
 _LOOK_S, _WAIT_S = 3.0, 0.05
@@ -85,7 +84,7 @@ class LslInlet:
                 try:
                     # Infinity, and what does not fit 32 bits, is a missing value, and counted as one.
                     finite = [value if abs(value) <= VALUE else math.nan for value in map(float, values)]
-                    receive([stamp, *finite], time.time_ns())
+                    receive([stamp, *finite], now_ns())
                 except (Error, OSError):
                     # The recording has ended; its own end reports why.
                     return
@@ -121,5 +120,5 @@ class LslOutlet:
 
     def __call__(self, detection: Any) -> None:
         """Send a `taxel.Detection`."""
-        ago_s = (time.time_ns() - detection.reported_ns) * 1e-9 + (detection.reported - detection.t) * 1e-6
+        ago_s = (now_ns() - detection.reported_ns) * 1e-9 + (detection.reported - detection.t) * 1e-6
         self._outlet.push_sample([detection.label], self._clock() - ago_s)

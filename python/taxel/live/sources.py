@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -129,7 +128,7 @@ class Sources:
         lines = next((lines for lines in self.lines if lines.name == name), None)
         if lines is None:
             raise ProblemError(f"source {name!r}: no source of numbers has this name")
-        lines.sample(values, time.time_ns() if at_ns is None else at_ns)
+        lines.sample(values, _core.now_ns() if at_ns is None else at_ns)
 
     def with_unread(self, counters: dict[str, Any]) -> dict[str, Any]:
         """Return counters with the lines of each source of frames that are in no frame, by kind."""

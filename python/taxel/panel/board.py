@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import threading
+import time
 from typing import Any
 
 from taxel import _core
@@ -18,6 +20,9 @@ _READABLE = (0, 1, 2, 3, 4, 5, 7)
 
 #: Value of REG7 while a recording runs (Table 5.5).
 _RECORD = 1 << 16
+
+#: How long another program may have the line that it took, s.
+_TAKEN_S = 2.0
 
 #: Registers that are not set by hand.
 _APART = {"record": " is written when a recording starts or stops", "channels": " is a property of the board"}
@@ -38,6 +43,8 @@ class Board:
         self.registers: dict[str, Any] = Registers()._held
         #: Whether they were read from the board.
         self.known = False
+        #: When the line was lost, s of the monotonic clock.
+        self._lost_s: float | None = None
 
     @property
     def is_connected(self) -> bool:
@@ -51,7 +58,7 @@ class Board:
 
     def connect(self, cable: Cable) -> None:
         """Use a serial line from now on."""
-        self._cable, self._resets, self.known = cable, 0, False
+        self._cable, self._resets, self.known, self._lost_s = cable, 0, False, None
 
     def close(self) -> None:
         """Close the serial line."""
@@ -60,25 +67,49 @@ class Board:
                 self._cable.close()
                 self._cable = None
 
+    @property
+    def is_due(self) -> bool:
+        """Whether registers are read again: they were known, or the line was lost a while ago."""
+        lost_s = self._lost_s
+        return self.is_connected and (self.known if lost_s is None else time.monotonic() - lost_s > _TAKEN_S)
+
     def was_reset(self) -> bool:
         """Return whether the board has reported a reset since the last call."""
         with self._lock:
-            if self._cable is None:
+            if self._cable is None or self._lost_s is not None:
                 return False
-            self._cable.take_lines()
+            try:
+                self._cable.take_lines()
+            except (DeviceError, OSError):
+                self._lost_s = time.monotonic()
             before, self._resets = self._resets, self._cable.resets
             return before != self._resets
 
-    def read(self) -> None:
-        """Read all registers."""
+    def read(self, *, again: bool = False) -> None:
+        """Read all registers; a line that was lost, as to another program, is opened again.
+
+        Parameters
+        ----------
+        again : bool
+            Whether the number of channels is known, for which a board without a greeting is waited for.
+        """
         with self._lock:
             cable = self._connected()
             try:
-                # It is no register: it is in the board's greeting. A board without one has as many as it had.
-                channels = cable.greeting().channels
-            except DeviceError:
+                if self._lost_s is not None:
+                    cable.reopen(within=0.0)
+                    self._lost_s = None
                 channels = self.registers["channels"]
-            words = [cable.read(n) if n in _READABLE else 0 for n in range(8)]
+                if not again:
+                    # It is no register: it is in the board's greeting. A board without one has as many as it had.
+                    with contextlib.suppress(DeviceError):
+                        channels = cable.greeting().channels
+                words = [cable.read(n) if n in _READABLE else 0 for n in range(8)]
+            except (DeviceError, OSError) as error:
+                self.known = False
+                if isinstance(error, OSError) or self._lost_s is not None:
+                    self._lost_s = time.monotonic()
+                raise
             self.registers, self.known = _core.registers_of_words(words, channels), True
 
     def set(self, values: dict[str, Any], array: Array) -> None:

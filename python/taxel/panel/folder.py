@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -81,11 +82,13 @@ class Folder:
         How recordings are opened.
     asked : str or None
         The recording that is opened so also if it is a board's.
+    records : function
+        Whether a recording runs.
     """
 
-    def __init__(self, path: Path, opening: Opening, asked: str | None) -> None:
+    def __init__(self, path: Path, opening: Opening, asked: str | None, records: Callable[[], bool]) -> None:
         self.path, self._asked = path, asked
-        self.files = ShownFiles(opening)
+        self.files = ShownFiles(opening, records)
         self._opening = opening
         self._locks: dict[Path, asyncio.Lock] = {}
         #: The recordings that were opened last, by path and the trial that was asked for.

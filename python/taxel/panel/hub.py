@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import threading
 from collections.abc import Callable, Coroutine, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -31,8 +33,8 @@ from taxel.wire.registers import Registers, fields_of_registers, fitting_presets
 
 _T = TypeVar("_T")
 
-#: How often counters are sent, and tables of labels are looked at, s.
-_COUNT_S, _FOLLOW_S = 0.25, 0.3
+#: How often counters are sent, tables of labels are looked at, and registers are read, s.
+_COUNT_S, _FOLLOW_S, _READ_S = 0.25, 0.3, 2.0
 
 
 class Client(Protocol):
@@ -94,11 +96,11 @@ class Hub:
         #: Requests that are carried out beside others.
         self.tasks: set[asyncio.Task[None]] = set()
         self.opened, self.registers_stated = opened, registers_stated
-        self.folder = Folder(folder, opening, opened if asked else None)
+        self.folder = Folder(folder, opening, opened if asked else None, lambda: self.recorder.runs)
         self.labels = LabelTables(self.folder, opening)
         self.recorder = Recorder(self)
         self.training = Training(opening, self.folder.files)
-        self.board = Board(cable)
+        self.board, self._on_board = Board(cable), asyncio.Lock()
         self.source: _core.PanelLive | None = None
         #: In what the board was said to differ from that of the readout's training.
         self._differing = ""
@@ -128,6 +130,7 @@ class Hub:
         """Yield what is done beside the clients until the server ends."""
         yield self._count()
         yield self._follow_labels()
+        yield self._follow_registers()
         yield self._read_first()
 
     # ---------------------------------------------------------------------------------------------- clients
@@ -293,18 +296,19 @@ class Hub:
 
     async def on_board(self, work: Callable[[], _T]) -> _T:
         """Work on the board in a thread of its own, and tell all clients what it holds then."""
-        before = dict(self.board.registers), self.board.known
-        try:
-            return await in_thread(work)
-        finally:
-            if before != (self.board.registers, self.board.known):
-                if self.source is not None:
-                    self.source.announce(json.dumps(self.board.registers))
-                await self.say(self.registers())
-                if before[0]["channels"] != self.board.registers["channels"]:
-                    # Other presets fit it.
-                    await self.say(self.presets())
-                await self._agree()
+        async with self._on_board:
+            before = dict(self.board.registers), self.board.known
+            try:
+                return await in_thread(work)
+            finally:
+                if before != (self.board.registers, self.board.known):
+                    if self.source is not None:
+                        self.source.announce(json.dumps(self.board.registers))
+                    await self.say(self.registers())
+                    if before[0]["channels"] != self.board.registers["channels"]:
+                        # Other presets fit it.
+                        await self.say(self.presets())
+                    await self._agree()
 
     async def forget_registers(self) -> None:
         """After a reset the board holds other registers than were read."""
@@ -337,6 +341,14 @@ class Hub:
                     await self.say_labels(name)
             except (OSError, _core.Error) as error:
                 await self.warn(error)
+
+    async def _follow_registers(self) -> None:
+        """Read the board's registers again, which another program may have written."""
+        while True:
+            await asyncio.sleep(_READ_S)
+            if self.sessions and self.board.is_due:
+                with contextlib.suppress(OSError, _core.Error):
+                    await self.on_board(partial(self.board.read, again=True))
 
     async def say_labels(self, name: str) -> None:
         """Send the labels of a recording to the clients that show it."""

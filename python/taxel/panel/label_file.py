@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import time
 from collections import Counter
@@ -46,7 +47,8 @@ class LabelFile:
     Parameters
     ----------
     table : path
-        It need not exist. A link stays one: the file that it leads to is written.
+        It need not exist. A link to a file stays one: that file is written. What is no regular file, such as a pipe,
+        which would be waited for, and a link that leads nowhere are refused.
     names : set of str
         The names that the table may have for the recording; its rows are given without one.
     begin_us : int, us
@@ -56,7 +58,7 @@ class LabelFile:
     """
 
     def __init__(self, table: Path, names: frozenset[str], begin_us: int = 0, unit_us: float = 1.0) -> None:
-        self.path = Path(os.path.realpath(table))
+        self._named, self.path = table, Path(os.path.realpath(table))
         self._names, self._begin_us, self._unit_us = names, begin_us, unit_us
 
     def read(self) -> tuple[Note, ...]:
@@ -139,6 +141,8 @@ class LabelFile:
 
     def _text(self) -> bytes | None:
         """Return the text of the table; None where there is none."""
+        if os.path.lexists(self._named) and not self.path.is_file():
+            raise OSError(errno.EINVAL, "is no regular file", str(self._named))
         try:
             return self.path.read_bytes()
         except FileNotFoundError:

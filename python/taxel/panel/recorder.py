@@ -75,6 +75,11 @@ class Recorder:
         return self._state != "idle"
 
     @property
+    def runs(self) -> bool:
+        """Whether any recording of the live source runs, also one that the page did not begin."""
+        return self.is_busy or (self._hub.source is not None and self._hub.source.is_recording())
+
+    @property
     def file(self) -> str | None:
         """The file that is being recorded."""
         return self._file if self.is_busy else None
@@ -101,7 +106,7 @@ class Recorder:
         ProblemError : a recording runs; there is no live source; the file exists
         OSError : it cannot be written
         """
-        if self.is_busy or (self._hub.source is not None and self._hub.source.is_recording()):
+        if self.runs:
             raise ProblemError("a recording runs already: stop it first")
         source, file = self._hub.needed_source(), f"{name}.mcap"
         path = self._hub.folder.file(file)

@@ -21,7 +21,7 @@ from urllib.parse import quote
 
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.datastructures import Headers
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidMessage
 from websockets.http11 import Request, Response
 
 from taxel.panel.hub import Hub
@@ -75,6 +75,22 @@ _HEADERS = {
 _QUIET = logging.getLogger("taxel.panel.strangers")
 _QUIET.propagate = False
 _QUIET.addHandler(logging.NullHandler())
+
+
+class _Connection(ServerConnection):
+    """Answer what the library closes in silence: what is no request for a page, as one with a body."""
+
+    _is_answered = False
+
+    def send_data(self) -> None:
+        """Send what waits, behind that answer."""
+        wrong = self.protocol.handshake_exc
+        if not self._is_answered and isinstance(wrong, InvalidMessage) and not isinstance(wrong.__cause__, EOFError):
+            self._is_answered = True
+            answer = _answer(HTTPStatus.BAD_REQUEST)
+            answer.headers.update(_HEADERS)
+            self.transport.write(answer.serialize())
+        super().send_data()
 
 
 class Server:
@@ -146,6 +162,7 @@ class Server:
             sock=self._socket,
             process_request=self._gate,
             process_response=self._complete,
+            create_connection=_Connection,
             subprotocols=[_PROTOCOL],  # type: ignore[list-item]
             compression=None,
             write_limit=_WRITE_LIMIT,
@@ -209,8 +226,7 @@ class Server:
 
     def _complete(self, _connection: ServerConnection, _request: Request, response: Response) -> None:
         """Add the headers that every answer has."""
-        for name, value in _HEADERS.items():
-            response.headers[name] = value
+        response.headers.update(_HEADERS)
 
     # ---------------------------------------------------------------------------------------------- clients
 

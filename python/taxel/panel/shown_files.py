@@ -39,6 +39,9 @@ _MOST_DETECTIONS = 10_000
 #: Changes of a recording take one in so many bytes of the memory that is available, at most.
 _MEMORY_SHARE = 4
 
+#: The endings of what is read in little memory.
+_OWN = (".mcap", ".lsa")
+
 _Taxels = list[tuple[int, int]]
 
 
@@ -185,10 +188,18 @@ def state_of(path: Path) -> FileState:
 
 
 class ShownFiles:
-    """Read recordings for the panel."""
+    """Read recordings for the panel.
 
-    def __init__(self, opening: Opening | None = None) -> None:
-        self._opening = Opening() if opening is None else opening
+    Parameters
+    ----------
+    opening : Opening
+        How recordings are opened.
+    records : function
+        Whether a recording runs, which a file of another program may end: it may need all memory of the process.
+    """
+
+    def __init__(self, opening: Opening | None = None, records: Callable[[], bool] = lambda: False) -> None:
+        self._opening, self._records = Opening() if opening is None else opening, records
         self._lock = threading.Lock()
         #: The trials of the file with several that was read last, by its path and state.
         self._trials: tuple[tuple[Path, FileState], list[Recording]] | None = None
@@ -199,8 +210,14 @@ class ShownFiles:
         Raises
         ------
         FormatError : no recording
-        ProblemError : no trial of that name
+        ProblemError : no trial of that name; a recording runs, and the file is of another program
         """
+        if path.suffix.lower() not in _OWN and self._records():
+            own = " and ".join(_OWN)
+            raise ProblemError(
+                f"{path.name}: while a recording runs, the page opens {own} only, as another file may need all memory; "
+                "stop the recording first"
+            )
         key = path, state_of(path)
         with self._lock:
             known = self._trials

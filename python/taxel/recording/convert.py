@@ -142,6 +142,7 @@ def _beside_table(source: SourceView, kind: str) -> list[str]:
         "the place of the heel": bool(facts.heel),
         "the names of the columns": bool(facts.columns),
         "that readings were inverted": facts.turned is not None,
+        "the remarks": bool(facts.remarks),
         "the verdict": facts.kind not in ("events", *ENDINGS.values()) or facts.kind == "mcap",
     }
     return [name for name, is_there in there.items() if is_there]

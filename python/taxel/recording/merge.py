@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,7 +150,18 @@ def _merged(parts: Sequence[SourceView], shifts: Sequence[int]) -> InMemory:
             held=marks[int(np.argmin(begins))].held,
         ),
         _verdict(parts, shifts),
+        _counts(parts),
     )
+
+
+def _counts(parts: Sequence[SourceView]) -> dict[str, Any]:
+    """Return the counts of the file of each part, by the names that the verdict has."""
+    counts, seen = dict[str, Any](), Counter[str]()
+    for part in {each.facts.path: each for each in parts if each.counts}.values():
+        name = part.facts.name
+        seen[name] += 1
+        counts[name if seen[name] == 1 else f"{name} ({seen[name]})"] = dict(part.counts)
+    return counts
 
 
 def _verdict(parts: Sequence[SourceView], shifts: Sequence[int]) -> Verdict:

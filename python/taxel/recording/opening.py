@@ -274,7 +274,7 @@ def _open_folder(folder: Path, options: OpenOptions) -> list[Recording]:
         warn(f"left out, because it cannot be read: {why}", stacklevel=5)
     opened.sort(key=lambda pair: natural_order(pair[0]))
     count = len({trial_of(str(name), each.label) for name, each in opened}) + len(errors)
-    labels = Labels(folder / LABELS) if (folder / LABELS).exists() else None
+    labels = Labels(folder / LABELS) if (folder / LABELS).is_file() else None
     if labels is not None:
         _check_labels(labels, count, opened, [*errors])
     return [labels_for(each, name, labels, is_alone=count == 1) for name, each in opened]

@@ -117,7 +117,11 @@ def _images(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
     try:
         with h5py.File(path) as h5:
             for name in sorted(h5):
-                yield name, h5[name][...]
+                data = h5[name]
+                # The values may be in any other file of the user, by a link or as a data set.
+                if not isinstance(data, h5py.Dataset) or data.file != h5 or data.external or data.is_virtual:
+                    raise FormatError(f"{path.name}, {name}: must be a data set with its values in this file")
+                yield name, data[...]
     except (OSError, KeyError, RuntimeError, ValueError) as error:
         raise FormatError(f"{path.name}: the HDF5 file is damaged: {error}") from None
 

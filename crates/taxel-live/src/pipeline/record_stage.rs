@@ -129,8 +129,9 @@ impl RecordStage {
         self.with(|recording| recording.preview(now_ns(), t_us, &values))
     }
 
-    /// Writes the counts if they are due.
+    /// Writes the counts if they are due, and notices within a second that the file can no longer be written.
     pub(super) fn progress(&mut self) -> Result<()> {
+        self.with(|recording| recording.check())?;
         if self.counted.elapsed() < COUNTS_EVERY || !self.runs() {
             return Ok(());
         }

@@ -235,8 +235,7 @@ impl SourceWriter {
     ///
     /// # Errors
     ///
-    /// `File` if an earlier write failed because the disk is full or not available. `Core` if there are more bytes than
-    /// a datagram can have.
+    /// As [`SourceWriter::check`]; `Core` if there are more bytes than a datagram can have.
     pub fn datagram(&self, arrived_ns: i64, number: u64, bytes: &[u8]) -> Result<()> {
         self.datagram_at_most(arrived_ns, number, bytes, QUEUE_BYTES)
     }
@@ -333,6 +332,15 @@ impl SourceWriter {
         let Detection { label, t, known, slope, repaired } = detection;
         let value = json!({ "label": label, "t_us": t, "known_us": known, "slope": slope, "repaired": repaired });
         self.push_json(Topic::Detections, at_ns, &value)
+    }
+
+    /// Says whether what was accepted could be written so far.
+    ///
+    /// # Errors
+    ///
+    /// `File` if the disk is full or not available, or another program has taken the file.
+    pub fn check(&self) -> Result<()> {
+        self.queue.lock().check(&self.queue.path)
     }
 
     /// Writes the counts so far, so that an unfinished recording contains them too; to be called about once a second.

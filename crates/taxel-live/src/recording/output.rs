@@ -8,7 +8,7 @@ mod unix;
 #[cfg(windows)]
 mod windows;
 
-use std::fs::{File, OpenOptions};
+use std::fs::{File, Metadata, OpenOptions};
 use std::io::{Error as IoError, ErrorKind, Result as IoResult};
 use std::path::{Path, PathBuf};
 
@@ -22,6 +22,8 @@ use windows as reserved;
 #[derive(Debug)]
 pub struct OutputFile {
     path: PathBuf,
+    /// The path from any current folder.
+    place: PathBuf,
     file: File,
 }
 
@@ -46,7 +48,8 @@ impl OutputFile {
         if !new && file.metadata().map_err(Error::file(path))?.is_file() {
             file.set_len(0).map_err(Error::file(path))?;
         }
-        Ok(Self { path: path.to_owned(), file })
+        let place = std::path::absolute(path).map_err(Error::file(path))?;
+        Ok(Self { path: path.to_owned(), place, file })
     }
 
     /// Path of the file.
@@ -61,6 +64,12 @@ impl OutputFile {
         &self.file
     }
 
+    /// Whether the path leads to the file of this metadata, which is this one's.
+    #[must_use]
+    pub fn is_in_place(&self, about: &Metadata) -> bool {
+        reserved::is_at(about, &self.place)
+    }
+
     /// Removes the file, which holds nothing; a device stays.
     ///
     /// # Errors
@@ -68,7 +77,7 @@ impl OutputFile {
     /// `File` where the system refuses.
     pub fn discard(self) -> Result<()> {
         let is_file = self.file.metadata().map_err(Error::file(&self.path))?.is_file();
-        if is_file { reserved::remove(self.file, &self.path).map_err(Error::file(&self.path)) } else { Ok(()) }
+        if is_file { reserved::remove(self.file, &self.place).map_err(Error::file(&self.path)) } else { Ok(()) }
     }
 }
 

@@ -13,6 +13,7 @@ use super::senders::Senders;
 use crate::capture::counts::Totals;
 use crate::capture::options::ReceiverOptions;
 use crate::capture::queue::Batch;
+use crate::host_clock::Ahead;
 use crate::kernel_drops::KernelDrops;
 use crate::recording::now_ns;
 
@@ -32,6 +33,7 @@ pub(crate) struct LinuxSocket {
     gro: bool,
     totals: Totals,
     senders: Senders<Address>,
+    ahead: Ahead,
 }
 
 /// The address of a sender as the kernel writes it.
@@ -51,7 +53,7 @@ impl LinuxSocket {
         socket.set_nonblocking(true)?;
         // Kernels before 5.0 have no UDP_GRO: then each datagram needs its own call, and `gro` is false.
         let gro = options.gro && set(fd, libc::SOL_UDP, libc::UDP_GRO, &1_i32).is_ok();
-        Ok(Self { socket, gro, totals: Totals::default(), senders: Senders::default() })
+        Ok(Self { socket, gro, totals: Totals::default(), senders: Senders::default(), ahead: Ahead::default() })
     }
 
     pub(super) fn address(&self) -> io::Result<SocketAddr> {
@@ -72,7 +74,7 @@ impl LinuxSocket {
         if got.is_ok() { u64::from(bytes[0]) } else { 0 }
     }
 
-    pub(super) fn wait(&self, timeout: Duration) -> io::Result<bool> {
+    pub(super) fn wait(&mut self, timeout: Duration) -> io::Result<bool> {
         let mut asked = libc::pollfd { fd: self.socket.as_raw_fd(), events: libc::POLLIN, revents: 0 };
         let timeout = libc::timespec {
             tv_sec: timeout.as_secs().try_into().unwrap_or(libc::time_t::MAX),
@@ -80,6 +82,7 @@ impl LinuxSocket {
         };
         // SAFETY: one pollfd and the timeout live through the call; no signal mask is given.
         let ready = unsafe { libc::ppoll(&raw mut asked, 1, &raw const timeout, std::ptr::null()) };
+        self.ahead.look();
         match ready {
             1.. => Ok(true),
             0 => Ok(false),
@@ -132,7 +135,7 @@ impl LinuxSocket {
                 match ((*header).cmsg_level, (*header).cmsg_type) {
                     (libc::SOL_SOCKET, libc::SCM_TIMESTAMPNS) => {
                         let stamp = data.cast::<libc::timespec>().read_unaligned();
-                        arrived_ns = Some(stamp.tv_sec * 1_000_000_000 + stamp.tv_nsec);
+                        arrived_ns = Some(stamp.tv_sec * 1_000_000_000 + stamp.tv_nsec + self.ahead.0);
                     }
                     (libc::SOL_SOCKET, libc::SO_RXQ_OVFL) => self.note_dropped(data.cast::<u32>().read_unaligned()),
                     (libc::SOL_UDP, libc::UDP_GRO) => {

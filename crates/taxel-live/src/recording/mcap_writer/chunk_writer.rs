@@ -82,7 +82,8 @@ impl ChunkWriter {
         Ok(writer)
     }
 
-    /// Packs messages into chunks and passes each to the operating system, after which a kill no longer loses it.
+    /// Packs messages into chunks and passes each to the operating system, after which a kill no longer loses it; without
+    /// any, looks whether the file is still there.
     pub(super) fn write(&mut self) -> std::result::Result<(), McapError> {
         let (mut at, mut chunk) = (0, 0);
         for message in &self.batch.messages {
@@ -101,7 +102,7 @@ impl ChunkWriter {
             }
         }
         self.batch.clear();
-        if chunk > 0 { self.mcap.flush() } else { Ok(()) }
+        self.mcap.flush()
     }
 
     /// Writes the counts and the summary, and waits until everything is on the disk.

@@ -1,5 +1,6 @@
 //! The recording's file behind a small buffer. It tracks the end of the last whole record: after a failed write the
-//! file is truncated there and closed with a valid end.
+//! file is truncated there and closed with a valid end. Each write, and each flush without one, first looks whether
+//! another program has taken the file.
 
 use std::io::{self, Seek, SeekFrom, Write};
 use std::sync::Arc;
@@ -17,6 +18,8 @@ pub(super) struct RecordFile {
     written: u64,
     /// End of the last whole record in the file.
     complete: u64,
+    /// Whether another program has written into the file or shortened it: it is left to that program then.
+    is_of_another: bool,
     at_disk: Arc<AtomicBool>,
 }
 
@@ -47,7 +50,7 @@ impl Write for RecordFile {
 
 impl RecordFile {
     pub(super) fn new(file: OutputFile, at_disk: &Arc<AtomicBool>) -> Self {
-        Self { file, waiting: Vec::new(), written: 0, complete: 0, at_disk: Arc::clone(at_disk) }
+        Self { file, waiting: Vec::new(), written: 0, complete: 0, is_of_another: false, at_disk: Arc::clone(at_disk) }
     }
 
     /// Waits until everything is on the disk.
@@ -66,15 +69,31 @@ impl RecordFile {
 
     fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.at_disk.store(true, Ordering::Relaxed);
-        let outcome = bytes.chunks(PIECE).try_for_each(|piece| self.file.file().write_all(piece));
+        let outcome =
+            self.check().and_then(|()| bytes.chunks(PIECE).try_for_each(|piece| self.file.file().write_all(piece)));
         self.at_disk.store(false, Ordering::Relaxed);
         outcome?;
         self.written += bytes.len() as u64;
         Ok(())
     }
 
+    /// Checks that no other program has taken the file away or changed its length; a device has none.
+    fn check(&mut self) -> io::Result<()> {
+        let about = self.file.file().metadata()?;
+        self.is_of_another = about.is_file() && about.len() != self.written;
+        let what = match (self.is_of_another, !about.is_file() || self.file.is_in_place(&about)) {
+            (true, _) => "shortened or overwrote",
+            (false, false) => "removed, renamed or replaced",
+            (false, true) => return Ok(()),
+        };
+        Err(io::Error::other(format!("another program {what} this file while it was recorded")))
+    }
+
     /// After a failed write: truncates an incomplete record, and writes a valid end if the disk has room for it.
     pub(super) fn salvage(self, why: &str) {
+        if self.is_of_another {
+            return;
+        }
         let mut file = self.file.file();
         let mut close = |end: &[u8]| -> io::Result<()> {
             file.set_len(self.complete)?;

@@ -25,7 +25,7 @@ use crate::{Error, Result};
 
 /// The queue of a recording, and the state of its file: being written, or closed.
 pub(super) struct WriteQueue {
-    path: PathBuf,
+    pub(super) path: PathBuf,
     /// Locked by the thread that writes; if both locks are needed, before `state`. `None` after the file's end.
     pub(super) writer: Mutex<Option<ChunkWriter>>,
     pub(super) thread: Mutex<Option<JoinHandle<Result<()>>>>,
@@ -49,6 +49,13 @@ pub(super) struct Pending {
     end: Option<Option<RecordingCounts>>,
     /// Why writing failed; nothing is queued after it.
     failure: Option<WriteFailure>,
+}
+
+impl Pending {
+    /// Why writing failed, if it has.
+    pub(super) fn check(&self, path: &Path) -> Result<()> {
+        self.failure.clone().map_or(Ok(()), |failure| Err(failure.of_file(path)))
+    }
 }
 
 /// What was written of a source.
@@ -133,9 +140,7 @@ impl WriteQueue {
             self.work.notify_all();
             state = self.room.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
-        if let Some(failure) = &state.failure {
-            return Err(failure.clone().of_file(&self.path));
-        }
+        state.check(&self.path)?;
         if state.end.is_some() {
             return Err(problem!("{}: the recording has ended", self.path.display()).into());
         }
@@ -209,7 +214,7 @@ impl WriteQueue {
             // for it is not written.
             let mut state = self.lock();
             state.queue = MessageQueue::default();
-            return state.failure.clone().map_or(Ok(()), |failure| Err(failure.of_file(&self.path)));
+            return state.check(&self.path);
         };
         std::mem::swap(&mut self.lock().queue, &mut writer.batch);
         self.room.notify_all();

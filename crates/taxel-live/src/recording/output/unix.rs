@@ -1,7 +1,8 @@
 //! A recording's file in Unix: a lock, which other programs may ignore.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, Metadata, OpenOptions, TryLockError};
 use std::io::Result;
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
 /// Opens the file for one recording.
@@ -25,4 +26,9 @@ pub(super) fn lock(file: &File) -> Result<bool> {
 /// Removes the file while its lock is held.
 pub(super) fn remove(_locked: File, path: &Path) -> Result<()> {
     std::fs::remove_file(path)
+}
+
+/// Whether the path still leads to the file.
+pub(super) fn is_at(file: &Metadata, path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|found| (found.dev(), found.ino()) == (file.dev(), file.ino()))
 }
