@@ -18,6 +18,8 @@ from shell import run_beside
 import taxel
 import taxel.device
 from taxel.detect.board import summary
+from taxel.live import Live
+from taxel.panel import Panel
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers
 
@@ -104,3 +106,20 @@ def test_a_raised_noise_floor_reaches_the_readout_and_is_told_once(tmp_path):
         # Where its registers were read while it measured its own rest, they had a floor of 0.
         assert [("7 ticks" in text, "2 ticks" in text) for text in told[-2:]] == [(True, False), (False, True)]
         assert len(told) <= 3
+
+
+def test_a_tare_of_one_board_is_not_kept_for_another():
+    """A readout ends with its tare when another source is received; one that tares afresh goes on."""
+    array = taxel.Array(2, 2)
+    tare = taxel.Tare.take(taxel.Frames(np.full((2, 2, 2), 50.0), [0, 1000], unit="ticks", array=array))
+    rule = taxel.detect.PlainRule("area", 2)
+    for given, goes_on in ((tare, False), (0.5, True)):
+        with (
+            Live(sources="given,array=2x2,rate=1,unit=ticks", readout=rule, tare=given) as live,
+            Panel(live) as panel,
+            Client(panel) as page,
+        ):
+            assert page.until("hello")["readout"]
+            assert page.ask("disconnect")["type"] == "done"
+            hello = [message for message in page.said if message["type"] == "hello"][-1]
+            assert bool(hello["readout"]) == goes_on
