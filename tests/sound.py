@@ -402,7 +402,7 @@ USES: dict[str, Callable[[Any], Any]] = {
 #: What is not called, by name: what only taxel makes, and what needs a live board.
 LEFT_OUT = {
     *("BoardChange", "Clock", "Datagrams", "Detection", "Health", "Recording", "Zeroing", "Certificate", "Checked"),
-    *("Margin", "Multipliers", "Row", "Summary", "Matching", "TakenRest", "Status", "Received"),
+    *("Margin", "Multipliers", "Row", "Summary", "Matching", "Status", "Received"),
     *("BoardCheck", "Finding", "Greeting", "Port", "Training.command"),
     "check_board",
     "Workers.run",

@@ -10,9 +10,8 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 from cyclopts import Parameter
 
 from taxel._base.arguments import (
@@ -21,7 +20,6 @@ from taxel._base.arguments import (
     flag,
     integer,
     mapping,
-    number,
     parameters,
     several,
     short,
@@ -30,7 +28,7 @@ from taxel._base.arguments import (
 from taxel._base.documents import of_toml
 from taxel._base.errors import refused
 from taxel._core import FormatError, ProblemError, encoder_names
-from taxel.tare import Tare
+from taxel.tare import GivenTare, check_tare
 
 if TYPE_CHECKING:
     from taxel.detect import Recipe
@@ -48,9 +46,6 @@ __all__ = [
     "Settings",
     "TrainOptions",
 ]
-
-#: A tare, the file of one, a recording at rest, or how many seconds at the beginning of a recording are at rest.
-GivenTare: TypeAlias = Tare | str | os.PathLike[str] | float
 
 
 def settings(_: Any, tokens: Sequence[Any]) -> dict[str, Any]:
@@ -99,25 +94,6 @@ _INTS = _between_commas(int, "whole numbers, for example 10,30")
 _Path = Annotated[
     str | os.PathLike[str] | None, Parameter(metavar="FILE", n_tokens=1, accepts_keys=False, converter=_typed)
 ]
-
-
-def seconds_of(tare: GivenTare) -> float | None:
-    """Return the seconds that a given tare says; None of a tare or a file."""
-    if isinstance(tare, Tare | os.PathLike):
-        return None
-    if not isinstance(tare, str):
-        return number("tare", tare)
-    try:
-        return float(tare)
-    except ValueError:
-        return None
-
-
-def check_tare(tare: GivenTare | None) -> None:
-    """Refuse what is neither a tare nor a path nor seconds above 0."""
-    seconds = None if tare is None else seconds_of(tare)
-    if seconds is not None and not 0 < seconds < np.inf:
-        raise refused("tare", f" is {tare}: must be seconds above 0, or a file")
 
 
 def check_shift(shift_ms: float) -> None:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 import re
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._base.arguments import instance, integer, shown
+from taxel._base.arguments import instance, integer, number, shown
 from taxel._base.arguments import text as checked_text
 from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped
@@ -22,7 +22,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded, recorded
 
-__all__ = ["Tare"]
+__all__ = ["GivenTare", "Tare", "check_tare", "seconds_of"]
 
 #: How another file of taxel begins, which says what it is.
 _OTHER = re.compile(r'\s*\{\s*"format":\s*"([\w ]+)"')
@@ -162,13 +162,18 @@ class Tare(Saved):
         tare.start_us, tare.stop_us, tare.note = values["start_us"], values["stop_us"], values["note"]
         return tare
 
-    def _with(self, **parts: Sequence[float | None]) -> Tare:
-        """Return the tare with other values by taxel."""
-        return self.from_json(json.dumps(json.loads(self._text) | parts))
+    def _with(self, array: Array | None = None, **parts: NDArray[np.float64]) -> Tare:
+        """Return the tare with other values by taxel, NaN where there is none, and of another array."""
+        changed: dict[str, Any] = {} if array is None else {"array": array._geometry()}
+        for name, values in parts.items():
+            changed[name] = [None if np.isnan(value) else value for value in values.reshape(-1).tolist()]
+        return self.from_json(json.dumps(json.loads(self._text) | changed))
 
-    def _padded_to(self, array: Array) -> Tare:
-        """Return the tare as that of a larger array's first rows and columns; taxels beyond have none."""
-        return self.from_json(_core.pad_tare(self._text, array._parts()))
+    @classmethod
+    def _of(cls, array: Array, rest: NDArray[np.float64], note: str) -> Tare:
+        """Return a tare whose rest was not measured here, and whose noise is not known."""
+        nothing = Frames(np.zeros((2, *array.shape)), [0, 1], array=array)
+        return cls.take(nothing, note=note)._with(rest=rest, noise=np.full(array.shape, np.nan))
 
     def to_json(self) -> str:
         """Return the tare as JSON."""
@@ -187,3 +192,26 @@ def _of_taxels(values: list[float | None], array: Array) -> NDArray[np.float64]:
     rest = np.array([np.nan if value is None else value for value in values], dtype=float).reshape(array.shape)
     rest.setflags(write=False)
     return rest
+
+
+#: A tare, the file of one, a recording at rest, or how many seconds at the beginning of a recording are at rest.
+GivenTare: TypeAlias = Tare | str | os.PathLike[str] | float
+
+
+def seconds_of(tare: GivenTare) -> float | None:
+    """Return the seconds that a given tare says; None of a tare or a file."""
+    if isinstance(tare, Tare | os.PathLike):
+        return None
+    if not isinstance(tare, str):
+        return number("tare", tare)
+    try:
+        return float(tare)
+    except ValueError:
+        return None
+
+
+def check_tare(tare: GivenTare | None) -> None:
+    """Refuse what is neither a tare nor a path nor seconds above 0."""
+    seconds = None if tare is None else seconds_of(tare)
+    if seconds is not None and not 0 < seconds < np.inf:
+        raise refused("tare", f" is {tare}: must be seconds above 0, or a file")

@@ -259,5 +259,7 @@ def test_where_no_label_is_learnt_nothing_is_written(tmp_path: Path, capsys) -> 
     rows = "".join(f"contact,{t}\n" for t in range(2_000_000, 19_000_000, 1_000_000))
     (tmp_path / "labels.csv").write_text("label,t_us\n" + rows)
     out = tmp_path / "readout.json"
-    code, said, _ = call(capsys, "train", tmp_path / "noise.npz", "--labels", tmp_path / "labels.csv", "-o", out)
+    command = "train", tmp_path / "noise.npz", "--labels", tmp_path / "labels.csv", "-o", out
+    assert call(capsys, *command)[0] == 2, "nothing is quiet"
+    code, said, _ = call(capsys, *command, "--tare", "0.5")
     assert (code, out.exists()) == (3, False), said

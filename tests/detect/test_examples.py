@@ -12,8 +12,8 @@ import taxel
 from taxel import Detections, Tare
 from taxel._base.messages import collected
 from taxel.detect import Example, score
-from taxel.detect.examples import array_of, check_examples, unreliable
-from taxel.detect.floors import held_by_tare
+from taxel.detect.examples import array_of, unreliable
+from taxel.recording.analysis.quiet import touched
 
 
 @given(st.integers(0, 1000), st.floats(0, 0.9))
@@ -21,10 +21,9 @@ def test_a_tare_that_ends_in_a_touch_holds_it(seed: int, share: float) -> None:
     frames, truth = pressed(seed, 5, begin_s=0.0)
     begin, end = (int(truth[label][0]) for label in ("contact", "lift"))
     until = int(begin + share * (end - begin))
-    (one,) = check_examples([Example(frames, truth, Tare.take(frames, stop_us=until))])
-    held = held_by_tare([one])
+    held = touched(frames, Tare.take(frames, stop_us=until))
     assert held == (4 if until - begin > 20_000 else held)
-    assert held_by_tare([one._replace(tare=Tare.take(frames, stop_us=begin - 20_000))]) == 0
+    assert touched(frames, Tare.take(frames, stop_us=begin - 20_000)) == 0
 
 
 @pytest.mark.parametrize(

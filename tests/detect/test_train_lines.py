@@ -24,7 +24,7 @@ def recorded(folder: Path, seed: int, count: int = 6, late_us: int = 0, more: st
 
 def test_the_first_line_says_held_out_and_the_next_ones_how_each_label_scored(tmp_path: Path, capsys) -> None:
     recording, labels = recorded(tmp_path, 1, 12, late_us=7_000)
-    code, out, _ = call(capsys, "train", recording, "--labels", labels, "-o", tmp_path / "r.json")
+    code, out, _ = call(capsys, "train", recording, "--labels", labels, "-o", tmp_path / "r.json", "--tare", 0.08)
     lines = out.splitlines()
     assert (code, lines[0]) == (0, "held out: 5 blocks of time (window 50 ms)")
     counts = r"12 of 12 found, 0 missed, 0 false, known -[\d.]+ ms after the label \(median\)"

@@ -65,7 +65,7 @@ def test_a_channel_that_begins_with_somebody_standing_on_it_has_no_rest() -> Non
         if rest.source == "quiet":
             # Nearly nothing reads less than a rest.
             scale = 150 / float(np.ptp(frames.values))
-            assert np.mean((frames.values - rest.values[0]) * scale < -8) <= 0.1
+            assert np.mean((frames.values - rest.tare.rest.flat[0]) * scale < -8) <= 0.1
     assert {name for name, source in sources.items() if source == "quiet"} == UNLOADED
     assert len(sources) == 24
 

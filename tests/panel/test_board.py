@@ -19,6 +19,8 @@ from shell import run_beside
 import taxel
 import taxel.device
 from taxel.detect.board import summary
+from taxel.live import Live
+from taxel.panel import Panel
 from taxel.simulate import Board, Version2
 from taxel.wire import Command, Registers
 
@@ -130,3 +132,37 @@ def test_a_line_that_another_program_takes_is_opened_again(by_tcp):
         with taxel.device.Device(by_tcp.control) as device:
             device.set(threshold_rest=17)
         noticed(page, "threshold_rest", 17)
+
+
+def test_a_tare_of_one_board_is_not_kept_for_another():
+    """A readout ends with its tare when another source is received; one that tares afresh goes on."""
+    array = taxel.Array(2, 2)
+    tare = taxel.Tare.take(taxel.Frames(np.full((2, 2, 2), 50.0), [0, 1000], unit="ticks", array=array))
+    rule = taxel.detect.PlainRule("area", 2)
+    for given, goes_on in ((tare, False), (0.5, True)):
+        with (
+            Live(sources="given,array=2x2,rate=1,unit=ticks", readout=rule, tare=given) as live,
+            Panel(live) as panel,
+            Client(panel) as page,
+        ):
+            assert page.until("hello")["readout"]
+            assert page.ask("disconnect")["type"] == "done"
+            hello = [message for message in page.said if message["type"] == "hello"][-1]
+            assert bool(hello["readout"]) == goes_on
+
+
+@pytest.mark.parametrize("noise", [0.6, 4.9])
+def test_a_sensor_with_noise_has_no_area_at_rest(noise):
+    random = np.random.default_rng(1)
+    rule = taxel.detect.PlainRule("area", 2, noise_floor=6 * noise, unit="counts")
+    source = "given,array=12x10,rate=200,unit=counts,time=1:ms"
+    with Live(sources=source, readout=rule, tare=0.5) as live, Panel(live) as panel, Client(panel) as page:
+        for k in range(300):
+            live.sample(live.name, [5.0 * k, *np.rint(500 + random.normal(0, noise, 120))])
+        page.until("counters", taring=False)
+        for k in range(300, 310):
+            live.sample(live.name, [5.0 * k, *np.rint(500 + random.normal(0, noise, 120))])
+            page.send(type="credit", n=1)
+            page.ask("ports")
+        areas = [int(values[1]) for frame in page.frames if len(values := section(frame, 6, "<u4"))]
+        assert set(areas[-5:]) == {0}

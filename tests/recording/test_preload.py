@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import taxel
-from taxel.recording.analysis.rest import standing
+from taxel.recording.analysis.quiet import standing
 
 HZ = 50
 

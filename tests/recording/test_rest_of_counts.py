@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from taxel import Array, Frames, Tare
-from taxel.detect.examples import Example
-from taxel.detect.floors import TOUCH, held_by_tare
-from taxel.recording.analysis.rest import of_quiet
+from taxel.recording.analysis.quiet import TOUCH, touched
+from taxel.recording.analysis.rest import of_frames
 
 SHAPES = [(1, 1), (1, 4), (1, 16), (4, 4), (10, 12), (60, 80)]
 WINDOWS_US = [5000, 20_000]
@@ -26,8 +25,8 @@ def drawn(shape: tuple[int, int], mean: float, seed: int, window_us: int) -> Fra
 def test_noise_is_quiet_and_no_touch_at_any_rate(shape: tuple[int, int], mean: float, window_us: int) -> None:
     for seed in range(1 if shape[0] > 20 else 4):
         frames = drawn(shape, mean, seed, window_us)
-        rest = of_quiet(frames)
+        rest = of_frames(frames)
         assert (rest.source, rest.falls, rest.preload_at) == ("quiet", False, "")
         for count in (25, 115, 250):
             tare = Tare.take(frames, stop_us=window_us * count)
-            assert held_by_tare([Example(frames, {}, tare)]) < TOUCH
+            assert touched(frames, tare) < TOUCH

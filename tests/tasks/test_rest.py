@@ -33,30 +33,45 @@ def test_forces_rest_at_0_and_other_values_at_their_first_quiet_stretch(tmp_path
 
 
 @pytest.mark.parametrize("begin_us", [0, 1_795_000_000_000_000])
-def test_a_training_takes_the_rest_of_a_detection_and_where_nothing_is_quiet_the_time_before_its_first_label(
-    begin_us: int, tmp_path: Path
-) -> None:
+def test_a_training_takes_the_rest_of_a_detection(begin_us: int, tmp_path: Path) -> None:
     frames, labels = pressed(1)
     later = Frames(frames.values, frames.t + begin_us, unit=frames.unit, array=frames.array)
     taxel.convert(later, tmp_path / "a.npz")
     recording, own = taxel.open(tmp_path / "a.npz"), {label: t + begin_us for label, t in labels.items()}
     training = taxel.train(recording, [own], taxel.tasks.TrainOptions(folds=0))
     assert [taken.to_dict() for taken in training.rests] == [rest(recording).to_dict()]
+    assert f"rest: {rest(recording)}; --tare sets" in "\n".join(training.lines())
     assert "--tare" not in training.command("r.json")
-    values = np.full((300, 4, 4), 50.0)
-    begins = list(range(25, 300, 30))
-    for begin in begins:
-        values[begin : begin + 10, 1:3, 1:3] = 250
-    busy = Frames(values, begin_us + 10_000 * np.arange(300), unit="counts", array=Array(4, 4))
-    taxel.convert(busy, tmp_path / "b.npz")
-    recording, first = taxel.open(tmp_path / "b.npz"), {"contact": busy.t[begins]}
-    taken = rest(recording, labels=first)
-    assert (taken.source, taken.to_dict()["us"]) == ("labels", [begin_us, begin_us + 230_000])
-    training = taxel.train(recording, [first], taxel.tasks.TrainOptions(folds=0))
-    assert training.command("r.json").endswith("--tare 0.23")
-    assert "rest: the time before its first label, 0.000 to 0.230 s; --tare sets" in "\n".join(training.lines())
-    with pytest.raises(ProblemError, match="no label is late enough"):
-        rest(recording, labels={"contact": busy.t[[1]]})
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (4, 4)])
+def test_a_stretch_in_which_the_sensor_was_loaded_is_no_rest(shape: tuple[int, int], tmp_path: Path) -> None:
+    """Somebody stands for a second and walks then; the labels are later."""
+    values = np.random.default_rng(1).normal(500, 2, (900, *shape))
+    values[:100] += 2500
+    for begin in range(130, 900, 60):
+        values[begin : begin + 35] += 3000
+    frames = Frames(values, 10_000 * np.arange(900), unit="counts", array=Array(*shape))
+    taxel.convert(frames, tmp_path / "walk.npz")
+    recording = taxel.open(tmp_path / "walk.npz")
+    taken = rest(recording)
+    assert (taken.source, taken.tare) == ("none", None)
+    assert str(taken).startswith("unknown, because no stretch")
+    assert "rest                unknown" in run("info", tmp_path / "walk.npz").stdout
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (8, 8)])
+def test_a_load_in_the_first_quiet_stretch_is_taken_off(shape: tuple[int, int], tmp_path: Path) -> None:
+    """A load lies on a part of the sensor for a second; later all of it is at rest, but for short presses."""
+    values = np.random.default_rng(2).normal(500, 1, (900, *shape))
+    lain = values.reshape(900, -1)[:, : max(1, values[0].size // 3)]
+    lain[:100] += 2000
+    for begin in range(300, 900, 100):
+        values[begin : begin + 20] += 3000
+    taxel.convert(Frames(values, 10_000 * np.arange(900), unit="counts", array=Array(*shape)), tmp_path / "a.npz")
+    taken = rest(taxel.open(tmp_path / "a.npz"))
+    assert taken.source == "quiet"
+    assert np.abs(taken.tare.rest - 500).max() < 20
 
 
 @pytest.mark.parametrize("unit", ["N", "kPa"])
@@ -64,7 +79,7 @@ def test_a_training_takes_the_rest_of_a_detection_and_where_nothing_is_quiet_the
 def test_forces_that_do_not_rest_near_0_are_said_with_the_tare_that_takes_that_off(
     seed: int, unit: str, tmp_path: Path
 ) -> None:
-    frames, labels = pressed(seed)
+    frames, _ = pressed(seed)
     random = np.random.default_rng(seed)
     drift = np.linspace(0, 1, len(frames))[:, None, None] * random.uniform(0, 2, (6, 6))
     presses = np.maximum(frames.values - 50, 0) / 10
@@ -75,7 +90,7 @@ def test_forces_that_do_not_rest_near_0_are_said_with_the_tare_that_takes_that_o
         said = taxel.tasks.info(recording, tare).warnings
         with collected() as of_training:
             if tare is None:
-                rest(recording, labels=labels)
+                rest(recording)
         assert tuple(of_training) == said
         return list(said)
 
@@ -116,7 +131,9 @@ def test_where_nothing_is_quiet_it_is_refused_with_what_to_give(tmp_path: Path) 
         values[begin : begin + 10, 1:3, 1:3] = 250
     taxel.convert(Frames(values, 10_000 * np.arange(300), unit="counts", array=Array(4, 4)), tmp_path / "a.npz")
     rule = PlainRule("area", 2, noise_floor=40.0)
-    with pytest.raises(ProblemError, match=r"a\.npz: the values .* and four values is quiet; give tare$"):
+    with pytest.raises(
+        ProblemError, match=r"a\.npz: the values .* and four values was quiet and without load; give tare$"
+    ):
         detect(rule, taxel.open(tmp_path / "a.npz"))
     rule.save(tmp_path / "rule.json")
     refused = run("detect", tmp_path / "a.npz", "--readout", tmp_path / "rule.json")

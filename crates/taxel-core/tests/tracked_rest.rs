@@ -89,28 +89,6 @@ fn a_load_stays_above_the_rest_and_what_was_loaded_at_first_is_found_once_it_is_
 }
 
 #[test]
-fn a_press_that_is_held_sets_no_rest_anew_where_values_fall_with_it() {
-    // As above, upside down; then pressed for 20 s.
-    let mut rest = unknown().falling();
-    let is_3000 = |rest: &TrackedRest| {
-        let now = rest.rests().nth(28).flatten().unwrap();
-        (now - 3000.0).abs() < 0.2 && (rest.begins()[28] - 3000.0).abs() < 1e-6
-    };
-    sampled(&mut rest, 0, 30, |_, taxel| if touched(taxel) { 2960.0 } else { 3000.0 });
-    sampled(&mut rest, 30, 30, |_, _| 3000.0);
-    assert!(is_3000(&rest), "{:?} {:?}", rest.rests().nth(28), rest.begins()[28]);
-    let above = sampled(&mut rest, 60, 20, |_, taxel| if touched(taxel) { 2960.0 } else { 3000.0 });
-    assert!((-40.0..-39.9).contains(&above[28]), "{}", above[28]);
-    sampled(&mut rest, 80, 380, |_, taxel| if touched(taxel) { 2960.0 } else { 3000.0 });
-    sampled(&mut rest, 460, 20, |_, _| 3000.0);
-    assert!(is_3000(&rest), "{:?} {:?}", rest.rests().nth(28), rest.begins()[28]);
-    // A rest that is given is not set below it either.
-    let mut rest = TrackedRest::new(8, 3.0, vec![3000.0; 64]).falling();
-    sampled(&mut rest, 0, 30, |_, taxel| if touched(taxel) { 2960.0 } else { 3000.0 });
-    assert!(rest.rests().nth(28).unwrap().unwrap() > 2997.0);
-}
-
-#[test]
 fn a_taxel_without_a_value_has_no_rest_and_its_first_value_is_one() {
     let mut rest = unknown();
     let above = sampled(&mut rest, 0, 20, |_, taxel| if touched(taxel) { f32::NAN } else { 50.0 });

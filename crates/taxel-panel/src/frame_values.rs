@@ -78,9 +78,6 @@ pub struct Frames {
     pub(crate) sum_floor: u16,
     /// Number of the source of each column of the array; empty where there is one, or more than have a curve each.
     pub(crate) source_of: Vec<usize>,
-    /// Up to this sum of ticks above rest there is noise alone, and no centre: of each source that has a curve, and of all.
-    pub(crate) noise: Vec<u32>,
-    pub(crate) noise_of_all: u32,
 }
 
 impl Frames {

@@ -5,7 +5,7 @@
 
 use taxel_core::Array;
 use taxel_core::held::UNKNOWN;
-use taxel_core::rest::{FrameNoise, NOISE_FLOOR, TrackedRest, ValueSteps, above_noise};
+use taxel_core::rest::{NOISE_FLOOR, TrackedRest, ValueSteps};
 use taxel_live::Result;
 use taxel_live::pipeline::TaxelChange;
 
@@ -81,28 +81,6 @@ impl<'a> SteppedFrames<'a> {
         }
     }
 
-    /// The most that noise above a rest that was found adds up to: above a given one any value is load.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    fn noise(&self, floor: u16, sum_floor: u16, weights: &Weights) -> u32 {
-        if self.given.about.rest.source != RestSource::Quiet {
-            return 0;
-        }
-        let mut noise = FrameNoise::default();
-        for (k, &t) in self.given.t.iter().enumerate() {
-            let frame = self.frame(k);
-            if frame.iter().all(|&ticks| ticks == UNKNOWN) {
-                continue;
-            }
-            let mut sum = 0_u64;
-            for ((&ticks, &rest), &taxel) in frame.iter().zip(self.rest(k)).zip(&self.taxels) {
-                let above = u64::from(above_noise(ticks, rest, sum_floor));
-                sum = sum.wrapping_add(weights.weighed(taxel, above));
-            }
-            noise.take(t, weights.sum(sum).into());
-        }
-        noise.most(floor.into()) as u32
-    }
-
     fn frame_us(&self) -> i64 {
         let t = &self.given.t;
         let steps = i64::try_from(t.len()).unwrap_or(i64::MAX).saturating_sub(1).max(1);
@@ -127,13 +105,12 @@ fn rests(given: &FrameSource<'_>, steps: ValueSteps) -> Vec<(usize, Vec<u16>)> {
             return vec![(0, (0..values.len()).map(|cell| base(given.values, cell, values.len(), steps)).collect())];
         }
         RestSource::Given => return fixed(),
+        // Nothing is shown above it.
+        RestSource::Quiet if *falls => return vec![(0, vec![UNKNOWN; values.len()])],
         RestSource::Quiet => {}
     }
     let begins: Vec<f64> = values.iter().map(|rest| rest * ticks_by_unit).collect();
     let mut tracked = TrackedRest::new(given.about.sensor.columns.into(), NOISE_FLOOR, begins);
-    if *falls {
-        tracked = tracked.falling();
-    }
     let mut stored: Vec<Option<f64>> = vec![];
     let mut rests: Vec<(usize, Vec<u16>)> = vec![];
     for (k, (&t, frame)) in given.t.iter().zip(given.values.chunks_exact(values.len())).enumerate() {
@@ -214,8 +191,7 @@ fn about(
 ) -> Frames {
     let rests = || sources.iter().map(|source| source.given.about.rest.source);
     let sum_floor = if rests().any(|rest| rest == RestSource::Quiet) { floor } else { 0 };
-    let (weights, newtons) = Weights::new(array, &unit);
-    let noise: Vec<u32> = sources.iter().map(|source| source.noise(floor, sum_floor, &weights)).collect();
+    let (_, newtons) = Weights::new(array, &unit);
     let first = rests().next().unwrap_or(RestSource::None);
     let mut frames = Frames {
         unit,
@@ -228,12 +204,9 @@ fn about(
         rest_source: if rests().all(|rest| rest == first) { first } else { RestSource::None },
         sum_floor,
         source_of: vec![],
-        noise_of_all: noise.iter().fold(0, |sum: u32, &noise| sum.saturating_add(noise)),
-        noise: vec![],
     };
     if (2..=MOST_SOURCES).contains(&sources.len()) {
         frames.source_of = (0..array.columns).map(|column| frames.source_at(column)).collect();
-        frames.noise = noise;
     }
     frames
 }

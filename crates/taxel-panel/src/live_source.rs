@@ -220,7 +220,7 @@ impl LiveSource {
 
     /// The steps of the values; ticks of a board.
     fn value_steps(&self) -> ValueSteps {
-        self.handle.frame_values().map_or(ValueSteps { size: 1.0, zero: 0 }, |(_, steps, _)| steps)
+        self.handle.frame_values().map_or(ValueSteps { size: 1.0, zero: 0, floor: 0 }, |(_, steps, _)| steps)
     }
 
     /// The `counters` message, with rates since the last call; a frame takes `frame_us` where that is known.
@@ -365,6 +365,9 @@ impl Receiving {
         let steps = source.handle.frame_values().map(|(_, steps, _)| steps);
         if std::mem::replace(&mut self.steps, steps) != steps {
             lock(&source.news).about = true;
+            if let Some(steps) = steps {
+                lock(&source.state).set_noise_floor(steps.floor);
+            }
         }
         source.received.fetch_add(1, Ordering::Relaxed);
     }

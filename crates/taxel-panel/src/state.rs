@@ -103,7 +103,7 @@ impl Sensor {
 
     /// Number of sources that have a curve each.
     pub fn curves(&self) -> usize {
-        self.frames.as_ref().map_or(0, |frames| frames.noise.len())
+        self.frames.as_ref().map_or(0, |frames| if frames.source_of.is_empty() { 0 } else { frames.sources.len() })
     }
 
     /// Number of the source of a taxel, where each has a curve.
@@ -493,11 +493,9 @@ impl ArrayState {
     /// The curves of all taxels and of each of several sources, at this time.
     pub fn curves(&self) -> impl Iterator<Item = Curve> {
         let Sensor { frames, centre, weights, .. } = &*self.sensor;
-        self.loads.iter().enumerate().map(move |(number, load)| match (frames, number.checked_sub(1)) {
-            (Some(_), source) if !self.knows(source) => MISSING,
-            (Some(frames), Some(source)) => load.curve(centre, weights, frames.noise[source]),
-            (Some(frames), None) => load.curve(centre, weights, frames.noise_of_all),
-            (None, _) => load.curve(centre, weights, 0),
+        self.loads.iter().enumerate().map(move |(number, load)| {
+            let missing = frames.is_some() && !self.knows(number.checked_sub(1));
+            if missing { MISSING } else { load.curve(centre, weights) }
         })
     }
 

@@ -153,9 +153,3 @@ pub fn tare_of_frames(
 pub fn check_tare(tare: &str) -> PyResult<String> {
     Ok(Tare::from_json(tare).map_err(core)?.to_json())
 }
-
-/// A tare as that of a larger array's first rows and columns.
-#[pyfunction]
-pub fn pad_tare(tare: &str, array: ArrayParts) -> PyResult<String> {
-    Ok(Tare::from_json(tare).map_err(core)?.padded_to(&to_array(array)?).to_json())
-}

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::health::{BIN_US, TouchCounts};
 use taxel_core::held::{HeldOverTime, UNKNOWN, as_events};
-use taxel_core::rest::{FrameNoise, Rest, TrackedRest, Value, preload as preload_of, preload_text, touched_from};
+use taxel_core::rest::{Rest, TrackedRest, Value, preload as preload_of, preload_text, touched_from};
 use taxel_core::{Error, problem};
 
 use taxel_border::convert::{ArrayParts, EventsIn, EventsOut, FramesIn, array, from_events, slice, to_array};
@@ -96,27 +96,17 @@ pub fn above_rest<'py>(
     Ok(array(py, found))
 }
 
-/// The most that the noise of frames adds up to, of their sums above rest at times `t`, us: taxels count above `floor`.
-#[pyfunction]
-pub fn frame_noise(t: PyReadonlyArray1<'_, i64>, sums: PyReadonlyArray1<'_, f64>, floor: f64) -> PyResult<f64> {
-    let mut noise = FrameNoise::default();
-    slice("t", &t)?.iter().zip(slice("sums", &sums)?).for_each(|(&t, &sum)| noise.take(t, sum));
-    Ok(noise.most(floor))
-}
-
 /// The rest of frames without a tare: `columns` of the array, its noise floor, the rest of each taxel to begin
-/// with (NaN where unknown), and whether values fall from it with pressure.
+/// with (NaN where unknown).
 #[pyclass(frozen, name = "TrackedRest", module = "taxel._core")]
 pub struct PyTrackedRest(Exclusive<TrackedRest>);
 
 #[pymethods]
 impl PyTrackedRest {
     #[new]
-    #[pyo3(signature = (columns, noise_floor, begins, falls=false))]
-    fn new(columns: usize, noise_floor: f64, begins: PyReadonlyArray1<'_, f64>, falls: bool) -> PyResult<Self> {
+    fn new(columns: usize, noise_floor: f64, begins: PyReadonlyArray1<'_, f64>) -> PyResult<Self> {
         let begins = slice("begins", &begins)?.iter().map(|&rest| if rest.is_nan() { f64::NO_REST } else { rest });
-        let rest = TrackedRest::new(columns, noise_floor, begins.collect());
-        Ok(Self(Exclusive::new(if falls { rest.falling() } else { rest })))
+        Ok(Self(Exclusive::new(TrackedRest::new(columns, noise_floor, begins.collect()))))
     }
 
     /// Reads frames at `t` us, one after the other in `values` (NaN where a taxel has none); returns them above the

@@ -31,7 +31,7 @@ mod _core {
     use pyo3::prelude::*;
     use pyo3::types::PyTuple;
     use taxel_core::held::UNKNOWN;
-    use taxel_core::rest::{FORCE_UNITS, LOADED_TICKS};
+    use taxel_core::rest::{FORCE_UNITS, LOADED_TICKS, NOISE_FLOOR, TIMES_NOISE};
     use taxel_live::capture::FIREWALL;
     use taxel_live::serial_line::BAUDS;
 
@@ -54,11 +54,11 @@ mod _core {
     #[pymodule_export]
     use crate::encode::{
         EncoderStream, check_encoder, check_tare, encode_events, encode_frames, encoder_about, encoder_names,
-        local_load_of_events, local_load_of_frames, local_load_quantities, pad_tare, tare_of_events, tare_of_frames,
+        local_load_of_events, local_load_of_frames, local_load_quantities, tare_of_events, tare_of_frames,
     };
     #[pymodule_export]
     use crate::held::{
-        HeldValues, PyTrackedRest, above_rest, changes_of_frames, frame_noise, held_as_events, preload, touched_above,
+        HeldValues, PyTrackedRest, above_rest, changes_of_frames, held_as_events, preload, touched_above,
         touches_of_events, touches_of_frames,
     };
     #[pymodule_export]
@@ -102,6 +102,8 @@ mod _core {
         module.add("FIREWALL", FIREWALL)?;
         module.add("UNKNOWN", UNKNOWN)?;
         module.add("FORCE_UNITS", PyTuple::new(module.py(), FORCE_UNITS)?)?;
+        module.add("TIMES_NOISE", TIMES_NOISE)?;
+        module.add("NOISE_FLOOR", NOISE_FLOOR)?;
         module.add("LOADED_TICKS", LOADED_TICKS)
     }
 }

@@ -326,18 +326,7 @@ impl PanelView {
     }
 }
 
-/// `ReadRest` of Python: its values are NaN where the rest is unknown.
-#[derive(FromPyObject)]
-struct ReadRest<'py> {
-    source: String,
-    values: PyReadonlyArray1<'py, f64>,
-    ticks_by_unit: f64,
-    loaded_from: f64,
-    falls: bool,
-    preload_at: String,
-}
-
-/// `ReadSource` of Python.
+/// `ReadSource` of Python: its rest is NaN where it is unknown.
 #[derive(FromPyObject)]
 struct ReadSource<'py> {
     name: String,
@@ -345,7 +334,12 @@ struct ReadSource<'py> {
     array: ArrayParts,
     t: PyReadonlyArray1<'py, i64>,
     values: PyReadonlyArray1<'py, f32>,
-    rest: ReadRest<'py>,
+    rest_source: String,
+    rest: PyReadonlyArray1<'py, f64>,
+    ticks_by_unit: f64,
+    loaded_from: f64,
+    falls: bool,
+    preload_at: String,
 }
 
 /// `ReadFrames` of Python.
@@ -362,9 +356,9 @@ fn to_index(py: Python<'_>, frames: ReadFrames<'_>, kept: Kept) -> PyResult<Inde
     let array = to_array(array)?;
     let mut placed = vec![];
     let values: Vec<PyReadonlyArray1<'_, f32>> = sources.iter().map(|source| source.values.clone()).collect();
-    for (ReadSource { name, left, array: parts, t, rest, .. }, values) in sources.into_iter().zip(&values) {
-        let sensor = to_array(parts)?;
-        let (t, values, rests) = (slice("t", &t)?, slice("values", values)?, slice("rest", &rest.values)?);
+    for (read, values) in sources.into_iter().zip(&values) {
+        let (name, left, sensor) = (read.name, read.left, to_array(read.array)?);
+        let (t, values, rests) = (slice("t", &read.t)?, slice("values", values)?, slice("rest", &read.rest)?);
         let cells = sensor.len();
         let inside = left <= array.columns && sensor.columns <= array.columns - left && sensor.rows <= array.rows;
         if !inside || values.len() != t.len() * cells || rests.len() != cells {
@@ -372,13 +366,14 @@ fn to_index(py: Python<'_>, frames: ReadFrames<'_>, kept: Kept) -> PyResult<Inde
         }
         let known = |&rest: &f64| if rest.is_nan() { f64::NO_REST } else { rest };
         let rest = FrameRest {
-            source: serde_json::from_value(json!(rest.source))
-                .map_err(|error| ProblemError::new_err(format!("source {name}: rest {:?}: {error}", rest.source)))?,
+            source: serde_json::from_value(json!(read.rest_source)).map_err(|error| {
+                ProblemError::new_err(format!("source {name}: rest {:?}: {error}", read.rest_source))
+            })?,
             values: rests.iter().map(known).collect(),
-            ticks_by_unit: rest.ticks_by_unit,
-            loaded_from: rest.loaded_from,
-            falls: rest.falls,
-            preload_at: rest.preload_at,
+            ticks_by_unit: read.ticks_by_unit,
+            loaded_from: read.loaded_from,
+            falls: read.falls,
+            preload_at: read.preload_at,
         };
         placed.push(FrameSource { about: FramesOfSource { name, left, sensor, rest }, t: t.to_vec(), values });
     }

@@ -20,7 +20,7 @@ from taxel.cli.console import Console
 from taxel.detect import load
 from taxel.live import Summary
 from taxel.live._stated_options import StatedOptions
-from taxel.tare import Tare
+from taxel.tare import Tare, seconds_of
 from taxel.verdict import in_words
 from taxel.wire import Registers
 from taxel.wire.registers import QUOTED_PRESETS
@@ -140,10 +140,8 @@ def _rest(value: str | None) -> Tare | float | None:
     """Return what --tare names: the tare of a file, or how long to take a fresh one, s."""
     if value is None:
         return None
-    try:
-        seconds = float(value)
-    except ValueError:
-        from taxel.tasks.rest import tare_of  # noqa: PLC0415  the command line starts quickly
+    if (seconds := seconds_of(value)) is None:
+        from taxel.recording.analysis.rest import tare_of  # noqa: PLC0415  the command line starts quickly
 
         return tare_of(Path(value))
     if not 1e-6 <= seconds <= 3600:

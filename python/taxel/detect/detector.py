@@ -6,8 +6,6 @@ import json
 from abc import abstractmethod
 from typing import Any, Self
 
-import numpy as np
-
 from taxel import _core
 from taxel._base.arguments import instance, integer, number, parameters, shown
 from taxel._base.arguments import text as checked_text
@@ -16,13 +14,12 @@ from taxel._base.saved import Saved
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect.board import noise_floor
-from taxel.detect.floors import floor_at_rest
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
 from taxel.recorded import unit_of
-from taxel.recording.analysis.rest import FORCE_UNITS
+from taxel.recording.analysis.quiet import FORCE_UNITS, floor_at_rest
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
@@ -80,8 +77,7 @@ class _Detector(Saved):
         """
         least = noise_floor(source)
         if tare is not None and self.unit is not None and are_counts(self.unit):
-            known = tare.noise[np.isfinite(tare.noise)]
-            least = floor_at_rest(known) if len(known) else 0.0
+            least = floor_at_rest(tare.noise)
         return self._with_floor(least)
 
     def _with_floor(self, least: float) -> Self:

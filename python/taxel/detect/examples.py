@@ -165,9 +165,12 @@ def padded_to(frames: Frames, tare: Tare | None, shape: tuple[int, int]) -> tupl
     A taxel beyond an edge reads 0, and has no rest in a tare, so that it counts nowhere.
     """
     array = frames.array._padded(shape)
-    beyond = [(0, 0), *((0, most - size) for size, most in zip(frames.array.shape, shape, strict=True))]
-    values = Frames(np.pad(frames.values, beyond), frames.t, unit=frames.unit, array=array)
-    return values, None if tare is None else tare._padded_to(array)
+    beyond = [(0, most - size) for size, most in zip(frames.array.shape, shape, strict=True)]
+    values = Frames(np.pad(frames.values, [(0, 0), *beyond]), frames.t, unit=frames.unit, array=array)
+    if tare is None:
+        return values, None
+    rest, noise = (np.pad(each, beyond, constant_values=np.nan) for each in (tare.rest, tare.noise))
+    return values, tare._with(array, rest=rest, noise=noise)
 
 
 def array_of(examples: Sequence[Example]) -> Array | None:

@@ -222,13 +222,17 @@ class Hub:
         await self.say(self.zeroed())
 
     async def read_source(self, source: str) -> None:
-        """Receive another source, as `sources` of `taxel.live.Live` names it, with all other options unchanged."""
+        """Receive another source, as `sources` of `taxel.live.Live` names it, with all other options unchanged.
+
+        A tare is one board's: a readout that reads with one ends, unless the tare is taken afresh.
+        """
 
         def change(before: Live) -> Live:
+            own = {"readout": None, "tare": None} if isinstance(before._options.tare, Tare) else {}
             # A serial line has one reader at a time.
             before.stop()
             try:
-                return before._again(port=None, host=None, sources=source)
+                return before._again(port=None, host=None, sources=source, **own)
             except Exception:
                 self._show_live(before._again())
                 raise

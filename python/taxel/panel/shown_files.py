@@ -22,7 +22,8 @@ from taxel.labels import Labels, beside, by_clock
 from taxel.options import FullReading
 from taxel.recording import Recording
 from taxel.recording.analysis.health import health, judge
-from taxel.recording.analysis.rest import loaded_from, of_frames, ticks_by_unit
+from taxel.recording.analysis.quiet import ticks_by_unit
+from taxel.recording.analysis.rest import loaded_from, of_frames
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
 from taxel.recording.kinds import is_recording
@@ -46,41 +47,20 @@ _Taxels = list[tuple[int, int]]
 
 
 @dataclass(frozen=True)
-class ReadRest:
-    """Hold how a sensor rests.
-
-    Parameters
-    ----------
-    source : str
-        Where the rest is known from.
-    values : float64, one per taxel, NaN where unknown
-    ticks_by_unit : float
-    loaded_from : float
-        From where on a value above rest is a load.
-    falls : bool
-        Whether values fall under load.
-    preload_at : str
-        What lay on the sensor, in words.
-    """
-
-    source: str
-    values: NDArray[np.float64]
-    ticks_by_unit: float
-    loaded_from: float
-    falls: bool
-    preload_at: str
-
-
-@dataclass(frozen=True)
 class ReadSource:
-    """Hold the frames of a sensor, from column `left` of the array that is shown; times in us."""
+    """Hold the frames of a sensor, from column `left` of the array that is shown, with their rest; times in us."""
 
     name: str
     left: int
     array: _core._Array
     t: NDArray[np.int64]
     values: NDArray[np.float32]
-    rest: ReadRest
+    rest_source: str
+    rest: NDArray[np.float64]
+    ticks_by_unit: float
+    loaded_from: float
+    falls: bool
+    preload_at: str
 
 
 @dataclass(frozen=True)
@@ -388,10 +368,7 @@ def _frames(recording: Recording) -> Viewed:
         raise ProblemError(f"{recording.path}: its sources are in {', '.join(sorted(units))}; must be in one unit")
     array, lefts = _array_of(frames)
     us = 1 if recording.timed else _NUMBER_US
-    parts = [
-        ReadSource(name, left, read.array._parts(), _times(read.t, us), _values(read), _rest(read))
-        for (name, read), left in zip(frames.items(), lefts, strict=True)
-    ]
+    parts = [_read(name, left, read, us) for (name, read), left in zip(frames.items(), lefts, strict=True)]
     noted = {name: {(note.t, note.text) for note in sensor.notes} for name, sensor in sources.items()}
     of_all = set.intersection(*noted.values())
     notes = {(t, text, "") for t, text in of_all}
@@ -419,15 +396,18 @@ def _in_its_unit(recording: Recording) -> Frames:
     return recording.frames() if recording.calibration is None else recording.calibrated()
 
 
-def _rest(frames: Frames) -> ReadRest:
-    rest = of_frames(frames)
-    source, loaded = {"unit": "given"}.get(rest.source, rest.source), loaded_from(frames, rest)
-    return ReadRest(source, rest.values, ticks_by_unit(frames), loaded, rest.falls, rest.preload_at)
-
-
-def _times(t: NDArray[np.int64], us: int) -> NDArray[np.int64]:
-    return np.ascontiguousarray(t * us)
-
-
-def _values(frames: Frames) -> NDArray[np.float32]:
-    return np.ascontiguousarray(frames.values).reshape(-1)
+def _read(name: str, left: int, frames: Frames, us: int) -> ReadSource:
+    taken, values = of_frames(frames), np.ascontiguousarray(frames.values).reshape(-1)
+    return ReadSource(
+        name,
+        left,
+        frames.array._parts(),
+        np.ascontiguousarray(frames.t * us),
+        values,
+        "given" if taken.source == "unit" else taken.source,
+        taken._values(frames.array),
+        ticks_by_unit(frames),
+        loaded_from(frames, taken),
+        taken.falls,
+        taken.preload_at,
+    )

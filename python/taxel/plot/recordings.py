@@ -131,8 +131,7 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
     >>> [ax.get_ylabel() for ax in pressure(frames).axes]
     ['contact area (mm2)', 'peak (kPa)', 'sum (kPa)', 'centre (mm)']
     """
-    nowhere = np.full(instance("frames", frames, Frames).array.rows * frames.array.columns, np.nan)
-    series = Series.from_frames(frames, number("above", above), Rest("none", nowhere))
+    series = Series.from_frames(instance("frames", frames, Frames), number("above", above), Rest("none"))
     if figure is None:
         figure = plt.figure(figsize=(11, 6), layout="constrained")
     begin_us = beginning_us(frames.t)

@@ -11,6 +11,8 @@ from taxel.options import DetectOptions as DetectOptions
 from taxel.options import EncodeOptions as EncodeOptions
 from taxel.options import InformationOptions as InformationOptions
 from taxel.options import TrainOptions as TrainOptions
+from taxel.recording.analysis.rest import Rest as Rest
+from taxel.recording.analysis.rest import rest as rest
 from taxel.tasks.calibrate import Calibrated as Calibrated
 from taxel.tasks.calibrate import KnownLoad as KnownLoad
 from taxel.tasks.calibrate import calibrate as calibrate
@@ -24,8 +26,6 @@ from taxel.tasks.info import Info as Info
 from taxel.tasks.info import info as info
 from taxel.tasks.information import Information as Information
 from taxel.tasks.information import information as information
-from taxel.tasks.rest import TakenRest as TakenRest
-from taxel.tasks.rest import rest as rest
 from taxel.tasks.train import train as train
 from taxel.tasks.train_result import Training as Training
 

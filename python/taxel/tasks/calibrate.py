@@ -24,7 +24,7 @@ from taxel.frames import Frames
 from taxel.options import CalibrateOptions, GivenTare
 from taxel.recording import Recording
 from taxel.recording.analysis.pressure import readings
-from taxel.tasks.rest import given_tare
+from taxel.recording.analysis.rest import rest
 
 
 @dataclass(frozen=True)
@@ -146,8 +146,8 @@ def calibrate(
 
 
 def _calibrated(recording: Recording, known: Sequence[KnownLoad], options: CalibrateOptions) -> Calibration:
-    frames, rest, floor = _read(recording, options.tare)
-    how: dict[str, Any] = {"unit": options.unit, "rest": rest, "floor": floor}
+    frames, at_rest, floor = _read(recording, options.tare)
+    how: dict[str, Any] = {"unit": options.unit, "rest": at_rest, "floor": floor}
     how |= {"date": options.date, "note": options.note}
     calibration: Calibration | None = None
     if options.table is not None:
@@ -162,19 +162,15 @@ def _calibrated(recording: Recording, known: Sequence[KnownLoad], options: Calib
 
 def _read(recording: Recording, tare: GivenTare | None) -> tuple[Frames, NDArray[np.float64] | None, float]:
     """Return the readings, those at rest, and the floor above rest from which a taxel counts as loaded."""
-    values = readings(recording, None if tare is None else given_tare(tare, recording))
+    values = readings(recording, None if tare is None else rest(recording, tare))
     if values is None:
         raise ProblemError(f"{recording.path}: contains events without intensities, so there is nothing to calibrate")
-    frames, rest, floor = values
+    frames, taken, floor = values
     if frames.unit in UNITS:
         raise ProblemError(f"{recording.path}: is in {frames.unit} already; only ticks or counts are calibrated")
-    if rest.source == "none" and recording.has_events:
-        error = ProblemError(
-            f"{recording.path}: the values of its taxels at rest are not known, because no half second is quiet"
-        )
-        raise helped(error, "tare", "give")
-    is_measured = rest.source not in ("unit", "none")
-    return frames, rest.values.reshape(recording.array.shape) if is_measured else None, floor
+    if recording.has_events:
+        taken._needed(recording)
+    return frames, None if taken.tare is None or taken.source == "unit" else taken.tare.rest, floor
 
 
 def _load(frames: Frames, known: KnownLoad) -> Load:

@@ -26,16 +26,14 @@ from taxel.detect.readout import run
 from taxel.detect.scoring import many_wrong, score_together
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
-from taxel.frames import Frames
 from taxel.options import DetectOptions, GivenTare
 from taxel.recorded import recorded, unit_of
 from taxel.recording import Recording
-from taxel.recording.analysis.rest import FORCE_UNITS
+from taxel.recording.analysis.rest import Rest, is_stated, rest
 from taxel.recording.opening import sensors_of
 from taxel.spikes import to_us
 from taxel.tasks.info import sensor_lines
 from taxel.tasks.labels import GivenLabels, given_labels
-from taxel.tasks.rest import TakenRest, rest
 
 #: So many lines, beside that of each sensor, say what was measured.
 _LINES = 3
@@ -52,7 +50,7 @@ class Detected:
     recording : Recording
     outcome : taxel.detect.Outcome
         Detections and score.
-    rest : TakenRest, optional
+    rest : Rest, optional
         Which rest was taken; None where the readout needs none.
     remarks : tuple of str
         What may keep detections away or make false ones: gaps, dead, stuck and noisy taxels, values that fall from
@@ -61,7 +59,7 @@ class Detected:
 
     recording: Recording
     outcome: Outcome
-    rest: TakenRest | None
+    rest: Rest | None
     remarks: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
@@ -295,7 +293,7 @@ def _detected(readout: Readout | PlainRule, known: Sequence[str], options: Detec
     with _naming(recording.title):
         _check_unit(readout, recording)
         taken = _rest(readout, recording, options.tare)
-        tare, begin_us = (None, None) if taken is None else (taken.tare, taken.detect_from_us)
+        tare, begin_us = (None, None) if taken is None else (taken._needed(recording), taken.detect_from_us)
         found = run(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=begin_us)
     # Labels that the readout does not have do not count as missed.
     true = {} if labels is None else {label: labels.get(label, _NONE) for label in known}
@@ -337,16 +335,14 @@ def _check_unit(readout: Readout | PlainRule, recording: Recording) -> None:
     readout._check_unit(unit_of(source))
 
 
-def _rest(readout: Readout | PlainRule, recording: Recording, tare: GivenTare | None) -> TakenRest | None:
+def _rest(readout: Readout | PlainRule, recording: Recording, tare: GivenTare | None) -> Rest | None:
     """Return the rest of a recording; None of one without a rest by its unit, if the readout needs none.
 
     None of one of another sensor too, which the readout refuses.
     """
     if not readout._accepts(recording.array):
         return None
-    source = recorded(recording, hold=False)
-    known = tare is not None or (isinstance(source, Frames) and source.unit in FORCE_UNITS)
-    return rest(recording, tare) if known or readout._needs_tare else None
+    return rest(recording, tare) if is_stated(recording, tare) or readout._needs_tare else None
 
 
 @contextmanager

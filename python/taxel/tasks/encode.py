@@ -14,8 +14,8 @@ from taxel._base.progress import Progress, reporting
 from taxel.encode import Encoder
 from taxel.options import EncodeOptions
 from taxel.recording import Recording
+from taxel.recording.analysis.rest import is_stated, rest
 from taxel.spikes import SpikeTrains
-from taxel.tasks.rest import given_or_by_unit
 
 __all__ = ["Encoded", "encode"]
 
@@ -84,8 +84,8 @@ def encode(recording: Recording, options: EncodeOptions, *, progress: Progress |
     instance("recording", recording, Recording)
     with collected() as warnings:
         encoder = options._chosen()
-        rest = given_or_by_unit(options.tare, recording)
-        encoder = encoder if rest is None else encoder.with_tare(rest)
+        if is_stated(recording, options.tare):
+            encoder = encoder.with_tare(rest(recording, options.tare)._needed(recording))
         events = recording.has_events
         count = len(recording.events) if events else len(recording.frames())
         show(f"encoding {counted(count, 'event' if events else 'frame')}", 0, 0)

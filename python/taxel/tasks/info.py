@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,16 +12,14 @@ from taxel._base.arguments import instance
 from taxel._base.messages import collected, counted
 from taxel.formats.event_camera import are_counts
 from taxel.frames import Frames
-from taxel.options import GivenTare
 from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.recording.analysis.health import health
 from taxel.recording.analysis.pressure import Series, series
-from taxel.recording.analysis.rest import of_frames
+from taxel.recording.analysis.rest import of_frames, rest
 from taxel.recording.analysis.summary import summary
 from taxel.spikes import SpikeTrains
-from taxel.tare import Tare
-from taxel.tasks.rest import given_tare, zero_by_unit
+from taxel.tare import GivenTare
 
 #: At most so many frames are looked at for dead, stuck and noisy taxels.
 _LOOKS = 2000
@@ -37,14 +35,11 @@ class Info:
         Of several sources those of each, with offset and drift of their clocks against the first one's.
     pressed : taxel.recording.analysis.pressure.Series, optional
         The pressure over time; None of several sources, and without intensities.
-    tare : Tare, optional
-        The one that was given.
     warnings : tuple of str
     """
 
     facts: dict[str, Any]
     pressed: Series | None
-    tare: Tare | None
     warnings: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
@@ -81,19 +76,19 @@ def info(recording: Recording, tare: GivenTare | None = None) -> Info:
     instance("recording", recording, Recording)
     with collected() as warnings:
         if len(recording.sources) > 1:
-            found = Info(_sources(recording, tare), None, None)
+            found = Info(_sources(recording, tare), None)
         else:
-            rest = _rest(recording, tare)
-            pressed = series(recording, rest)
-            found = Info(summary(recording, pressed), pressed, rest)
-    return Info(found.facts, found.pressed, found.tare, tuple(warnings))
+            given = None if tare is None else rest(recording, tare)
+            pressed = series(recording, given)
+            found = Info(summary(recording, pressed), pressed)
+    return replace(found, warnings=tuple(warnings))
 
 
 def sensor_lines(recording: Recording) -> Iterator[str]:
     """Yield that values fall from their rest, and how many taxels are dead, stuck or noisy, and gaps there are."""
     source, parts = recorded(recording, hold=False), []
-    if isinstance(source, Frames) and (quiet := of_frames(source)).falls:
-        yield f"rest: {quiet.text(recording.path, recording._turned)}"
+    if isinstance(source, Frames) and (taken := of_frames(source)).falls:
+        yield f"rest: {taken._text(recording.path, recording._turned)}"
     # Pixels of counts may have no event.
     if not isinstance(source, SpikeTrains) and not (isinstance(source, Frames) and are_counts(source.unit)):
         if isinstance(source, Frames):
@@ -110,22 +105,13 @@ def sensor_lines(recording: Recording) -> Iterator[str]:
         yield f"sensor: {'; '.join(parts)} (taxel info lists them)"
 
 
-def _rest(recording: Recording, tare: GivenTare | None) -> Tare | None:
-    """Return the given tare, if any; without one warn of frames in a unit of force that do not rest near 0."""
-    if tare is not None:
-        return given_tare(tare, recording)
-    if recording.timed and not recording.has_events:
-        zero_by_unit(recording)
-    return None
-
-
 def _sources(recording: Recording, tare: GivenTare | None) -> dict[str, Any]:
     """Return the facts of each source of a file, with offset and drift of their clocks against the first one's."""
     name_of_first, first = next(iter(recording.sources.items()))
     ours, sources = first.clock, {}
     for name, source in recording.sources.items():
-        rest = None if source.is_stream else _rest(source, tare)
-        facts = summary(source, None if source.is_stream else series(source, rest))
+        given = None if tare is None or source.is_stream else rest(source, tare)
+        facts = summary(source, None if source.is_stream else series(source, given))
         if source.is_stream:
             facts["columns"] = source.columns
         clock = source.clock

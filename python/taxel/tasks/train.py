@@ -20,20 +20,20 @@ from taxel.detect.clock import beside_loads, exchanged, off_loads
 from taxel.detect.drift import training_data
 from taxel.detect.examples import check_examples, sizes_of
 from taxel.detect.fit import Fitter
-from taxel.detect.floors import TOUCH, held_by_tare, measured_floor
+from taxel.detect.floors import measured_floor
 from taxel.detect.folds import count_of_folds
 from taxel.detect.judge import judge_by, judge_training
 from taxel.detect.readout import run
 from taxel.detect.scoring import many, many_wrong
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.options import GivenTare, TrainOptions
+from taxel.options import TrainOptions
 from taxel.recorded import recorded
 from taxel.recording import Recording
+from taxel.recording.analysis.rest import Rest, rest
 from taxel.recording.opening import sensors_of
 from taxel.tasks.info import sensor_lines
 from taxel.tasks.labels import GivenLabels, few, given_labels, labelled_trials
-from taxel.tasks.rest import TakenRest, UnknownRestError, rest
 from taxel.tasks.train_result import Training
 
 #: Sensors of more taxels are no columns of a table.
@@ -111,10 +111,10 @@ def _train(
     some = [k for k, each in enumerate(opened) if each.label not in unlabelled]
     opened, labelled = [opened[k] for k in some], [labelled[k] for k in some]
     names = sorted({label for events in labelled for label in events})
-    rests = _rests(opened, labelled, options.tare)
+    rests = [rest(recording, options.tare) for recording in opened]
     if options.recipe is None and "encoder.name" not in options.changes:
         source = recorded(opened[0])
-        known = all(map(_is_rest, rests, opened))
+        known = all(taken.tare is not None for taken in rests)
         recipe, why = recipes.chosen(source, names, rests=known)
         update(f"recipe {recipe}, chosen for {why}{', whose rest is not known' * (not known)}", 0, 0)
         options = replace(options, recipe=recipe)
@@ -147,9 +147,8 @@ def _train(
             for example in examples
         ]
         fitter = fitter_of(examples)
-    taken = [one for one in rests if isinstance(one, TakenRest)]
     try:
-        training = _trained(opened, examples, taken, options, fitter, constants, update, workers)
+        training = _trained(opened, examples, rests, options, fitter, constants, update, workers)
     except ProblemError as error:
         if off := off_loads(check_examples(examples)):
             error.args = (f"{error.args[0]}; {off[0]}", *error.args[1:])
@@ -228,31 +227,10 @@ def _like_labels(table: Events | Frames, events: Mapping[str, NDArray[np.int64]]
     return [names[k] for k, own in at.items() if np.abs(own[:, None] - t).min(axis=0).max() <= 1.5 * step]
 
 
-def _rests(
-    opened: Sequence[Recording], labelled: Sequence[Mapping[str, NDArray[np.int64]]], tare: GivenTare | None
-) -> list[TakenRest | UnknownRestError]:
-    """Return the rest of each recording, or why it is not known."""
-    found: list[TakenRest | UnknownRestError] = []
-    for recording, events in zip(opened, labelled, strict=True):
-        try:
-            found.append(rest(recording, tare, events))
-        except UnknownRestError as error:
-            found.append(error)
-    return found
-
-
-def _is_rest(taken: TakenRest | UnknownRestError, recording: Recording) -> bool:
-    """Whether a rest is known, and holds no touch."""
-    if isinstance(taken, UnknownRestError):
-        return False
-    source = recorded(recording)
-    return held_by_tare([Example(source, {}, taken.tare)]) < min(TOUCH, source.array.taxels)
-
-
 def _examples(
     opened: Sequence[Recording],
     labelled: Sequence[Mapping[str, NDArray[np.int64]]],
-    rests: Sequence[TakenRest | UnknownRestError],
+    rests: Sequence[Rest],
     plan: Recipe,
 ) -> list[Example]:
     """Return recordings as examples.
@@ -262,9 +240,9 @@ def _examples(
     needed = any(part.tare is None for part in plan.encoder._each() if hasattr(part, "tare"))
     examples = []
     for recording, events, taken in zip(opened, labelled, rests, strict=True):
-        if needed and isinstance(taken, UnknownRestError):
-            raise taken
-        tare = None if isinstance(taken, UnknownRestError) else taken.tare
+        tare = taken._needed(recording) if needed else taken.tare
+        if taken.preload_at:
+            warn(f"{recording.path}: the rest is {taken}")
         group = recording.title.removesuffix(recording.label)
         examples.append(Example(recording, events, tare, group, recording.title))
     return examples
@@ -292,7 +270,7 @@ def _within_touches(fitter: Fitter) -> Iterator[str]:
 def _trained(
     opened: Sequence[Recording],
     examples: Sequence[Example],
-    rests: Sequence[TakenRest],
+    rests: Sequence[Rest],
     options: TrainOptions,
     fitter: Fitter,
     constants: Mapping[str, float],

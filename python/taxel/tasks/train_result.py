@@ -14,9 +14,9 @@ from taxel.detect.examples import unreliable
 from taxel.detect.scoring import score_rows
 from taxel.options import TrainOptions
 from taxel.recording import Recording
+from taxel.recording.analysis.rest import Rest
 from taxel.spikes import to_ms, to_us
 from taxel.tare import Tare
-from taxel.tasks.rest import TakenRest
 
 #: Detections are known late that are known so long after their label, ms.
 _LATE_MS = 500.0
@@ -44,8 +44,8 @@ class Training:
         Why the scores are those on the training data; empty where they are held out.
     outcomes : sequence of taxel.detect.Outcome
         What the readout detects in its own training data.
-    rests : sequence of TakenRest
-        The rest of each recording whose rest is known.
+    rests : sequence of Rest
+        The rest of each recording.
     warned : tuple of str
         The warnings of the training, and, where more than 5 % of the labels of a name are missed or false, by how much
         labels are off what was felt, and what is the matter with the sensor.
@@ -61,7 +61,7 @@ class Training:
     scored: Judged
     why: str
     outcomes: Sequence[Outcome]
-    rests: Sequence[TakenRest]
+    rests: Sequence[Rest]
     warned: tuple[str, ...] = ()
     unlabelled: tuple[str, ...] = ()
     constants_ms: Mapping[str, float] = field(default_factory=dict)
@@ -205,9 +205,6 @@ class Training:
         if not self.learnt:
             return ""
         tare = "FILE" if isinstance(self.options.tare, Tare) else self.options.tare
-        before = [taken.tare.stop_us - taken.tare.start_us for taken in self.rests if taken.source == "labels"]
-        if before:
-            tare = f"{min(before) / 1e6:g}"
         option = f" --tare {quote(str(tare))}" if tare and self.readout._needs_tare else ""
         return f"taxel detect RECORDING --readout {quote(readout)}{option}"
 
@@ -221,13 +218,11 @@ class Training:
 
     def _rests(self) -> Iterator[str]:
         """Yield the line of which rests were taken from the recordings."""
-        taken = [one for one in self.rests if one.source in ("beginning", "quiet", "labels")]
-        if len(taken) == 1:
-            yield f"rest: {taken[0]}; --tare sets another"
-        elif taken:
-            lasts_ms = [to_ms(one.tare.stop_us - one.tare.start_us) for one in taken]
+        if len(self.rests) == 1 and self.rests[0].us:
+            yield f"rest: {self.rests[0]}; --tare sets another"
+        elif lasts_ms := [to_ms(taken.us[1] - taken.us[0]) for taken in self.rests if taken.us]:
             lasts = f"{min(lasts_ms):g} to {max(lasts_ms):g} ms"
-            yield f"rest: measured separately in each of {len(taken)} recordings, for {lasts}; --tare sets another"
+            yield f"rest: measured separately in each of {len(lasts_ms)} recordings, for {lasts}; --tare sets another"
 
     def _scores(self, label: str) -> Iterator[str]:
         """Yield how the neuron and the plain rule of a label scored on the same labels, and which of them runs."""

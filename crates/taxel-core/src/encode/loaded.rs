@@ -3,12 +3,9 @@
 use super::blocks::{BLOCK, Block, blocks};
 use super::driver::Sample;
 use super::tare::Tare;
-use crate::rest::{Rest, touched_from};
+use crate::rest::{Rest, TIMES_NOISE, touched_from};
 use crate::vectors::wide;
 use crate::{Array, Hint, Result, problem};
-
-/// A channel that counts alone is loaded from so many times its noise on, which noise alone does not reach.
-const TIMES_NOISE: f64 = 6.0;
 
 /// It is loaded until it is below this part of that, so that noise does not end a touch.
 const RELEASE: f64 = 0.5;

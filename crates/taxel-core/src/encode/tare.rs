@@ -37,31 +37,24 @@ impl Tare {
     pub fn check(&self) -> Result<()> {
         let (rows, columns) = (self.array.rows, self.array.columns);
         self.array.check().map_err(|error| problem!("tare: {error}"))?;
-        if self.rest.len() != self.array.len() {
-            return Err(problem!(
-                "tare: {} rests for {rows} x {columns} taxels: must be one per taxel",
-                self.rest.len()
-            ));
-        }
         if self.start_us >= self.stop_us {
             return Err(problem!("tare from {} to {} us: start must be before stop", self.start_us, self.stop_us));
         }
-        if let Some(taxel) = self.rest.iter().position(|rest| rest.is_some_and(|r| !r.is_finite())) {
-            return Err(problem!("tare: rest of the taxel at {} is not finite", self.array.position_text(taxel)));
-        }
-        if self.noise.len() != self.array.len() {
-            return Err(problem!(
-                "tare: noise of {} taxels for {rows} x {columns} taxels: must be one value per taxel",
-                self.noise.len()
-            ));
-        }
-        match self.noise.iter().position(|noise| noise.is_some_and(|n| !(n >= 0.0 && n.is_finite()))) {
-            Some(taxel) => {
-                let position = self.array.position_text(taxel);
-                Err(problem!("tare: noise of the taxel at {position} must be 0 or more and finite"))
+        for (what, values, least) in [("rest", &self.rest, f64::MIN), ("noise", &self.noise, 0.0)] {
+            if values.len() != self.array.len() {
+                let n = values.len();
+                return Err(problem!(
+                    "tare: {what} of {n} taxels for {rows} x {columns} taxels: must be one per taxel"
+                ));
             }
-            None => Ok(()),
+            let sound = |value: f64| value.is_finite() && value >= least;
+            if let Some(taxel) = values.iter().position(|value| value.is_some_and(|value| !sound(value))) {
+                let (at, value) = (self.array.position_text(taxel), values[taxel].unwrap_or_default());
+                let or_more = if least == 0.0 { " and 0 or more" } else { "" };
+                return Err(problem!("tare: {what} of the taxel at {at} is {value}: must be finite{or_more}"));
+            }
         }
+        Ok(())
     }
 
     /// The tare as that of a larger array's first rows and columns; taxels beyond have none.
@@ -240,26 +233,12 @@ impl TareBuilder {
         Self { array: array.clone(), start, present: i64::MIN, held, integrals }
     }
 
-    /// Start of the interval, us; `None` before the first input if no start was given.
-    #[must_use]
-    pub fn start(&self) -> Option<i64> {
-        self.start
-    }
-
-    /// Adds the next events.
+    /// Adds the next events of the sensor.
     ///
     /// # Errors
     ///
-    /// `Problem` if the events have no intensities or are of another sensor.
+    /// `Problem` if they have no intensities.
     pub fn push_events(&mut self, events: EventsView<'_>) -> Result<()> {
-        let (rows, columns) = (events.array.rows, events.array.columns);
-        if (rows, columns) != (self.array.rows, self.array.columns) {
-            let (own_rows, own_columns) = (self.array.rows, self.array.columns);
-            return Err(problem!(
-                "events of {rows} x {columns} taxels: the tare is for {own_rows} x {own_columns} taxels"
-            ));
-        }
-        events.check()?;
         let Some(intensity) = &events.intensity else {
             return Err(problem!("events without intensities: a tare needs intensities"));
         };
@@ -275,15 +254,12 @@ impl TareBuilder {
         Ok(())
     }
 
-    /// Adds the next frame, at `t` us.
+    /// Adds the next frame of the sensor, at `t` us.
     ///
     /// # Errors
     ///
-    /// `Problem` if the frame has another size, contains NaN or is out of order.
+    /// `Problem` if the frame contains NaN or is out of order.
     pub fn push_frame(&mut self, t: i64, values: &[f32]) -> Result<()> {
-        if values.len() != self.integrals.len() {
-            return Err(problem!("frame at {t} us: {} values; must be {}", values.len(), self.integrals.len()));
-        }
         if t < self.present {
             return Err(problem!("frame at {t} us comes after {} us: times must ascend", self.present));
         }
@@ -299,18 +275,15 @@ impl TareBuilder {
         Ok(())
     }
 
-    /// The tare up to `stop` us; no later input may have arrived.
+    /// The tare up to `stop` us; no later input has arrived.
     ///
     /// # Errors
     ///
-    /// `Problem` if there was no event, the interval is empty, or an event was later.
+    /// `Problem` if there was no event, or the interval is empty.
     pub fn finish(mut self, stop: i64, note: &str) -> Result<Tare> {
         let Some(start) = self.start else { return Err(problem!("tare: nothing has arrived")) };
         if stop <= start {
             return Err(problem!("tare from {start} to {stop} us: start must be before stop"));
-        }
-        if stop < self.present {
-            return Err(problem!("tare until {stop} us: must not end before the last value, at {} us", self.present));
         }
         for (integral, &held) in self.integrals.iter_mut().zip(self.held.values()) {
             integral.extend(stop, held);

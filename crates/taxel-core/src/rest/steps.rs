@@ -1,5 +1,6 @@
 //! Values of frames in whole steps, which have 16 bits as the values of a board do.
 
+use super::value::{NOISE_FLOOR, TIMES_NOISE};
 use crate::held::UNKNOWN;
 
 /// Most steps from the least value to the greatest.
@@ -11,6 +12,9 @@ const MIDDLE: u16 = MOST_STEPS / 2;
 /// Values that arrive live have room for so many times the greatest of the first frame.
 const ROOM: f64 = 16.0;
 
+/// So many steps above rest are noise where it is not known.
+const FLOOR: u16 = NOISE_FLOOR as u16;
+
 /// Most decimals of values whose last decimal is a step.
 const MOST_DECIMALS: i32 = 6;
 
@@ -21,6 +25,8 @@ pub struct ValueSteps {
     pub size: f64,
     /// Steps of the value 0.
     pub zero: u16,
+    /// So many steps above rest are noise.
+    pub floor: u16,
 }
 
 impl ValueSteps {
@@ -36,7 +42,7 @@ impl ValueSteps {
         // The sum over the array has 32 bits.
         let steps = usize::from(MOST_STEPS).min(u32::MAX as usize / taxels.max(1)) as f64;
         let size = if integers && range <= f64::from(MOST_STEPS) { 1.0 } else { range / steps };
-        Self { size, zero: (-least / size).ceil() as u16 }
+        Self { size, zero: (-least / size).ceil() as u16, floor: FLOOR }
     }
 
     /// Steps for values of which only the first frame is known: of 1 where all are whole, else of their last decimal, or
@@ -50,26 +56,28 @@ impl ValueSteps {
         let has = |size: f64| known().all(|value| is_multiple(value, size));
         let decimals = (0..MOST_DECIMALS).find(|&decimals| has(decimal(decimals))).unwrap_or(MOST_DECIMALS);
         if decimals == 0 && !negative && greatest <= f64::from(MOST_STEPS) {
-            return Self { size: 1.0, zero: 0 };
+            return Self { size: 1.0, zero: 0, floor: FLOOR };
         }
         let least = greatest * ROOM / f64::from(MIDDLE);
-        Self { size: decimal(decimals).max(least), zero: MIDDLE }
+        Self { size: decimal(decimals).max(least), zero: MIDDLE, floor: FLOOR }
     }
 
-    /// Steps that are not much smaller than the noise, its standard deviation, so that a noise floor of some steps holds it.
+    /// Steps that are not much smaller than the noise, its standard deviation, with a noise floor that holds it.
     #[must_use]
     pub fn above_noise(self, noise: f64) -> Self {
         let power = 10_f64.powf(noise.log10().floor());
         let size =
             [5.0, 2.0, 1.0].into_iter().map(|digit| digit * power).find(|&size| size <= noise).unwrap_or(self.size);
-        if size > self.size { Self { size, ..self } } else { self }
+        let size = size.max(self.size);
+        Self { size, floor: FLOOR.max((TIMES_NOISE * noise / size).ceil() as u16), ..self }
     }
 
     /// Larger steps, which have room for this value too.
     #[must_use]
     pub fn widened(self, value: f32) -> Self {
         let size = (f64::from(value.abs()) / f64::from(MIDDLE)).max(self.size) * ROOM;
-        Self { size, zero: MIDDLE }
+        let floor = (f64::from(self.floor) * self.size / size).ceil() as u16;
+        Self { size, zero: MIDDLE, floor: FLOOR.max(floor) }
     }
 
     /// Whether a value has a step; a missing one has.
@@ -116,21 +124,23 @@ mod tests {
             (&[0.0, 0.0], 1.0, 0),
             (&[], 1.0, 0),
         ] {
-            assert_eq!(ValueSteps::of_first(values), ValueSteps { size, zero }, "{values:?}");
+            assert_eq!(ValueSteps::of_first(values), ValueSteps { size, zero, floor: FLOOR }, "{values:?}");
         }
         let steps = ValueSteps::of_first(&[1e5, -70_000.0]);
         assert!([1e5, -70_000.0, 1.5e6, f32::NAN].iter().all(|&value| steps.holds(value)), "{steps:?}");
         for value in [1e9, -1e9, 65_534.0, -1.0] {
-            let steps = ValueSteps { size: 1.0, zero: 0 };
+            let steps = ValueSteps { size: 1.0, zero: 0, floor: FLOOR };
             assert!(!steps.holds(value) && steps.widened(value).holds(value), "{value}");
         }
     }
 
     #[test]
-    fn steps_are_as_large_as_the_noise() {
-        let steps = ValueSteps { size: 0.001, zero: MIDDLE };
+    fn steps_are_as_large_as_the_noise_and_their_floor_holds_it() {
+        let steps = ValueSteps { size: 0.001, zero: MIDDLE, floor: FLOOR };
         for (noise, size) in [(0.0, 0.001), (0.0004, 0.001), (0.37, 0.2), (5.0, 5.0), (1.99, 1.0), (12.0, 10.0)] {
-            assert!((steps.above_noise(noise).size - size).abs() < 1e-9, "{noise}");
+            let steps = steps.above_noise(noise);
+            assert!((steps.size - size).abs() < 1e-9, "{noise}");
+            assert!((TIMES_NOISE * noise..TIMES_NOISE * noise + 3.0 * size).contains(&(f64::from(steps.floor) * size)));
         }
     }
 

@@ -6,7 +6,7 @@
 //! Reading: a stretch is quiet if no taxel was further from its mean than the tracked rest calls far; on a grid, if no
 //! three of nine neighbours were, so that bad taxels, which move alone or in pairs, do not count. It can be that of a
 //! load that does not move: a taxel that lies far below its rest for a whole quiet stretch was loaded before, and its
-//! rest is set anew. Where values fall with pressure, it is one that lies far above.
+//! rest is set anew.
 
 use std::collections::HashMap;
 
@@ -127,8 +127,6 @@ impl TaxelGrid {
 pub struct TrackedRest {
     grid: TaxelGrid,
     noise_floor: f64,
-    /// Whether values fall from their rest with pressure.
-    falls: bool,
     baseline: Baseline,
     /// The values to read: those of taxels without a value are their rest.
     values: Vec<f32>,
@@ -159,15 +157,8 @@ impl TrackedRest {
         let rest_given = known.contains(&true);
         let (grid, begins) = (TaxelGrid { taxels: n, columns: columns.max(1) }, vec![f64::NO_REST; n]);
         let values = vec![0.0; n];
-        let falls = false;
         let (stretch, quiet) = (None, None);
-        Self { grid, noise_floor, falls, baseline, values, known, rest_given, stretch, far, quiet, begins }
-    }
-
-    /// The same of values that fall from their rest with pressure: what lies far above it was loaded before.
-    #[must_use]
-    pub fn falling(self) -> Self {
-        Self { falls: true, ..self }
+        Self { grid, noise_floor, baseline, values, known, rest_given, stretch, far, quiet, begins }
     }
 
     /// Reads the next values, at `t` us, NaN for a taxel without one; returns them above the rest (negative below it).
@@ -229,7 +220,7 @@ impl TrackedRest {
                 continue;
             }
             let (mean, rest) = (stretch.mean(taxel), self.baseline.values()[taxel]);
-            let load = if self.falls { rest - mean } else { mean - rest };
+            let load = mean - rest;
             let released = load <= -far;
             if released || first && load < far {
                 self.baseline.set(taxel, mean);
@@ -241,7 +232,7 @@ impl TrackedRest {
             if *begins == f64::NO_REST {
                 *begins = rest;
             } else if released {
-                *begins = if self.falls { begins.max(rest) } else { begins.min(rest) };
+                *begins = begins.min(rest);
             }
         }
     }

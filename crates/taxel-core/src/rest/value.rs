@@ -5,6 +5,9 @@ use std::collections::BTreeSet;
 /// The noise floor of the board's fast presets, ticks: by it a rest is found that was not measured.
 pub const NOISE_FLOOR: f64 = 3.0;
 
+/// A noise floor is so many standard deviations of the noise, so that two neighbours rarely exceed it together.
+pub const TIMES_NOISE: f64 = 6.0;
+
 /// Units of force and pressure, in which the rest of a taxel is 0.
 pub const FORCE_UNITS: [&str; 20] = [
     "N", "mN", "kN", "gf", "kgf", "Pa", "hPa", "kPa", "MPa", "mbar", "bar", "psi", "mmHg", "N/cm2", "N/cm²", "N/mm2",

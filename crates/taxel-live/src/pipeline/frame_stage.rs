@@ -216,7 +216,7 @@ impl FirstNoise {
         Self { squares: vec![0.0; taxels], frames: 0 }
     }
 
-    /// Takes the next frame; once, when it was measured, returns the standard deviation of the median taxel.
+    /// Takes the next frame; once, when it was measured, returns the standard deviation that 90 % of the taxels have at most.
     fn take(&mut self, before: &[f32], frame: &[f32]) -> Option<f64> {
         if self.frames >= NOISE_FRAMES || before.is_empty() {
             return None;
@@ -229,11 +229,11 @@ impl FirstNoise {
         if self.frames < NOISE_FRAMES {
             return None;
         }
-        let middle = self.squares.len() / 2;
-        let (_, median, _) = self.squares.select_nth_unstable_by(middle, f64::total_cmp);
+        let most = (self.squares.len() - 1) * 9 / 10;
+        let (_, square, _) = self.squares.select_nth_unstable_by(most, f64::total_cmp);
         // A difference has the noise of two frames.
         #[allow(clippy::cast_precision_loss)]
-        Some((*median / (2.0 * NOISE_FRAMES as f64)).sqrt())
+        Some((*square / (2.0 * NOISE_FRAMES as f64)).sqrt())
     }
 }
 

@@ -142,67 +142,6 @@ fn at_any_time_the_last_frame_of_each_source_is_shown_with_its_load() {
 }
 
 #[test]
-fn noise_has_no_centre_and_a_touch_has_one_also_where_one_foot_always_stands() {
-    let mut random = StdRng::seed_from_u64(5);
-    let stands = |foot: usize, k: usize| k >= 60 && (k / 40 + foot).is_multiple_of(2);
-    for spread in [0, 2, 4, 6] {
-        let values = [0, 1].map(|foot| {
-            let mut value = |k: usize| -> f32 {
-                let noise: i16 = (0..4).map(|_| random.random_range(-spread..=spread)).sum();
-                f32::from(200 + noise) + if stands(foot, k) { 60.0 } else { 0.0 }
-            };
-            (0..600).flat_map(|k| [k; 16]).map(&mut value).collect::<Vec<f32>>()
-        });
-        let rest = FrameRest {
-            source: RestSource::Quiet,
-            values: vec![200.0; 16],
-            ticks_by_unit: 0.5,
-            loaded_from: 7.0,
-            falls: false,
-            preload_at: String::new(),
-        };
-        let sources = values.iter().zip([("left", 0), ("right", 5)]).map(|(values, (name, left))| FrameSource {
-            about: about(name, left, Array::unmeasured(4, 4, "foot"), rest.clone()),
-            t: (0..600).map(|k| 10_000 * k).collect(),
-            values,
-        });
-        let array = Array::new(4, 9, 1.0, "feet").unwrap();
-        let index = Arc::new(indexed(array, sources.collect()));
-        let mut player = Player::open(&index, 0, &ViewOptions::plain(COLUMN_US), None).unwrap();
-        for k in 0..600 {
-            player.advance(10_000 * i64::try_from(k).unwrap()).unwrap();
-            let sum = player.state.curves().next().unwrap().sum;
-            let (touches, noise) = (stands(0, k) || stands(1, k), frames(&index).noise_of_all);
-            assert_eq!(sum > noise, touches, "spread {spread}, frame {k}: {sum} of {noise}");
-        }
-    }
-}
-
-#[test]
-fn a_source_that_begins_later_has_the_noise_of_its_own_frames() {
-    let values = vec![210.0; 600 * 6];
-    let noise = [0, 1_000_000].map(|late| {
-        let rest = FrameRest {
-            source: RestSource::Quiet,
-            values: vec![200.0; 6],
-            ticks_by_unit: 0.5,
-            loaded_from: 7.0,
-            falls: false,
-            preload_at: String::new(),
-        };
-        let sources = [("left", 0, 0), ("right", 4, late)].map(|(name, left, begin)| FrameSource {
-            about: about(name, left, foot(), rest.clone()),
-            t: (0..600).map(|k| begin + 10_000 * k).collect(),
-            values: &values,
-        });
-        let array = Array::new(2, 7, 1.0, "feet").unwrap();
-        frames(&indexed(array, sources.into())).noise.clone()
-    });
-    assert_eq!(noise[0], noise[1]);
-    assert!(noise[0][1] > 4 * 7);
-}
-
-#[test]
 fn steps_go_from_frame_to_frame_both_ways() {
     let left = ((0..9).map(|k| 10_000 * k).collect::<Vec<i64>>(), vec![1.0; 54]);
     let index = index(&left, &(vec![], vec![]));

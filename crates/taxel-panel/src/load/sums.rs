@@ -39,15 +39,12 @@ impl Load {
         self.area = self.area + u32::from(now > 0) - u32::from(before > 0);
     }
 
-    /// Its curve: the sum, the area and the centre of the loaded taxels; up to a sum of `noise` there is noise alone, and no
-    /// centre.
-    pub(crate) fn curve(&self, at: &Coordinates, weights: &Weights, noise: u32) -> Curve {
+    /// Its curve: the sum, the area and the centre of the loaded taxels.
+    pub(crate) fn curve(&self, at: &Coordinates, weights: &Weights) -> Curve {
         if self.sum == 0 {
             return NOTHING;
         }
-        let sum = weights.sum(self.sum);
-        let loaded = if sum > noise { self.loaded } else { 0 };
-        let (x, y) = at.centre(loaded, self.loaded_x, self.loaded_y);
-        Curve { sum, area: self.area, x, y }
+        let (x, y) = at.centre(self.loaded, self.loaded_x, self.loaded_y);
+        Curve { sum: weights.sum(self.sum), area: self.area, x, y }
     }
 }

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +13,8 @@ from taxel._core import ProblemError
 from taxel.calibration._curves import N_PER_KPA_MM2
 from taxel.encode import ContactArea
 from taxel.frames import Frames
-from taxel.recording.analysis.rest import (
-    FrameBlock,
-    Rest,
-    find_rest,
-    frames_above,
-    loaded_from,
-    of_frames,
-    rest_scale,
-)
+from taxel.recording.analysis.quiet import Readings, held_values, interval
+from taxel.recording.analysis.rest import Rest, loaded_from, rest
 from taxel.recording.frames import FRAMES_HZ, period_us
 from taxel.recording.recording import Recording
 from taxel.tare import Tare
@@ -30,8 +23,6 @@ from taxel.tare import Tare
 MOST_FRAMES, _MOST_VALUES = 2000, 1 << 27
 #: Number of values of frames that are computed at once.
 _BLOCK = 1 << 21
-#: The rest of events is tracked this often, us, so many times from each change on: a second has a whole quiet stretch.
-_TRACKED_US, _AFTER = 50_000, 21
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +38,7 @@ class Series:
     columns : dict from str to float64, shape (n,)
         By name and unit, as ``peak_kPa``: `area` (mm2, or taxels where their area is not known); the largest value,
         `peak`; the `sum` of the loaded taxels, 0 without one, and of all where `above` is 0; `centre_x` and `centre_y`
-        (`Array.centre_unit`), NaN in frames above the rest of a quiet stretch whose sum is one that noise adds up to;
+        (`Array.centre_unit`), NaN in frames without a loaded taxel;
         `force` (N), of values in kPa whose areas are known. Channels have neither area nor centre.
     rest : Rest
         What was subtracted.
@@ -80,9 +71,7 @@ class Series:
         if not array.is_channels:
             in_mm2 = array.area_mm2 is not None
             area = over(lambda block: block.area(above) if in_mm2 else block.loaded(above).astype(np.float64))
-            total, centre = columns[f"sum_{frames.unit}"], over(lambda block: block.centre(above))
-            if rest.source == "quiet" and len(frames):
-                centre[total <= _core.frame_noise(frames.t, total, above)] = np.nan
+            centre = over(lambda block: block.centre(above))
             columns = {"area_mm2" if in_mm2 else "area_taxels": area, **columns}
             columns |= {f"centre_{axis}_{array.centre_unit}": centre[:, k] for k, axis in enumerate("xy")}
         if (force := force_n(frames)) is not None:
@@ -98,54 +87,23 @@ def force_n(frames: Frames) -> NDArray[np.float64] | None:
     return np.asarray(np.einsum("nij,ij->n", frames.values, areas, dtype=np.float64) * N_PER_KPA_MM2)
 
 
-def series(recording: Recording, tare: Tare | None = None) -> Series | None:
+def series(recording: Recording, taken: Rest | None = None) -> Series | None:
     """Return area, peak, sum and centre of a recording's frames above rest (`above_rest`); None without intensities."""
-    result = above_rest(recording, tare)
+    result = above_rest(recording, taken)
     return None if result is None else Series.from_frames(*result)
 
 
-def _held(recording: Recording) -> _core.HeldValues:
-    """Return what the taxels hold over time; NaN before the first event of a taxel whose value was not known."""
-    unknown = np.full(recording.array.shape, np.nan, np.float32)
-    begins = unknown if recording.held is None else recording.held
-    return _core.HeldValues(recording.events._parts(), None, begins.reshape(-1))
-
-
-def _interval(recording: Recording) -> tuple[int, int]:
-    """Return the first time of a recording of events and its end, us."""
-    t = recording.events.t
-    return recording.interval or (int(t.min()), int(t.max()) + 1)
-
-
-def _rest_of_events(recording: Recording) -> Rest:
-    """Return the rest that a quiet stretch of held values shows.
-
-    They are read where a taxel changes, and for a while after it: in longer silence all stays as it is.
-    """
-    (first, stop), held, taxels = _interval(recording), _held(recording), recording.array.rows * recording.array.columns
-    steps = np.unique((np.append(recording.events.t, first) - first) // _TRACKED_US)
-    times = first + np.unique(steps[:, None] + np.arange(_AFTER)) * _TRACKED_US
-    times = times[times < stop]
-
-    def blocks() -> Iterator[FrameBlock]:
-        size = max(1, _BLOCK // taxels)
-        for t in (times[k : k + size] for k in range(0, len(times), size)):
-            yield t, held.at(t).reshape(len(t), taxels)
-
-    return find_rest(blocks, taxels, recording.array.columns)
-
-
 def _frames(recording: Recording) -> Frames:
-    """Return frames of held values, at most 100 a second; NaN as of `_held`."""
-    (first, stop), array = _interval(recording), recording.array
+    """Return frames of held values, at most 100 a second; NaN as of `held_values`."""
+    (first, stop), array = interval(recording), recording.array
     taxels, seconds = array.rows * array.columns, recording.events.duration_us / 1e6
     most = max(1, min(MOST_FRAMES, _MOST_VALUES // taxels))
     period = period_us("rate_hz", min(FRAMES_HZ, most / seconds) if seconds else FRAMES_HZ)
     t = np.arange(first, stop, period, dtype=np.int64)
-    return Frames(_held(recording).at(t).reshape(-1, *array.shape), t, unit="ticks", array=array)
+    return Frames(held_values(recording).at(t).reshape(-1, *array.shape), t, unit="ticks", array=array)
 
 
-def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, float, Rest] | None:
+def above_rest(recording: Recording, taken: Rest | None = None) -> tuple[Frames, float, Rest] | None:
     """Return frames of the values above rest, the threshold of a loaded taxel, and the rest.
 
     They are in N or kPa if the recording has a calibration file beside it. None without intensities.
@@ -153,8 +111,8 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
     Parameters
     ----------
     recording : Recording
-    tare : Tare, optional
-        The rest as it was measured.
+    taken : Rest, optional
+        Default: as of `readings`.
 
     Notes
     -----
@@ -163,60 +121,50 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
     (`taxel.encode.LocalLoad`); else it is not known: events are then above each taxel's first value, and frames as
     they are. A taxel is loaded if it is above its rest by more than the noise floor of the board's fast presets and
     half a tick, as in `taxel.encode.ContactArea`; in another unit the range of a recording's values counts as 150
-    ticks; in one of force or pressure by more than six times the noise of a quiet stretch, or than 0 without one.
+    ticks, and six times the noise of the quiet stretch is less than a load; in one of force or pressure that alone.
     """
-    read = readings(recording, tare)
+    read = readings(recording, taken)
     if read is None:
         return None
-    frames, rest, floor = read
-    unit, array = frames.unit, frames.array
+    frames, taken, floor = read
+    array, known = frames.array, taken._values(frames.array)
     if (calibration := recording.calibration) is not None:
-        values = calibration._values(np.nan_to_num(frames.values), rest.values.reshape(array.shape))
-        return Frames(values, frames.t, unit=calibration.unit, array=array), 0.0, rest
-    if not recording.has_events and rest.source in ("unit", "none"):
-        return frames, floor, rest
-    values = frames.values.reshape(len(frames), rest.values.size)
-    if rest.source in ("quiet", "none"):
-        [(_, above)] = frames_above(rest, [(frames.t, values)], array.columns, rest_scale(frames))
+        values = calibration._values(np.nan_to_num(frames.values), known.reshape(array.shape))
+        return Frames(values, frames.t, unit=calibration.unit, array=array), 0.0, taken
+    if not recording.has_events and taken.source in ("unit", "none"):
+        return frames, floor, taken
+    values = frames.values.reshape(len(frames), known.size)
+    if taken.source in ("quiet", "none"):
+        blocks = Readings.of_frames(frames)
+        parts = [part for _, part in blocks.above(blocks.tracked(known))]
+        above = np.concatenate([np.empty((0, known.size)), *parts])
     else:
-        known = np.where(np.isnan(rest.values), np.inf, rest.values)
-        above = _core.above_rest(np.nan_to_num(values).reshape(-1), known).reshape(values.shape)
+        above = _core.above_rest(np.nan_to_num(values).reshape(-1), np.where(np.isnan(known), np.inf, known))
+        above = above.reshape(values.shape)
     for zeroed in recording.zeroings:
         later, taxel = frames.t >= zeroed.t, zeroed.y * array.columns + zeroed.x
         above[later, taxel] = np.maximum(np.nan_to_num(values[later, taxel] - np.float32(zeroed.rest)), 0)
-    return Frames(above.reshape(-1, *array.shape), frames.t, unit=unit, array=array), floor, rest
+    return Frames(above.reshape(-1, *array.shape), frames.t, unit=frames.unit, array=array), floor, taken
 
 
-def quiet_rest(recording: Recording) -> Rest | None:
-    """Return the rest that a quiet stretch of a board's events shows; None without intensities."""
-    present = recording.events.present
-    return None if present is None or not present.any() else _rest_of_events(recording)
+def readings(recording: Recording, taken: Rest | None = None) -> tuple[Frames, Rest, float] | None:
+    """Return raw frames, their rest, and the threshold of a loaded taxel; None without intensities.
 
-
-def readings(recording: Recording, tare: Tare | None = None) -> tuple[Frames, Rest, float] | None:
-    """Return raw frames, the rest of each taxel, and the threshold of a loaded taxel; None without intensities.
-
-    The rest is as of `above_rest`, but that of a quiet stretch as it was there; a taxel has NaN before its first event.
+    A taxel has NaN before its first event. The rest is by default the calibration's, else as of `rest`.
     """
-    measured = _measured(recording, tare)
-    if not recording.has_events:
-        frames = recording.frames()
-        rest = measured or of_frames(frames)
-        return frames, rest, loaded_from(frames, rest)
-    if recording.events.present is None or not recording.events.present.any():
+    if recording.has_events and (recording.events.present is None or not recording.events.present.any()):
         return None
-    rest = measured or _rest_of_events(recording)
-    return _frames(recording), replace(rest, zeroed=len({(z.x, z.y) for z in recording.zeroings})), ContactArea().above
-
-
-def _measured(recording: Recording, tare: Tare | None) -> Rest | None:
-    """Return the measured rest; NaN where a taxel has none."""
-    if tare is not None:
-        if tare.array.shape != recording.array.shape:
-            measured, stated = (f"{rows} x {columns}" for rows, columns in (tare.array.shape, recording.array.shape))
-            raise ProblemError(f"the tare has {measured} taxels, {recording.path} has {stated}")
-        return Rest("tare", tare.rest.reshape(-1))
-    calibration = recording.calibration
-    if calibration is None or calibration.rest is None:
-        return None
-    return Rest("calibration", calibration.rest.reshape(-1))
+    if taken is None:
+        of_calibration = None if recording.calibration is None else recording.calibration.rest
+        taken = (
+            rest(recording)
+            if of_calibration is None
+            else Rest("calibration", Tare._of(recording.array, of_calibration, "the calibration's"))
+        )
+    if taken.tare is not None and taken.tare.array.shape != recording.array.shape:
+        measured, stated = (f"{rows} x {columns}" for rows, columns in (taken.tare.array.shape, recording.array.shape))
+        raise ProblemError(f"the tare has {measured} taxels, {recording.path} has {stated}")
+    if recording.has_events:
+        return _frames(recording), taken, ContactArea().above
+    frames = recording.frames()
+    return frames, taken, loaded_from(frames, taken)

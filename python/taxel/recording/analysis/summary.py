@@ -78,7 +78,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
     facts["rest"] = (
         None
         if pressed is None
-        else {**pressed.rest.described(), "text": pressed.rest.text(recording.path, recording._turned)}
+        else {**pressed.rest.to_dict(), "text": pressed.rest._text(recording.path, recording._turned)}
     )
     # Above the rest of readings that fall is nothing but noise.
     facts["pressure"] = None if pressed is None or pressed.rest.falls else _pressure(pressed)
