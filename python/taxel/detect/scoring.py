@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import add
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -304,9 +304,10 @@ def _truth(
     """Return the reference events as labels and times."""
     if isinstance(truth, Detections):
         return truth.label.tolist(), truth.t
-    if isinstance(truth, Sequence) and any(isinstance(note, Note) for note in truth):
-        timed = [note for note in truth if instance("truth", note, Note).t is not None]
-        return [note.text for note in timed], np.array([note.t for note in timed], np.int64)
+    notes = [note for note in truth if isinstance(note, Note)] if isinstance(truth, Sequence) else []
+    if notes:
+        timed = [(note.text, note.t) for note in notes if note.t is not None]
+        return [text for text, _ in timed], np.array([t for _, t in timed], np.int64)
     if isinstance(truth, Mapping):
         wrong = [label for label in truth if not isinstance(label, str)]
         if wrong:
@@ -314,7 +315,7 @@ def _truth(
         columns = {label: column(f"truth[{label!r}]", times, np.int64) for label, times in truth.items()}
         labels = [label for label, times in columns.items() for _ in range(len(times))]
         return labels, np.concatenate([*columns.values(), np.empty(0, np.int64)])
-    times = column("truth", truth, np.int64)
+    times = column("truth", cast("ArrayLike", truth), np.int64)
     if len(detections.labels) > 1:
         raise refused("truth", f" has no labels, found has {', '.join(detections.labels)}: give times by label")
     return [(detections.labels or ("event",))[0]] * len(times), times
