@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import column, fields, instance, nth, rows, shown, window
+from taxel._base.arguments import column, fields, instance, nth, rows, say_if_missed, shown, window
 from taxel._base.columns import FrozenColumns, frozen, frozen_column
 from taxel._base.drawing import draw
 from taxel._base.errors import refused
@@ -149,6 +149,7 @@ class Events(FrozenColumns):
         array([192])
         """
         start, stop = window("us", start, stop)
+        say_if_missed("event", self.t, start, stop)
         selected = self[(self.t >= start) & (self.t < stop)]
         selected.markers = tuple(m for m in self.markers if start <= m[0] < stop)
         return selected

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import finite, instance, integer, shown, text, window
+from taxel._base.arguments import finite, instance, integer, say_if_missed, shown, text, window
 from taxel._base.columns import FrozenColumns, frozen, frozen_column, frozen_numbers
 from taxel._base.drawing import draw
 from taxel._base.errors import refused
@@ -20,6 +20,7 @@ from taxel.array import Array
 from taxel.events import Events
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
 
 __all__ = ["Frames"]
@@ -173,7 +174,9 @@ class Frames(FrozenColumns):
         >>> len(Frames([[[1.0]], [[2.0]]], [0, 100]).between(50, 150))
         1
         """
-        first, last = np.searchsorted(self.t, window("us", start, stop))
+        start, stop = window("us", start, stop)
+        say_if_missed("frame", self.t, start, stop)
+        first, last = np.searchsorted(self.t, [start, stop])
         return self[int(first) : int(last)]
 
     def region(self, x: slice, y: slice) -> Frames:
@@ -372,6 +375,27 @@ class Frames(FrozenColumns):
 
     def _loaded(self, above: float) -> NDArray[np.bool_]:
         return np.asarray(self.values > np.float64(finite("above", above)))
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return a pandas.DataFrame: a row for each frame, by its time (``t_us``), and a column for each taxel.
+
+        A column has the name of its taxel, or, without one, its column and row, as in a .csv.
+
+        Examples
+        --------
+        >>> Frames([[[1.0, 2.0]], [[3.0, 4.0]]], [0, 1000]).to_pandas()
+              x0y0  x1y0
+        t_us
+        0      1.0   2.0
+        1000   3.0   4.0
+        """
+        import pandas as pd  # noqa: PLC0415  takes long
+
+        array = self.array
+        y, x = np.nonzero(np.ones(array.shape, np.bool_) if array.exists is None else array.exists)
+        names = np.array(array.names or [""] * (array.rows * array.columns), object).reshape(array.shape)
+        columns = [name or f"x{column}y{row}" for name, column, row in zip(names[y, x], x, y, strict=True)]
+        return pd.DataFrame(self.values[:, y, x], pd.Index(self.t, name="t_us"), columns)
 
     def to_numpy(self) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
         """Return values (n, rows, columns) and times (us)."""

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 import taxel
 from taxel.detect import Spread, score
+from taxel.labels import Note
 
 TIMES = st.lists(st.integers(-(10**6), 10**6), max_size=12)
 
@@ -109,3 +110,14 @@ def test_detections_are_chosen_by_label_time_and_place() -> None:
     for start, stop in ((5, 1), (None, 1), ("a", "b"), (math.nan, 1)):
         with pytest.raises(taxel.ProblemError, match="start"):
             found.between(start, stop)  # type: ignore[arg-type]
+
+
+def test_notes_are_a_truth_and_labels_that_it_lacks_are_left_out() -> None:
+    """As the command does: nothing is known of when they happened."""
+    found = taxel.Detections(["contact", "contact", "lift"], [1000, 500_000, 2000], [1100, 500_100, 2100])
+    notes = [Note("contact", 1200), Note("of the whole"), Note("contact", 900_000)]
+    by_notes, by_times = score(found, notes), score(found, {"contact": [1200, 900_000]})
+    for scored in (by_notes, by_times):
+        assert (scored.found, scored.missed, scored.false, list(scored.by_label)) == (1, 1, 1, ["contact"])
+    assert score(found, {"contact": [], "lift": []}).false == 3
+    assert score(found["contact"], []).false == 2

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
+
 import matplotlib as mpl
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from taxel import Array, Frames
+from taxel import Array, Events, Frames
 
 mpl.use("Agg")
 
@@ -67,3 +70,29 @@ def test_changed_frames_are_not_equal(frames: Frames) -> None:
 def test_what_was_not_measured_is_equal_to_itself() -> None:
     values = np.full((1, 2, 2), np.nan)
     assert Frames(values, [0]) == Frames(values, [0])
+
+
+def test_pandas_gets_a_column_a_taxel_by_its_name_or_place() -> None:
+    values = np.arange(12.0).reshape(2, 2, 3)
+    exists = np.array([[True, False, True], [True, True, True]])
+    table = Frames(values, [5, 1005], array=Array(2, 3, exists=exists)).to_pandas()
+    assert (table.index.name, table.index.tolist()) == ("t_us", [5, 1005])
+    assert table.to_dict("list") == {"x0y0": [0, 6], "x2y0": [2, 8], "x0y1": [3, 9], "x1y1": [4, 10], "x2y1": [5, 11]}
+    named = Frames(values, [5, 1005], array=Array(2, 3, names=["heel", *["toe"] * 5])).to_pandas()
+    assert named["heel"].tolist() == [0, 6]
+
+
+@pytest.mark.parametrize("window", [(0.5, 2.5), (3, 900), (0, 4)])
+@pytest.mark.parametrize("table", [Frames, Events])
+def test_a_window_that_may_be_stated_in_s_or_ms_is_told(
+    table: type[Frames | Events], window: tuple[float, float]
+) -> None:
+    t = np.arange(5000, 10_000_000, 1000)
+    frames = Frames(np.zeros((len(t), 1, 1)), t)
+    data = frames if table is Frames else Events(t, 0 * t, 0 * t, t > 0, array=Array(1, 1))
+    with pytest.warns(UserWarning, match="between takes us"):
+        assert len(data.between(*window)) == 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert len(data.between(0, 6000)) == 1
+        assert len(data.between(20_100, 20_900)) == len(data.between(-5, -1)) == 0

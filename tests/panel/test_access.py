@@ -5,19 +5,22 @@ from __future__ import annotations
 import contextlib
 import http.client
 import socket
+import sys
 import threading
 import time
 
 import pytest
 from panel.protocol import (
+    ADDRESS,
     SOON,
     Client,
+    door,
     heard,
     say,
     websockets,
     word,
 )
-from shell import run
+from shell import run, run_beside
 
 import taxel
 from taxel.live import Live, send
@@ -30,6 +33,28 @@ def test_a_port_that_is_taken_is_said_with_what_to_do(panel, tmp_path):
     done = run("view", tmp_path / "a.npz", "--no-open", "--panel-port", port)
     says = f"taxel: {host}:{port}: address already in use; end the program that listens there, or name another port\n"
     assert (done.returncode, done.stderr) == (3, says)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="has one address of this computer alone, else")
+def test_unless_asked_no_other_address_than_this_computers_own_is_listened_on(panel, tmp_path):
+    """Who listens on all addresses is reached at each of them."""
+
+    def is_reached(port):
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.2", port), timeout=SOON):
+            return True
+        return False
+
+    def look(said):
+        reached.append(is_reached(door(said).address[1]))
+
+    reached = [is_reached(panel.address[1])]
+    taxel.convert(taxel.Events([0], [0], [0], [True], array=taxel.Array(2, 2)), tmp_path / "a.npz")
+    run_beside(look, "view", tmp_path / "a.npz", "--no-open", says=ADDRESS)
+    run_beside(look, "live", "--panel", "--port", 0, "--host", "127.0.0.1", "--folder", tmp_path, says=ADDRESS)
+    run_beside(
+        look, "view", tmp_path / "a.npz", "--no-open", "--panel-host", "127.0.0.2", says=r"http://127\.0\.0\.2:\d+/#\S+"
+    )
+    assert reached == [False, False, False, True]
 
 
 def test_a_foreign_or_nameless_visitor_is_not_let_in(panel):

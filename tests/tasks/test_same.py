@@ -54,6 +54,10 @@ def test_readouts_and_detections_are_the_same_from_python_the_shell_and_the_page
     if place.is_dir():
         assert shown["recordings"] == found["recordings"]
         return
+    rec = taxel.open(place)
+    by_hand, truth = taxel.detect.run(training.readout, rec), detect(training.readout, rec, "notes")
+    assert [(d.label, d.t) for d in by_hand] == moments(found["recordings"][0]["detections"])
+    assert repr(taxel.detect.score(by_hand, rec.notes)) == repr(truth.each[0].outcome.score)
     [one] = found["recordings"]
     assert {key: shown[key] for key in one} == one
     labels, detections = requests().detect(place, None, readout)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.errors import refused
-from taxel._base.messages import plain
+from taxel._base.messages import plain, warn
 from taxel._core import ProblemError
 
 T = TypeVar("T")
@@ -23,6 +23,8 @@ R = TypeVar("R")
 
 #: The most characters of a value that an error shows.
 _SHOWN = 60
+#: A window up to there is more likely stated in another unit, us.
+_SMALL_US = 10_000
 
 
 def shown(value: object) -> str:
@@ -190,6 +192,13 @@ def window(unit: str, start: object, stop: object) -> tuple[float, float]:
     if not first <= last:
         raise ProblemError(f"window {plain(first)} to {plain(last)} {unit}: start must not be after stop")
     return first, last
+
+
+def say_if_missed(noun: str, t: NDArray[np.int64], start: float, stop: float) -> None:
+    """Warn of a window (us) before or between all times, if it is as small as one that is stated in s or ms."""
+    if len(t) and 0 <= start < stop <= _SMALL_US < t[-1] and not ((start <= t) & (t < stop)).any():
+        there = f"the {noun}s are from {t.min()} to {t.max()} us"
+        warn(f"between takes us: no {noun} is from {plain(start)} to {plain(stop)} us; {there}", stacklevel=3)
 
 
 def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str = "") -> NDArray[Any]:

@@ -45,6 +45,10 @@ class _Detector(Saved):
     def _needs_tare(self) -> bool:
         """Whether it reads no recording without a tare."""
 
+    @abstractmethod
+    def _accepts(self, array: Array) -> bool:
+        """Whether it can detect in what a sensor sends."""
+
     @property
     @abstractmethod
     def labels(self) -> tuple[str, ...]:

@@ -28,8 +28,9 @@ from taxel.frames import Frames
 from taxel.neuron import Neuron
 from taxel.recorded import recorded, unit_of
 from taxel.recording import Recording
+from taxel.recording.analysis.rest import Rest, is_stated, rest
 from taxel.spikes import SpikeTrains, to_us
-from taxel.tare import Tare
+from taxel.tare import GivenTare, Tare
 from taxel.wire import FRAME_US
 
 #: Detection goes on for so long after the last event, ms.
@@ -374,6 +375,16 @@ class Readout(_Detector):
         )
 
 
+def rest_for(readout: _Detector, recording: Recording, tare: GivenTare | None = None) -> Rest | None:
+    """Return the rest of a recording; None of one without a rest by its unit, if the readout needs none.
+
+    None of one of another sensor too, which the readout refuses.
+    """
+    if not readout._accepts(recording.array):
+        return None
+    return rest(recording, tare) if is_stated(recording, tare) or readout._needs_tare else None
+
+
 def run(
     readout: _Detector,
     source: Recording | Events | Frames | SpikeTrains,
@@ -398,7 +409,8 @@ def run(
         How long the board's frame lasts, at whose end a crossing is `known`. Left out: what the recording's registers
         hold; of frames, their median distance; else 192, the board at reset.
     tare : Tare, optional
-        The taxels' rest, where the encoder needs one and has none.
+        The taxels' rest, where the encoder needs one and has none. Left out: that of the recording, as `taxel detect`
+        finds it.
     wire_version : int, from 1 to 2, optional
         Version of the wire that stamped the events: 1 counts 100 us (a stamp may be before its frame), 2 counts us.
         Left out: what the recording's registers hold, else 1.
@@ -424,10 +436,15 @@ def run(
     >>> found.t, found.known
     (array([10479]), array([20000]))
     """
-    text = detector("readout", readout)._for(source, tare).to_json()
+    checked = detector("readout", readout)
+    if isinstance(source, Recording) and tare is None:
+        checked._check_unit(unit_of(recorded(source, hold=False)))
+        taken = rest_for(checked, source)
+        tare = None if taken is None else taken._needed(source)
+    text = checked._for(source, tare).to_json()
     period = None if frame_us is None else number("frame_us", frame_us)
     version = None if wire_version is None else integer("wire_version", wire_version, 1, 2)
-    rest, zeroings = tare_text(tare), []
+    given, zeroings = tare_text(tare), []
     if begin_us is not None:
         begin_us = integer("begin_us", begin_us, -(2**52), 2**52)
     if isinstance(source, Recording):
@@ -450,13 +467,13 @@ def run(
                 array._warn_apart(source.array, "the recording")
     if isinstance(source, Events):
         period, version = FRAME_US if period is None else period, version or 1
-        columns = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings, begin_us)
+        columns = _core.readout_run_events(text, source._parts(), period, version, given, zeroings, begin_us)
         return Detections._from_parts(columns)
     if not isinstance(source, Frames):
         raise refused(
             "source", f" is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or taxel.SpikeTrains"
         )
-    return Detections._from_parts(_core.readout_run_frames(text, source._parts(), period, rest, zeroings, begin_us))
+    return Detections._from_parts(_core.readout_run_frames(text, source._parts(), period, given, zeroings, begin_us))
 
 
 def _receives(encoder: Encoder, trained: TrainedNeuron, array: Array | None, delays: int) -> NDArray[np.bool_] | None:

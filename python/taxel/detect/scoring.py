@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import add
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,7 @@ from taxel._base.errors import refused
 from taxel._base.messages import counted, escaped, plain, three_digits
 from taxel._core import ProblemError
 from taxel.detections import Detections
+from taxel.labels import Note
 from taxel.spikes import to_us
 
 #: Distance between recordings that are scored together, us: no detection pairs with an event of another recording.
@@ -203,10 +204,10 @@ class Mistake(NamedTuple):
 
 def score(
     found: Detections,
-    truth: Mapping[str, ArrayLike] | ArrayLike,
+    truth: Mapping[str, ArrayLike] | ArrayLike | Sequence[Note],
     window_ms: float | Mapping[str, float | ArrayLike] | ArrayLike = 50.0,
 ) -> Score:
-    """Score detections against reference events, label by label.
+    """Score detections against reference events, label by label; those of labels that the truth lacks are left out.
 
     Pairs are made one to one and in the order of time: as many as the window allows, and of all ways to have so many
     the one with the least sum of distances. Every further detection is false, inside the window too.
@@ -214,8 +215,9 @@ def score(
     Parameters
     ----------
     found : Detections
-    truth : mapping of str to int, us; or int, shape (events,), us; or Detections
-        Times of the reference events by label. Times alone are of the one label that `found` has.
+    truth : mapping of str to int, us; or int, shape (events,), us; or Detections; or notes
+        Times of the reference events by label, or notes with times, as those of a recording. Times alone are of the one
+        label that `found` has.
     window_ms : float, ms; or shape (events,), one a reference event; or a mapping of str to either
         How far a detection may be from its event, either way, 0 to 3 600 000; a mapping is by label. 50 as in 6.5.
 
@@ -245,9 +247,10 @@ def score(
     instance("found", found, Detections)
     labels, times = _truth(found, truth)
     windows = _windows(labels, window_ms)
+    known = {*labels, *(truth if isinstance(truth, Mapping) else ())} or {*found.labels}
     tallies = _core.score(found._parts(), labels, times, windows)
     scores = {}
-    for tally in tallies:
+    for tally in (tally for tally in tallies if tally.label in known):
         pairs, lost = np.column_stack([tally.detected, tally.events]), (tally.missed_events, tally.false_detections)
         scores[tally.label] = Score(tally.label, pairs, *lost, tally.false_near, tally.errors_ms, tally.delays_ms)
     no_times, ms = np.empty(0, np.int64), np.empty(0)
@@ -295,10 +298,16 @@ def score_together(
     return score(reduce(add, moved), happened, window_ms)
 
 
-def _truth(detections: Detections, truth: Mapping[str, ArrayLike] | ArrayLike) -> tuple[list[str], NDArray[np.int64]]:
+def _truth(
+    detections: Detections, truth: Mapping[str, ArrayLike] | ArrayLike | Sequence[Note]
+) -> tuple[list[str], NDArray[np.int64]]:
     """Return the reference events as labels and times."""
     if isinstance(truth, Detections):
         return truth.label.tolist(), truth.t
+    notes = [note for note in truth if isinstance(note, Note)] if isinstance(truth, Sequence) else []
+    if notes:
+        timed = [(note.text, note.t) for note in notes if note.t is not None]
+        return [text for text, _ in timed], np.array([t for _, t in timed], np.int64)
     if isinstance(truth, Mapping):
         wrong = [label for label in truth if not isinstance(label, str)]
         if wrong:
@@ -306,7 +315,7 @@ def _truth(detections: Detections, truth: Mapping[str, ArrayLike] | ArrayLike) -
         columns = {label: column(f"truth[{label!r}]", times, np.int64) for label, times in truth.items()}
         labels = [label for label, times in columns.items() for _ in range(len(times))]
         return labels, np.concatenate([*columns.values(), np.empty(0, np.int64)])
-    times = column("truth", truth, np.int64)
+    times = column("truth", cast("ArrayLike", truth), np.int64)
     if len(detections.labels) > 1:
         raise refused("truth", f" has no labels, found has {', '.join(detections.labels)}: give times by label")
     return [(detections.labels or ("event",))[0]] * len(times), times

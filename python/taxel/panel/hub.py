@@ -96,9 +96,9 @@ class Hub:
         #: Requests that are carried out beside others.
         self.tasks: set[asyncio.Task[None]] = set()
         self.opened, self.registers_stated = opened, registers_stated
+        self.recorder: Recorder = Recorder(self)
         self.folder = Folder(folder, opening, opened if asked else None, lambda: self.recorder.runs)
         self.labels = LabelTables(self.folder, opening)
-        self.recorder = Recorder(self)
         self.training = Training(opening, self.folder.files)
         self.board, self._on_board = Board(cable), asyncio.Lock()
         self.source: _core.PanelLive | None = None

@@ -22,14 +22,14 @@ from taxel.detect.board import differences, noise_floor, other_frames
 from taxel.detect.clock import off_detections
 from taxel.detect.detector import detector
 from taxel.detect.examples import check_examples, unreliable
-from taxel.detect.readout import run
+from taxel.detect.readout import rest_for, run
 from taxel.detect.scoring import many_wrong, score_together
 from taxel.events import Events
 from taxel.formats.event_camera import are_counts
-from taxel.options import DetectOptions, GivenTare
+from taxel.options import DetectOptions
 from taxel.recorded import recorded, unit_of
 from taxel.recording import Recording
-from taxel.recording.analysis.rest import Rest, is_stated, rest
+from taxel.recording.analysis.rest import Rest
 from taxel.recording.opening import sensors_of
 from taxel.spikes import to_us
 from taxel.tasks.info import sensor_lines
@@ -292,7 +292,7 @@ def _detected(readout: Readout | PlainRule, known: Sequence[str], options: Detec
         warn(f"{recording.title}: {recording.verdict}", stacklevel=3)
     with _naming(recording.title):
         _check_unit(readout, recording)
-        taken = _rest(readout, recording, options.tare)
+        taken = rest_for(readout, recording, options.tare)
         tare, begin_us = (None, None) if taken is None else (taken._needed(recording), taken.detect_from_us)
         found = run(readout, recording, frame_us=options.frame_us, tare=tare, begin_us=begin_us)
     # Labels that the readout does not have do not count as missed.
@@ -333,16 +333,6 @@ def _check_unit(readout: Readout | PlainRule, recording: Recording) -> None:
             "training"
         )
     readout._check_unit(unit_of(source))
-
-
-def _rest(readout: Readout | PlainRule, recording: Recording, tare: GivenTare | None) -> Rest | None:
-    """Return the rest of a recording; None of one without a rest by its unit, if the readout needs none.
-
-    None of one of another sensor too, which the readout refuses.
-    """
-    if not readout._accepts(recording.array):
-        return None
-    return rest(recording, tare) if is_stated(recording, tare) or readout._needs_tare else None
 
 
 @contextmanager
