@@ -63,9 +63,9 @@ Section = dict[str, Any]
 #: or an Intel Xeon; `studies/tests/test_kept_figures.py` compares them with the kept figures.
 CPU_SECONDS = {
     "contact": ("full", 3421),
-    "asynchronous": ("full", 200),
+    "asynchronous": ("full", 279),
     "drops": ("full", 294),
-    "fa1": ("full", 94),
+    "fa1": ("full", 217),
     "fig5.5": ("full", 5152),
     "fig5.7": ("full", 1257),
     "fig5.11": ("full", 728),
