@@ -1,4 +1,4 @@
-"""Lines of numbers of a live source: read as they arrive, understood as tables are, passed on as frames or numbers."""
+"""Lines of numbers of a live source: read as they arrive, understood as tables are, passed on as frames."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from taxel.formats.form import Form
 from taxel.formats.line_form import form_of_lines, stated_count
 from taxel.formats.lines import is_number
 from taxel.formats.times import FOUND_US, ISO, UNITS_US
-from taxel.live.line_frames import LineFrames, array_of
+from taxel.live.line_frames import LineFrames, array_of, row_of
 from taxel.live.line_input import LineInput
 from taxel.live.stated_source import StatedSource
 
@@ -42,8 +42,8 @@ class Lines:
     ----------
     stated : StatedSource
     is_read_out : bool
-        Whether it is the source that is read out and shown, whose lines are frames; else they are frames only if that
-        is stated.
+        Whether it is the source that is read out and shown; another one is a row of quantities, as of an IMU, if it is
+        not stated to be a sensor.
     readout : Array, optional
         The sensor of the readout.
 
@@ -55,7 +55,7 @@ class Lines:
 
     def __init__(self, stated: StatedSource, *, is_read_out: bool, readout: Array | None = None) -> None:
         self.stated, self.name = stated, stated.called
-        self.are_frames = is_read_out or stated.are_frames
+        self._is_row = not (is_read_out or stated.are_frames)
         self._readout = readout
         self._input = None
         if stated.kind == "lines":
@@ -65,12 +65,6 @@ class Lines:
         self.array = stated.array
         self.names: tuple[str, ...] = ()
         self.frame_us = 0.0 if stated.rate_hz is None else 1e6 / stated.rate_hz
-        if not self.are_frames:
-            printed = stated.printed
-            keys = {"leave_out": printed.leave_out, "unit": stated.unit, "falls": stated.turned, "rate": stated.rate_hz}
-            wrong = next((key for key, value in keys.items() if value not in (None, ())), None)
-            if wrong is not None:
-                raise ProblemError(f"source {stated.text!r}: {wrong} is only for frames: add array=ROWSxCOLUMNS")
         self.waited = self._input is not None and self._input.is_file
         self.form: Form | None = None
         #: How the lines are read, for people.
@@ -119,9 +113,7 @@ class Lines:
         # The names of columns come with the lines.
         is_named = not printed.columns and not all(map(str.isdecimal, columns))
         is_stated = (
-            count is not None
-            and not is_named
-            and (not self.are_frames or (self.array is not None and self.frame_us > 0.0))
+            count is not None and not is_named and (self._is_row or (self.array is not None and self.frame_us > 0.0))
         )
         if is_stated:
             self._declared = self._of_statement()
@@ -153,7 +145,7 @@ class Lines:
 
     def _of_program(self) -> None:
         """Take what is stated for what a program passes."""
-        if self.are_frames and self.stated.rate_hz is None:
+        if not self._is_row and self.stated.rate_hz is None:
             raise ProblemError(
                 f"source {self.stated.text!r}: rate=HZ is missing: it states how many frames per second the program "
                 "passes"
@@ -163,10 +155,10 @@ class Lines:
     def _of_statement(self) -> LineFrames:
         """Return frames of lines as they are stated, without any line."""
         printed = self.stated.printed
-        size = self.array.taxels if self.array is not None and self.are_frames else None
+        size = None if self.array is None else self.array.taxels
         count = stated_count(printed, size)
         if count is None:
-            needs = "columns=A:B:C" if not self.are_frames else "array=ROWSxCOLUMNS or columns=A:B:C"
+            needs = "columns=A:B:C" if self._is_row else "array=ROWSxCOLUMNS or columns=A:B:C"
             raise ProblemError(f"source {self.stated.text!r}: needs {needs}")
         return self._set(self._form_of([",".join(["2"] * count)], None))
 
@@ -181,7 +173,7 @@ class Lines:
         """Return whether the lines so far show what they are; if they are the last to show it, refuse others."""
         texts = [line.text for line in self._texts()]
         form = self._form_of(texts, self._texts())
-        if form is None and final and texts and not self.are_frames and not self._has_ended:
+        if form is None and final and texts and self._is_row and not self._has_ended:
             # Only the names of columns have arrived.
             separator = next((mark for mark in ";,\t" if mark in texts[-1]), None)
             example = None if separator is None else separator.join("2" * len(texts[-1].split(separator)))
@@ -193,7 +185,7 @@ class Lines:
         self._frames = self._set(form)
         if self._declared is not None:
             self._frames.unread = self._declared.unread
-        if self.frame_us == 0.0 and self.are_frames:
+        if self.frame_us == 0.0 and not self._is_row:
             times = self._times()
             if len(times) < 2:
                 self.form, self._frames, self.array = None, None, self.stated.array
@@ -222,9 +214,9 @@ class Lines:
             by_second = (stamps[-1] - stamps[0]) / passed_s if passed_s > 0 else 0.0
             return next((unit for unit, us in FOUND_US.items() if 0.5 <= by_second * us * 1e-6 < 2.0), "")
 
-        size = self.array.taxels if self.array is not None and self.are_frames else None
+        size = None if self.array is None or self._is_row else self.array.taxels
         try:
-            return form_of_lines(texts, self.stated.printed, size, unit_of, are_frames=self.are_frames)
+            return form_of_lines(texts, self.stated.printed, size, unit_of, are_taxels=not self._is_row)
         except ProblemError as error:
             raise ProblemError(f"source {self.stated.text!r}: {first_line(error)}") from None
 
@@ -233,30 +225,29 @@ class Lines:
         if form is None:
             raise ProblemError(f"source {self.stated.text!r}: what it states makes no line of numbers")
         self.form = form
-        size, said = len(form.taxels), list(form.said)
-        if self.are_frames:
+        guess, said = "", list(form.said)
+        if self._is_row:
+            self.array, self.names = row_of(form, self.name)
+        else:
             try:
                 self.array, self.names, guess = array_of(form, self.array, self._readout, self.name)
             except ProblemError as error:
                 raise ProblemError(f"source {self.stated.text!r}: {first_line(error)}") from None
-            size = self.array.taxels
-            said = [guess, *said] if guess else said
-            if not form.clocks:
-                said.append("a frame's time is when it arrived")
-            if guess or not form.clocks:
-                rows, columns = self.array.shape
-                self.read_as = f"{self.place}: read as {rows} x {columns} taxels: {'; '.join(said)}"
-        elif len(form.clocks) > 1:
-            raise ProblemError(f"source {self.stated.text!r}: time=A+B is only for frames: add array=ROWSxCOLUMNS")
+        said = [guess, *said] if guess else said
+        if not form.clocks:
+            said.append("a frame's time is when it arrived")
+        if guess or not form.clocks:
+            rows, columns = self.array.shape
+            self.read_as = f"{self.place}: read as {rows} x {columns} taxels: {'; '.join(said)}"
         if self._sink is None:
             self._stamp_us = form.clocks[0][1] if len(form.clocks) == 1 else 1.0
-        return LineFrames(form, size, are_frames=self.are_frames, stamp_us=self._stamp_us)
+        return LineFrames(form, self.array.taxels, stamp_us=self._stamp_us)
 
     def _times(self) -> NDArray[np.float64]:
         """Return the times of the frames so far, us."""
         assert self.form is not None
         assert self.array is not None
-        frames = LineFrames(self.form, self.array.taxels, are_frames=True, stamp_us=1.0)
+        frames = LineFrames(self.form, self.array.taxels)
         for line in self._waiting:
             frames.push(line)
         passed = frames.take_passed()
@@ -266,15 +257,6 @@ class Lines:
 
     def source(self, readout_unit: str | None) -> dict[str, Any]:
         """Return the source as the compiled part knows it."""
-        if not self.are_frames:
-            assert self.form is not None
-            columns = [name or f"column_{k}" for k, name in enumerate(self.form.names)]
-            clock = next(iter(self.form.clocks), None)
-            kept = sorted({*self.form.taxels, *(k for k, _ in self.form.clocks)})
-            stream: dict[str, Any] = {"columns": [columns[k] for k in kept], "waited": self.waited}
-            if clock is not None:
-                stream |= {"time": columns[clock[0]], "unit_us": clock[1]}
-            return {"name": self.name, "place": self.place, "kind": {"numbers": stream}}
         return {"name": self.name, "place": self.place, "kind": {"frames": self.layout(readout_unit)}}
 
     def layout(self, readout_unit: str | None) -> dict[str, Any]:
@@ -282,11 +264,11 @@ class Lines:
         assert self.array is not None
         return {
             "array": self.array._geometry(),
-            "unit": self.stated.unit or readout_unit or "counts",
+            "unit": self.stated.unit or ("as sent" if self._is_row else readout_unit or "counts"),
             "unit_is_stated": self.stated.unit is not None,
             "names": list(self.names),
             "turned": self.stated.turned,
-            "frame_us": self.frame_us,
+            "frame_us": self.frame_us or None,
             "stamp_us": self._stamp_us,
             "waited": self.waited,
         }
@@ -407,13 +389,10 @@ class Lines:
         if self._has_ended:
             frames.end()
         passed = frames.take_passed()
-        if not self.are_frames:
-            # A stream states each line that could not be read.
-            passed.strange = 0
         in_no_line, unfinished = self._left_out
         self._left_out = [0, 0]
         trouble, self._trouble = self._trouble or self._unclear, None
-        arrived_ns, stamps, values = passed.arrays(self.stated.turned if self.are_frames else None)
+        arrived_ns, stamps, values = passed.arrays(self.stated.turned)
         self._sink(
             self.name,
             arrived_ns,

@@ -253,10 +253,9 @@ class Live:
         `verdict` (status, lost, damaged, ...: that of a recording of all so far; not of one that has ended),
         `events`, `read_out`, `events_dropped`,
         `late` (events out of order), `detections`, `wrong` (those output in a
-        silence that an event then interrupted, later than the guard), `detections_dropped`, `sources` (the counts of
-        each other source; of one of lines: lines, strange, bytes_in_no_line, bytes_of_unfinished_lines, trouble, and
-        for frames unread: by kind the lines in no frame, with the first),
-        `sent` (of each destination: to,
+        silence that an event then interrupted, later than the guard), `detections_dropped`, `sources` (these counts of
+        each other source), `lines` (of a board None; else lines, strange, bytes_in_no_line, bytes_of_unfinished_lines,
+        trouble, and unread: by kind the lines in no frame, with the first), `frames`, `sent` (of each destination: to,
         sent, lost, waiting, trouble), `decode_latency` and
         `report_latency` (count, p50_us, p99_us, max_us; None where nothing was measured, as where the
         kernel does not stamp arrivals), `offset` (board_us, host_ns,

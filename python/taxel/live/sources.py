@@ -134,7 +134,7 @@ class Sources:
         """Return counters with the lines of each source of frames that are in no frame, by kind."""
         for lines in self.lines:
             of = counters if lines is self._read else counters["sources"].get(lines.name, {})
-            if isinstance(of.get("lines"), dict):
+            if of.get("lines") is not None:
                 of["lines"]["unread"] = {kind: dict(found) for kind, found in lines.unread.items()}
         return counters
 
