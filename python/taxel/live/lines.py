@@ -84,6 +84,10 @@ class Lines:
         self._sink: Callable[..., object] | None = None
         self._thread: threading.Thread | None = None
         self._ends = threading.Event()
+        #: Whether reading goes on after its end, so that the line that has begun is not over.
+        self._goes_on = False
+        #: Whether it has a place that is open.
+        self.is_open = self._input is not None
         _, _, unit = (stated.printed.time or "").partition(":")
         #: The unit of the stamps that are passed on.
         self._stamp_us = UNITS_US["s" if unit == ISO else unit] if unit in (*UNITS_US, ISO) else 1.0
@@ -278,8 +282,9 @@ class Lines:
     def begin(self, sink: Callable[..., object], end: Callable[[str], object]) -> None:
         """Pass lines on in a separate thread, as `_core.Live.lines` takes them, until they end."""
         self._sink = sink
-        if self._input is None:
+        if (input_ := self._input) is None:
             return
+        self._ends.clear()
 
         def run() -> None:
             try:
@@ -288,7 +293,10 @@ class Lines:
                     if self._has_ended:
                         break
                     self._read()
-                self._end()
+                if not self._goes_on:
+                    input_.lines.discard()
+                    self._leave_out()
+                self._pass()
                 # What follows is no silence.
                 end(self.name)
             except (Error, OSError) as error:
@@ -316,8 +324,24 @@ class Lines:
                 raise ProblemError(f"source {self.name}: {error}") from None
             self._pass()
 
+    def pause(self) -> None:
+        """End reading until `begin`; what was read is passed on, and the place stays open."""
+        self._goes_on = True
+        self._end()
+
+    def renew(self) -> None:
+        """Count from now on what is in no frame."""
+        self._goes_on, self.failed = False, None
+        self.unread.clear()
+
     def close(self) -> None:
-        """End reading; what was read is passed on."""
+        """End reading; what was read is passed on, and the place is closed at once."""
+        self._end()
+        if self._input is not None:
+            self._input.close()
+            self.is_open = False
+
+    def _end(self) -> None:
         self._ends.set()
         if self._thread is not None:
             self._thread.join()
@@ -405,12 +429,6 @@ class Lines:
             now_ns(),
         )
 
-    def _end(self) -> None:
-        assert self._input is not None
-        self._input.lines.discard()
-        self._leave_out()
-        self._pass()
-
 
 def _ends_in_number(text: str) -> bool:
     """Return whether the last cell of a line is a number."""
@@ -453,8 +471,11 @@ def preview(source: str, most_s: float) -> tuple[list[str], str, str]:
     """
     lines = Lines(StatedSource.of(source), is_read_out=True)
     until = time.monotonic() + most_s
-    while time.monotonic() < until and not lines._has_ended and len(lines._numbers()) < _KEPT:
-        lines._read()
+    try:
+        while time.monotonic() < until and not lines._has_ended and len(lines._numbers()) < _KEPT:
+            lines._read()
+    finally:
+        lines.close()
     shown = [line.text[:200] for line in lines._waiting][-12:]
     try:
         form = lines._form_of([line.text for line in lines._texts()], lines._texts())
