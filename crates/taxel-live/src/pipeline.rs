@@ -20,6 +20,7 @@
 
 mod counters;
 mod decode_stage;
+mod flows;
 mod frame_block;
 mod frame_input;
 mod frame_stage;
@@ -37,11 +38,13 @@ mod sending;
 mod shared;
 mod sink;
 mod source;
+mod source_stage;
 mod speculative_readout;
 mod stages;
 mod tare_measurement;
 mod threads;
 mod viewer_queue;
+mod zeroing;
 
 use std::ops::Deref;
 use std::sync::atomic::AtomicBool;
