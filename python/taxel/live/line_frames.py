@@ -65,7 +65,8 @@ class LineFrames:
         self.form = form
         # A counter that wraps is known by its whole numbers: in its own unit they stay as they are.
         self._clocks = tuple((k, unit / stamp_us) for k, unit in form.clocks)
-        self._size = size
+        #: Number of values of a frame.
+        self.size = size
         self._takes_all = form.taxels == tuple(range(len(form.names)))
         self.passed = PassedLines()
         self.unread: dict[str, dict[str, Any]] = {}
@@ -142,7 +143,7 @@ class LineFrames:
         self._open.append(line)
         self._values += row
         if self.form.table.frame_end:
-            if len(self._values) > self._size:
+            if len(self._values) > self.size:
                 self._discard()
         elif len(self._open) == self.form.lines:
             self._end_open()
@@ -154,7 +155,7 @@ class LineFrames:
 
     def _end_at_blank(self) -> None:
         """End a frame at an empty line; one that lacks lines is left out, and its lines are counted."""
-        if self._open and len(self._values) == self._size:
+        if self._open and len(self._values) == self.size:
             self._end_open()
             return
         self._discard()

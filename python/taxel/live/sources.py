@@ -92,7 +92,7 @@ class Sources:
                 f"source {source.text!r}: contains no frames, so it cannot be shown or read by a readout"
             )
         self._read = self._opened(source, options, is_read_out=True)
-        return replace(options, array=self._read.array, name=source.called)
+        return replace(options, array=self._read.shape.array, name=source.called)
 
     def _other(self, source: StatedSource) -> dict[str, Any]:
         """Return a further source as the compiled part knows it."""
@@ -121,13 +121,13 @@ class Sources:
         read = self._read
         frames = None
         if read is not None:
-            frames = {"text": read.stated.text, "place": read.place, "layout": read.layout(self._unit)}
+            frames = {"text": read.stated.text, "place": read.place, "layout": read.shape.layout(self._unit)}
         return self.options.for_rust(send=list(send), read=frames, sources=self._others)
 
     @property
     def read_as(self) -> str:
         """How the lines that are read out were understood, if what they are was not stated; else ""."""
-        return "" if self._read is None else self._read.read_as
+        return "" if self._read is None else self._read.shape.read_as
 
     def begin(self, core: _core.Live) -> None:
         """Pass what arrives on."""
