@@ -262,16 +262,6 @@ class DecodedDatagrams:
     left: Final[NDArray[np.int64]]
 
 @final
-class Samples:
-    """The lines of a stream: arrivals, numbers, own times (us), all values, and what a verdict takes from reading."""
-
-    arrived_ns: Final[NDArray[np.int64]]
-    number: Final[NDArray[np.uint64]]
-    t: Final[NDArray[np.int64]]
-    values: Final[NDArray[np.float64]]
-    found: Final[dict[str, Any]]
-
-@final
 class Remarks:
     """What a recording holds beside its data, as the file has it; `held` by taxel index, ticks."""
 
@@ -285,7 +275,6 @@ class Remarks:
     condition: Final[dict[str, Any]]
     datagrams: Final[int]
     datagram_bytes: Final[int]
-    samples: Final[int]
     held: Final[list[int] | None]
 
 @type_check_only
@@ -295,6 +284,14 @@ class _Datagrams(TypedDict):
     offsets: NDArray[np.int64]
     payload: NDArray[np.uint8]
 
+@type_check_only
+class _RecordedFrames(TypedDict):
+    t: NDArray[np.int64]
+    at_ns: NDArray[np.int64]
+    values: NDArray[np.float32]
+    bad: int
+    found: dict[str, Any]
+
 @final
 class RecordingReader:
     def __new__(cls, path: str | PathLike[str]) -> RecordingReader: ...
@@ -303,10 +300,9 @@ class RecordingReader:
     def of_source(self, name: str) -> RecordingReader: ...
     def about(self) -> tuple[dict[str, Any], Any, dict[str, Any]]: ...
     def remarks(self) -> Remarks: ...
-    def samples(self) -> Samples: ...
     def decode(self) -> DecodedDatagrams: ...
     def datagrams(self) -> _Datagrams: ...
-    def frames(self) -> tuple[NDArray[np.int64], NDArray[np.float32], int]: ...
+    def frames(self) -> _RecordedFrames: ...
 
 @final
 class RecordingWriter:
@@ -338,9 +334,6 @@ class RecordingWriter:
     def counts(self, at_ns: int, counts: str) -> None: ...
     def preview(self, at_ns: int, t_us: int, ticks: NDArray[np.uint16]) -> None: ...
     def held(self, at_ns: int, t_us: int | None, ticks: NDArray[np.uint16]) -> None: ...
-    def samples(
-        self, arrived_ns: NDArray[np.int64], number: NDArray[np.uint64], values: NDArray[np.float64]
-    ) -> None: ...
     def finish(self, counts: str) -> None: ...
 
 def whole_frames(values: NDArray[np.float32]) -> bool: ...

@@ -34,7 +34,6 @@ __all__ = [
     "Datagrams",
     "Facts",
     "InMemory",
-    "Lines",
     "Marks",
     "Reader",
     "View",
@@ -204,38 +203,6 @@ class Datagrams:
         return f"Datagrams({len(self)}, {self.payload.size} bytes)"
 
 
-@dataclass(frozen=True, eq=False)
-class Lines:
-    """Hold the lines of a stream of numbers as received.
-
-    Parameters
-    ----------
-    about : mapping
-        The description of the stream in the file: its name, columns, and which of them is its own time.
-    arrived_ns : int64, shape (n,), ns since 1970
-    number : uint64, shape (n,)
-        Our arrival number.
-    t : int64, shape (n,), us
-        The stream's own time, unwrapped; the host's if it has none.
-    values : float64, shape (n, columns)
-        All columns of each line, with its own time unwrapped.
-    """
-
-    about: Mapping[str, Any]
-    arrived_ns: NDArray[np.int64]
-    number: NDArray[np.uint64]
-    t: NDArray[np.int64]
-    values: NDArray[np.float64]
-
-    def __len__(self) -> int:
-        return len(self.t)
-
-    def between(self, start: float, stop: float) -> Lines:
-        """Return the lines of ``start <= t < stop`` (us)."""
-        inside = (self.t >= start) & (self.t < stop)
-        return Lines(self.about, self.arrived_ns[inside], self.number[inside], self.t[inside], self.values[inside])
-
-
 @dataclass(frozen=True, kw_only=True)
 class Facts:
     """Hold what is known of a source without reading its table.
@@ -266,7 +233,7 @@ class Facts:
         The number that readings were subtracted from, as they fall with pressure (`falls` of a layout file).
     frame_us : float, us, optional
         Time from one frame to the next, by which a readout knew live when a frame was over.
-    raw : {"datagrams", "lines", ""}
+    raw : {"datagrams", ""}
         What was received that the reader holds too.
     begins_us : int, us, optional
         About when its times begin, if this is known; else the table says it.
@@ -391,7 +358,7 @@ class Reader(Protocol):
         """Return what was lost."""
         return Verdict._of({"silent": kind_of_file(self.facts.kind)})
 
-    def datagrams(self) -> Datagrams | Lines | None:
+    def datagrams(self) -> Datagrams | None:
         """Return what was received, as it was received; None if the file does not hold it."""
         return None
 

@@ -24,13 +24,13 @@ def repeated(line: Callable[[int], str], count: int = 20) -> list[str]:
 
 
 def form(
-    lines: Sequence[str], size: int | None = None, unit: str = "", *, are_frames: bool = True, **stated: object
+    lines: Sequence[str], size: int | None = None, unit: str = "", *, are_taxels: bool = True, **stated: object
 ) -> Form | None:
     def unit_of(stamps: NDArray[np.float64], numbers: Sequence[int]) -> str:
         assert len(stamps) == len(numbers)
         return unit
 
-    return form_of_lines(lines, PrintedFrames("lines:-", **stated), size, unit_of, are_frames=are_frames)  # type: ignore[arg-type]
+    return form_of_lines(lines, PrintedFrames("lines:-", **stated), size, unit_of, are_taxels=are_taxels)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_what_lines_do_not_show_is_refused(lines: list[str], keys: dict[str, obj
 
 
 def test_columns_of_quantities_are_all_kept_but_for_texts() -> None:
-    found = form(["t_us,acc_x,battery,mode", "0,1,2,walk", "10,2,3,walk"], are_frames=False)
+    found = form(["t_us,acc_x,battery,mode", "0,1,2,walk", "10,2,3,walk"], are_taxels=False)
     assert found is not None
     assert (found.names, found.clocks, found.taxels) == (
         ("t_us", "acc_x", "battery", "mode"),

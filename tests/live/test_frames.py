@@ -194,3 +194,28 @@ def test_a_source_that_states_no_unit_is_taken_in_that_of_the_readout(tmp_path: 
         assert {source.frames().unit for source in taxel.open(path).sources.values()} == {unit}
     with Live(sources="given,array=2x2,rate=10") as live:
         assert live.unit == "counts"
+
+
+@pytest.mark.parametrize(("unit", "steps_ms", "right"), [("s", 20.0, "ms"), ("ms", 20_000.0, "us")])
+def test_stamps_in_another_unit_than_is_stated_are_told(unit: str, steps_ms: float, right: str) -> None:
+    """Frames come 50 times a second, but last 20 s by their stamps."""
+    over = threading.Event()
+    with socket.create_server((LOOPBACK, 0)) as server:
+
+        def serve() -> None:
+            connection, _ = server.accept()
+            with connection, contextlib.suppress(OSError):
+                for k in range(1000):
+                    connection.sendall(f"{k * steps_ms:.0f},1,2,3,{k % 7}\n".encode())
+                    if over.wait(0.02):
+                        return
+
+        thread = threading.Thread(target=serve, daemon=True)
+        thread.start()
+        source = f"lines+tcp:{LOOPBACK}:{server.getsockname()[1]},array=2x2,time=1:{unit}"
+        try:
+            with pytest.raises(taxel.ProblemError, match=rf"a frame lasts 20 s: is the unit {right}\?"):
+                Live(sources=source)
+        finally:
+            over.set()
+            thread.join(10)

@@ -16,7 +16,7 @@ from taxel.live.line_frames import LineFrames
 def frames_of(example: str, size: int, **stated: object) -> LineFrames:
     form = form_of_lines([example], PrintedFrames("lines:-", **stated), size, lambda *_: "")  # type: ignore[arg-type]
     assert form is not None
-    return LineFrames(form, size, are_frames=True)
+    return LineFrames(form, size)
 
 
 def push(frames: LineFrames, *texts: str) -> tuple[int, int, int]:

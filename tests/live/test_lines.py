@@ -55,15 +55,21 @@ def writing(place: Path, pieces: list[bytes]) -> Iterator[threading.Event]:
         thread.join(10)
 
 
-def numbers_of(pieces: list[bytes]) -> tuple[int, int, int, int]:
-    """Return the number of lines, of those that are no two numbers, of bytes in no line and of unfinished lines."""
+def numbers_of(pieces: list[bytes]) -> tuple[int, int, int, int, int]:
+    """Return the number of lines, of those that are no frame, of bytes in no line and of unfinished lines,
+    and of frames.
+
+    A frame is two numbers; text before the first one is no fault.
+    """
     *whole, last = b"".join(pieces).replace(b"\r", b"\n").split(b"\n")
     lines = [line for line in whole if line.strip()]
     beyond = sum(max(0, len(line) - LONGEST) for line in [*lines, last])
     cut = [line for line in [*lines, last] if len(line) > LONGEST]
-    good = [line for line in lines if line not in cut and _is_pair(line)]
-    total = len([line for line in lines if line not in cut]) + len(cut)
-    return total, total - len(good), beyond, 0 if last in cut else len(last)
+    all_ = [*lines, *([last] if last in cut else [])]
+    good = [line not in cut and _is_pair(line) for line in all_]
+    begun = good.index(True) if any(good) else len(all_)
+    strange = [k for k, line in enumerate(all_) if not good[k] and (k > begun or line.isdigit())]
+    return len(all_), len(strange), beyond, 0 if last in cut else len(last), sum(good)
 
 
 def _is_pair(line: bytes) -> bool:
@@ -92,14 +98,14 @@ PIPES = {
 @pytest.mark.parametrize("name", PIPES)
 def test_each_byte_of_a_pipe_is_in_a_line_or_counted(tmp_path: Path, name: str) -> None:
     pieces = PIPES[name]
-    lines, strange, beyond, unfinished = numbers_of(pieces)
+    lines, strange, beyond, unfinished, frames = numbers_of(pieces)
     path, place = tmp_path / "a.mcap", tmp_path / "pipe"
     sources = {"imu": f"lines:{place},columns=a:b"}
     with writing(place, pieces) as written, Live(0, host=LOOPBACK, record=path, sources=sources) as live:
         assert written.wait(20)
         until(lambda: counts_of(live)["lines"] == lines and counts_of(live)["bytes_in_no_line"] == beyond)
         summary = live.stop()
-    counts = summary.counters["sources"]["imu"]
+    counts = summary.counters["sources"]["imu"]["lines"]
     assert (counts["lines"], counts["strange"]) == (lines, strange)
     assert (counts["bytes_in_no_line"], counts["bytes_of_unfinished_lines"]) == (beyond, unfinished)
     verdict = summary.verdict.parts["imu"]
@@ -112,34 +118,35 @@ def test_each_byte_of_a_pipe_is_in_a_line_or_counted(tmp_path: Path, name: str) 
     assert recording.verdict.to_dict() == verdict.to_dict()
     assert recording.counts["bytes_in_no_line"] == beyond
     assert recording.counts["lines_that_could_not_be_read"] == strange
-    assert len(recording.frames()) == lines - strange
+    assert len(recording.frames()) == frames
     # What a line of 3 MB takes in the file is bounded, too.
     assert path.stat().st_size < 1_500_000
 
 
 def counts_of(live: Live) -> dict[str, int]:
-    counts: dict[str, int] = live.counters["sources"]["imu"]
+    counts: dict[str, int] = live.counters["sources"]["imu"]["lines"]
     return counts
 
 
 @pytest.mark.parametrize("garbage", [b"x" * 5_000_000, b"\0\1\2\n" * 1000, b"\xff" * 70_000])
-def test_what_comes_before_the_first_line_is_counted_and_names_no_column(tmp_path: Path, capsys, garbage) -> None:
+def test_what_comes_before_the_first_line_is_told_and_names_no_column(tmp_path: Path, capsys, garbage) -> None:
     path, place = tmp_path / "a.mcap", tmp_path / "pipe"
     with writing(place, [garbage, b"\n1,2\n3,4\n"]):
         source = ("--source", f"imu=lines:{place}", "--seconds", "1", "--json")
-        code, out, _ = call(capsys, "record", path, "--port", "0", "--host", LOOPBACK, *source)
+        code, out, err = call(capsys, "record", path, "--port", "0", "--host", LOOPBACK, *source)
     summary = json.loads(out)
-    counts = summary["counters"]["sources"]["imu"]
+    counts = summary["counters"]["sources"]["imu"]["lines"]
     # Of a line that is too long the beginning is read.
-    strange, beyond = garbage.count(b"\n") or 1, max(0, len(garbage) - LONGEST)
-    assert (code, counts["lines"], counts["strange"]) == (3, 2 + strange, strange)
-    assert counts["bytes_in_no_line"] == beyond
+    other, beyond = garbage.count(b"\n") or 1, max(0, len(garbage) - LONGEST)
+    assert (code, counts["lines"], counts["strange"], counts["bytes_in_no_line"]) == (3, 2 + other, 0, beyond)
+    [kind] = counts["unread"].values()
+    assert kind["lines"] == other
+    assert f"imu: {other} line" in err
     lost = {"bytes_in_no_line": beyond} if beyond else {}
     assert summary["verdict_details"]["parts"]["imu"]["lost"] == lost
     assert taxel.open(path).sources["imu"].columns == ["column_0", "column_1"]
     code, out, _ = call(capsys, "info", path)
-    said = f"{beyond} bytes in no line of numbers" if beyond else f"{strange} lines that could not be read"
-    assert said in out.replace("\n", " ")
+    assert (f"{beyond} bytes in no line of numbers" in out.replace("\n", " ")) == bool(beyond)
 
 
 @contextlib.contextmanager
@@ -183,7 +190,7 @@ def test_a_serial_line_is_read_again_after_it_was_unplugged(tmp_path: Path, kind
             send = plug()
             until(lambda: send(b"6,7\n") and counts_of(live)["lines"] > 2)
             summary = live.stop()
-    counts = summary.counters["sources"]["imu"]
+    counts = summary.counters["sources"]["imu"]["lines"]
     assert (counts["strange"], counts["bytes_in_no_line"], counts["bytes_of_unfinished_lines"]) == (0, 0, 2)
     # The line is back.
     assert counts["trouble"] is None
@@ -200,7 +207,7 @@ def test_the_rest_of_a_line_amid_which_reading_began_is_no_fault(tmp_path: Path,
         assert written.wait(20)
         until(lambda: counts_of(live)["lines"] == 3)
         summary = live.stop()
-    counts, verdict = summary.counters["sources"]["imu"], summary.verdict.parts["imu"]
+    counts, verdict = summary.counters["sources"]["imu"]["lines"], summary.verdict.parts["imu"]
     assert (counts["lines"], counts["strange"], counts["bytes_of_unfinished_lines"]) == (3, 0, 0)
     assert (dict(verdict.damaged), dict(verdict.noted)) == ({}, {})
     recording = taxel.open(tmp_path / "a.mcap").sources["imu"]

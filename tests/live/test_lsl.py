@@ -32,7 +32,7 @@ def test_a_stream_is_recorded_with_its_own_stamps(tmp_path: Path) -> None:
         sent = [(1000.0 + k / 100, [k, -k]) for k in range(50)]
         for stamp, values in sent:
             outlet.push_sample(values, stamp)
-        while live.counters["sources"]["emg"]["lines"] < len(sent):
+        while live.counters["sources"]["emg"]["frames"] < len(sent):
             assert time.monotonic() < until
             time.sleep(0.01)
     emg = taxel.open(path).sources["emg"]

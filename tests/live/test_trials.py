@@ -186,7 +186,7 @@ def test_every_source_is_in_every_trial_and_each_of_its_lines_in_one(tmp_path: P
                 until(lambda: heard(live) > came + 10)  # noqa: B023
                 live.note(f"note {n}")
             ended = live.end_recording()
-        assert ended.counters["sources"]["force"]["lines"] == 13
+        assert ended.counters["sources"]["force"]["frames"] == 13
     lines: list[float] = []
     for name in ("right", "left"):
         assert_follow_each_other(paths, name)

@@ -102,7 +102,6 @@ CALLS = {
     "no text": recorded({"imu": 3}),
     "no source": recorded(["imu"]),
     "an option": recorded({"imu": "given,columns=a,speed=3"}),
-    "a rate of no frames": recorded({"imu": "given,columns=a,rate=3"}),
 }
 
 

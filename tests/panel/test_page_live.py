@@ -103,8 +103,8 @@ def test_what_does_not_arrive_is_said(chromium: Any, tmp_path: Path) -> None:
             return bool(page.locator("#frames").inner_text() == "500")
 
         until(shown, "the frames of a board that sends")
-        shows(page, "silence", "^The board is lost: nothing has arrived for .* heartbeat at least every ")
-        shows(page, "state-word", "^Lost$")
+        shows(page, "silence", "^The board is silent: nothing has arrived for .* heartbeat at least every ")
+        shows(page, "state-word", "^Silent$")
         shows(page, "frames", "^–$")
 
 

@@ -30,7 +30,7 @@ def presses(n: int, x: int) -> taxel.Events:
 
 
 def lines(live: Live, name: str) -> int:
-    return int(live.counters["sources"][name]["lines"])
+    return int(live.counters["sources"][name]["lines"]["lines"])
 
 
 def record_all(path: Path) -> dict[str, taxel.Events]:
@@ -57,8 +57,9 @@ def record_all(path: Path) -> dict[str, taxel.Events]:
     os.close(ours)
     os.close(theirs)
     none = {"bytes_in_no_line": 0, "bytes_of_unfinished_lines": 0, "trouble": None}
-    assert counts["imu"] == {"lines": 51, "strange": 1, **none}
-    assert counts["given"]["lines"] == 5
+    unread = {"text": {"lines": 1, "first": "nonsense"}}
+    assert counts["imu"]["lines"] == {"lines": 51, "strange": 1, "unread": unread, **none}
+    assert counts["given"]["frames"] == 5
     assert verdict.parts["imu"].damaged == verdict.damaged == {"lines_that_could_not_be_read": 1}
     assert (verdict.status, verdict.parts["left"].status) == ("damaged", "complete after arrival")
     of_file = taxel.open(path).verdict
@@ -223,7 +224,7 @@ def test_the_command_says_what_came_of_each_source_of_an_input_whose_last_line_l
     with standard_input(tmp_path / "lines"):
         done = run(*line, "--source", f"left=board:{LOOPBACK}:0", "--source", "imu=lines:-")
     assert "  left: 0 datagrams, 0 events\n" in done.stdout
-    assert "  imu: 901 lines\n" in done.stdout
+    assert "  imu: 901 lines, 901 frames\n" in done.stdout
     frames = taxel.open(tmp_path / "two.mcap").sources["imu"].frames()
     assert frames.values[-2:, 0].tolist() == [[899, 0.25], [3, 4.5]]
 

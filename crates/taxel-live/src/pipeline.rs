@@ -20,6 +20,7 @@
 
 mod counters;
 mod decode_stage;
+mod flows;
 mod frame_block;
 mod frame_input;
 mod frame_stage;
@@ -37,12 +38,13 @@ mod sending;
 mod shared;
 mod sink;
 mod source;
-mod sources;
+mod source_stage;
 mod speculative_readout;
 mod stages;
 mod tare_measurement;
 mod threads;
 mod viewer_queue;
+mod zeroing;
 
 use std::ops::Deref;
 use std::sync::atomic::AtomicBool;
@@ -59,9 +61,7 @@ use crate::capture::Receiver;
 use crate::locked::lock;
 use crate::recording::SourceWriter;
 use crate::{Error, Result, address, host_clock};
-pub use counters::{
-    Arrival, ArrivalState, BoardState, Counters, DecodingCounts, LiveSummary, ReadoutCounts, SourceCounts,
-};
+pub use counters::{Arrival, ArrivalState, BoardState, Counters, DecodingCounts, LiveSummary, ReadoutCounts};
 use frame_input::FrameInput;
 pub use frame_input::{LineCounts, ReadLines};
 pub use handle::Handle;
@@ -75,7 +75,6 @@ pub use sending::Sent;
 use shared::{PipelineShared, PublishedState, RecordingSlot};
 pub use sink::{LineSink, OutputDetection, Sink};
 pub use source::{BoardSource, FrameLayout, FrameSource, NamedSource, SourceKind};
-use sources::{Named, NumberStream};
 use stages::Stages;
 use threads::Threads;
 pub use viewer_queue::{Piece, TaxelChange, ViewerEvents};
@@ -92,7 +91,7 @@ pub struct Live {
     detections: channel::Receiver<OutputDetection>,
     threads: Vec<JoinHandle<()>>,
     /// Other boards and sources of frames, by name, each with its own pipeline.
-    others: Named<Live>,
+    others: Vec<(String, Live)>,
 }
 
 impl Deref for Live {
@@ -178,13 +177,13 @@ impl Live {
             ended: AtomicBool::new(false),
         });
         let (queue, detections) = channel::bounded(OUTPUT_WAITING);
-        let (others, numbers) = Self::begin_others(&shared).inspect_err(|_| {
+        let others = Self::begin_others(&shared).inspect_err(|_| {
             // Nothing arrived: the file is removed.
             let recording = lock(&shared.recording.running).take();
             drop(recording.map(|recording| recording.finish(&Counters::default())));
         })?;
         let pipelines = others.iter().map(|(name, live)| (name.clone(), Arc::clone(&live.shared))).collect();
-        let handle = Handle::new(Arc::clone(&shared), pipelines, numbers.into());
+        let handle = Handle::new(Arc::clone(&shared), pipelines);
         let mut live = Self { handle, detections, threads: vec![], others };
         // The destinations come first: a device that detections drive must not wait for a callback.
         let sending = sending.into_iter().map(|sending| Box::new(sending) as Box<dyn Sink>);
@@ -199,9 +198,9 @@ impl Live {
         Ok(live)
     }
 
-    /// Starts the other sources of a recording: those with a pipeline of their own, and lines of numbers.
-    fn begin_others(shared: &PipelineShared) -> Result<(Named<Self>, Named<Arc<NumberStream>>)> {
-        let (mut pipelines, mut numbers) = (vec![], vec![]);
+    /// Starts the other sources of a recording.
+    fn begin_others(shared: &PipelineShared) -> Result<Vec<(String, Self)>> {
+        let mut pipelines = vec![];
         for NamedSource { name, place, kind } in &shared.options.sources {
             let part =
                 lock(&shared.recording.running).as_ref().map(|recording| recording.track_of(name)).transpose()?;
@@ -210,10 +209,6 @@ impl Live {
                 SourceKind::Frames(layout) => {
                     let input = FrameSource { text: String::new(), place: place.clone(), layout: (**layout).clone() };
                     (&layout.array, None, Some(input))
-                }
-                SourceKind::Numbers(stream) => {
-                    numbers.push((name.clone(), Arc::new(NumberStream::new(name, stream.clone(), part))));
-                    continue;
                 }
             };
             let address = board.map(|board| address::of_text(&board.address)).transpose()?;
@@ -234,7 +229,7 @@ impl Live {
             };
             pipelines.push((name.clone(), Self::begin(options, vec![], part)?));
         }
-        Ok((pipelines, numbers))
+        Ok(pipelines)
     }
 
     /// A handle with the operations that other threads may use while the pipeline runs.
@@ -302,7 +297,6 @@ impl Live {
     ///
     /// The error that ended the pipeline early, or `File` if the end of the recording cannot be written.
     pub fn stop(mut self) -> Result<LiveSummary> {
-        self.numbers.iter().for_each(|(_, numbers)| drop(numbers.record_into(None)));
         let mut ended = Ok(());
         for (_, other) in std::mem::take(&mut self.others) {
             ended = ended.and(other.stop().map(drop));

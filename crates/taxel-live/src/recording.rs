@@ -30,7 +30,8 @@ pub use frames::{FrameEncoding, FrameProperties, Frames};
 pub use mcap_reader::{Datagrams, DecodedRecording, Message, Reader, Remarks};
 pub use mcap_writer::{SourceWriter, Writer};
 pub use output::OutputFile;
-pub use stream::{Samples, StreamColumns, StreamFaults};
+use stream::StreamColumns;
+pub use stream::StreamFaults;
 pub use topic::Topic;
 pub use verdict::{
     Basis, Condition, FileEnding, Found, NOTHING_LOST, Rebuilt, RecordingCounts, RecordingStatus, Verdict,
@@ -78,7 +79,7 @@ pub struct Header {
     /// Where the sensor lies.
     #[serde(flatten)]
     pub placement: Placement,
-    /// For a stream of numbers, the content of its lines; none for a board.
+    /// Of a recording before 0.1.0, what its lines of numbers are: as a reader has it, `frames` states them too.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stream: Option<StreamColumns>,
     /// For a source of frames, their unit and more; none for a board.
@@ -180,19 +181,23 @@ impl std::str::FromStr for Compression {
 }
 
 impl Header {
-    /// The channels of the source: a board, a stream of numbers, or frames.
+    /// The channels of the source: a board, or frames.
     fn topics(&self) -> impl Iterator<Item = Topic> {
-        let (stream, frames) = (self.stream.is_some(), self.frames.is_some());
+        let frames = self.frames.is_some();
         let belongs = move |topic: &Topic| match topic {
-            Topic::Samples => stream,
+            Topic::Samples => false,
             Topic::Frames => frames,
-            Topic::Datagrams => !stream && !frames,
             // Any viewer shows frames.
-            Topic::Pressure => !stream && !frames,
-            Topic::Counts | Topic::Notes | Topic::Detections => true,
-            _ => !stream,
+            Topic::Datagrams | Topic::Pressure => !frames,
+            _ => true,
         };
         Topic::ALL.into_iter().filter(belongs)
+    }
+
+    /// States lines that were recorded as JSON as frames too.
+    fn state_frames(&mut self) {
+        self.sources.iter_mut().for_each(Self::state_frames);
+        self.frames = self.stream.as_ref().map(StreamColumns::properties).or(self.frames.take());
     }
 
     /// Checks the properties that a file states.
@@ -205,22 +210,12 @@ impl Header {
         if !(-limits::TIME_US..=limits::TIME_US).contains(&self.decoding.origin_us) {
             return Err(problem!("origin_us"; " is {}: must be within 142 years of 0", self.decoding.origin_us));
         }
-        if let Some(stream) = &self.stream {
-            stream.check(&self.name)?;
-            if self.array.len() != stream.values().count() {
-                let n = stream.values().count();
-                return Err(problem!(
-                    "source {}: {n} columns of values for {} taxels; must be one per taxel",
-                    self.name,
-                    self.array.len()
-                ));
-            }
+        if let Some(n) = self.stream.as_ref().map(|stream| stream.values().count()).filter(|&n| n != self.array.len()) {
+            let (name, taxels) = (&self.name, self.array.len());
+            return Err(problem!("source {name}: {n} columns of values for {taxels} taxels; must be one per taxel"));
         }
         if let Some(frames) = &self.frames {
             frames.check(&self.name, self.array.columns)?;
-            if self.stream.is_some() {
-                return Err(problem!("source {}: is both a stream of numbers and frames", self.name));
-            }
         }
         let driven = self.driven.as_ref().unwrap_or(&self.array);
         driven.check()?;
@@ -276,21 +271,6 @@ impl Header {
     ) -> taxel_core::Result<Self> {
         let board = Self::of_board(array, None, source, started_ns);
         let header = Self { name: name.to_owned(), frames: Some(frames), ..board };
-        header.check()?;
-        Ok(header)
-    }
-
-    /// The header of a stream of numbers: an array of one row, with one taxel per column of values.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` if the name or a column is not valid.
-    pub fn of_stream(name: &str, stream: StreamColumns, source: String, started_ns: i64) -> taxel_core::Result<Self> {
-        stream.check(name)?;
-        let columns = u16::try_from(stream.values().count()).unwrap_or(u16::MAX);
-        let array = Array::unmeasured(1, columns, name);
-        let board = Self::of_board(array, None, source, started_ns);
-        let header = Self { name: name.to_owned(), stream: Some(stream), ..board };
         header.check()?;
         Ok(header)
     }

@@ -75,7 +75,7 @@ mod _core {
     use crate::panel::{PanelLive, PanelRecording, PanelView, panel_limits};
     #[pymodule_export]
     use crate::recording::{
-        DecodedDatagrams, RecordingReader, RecordingWriter, Remarks, Samples, causes, clock_doubt, clock_lines,
+        DecodedDatagrams, RecordingReader, RecordingWriter, Remarks, causes, clock_doubt, clock_lines,
         recording_damage, recording_verdict, verdict_text, whole_frames,
     };
     #[pymodule_export]

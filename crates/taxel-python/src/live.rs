@@ -177,7 +177,9 @@ impl Live {
     /// Unit of the frames of numbers that it receives, whether the source states it, and their length, us; None of a board.
     fn frame_layout(&self, py: Python<'_>) -> PyResult<Option<(String, bool, f64)>> {
         self.with(py, |pipeline| {
-            Ok(pipeline.layout().map(|layout| (layout.unit.clone(), layout.unit_is_stated, layout.frame_us)))
+            Ok(pipeline
+                .layout()
+                .map(|layout| (layout.unit.clone(), layout.unit_is_stated, layout.frame_us.unwrap_or_default())))
         })
     }
 
@@ -207,7 +209,7 @@ impl Live {
         Ok(address.map(|address| (address.ip().to_string(), address.port())))
     }
 
-    /// Passes lines of a source of numbers on: the arrival of each frame or line (ns since 1970), the stamps of frames if they
+    /// Passes lines of a source of numbers on: the arrival of each frame (ns since 1970), the stamps of frames if they
     /// have any, all values one after the other, the number of lines; of those that could not be read, of bytes in no line and
     /// of unfinished lines; the lines that were not read with their arrival, why reading fails now, and the time before which
     /// all that arrived was read.

@@ -38,16 +38,17 @@ pub struct DecodedDatagrams {
     left: Column<i64>,
 }
 
-/// The lines of a stream.
-#[pyclass(frozen, get_all)]
-pub struct Samples {
-    arrived_ns: Column<i64>,
-    number: Column<u64>,
-    /// The stream's own time, us.
-    t: Column<i64>,
-    /// All values, line by line.
-    values: Column<f64>,
-    /// What could not be read, and what is wrong with the times: what a verdict takes from reading.
+/// Frames, by name.
+#[derive(IntoPyObject)]
+struct Frames<'py> {
+    /// Time of each, us, and in the file, ns.
+    t: Bound<'py, PyArray1<i64>>,
+    at_ns: Bound<'py, PyArray1<i64>>,
+    /// All values, row by row.
+    values: Bound<'py, PyArray1<f32>>,
+    /// Number of messages that are no frame of the array.
+    bad: u64,
+    /// What a verdict takes from reading.
     found: Plain<Value>,
 }
 
@@ -70,7 +71,6 @@ pub struct Remarks {
     condition: Plain<Value>,
     datagrams: u64,
     datagram_bytes: u64,
-    samples: u64,
     /// The values that taxels held at the beginning, ticks; none if that is not known.
     held: Option<Vec<u16>>,
 }
@@ -90,7 +90,6 @@ impl Remarks {
             condition: Plain(json!(condition)),
             datagrams: all.datagrams,
             datagram_bytes: all.datagram_bytes,
-            samples: all.samples,
             held: all.held.clone(),
         }
     }
@@ -105,9 +104,6 @@ struct Datagrams<'py> {
     offsets: Bound<'py, PyArray1<i64>>,
     payload: Bound<'py, PyArray1<u8>>,
 }
-
-/// Time us of each frame, all values, messages that are no frame.
-type FramesOut<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f32>>, u64);
 
 /// A recording of the live format, opened.
 #[pyclass(frozen)]
@@ -137,22 +133,11 @@ impl RecordingReader {
         Ok(Self { reader: self.reader.of_source(name).map_err(live)? })
     }
 
-    /// All samples of a stream.
-    fn samples(&self, py: Python<'_>) -> PyResult<Samples> {
-        let all = enter(py, |stop| self.reader.samples(stop))?;
-        Ok(Samples {
-            arrived_ns: column(py, all.arrived_ns),
-            number: column(py, all.number),
-            t: column(py, all.t),
-            values: column(py, all.values),
-            found: Plain(json!(all.found)),
-        })
-    }
-
-    /// All frames of a source: time us of each, all values, messages that are no frame of its array.
-    fn frames<'py>(&self, py: Python<'py>) -> PyResult<FramesOut<'py>> {
-        let all = enter(py, |stop| self.reader.frames(stop))?;
-        Ok((array(py, all.t), array(py, all.values), all.bad))
+    /// All frames of a source.
+    fn frames<'py>(&self, py: Python<'py>) -> PyResult<Frames<'py>> {
+        let recording::Frames { t, at_ns, values, bad, found } = enter(py, |stop| self.reader.frames(stop))?;
+        let (t, at_ns, values) = (array(py, t), array(py, at_ns), array(py, values));
+        Ok(Frames { t, at_ns, values, bad, found: Plain(json!(found)) })
     }
 
     /// The header, how the recording ended, and what was rebuilt on opening.
@@ -336,23 +321,6 @@ impl RecordingWriter {
     fn held(&self, py: Python<'_>, at_ns: i64, t_us: Option<i64>, ticks: PyReadonlyArray1<'_, u16>) -> PyResult<()> {
         let ticks = slice("ticks", &ticks)?;
         self.with(py, |writer| writer.held(at_ns, t_us, ticks))
-    }
-
-    /// Writes samples of the stream that the recording is of: arrival ns, number, all columns row by row.
-    fn samples(
-        &self,
-        py: Python<'_>,
-        arrived_ns: PyReadonlyArray1<'_, i64>,
-        number: PyReadonlyArray1<'_, u64>,
-        values: PyReadonlyArray1<'_, f64>,
-    ) -> PyResult<()> {
-        let (arrived_ns, number) = (slice("arrived_ns", &arrived_ns)?, slice("number", &number)?);
-        let values = slice("values", &values)?;
-        let columns = values.len().checked_div(arrived_ns.len()).unwrap_or(0).max(1);
-        self.with(py, |writer| {
-            let rows = arrived_ns.iter().zip(number).zip(values.chunks(columns));
-            rows.into_iter().try_for_each(|((&at_ns, &number), row)| writer.sample(at_ns, number, row))
-        })
     }
 
     /// Ends the recording; `counts` is JSON.

@@ -188,14 +188,10 @@ def received(counters: dict[str, Any]) -> str:
     lines = counters["lines"]
     if lines is None:
         return f"{counted(counters['decoded'], 'datagram')}, {counted(counters['events'], 'event')}"
-    return f"{counted(lines['lines'], 'line')}, {counted(counters['frames'], 'frame')}{left_out(lines)}"
-
-
-def left_out(lines: dict[str, Any]) -> str:
-    """Return what is wrong with lines of numbers, in words that follow their number."""
     unread = {"lines_that_could_not_be_read": lines["strange"], "bytes_in_no_line": lines["bytes_in_no_line"]}
     counts = in_words(unread)
-    return f", {counts}" * bool(counts) + (f"; {lines['trouble']}" if lines["trouble"] else "")
+    wrong = f", {counts}" * bool(counts) + (f"; {lines['trouble']}" if lines["trouble"] else "")
+    return f"{counted(lines['lines'], 'line')}, {counted(counters['frames'], 'frame')}{wrong}"
 
 
 #: Kinds of lines that are no part of a frame, by their keys in the counters.
@@ -220,8 +216,7 @@ def say_wrong(counters: dict[str, Any], array: Array, told: set[tuple[str, str]]
 def _unread(counters: dict[str, Any], told: set[tuple[str, str]]) -> Iterator[str]:
     """Yield what is wrong with lines of each source, each kind once: `told` holds those that were."""
     for source, counts in {"": counters, **counters["sources"]}.items():
-        lines = counts.get("lines")
-        kinds = (lines if isinstance(lines, dict) else {}).get("unread") or {}
+        kinds = (counts["lines"] or {}).get("unread") or {}
         for kind, words in _UNREAD.items():
             found = kinds.get(kind, {"lines": 0})
             if found["lines"] and (source, kind) not in told:

@@ -126,12 +126,11 @@ def live(*, options: Any, typed: Flat[_LiveArguments] = _LiveArguments()) -> int
                     console.print(
                         f"values are assumed to be in {pipeline.unit}, the unit of the readout: --source states no unit"
                     )
-                for name, counts in pipeline.counters["sources"].items():
-                    if "capture" in counts:  # else lines that are no frames, as of an IMU
-                        console.print(
-                            f"{name}: this source is recorded, but neither read out nor shown; a second taxel live can "
-                            "read it out"
-                        )
+                for name in pipeline.counters["sources"]:
+                    console.print(
+                        f"{name}: this source is recorded, but neither read out nor shown; a second taxel live can "
+                        "read it out"
+                    )
                 last = _show(typed, pipeline, console, at_rest, end_request, fresh=isinstance(rest, float))
             summary = last.stop()
             # Detections that the readout made while `stop` ran.

@@ -28,7 +28,6 @@ from taxel.cli.board import (
     doubts,
     exit_code,
     for_live,
-    left_out,
     received,
     say_waiting,
     say_wrong,
@@ -243,8 +242,7 @@ def _print(summary: Summary, as_json: bool) -> None:
         what = f"{received(counters)}{_bytes_and_markers(counters)}"
         say(f"{summary.path}: {what}, received in {counters['seconds']:.1f} s")
     for name, counts in counters["sources"].items():
-        contents = received(counts) if "capture" in counts else f"{counted(counts['lines'], 'line')}{left_out(counts)}"
-        say(f"  {name}: {contents}")
+        say(f"  {name}: {received(counts)}")
     for why in doubts(counters):
         say(why)
     say(summary.verdict)

@@ -24,7 +24,7 @@ def form_of_lines(
     size: int | None,
     unit_of: Callable[[NDArray[np.float64], Sequence[int]], str],
     *,
-    are_frames: bool = True,
+    are_taxels: bool = True,
 ) -> Form | None:
     """Return how lines of a live source are read: as is stated, and else as the first ones look; None if none is read.
 
@@ -38,7 +38,7 @@ def form_of_lines(
     unit_of : callable
         Returns the unit of a column of times (and the lines that these are of) by the arrival of lines; "" if it does
         not show.
-    are_frames : bool
+    are_taxels : bool
         Whether columns are taxels; else they are quantities, each with a name.
 
     Raises
@@ -70,17 +70,17 @@ def form_of_lines(
         unit = _unit_of_stated(draft, stated.time or "", times, unit_of)
         draft.set(time_column=stated.time and stated.time.partition(":")[0], time_unit=unit)
     elif not is_whole:
-        time = time_of(draft, is_stated=not are_frames)
+        time = time_of(draft, is_stated=not are_taxels)
         if time is not None and time not in left:
             times = places_of(names, "time", draft.table.time_column or 0)
             ask_for_lines_of_one_time(draft, time)
             if len(times) == 1:
-                _set_found_unit(draft, time, unit_of, is_sure=not are_frames)
+                _set_found_unit(draft, time, unit_of, is_sure=not are_taxels)
             keys["time"] = f"{draft.table.time_column}:{draft.table.time_unit}".removesuffix(":s" * (len(times) > 1))
         else:
             draft.set(time_column=None)
     time = next(iter(times), None)
-    if is_whole or stated.leave_out or stated.columns or not are_frames:
+    if is_whole or stated.leave_out or stated.columns or not are_taxels:
         draft.asked.clear()
         draft.left.update((k, "texts") for k, kind in enumerate(fit.types) if kind == "text")
         taxels = [k for k in range(len(draft.names)) if k not in {*left, *times, *draft.left}]
@@ -93,7 +93,7 @@ def form_of_lines(
         why = draft.asked[0][0] if draft.asked else f"column {draft.table.taxel_column} names the taxel of each line"
         raise ProblemError(f"{why}: state what it is by time=COLUMN:UNIT, leave_out= or frame_lines=")
     gone = sorted(set(draft.left) - left - {*times} - {*taxels})
-    if gone and are_frames:
+    if gone and are_taxels:
         keys["leave_out"] = ":".join([*map(str, stated.leave_out), *(str(k + 1) for k in gone)])
     draft.set(leave_out=[k + 1 for k in range(len(names)) if k not in {*times, *taxels}], label_column=None)
     said = tuple(said_of(draft, time))

@@ -16,7 +16,7 @@ from taxel.array import Array
 from taxel.formats.form import Form
 from taxel.formats.lines import is_number
 
-__all__ = ["LineFrames", "PassedLines", "array_of"]
+__all__ = ["LineFrames", "PassedLines", "array_of", "row_of"]
 
 #: Length of the first line of a kind, as it is kept, characters.
 _SHOWN = 40
@@ -45,15 +45,13 @@ class PassedLines:
 
 
 class LineFrames:
-    """Make frames of lines as they arrive, or rows of numbers, and count what is in none.
+    """Make frames of lines as they arrive, and count what is in none.
 
     Parameters
     ----------
     form : Form
     size : int
         Number of values of a frame.
-    are_frames : bool
-        Whether columns are taxels; else each line is a row of its columns, its clock among them.
     stamp_us : float, us
         The unit of the stamps that are passed on.
 
@@ -63,13 +61,13 @@ class LineFrames:
         By kind the number of lines that are in no frame, and the beginning of the first.
     """
 
-    def __init__(self, form: Form, size: int, *, are_frames: bool, stamp_us: float = 1.0) -> None:
+    def __init__(self, form: Form, size: int, *, stamp_us: float = 1.0) -> None:
         self.form = form
         # A counter that wraps is known by its whole numbers: in its own unit they stay as they are.
         self._clocks = tuple((k, unit / stamp_us) for k, unit in form.clocks)
-        self._size, self._are_frames = size, are_frames
-        self._columns = form.taxels if are_frames else tuple(sorted({*form.taxels, *(k for k, _ in form.clocks)}))
-        self._takes_all = self._columns == tuple(range(len(form.names)))
+        #: Number of values of a frame.
+        self.size = size
+        self._takes_all = form.taxels == tuple(range(len(form.names)))
         self.passed = PassedLines()
         self.unread: dict[str, dict[str, Any]] = {}
         #: The lines of the frame so far, their values, its stamp.
@@ -99,7 +97,7 @@ class LineFrames:
             if self.form.table.frame_end:
                 self._end_at_blank()
             return
-        if text.startswith("#") and self._are_frames:
+        if text.startswith("#"):
             return
         values, odd = self.form.values(text)
         if odd and not self._open and self._names_columns(text):
@@ -135,7 +133,7 @@ class LineFrames:
 
     def _push(self, values: Sequence[float], line: ArrivedLine) -> None:
         self._has_begun = True
-        row = values if self._takes_all else [values[k] for k in self._columns]
+        row = values if self._takes_all else [values[k] for k in self.form.taxels]
         if self.form.lines == 1:
             self._stamp = sum(values[k] * scale for k, scale in self._clocks)
             self._end_frame(row, line.at_ns)
@@ -145,7 +143,7 @@ class LineFrames:
         self._open.append(line)
         self._values += row
         if self.form.table.frame_end:
-            if len(self._values) > self._size:
+            if len(self._values) > self.size:
                 self._discard()
         elif len(self._open) == self.form.lines:
             self._end_open()
@@ -157,7 +155,7 @@ class LineFrames:
 
     def _end_at_blank(self) -> None:
         """End a frame at an empty line; one that lacks lines is left out, and its lines are counted."""
-        if self._open and len(self._values) == self._size:
+        if self._open and len(self._values) == self.size:
             self._end_open()
             return
         self._discard()
@@ -165,7 +163,7 @@ class LineFrames:
 
     def _end_frame(self, values: Sequence[float], at_ns: int) -> None:
         passed = self.passed
-        if self.form.clocks and self._are_frames:
+        if self.form.clocks:
             stamp = self._stamp
             if self._last_stamp is not None and stamp <= self._last_stamp:
                 columns = "+".join(str(k + 1) for k, _ in self.form.clocks)
@@ -192,7 +190,7 @@ class LineFrames:
         cells, _ = self.form.cells(text)
         numbers = bool(cells) and all(is_number(cell, self.form.table.decimal) for cell in cells)
         self._count("no_text" if not line.is_text else "other_length" if numbers else "text", text)
-        # A stream states each of its lines; of frames, text before the first numbers is no fault.
+        # Text before the first numbers is no fault.
         self.passed.strange += self._has_begun or numbers
         self.passed.unread.append((line.at_ns, line.text))
 
@@ -203,6 +201,11 @@ class LineFrames:
     def _names_columns(self, text: str) -> bool:
         cells, odd = self.form.cells(text)
         return odd == "of text" and tuple(cells) == self.form.names
+
+
+def row_of(form: Form, name: str) -> tuple[Array, tuple[str, ...]]:
+    """Return the row that lines of quantities fill, as of an IMU, and the names of its columns."""
+    return Array(1, len(form.taxels), name=name), tuple(form.names[k] or f"column_{k}" for k in form.taxels)
 
 
 def array_of(form: Form, stated: Array | None, readout: Array | None, name: str) -> tuple[Array, tuple[str, ...], str]:
@@ -230,8 +233,8 @@ def array_of(form: Form, stated: Array | None, readout: Array | None, name: str)
         return readout, (), ""
     if lines > 1:
         rows, columns = lines, count
-    elif all(names := tuple(form.names[k] for k in form.taxels)):
-        return Array(1, count, name=name), names, f"array=1x{count}, a column each"
+    elif all(form.names[k] for k in form.taxels):
+        return *row_of(form, name), f"array=1x{count}, a column each"
     else:
         rows, columns = _sides(count)
     return Array(rows, columns, name=name), (), f"array={rows}x{columns} is guessed"

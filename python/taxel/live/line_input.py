@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import queue
@@ -54,6 +55,8 @@ class LineInput:
         self._is_cut, self._was_interrupted = self._may_be_cut, False
         #: Whether no more can arrive.
         self.has_ended = False
+        #: Closes the place, but a port or server, which closes with the last who can read it.
+        self._opened = contextlib.ExitStack()
         self._receive: Callable[[], bytes | None] | None = self._open()
 
     def read(self) -> list[ArrivedLine]:
@@ -73,7 +76,7 @@ class LineInput:
         except OSError as error:
             self.lines.discard()
             # A port that is open is not opened again.
-            self._receive = None
+            self.close()
             self._reopen()
             self._is_cut, self._was_interrupted = self._may_be_cut, True
             if error.filename is None and error.strerror is not None:
@@ -89,6 +92,11 @@ class LineInput:
         is_cut, self._is_cut = self._is_cut, False
         return self._was_interrupted if is_cut else None
 
+    def close(self) -> None:
+        """Close the place at once: other programs may open it."""
+        self._receive = None
+        self._opened.close()
+
     def _reopen(self) -> None:
         try:
             self._receive = self._open()
@@ -101,7 +109,7 @@ class LineInput:
             line = _core.SerialLine(self._where, self._baud, _CONNECT_S)
             return lambda: line.read(_WAIT_S)
         if self._kind == "udp":
-            return _datagrams(self._where)
+            return self._datagrams()
         is_input = self._where == "-"
         # Without O_NONBLOCK a named pipe waits until a program writes. The buffer of the standard input is passed by.
         file = (
@@ -109,6 +117,8 @@ class LineInput:
             if is_input
             else io.FileIO(self._where, opener=lambda path, flags: os.open(path, flags | _NONBLOCK))
         )
+        if _NONBLOCK:
+            self._opened.callback(file.close)
         read = _polled(file) if _NONBLOCK else _by_thread(file)
 
         def piece() -> bytes | None:
@@ -122,28 +132,28 @@ class LineInput:
 
         return piece
 
-
-def _datagrams(address: str) -> Callable[[], bytes]:
-    """Return what reads datagrams of whole lines."""
-    host, _, port = address.rpartition(":")
-    host = host.strip("[]")
-    receiver = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM)
-    receiver.settimeout(_WAIT_S)
-    try:
-        receiver.bind((host, int(port)))
-    except OSError as error:
-        receiver.close()
-        raise OSError(error.errno, error.strerror, f"UDP {address}") from None
-
-    def receive() -> bytes:
+    def _datagrams(self) -> Callable[[], bytes]:
+        """Return what reads datagrams of whole lines."""
+        host, _, port = self._where.rpartition(":")
+        host = host.strip("[]")
+        receiver = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM)
+        receiver.settimeout(_WAIT_S)
         try:
-            data = receiver.recv(_DATAGRAM)
-        except TimeoutError:
-            return b""
-        # The end of a datagram ends its last line.
-        return data if data.endswith(b"\n") or not data else data + b"\n"
+            receiver.bind((host, int(port)))
+        except OSError as error:
+            receiver.close()
+            raise OSError(error.errno, error.strerror, f"UDP {self._where}") from None
+        self._opened.callback(receiver.close)
 
-    return receive
+        def receive() -> bytes:
+            try:
+                data = receiver.recv(_DATAGRAM)
+            except TimeoutError:
+                return b""
+            # The end of a datagram ends its last line.
+            return data if data.endswith(b"\n") or not data else data + b"\n"
+
+        return receive
 
 
 _NONBLOCK: int = getattr(os, "O_NONBLOCK", 0)

@@ -1,4 +1,4 @@
-"""Lines of numbers of a live source: read as they arrive, understood as tables are, passed on as frames or numbers."""
+"""Lines of numbers of a live source: read as they arrive, passed on as frames."""
 
 from __future__ import annotations
 
@@ -8,20 +8,15 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from taxel._base.limits import VALUE
-from taxel._base.messages import counted, first_line
+from taxel._base.messages import counted
 from taxel._base.text_lines import ArrivedLine
 from taxel._core import Error, ProblemError, now_ns
 from taxel.array import Array
-from taxel.formats.form import Form
-from taxel.formats.line_form import form_of_lines, stated_count
 from taxel.formats.lines import is_number
-from taxel.formats.times import FOUND_US, ISO, UNITS_US
-from taxel.live.line_frames import LineFrames, array_of
+from taxel.live.line_frames import LineFrames
 from taxel.live.line_input import LineInput
+from taxel.live.line_shape import LineShape, numbers_of, texts_of
 from taxel.live.stated_source import StatedSource
 
 __all__ = ["Lines", "preview"]
@@ -30,8 +25,6 @@ __all__ = ["Lines", "preview"]
 _LINES, _MEASURE_S = 33, 1.0
 #: How long the columns may be unknown after the first line, and the lines that are kept then.
 _WITHIN_S, _KEPT = 3.0, 256
-#: So many stamps show their unit.
-_FEW = 5
 _BETWEEN = re.compile(r"[,;\s]+")
 
 
@@ -42,8 +35,8 @@ class Lines:
     ----------
     stated : StatedSource
     is_read_out : bool
-        Whether it is the source that is read out and shown, whose lines are frames; else they are frames only if that
-        is stated.
+        Whether it is the source that is read out and shown; another one is a row of quantities, as of an IMU, if it is
+        not stated to be a sensor.
     readout : Array, optional
         The sensor of the readout.
 
@@ -55,26 +48,15 @@ class Lines:
 
     def __init__(self, stated: StatedSource, *, is_read_out: bool, readout: Array | None = None) -> None:
         self.stated, self.name = stated, stated.called
-        self.are_frames = is_read_out or stated.are_frames
-        self._readout = readout
         self._input = None
         if stated.kind == "lines":
             baud = stated.printed.baud
             self._input = LineInput(stated.place if baud is None else f"{stated.place},baud={baud}")
-        self.place = "given by a program" if self._input is None else self._input.place
-        self.array = stated.array
-        self.names: tuple[str, ...] = ()
-        self.frame_us = 0.0 if stated.rate_hz is None else 1e6 / stated.rate_hz
-        if not self.are_frames:
-            printed = stated.printed
-            keys = {"leave_out": printed.leave_out, "unit": stated.unit, "falls": stated.turned, "rate": stated.rate_hz}
-            wrong = next((key for key, value in keys.items() if value not in (None, ())), None)
-            if wrong is not None:
-                raise ProblemError(f"source {stated.text!r}: {wrong} is only for frames: add array=ROWSxCOLUMNS")
-        self.waited = self._input is not None and self._input.is_file
-        self.form: Form | None = None
-        #: How the lines are read, for people.
-        self.read_as = ""
+        self.place = "a program" if self._input is None else self._input.place
+        is_row = not (is_read_out or stated.are_frames)
+        waited = self._input is not None and self._input.is_file
+        #: What the lines are.
+        self.shape = LineShape(stated, self.place, is_row=is_row, waited=waited, readout=readout)
         self._frames: LineFrames | None = None
         #: As is stated, before lines have shown their separators.
         self._declared: LineFrames | None = None
@@ -90,13 +72,12 @@ class Lines:
         self._sink: Callable[..., object] | None = None
         self._thread: threading.Thread | None = None
         self._ends = threading.Event()
-        _, _, unit = (stated.printed.time or "").partition(":")
-        #: The unit of the stamps that are passed on.
-        self._stamp_us = UNITS_US["s" if unit == ISO else unit] if unit in (*UNITS_US, ISO) else 1.0
+        #: Whether reading goes on after its end, so that the line that has begun is not over.
+        self._goes_on = False
+        #: Whether it has a place that is open.
+        self.is_open = self._input is not None
         self.failed: Error | OSError | None = None
         self._given = threading.Lock()
-
-    # ------------------------------------------------------------------------------------------- what the lines are
 
     def find(self, most_s: float) -> None:
         """Find out how the lines are read. What is stated whole need not have sent anything.
@@ -111,20 +92,11 @@ class Lines:
         ProblemError : nothing came, or lines that are not what is stated, or that can be read in two ways
         """
         if self._input is None:
-            self._of_program()
+            self._frames = self.shape.of_program()
             return
-        printed = self.stated.printed
-        count = stated_count(printed, self.array.taxels if self.array is not None else None)
-        columns = [*map(str, printed.leave_out), *(printed.time or "1").partition(":")[0].split("+")]
-        # The names of columns come with the lines.
-        is_named = not printed.columns and not all(map(str.isdecimal, columns))
-        is_stated = (
-            count is not None
-            and not is_named
-            and (not self.are_frames or (self.array is not None and self.frame_us > 0.0))
-        )
+        is_stated = self.shape.is_stated
         if is_stated:
-            self._declared = self._of_statement()
+            self._declared = self.shape.of_statement()
         begun, first = time.monotonic(), None
         while True:
             beyond = self._left_out[0]
@@ -132,12 +104,12 @@ class Lines:
             now = time.monotonic()
             # What cannot be a line of numbers is waited out.
             begun = now if self._left_out[0] > beyond else begun
-            first = now if first is None and self._texts() else first
+            first = now if first is None and texts_of(self._waiting) else first
             since = 0.0 if first is None else now - first
-            enough = len(self._numbers()) >= _LINES or since >= _MEASURE_S or self._has_ended
+            enough = len(numbers_of(self._waiting)) >= _LINES or since >= _MEASURE_S or self._has_ended
             if first is not None and (enough or is_stated) and self._understood(final=False):
                 return
-            if is_stated and (first is None or not self._numbers()):
+            if is_stated and (first is None or not numbers_of(self._waiting)):
                 # The first lines that come will show it.
                 return
             if first is None and (self._has_ended or now - begun >= most_s):
@@ -151,153 +123,24 @@ class Lines:
                 self._understood(final=True)
                 return
 
-    def _of_program(self) -> None:
-        """Take what is stated for what a program passes."""
-        if self.are_frames and self.stated.rate_hz is None:
-            raise ProblemError(
-                f"source {self.stated.text!r}: rate=HZ is missing: it states how many frames per second the program "
-                "passes"
-            )
-        self._frames = self._of_statement()
-
-    def _of_statement(self) -> LineFrames:
-        """Return frames of lines as they are stated, without any line."""
-        printed = self.stated.printed
-        size = self.array.taxels if self.array is not None and self.are_frames else None
-        count = stated_count(printed, size)
-        if count is None:
-            needs = "columns=A:B:C" if not self.are_frames else "array=ROWSxCOLUMNS or columns=A:B:C"
-            raise ProblemError(f"source {self.stated.text!r}: needs {needs}")
-        return self._set(self._form_of([",".join(["2"] * count)], None))
-
-    def _texts(self) -> list[ArrivedLine]:
-        """Return the lines so far that are text of a length that lines of numbers may have."""
-        return [line for line in self._waiting if line.is_text and not line.is_cut]
-
-    def _numbers(self) -> list[ArrivedLine]:
-        return [line for line in self._texts() if any(map(str.isdigit, line.text))]
-
     def _understood(self, *, final: bool) -> bool:
         """Return whether the lines so far show what they are; if they are the last to show it, refuse others."""
-        texts = [line.text for line in self._texts()]
-        form = self._form_of(texts, self._texts())
-        if form is None and final and texts and not self.are_frames and not self._has_ended:
-            # Only the names of columns have arrived.
-            separator = next((mark for mark in ";,\t" if mark in texts[-1]), None)
-            example = None if separator is None else separator.join("2" * len(texts[-1].split(separator)))
-            form = None if example is None else self._form_of([texts[-1], example], None)
-        if form is None:
-            if final:
-                raise ProblemError(f"{self.place}: {self._came()}, but no line contains only numbers")
-            return False
-        self._frames = self._set(form)
-        if self._declared is not None:
-            self._frames.unread = self._declared.unread
-        if self.frame_us == 0.0 and self.are_frames:
-            times = self._times()
-            if len(times) < 2:
-                self.form, self._frames, self.array = None, None, self.stated.array
-                if final:
-                    raise ProblemError(f"{self.place}: only 1 frame arrived, so the rate is unknown: add rate=HZ")
-                return False
-            self.frame_us = float(np.median(np.diff(times))) if form.clocks else _period(times)
-        return True
-
-    def _came(self) -> str:
-        texts = [line.text for line in self._waiting if line.text.strip()]
-        return f"{counted(len(texts), 'line')} arrived ({texts[0][:60]!r} ...)" if texts else "bytes arrived"
-
-    def _form_of(self, texts: Sequence[str], lines: Sequence[ArrivedLine] | None) -> Form | None:
-        """Return what lines are; those of a program have no arrivals."""
-        at = [] if lines is None else [line.at_ns for line in lines]
-
-        def unit_of(stamps: NDArray[np.float64], numbers: Sequence[int]) -> str:
-            """Return the unit in which stamps pass as lines arrive; before any do, it is not used."""
-            if lines is None and self._input is not None:
-                return "us"
-            steps = np.diff(stamps)
-            if len(stamps) < _FEW or not at or self.waited or not bool((steps > 0).all()):
-                return ""
-            passed_s = (at[numbers[-1]] - at[numbers[0]]) * 1e-9
-            by_second = (stamps[-1] - stamps[0]) / passed_s if passed_s > 0 else 0.0
-            return next((unit for unit, us in FOUND_US.items() if 0.5 <= by_second * us * 1e-6 < 2.0), "")
-
-        size = self.array.taxels if self.array is not None and self.are_frames else None
-        try:
-            return form_of_lines(texts, self.stated.printed, size, unit_of, are_frames=self.are_frames)
-        except ProblemError as error:
-            raise ProblemError(f"source {self.stated.text!r}: {first_line(error)}") from None
-
-    def _set(self, form: Form | None) -> LineFrames:
-        """Take a form; return what makes frames by it."""
-        if form is None:
-            raise ProblemError(f"source {self.stated.text!r}: what it states makes no line of numbers")
-        self.form = form
-        size, said = len(form.taxels), list(form.said)
-        if self.are_frames:
-            try:
-                self.array, self.names, guess = array_of(form, self.array, self._readout, self.name)
-            except ProblemError as error:
-                raise ProblemError(f"source {self.stated.text!r}: {first_line(error)}") from None
-            size = self.array.taxels
-            said = [guess, *said] if guess else said
-            if not form.clocks:
-                said.append("a frame's time is when it arrived")
-            if guess or not form.clocks:
-                rows, columns = self.array.shape
-                self.read_as = f"{self.place}: read as {rows} x {columns} taxels: {'; '.join(said)}"
-        elif len(form.clocks) > 1:
-            raise ProblemError(f"source {self.stated.text!r}: time=A+B is only for frames: add array=ROWSxCOLUMNS")
-        if self._sink is None:
-            self._stamp_us = form.clocks[0][1] if len(form.clocks) == 1 else 1.0
-        return LineFrames(form, size, are_frames=self.are_frames, stamp_us=self._stamp_us)
-
-    def _times(self) -> NDArray[np.float64]:
-        """Return the times of the frames so far, us."""
-        assert self.form is not None
-        assert self.array is not None
-        frames = LineFrames(self.form, self.array.taxels, are_frames=True, stamp_us=1.0)
-        for line in self._waiting:
-            frames.push(line)
-        passed = frames.take_passed()
-        return np.array(passed.stamps) if self.form.clocks else np.array(passed.arrived_ns) / 1e3
-
-    # ------------------------------------------------------------------------------------------------- what Rust knows
+        frames = self.shape.of_lines(self._waiting, final=final, has_ended=self._has_ended)
+        if frames is not None and self._declared is not None:
+            frames.unread = self._declared.unread
+        self._frames = frames
+        return frames is not None
 
     def source(self, readout_unit: str | None) -> dict[str, Any]:
         """Return the source as the compiled part knows it."""
-        if not self.are_frames:
-            assert self.form is not None
-            columns = [name or f"column_{k}" for k, name in enumerate(self.form.names)]
-            clock = next(iter(self.form.clocks), None)
-            kept = sorted({*self.form.taxels, *(k for k, _ in self.form.clocks)})
-            stream: dict[str, Any] = {"columns": [columns[k] for k in kept], "waited": self.waited}
-            if clock is not None:
-                stream |= {"time": columns[clock[0]], "unit_us": clock[1]}
-            return {"name": self.name, "place": self.place, "kind": {"numbers": stream}}
-        return {"name": self.name, "place": self.place, "kind": {"frames": self.layout(readout_unit)}}
-
-    def layout(self, readout_unit: str | None) -> dict[str, Any]:
-        """Return what a frame is, as the compiled part knows it."""
-        assert self.array is not None
-        return {
-            "array": self.array._geometry(),
-            "unit": self.stated.unit or readout_unit or "counts",
-            "unit_is_stated": self.stated.unit is not None,
-            "names": list(self.names),
-            "turned": self.stated.turned,
-            "frame_us": self.frame_us,
-            "stamp_us": self._stamp_us,
-            "waited": self.waited,
-        }
-
-    # -------------------------------------------------------------------------------------------------------- reading
+        return {"name": self.name, "place": self.place, "kind": {"frames": self.shape.layout(readout_unit)}}
 
     def begin(self, sink: Callable[..., object], end: Callable[[str], object]) -> None:
         """Pass lines on in a separate thread, as `_core.Live.lines` takes them, until they end."""
         self._sink = sink
-        if self._input is None:
+        if (input_ := self._input) is None:
             return
+        self._ends.clear()
 
         def run() -> None:
             try:
@@ -306,7 +149,10 @@ class Lines:
                     if self._has_ended:
                         break
                     self._read()
-                self._end()
+                if not self._goes_on:
+                    input_.lines.discard()
+                    self._leave_out()
+                self._pass()
                 # What follows is no silence.
                 end(self.name)
             except (Error, OSError) as error:
@@ -334,8 +180,24 @@ class Lines:
                 raise ProblemError(f"source {self.name}: {error}") from None
             self._pass()
 
+    def pause(self) -> None:
+        """End reading until `begin`; what was read is passed on, and the place stays open."""
+        self._goes_on = True
+        self._end()
+
+    def renew(self) -> None:
+        """Count from now on what is in no frame."""
+        self._goes_on, self.failed = False, None
+        self.unread.clear()
+
     def close(self) -> None:
-        """End reading; what was read is passed on."""
+        """End reading; what was read is passed on, and the place is closed at once."""
+        self._end()
+        if self._input is not None:
+            self._input.close()
+            self.is_open = False
+
+    def _end(self) -> None:
         self._ends.set()
         if self._thread is not None:
             self._thread.join()
@@ -395,7 +257,7 @@ class Lines:
             except ProblemError as error:
                 self._unclear = str(error)
         frames = self._frames
-        if frames is None and (self._ends.is_set() or self._has_ended or not self._numbers()):
+        if frames is None and (self._ends.is_set() or self._has_ended or not numbers_of(self._waiting)):
             frames = self._declared
         if frames is None:
             del self._waiting[:-_KEPT]
@@ -407,13 +269,10 @@ class Lines:
         if self._has_ended:
             frames.end()
         passed = frames.take_passed()
-        if not self.are_frames:
-            # A stream states each line that could not be read.
-            passed.strange = 0
         in_no_line, unfinished = self._left_out
         self._left_out = [0, 0]
         trouble, self._trouble = self._trouble or self._unclear, None
-        arrived_ns, stamps, values = passed.arrays(self.stated.turned if self.are_frames else None)
+        arrived_ns, stamps, values = passed.arrays(self.stated.turned)
         self._sink(
             self.name,
             arrived_ns,
@@ -426,37 +285,11 @@ class Lines:
             now_ns(),
         )
 
-    def _end(self) -> None:
-        assert self._input is not None
-        self._input.lines.discard()
-        self._leave_out()
-        self._pass()
-
 
 def _ends_in_number(text: str) -> bool:
     """Return whether the last cell of a line is a number."""
     last = _BETWEEN.split(text.strip(" \t,;"))[-1]
     return is_number(last) and abs(float(last)) <= VALUE
-
-
-def _period(times: NDArray[np.float64]) -> float:
-    """Return the time from one frame to the next by their arrivals, us.
-
-    Lines arrive in packets, and those that waited until they were read arrive at once: it is that from the second
-    packet to the last.
-
-    Examples
-    --------
-    >>> _period(np.array([0.0, 1, 2, 30_000, 40_000, 50_000]))
-    10000.0
-    """
-    end = len(times) - 1
-    at_once = (times[-1] - times[0]) / end / 10
-    is_apart = np.flatnonzero(np.diff(times) >= at_once)
-    first = int(is_apart[0]) + 1 if len(is_apart) and is_apart[0] > 0 else 0
-    last = int(is_apart[-1]) + 1 if len(is_apart) else end
-    first, last = (first, last) if first < last else (0, end)
-    return max(1.0, float(times[last] - times[first]) / (last - first))
 
 
 def preview(source: str, most_s: float) -> tuple[list[str], str, str]:
@@ -474,19 +307,24 @@ def preview(source: str, most_s: float) -> tuple[list[str], str, str]:
     """
     lines = Lines(StatedSource.of(source), is_read_out=True)
     until = time.monotonic() + most_s
-    while time.monotonic() < until and not lines._has_ended and len(lines._numbers()) < _KEPT:
-        lines._read()
-    shown = [line.text[:200] for line in lines._waiting][-12:]
     try:
-        form = lines._form_of([line.text for line in lines._texts()], lines._texts())
-        lines._frames = lines._set(form)
+        while time.monotonic() < until and not lines._has_ended and len(numbers_of(lines._waiting)) < _KEPT:
+            lines._read()
+    finally:
+        lines.close()
+    shown = [line.text[:200] for line in lines._waiting][-12:]
+    shape = lines.shape
+    try:
+        form = shape.form_of([line.text for line in texts_of(lines._waiting)], texts_of(lines._waiting))
+        if form is None:
+            raise ProblemError(f"source {source!r}: no line contains only numbers")
+        shape.take(form)
     except ProblemError as error:
         reason = "Nothing arrived: is the sensor connected and switched on?"
         return shown, str(error) if shown else reason, source
-    assert lines.array is not None
-    assert lines.form is not None
-    keys = {"array": f"{lines.array.rows}x{lines.array.columns}"} if lines.stated.array is None else {}
-    keys |= dict(lines.form.keys)
+    assert shape.array is not None
+    keys = {"array": f"{shape.array.rows}x{shape.array.columns}"} if lines.stated.array is None else {}
+    keys |= dict(form.keys)
     text = ",".join([source, *(f"{key}={value}" for key, value in keys.items())])
-    about = f"{counted(len(lines.form.taxels), 'number')} per line: {lines.array.rows} x {lines.array.columns}"
-    return shown, "; ".join([about, *lines.form.said]), text
+    about = f"{counted(len(form.taxels), 'number')} per line: {shape.array.rows} x {shape.array.columns}"
+    return shown, "; ".join([about, *form.said]), text

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator
-from dataclasses import fields, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from types import TracebackType
 from typing import Any
 
@@ -21,6 +21,7 @@ from taxel._base.options import with_fields_of
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detections import Detection
+from taxel.live.lines import Lines
 from taxel.live.lsl import LslOutlet
 from taxel.live.options import LiveOptions
 from taxel.live.sources import Sources
@@ -147,21 +148,26 @@ class Live:
 
     @with_fields_of(LiveOptions)
     def __init__(self, options: LiveOptions) -> None:
+        self._begin(options, ())
+
+    def _begin(self, options: LiveOptions, kept: Sequence[Lines]) -> None:
+        """Begin with these options, and with places of lines that are open already."""
         #: Whether the registers were stated; the panel shows no frame rate that is only assumed.
         self._registers_stated = options.registers is not None
         options = options.completed()
         say = options.say
         destinations = options.destinations()
         outlets = [LslOutlet(to.removeprefix(_LSL)) for to in destinations if to.startswith(_LSL)]
-        self._sources = sources = Sources(options)
+        self._sources = sources = Sources(options, kept)
         options = sources.options
         receivers: list[Callable[[Detection], object]] = [*outlets, *([] if say is None else [say])]
         self._summary: Summary | None = None
-        self._core = _core.Live(
-            sources.for_rust([to for to in destinations if not to.startswith(_LSL)]),
-            None if options.record is None else checked_path("record", options.record),
-            None if not receivers else lambda values: [receive(Detection(**values)) for receive in receivers],
-        )
+        with sources.abandoned_on_error():
+            self._core = _core.Live(
+                sources.for_rust([to for to in destinations if not to.startswith(_LSL)]),
+                None if options.record is None else checked_path("record", options.record),
+                None if not receivers else lambda values: [receive(Detection(**values)) for receive in receivers],
+            )
         array, name = self._core.sensor()
         self.array = Array._from_geometry(array)
         #: The name of the source that is read out.
@@ -183,11 +189,22 @@ class Live:
         sources.begin(self._core)
 
     def _again(self, **changed: Any) -> Live:
-        """Return another `Live` that works alike, with other options; by default it receives from the same place."""
+        """Return another `Live` that works alike, with other options; by default it receives from the same place.
+
+        After `_pause` it goes on to read the places of lines, which stayed open.
+        """
         host, port = self._listened_on
-        kept = {"host": host, "port": port} | ({} if self._registers_stated else {"registers": None})
-        options = replace(self._options, **{**kept, **changed})
-        return Live(**{field.name: getattr(options, field.name) for field in fields(options)})
+        same = {"host": host, "port": port} | ({} if self._registers_stated else {"registers": None})
+        again = Live.__new__(Live)
+        again._begin(replace(self._options, **{**same, **changed}), self._sources.lines)
+        # What it has begun with is no longer closed here.
+        self._sources.lines = []
+        return again
+
+    def _pause(self) -> None:
+        """End as `stop` does, but keep the places of lines open for `_again`."""
+        self._sources.pause()
+        self._end()
 
     @property
     def address(self) -> tuple[str, int]:
@@ -253,10 +270,9 @@ class Live:
         `verdict` (status, lost, damaged, ...: that of a recording of all so far; not of one that has ended),
         `events`, `read_out`, `events_dropped`,
         `late` (events out of order), `detections`, `wrong` (those output in a
-        silence that an event then interrupted, later than the guard), `detections_dropped`, `sources` (the counts of
-        each other source; of one of lines: lines, strange, bytes_in_no_line, bytes_of_unfinished_lines, trouble, and
-        for frames unread: by kind the lines in no frame, with the first),
-        `sent` (of each destination: to,
+        silence that an event then interrupted, later than the guard), `detections_dropped`, `sources` (these counts of
+        each other source), `lines` (of a board None; else lines, strange, bytes_in_no_line, bytes_of_unfinished_lines,
+        trouble, and unread: by kind the lines in no frame, with the first), `frames`, `sent` (of each destination: to,
         sent, lost, waiting, trouble), `decode_latency` and
         `report_latency` (count, p50_us, p99_us, max_us; None where nothing was measured, as where the
         kernel does not stamp arrivals), `offset` (board_us, host_ns,
@@ -485,6 +501,9 @@ class Live:
         ProblemError : called by `say`, or after an end by an error
         """
         self._sources.close()
+        return self._end()
+
+    def _end(self) -> Summary:
         if self._summary is None:
             self._summary = summary_of(self._core.stop())
             self._sources.with_unread(self._summary.counters)

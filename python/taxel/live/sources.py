@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -28,6 +29,8 @@ class Sources:
     ----------
     options : LiveOptions
         Complete.
+    kept : sequence of Lines
+        Those whose places are open, to go on where their sources are stated again.
 
     Attributes
     ----------
@@ -42,7 +45,7 @@ class Sources:
     ProblemError : no such source, or one whose lines are not what is stated
     """
 
-    def __init__(self, options: LiveOptions) -> None:
+    def __init__(self, options: LiveOptions, kept: Sequence[Lines] = ()) -> None:
         stated = [StatedSource.of(text) for text in options.source_texts()]
         for k, source in enumerate(stated):
             if any(before.called == source.called for before in stated[:k]):
@@ -51,16 +54,28 @@ class Sources:
                     "another NAME="
                 )
         self.lines: list[Lines] = []
+        self._kept = {lines.stated.text: lines for lines in kept if lines.is_open}
         self._inlets: dict[str, LslInlet] = {}
         self._unit = getattr(options.readout, "unit", None)
         self._readout = options.array
         self._read: Lines | None = None
         is_board = options.port is not None or options.host is not None or not stated
-        if not is_board:
-            boards = [k for k, source in enumerate(stated) if source.kind == "board"]
-            options = self._read_out(stated.pop(boards[0] if boards else 0), options)
-        self.options = options
-        self._others = [self._other(source) for source in stated]
+        with self.abandoned_on_error():
+            if not is_board:
+                boards = [k for k, source in enumerate(stated) if source.kind == "board"]
+                options = self._read_out(stated.pop(boards[0] if boards else 0), options)
+            self.options = options
+            self._others = [self._other(source) for source in stated]
+
+    @contextlib.contextmanager
+    def abandoned_on_error(self) -> Iterator[None]:
+        """Close what was opened here if the block fails: other programs may open it."""
+        try:
+            yield
+        except BaseException:
+            self.lines = [lines for lines in self.lines if lines.stated.text not in self._kept]
+            self.close()
+            raise
 
     def _read_out(self, source: StatedSource, options: LiveOptions) -> LiveOptions:
         """Return the options to receive a source."""
@@ -77,7 +92,7 @@ class Sources:
                 f"source {source.text!r}: contains no frames, so it cannot be shown or read by a readout"
             )
         self._read = self._opened(source, options, is_read_out=True)
-        return replace(options, array=self._read.array, name=source.called)
+        return replace(options, array=self._read.shape.array, name=source.called)
 
     def _other(self, source: StatedSource) -> dict[str, Any]:
         """Return a further source as the compiled part knows it."""
@@ -92,9 +107,13 @@ class Sources:
         return self._opened(source, self.options, is_read_out=False).source(self._unit)
 
     def _opened(self, source: StatedSource, options: LiveOptions, *, is_read_out: bool) -> Lines:
+        if (kept := self._kept.get(source.text)) is not None:
+            kept.renew()
+            self.lines.append(kept)
+            return kept
         lines = Lines(source, is_read_out=is_read_out, readout=self._readout)
-        lines.find(options.first_line_s)
         self.lines.append(lines)
+        lines.find(options.first_line_s)
         return lines
 
     def for_rust(self, send: Sequence[str]) -> str:
@@ -102,13 +121,13 @@ class Sources:
         read = self._read
         frames = None
         if read is not None:
-            frames = {"text": read.stated.text, "place": read.place, "layout": read.layout(self._unit)}
+            frames = {"text": read.stated.text, "place": read.place, "layout": read.shape.layout(self._unit)}
         return self.options.for_rust(send=list(send), read=frames, sources=self._others)
 
     @property
     def read_as(self) -> str:
         """How the lines that are read out were understood, if what they are was not stated; else ""."""
-        return "" if self._read is None else self._read.read_as
+        return "" if self._read is None else self._read.shape.read_as
 
     def begin(self, core: _core.Live) -> None:
         """Pass what arrives on."""
@@ -134,17 +153,26 @@ class Sources:
         """Return counters with the lines of each source of frames that are in no frame, by kind."""
         for lines in self.lines:
             of = counters if lines is self._read else counters["sources"].get(lines.name, {})
-            if isinstance(of.get("lines"), dict):
+            if of.get("lines") is not None:
                 of["lines"]["unread"] = {kind: dict(found) for kind, found in lines.unread.items()}
         return counters
 
+    def pause(self) -> None:
+        """End reading; what was read is passed on, and places of lines stay open for another `Sources`."""
+        self._close_inlets()
+        for lines in self.lines:
+            lines.pause()
+
     def close(self) -> None:
-        """End reading; what was read is passed on."""
+        """End reading; what was read is passed on, and places are closed at once."""
+        self._close_inlets()
+        for lines in self.lines:
+            lines.close()
+
+    def _close_inlets(self) -> None:
         inlets, self._inlets = self._inlets, {}
         for inlet in inlets.values():
             inlet.close()
-        for lines in self.lines:
-            lines.close()
 
     @property
     def failed(self) -> Exception | None:

@@ -123,11 +123,14 @@ class StatedSource:
             raise ProblemError("unit is empty: must be the unit of the values, for example N or kPa")
         falls = keys.get("falls", "false")
         turned = {"true": 0.0, "false": None}[falls] if falls in ("true", "false") else _number("falls", falls)
+        columns = tuple(keys["columns"].split(":")) if "columns" in keys else ()
+        if len(set(columns)) < len(columns) or "" in columns:
+            raise ProblemError(f"columns={keys['columns']}: each column must have a name of its own")
         printed = PrintedFrames(
             place,
             baud=_whole("baud", keys.get("baud")),
             time=keys.get("time"),
-            columns=keys["columns"].split(":") if "columns" in keys else (),
+            columns=columns,
             leave_out=keys["leave_out"].split(":") if "leave_out" in keys else (),
             frame_lines=_whole("frame_lines", keys.get("frame_lines")),
             frame_end=keys.get("frame_end"),

@@ -231,13 +231,27 @@ class Hub:
             own = {"readout": None, "tare": None} if isinstance(before._options.tare, Tare) else {}
             # A serial line has one reader at a time.
             before.stop()
-            try:
-                return before._again(port=None, host=None, sources=source, **own)
-            except Exception:
-                self._show_live(before._again())
-                raise
+            return self._replaced(before, port=None, host=None, sources=source, **own)
 
         await self.restart(change)
+
+    async def read_nothing(self) -> None:
+        """Receive nothing any more."""
+        await self.read_source(_nothing_like(self.needed_live()))
+
+    def _replaced(self, before: Live, **changed: Any) -> Live:
+        """Return the `Live` in place of one that has ended; where it is refused, the sensor stays in sight."""
+        try:
+            return before._again(**changed)
+        except Exception:
+            try:
+                self._show_live(before._again())
+            except (OSError, _core.Error):
+                # It is not there any more.
+                before.stop()
+                nothing = {"sources": _nothing_like(before), "readout": None, "tare": None}
+                self._show_live(before._again(port=None, host=None, **nothing))
+            raise
 
     async def read_out(self, readout: Path) -> None:
         """Read the live source out with another readout: time, values and the past begin again.
@@ -255,13 +269,8 @@ class Hub:
             if tare is None:
                 tare = _rest_of_held(before)
             held = {"registers": Registers._of(self.board.registers, before.array)} if self.board.known else {}
-            before.stop()
-            try:
-                return before._again(readout=readout, tare=tare, **held)
-            except Exception:
-                # The sensor stays in sight, whatever the readout lacks.
-                self._show_live(before._again())
-                raise
+            before._pause()
+            return self._replaced(before, readout=readout, tare=tare, **held)
 
         await self.restart(change)
 
@@ -427,6 +436,12 @@ class Hub:
             ],
             "readouts": readouts,
         }
+
+
+def _nothing_like(live: Live) -> str:
+    """Return the source that gives nothing, with the sensor of another one."""
+    rows, columns = live.array.shape
+    return f"{live.name}=given,array={rows}x{columns},rate=1"
 
 
 def _rest_of_held(live: Live) -> Tare:

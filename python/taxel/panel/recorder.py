@@ -159,7 +159,9 @@ class Recorder:
             self._error = str(error)
         else:
             if summary.path is None:
-                self._error = f"no datagrams arrived during the recording{_core.FIREWALL}: no file was written"
+                what = f"datagrams arrived during the recording{_core.FIREWALL}"
+                what = what if live.frame_us is None else "frames arrived during the recording"
+                self._error = f"no {what}: no file was written"
             else:
                 self._last = {"file": path.name, "verdict": str(summary.verdict)}
         self._state = "idle"

@@ -376,9 +376,7 @@ class Session:
     @request
     async def disconnect(self) -> None:
         """Receive nothing any more, for all clients: the port is free for other programs."""
-        live = self._hub.needed_live()
-        rows, columns = live.array.shape
-        await self._hub.read_source(f"{live.name}=given,array={rows}x{columns},rate=1")
+        await self._hub.read_nothing()
 
     # ------------------------------------------------------------------------------------------ requests: recordings
 

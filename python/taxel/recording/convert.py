@@ -14,7 +14,7 @@ from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.formats.layout import Layout
 from taxel.frames import Frames
-from taxel.reading import ENDINGS, Datagrams, Facts, InMemory
+from taxel.reading import ENDINGS, Facts, InMemory
 from taxel.recording.frames import period_us
 from taxel.recording.opening import open_one
 from taxel.recording.recording import Recording
@@ -128,7 +128,7 @@ def _export(path: Path, kind: str, source: SourceView, others: list[str], overwr
 def _beside_table(source: SourceView, kind: str) -> list[str]:
     """Return what a recording has beside its table that a kind of export leaves out."""
     facts, marks, clock, received = source.facts, source.marks, source.clock, source.received
-    are_bytes = kind == ".lsa" and isinstance(received, Datagrams) and received.version == 1
+    are_bytes = kind == ".lsa" and received is not None and received.version == 1
     there = {
         "the raw data": received is not None and not are_bytes,
         "arrival times": clock is not None and len(clock.board_us) > 0,
@@ -173,7 +173,7 @@ def _as_frames(recording: Recording, frames_hz: float) -> Recording:
 
     def drawn(source: SourceView) -> SourceView:
         frames = Recording({source.facts.label: source}).frames(frames_hz)
-        lost = ("raw datagrams",) * (source.facts.raw == "datagrams")
+        lost = ("raw datagrams",) * bool(source.facts.raw)
         # The first frame includes the held values.
         marks = replace(source.marks, held=None)
         return SourceView(source.in_memory(frames, marks, lost=tuple(dict.fromkeys((*source.lost, *lost)))))

@@ -423,7 +423,7 @@ class Recording:
         if isinstance(received, Datagrams):
             return received
         if self.is_stream:
-            why = f"source {self.label!r} is a stream of numbers, which has lines and no datagrams"
+            why = f"source {self.label!r} is a stream of numbers, which has no datagrams"
         elif self._main.facts.raw == "datagrams" and self.kind == "mcap":
             why = "a part of the recording has no datagrams; those of the file belong to the whole"
         else:

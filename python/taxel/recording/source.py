@@ -16,7 +16,7 @@ from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.reading import Datagrams, Facts, InMemory, Lines, Marks, Reader, Times, View
+from taxel.reading import Datagrams, Facts, InMemory, Marks, Reader, Times, View
 from taxel.recording.frames import times_at
 from taxel.verdict import Verdict
 
@@ -142,22 +142,15 @@ class SourceView:
         return self.reader.counts()
 
     @property
-    def received(self) -> Datagrams | Lines | None:
+    def received(self) -> Datagrams | None:
         """What was received of this view, as it was received; None if the events or frames must be written instead."""
-        if self.view.is_whole:
-            return self.reader.datagrams()
-        if self.facts.raw == "lines" and replace(self.view, start=-np.inf, stop=np.inf).is_whole:
-            lines = self.reader.datagrams()
-            return lines.between(self.view.start, self.view.stop) if isinstance(lines, Lines) else None
-        return None
+        return self.reader.datagrams() if self.view.is_whole else None
 
     @property
     def lost(self) -> tuple[str, ...]:
         """A line for each kind of information that is not there any more."""
-        raw = {"datagrams": "raw datagrams", "lines": "the lines of the stream as received"}.get(self.facts.raw)
-        is_sliced = self.view.is_slice and self.facts.raw == "lines"
-        has_raw = raw is None or self.view.is_whole or (is_sliced and self.received is not None)
-        return self.facts.lost if has_raw else tuple(dict.fromkeys((*self.facts.lost, str(raw))))
+        has_raw = not self.facts.raw or self.view.is_whole
+        return self.facts.lost if has_raw else tuple(dict.fromkeys((*self.facts.lost, "raw datagrams")))
 
     @property
     def interval(self) -> tuple[int, int] | None:
@@ -264,7 +257,7 @@ def share_clock(sources: Mapping[str, SourceView]) -> bool:
     views = [source.view for source in sources.values()]
     if all(view.clock is not None for view in views):
         return True
-    return all(not source.facts.has_events and not source.facts.raw for source in sources.values())
+    return all(not source.facts.has_events and source.clock is None for source in sources.values())
 
 
 def one_clock(sources: Mapping[str, SourceView], name: str) -> dict[str, SourceView]:

@@ -74,7 +74,7 @@ def written() -> None:
 
 
 def live() -> None:
-    """Record live: a readout's detections, a board of version 2 with losses, and several sources."""
+    """Record live: a readout's detections, and a board of version 2 with losses."""
     events = presses(6)
     options = {"array": SMALL, "readout": touch(), "guard_frames": 1e6, "say": lambda found: None}
     with Live(0, host=LOOPBACK, record=HERE / "detected.mcap", compression="zstd", **options) as running:
@@ -96,6 +96,10 @@ def live() -> None:
                 for _again in range((0, 1, 2, 1)[fate]):
                     link.sendto(changed, running.address)
                     time.sleep(0.0005)
+
+
+def several() -> None:
+    """Record several sources live: boards and numbers."""
     ours, theirs = pty.openpty()
     tty.setraw(theirs)
     sources = {
@@ -110,7 +114,7 @@ def live() -> None:
         os.write(ours, b"".join(f"{10 * k}, {k / 8}, {-k}\r\n".encode() for k in range(20)) + b"nonsense\n")
         for k in range(5):
             running.sample("given", [k + 0.5], arrived_ns=BEGAN + k * 1_000_000)
-        until(lambda: running.counters["sources"]["imu"]["lines"] == 21)
+        until(lambda: running.counters["sources"]["imu"]["lines"]["lines"] == 21)
         until(lambda: running.counters["sources"]["left"]["decoded"] > 0 and running.counters["decoded"] > 0)
 
 
@@ -192,6 +196,7 @@ def pinned() -> None:
 if __name__ == "__main__":
     written()
     live()
+    several()
     made()
     texts()
     pinned()

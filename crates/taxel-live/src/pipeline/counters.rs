@@ -35,7 +35,7 @@ pub struct Counters {
     /// Counts of each destination: `sent + lost + waiting = detections`.
     pub sent: Vec<Sent>,
     /// Counts of the recording's other sources.
-    pub sources: BTreeMap<String, SourceCounts>,
+    pub sources: BTreeMap<String, Counters>,
     /// Latency from the kernel's stamp to the end of decoding, per datagram; none if the kernel does not stamp.
     pub decode_latency: Quantiles,
     /// Latency from `known` to the output, by the board's clock.
@@ -238,14 +238,4 @@ pub struct LiveSummary {
     pub path: Option<PathBuf>,
     /// The fresh tare, where one was completed.
     pub tare: Option<Tare>,
-}
-
-/// Counts of what arrived from a source, and of what was lost.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(untagged)]
-pub enum SourceCounts {
-    /// The counts of the pipeline of a board or of frames.
-    Pipeline(Box<Counters>),
-    /// The counts of a stream of numbers.
-    Numbers(Box<LineCounts>),
 }

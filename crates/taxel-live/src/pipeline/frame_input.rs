@@ -21,11 +21,11 @@ const ROOM_EVERY: Duration = Duration::from_millis(1);
 /// Lines that a reader passes on at once.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ReadLines {
-    /// When each frame, or line of numbers, arrived, ns since 1970.
+    /// When each frame arrived, ns since 1970.
     pub arrived_ns: Vec<i64>,
     /// The stamp of each frame; empty if they have none.
     pub stamps: Vec<f64>,
-    /// The values of all frames, row by row, or of all lines, column by column.
+    /// The values of all frames, row by row.
     pub values: Vec<f64>,
     /// Number of lines, with those that could not be read.
     pub lines: u64,
@@ -73,7 +73,10 @@ impl LineCounts {
     /// The difference from earlier counts.
     pub(super) fn since(&self, earlier: &Self) -> Self {
         let counts = self.faults.counts.since(&earlier.faults.counts);
-        let faults = Found { counts, ..self.faults.clone() };
+        // A doubt from before is not one of times that arrived since by a clock that was sound.
+        let is_doubtful = [Cause::Jumps, Cause::StampsBack, Cause::Drifts].iter().any(|&cause| counts[cause] > 0);
+        let doubtful_after_us = self.faults.doubtful_after_us.filter(|_| is_doubtful);
+        let faults = Found { counts, doubtful_after_us, ..self.faults.clone() };
         Self::new(self.lines - earlier.lines, faults, self.trouble.clone())
     }
 }
@@ -136,7 +139,7 @@ impl FrameInput {
 impl InputState {
     fn push(&mut self, read: &ReadLines, taxels: usize) {
         self.lines += read.lines;
-        self.times.faults.add(&read.counts);
+        self.times.faults.found.counts.extend(read.counts.iter());
         if read.trouble.is_some() || !read.arrived_ns.is_empty() {
             // A line that failed is there again where frames arrive.
             self.trouble.clone_from(&read.trouble);

@@ -26,7 +26,7 @@ const GUARD_FRAMES: f64 = 5.0;
 const NOISE_FRAMES: usize = 32;
 
 pub(super) struct FrameStage {
-    frame_us: f64,
+    frame_us: Option<f64>,
     /// Whether the lines waited in a file, so that their arrival shows no pace of a clock.
     waited: bool,
     guard_frames: f64,
@@ -186,21 +186,22 @@ impl FrameStage {
         // A source of frames sends one each so long, as a board its heartbeats.
         #[allow(clippy::cast_possible_truncation)]
         {
-            counters.board.heartbeat_us = Some(self.frame_us.ceil() as i64);
+            counters.board.heartbeat_us = self.frame_us.map(|frame_us| frame_us.ceil() as i64);
         }
     }
 
     /// The interval at which the readout's time is advanced while no frames arrive.
     pub(super) fn tick(&self) -> Duration {
-        TICK.max(Duration::from_secs_f64(self.frame_us * 1e-6))
+        TICK.max(Duration::from_secs_f64(self.frame_us.unwrap_or_default() * 1e-6))
     }
 
     /// The source's time before which everything has arrived, if nothing arrived until `until_ns`.
     #[allow(clippy::cast_possible_truncation)]
     pub(super) fn quiet_until(&self, until_ns: Option<i64>) -> Option<QuietUntil> {
         let (t, arrived_ns) = self.latest?;
+        let guard_us = (self.guard_frames * self.frame_us?) as i64;
         let passed_us = (until_ns? - arrived_ns).max(0) / 1000;
-        Some(QuietUntil::ByHostClock(t + passed_us - (self.guard_frames * self.frame_us) as i64))
+        Some(QuietUntil::ByHostClock(t + passed_us - guard_us))
     }
 }
 

@@ -12,7 +12,7 @@ const SILENT_FRAMES: f64 = 3.0;
 pub(super) struct FrameTimes {
     pub(super) faults: StreamFaults,
     waited: bool,
-    frame_us: f64,
+    frame_us: Option<f64>,
     /// Time of the last frame, us.
     last: Option<i64>,
     /// When the last frame arrived, ns since 1970.
@@ -32,7 +32,7 @@ struct Silences {
 impl FrameTimes {
     pub(super) fn new(layout: &FrameLayout) -> Self {
         Self {
-            faults: StreamFaults::by_clock(layout.stamp_us, layout.waited),
+            faults: StreamFaults::new(layout.stamp_us, layout.waited),
             waited: layout.waited,
             frame_us: layout.frame_us,
             last: None,
@@ -60,13 +60,11 @@ impl FrameTimes {
 
     /// The silences so far, with that which lasts until `now_ns` since 1970.
     fn silences_until(&self, now_ns: i64) -> Silences {
-        if self.waited {
-            return self.silences;
-        }
+        let Some(frame_us) = self.frame_us.filter(|_| !self.waited) else { return self.silences };
         let now_ns = self.ended_ns.unwrap_or(now_ns);
         let Silences { count, ns } = self.silences;
         #[allow(clippy::cast_possible_truncation)]
-        let least = SILENT_NS.max((SILENT_FRAMES * 1000.0 * self.frame_us) as i64);
+        let least = SILENT_NS.max((SILENT_FRAMES * 1000.0 * frame_us) as i64);
         match self.arrived_ns.map(|arrived_ns| now_ns - arrived_ns) {
             Some(silent) if silent > least => Silences { count: count + 1, ns: ns + silent.unsigned_abs() },
             _ => self.silences,
@@ -96,7 +94,7 @@ mod tests {
             unit_is_stated: false,
             names: vec![],
             turned: None,
-            frame_us: 10_000.0,
+            frame_us: Some(10_000.0),
             stamp_us: 1.0,
             waited: false,
         });

@@ -11,14 +11,13 @@ use taxel_core::rest::ValueSteps;
 use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
-use super::counters::{Counters, LiveSummary, SourceCounts};
-use super::frame_input::{FrameInput, LineCounts, ReadLines};
+use super::counters::{Counters, LiveSummary};
+use super::frame_input::{FrameInput, ReadLines};
 use super::options::{LiveOptions, Record};
 use super::running_recording::{EndedRecording, RunningRecording, losses};
 use super::shared::PipelineShared;
 use super::sink::OutputDetection;
 use super::source::FrameLayout;
-use super::sources::{NumberStream, losses_of_lines};
 use super::viewer_queue::ViewerEvents;
 use crate::capture::{FIREWALL, Origin};
 use crate::locked::lock;
@@ -29,20 +28,15 @@ use crate::{Error, Result};
 #[derive(Clone)]
 pub struct Handle {
     pub(super) shared: Arc<PipelineShared>,
-    /// The other sources of its recordings, by name: those with a pipeline of their own, and lines of numbers.
+    /// The other sources of its recordings, by name, each with a pipeline of its own.
     pub(super) pipelines: Arc<[(String, Arc<PipelineShared>)]>,
-    pub(super) numbers: Arc<[(String, Arc<NumberStream>)]>,
     /// Locked while one recording replaces another.
     replacing: Arc<Mutex<()>>,
 }
 
 impl Handle {
-    pub(super) fn new(
-        shared: Arc<PipelineShared>,
-        pipelines: Arc<[(String, Arc<PipelineShared>)]>,
-        numbers: Arc<[(String, Arc<NumberStream>)]>,
-    ) -> Self {
-        Self { shared, pipelines, numbers, replacing: Arc::default() }
+    pub(super) fn new(shared: Arc<PipelineShared>, pipelines: Arc<[(String, Arc<PipelineShared>)]>) -> Self {
+        Self { shared, pipelines, replacing: Arc::default() }
     }
 
     /// The address on which the pipeline receives, with the actual port if 0 was requested; unspecified, with port 0,
@@ -67,10 +61,8 @@ impl Handle {
     /// Counts of what arrived, how it was processed and what was lost, so far.
     #[must_use]
     pub fn counters(&self) -> Counters {
-        let counted = |shared: &PipelineShared| SourceCounts::Pipeline(Box::new(shared.counters()));
-        let pipelines = self.pipelines.iter().map(|(name, shared)| (name.clone(), counted(shared)));
-        let numbers = self.numbers.iter().map(|(name, numbers)| (name.clone(), numbers.counts()));
-        Counters { sources: pipelines.chain(numbers).collect(), ..self.shared.counters() }
+        let sources = self.pipelines.iter().map(|(name, shared)| (name.clone(), shared.counters()));
+        Counters { sources: sources.collect(), ..self.shared.counters() }
     }
 
     /// What these counts say was lost of each source, or that nothing arrived.
@@ -91,9 +83,6 @@ impl Handle {
     ///
     /// `Core(Problem)` if there is no such source, it has other columns, or has ended; `File` if the disk is full.
     pub fn lines(&self, name: &str, read: &ReadLines) -> Result<()> {
-        if let Some((_, numbers)) = self.numbers.iter().find(|(known, _)| known == name) {
-            return numbers.push(read);
-        }
         let Some((shared, frames)) = self.frames_of(name) else {
             return Err(problem!("source {name:?}: no source of numbers has this name").into());
         };
@@ -280,12 +269,8 @@ impl Handle {
                 .as_ref()
                 .and_then(RunningRecording::since)
                 .map_or_else(Counters::default, |s| counts.since(s));
-            sources.insert(name.clone(), SourceCounts::Pipeline(Box::new(counters)));
+            sources.insert(name.clone(), counters);
             ended.push((recording, counts));
-        }
-        for (name, numbers) in self.numbers.iter() {
-            let track = next.as_ref().map(|next| next.track_of(name)).transpose()?;
-            sources.insert(name.clone(), numbers.record_into(track));
         }
         let (recording, counters) = replace_of(&self.shared, next)?;
         // The parts must end before the whole recording.
@@ -368,23 +353,14 @@ fn replace_of(shared: &PipelineShared, next: Option<RunningRecording>) -> Result
 fn verdict(shared: &PipelineShared, counters: &Counters, lost: &RecordingCounts) -> Verdict {
     let of_source = |counters: &Counters, lost: &RecordingCounts| match &counters.lines {
         None => lost.verdict().doubtful(counters.decoding.totals.doubtful_after),
-        Some(lines) => Verdict::of_lines(lost).doubtful(lines.faults.doubtful_after_us),
+        Some(_) => Verdict::of_lines(lost),
     };
     let verdict = if counters.nothing_came() {
         Verdict::nothing_arrived(nothing_arrived(shared.receiver.origin(), counters.seconds))
     } else {
         of_source(counters, lost)
     };
-    let others = counters.sources.iter().map(|(name, counts)| {
-        let verdict = match counts {
-            SourceCounts::Pipeline(counts) => of_source(counts, &losses(counts, None)),
-            SourceCounts::Numbers(counts) => {
-                let LineCounts { lines, faults, .. } = &**counts;
-                Verdict::of_lines(&losses_of_lines(*lines, faults)).doubtful(faults.doubtful_after_us)
-            }
-        };
-        (name.clone(), verdict)
-    });
+    let others = counters.sources.iter().map(|(name, counts)| (name.clone(), of_source(counts, &losses(counts, None))));
     Verdict::combine(std::iter::once((shared.options.name.clone(), verdict)).chain(others).collect())
 }
 

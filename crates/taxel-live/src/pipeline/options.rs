@@ -88,7 +88,7 @@ impl LiveOptions {
     #[must_use]
     pub fn frame_time(&self) -> FrameTime {
         match self.layout() {
-            Some(layout) => layout.frame_us.into(),
+            Some(layout) => layout.frame_us.unwrap_or_default().into(),
             None => FrameTime::on_wire(self.registers.frame_us(), self.registers.wire_version),
         }
     }

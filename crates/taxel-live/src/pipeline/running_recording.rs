@@ -61,7 +61,7 @@ impl RunningRecording {
         }
         let sources = sources.iter().map(NamedSource::header).collect::<taxel_core::Result<_>>()?;
         let mut header = Header { sources, ..header };
-        for source in header.sources.iter_mut().filter(|source| source.stream.is_none() && source.frames.is_none()) {
+        for source in header.sources.iter_mut().filter(|source| source.frames.is_none()) {
             source.decoding.begun_later = later;
         }
         header.decoding.begun_later = later && header.frames.is_none();
@@ -192,6 +192,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> Recording
             recorded: now.decoding.decoded,
             dropped_by_queue: now.capture.dropped_by_queue,
             decoder: lines.faults.counts,
+            doubtful_after_us: lines.faults.doubtful_after_us,
             ..RecordingCounts::default()
         };
     }

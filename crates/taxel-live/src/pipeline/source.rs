@@ -1,10 +1,10 @@
-//! The sources of a pipeline, as Python states them: boards, frames of numbers and lines of numbers that are no frames.
+//! The sources of a pipeline, as Python states them: boards, and frames of numbers.
 
 use serde::Deserialize;
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
-use crate::recording::{FrameProperties, Header, StreamColumns, now_ns};
+use crate::recording::{FrameProperties, Header, now_ns};
 
 /// A source with its name.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -23,10 +23,8 @@ pub struct NamedSource {
 pub enum SourceKind {
     /// A board.
     Board(Box<BoardSource>),
-    /// Frames of numbers.
+    /// Frames of numbers; those of one row may be quantities, as of an IMU.
     Frames(Box<FrameLayout>),
-    /// Lines of numbers that are no frames, as of an IMU.
-    Numbers(StreamColumns),
 }
 
 /// Frames of numbers that are received instead of a board.
@@ -64,8 +62,8 @@ pub struct FrameLayout {
     pub names: Vec<String>,
     /// The number from which each reading was subtracted, if readings fall with pressure.
     pub turned: Option<f64>,
-    /// Time from one frame to the next, us.
-    pub frame_us: f64,
+    /// Time from one frame to the next, us; unknown of frames that are only recorded.
+    pub frame_us: Option<f64>,
     /// Unit of the stamps of frames, us; frames without stamps have their times of arrival.
     pub stamp_us: f64,
     /// Whether the lines waited in a file until they were read, so that their arrival is no clock to compare with.
@@ -81,7 +79,8 @@ impl FrameLayout {
             clock: true,
             columns: self.names.clone(),
             turned: self.turned,
-            frame_us: Some(self.frame_us),
+            frame_us: self.frame_us,
+            arrivals: !(self.names.is_empty() || self.waited),
         }
     }
 
@@ -92,8 +91,8 @@ impl FrameLayout {
     /// `Problem`, with the number.
     pub fn check(&self) -> taxel_core::Result<()> {
         self.array.check()?;
-        if !(1.0..=3.6e9).contains(&self.frame_us) {
-            return Err(problem!("a frame lasts {} us: must be from 1 us to an hour", self.frame_us));
+        if let Some(frame_us) = self.frame_us.filter(|frame_us| !(1.0..=3.6e9).contains(frame_us)) {
+            return Err(problem!("a frame lasts {frame_us} us: must be from 1 us to an hour"));
         }
         Ok(())
     }
@@ -111,7 +110,6 @@ impl NamedSource {
             SourceKind::Frames(layout) => {
                 Header::of_frames(&self.name, layout.array.clone(), layout.properties(), place, now_ns())
             }
-            SourceKind::Numbers(stream) => Header::of_stream(&self.name, stream.clone(), place, now_ns()),
         }
     }
 }

@@ -6,11 +6,10 @@ use std::time::{Duration, Instant};
 
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
-use taxel_core::held::{Held, UNKNOWN};
-use taxel_core::problem;
 use taxel_core::wire::Registers;
 
 use super::decode_stage::DecodeStage;
+use super::flows::{EventFlow, FrameFlow};
 use super::frame_stage::FrameStage;
 use super::readout_queue::QuietUntil;
 use super::readout_stage::ReadoutStage;
@@ -18,6 +17,7 @@ use super::record_stage::RecordStage;
 use super::running_readout::RunningReadout;
 use super::running_recording::{EndedRecording, RunningRecording};
 use super::shared::{Decoding, PipelineShared};
+use super::source_stage::SourceStage;
 use super::viewer_queue::{ViewerEvents, ViewerQueue, viewer_queue};
 use crate::Result;
 use crate::capture::Batch;
@@ -30,9 +30,6 @@ const IDLE: Duration = Duration::from_millis(20);
 /// Time for which datagrams are gathered during a recording without a readout: this costs half the CPU.
 const GATHER: Duration = Duration::from_millis(1);
 
-/// Number of events after which they are passed on, even in the middle of a large batch.
-const FLUSH_AFTER: usize = 1 << 14;
-
 /// Why [`Stages::run`] returned.
 pub(super) enum StagesOutcome {
     /// Detections wait for output ([`Stages::pending_detections`]).
@@ -41,52 +38,6 @@ pub(super) enum StagesOutcome {
     MoveReadout(Box<RunningReadout>),
     /// No more data will arrive.
     Finished,
-}
-
-/// The second stage, by what the source sends.
-enum SourceStage {
-    Board(Box<DecodeStage>),
-    Frames(Box<FrameStage>),
-}
-
-impl SourceStage {
-    fn held(&self) -> &Held {
-        match self {
-            Self::Board(decode) => decode.held(),
-            Self::Frames(frames) => frames.held(),
-        }
-    }
-
-    /// Number of datagrams or frames.
-    fn count(&self) -> u64 {
-        match self {
-            Self::Board(decode) => decode.datagram_count(),
-            Self::Frames(frames) => frames.count(),
-        }
-    }
-
-    /// How long to wait for data before the readout's time is advanced, if it depends on silence.
-    fn tick(&self) -> Option<Duration> {
-        match self {
-            Self::Board(decode) => decode.tick(),
-            Self::Frames(frames) => Some(frames.tick()),
-        }
-    }
-
-    fn quiet_until(&self, until_ns: Option<i64>) -> Option<QuietUntil> {
-        match self {
-            Self::Board(decode) => decode.quiet_until(until_ns),
-            Self::Frames(frames) => frames.quiet_until(until_ns),
-        }
-    }
-
-    /// The rest of a taxel that nothing touches now: the held value of a board, the median of a noisy source's last second.
-    fn rest_now(&self, taxel: usize) -> Option<f64> {
-        match self {
-            Self::Board(decode) => Some(decode.held().values()[taxel]).filter(|&held| held != UNKNOWN).map(f64::from),
-            Self::Frames(frames) => frames.rest_now(taxel),
-        }
-    }
 }
 
 pub(super) struct Stages {
@@ -203,19 +154,7 @@ impl Stages {
         match source {
             SourceStage::Board(decode) => EventFlow { shared, decode, record, readout, viewers }.decode(batch),
             SourceStage::Frames(stage) => {
-                if stage.push(batch) {
-                    viewers.iter_mut().for_each(|queue| queue.reset(stage.held()));
-                }
-                {
-                    let (now, mut published) = (now_ns(), shared.published());
-                    batch.iter().for_each(|(message, _)| published.decode_latency.note(now - message.arrived_ns));
-                    stage.publish(&mut published.counters);
-                    published.steps = stage.steps();
-                }
-                let (frames, changes, held) = stage.parts();
-                viewers.iter_mut().for_each(|queue| queue.push(changes, held));
-                readout.push_frames(shared, frames);
-                stage.clear();
+                FrameFlow { shared, stage, readout, viewers }.read(batch);
                 Ok(())
             }
         }
@@ -286,96 +225,12 @@ impl Decoding for Stages {
     }
 
     fn zero(&mut self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
-        let array = &self.shared.options.array;
-        let published = self.shared.published();
-        if published.counters.readout.taring {
-            return Err(problem!("a tare is being measured: zero taxels after it").into());
-        }
-        let now = published.counters.board.offset.map(|offset| offset.board_us(now_ns()));
-        let Some(t) = published.counters.board.board_us.max(self.readout.announced_until()).max(now) else {
-            return Err(problem!("nothing has arrived yet, so no taxel can be zeroed").into());
-        };
-        let mut zeroings = vec![];
-        for &(x, y) in taxels {
-            let mut zeroing = Zeroing { t, x, y, rest: 0.0, before: None };
-            zeroing.check(array)?;
-            let taxel = array.index(x, y);
-            let Some(rest) = self.source.rest_now(taxel) else {
-                return Err(problem!(
-                    "taxel at row {y}, column {x}: its value is unknown, because it has sent no event so far"
-                )
-                .into());
-            };
-            zeroing.rest = rest;
-            let tared = published.rest.get(taxel).copied().flatten();
-            zeroing.before = published.zeroed.get(&taxel).map(|earlier| earlier.rest).or(tared);
-            zeroings.push(zeroing);
-        }
-        drop(published);
+        let (announced, rest_now) = (self.readout.announced_until(), |taxel| self.source.rest_now(taxel));
+        let zeroings = self.shared.published().zeroings_of(&self.shared.options.array, taxels, announced, rest_now)?;
         // Recorded first, so that every zeroing is in the recording.
         self.record.zeroings(&zeroings)?;
-        let mut published = self.shared.published();
-        published.zeroed.extend(zeroings.iter().map(|zeroing| (array.index(zeroing.x, zeroing.y), *zeroing)));
-        published.zeroings += 1;
-        drop(published);
+        self.shared.published().add_zeroings(&self.shared.options.array, &zeroings);
         self.readout.zero(&self.shared, &zeroings);
         Ok(zeroings)
-    }
-}
-
-/// The decoded events of a board, on their way to the other stages.
-struct EventFlow<'a> {
-    shared: &'a PipelineShared,
-    decode: &'a mut DecodeStage,
-    record: &'a mut RecordStage,
-    readout: &'a mut ReadoutStage,
-    viewers: &'a mut Vec<ViewerQueue>,
-}
-
-impl EventFlow<'_> {
-    fn decode(mut self, batch: &Batch) -> Result<()> {
-        for (datagram, bytes) in batch.iter() {
-            let mut decoded = self.decode.push(datagram, bytes);
-            if decoded.info.reset {
-                let later = self.decode.split_at_reset(&mut decoded);
-                self.flush()?;
-                self.decode.reset(&later);
-                self.viewers.iter_mut().for_each(|queue| queue.reset(self.decode.held()));
-                if decoded.info.version == 2 {
-                    self.readout.reset();
-                }
-            }
-            let now = now_ns();
-            self.decode.note(&decoded, self.readout.announced_until());
-            self.record.record_board_change(&decoded.info, decoded.arrived_ns)?;
-            if self.record.awaits_origin()
-                && let Some(origin_us) = self.decode.origin(&decoded)
-            {
-                self.record.set_origin(origin_us)?;
-            }
-            self.shared.published().decode_latency.note(now - decoded.arrived_ns);
-            if self.decode.events().len() >= FLUSH_AFTER {
-                // A batch has this many events only if reading out is slower than they arrive.
-                self.readout.move_to_thread();
-                self.flush()?;
-            }
-        }
-        self.flush()
-    }
-
-    /// Passes the decoded events to the other stages.
-    fn flush(&mut self) -> Result<()> {
-        self.decode.update_held();
-        self.viewers.iter_mut().for_each(|queue| queue.push(self.decode.events(), self.decode.held()));
-        self.record.markers(&self.decode.events().markers)?;
-        {
-            let mut published = self.shared.published();
-            published.markers.extend_from_slice(&self.decode.events().markers);
-            self.decode.publish(&mut published.counters);
-        }
-        let promised = self.decode.take_promise();
-        self.readout.push(self.shared, self.decode.events_mut(), promised);
-        self.decode.clear();
-        Ok(())
     }
 }

@@ -8,6 +8,8 @@ use prost::Message;
 use serde::{Deserialize, Serialize};
 use taxel_core::problem;
 
+use super::verdict::Found;
+
 /// Properties of a source of frames, beside its array.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameProperties {
@@ -26,6 +28,9 @@ pub struct FrameProperties {
     /// the frames show it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame_us: Option<f64>,
+    /// Whether the file has the time at which each frame arrived, of numbers with a clock of their own.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub arrivals: bool,
 }
 
 fn true_by_default() -> bool {
@@ -55,8 +60,12 @@ pub struct Frames {
     pub t: Vec<i64>,
     /// The values of all frames, each row by row.
     pub values: Vec<f32>,
+    /// Time in the file of each frame, ns: that of arrival, if the properties say so.
+    pub at_ns: Vec<i64>,
     /// Number of messages that are no frame of the source's array.
     pub bad: u64,
+    /// Of lines that were recorded as JSON: what could not be read, and what is wrong with the times.
+    pub found: Found,
 }
 
 /// How the values of a frame are encoded.
@@ -151,9 +160,10 @@ pub(super) fn message(source: &str, t_us: i64, columns: u16, values: &[f32], enc
 
 impl Frames {
     /// Adds the frame of a message; one that does not fit an array of `rows` x `columns` is counted.
-    pub(super) fn push(&mut self, message: &[u8], rows: u16, columns: u16) {
-        if self.read(message, rows, columns).is_none() {
-            self.bad += 1;
+    pub(super) fn push(&mut self, at_ns: i64, message: &[u8], rows: u16, columns: u16) {
+        match self.read(message, rows, columns) {
+            Some(()) => self.at_ns.push(at_ns),
+            None => self.bad += 1,
         }
     }
 
@@ -202,7 +212,7 @@ mod tests {
             assert_eq!(FrameEncoding::choose(values), encoding, "{values:?}");
             for t in [0, 1, -1, 1_234_567, -4_503_599_627_370_496, 4_503_599_627_370_496] {
                 let mut back = Frames::default();
-                back.push(&message("left", t, 2, values, encoding), 2, 2);
+                back.push(0, &message("left", t, 2, values, encoding), 2, 2);
                 let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
                 assert_eq!((back.t, bits(&back.values), back.bad), (vec![t], bits(values), 0));
             }
@@ -215,8 +225,8 @@ mod tests {
         let mut frames = Frames::default();
         // The source's name comes last, and is not needed.
         let named = message.len() - 6;
-        (0..message.len()).filter(|&cut| cut != named).for_each(|cut| frames.push(&message[..cut], 2, 2));
-        frames.push(&message, 4, 1);
+        (0..message.len()).filter(|&cut| cut != named).for_each(|cut| frames.push(0, &message[..cut], 2, 2));
+        frames.push(0, &message, 4, 1);
         assert_eq!(frames.t.len(), 0);
         assert_eq!(frames.bad as usize, message.len());
     }

@@ -19,9 +19,6 @@ pub(super) const METADATA: u64 = 1 << 24;
 /// Largest number of sources in a file.
 pub(super) const SOURCES: usize = 64;
 
-/// Largest number of columns in a stream of numbers.
-pub(super) const COLUMNS: usize = 1024;
-
 /// Largest number of taxels in a sensor: 2048 x 2048.
 pub(super) const TAXELS: usize = 1 << 22;
 

@@ -18,10 +18,10 @@ use mcap::records::Record;
 use taxel_core::wire::{self, Decoder};
 use taxel_core::{Events, Stop, problem};
 
-use super::stream::Sampling;
+use super::stream::RecordedLines;
 use super::{
     BoardChange, BoardChangeKind, Cause, Condition, Counts, FileEnding, Found, Frames, Header, Rebuilt,
-    RecordingCounts, Samples, Topic, limits,
+    RecordingCounts, Topic, limits,
 };
 use crate::clock::leaves;
 use crate::{Error, Result};
@@ -130,12 +130,13 @@ impl Reader {
         let FileWalk { begin, end, ending, ends, blocks, rebuilt, .. } = walk;
         let blocks = Blocks { path: path.to_owned(), file, blocks };
         // The copy of the header in the chunk of the datagrams' channel has a checksum; the other copies have none.
-        let Some(header) = blocks.header()?.or(end).or(begin) else {
+        let Some(mut header) = blocks.header()?.or(end).or(begin) else {
             return Err(Error::format(
                 path,
                 "is not a taxel recording: the header (metadata record \"taxel\") of this MCAP file is missing",
             ));
         };
+        header.state_frames();
         let (blocks, header, ends) = (Arc::new(blocks), Arc::new(header), Arc::new(ends));
         let mut reader = Self { blocks, header, source: 0, ending, ends, rebuilt, memory: u64::MAX };
         for source in (0..=reader.header.sources.len()).rev() {
@@ -303,7 +304,7 @@ impl Reader {
                     let topic = topics.get(&header.channel_id).copied();
                     if let Some(topic) = topic.unwrap_or_else(|| Topic::of_number(header.channel_id, self.source)) {
                         let mut number = u64::from(header.sequence);
-                        if matches!(topic, Topic::Datagrams | Topic::Samples) {
+                        if topic == Topic::Datagrams {
                             number = unwrap(*last, header.sequence);
                             *last = number;
                         }
@@ -356,26 +357,6 @@ impl Reader {
         Ok(all)
     }
 
-    /// All samples of a stream.
-    ///
-    /// # Errors
-    ///
-    /// `Core(Problem)` if the source is a board; otherwise as [`Reader::messages`].
-    pub fn samples(&self, stop: Stop<'_>) -> Result<Samples> {
-        let Some(stream) = &self.header().stream else {
-            return Err(problem!("source {}: a board has no samples", self.header().name).into());
-        };
-        let mut sampling = Sampling::new(stream);
-        self.messages(stop, |message| {
-            if message.topic == Topic::Samples {
-                sampling.push(message.at_ns, message.number, message.data);
-                self.fits("lines of numbers", sampling.size())?;
-            }
-            Ok(())
-        })?;
-        Ok(sampling.finish())
-    }
-
     /// All frames of a source of frames.
     ///
     /// # Errors
@@ -383,19 +364,23 @@ impl Reader {
     /// `Core(Problem)` if the source is another; `Core` (format) if there are more than can be read; otherwise as
     /// [`Reader::messages`].
     pub fn frames(&self, stop: Stop<'_>) -> Result<Frames> {
-        let Header { name, array, frames, .. } = self.header();
+        let Header { name, array, frames, stream, .. } = self.header();
         if frames.is_none() {
             return Err(problem!("source {name}: contains no frames").into());
         }
-        let mut all = Frames::default();
+        let (mut all, mut lines) = (Frames::default(), stream.as_ref().map(RecordedLines::new));
         self.messages(stop, |message| {
-            if message.topic == Topic::Frames {
-                self.fits("frames", 4 * (all.values.len() + array.len()) + 8 * all.t.len())?;
-                all.push(message.data, array.rows, array.columns);
+            if message.topic == data_of(self.header()) {
+                let values = array.len() + lines.as_ref().map_or(all.values.len(), RecordedLines::len);
+                self.fits("frames", 4 * values + 16 * values / array.len())?;
+                match &mut lines {
+                    Some(lines) => lines.push(message.at_ns, message.data),
+                    None => all.push(message.at_ns, message.data, array.rows, array.columns),
+                }
             }
             Ok(())
         })?;
-        Ok(all)
+        Ok(lines.map_or(all, RecordedLines::finish))
     }
 
     /// Decodes all datagrams.

@@ -21,7 +21,7 @@ use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
 use super::frames::{FrameEncoding, message};
-use super::{BoardChange, Header, OutputFile, RecordingCounts, StreamColumns, Topic, WriterOptions};
+use super::{BoardChange, Header, OutputFile, RecordingCounts, Topic, WriterOptions};
 use crate::Result;
 use crate::locked::lock;
 use write_queue::WriteQueue;
@@ -53,7 +53,6 @@ pub struct SourceWriter {
     /// Index of the source in the file.
     source: usize,
     name: String,
-    stream: Option<StreamColumns>,
     /// Number of columns of the array.
     columns: u16,
     /// Number of cells in the array.
@@ -101,7 +100,7 @@ impl Writer {
         Ok(SourceWriter::new(Arc::clone(&self.track.queue), k, source))
     }
 
-    /// Whether any source has passed data, bytes that are in no line, or a note.
+    /// Whether any source has passed data, a line that was not read, or a note.
     #[must_use]
     pub fn has_content(&self) -> bool {
         self.track.queue.lock().written.iter().any(|written| written.data > 0 || written.is_kept)
@@ -133,14 +132,7 @@ impl Writer {
 impl SourceWriter {
     /// The writer of the source with this index in the file.
     fn new(queue: Arc<WriteQueue>, source: usize, header: &Header) -> Self {
-        Self {
-            queue,
-            source,
-            name: header.name.clone(),
-            stream: header.stream.clone(),
-            columns: header.array.columns,
-            taxels: header.array.len(),
-        }
+        Self { queue, source, name: header.name.clone(), columns: header.array.columns, taxels: header.array.len() }
     }
 
     /// Writes a frame that arrived at `arrived_ns` (ns since 1970), with its arrival number, its time (us) and the values of
@@ -187,41 +179,14 @@ impl SourceWriter {
         Ok(())
     }
 
-    /// Writes one line of a stream, with a number for each of its columns, the arrival time by the host's clock (ns
-    /// since 1970) and the arrival number.
-    ///
-    /// # Errors
-    ///
-    /// `Core(Problem)` if the source is not a stream, or has other columns; otherwise as [`SourceWriter::datagram`].
-    pub fn sample(&self, arrived_ns: i64, number: u64, values: &[f64]) -> Result<()> {
-        let Some(stream) = self.stream.as_ref().filter(|stream| stream.fits(values)) else {
-            let n = self.stream.as_ref().map_or(0, |stream| stream.columns.len());
-            return Err(problem!("{} values: the source has {n} columns", values.len()).into());
-        };
-        self.push(Topic::Samples, arrived_ns, number, stream.message(values).to_string().as_bytes())
-    }
-
-    /// Writes a line of a stream that could not be parsed, as it arrived.
-    ///
-    /// # Errors
-    ///
-    /// As [`SourceWriter::datagram`].
-    pub fn strange_line(&self, arrived_ns: i64, number: u64, line: &str) -> Result<()> {
-        self.push(Topic::Samples, arrived_ns, number, json!({ "line": line }).to_string().as_bytes())
-    }
-
     /// Writes a line of a source of frames that was not read, as it arrived.
     ///
     /// # Errors
     ///
     /// As [`SourceWriter::datagram`].
     pub fn unread_line(&self, arrived_ns: i64, line: &str) -> Result<()> {
-        self.push_json(Topic::Lines, arrived_ns, &json!({ "line": line }))
-    }
-
-    /// States that bytes arrived that are in no line; a recording with nothing else is kept, for their count.
-    pub fn note_left_out(&self) {
         self.queue.lock().written[self.source].is_kept = true;
+        self.push_json(Topic::Lines, arrived_ns, &json!({ "line": line }))
     }
 
     /// Ends this source with the counts of what was received and lost; it must not be used afterwards.

@@ -28,7 +28,7 @@ pub enum Topic {
     Held = 8,
     /// Resets of the board, and changes of its version of the wire.
     Board = 9,
-    /// Lines of numbers of a source that is not a board.
+    /// Lines of numbers as JSON, of recordings before 0.1.0; numbers are frames.
     Samples = 10,
     /// Frames at full rate.
     Frames = 11,
@@ -85,10 +85,10 @@ impl Topic {
     }
 
     /// Name, encoding and text of the schema of the channel's messages; datagrams have none, because they are the board's
-    /// own bytes.
+    /// own bytes, and what is only read.
     pub(super) fn schema(self) -> Option<(&'static str, &'static str, &'static [u8])> {
         let (name, text) = match self {
-            Self::Datagrams => return None,
+            Self::Datagrams | Self::Samples => return None,
             // A `FileDescriptorSet` of protobuf: foxglove/RawImage.proto and the time stamp that it uses.
             Self::Frames | Self::Pressure => {
                 return Some(("foxglove.RawImage", "protobuf", include_bytes!("schemas/RawImage.bin")));
@@ -100,7 +100,6 @@ impl Topic {
             Self::Counts => ("taxel.Counts", include_str!("schemas/Counts.json")),
             Self::Held => ("taxel.Held", include_str!("schemas/Held.json")),
             Self::Board => ("taxel.Board", include_str!("schemas/Board.json")),
-            Self::Samples => ("taxel.Sample", include_str!("schemas/Sample.json")),
             Self::Lines => ("taxel.Line", include_str!("schemas/Line.json")),
         };
         Some((name, "jsonschema", text.as_bytes()))

@@ -14,7 +14,7 @@ use crate::kernel_drops::KernelDrops;
 
 /// The wording of version 1 when nothing was dropped between the socket and the file.
 pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wire cannot show losses before arrival)";
-/// The same for a stream of numbers, and for frames of them.
+/// The same for frames of numbers.
 const NO_LINE_LOST: &str = "nothing lost after arrival (lines are not numbered, so losses before arrival are unknown)";
 
 /// How much of a recording is there, from the best to the worst; of several parts the worst counts.
@@ -116,6 +116,9 @@ pub struct RecordingCounts {
     /// Where times step back.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub steps_back: Vec<StepBack>,
+    /// Of frames of numbers: the time after which times are doubtful, us.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub doubtful_after_us: Option<i64>,
     /// For version 2: datagrams that the board sent and that never arrived intact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<u64>,
@@ -206,7 +209,7 @@ pub struct Condition {
     pub converted: Option<Box<Verdict>>,
     /// What decoding found, if the file was decoded.
     pub decoded: Option<Found>,
-    /// Whether the source is one of numbers, or of frames of them.
+    /// Whether the source is one of frames of numbers.
     pub lines: bool,
     /// The board's time at which the recording begins, us.
     pub origin_us: i64,
@@ -281,7 +284,7 @@ impl Verdict {
         Self { status: RecordingStatus::NothingArrived, known, ..Self::default() }
     }
 
-    /// The verdict on a stream of numbers, or on frames of them.
+    /// The verdict on frames of numbers.
     pub(crate) fn of_lines(counts: &RecordingCounts) -> Self {
         Self::of_counts(counts, NO_LINE_LOST)
     }
@@ -321,7 +324,7 @@ impl Verdict {
             steps_back: counts.steps_back.clone(),
             ..Self::default()
         };
-        verdict.with(happened)
+        verdict.with(happened).doubtful(counts.doubtful_after_us)
     }
 
     /// The verdict on a source of a file: how it ended, what reading it found, and what its counts say.

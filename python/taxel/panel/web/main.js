@@ -121,7 +121,7 @@ function showUnits() {
   const frames = opened?.frames;
   const live = opened ? null : hello?.frames;
   const { unit, step, zero } = frames ?? live ?? { unit: "ticks", step: 1, zero: 0 };
-  maps.values = { unit, step, zero, frames: frames !== null && frames !== undefined };
+  maps.values = { unit, step, zero, frames: frames !== null && frames !== undefined, isBoard: opened ? !frames : !hello?.lines };
   maps.name();
   numbering.number_us = frames?.number_us ?? null;
   numbering.begin_us = beginning(opened?.start_us ?? live?.begin_us ?? null);

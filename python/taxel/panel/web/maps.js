@@ -106,7 +106,7 @@ export class Maps {
     /** @type {Pick<Health, "dead" | "stuck" | "noisy"> | null} */
     this.health = null;
     /** Unit of the values, size of a tick in it, and ticks of the value 0; `frames` have no events. */
-    this.values = { unit: "ticks", step: 1, zero: 0, frames: false };
+    this.values = { unit: "ticks", step: 1, zero: 0, frames: false, isBoard: true };
     /** The sources that stand side by side, of frames. @type {FrameSourceInfo[]} */
     this.sources = [];
     /** Taxels whose rest a person set. @type {Zeroing[]} */
@@ -276,7 +276,7 @@ export class Maps {
   named() {
     if (!this.taxel) return "none: click a map, or use the arrow keys on a map";
     const [x, y] = this.taxel;
-    return this.geometry.named(this.taxel) + (this.values.frames ? "" : ` · sense line ${y}, driven line ${x}`);
+    return this.geometry.named(this.taxel) + (this.values.isBoard ? ` · sense line ${y}, driven line ${x}` : "");
   }
 
   /**

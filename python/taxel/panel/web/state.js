@@ -28,11 +28,11 @@ function silence(counters, address, isBoard, firewall) {
   if (arrival.state === "nothing") {
     const text = isBoard
       ? `Nothing has arrived at ${address} so far. Is the board on, and does it send to this address and port?${firewall}`
-      : `No frame has arrived from ${address} so far. Is the sensor connected, and does it print lines of numbers?`;
+      : `Nothing has arrived from ${address} so far. Is the sensor connected, and does it print lines of numbers?`;
     return elapsed_s < FIRST_WITHIN_S ? null : { word: "Nothing arrives", text };
   }
   if (arrival.state === "lost" && !isBoard) return { word: "Silent", text: `The line is silent: nothing has arrived from ${address} ${since}.` };
-  if (arrival.state === "lost") return { word: "Lost", text: `The board is lost: nothing has arrived ${since}, although the board sends a heartbeat at least every ${short(arrival.heartbeat_us ?? 0)}.` };
+  if (arrival.state === "lost") return { word: "Silent", text: `The board is silent: nothing has arrived ${since}, although it sends a heartbeat at least every ${short(arrival.heartbeat_us ?? 0)}.` };
   if (taring) return { word: "Tare", text: "Taking a tare: leave the sensor at rest." };
   return arrival.state === "quiet" ? { word: "Quiet", text: `Quiet: nothing has arrived ${since}.` } : null;
 }

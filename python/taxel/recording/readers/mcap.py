@@ -20,7 +20,7 @@ from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Note
-from taxel.reading import BoardChange, Datagrams, Facts, Lines, Marks, Reader, Zeroing
+from taxel.reading import BoardChange, Datagrams, Facts, Marks, Reader, Zeroing
 from taxel.verdict import Verdict
 from taxel.wire import Registers
 
@@ -54,7 +54,7 @@ def read_mcap(path: Path) -> list[McapReader]:
 
 
 class McapReader(Reader):
-    """Reads one source of a .mcap: a board, frames, or a stream of numbers, whose lines are frames of one row.
+    """Reads one source of a .mcap: a board, or frames; those of a stream of numbers have one row.
 
     Parameters
     ----------
@@ -68,14 +68,10 @@ class McapReader(Reader):
         self._header, ending, self._opened = reader.about()
         self._ending = ending or {}
         self._frames = self._header.get("frames")
-        self._stream = self._header.get("stream")
         about, header = self._frames or {}, self._header
         # Those of the recording that it was converted from.
         self._before: dict[str, Any] = header.get("counts") or {}
-        is_board = self._frames is None and self._stream is None
-        columns = about.get("columns") or ()
-        if self._stream is not None:
-            columns = [name for name in self._stream["columns"] if name != self._stream.get("time")]
+        is_board = self._frames is None
         self.facts = Facts(
             path=path,
             array=Array._from_geometry(header["array"]),
@@ -86,10 +82,10 @@ class McapReader(Reader):
             heel=header.get("heel", ""),
             has_events=is_board,
             timed=about.get("clock", True),
-            columns=tuple(columns),
+            columns=tuple(about.get("columns") or ()),
             turned=about.get("turned"),
             frame_us=about.get("frame_us"),
-            raw="datagrams" if is_board else "lines" if self._stream is not None else "",
+            raw="datagrams" if is_board else "",
             begins_us=int(header["origin_us"]) if is_board else None,
             remarks=tuple(header.get("remarks", ())),
             lost=tuple(header.get("lost", ())),
@@ -109,27 +105,18 @@ class McapReader(Reader):
         return self._now().decode()
 
     @cached_property
-    def _samples(self) -> _core.Samples:
-        return self._now().samples()
-
-    @cached_property
-    def _read_frames(self) -> tuple[NDArray[np.int64], NDArray[np.float32], int]:
+    def _read_frames(self) -> _core._RecordedFrames:
         return self._now().frames()
 
     @cached_property
     def _table(self) -> Events | Frames:
         array = self.facts.array
-        if self._stream is not None:
-            t, values = self._samples.t, self._samples.values
-            order = np.argsort(t, kind="stable")
-            rows = frozen(values.reshape(len(t), 1, array.columns)[order].astype(np.float32))
-            return Frames(rows, ascending(t[order]), unit="as sent", array=array)
         if self._frames is None:
             return Events._from_parts(self._decoded.events, array)
-        at, flat, _ = self._read_frames
+        t, values = self._read_frames["t"], self._read_frames["values"]
         try:
-            shaped = frozen(flat).reshape(len(at), *array.shape)
-            return Frames(shaped, frozen(at), unit=self._frames["unit"], array=array)
+            shaped = frozen(values).reshape(len(t), *array.shape)
+            return Frames(shaped, frozen(t), unit=self._frames["unit"], array=array)
         except ProblemError as error:
             raise FormatError(f"{self.facts.path}, source {self.facts.label}: {error}") from None
 
@@ -175,10 +162,8 @@ class McapReader(Reader):
     @cached_property
     def _clock(self) -> Clock | None:
         if self._frames is not None:
-            return None
-        if self._stream is not None:
-            # The arrival of lines that waited in a file is none of their clock.
-            return None if self._stream.get("waited") else Clock(self._samples.t, self._samples.arrived_ns)
+            read = self._read_frames if self._frames.get("arrivals") else None
+            return None if read is None else Clock(read["t"], read["at_ns"])
         has = self._decoded.left > np.iinfo(np.int64).min
         left, arrived = self._decoded.left[has], self._decoded.arrived_ns[has]
         return Clock(np.ascontiguousarray(left), np.ascontiguousarray(arrived))
@@ -190,14 +175,15 @@ class McapReader(Reader):
     @cached_property
     def _verdict(self) -> Verdict:
         condition = self._remarks.condition
-        has_messages = self._frames is None and condition["messages"]
-        if has_messages and self._must_decode():
-            found = self._decoded.found if self._stream is None else self._samples.found
+        # The counts of frames, but not those of lines that were recorded as JSON, say all.
+        can_decode = self._frames is None or "stream" in self._header
+        if can_decode and condition["messages"] and self._must_decode():
+            found = self._decoded.found if self._frames is None else self._read_frames["found"]
             condition = condition | {"decoded": found}
         return Verdict._of({"file": condition})
 
     def verdict(self) -> Verdict:
-        """Return what was lost at which stage; a board or a stream is decoded only if the file does not say it."""
+        """Return what was lost at which stage; a board is decoded only if the file does not say it."""
         return self._verdict
 
     def _must_decode(self) -> bool:
@@ -208,24 +194,17 @@ class McapReader(Reader):
         causes = DOUBTS if counts.get("steps_back") else (*DOUBTS, *STEPS)
         return not self._header.get("converted") and any(counts["decoder"].get(cause, 0) for cause in causes)
 
-    def datagrams(self) -> Datagrams | Lines | None:
-        """Return the datagrams of a board, or the lines of a stream, as received."""
+    def datagrams(self) -> Datagrams | None:
+        """Return the datagrams of a board as received."""
         if self._frames is not None:
             return None
-        if self._stream is None:
-            return Datagrams(
-                **self._now().datagrams(),
-                version=2 if self._decoded.version_2["intact"] else 1,
-                differences=bool(self._header["difference"]),
-                origin_us=int(self._header["origin_us"]),
-                unmarked=tuple(self._header.get("repaired", ())),
-            )
-        lines, stream = self._samples, self._stream
-        rows = lines.values.reshape(len(lines.t), self.facts.array.columns)
-        if stream.get("time") is not None:
-            times = lines.t / float(stream["unit_us"])
-            rows = np.insert(rows, stream["columns"].index(stream["time"]), times, axis=1)
-        return Lines(self._header, lines.arrived_ns, lines.number, lines.t, np.ascontiguousarray(rows))
+        return Datagrams(
+            **self._now().datagrams(),
+            version=2 if self._decoded.version_2["intact"] else 1,
+            differences=bool(self._header["difference"]),
+            origin_us=int(self._header["origin_us"]),
+            unmarked=tuple(self._header.get("repaired", ())),
+        )
 
     def damage(self) -> Mapping[str, int]:
         """Return the numbers of what reading the file skipped or repaired, by cause."""
@@ -239,11 +218,7 @@ class McapReader(Reader):
         """
         if self._before:
             return {**self._before, **{cause: n for cause, n in self.damage().items() if n}}
-        if self._frames is not None:
-            t, _, bad = self._read_frames
-            own = {"frames": len(t), "frames_that_could_not_be_read": bad, "received": self._counted.get("received")}
-        else:
-            own = self._counts_of_board() if self._stream is None else self._counts_of_stream()
+        own = self._counts_of_board() if self._frames is None else self._counts_of_frames()
         return {**own, **self.damage()}
 
     def _counts_of_board(self) -> dict[str, Any]:
@@ -263,25 +238,22 @@ class McapReader(Reader):
             **({"decoder_version_2": of_2} if of_2["datagrams"] else {}),
         }
 
-    def _counts_of_stream(self) -> dict[str, Any]:
-        read = self._samples
-        found, counts = read.found["counts"], self._counted or self._remarks.counts or {}
-        # Bytes that are in no line are not in the file.
-        recorded = counts.get("decoder", {})
-        lost = {cause: max(found.get(cause, 0), recorded.get(cause, 0)) for cause in _OF_STREAMS}
-        return {"samples": len(read.t), **lost, "received": self._counted.get("received")}
+    def _counts_of_frames(self) -> dict[str, Any]:
+        read = self._read_frames
+        found, recorded = read["found"]["counts"], (self._counted or self._remarks.counts or {}).get("decoder", {})
+        of_lines = _OF_STREAMS if self.facts.columns else ()
+        return {
+            "frames": len(read["t"]),
+            "frames_that_could_not_be_read": read["bad"],
+            **{cause: max(found.get(cause, 0), recorded.get(cause, 0)) for cause in of_lines},
+            "received": self._counted.get("received"),
+        }
 
     @property
     def _counted(self) -> dict[str, Any]:
         """The final counts of what was received; of a converted recording, or one that lacks its end, none."""
         counts = self._ending.get("finished", {}).get("counts") or {}
         return {} if self._header.get("converted") else counts
-
-
-def ascending(t: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return times of frames, with equal times moved apart by 1 us."""
-    steps = np.arange(len(t))
-    return np.maximum.accumulate(t - steps) + steps if len(t) else t
 
 
 def _detections(records: Any) -> Detections:

@@ -16,7 +16,7 @@ from taxel._core import ProblemError, RecordingWriter
 from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.reading import Datagrams, Lines
+from taxel.reading import Datagrams
 from taxel.recording.source import SourceView, ticks_of
 
 __all__ = ["RecordingWriter", "encode_events", "write_mcap"]
@@ -30,7 +30,7 @@ _PREVIEW_US = 100_000
 
 
 def write_mcap(path: Path, sources: Mapping[str, SourceView], compression: str) -> tuple[str, ...]:
-    """Write a .mcap of a board, of a stream of numbers, or of sources of frames by one clock.
+    """Write a .mcap of a board, or of sources of frames by one clock.
 
     Parameters
     ----------
@@ -49,22 +49,10 @@ def write_mcap(path: Path, sources: Mapping[str, SourceView], compression: str) 
     OSError : the disk is full ...
     """
     first = next(iter(sources.values()))
-    received = first.received
-    if isinstance(received, Lines):
-        _write_lines(path, first, received, compression)
-    elif isinstance(first.table, Events):
-        return _write_board(path, first, first.table, received, compression)
-    else:
-        _write_frames(path, sources, compression)
+    if isinstance(first.table, Events):
+        return _write_board(path, first, first.table, first.received, compression)
+    _write_frames(path, sources, compression)
     return tuple(dict.fromkeys(line for source in sources.values() for line in source.lost))
-
-
-def _write_lines(path: Path, source: SourceView, lines: Lines, compression: str) -> None:
-    header = {**lines.about, "sources": [], **_provenance(source, source.lost)}
-    writer = RecordingWriter(path, json.dumps(header), compression, True)
-    writer.samples(lines.arrived_ns, lines.number, np.ascontiguousarray(lines.values).reshape(-1))
-    _add_small(writer, source, _by_host(source))
-    writer.finish(json.dumps({"received": len(lines)}))
 
 
 def _write_board(
@@ -129,35 +117,27 @@ def _counts(source: SourceView, received: int) -> dict[str, Any]:
 def _header(source: SourceView, lost: tuple[str, ...]) -> dict[str, Any]:
     """Return what a header states of a sensor."""
     facts, registers = source.facts, source.marks.registers
+    is_file = facts.kind != "events"
+    # `source` names the recordings that were merged.
+    converted = [f"converted from {facts.name}"] * (is_file and facts.kind != "merged")
     driven = source.array if registers is None else registers.array
     return {
         "array": source.array._geometry(),
         "registers": None if registers is None else registers._held,
         **({} if driven == source.array else {"driven": driven._geometry()}),
-        **_provenance(source, lost),
+        # The verdict is here and not with the final counts, so that a file that was cut still states it.
+        "converted": source.verdict._held if is_file else None,
+        "counts": dict(source.counts),
+        "lost": lost,
+        "remarks": tuple(dict.fromkeys((*facts.remarks, *converted))),
         "source": facts.source or facts.name or ("events" if facts.has_events else "frames"),
         "side": facts.side,
         "heel": facts.heel,
     }
 
 
-def _provenance(source: SourceView, lost: tuple[str, ...]) -> dict[str, Any]:
-    """Return what a header states of the recording that a file was made of."""
-    facts = source.facts
-    is_file = facts.kind != "events"
-    # `source` names the recordings that were merged.
-    converted = [f"converted from {facts.name}"] * (is_file and facts.kind != "merged")
-    return {
-        "lost": lost,
-        "remarks": tuple(dict.fromkeys((*facts.remarks, *converted))),
-        # The verdict is here and not with the final counts, so that a file that was cut still states it.
-        "converted": source.verdict._held if is_file else None,
-        "counts": dict(source.counts),
-    }
-
-
 def _write_frames(path: Path, sources: Mapping[str, SourceView], compression: str) -> None:
-    """Write sources of frames, all by one clock; times in the file are those of the board, counted from 0."""
+    """Write sources of frames; times in the file are those of arrival, else those of their one clock, from 0 on."""
     tables = {name: cast("Frames", source.table) for name, source in sources.items()}
     origin_us = min([0, *(int(table.t[0]) for table in tables.values() if len(table))])
     headers = [
@@ -170,6 +150,7 @@ def _write_frames(path: Path, sources: Mapping[str, SourceView], compression: st
                 "columns": source.facts.columns,
                 "turned": source.facts.turned,
                 "frame_us": source.facts.frame_us,
+                "arrivals": source.clock is not None,
             },
         }
         for name, source in sources.items()
@@ -189,7 +170,9 @@ def _write_frames(path: Path, sources: Mapping[str, SourceView], compression: st
     for name, first, block, fits in _blocks(tables):
         t = np.ascontiguousarray(block.t)
         values = np.ascontiguousarray(block.values).reshape(-1)
-        tracks[name].frames(first, (t - origin_us) * 1000, t, values, fits)
+        clock = sources[name].clock
+        arrived = (t - origin_us) * 1000 if clock is None else np.asarray(clock.host_ns(t), np.int64)
+        tracks[name].frames(first, arrived, t, values, fits)
     for name, source in sources.items():
         _add_small(tracks[name], source, at_ns)
     counts = {name: json.dumps(_counts(source, len(tables[name]))) for name, source in sources.items()}

@@ -39,8 +39,6 @@ pub struct Remarks {
     pub messages: BTreeMap<Topic, u64>,
     /// Resets of the board, and changes of its version of the wire.
     pub board: Vec<BoardChange>,
-    /// Number of lines of a stream.
-    pub samples: u64,
     /// The taxels' values at the beginning of the recording, ticks by index, 65 535 for a taxel without any event so
     /// far; none if the recording does not state them.
     pub held: Option<Vec<u16>>,
@@ -57,7 +55,7 @@ impl Remarks {
                 let (first, last) = self.arrivals.unwrap_or((message.at_ns, message.at_ns));
                 self.arrivals = Some((first.min(message.at_ns), last.max(message.at_ns)));
             }
-            Topic::Pressure | Topic::Frames | Topic::Lines => {}
+            Topic::Pressure | Topic::Frames | Topic::Samples | Topic::Lines => {}
             // The checksum of a message that does not parse is valid, so another program wrote the message; it is
             // ignored.
             Topic::Registers => {
@@ -105,7 +103,6 @@ impl Remarks {
                     self.board.push(BoardChange { at_ns: message.at_ns, ..value });
                 }
             }
-            Topic::Samples => self.samples += 1,
             Topic::Counts => self.counts = serde_json::from_slice(message.data).ok().or(self.counts.take()),
         }
     }

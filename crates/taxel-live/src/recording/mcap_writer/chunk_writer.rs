@@ -112,8 +112,7 @@ impl ChunkWriter {
         others: &BTreeMap<String, RecordingCounts>,
     ) -> std::result::Result<(), McapError> {
         if let Some(counts) = counts {
-            let is_board = self.header.stream.is_none() && self.header.frames.is_none();
-            let verdict = if is_board { counts.verdict() } else { Verdict::of_lines(counts) };
+            let verdict = if self.header.frames.is_none() { counts.verdict() } else { Verdict::of_lines(counts) };
             let mut end = BTreeMap::from([
                 ("verdict".to_owned(), verdict.text()),
                 ("counts".to_owned(), json!(counts).to_string()),

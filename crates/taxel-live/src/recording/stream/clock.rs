@@ -134,7 +134,7 @@ impl StreamClock {
     }
 
     /// Converts a stamp to a time, us; none if it is no time. What is wrong with it is added to `found`.
-    #[allow(clippy::cast_possible_truncation)]
+    #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)]
     pub fn time(&mut self, stamp: f64, at_ns: i64, found: &mut Found) -> Option<i64> {
         let stamp_us = stamp * self.unit_us;
         if stamp_us.is_nan() || stamp_us.abs() > FARTHEST_US {
@@ -181,6 +181,9 @@ impl StreamClock {
         let t = stamp_us + self.state.added;
         self.compare(state.last, (t, at_ns), anew, found);
         self.state.last = Some((t, at_ns));
+        // Until the next stamp shows that the clock has jumped, one that is ahead of arrival may be damaged.
+        let by_arrival = state.last.filter(|_| matches!(step, StampStep::Ahead));
+        let t = by_arrival.map_or(t, |(last, last_ns)| last + at_ns.saturating_sub(last_ns) as f64 * 1e-3);
         Some(t.round() as i64)
     }
 
