@@ -336,8 +336,8 @@ class ConeX(SpikeLearner):
         patterns : sequence of SpikeTrains
             The same trains in each, unsigned or graded; signed ones split into ON and OFF.
         targets : sequence of float sequences, ms
-            Target spike times, one list per pattern; empty for a pattern without spikes. At the end of a refractory time
-            too the potential must equal the threshold (6.9a), though a neuron fires there above it too.
+            Target spike times, one list per pattern; empty for a pattern without spikes. At the end of a refractory
+            time too the potential must equal the threshold (6.9a), though a neuron fires there above it too.
         start : ConeX, optional
             An earlier fit of a similar problem, whose active rows and multipliers are the starting point. The result is
             the same; in continuous time `margin_` may differ.
