@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Smallest step of the computer's clock that is noticed, ns; below it are the times that reading two clocks takes.
+#[cfg(target_os = "linux")]
 const STEP_NS: i64 = 1_000_000;
 
 /// How far the computer's clock was ahead of the steady one, ns.
@@ -23,9 +24,11 @@ pub fn now_ns() -> i64 {
 }
 
 /// How far the host's clock is ahead of the computer's, ns: the kernel stamps arrivals by that.
+#[cfg(target_os = "linux")]
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Ahead(pub(crate) i64);
 
+#[cfg(target_os = "linux")]
 impl Ahead {
     /// Looks whether the computer's clock was set.
     pub(crate) fn look(&mut self) {
@@ -59,12 +62,11 @@ fn steady_ns() -> i64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-
+    #[cfg(target_os = "linux")]
     #[test]
     fn a_step_of_the_computers_clock_is_taken_over_and_no_smaller_difference() {
         let is_as_it_was = |ahead_ns| {
-            let mut ahead = Ahead(ahead_ns);
+            let mut ahead = super::Ahead(ahead_ns);
             ahead.look();
             ahead.0 == ahead_ns
         };
