@@ -5,7 +5,7 @@ use std::collections::HashSet;
 
 use super::cone_r::GapMultipliers;
 use super::exact::{BestWeights, Exact, MET, MOST_ROUNDS, Slopes};
-use crate::learn::engines::{Between, HardRows, Reached, nearest};
+use crate::learn::engines::{ACCURACY, Between, FINEST, HardRows, Reached, nearest};
 use crate::learn::fit::{Left, Round};
 use crate::learn::statement::{
     Bounds, NOTHING, Objective, Point, Program, Proof, Row, Rows, SilencePeak, Targets, largest,
@@ -23,23 +23,6 @@ const NEAR_SHARE: f64 = 1e-4;
 const ENOUGH: f64 = 0.3;
 const SMALLER: f64 = 0.1;
 const LEAST: f64 = 1e-4;
-/// A round is solved to this share of the gap, but no finer than for a gap of this share of the tolerance.
-const ACCURACY: f64 = 0.03;
-const FINEST: f64 = 1e-2;
-/// How far kinks are smoothed at first, in thresholds.
-const SMOOTH_FROM: f64 = 0.1;
-/// The curvature of the proximal term relative to the smoothing at first, and the factor of each round that proves
-/// little more, and its least value: where the objective is nearly flat, steps must grow.
-const NEAR_CENTRE: f64 = 10.0;
-const FARTHER: f64 = 0.1;
-const FARTHEST: f64 = 1e-9;
-/// The strength of the terms that hold weights at 0 and at their bounds, as a share of the targets' pull, and its factor
-/// after each round that proves little more: the multipliers of hard rows move far, and stiff terms take twice as many
-/// steps.
-const HELD_SHARE: f64 = 0.1;
-const STIFFER: f64 = 3.0;
-/// The number of rounds without a smaller gap after which the search ends.
-const MOST_IDLE: usize = 15;
 /// Rows within this many times the largest violation of their limit count when weights are moved to satisfy every row.
 const AT_LIMIT: f64 = 30.0;
 /// A row of silence this close before a target, in `tau`, is nearly parallel to the target's row.
@@ -68,21 +51,14 @@ impl Exact {
         let trains = self.statement.trains;
         let gram = if objective.b > 0.0 { self.targets.gram(stop)? } else { vec![0.0; trains * trains] };
         let mut rows = Written::new(self, &best, start)?;
-        let mut state = Between {
-            weights: best.weights.clone(),
-            multipliers: rows.multipliers(),
-            held: None,
-            smoothing: SMOOTH_FROM,
-            nearness: NEAR_CENTRE,
-            held_share: HELD_SHARE,
-        };
+        let mut state = Between::at(best.weights.clone(), rows.multipliers());
         // Where the difference is `nothing`, the gap is the tolerance.
         let gap_of = |value: f64, bound: f64| {
             let gap = (value - bound).max(0.0) / value.max(nothing / self.tolerance);
             if gap.is_nan() { f64::INFINITY } else { gap }
         };
         let finest = FINEST * self.tolerance;
-        let (mut value, mut aim, mut least_gap, mut idle) = (1.0, ENOUGH * self.tolerance, f64::INFINITY, 0);
+        let (mut value, mut aim) = (1.0, ENOUGH * self.tolerance);
         loop {
             best.rounds += 1;
             let program = Program {
@@ -95,7 +71,7 @@ impl Exact {
                 theta_0,
             };
             let accuracy = ACCURACY * (value - best.least / scale).max(finest * value.max(nothing / self.tolerance));
-            let Reached { point, value: reached, mut proof, state: next, stopped } =
+            let Reached { point, value: reached, mut proof, state: next, stopped, .. } =
                 program.round(state, accuracy, stop);
             (state, value) = (next, reached);
             proof.divide(1.0 / scale, 1.0);
@@ -103,13 +79,7 @@ impl Exact {
                 (best.least, best.proof) = (proof.bound, rows.name(proof, &self.targets));
             }
             let gap = gap_of(value, best.least / scale);
-            idle = if gap < 0.9 * least_gap { 0 } else { idle + 1 };
-            if idle > 0 {
-                state.nearness = (FARTHER * state.nearness).max(FARTHEST);
-                state.held_share = (STIFFER * state.held_share).min(1.0);
-            }
-            least_gap = least_gap.min(gap);
-            let ended = stopped || best.rounds >= MOST_ROUNDS || idle > MOST_IDLE;
+            let ended = state.is_idle(gap) || stopped || best.rounds >= MOST_ROUNDS;
             let meets = if gap <= aim || ended { rows.meet(objective, &self.targets, &point, stop)? } else { None };
             let met = meets.as_ref().unwrap_or(&point.weights);
             let tolerance = if gap > NEAR { NEAR_SHARE * theta_0 } else { self.rounding(met) };
@@ -121,7 +91,7 @@ impl Exact {
             let more = rows.add(self, met, &broken)?;
             state.multipliers = rows.multipliers();
             if more {
-                least_gap = f64::INFINITY;
+                state.least_gap = f64::INFINITY;
             }
             if !more
                 && self.worst_target(met) <= MET
