@@ -148,12 +148,14 @@ def test_one_layout_serves_all_divisors_and_sides_and_a_fit_of_other_sides_is_a_
     windows = [[(0.0, 60.0)], None]
     rows = ConeR(neuron=Neuron(tau=12.0)).prepare(patterns, targets, silence=windows)
     before = rows.fit(made(ConeR, tau=12.0))
-    for options in ({"sides_c": "below"}, {"sides_b": "below", "divide_d_by": "targets"}, {"divide_c_by": "targets"}):
+    sum_below = {"form_b": "sum", "sides_b": "below"}
+    for options in ({"sides_c": "below"}, {"sides_b": "below", "divide_d_by": "targets"}, {"form_b": "sum"}, sum_below):
         cold = fitted(made(ConeR, tau=12.0, **options), patterns, targets, silence=windows)
         assert rows.fit(made(ConeR, tau=12.0, **options)).objective_ == cold.objective_
         warm = rows.fit(made(ConeR, tau=12.0, **options), start=before)
         assert warm.status_ == "solved"
         assert warm.objective_ == pytest.approx(cold.objective_, rel=2e-6)
+        assert rows.fit(made(ConeR, tau=12.0, **options), start=warm).rounds_ == 1
 
 
 def test_a_target_that_only_negative_weights_reach_is_reachable():

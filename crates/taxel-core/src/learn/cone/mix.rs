@@ -8,7 +8,7 @@ use super::exact::{BestWeights, Exact, MET, MOST_ROUNDS, Slopes};
 use crate::learn::engines::{ACCURACY, Between, FINEST, HardRows, Reached, nearest};
 use crate::learn::fit::{Left, Round};
 use crate::learn::statement::{
-    Bounds, NOTHING, Objective, Point, Program, Proof, Row, Rows, SilencePeak, Targets, largest,
+    Bounds, FormB, Objective, Point, Program, Proof, Row, Rows, Sides, SilencePeak, Targets, largest,
 };
 use crate::vectors::dot;
 use crate::{Result, Stop};
@@ -45,11 +45,11 @@ impl Exact {
             return Ok(best);
         }
         let objective = &self.objective.scaled(1.0 / scale).within_reach(1.0);
-        let lifts = self.targets.thresholds.iter().map(|threshold| (objective.kappa * threshold).powi(2));
-        let nothing = NOTHING * objective.b * lifts.sum::<f64>();
+        let nothing = objective.nothing_of_b(&self.targets);
         let theta_0 = self.statement.neuron.theta_0;
         let trains = self.statement.trains;
-        let gram = if objective.b > 0.0 { self.targets.gram(stop)? } else { vec![0.0; trains * trains] };
+        let squares = objective.b > 0.0 && objective.form_b == FormB::Square;
+        let gram = if squares { self.targets.gram(stop)? } else { vec![0.0; trains * trains] };
         let mut rows = Written::new(self, &best, start)?;
         let mut state = Between::at(best.weights.clone(), rows.multipliers());
         // Where the difference is `nothing`, the gap is the tolerance.
@@ -67,7 +67,7 @@ impl Exact {
                 targets: &self.targets,
                 gram: &gram,
                 objective,
-                slopes: [[0.0, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]],
+                slopes: [[0.0, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY], Sides::Both.slopes(objective.b)],
                 theta_0,
             };
             let accuracy = ACCURACY * (value - best.least / scale).max(finest * value.max(nothing / self.tolerance));
@@ -119,7 +119,7 @@ impl Exact {
     }
 }
 
-/// The working set, as coefficients, with the multipliers of its rows and of the targets.
+/// The working set, as coefficients, with the multipliers of its rows, and of the targets and the rows after them.
 struct Written {
     coefficients: Vec<f64>,
     limit: Vec<f64>,
@@ -251,7 +251,8 @@ impl Written {
         self.of_rows = std::mem::take(multipliers);
     }
 
-    /// The nearest weights that satisfy all rows: those that are 0 stay 0 if that can be.
+    /// The nearest weights that satisfy all rows: those that are 0 stay 0, and the sums of B that are met stay met, if
+    /// that can be.
     fn meet(
         &self,
         objective: &Objective,
@@ -260,21 +261,35 @@ impl Written {
         stop: Stop<'_>,
     ) -> Result<Option<Vec<f64>>> {
         let n = point.weights.len();
-        let worst = largest(point.excess.iter().copied().chain([0.0]));
-        let near = |k: &usize| point.excess[*k] >= -AT_LIMIT * worst;
+        let hard = &point.excess[..self.names.len() + targets.len()];
+        let worst = largest(hard.iter().copied().chain([0.0]));
+        let (rows, stored) = point.excess.split_at(self.names.len());
+        let after = stored[targets.len()..].iter().enumerate();
+        let (mut at, mut wanted) = (targets.at.clone(), targets.thresholds.clone());
+        for (k, _) in after.filter(|(_, x)| x.abs() <= AT_LIMIT * worst) {
+            at.extend_from_slice(targets.row(k).behind);
+            wanted.push(objective.kappa * targets.thresholds[k]);
+        }
+        let near = |k: &usize| rows[*k] >= -AT_LIMIT * worst;
         let near: Vec<usize> = (0..self.names.len()).filter(near).collect();
         let limit: Vec<f64> = near.iter().map(|&k| self.limit[k]).collect();
         let below = Rows::Written(&self.coefficients).coefficients(&near, n);
-        let rows = HardRows { equal: &targets.at, equal_to: &targets.thresholds, below: &below, limit: &limit };
+        let alone = HardRows { equal: &targets.at, equal_to: &targets.thresholds, below: &below, limit: &limit };
+        let all = HardRows { equal: &at, equal_to: &wanted, ..alone };
         let Bounds { lower, upper } = &objective.bounds;
         let held = |bounds: &[f64]| -> Vec<f64> {
             let held = bounds.iter().zip(&point.weights);
             held.map(|(&bound, &w)| if w == 0.0 && objective.l1 > 0.0 { 0.0 } else { bound }).collect()
         };
-        if let Some(found) = nearest(&point.weights, &rows, &held(lower), &held(upper), stop)? {
-            return Ok(Some(found));
+        let (low, high) = (held(lower), held(upper));
+        for rows in [all, alone].iter().skip(usize::from(wanted.len() == targets.len())) {
+            for (lower, upper) in [(&low, &high), (lower, upper)] {
+                if let Some(found) = nearest(&point.weights, rows, lower, upper, stop)? {
+                    return Ok(Some(found));
+                }
+            }
         }
-        nearest(&point.weights, &rows, lower, upper, stop)
+        Ok(None)
     }
 
     /// The nonzero multipliers of a proof, by the names of their rows; those of a difference go to both of its rows.

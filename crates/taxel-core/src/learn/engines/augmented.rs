@@ -169,9 +169,9 @@ struct Lagrangian<'a> {
     held: Vec<f64>,
     /// The weights at the beginning of the round, the centre of the proximal term.
     centre: Vec<f64>,
-    /// The change of a multiplier, and the smoothing of the kinks, mV, over which it takes place: silence, targets.
-    unit: [f64; 2],
-    delta: [f64; 2],
+    /// The change of a multiplier, and the smoothing of the kinks, mV, over which it takes place, by kind of row.
+    unit: [f64; 3],
+    delta: [f64; 3],
     /// The least value of the objective so far.
     most: f64,
     /// The scale of differences between weights, mV: the bounds, unless they are far wider than the targets need.
@@ -292,7 +292,8 @@ impl Program<'_> {
         if solved {
             engine.end_round();
             let Lagrangian { weights, multipliers, held, .. } = engine;
-            let smoothing = if !self.is_hard() || missed > ENOUGH_MET * accuracy {
+            let soft = !self.is_hard() || self.sums() > 0;
+            let smoothing = if soft || missed > ENOUGH_MET * accuracy {
                 (SHRINK_WHOLE * state.smoothing).max(SHARPEST_WHOLE)
             } else {
                 state.smoothing
@@ -314,7 +315,7 @@ impl<'a> Lagrangian<'a> {
         let at = start.weights.map_or_else(|| zero.clone(), |weights| program.point(weights));
         let warm = start.multipliers.is_some();
         let mut engine = Self::with(program, at, start.multipliers.unwrap_or_default());
-        let from = if warm { [WARM_FROM; 2] } else { [SILENCE_FROM, TARGETS_FROM] };
+        let from = if warm { [WARM_FROM; 3] } else { [SILENCE_FROM, TARGETS_FROM, TARGETS_FROM] };
         engine.delta = from.map(|from| from * program.theta_0);
         engine.sigma = if warm { 500.0 } else { 1.0 } * engine.size(HELD_SHARE);
         engine.rho = if warm { 1e-3 } else { 0.1 } * engine.size(CENTRE_SHARE);
@@ -343,7 +344,7 @@ impl<'a> Lagrangian<'a> {
             multipliers,
             held: vec![0.0; n],
             unit: program.slopes.map(|[low, high]| if low < high { high - low } else { 1.0 }),
-            delta: [program.theta_0; 2],
+            delta: [program.theta_0; 3],
             most: f64::INFINITY,
             width,
             sigma: 1.0,
@@ -372,9 +373,12 @@ impl<'a> Lagrangian<'a> {
         let (program, objective, n) = (self.program, self.program.objective, self.weights.len() as f64);
         self.slopes();
         let mut pull = vec![0.0; self.weights.len()];
-        let of_targets = &self.factors[program.limit.len()..];
-        for (target, factor) in program.targets.iter().zip(of_targets) {
-            add(&mut pull, factor.abs().max(objective.c), target.at);
+        let silent = program.limit.len();
+        for (k, ((row, _), factor)) in program.stored().zip(&self.factors[silent..]).enumerate() {
+            let most = [objective.c, objective.b][program.kind(silent + k) - 1];
+            add(&mut pull, factor.abs().max(most), row);
+        }
+        for target in program.targets.iter().take(self.behind.len()) {
             add(&mut pull, 2.0 * objective.b * objective.kappa * target.threshold, target.behind);
         }
         let most = (dot(&pull, &pull) / n).sqrt();
@@ -383,7 +387,7 @@ impl<'a> Lagrangian<'a> {
 
     /// Sets the smoothing of hard rows, and the other terms accordingly.
     fn smooth(&mut self, state: &Between) {
-        self.delta = [state.smoothing * self.program.theta_0; 2];
+        self.delta = [state.smoothing * self.program.theta_0; 3];
         self.sigma = SILENCE_FROM / state.smoothing * self.size(state.held_share);
         self.rho = state.nearness * state.smoothing * self.size(CENTRE_SHARE);
     }
@@ -405,18 +409,17 @@ impl<'a> Lagrangian<'a> {
         reached
     }
 
-    /// How steeply the slope of a smoothed row changes: silence, targets.
-    fn steep(&self) -> [f64; 2] {
+    /// How steeply the slope of a smoothed row changes, by kind of row.
+    fn steep(&self) -> [f64; 3] {
         std::array::from_fn(|kind| self.unit[kind] / self.delta[kind])
     }
 
     /// Computes the slope of each smoothed row.
     fn slopes(&mut self) {
         let (program, steep) = (self.program, self.steep());
-        let silent = program.limit.len();
         let rows = self.factors.iter_mut().zip(&self.excess).zip(&self.multipliers);
         for (k, ((factor, &x), &multiplier)) in rows.enumerate() {
-            let kind = usize::from(k >= silent);
+            let kind = program.kind(k);
             let [low, high] = program.slopes[kind];
             *factor = (multiplier + x * steep[kind]).clamp(low, high);
         }
@@ -509,8 +512,9 @@ impl<'a> Lagrangian<'a> {
 
     /// What the slopes of the hard rows count their distances from their limits as, at a point.
     fn missed(&self, at: &Point) -> f64 {
-        let counted = self.factors.iter().zip(&at.excess).filter(|(factor, _)| **factor != 0.0);
-        counted.map(|(factor, x)| (factor * x).abs()).sum()
+        let hard = |row: &usize| self.program.slopes[self.program.kind(*row)][1].is_infinite();
+        let counted = (0..self.factors.len()).filter(|row| hard(row) && self.factors[*row] != 0.0);
+        counted.map(|row| (self.factors[row] * at.excess[row]).abs()).sum()
     }
 
     /// Ends a round: sets the multipliers to the slopes found.
