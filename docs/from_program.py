@@ -150,6 +150,11 @@ def study(section: dict[str, Any]) -> list[str]:
         lines += ["", f".. image:: {where}/{picture}", f"   :alt: {name}: {section['title']}", "   :width: 100%", ""]
     rows = [[str(j["claim"]), j["reading"], VERDICTS[j["holds"]], j["ours"], j["why"]] for j in section["judgements"]]
     lines += table(["claim", "reading", "", "ours", "why"], rows, "6 24 10 35 25")
+    if (fits := section.get("fits", {})).get("open"):
+        lines += [
+            "",
+            f"**{fits['open']} of {fits['count']} fits did not close**: gaps up to {fits['largest_gap']:.1e}.",
+        ]
     return [*lines, "", f"**Protocol.** {literal(section['protocol'])}", ""]
 
 

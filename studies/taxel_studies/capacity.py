@@ -17,6 +17,7 @@ from taxel.learn import ConeX
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.mapping import LEARN, TABLE
+from taxel_studies.runner import noted
 
 DURATION_MS = 200.0
 #: Where rounding prevents a proof either way, rows that hold to within this count as satisfied, mV.
@@ -58,7 +59,7 @@ def feasible(params: dict[str, Any], count: int, seed: int) -> bool:
         horizon=DURATION_MS,
         **margins,
     )
-    return satisfied(cone.fit(*patterns(seed, params["inputs"], count, params["classes"])))
+    return satisfied(noted(cone.fit(*patterns(seed, params["inputs"], count, params["classes"]))))
 
 
 def satisfied(cone: ConeX) -> bool:

@@ -19,6 +19,7 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.capacity import DURATION_MS, patterns, satisfied, weakest
 from taxel_studies.mapping import LEARN, TABLE, thresholds
+from taxel_studies.runner import noted
 from taxel_studies.study import Judgement, Parameters, Row, Summary, Task, subplots
 
 WHERE = "thesis 6.6.3, which names delays and kernels"
@@ -127,7 +128,7 @@ def fit(params: dict[str, Any], count: int, seed: int, lambdas: tuple[float, flo
     drawn, targets = patterns(seed, params["inputs"], count, params["classes"])
     neuron = Neuron(**TABLE, time=params["time"])
     cone = ConeX(neuron=neuron, **LEARN, lambdas=lambdas, horizon=DURATION_MS)
-    return cone.fit(delayed(params, drawn, seed), targets)
+    return noted(cone.fit(delayed(params, drawn, seed), targets))
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE, thresholds
+from taxel_studies.runner import noted
 from taxel_studies.study import Judgement, Parameters, Summary, one_task, only_result
 
 WHERE = "thesis 6.3.1, figure 6.1"
@@ -42,7 +43,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     trains = mapping.poisson(seed, params["inputs"], params["stop"], *params["rates_hz"])
     neuron = Neuron(**TABLE, after_spike=params["after_spike"])
     cone = ConeX(neuron=neuron, **LEARN, lambdas=(1.0, 0.0, 0.0), kappa=1.0)
-    cone.fit([trains], [params["targets"]])
+    noted(cone.fit([trains], [params["targets"]]))
     times = np.arange(round(params["stop"] / params["step_ms"]) + 1) * params["step_ms"]
     potential = cone.neuron_.potential(cone.weights_, trains, times, spikes=params["targets"])
     plain = cone.neuron_.potential(cone.weights_, trains, times)

@@ -13,6 +13,7 @@ from taxel.learn import ConeR, ConeX
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.mapping import LEARN, TABLE
+from taxel_studies.runner import noted
 from taxel_studies.study import Judgement, Parameters, Row, Summary, Task, grid
 
 WHERE = "thesis 6.3.4, figure 6.3"
@@ -55,10 +56,10 @@ def realise(params: dict[str, Any], _seed: int) -> dict[str, Any]:
         "lambdas": params["lambdas_x"] if hard else params["lambdas_r"],
     }
     if hard:
-        exact = ConeX(**options).fit([trains], [[params["target"]]])
+        exact = noted(ConeX(**options).fit([trains], [[params["target"]]]))
         status, weights = exact.status_, exact.weights_
     else:
-        best = ConeR(**options).fit([trains], [[params["target"]]])
+        best = noted(ConeR(**options).fit([trains], [[params["target"]]]))
         status, weights = best.status_, best.weights_
     axis = np.linspace(-params["bound"], params["bound"], params["points"])
     mesh = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1)

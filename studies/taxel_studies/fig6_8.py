@@ -14,6 +14,7 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies import waves
 from taxel_studies.mapping import LEARN
+from taxel_studies.runner import noted
 from taxel_studies.study import Judgement, Parameters, Summary, one_task, only_result, subplots
 
 WHERE = "thesis 6.4.5, figure 6.8"
@@ -51,7 +52,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     times = waves.pattern(seed)
     learnt = {name: params[name] for name in ("kappa", "lambdas")}
     cone = ConeX(neuron=Neuron(**waves.NEURON), **LEARN, **learnt, divide_b_by="targets")
-    cone.fit([SpikeTrains.from_lists([[t] for t in times], 0.0, waves.DURATION_MS)], [[waves.DURATION_MS]])
+    noted(cone.fit([SpikeTrains.from_lists([[t] for t in times], 0.0, waves.DURATION_MS)], [[waves.DURATION_MS]]))
     train = waves.waves(times, np.random.default_rng([seed, 3]), params["repetitions"])
     clean = train.trains
     end = float(train.targets[params["drawn_repetitions"] - 1] + waves.GAP_MS[0])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from taxel.learn import ConeX
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
+from taxel_studies.runner import noted
 
 #: Table 6.1; parameters that it does not name have taxel's defaults.
 TABLE: dict[str, Any] = {"tau": 15.0, "theta_0": 0.3, "theta_plus": 0.2, "refractory": 3.0}
@@ -86,7 +87,7 @@ def fitted(trains: SpikeTrains, targets: Sequence[float], times: Sequence[float]
         (mV, without spiking), ``between`` (mV, with it).
     """
     cone = ConeX(neuron=Neuron(**TABLE), **LEARN).set_params(**learn)
-    cone.fit([trains], [targets])
+    noted(cone.fit([trains], [targets]))
     neuron = cone.neuron_
     return {
         "status": cone.status_,

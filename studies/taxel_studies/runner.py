@@ -8,17 +8,23 @@ kill, power) loses no more than the realisations that are running.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from pathlib import Path
 from time import process_time
-from typing import Any
+from typing import Any, TypeVar
 
 import joblib
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from taxel.learn import ConeR, ConeX
 from taxel.tasks import Workers
+
+#: The gaps of the fits of the realisation that runs; 0 of those that are solved or proven to have no solution.
+_GAPS: ContextVar[list[float]] = ContextVar("_GAPS")
+Cone = TypeVar("Cone", bound=ConeX | ConeR)
 
 
 @dataclass(frozen=True)
@@ -31,10 +37,11 @@ class Task:
 
 @dataclass(frozen=True)
 class Row(Task):
-    """One realisation, its result and the CPU seconds that it took."""
+    """One realisation, its result, the CPU seconds that it took, and the gaps of its fits, 0 of those that closed."""
 
     result: Any = None
     seconds: float = 0.0
+    gaps: Sequence[float] = ()
 
 
 def grid(p: Mapping[str, Any], **axes: str) -> list[Task]:
@@ -58,11 +65,25 @@ def _made(function: Callable[..., Any], arguments: tuple[Any, ...], code: str) -
     return function(*arguments)
 
 
-def _timed(realise: Callable[..., Any], params: dict[str, Any], seed: int, code: str, given: Any) -> tuple[Any, float]:
+def noted(cone: Cone) -> Cone:
+    """Return a learner after its fit, whose gap goes to the row of the realisation that runs."""
+    if (gaps := _GAPS.get(None)) is not None:
+        gaps.append(0.0 if cone.status_ in ("solved", "infeasible") else cone.gap_)
+    return cone
+
+
+def _timed(
+    realise: Callable[..., Any], params: dict[str, Any], seed: int, code: str, given: Any
+) -> tuple[Any, float, list[float]]:
     del code
-    begun = process_time()
-    result = realise(params, seed, **given)
-    return result, process_time() - begun
+    gaps: list[float] = []
+    held = _GAPS.set(gaps)
+    try:
+        begun = process_time()
+        result = realise(params, seed, **given)
+        return result, process_time() - begun, gaps
+    finally:
+        _GAPS.reset(held)
 
 
 @dataclass(frozen=True)

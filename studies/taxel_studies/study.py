@@ -304,6 +304,7 @@ class Study:
             "parameters": parameters,
             "changed": sorted(changes or {}),
             "realisations": len(rows),
+            "fits": fits(rows),
             "judgements": [asdict(one) for one in self.judge(parameters, summary)],
             "tables": [asdict(t) for t in self.tables(parameters, summary)] if self.tables is not None else [],
             "said": summary,
@@ -365,6 +366,12 @@ def machine() -> dict[str, Any]:
         },
         "date": time.strftime("%Y-%m-%d", time.gmtime()),
     }
+
+
+def fits(rows: Sequence[Row]) -> dict[str, Any]:
+    """Return how many fits a study made, how many of them did not close, and their largest gap."""
+    gaps = [gap for row in rows for gap in row.gaps]
+    return {"count": len(gaps), "open": sum(gap > 0.0 for gap in gaps), "largest_gap": max(gaps, default=0.0)}
 
 
 def results(rows: Sequence[Row], **axes: Any) -> list[Any]:

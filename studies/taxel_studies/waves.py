@@ -19,6 +19,7 @@ from taxel.metrics import victor_purpura
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.mapping import LEARN
+from taxel_studies.runner import noted
 from taxel_studies.study import Row, Task
 
 INPUTS, DURATION_MS, REPETITIONS = 200, 40.0, 30
@@ -252,4 +253,4 @@ def _fitted(
         # Noise may well take a target out of reach; the distance shows it.
         warnings.simplefilter("ignore", UserWarning)
         learner = learn.ConeX if params["learner"] == "cone_x" else learn.ConeR
-        return learner(neuron=Neuron(**NEURON), **options).fit(patterns, targets)
+        return noted(learner(neuron=Neuron(**NEURON), **options).fit(patterns, targets))

@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from taxel import learn
 from taxel.cli import main
+from taxel.learn.cone_r import ConeRProblem
 from taxel_studies import STUDIES, load
 from taxel_studies.claims import CLAIMS
 from taxel_studies.page import write_page
@@ -40,8 +42,21 @@ def report(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def first_run(report) -> Callable[[str], dict[str, Any]]:
-    """Run a study of toy size once for all tests of this file."""
-    return functools.cache(lambda name: load(name).run(report, size="toy", data=DATA, quiet=True))
+    """Run a study of toy size once for all tests of this file; `fitted`: how often a learner was fitted."""
+
+    def run(name: str) -> dict[str, Any]:
+        fitted = []
+
+        def counted(fit):
+            return lambda *args, **options: [fit(*args, **options), fitted.append(1)][0]
+
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setattr(learn.ConeX, "fit", counted(learn.ConeX.fit))
+            patched.setattr(ConeRProblem, "fit", counted(ConeRProblem.fit))
+            section = load(name).run(report, size="toy", data=DATA, quiet=True)
+        return section | {"fitted": len(fitted)}
+
+    return functools.cache(run)
 
 
 @pytest.fixture
@@ -94,6 +109,13 @@ def test_a_study_gives_its_kept_toy_result(first_run, name):
     kept = json.loads(file.read_text())
     now = json.loads(json.dumps(first_run(name)))
     assert not [line for key in ("parameters", "said") for line in differences(kept[key], now[key], key)]
+
+
+@pytest.mark.parametrize("name", EACH)
+def test_every_fit_of_a_study_closes_or_is_told(first_run, name):
+    section = first_run(name)
+    assert section["fits"]["count"] == section["fitted"]
+    assert section["fits"]["open"] == 0
 
 
 @pytest.mark.parametrize("name", ["fig6.1", "fig6.2", "fig6.3", "fig6.4", "fig6.5", "fig6.6", "fig6.8", "fig6.9"])

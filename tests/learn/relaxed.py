@@ -74,6 +74,7 @@ def drawn(seed):
         "kappa": float(random.uniform(0.8, 2.0)),
         "delta_t_ms": one(None, 0.0, 4.0),
         "lambdas": [*(one(0.0, 1.0, 10.0, 100.0) for _ in range(4)), one(1.0, 80.0, 800.0)],
+        "form_b": ("square", "sum")[seed % 2],
         "divide_b_by": one("B_max", "targets"),
         "divide_c_by": one("C_max", "targets"),
         "divide_d_by": one("D_max", "targets"),

@@ -76,10 +76,11 @@ def short(sides, distances):
 
 def terms(cone, rows, w):
     at, behind, theta, silent, limit = rows
+    power = 2 if cone.form_b == "square" else 1
     found = [np.abs(w).sum(), np.linalg.norm(w) ** (2 if cone.norm == "square" else 1)]
     if not isinstance(cone, ConeR):
-        return np.array([*found, ((behind @ w - cone.kappa * theta) ** 2).sum()])
-    found.append((short(cone.sides_b, behind @ w - cone.kappa * theta) ** 2).sum())
+        return np.array([*found, (np.abs(behind @ w - cone.kappa * theta) ** power).sum()])
+    found.append((np.abs(short(cone.sides_b, behind @ w - cone.kappa * theta)) ** power).sum())
     found.append(np.abs(short(cone.sides_c, at @ w - theta)).sum())
     return np.array([*found, np.maximum(silent @ w - limit, 0).sum()])
 
@@ -105,14 +106,17 @@ def least(cone, rows, c):
     costs = [c @ terms(cone, rows, np.clip(w, cone.lb, cone.ub) * np.ones(n)) for w in (0.0, np.inf)]
     scale = 1 / (costs[0] or costs[1] or 1.0)
     c = c * scale
-    # variables: w, a >= |w|, t >= |w|_2, y = behind w - kappa theta; unless the rows are hard, e >= |at w - theta| and
-    # h >= max(silent w - limit, 0). Where only potentials below count, y >= kappa theta - behind w, e >= theta - at w
-    # and 0.
+    # variables: w, a >= |w|, t >= |w|_2, y = behind w - kappa theta (of a sum: at least its size); unless the rows are
+    # hard, e >= |at w - theta| and h >= max(silent w - limit, 0). Where only potentials below count,
+    # y >= kappa theta - behind w, e >= theta - at w and 0.
     one_b, one_c = (not hard and sides == "below" for sides in (getattr(cone, f"sides_{x}", "") for x in "bc"))
     sizes = np.cumsum([0, n, n, 1, k, *((0, 0) if hard else (k, m))])
     q, p = np.zeros(sizes[-1]), np.zeros(sizes[-1])
     q[sizes[1] : sizes[2]] = c[0]
-    p[sizes[3] : sizes[4]] = 2 * c[2]
+    if cone.form_b == "square":
+        p[sizes[3] : sizes[4]] = 2 * c[2]
+    else:
+        q[sizes[3] : sizes[4]] = c[2]
     if cone.norm == "square":
         p[:n] = 2 * c[1]
     else:
@@ -127,6 +131,11 @@ def least(cone, rows, c):
     eye = np.eye
     images = (block(k, w=(-1) ** one_b * behind, y=-eye(k)), (-1) ** one_b * cone.kappa * theta)
     equal, below = ([], [images]) if one_b else ([images], [])
+    if cone.form_b == "sum":
+        # y >= |behind w - kappa theta|.
+        equal, below = [], [images, (block(k, y=-eye(k)), np.zeros(k))]
+        if not one_b:
+            below.append((block(k, w=-behind, y=-eye(k)), -cone.kappa * theta))
     if hard:
         equal.append((block(k, w=at), theta))
         below.append((block(m, w=silent), limit))

@@ -41,6 +41,30 @@ def test_whatever_the_options_a_fit_is_the_least_of_what_is_stated(part):
         assert np.all(cone.weights_ <= cone.ub), seed
 
 
+@pytest.mark.parametrize("by", ["B_max", "targets"])
+def test_with_l1_alone_a_fit_is_solved(by):
+    """6.4.7's sparse weights without noise, whose multipliers are a fortieth of their range."""
+    for seed in range(4):
+        times = np.random.default_rng([seed, 0]).uniform(0.0, 40.0, 200)
+        one = [SpikeTrains.from_lists([[t] for t in times], stop=40.0)], [np.array([40.0])]
+        options = {"tau": 10.0, "theta_plus": 0.0, "after_spike": "reset", "kappa": 1.08, "delta_t_ms": 1.5}
+        cone = made(ConeR, **options, lambdas=(4, 0, 100, 100, 100), divide_b_by=by).fit(*one)
+        assert cone.status_ == "solved"
+        rows = grid_rows(cone, *one)
+        assert cone.objective_ == pytest.approx(least(cone, rows, shares(cone, rows)), rel=3e-6)
+
+
+@pytest.mark.parametrize(
+    "examined", [(1, 300, 10, 6, 1800.0, (0, 0, 1, 1, 1)), (199643, 182, 5, 3, 1200.0, (0, 0, 1, 1, 100))]
+)
+def test_without_a_norm_a_fit_over_thousands_of_rows_is_solved(examined):
+    seed, trains, patterns, targets, duration, lambdas = examined
+    by = {f"divide_{term}_by": "targets" for term in "bcd"}
+    cone = made(ConeR, lambdas=lambdas, **by)
+    assert fitted(cone, *examples(seed, trains, patterns, targets, duration)).status_ == "solved"
+    assert cone.silent_rows_ > 5000
+
+
 def test_a_target_out_of_reach_is_named_and_the_rest_is_fitted():
     trains = SpikeTrains.from_lists([[20.0], [25.0], [80.0], [85.0]], stop=120.0)
     cone = ConeR(lambdas=(0, 1e-3, 0, 100, 1), lb=-1.0, ub=1.0)
@@ -124,12 +148,14 @@ def test_one_layout_serves_all_divisors_and_sides_and_a_fit_of_other_sides_is_a_
     windows = [[(0.0, 60.0)], None]
     rows = ConeR(neuron=Neuron(tau=12.0)).prepare(patterns, targets, silence=windows)
     before = rows.fit(made(ConeR, tau=12.0))
-    for options in ({"sides_c": "below"}, {"sides_b": "below", "divide_d_by": "targets"}, {"divide_c_by": "targets"}):
+    sum_below = {"form_b": "sum", "sides_b": "below"}
+    for options in ({"sides_c": "below"}, {"sides_b": "below", "divide_d_by": "targets"}, {"form_b": "sum"}, sum_below):
         cold = fitted(made(ConeR, tau=12.0, **options), patterns, targets, silence=windows)
         assert rows.fit(made(ConeR, tau=12.0, **options)).objective_ == cold.objective_
         warm = rows.fit(made(ConeR, tau=12.0, **options), start=before)
         assert warm.status_ == "solved"
         assert warm.objective_ == pytest.approx(cold.objective_, rel=2e-6)
+        assert rows.fit(made(ConeR, tau=12.0, **options), start=warm).rounds_ == 1
 
 
 def test_a_target_that_only_negative_weights_reach_is_reachable():

@@ -34,6 +34,8 @@ OPTIONS = [
     {"lambdas": (2, 2, 200), "after_spike": "reset"},
     {"lambdas": (2, 2, 200), "divide_b_by": "targets", "kappa": 1.08},
     {"lambdas": (0, 1, 100), "norm": "square", "divide_b_by": "targets"},
+    {"lambdas": (2, 2, 200), "form_b": "sum", "kappa": 1.08},
+    {"lambdas": (1, 0, 2), "form_b": "sum", "divide_b_by": "targets", "after_spike": "reset"},
     {"lambdas": (0, 1, 0), "norm": "square", "margin": 0.01},
     {"lambdas": (0, 0, 1), "delta_t_ms": 4.0},
     {"lambdas": (1, 4, 0), "first_threshold": "printed", "after_spike": "ignore"},

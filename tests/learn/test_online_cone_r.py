@@ -29,6 +29,7 @@ def stream(seed, count, trains=20, duration=120.0):
 OPTIONS = [
     {},
     {"after_spike": "reset", "divide_b_by": "targets", "lambdas": (0, 4, 100, 100, 80)},
+    {"after_spike": "reset", "form_b": "sum"},
     {"norm": "square", "after_spike": "ignore", "margin": 0.01},
     {"lambdas": (4, 0, 100, 100, 80), "lb": -0.1, "ub": 0.4, "kernel": "double_exponential"},
 ]

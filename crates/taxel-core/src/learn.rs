@@ -14,6 +14,6 @@ pub use engines::{DualActiveSet, Multipliers, Ray, RowId, SolveOutcome};
 pub use fit::{Fit, Left, Round, Status};
 pub use online::OnlineConeR;
 pub use statement::{
-    Bounds, Certificate, Divisor, DivisorC, DivisorD, Margin, Norm, OneOrEach, Parts, Row, Sides, StatedRow,
+    Bounds, Certificate, Divisor, DivisorC, DivisorD, FormB, Margin, Norm, OneOrEach, Parts, Row, Sides, StatedRow,
 };
 pub use statement::{check_examples, check_pattern, check_some_target, check_trains};

@@ -59,6 +59,8 @@ class Stated:
         self.behind, self.behind_sizes = np.reshape(behind, (-1, 2, trains)).swapaxes(0, 1)
         self.theta = np.concatenate([rows.threshold(rows.targets) for rows in patterns])
         self.wanted = cone.kappa * self.theta
+        #: Of the distances in B.
+        self.power = 2 if cone.form_b == "square" else 1
         # The factors of 6.14: each lambda over the sum of all and over the largest value of its term.
         most = np.maximum(np.abs(self.lb), np.abs(self.ub))
         shares = np.zeros(5)
@@ -68,7 +70,7 @@ class Stated:
             [
                 most.sum(),
                 np.linalg.norm(most) ** (2 if cone.norm == "square" else 1),
-                ((np.abs(self.behind) @ most + self.wanted) ** 2).sum(),
+                ((np.abs(self.behind) @ most + self.wanted) ** self.power).sum(),
                 (np.abs(self.at) @ most + self.theta).sum(),
                 sum(above),
             ]
@@ -97,8 +99,8 @@ class Stated:
         above = [rows.above(rows.values * w[rows.trains]) for rows in self.patterns] if d > 0 else [np.zeros(2)]
         above, above_size = np.sum(above, axis=0)
         norms = l1 * sizes.sum() + l2 * np.linalg.norm(w) ** (2 if self.cone.norm == "square" else 1)
-        value = norms + b * (x @ x) + c * e.sum() + d * above
-        b_sizes = 2 * b * np.abs(x) @ (self.behind_sizes @ sizes + self.wanted)
+        value = norms + b * (np.abs(x) ** self.power).sum() + c * e.sum() + d * above
+        b_sizes = b * (self.power * np.abs(x) ** (self.power - 1)) @ (self.behind_sizes @ sizes + self.wanted)
         size = value + b_sizes + c * (self.at_sizes @ sizes + self.theta).sum() + d * above_size
         return float(value), float(np.finfo(float).eps * self.terms * size)
 

@@ -109,12 +109,13 @@ def check_gap(
 
     Each term of 6.14 (of 6.11 for `ConeX`) is at least each of its tangents. With x the excess of the potential over
     what its row requires: D of a silent row is at least ``y * x`` for a multiplier y from 0 to the factor of D, C of a
-    target for a y between plus and minus the factor of C, B is at least ``y * x - y**2 / (4 * b)`` with its factor b,
-    and the l2 term at least ``pull @ w`` for a pull no longer than its factor (squared:
-    ``pull @ w - pull @ pull / (4 * l2)``). The rows of `ConeX` are hard: ``y * x`` is at most 0 for all weights that
-    meet them, with any y at a target, 0 or more for silence and slopes, and takes the place of C and D. The sum of
-    these tangents and of l1 is minimised within the bounds synapse by synapse, and no weights have a smaller objective.
-    That holds for any multipliers: those out of their range are moved into it, and wrong ones prove less.
+    target for a y between plus and minus the factor of C, B is at least ``y * x - y**2 / (4 * b)`` with its factor b
+    (as a sum of distances: ``y * x`` for a y between plus and minus b), and the l2 term at least ``pull @ w`` for a
+    pull no longer than its factor (squared: ``pull @ w - pull @ pull / (4 * l2)``). The rows of `ConeX` are hard: ``y *
+    x`` is at most 0 for all weights that meet them, with any y at a target, 0 or more for silence and slopes, and takes
+    the place of C and D. The sum of these tangents and of l1 is minimised within the bounds synapse by synapse, and no
+    weights have a smaller objective. That holds for any multipliers: those out of their range are moved into it, and
+    wrong ones prove less.
 
     Parameters
     ----------
@@ -176,7 +177,8 @@ def check_gap(
     given, pull = _multipliers(cone, len(w))
     of_c, of_b = (np.array([given.pop((kind, *name), 0.0) for name in stated.names]) for kind in ("target", "behind"))
     of_c = of_c if hard else np.clip(of_c, -c, 0.0 if sides_c == "below" else c)
-    of_b = np.clip(of_b, -np.inf, 0.0 if sides_b == "below" else np.inf) * (b > 0)
+    steepest = b if cone.form_b == "sum" else np.inf
+    of_b = np.clip(of_b, -steepest, 0.0 if sides_b == "below" else steepest) * (b > 0)
     pull, length = pull * (l2 > 0), np.linalg.norm(pull)
     if cone.norm == "norm" and length > l2:
         pull = pull * (l2 / length * (1 - len(w) * np.finfo(float).eps))
@@ -185,7 +187,7 @@ def check_gap(
     slope = of_c @ stated.at + of_b @ stated.behind + pull
     sizes = np.abs(of_c) @ stated.at_sizes + np.abs(of_b) @ stated.behind_sizes + np.abs(pull)
     constants = [*(-of_c * stated.theta), *(-of_b * stated.wanted)]
-    constants += [*(-(of_b**2) / (4 * b))] if b > 0 else []
+    constants += [*(-(of_b**2) / (4 * b))] if b > 0 and cone.form_b == "square" else []
     constants += [*(-(pull**2) / (4 * l2))] if cone.norm == "square" and l2 > 0 else []
     for (kind, p, t), multiplier in given.items():
         if kind not in ("silence", "slope") or (kind == "slope" and not hard) or not 0 <= p < len(stated.patterns):

@@ -49,6 +49,8 @@ class ConeR(SpikeLearner):
     lb, ub : float, or float sequence of shape (trains,), mV
         Least and largest weight, for all synapses or one per synapse. All normalisers are computed at
         ``-max(|lb|, |ub|)`` and ``+max(|lb|, |ub|)``, synapse by synapse.
+    form_b : {"square", "sum"}
+        B as the sum of squared distances, as printed, or of the distances, which a large factor brings to 0 exactly.
     divide_b_by : {"B_max", "targets"}
         Divisor of B: its largest value, as printed, or the number of targets.
     divide_c_by : {"C_max", "targets"}
@@ -132,6 +134,7 @@ class ConeR(SpikeLearner):
     lambdas: Sequence[float] = _DEFAULT.lambdas
     lb: float | Sequence[float] = _DEFAULT.lb
     ub: float | Sequence[float] = _DEFAULT.ub
+    form_b: Literal["square", "sum"] = _DEFAULT.form_b
     divide_b_by: Literal["B_max", "targets"] = _DEFAULT.divide_b_by
     divide_c_by: Literal["C_max", "targets"] = _DEFAULT.divide_c_by
     divide_d_by: Literal["D_max", "targets"] = _DEFAULT.divide_d_by
@@ -156,8 +159,8 @@ class ConeR(SpikeLearner):
     refires_: int = field(init=False)
     fired_: tuple[int, int] = field(init=False)
     neuron_: Neuron = field(init=False)
-    #: What a start's multipliers belong to (the number of rows, `sides_c`), and these, as shares of their range.
-    _multipliers: tuple[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.float64]]] = field(init=False)
+    #: What a start's multipliers belong to (the number of rows and their kinds), and these, as shares of their range.
+    _multipliers: tuple[tuple[int | str, ...], tuple[NDArray[np.int64], NDArray[np.float64]]] = field(init=False)
 
     def fit(
         self,
@@ -326,8 +329,8 @@ class ConeRProblem:
         Parameters
         ----------
         cone : ConeR
-            May differ from the learner of the rows in `lambdas`, `kappa`, `lb`, `ub`, `divide_b_by`, `divide_c_by`,
-            `divide_d_by`, `sides_b`, `sides_c`, `norm`, `tolerance` and `max_seconds`.
+            May differ from the learner of the rows in `lambdas`, `kappa`, `lb`, `ub`, `form_b`, `divide_b_by`,
+            `divide_c_by`, `divide_d_by`, `sides_b`, `sides_c`, `norm`, `tolerance` and `max_seconds`.
         start : ConeR, or float64 of shape (trains,), mV, optional
         progress : function of (round, rows, objective, gap), optional
             As in `ConeR.fit`.
@@ -354,7 +357,7 @@ class ConeRProblem:
         if not hasattr(start, "weights_"):
             raise NotFittedError("start: not fitted yet, call fit first")
         start_rows, multipliers = start._multipliers
-        same = start_rows == (self._problem.rows, instance("cone", cone, ConeR).sides_c)
+        same = start_rows == _kinds(self._problem.rows, instance("cone", cone, ConeR))
         return self._weighed(start.weights_), multipliers if same else None
 
     def _for_all(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -417,9 +420,14 @@ def _keep(
     cone.multipliers_ = _multipliers((of_rows, of_behind, for_all(pull)))
     cone.silent_rows_ = silent_rows
     cone.neuron_ = cone._on_grid()
-    cone._multipliers = ((all_rows, cone.sides_c), fit.multipliers)
+    cone._multipliers = (_kinds(all_rows, cone), fit.multipliers)
     if fit.raised is not None:
         raise fit.raised
+
+
+def _kinds(rows: int, cone: ConeR) -> tuple[int | str, ...]:
+    """Return what the numbers and the ranges of a fit's multipliers depend on."""
+    return rows, cone.sides_c, cone.form_b, cone.sides_b
 
 
 def _shown(bound: float | Sequence[float]) -> str:

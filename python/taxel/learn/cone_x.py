@@ -144,7 +144,7 @@ class Multipliers:
     values : float64, shape (rows,), 1/mV
         Of silence 0 or more, of `ConeR` up to the factor of D. Of targets any; of `ConeR` from minus the factor of C
         up to it, up to 0 if `sides_c` is "below". Of slopes 0 or more, ms/mV. Of B any, at most 0 if `sides_b` is
-        "below".
+        "below"; if `form_b` is "sum", from minus the factor of B up to it.
     pull : float64, shape (trains,), 1/mV
         The multiplier of the l2 term: a slope no longer than its factor, of any length if `norm` is "square".
 
@@ -202,6 +202,8 @@ class ConeX(SpikeLearner):
         Weights of l1, l2, B in the objective; only their ratios matter. All 0: any feasible weights.
     lb, ub : float or float64 of shape (trains,), mV
         Least and largest weight, finite. All normalisers are computed at ``-max(|lb|, |ub|)`` and ``+max(|lb|, |ub|)``.
+    form_b : {"square", "sum"}
+        B as the sum of squared distances, as printed, or of the distances, which a large factor brings to 0 exactly.
     divide_b_by : {"B_max", "targets"}
         Divisor of B: its largest value, as printed, or the number of targets.
     norm : {"norm", "square"}
@@ -298,6 +300,7 @@ class ConeX(SpikeLearner):
     lambdas: Sequence[float] = _DEFAULT.lambdas
     lb: float | ArrayLike = _DEFAULT.lb
     ub: float | ArrayLike = _DEFAULT.ub
+    form_b: Literal["square", "sum"] = _DEFAULT.form_b
     divide_b_by: Literal["B_max", "targets"] = _DEFAULT.divide_b_by
     norm: Literal["norm", "square"] = _DEFAULT.norm
     margin: float | None = _DEFAULT.margin

@@ -35,6 +35,7 @@ class OnlineConeR(ConeR):
     delta_t_ms : float, ms, 0 or more, optional
     lambdas : five floats, 0 or more
     lb, ub : float, or float sequence of shape (trains,), mV
+    form_b : {"square", "sum"}
     divide_b_by : {"B_max", "targets"}
     divide_c_by : {"C_max", "targets"}
     divide_d_by : {"D_max", "targets"}

@@ -17,12 +17,14 @@ from taxel import ProblemError
 from taxel.detect import Example, Fold, Judged, Part, Recipe, Score, judge, score
 from taxel.detections import Detections
 from taxel.encode import Encoder
+from taxel.learn import ConeR
 from taxel.spikes import to_ms, to_us
 from taxel_rules import SKIM
 from taxel_studies.gait import insole, protocols, rules
 from taxel_studies.gait.pieces import Piece, Signal, joined
 from taxel_studies.gait.protocols import Scope
 from taxel_studies.gait.sources import SOURCES, Encoded, encoded
+from taxel_studies.runner import noted
 
 #: Detections count up to so far from a reference event, ms (thesis 6.5.2).
 WINDOW_MS = 50.0
@@ -149,7 +151,11 @@ def _judged(
     event = rows.event
     examples = [Example(p.spikes, {event: np.rint(to_us(p.truth[event])).astype(np.int64)}) for p in pieces]
     recipe = Recipe(Encoder.from_json(json.dumps(point["encoder"])), {}, {event: point["learner"]})
-    return judge(examples, recipe, parts, window_ms=WINDOW_MS)
+    judged = judge(examples, recipe, parts, window_ms=WINDOW_MS)
+    for cone in (learner for trained in judged.trained for learner in trained.learners.values()):
+        if isinstance(cone, ConeR):
+            noted(cone)
+    return judged
 
 
 def _skim(rows: _Rows, point: Mapping[str, Any], left_out: int, params: Mapping[str, Any]) -> dict[str, Any]:

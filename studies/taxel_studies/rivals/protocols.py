@@ -10,6 +10,7 @@ import numpy as np
 from taxel import ProblemError
 from taxel.spikes import SpikeTrains
 from taxel_studies.rivals.rules import RULES, learner
+from taxel_studies.runner import noted
 
 DURATION_MS = 200.0
 CLASSES = 5
@@ -53,7 +54,7 @@ def share_right(params: dict[str, Any], count: int, seed: int) -> float:
     patterns, targets = (gardner_gruning if protocol == "a" else thesis)(seed, inputs, count)
     training = {"epochs": params[f"epochs_{protocol}"], "until_right": protocol == "b", "within_ms": 1.0}
     if name == "ConeX":
-        cone = learner(name, protocol, inputs, count, seed).fit(patterns, targets)
+        cone = noted(learner(name, protocol, inputs, count, seed).fit(patterns, targets))
         if cone.status_ == "stopped":
             raise ProblemError(f"ConeX came to no verdict on {count} patterns, seed {seed}, of {params}")
         return 1.0 if cone.status_ in ("solved", "feasible") else 0.0

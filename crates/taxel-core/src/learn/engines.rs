@@ -6,6 +6,6 @@ mod minimise;
 mod nearest;
 mod touched;
 
-pub(crate) use augmented::{Between, Reached, WarmStart};
+pub(crate) use augmented::{ACCURACY, Between, FINEST, Reached, WarmStart};
 pub use dual_active_set::{DualActiveSet, Multipliers, Ray, RowId, SolveOutcome};
 pub(crate) use nearest::{HardRows, nearest};

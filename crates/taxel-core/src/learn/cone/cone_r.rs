@@ -6,8 +6,8 @@ use crate::allowed::{Range, one_weight_a_train};
 use crate::learn::engines::WarmStart;
 use crate::learn::fit::{Fit, Left, Round, Status};
 use crate::learn::statement::{
-    Choice, Divisor, DivisorC, DivisorD, Margin, Norm, Objective, OneOrEach, Proof, Relaxed, Row, Sides, Statement,
-    bounds_of, check_bounds, check_examples, check_silence, check_trains, end_of,
+    Choice, Divisor, DivisorC, DivisorD, FormB, Margin, Norm, Objective, OneOrEach, Proof, Relaxed, Row, Sides,
+    Statement, bounds_of, check_bounds, check_examples, check_silence, check_trains, end_of,
 };
 use crate::metrics::matching::{WINDOW_MS, match_spikes};
 use crate::neuron::{Neuron, Time};
@@ -32,6 +32,8 @@ parameters! {
         pub lb: OneOrEach = OneOrEach::All(-0.3), "mV", Range::FINITE;
         /// Largest weight, mV.
         pub ub: OneOrEach = OneOrEach::All(0.3), "mV", Range::FINITE;
+        /// How the distances after the targets add up in B.
+        pub form_b: FormB = FormB::Square;
         /// The normaliser of B.
         pub divide_b_by: Divisor = Divisor::Largest;
         /// The normaliser of C.
@@ -97,10 +99,10 @@ impl ConeR {
     }
 }
 
-/// The multipliers from which a similar fit starts: the nonzero ones, by row (silent rows first, then targets).
+/// The multipliers from which a similar fit starts: the nonzero ones, by row (silent rows first, then targets, then B).
 ///
 /// Each is a share of its row's weight in 6.14 (of twice that weight for a C of both sides): from 0 to 1 for a silent
-/// row; for a target from -1/2 to 1/2, from -1 to 0 if C counts only potentials below.
+/// row; for a target from -1/2 to 1/2, from -1 to 0 if C counts only potentials below; likewise for B, if it is a sum.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Shares {
     /// The numbers of the rows, ascending.
@@ -215,13 +217,11 @@ impl ConeRProblem {
         Ok(())
     }
 
-    /// Removes the first pattern; returns the number of grid rows and the number of targets removed with it.
-    pub(crate) fn drop_first(&mut self) -> (usize, usize) {
-        let gone = (self.rows.silent.rows_of_first(), self.rows.targets.count_of_first());
+    /// Removes the first pattern.
+    pub(crate) fn drop_first(&mut self) {
         self.rows.drop_first();
         self.statement.drop_first();
         self.patterns.remove(0);
-        gone
     }
 
     pub(crate) fn check_trains(&self, p: usize, pattern: &SpikeTrains) -> Result<()> {
@@ -232,8 +232,12 @@ impl ConeRProblem {
         self.patterns.len()
     }
 
-    pub(crate) fn silent_and_free_rows(&self) -> usize {
-        self.rows.silent.len()
+    /// The numbers of rows by kind: of the first pattern, and of all.
+    pub(crate) fn rows_by_kind(&self) -> [[usize; 3]; 2] {
+        let Relaxed { silent, targets, .. } = &self.rows;
+        let after = |targets| if self.base.form_b == FormB::Sum { targets } else { 0 };
+        let (first, all) = (targets.count_of_first(), targets.len());
+        [[silent.rows_of_first(), first, after(first)], [silent.len(), all, after(all)]]
     }
 
     /// The number of rows: grid points, with or without a requirement, and targets.
@@ -251,11 +255,12 @@ impl ConeRProblem {
     /// The objective 6.14 with these parameters, in this problem's units.
     fn objective(&self, parameters: &ConeR, silent: &[f64]) -> Result<Objective> {
         let bounds = bounds_of(&parameters.lb, &parameters.ub, self.rows.trains)?;
-        let ConeR { lambdas, kappa, norm, .. } = *parameters;
+        let ConeR { lambdas, kappa, norm, form_b, .. } = *parameters;
         let choice = Choice {
             lambdas,
             kappa,
             norm,
+            form_b,
             divisors: (parameters.divide_b_by, parameters.divide_c_by, parameters.divide_d_by),
             sides: (parameters.sides_b, parameters.sides_c),
         };
@@ -354,13 +359,14 @@ impl ConeRProblem {
         let within = weights.iter().zip(objective.bounds.lower.iter().zip(&objective.bounds.upper));
         let weights = Some(within.map(|(w, (&low, &high))| (w / self.statement.unit).clamp(low, high)).collect());
         let Some(multipliers) = multipliers else { return Ok(WarmStart { weights, multipliers: None }) };
-        let (silent, all) = (self.rows.silent.len(), self.rows());
+        let program = self.rows.program(objective);
+        let all = program.rows();
         let mut shares = vec![0.0; all];
         for (&row, &share) in multipliers.rows.iter().zip(&multipliers.values) {
             let Some(entry) = shares.get_mut(row) else {
                 return Err(problem!("start"; ": has a multiplier of row {row}, but there are only {all} rows"));
             };
-            let low = if row < silent { 0.0 } else { objective.kink_of_c().1 };
+            let low = program.least_share(row);
             if !(low <= share && share <= low + 1.0) {
                 return Err(problem!(
                     "start"; ": the multiplier of row {row} is {share}; must be from {low} to {}",

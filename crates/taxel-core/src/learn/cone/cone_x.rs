@@ -13,7 +13,7 @@ use super::shortest::{RowGenerationEnd, Shortest};
 use crate::allowed::Range;
 use crate::learn::fit::{Fit, Round, Status};
 use crate::learn::statement::{
-    Bounds, Certificate, Choice, Divisor, DivisorC, DivisorD, Margin, NOTHING, Norm, Objective, OneOrEach, Parts, Row,
+    Bounds, Certificate, Choice, Divisor, DivisorC, DivisorD, FormB, Margin, Norm, Objective, OneOrEach, Parts, Row,
     Sides, StatedRow, Statement, bounds_of, check_bounds, check_examples, check_some_target, end_of, largest,
     relative_gap,
 };
@@ -46,6 +46,8 @@ parameters! {
         pub lb: OneOrEach = OneOrEach::All(-0.3), "mV", Range::FINITE;
         /// Largest weight, mV, one for all or one per synapse.
         pub ub: OneOrEach = OneOrEach::All(0.3), "mV", Range::FINITE;
+        /// How the distances after the targets add up in B.
+        pub form_b: FormB = FormB::Square;
         /// The normaliser of B.
         pub divide_b_by: Divisor = Divisor::Largest;
         /// Whether the l2 term is the norm or its square.
@@ -194,6 +196,7 @@ impl ConeXProblem {
             lambdas: [l1, l2, b, 0.0, 0.0],
             kappa: parameters.kappa,
             norm: parameters.norm,
+            form_b: parameters.form_b,
             divisors: (parameters.divide_b_by, DivisorC::default(), DivisorD::default()),
             sides: (Sides::Both, Sides::Both),
         };
@@ -380,9 +383,7 @@ impl Exact {
         let parts = self.parts(&weights);
         let objective = parts.sum();
         let gap = relative_gap(objective, least);
-        let lifts = self.targets.thresholds.iter().map(|threshold| (self.objective.kappa * threshold).powi(2));
-        let nothing = NOTHING * self.objective.b * lifts.sum::<f64>();
-        let known = gap <= self.tolerance || objective - least <= nothing;
+        let known = gap <= self.tolerance || objective - least <= self.objective.nothing_of_b(&self.targets);
         let status = match unmet {
             None if known => Status::Solved,
             None => Status::Feasible,

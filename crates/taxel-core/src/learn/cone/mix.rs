@@ -5,10 +5,10 @@ use std::collections::HashSet;
 
 use super::cone_r::GapMultipliers;
 use super::exact::{BestWeights, Exact, MET, MOST_ROUNDS, Slopes};
-use crate::learn::engines::{Between, HardRows, Reached, nearest};
+use crate::learn::engines::{ACCURACY, Between, FINEST, HardRows, Reached, nearest};
 use crate::learn::fit::{Left, Round};
 use crate::learn::statement::{
-    Bounds, NOTHING, Objective, Point, Program, Proof, Row, Rows, SilencePeak, Targets, largest,
+    Bounds, FormB, Objective, Point, Program, Proof, Row, Rows, Sides, SilencePeak, Targets, largest,
 };
 use crate::vectors::dot;
 use crate::{Result, Stop};
@@ -23,23 +23,6 @@ const NEAR_SHARE: f64 = 1e-4;
 const ENOUGH: f64 = 0.3;
 const SMALLER: f64 = 0.1;
 const LEAST: f64 = 1e-4;
-/// A round is solved to this share of the gap, but no finer than for a gap of this share of the tolerance.
-const ACCURACY: f64 = 0.03;
-const FINEST: f64 = 1e-2;
-/// How far kinks are smoothed at first, in thresholds.
-const SMOOTH_FROM: f64 = 0.1;
-/// The curvature of the proximal term relative to the smoothing at first, and the factor of each round that proves
-/// little more, and its least value: where the objective is nearly flat, steps must grow.
-const NEAR_CENTRE: f64 = 10.0;
-const FARTHER: f64 = 0.1;
-const FARTHEST: f64 = 1e-9;
-/// The strength of the terms that hold weights at 0 and at their bounds, as a share of the targets' pull, and its factor
-/// after each round that proves little more: the multipliers of hard rows move far, and stiff terms take twice as many
-/// steps.
-const HELD_SHARE: f64 = 0.1;
-const STIFFER: f64 = 3.0;
-/// The number of rounds without a smaller gap after which the search ends.
-const MOST_IDLE: usize = 15;
 /// Rows within this many times the largest violation of their limit count when weights are moved to satisfy every row.
 const AT_LIMIT: f64 = 30.0;
 /// A row of silence this close before a target, in `tau`, is nearly parallel to the target's row.
@@ -62,27 +45,20 @@ impl Exact {
             return Ok(best);
         }
         let objective = &self.objective.scaled(1.0 / scale).within_reach(1.0);
-        let lifts = self.targets.thresholds.iter().map(|threshold| (objective.kappa * threshold).powi(2));
-        let nothing = NOTHING * objective.b * lifts.sum::<f64>();
+        let nothing = objective.nothing_of_b(&self.targets);
         let theta_0 = self.statement.neuron.theta_0;
         let trains = self.statement.trains;
-        let gram = if objective.b > 0.0 { self.targets.gram(stop)? } else { vec![0.0; trains * trains] };
+        let squares = objective.b > 0.0 && objective.form_b == FormB::Square;
+        let gram = if squares { self.targets.gram(stop)? } else { vec![0.0; trains * trains] };
         let mut rows = Written::new(self, &best, start)?;
-        let mut state = Between {
-            weights: best.weights.clone(),
-            multipliers: rows.multipliers(),
-            held: None,
-            smoothing: SMOOTH_FROM,
-            nearness: NEAR_CENTRE,
-            held_share: HELD_SHARE,
-        };
+        let mut state = Between::at(best.weights.clone(), rows.multipliers());
         // Where the difference is `nothing`, the gap is the tolerance.
         let gap_of = |value: f64, bound: f64| {
             let gap = (value - bound).max(0.0) / value.max(nothing / self.tolerance);
             if gap.is_nan() { f64::INFINITY } else { gap }
         };
         let finest = FINEST * self.tolerance;
-        let (mut value, mut aim, mut least_gap, mut idle) = (1.0, ENOUGH * self.tolerance, f64::INFINITY, 0);
+        let (mut value, mut aim) = (1.0, ENOUGH * self.tolerance);
         loop {
             best.rounds += 1;
             let program = Program {
@@ -91,11 +67,11 @@ impl Exact {
                 targets: &self.targets,
                 gram: &gram,
                 objective,
-                slopes: [[0.0, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]],
+                slopes: [[0.0, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY], Sides::Both.slopes(objective.b)],
                 theta_0,
             };
             let accuracy = ACCURACY * (value - best.least / scale).max(finest * value.max(nothing / self.tolerance));
-            let Reached { point, value: reached, mut proof, state: next, stopped } =
+            let Reached { point, value: reached, mut proof, state: next, stopped, .. } =
                 program.round(state, accuracy, stop);
             (state, value) = (next, reached);
             proof.divide(1.0 / scale, 1.0);
@@ -103,13 +79,7 @@ impl Exact {
                 (best.least, best.proof) = (proof.bound, rows.name(proof, &self.targets));
             }
             let gap = gap_of(value, best.least / scale);
-            idle = if gap < 0.9 * least_gap { 0 } else { idle + 1 };
-            if idle > 0 {
-                state.nearness = (FARTHER * state.nearness).max(FARTHEST);
-                state.held_share = (STIFFER * state.held_share).min(1.0);
-            }
-            least_gap = least_gap.min(gap);
-            let ended = stopped || best.rounds >= MOST_ROUNDS || idle > MOST_IDLE;
+            let ended = state.is_idle(gap) || stopped || best.rounds >= MOST_ROUNDS;
             let meets = if gap <= aim || ended { rows.meet(objective, &self.targets, &point, stop)? } else { None };
             let met = meets.as_ref().unwrap_or(&point.weights);
             let tolerance = if gap > NEAR { NEAR_SHARE * theta_0 } else { self.rounding(met) };
@@ -121,7 +91,7 @@ impl Exact {
             let more = rows.add(self, met, &broken)?;
             state.multipliers = rows.multipliers();
             if more {
-                least_gap = f64::INFINITY;
+                state.least_gap = f64::INFINITY;
             }
             if !more
                 && self.worst_target(met) <= MET
@@ -149,7 +119,7 @@ impl Exact {
     }
 }
 
-/// The working set, as coefficients, with the multipliers of its rows and of the targets.
+/// The working set, as coefficients, with the multipliers of its rows, and of the targets and the rows after them.
 struct Written {
     coefficients: Vec<f64>,
     limit: Vec<f64>,
@@ -281,7 +251,8 @@ impl Written {
         self.of_rows = std::mem::take(multipliers);
     }
 
-    /// The nearest weights that satisfy all rows: those that are 0 stay 0 if that can be.
+    /// The nearest weights that satisfy all rows: those that are 0 stay 0, and the sums of B that are met stay met, if
+    /// that can be.
     fn meet(
         &self,
         objective: &Objective,
@@ -290,21 +261,35 @@ impl Written {
         stop: Stop<'_>,
     ) -> Result<Option<Vec<f64>>> {
         let n = point.weights.len();
-        let worst = largest(point.excess.iter().copied().chain([0.0]));
-        let near = |k: &usize| point.excess[*k] >= -AT_LIMIT * worst;
+        let hard = &point.excess[..self.names.len() + targets.len()];
+        let worst = largest(hard.iter().copied().chain([0.0]));
+        let (rows, stored) = point.excess.split_at(self.names.len());
+        let after = stored[targets.len()..].iter().enumerate();
+        let (mut at, mut wanted) = (targets.at.clone(), targets.thresholds.clone());
+        for (k, _) in after.filter(|(_, x)| x.abs() <= AT_LIMIT * worst) {
+            at.extend_from_slice(targets.row(k).behind);
+            wanted.push(objective.kappa * targets.thresholds[k]);
+        }
+        let near = |k: &usize| rows[*k] >= -AT_LIMIT * worst;
         let near: Vec<usize> = (0..self.names.len()).filter(near).collect();
         let limit: Vec<f64> = near.iter().map(|&k| self.limit[k]).collect();
         let below = Rows::Written(&self.coefficients).coefficients(&near, n);
-        let rows = HardRows { equal: &targets.at, equal_to: &targets.thresholds, below: &below, limit: &limit };
+        let alone = HardRows { equal: &targets.at, equal_to: &targets.thresholds, below: &below, limit: &limit };
+        let all = HardRows { equal: &at, equal_to: &wanted, ..alone };
         let Bounds { lower, upper } = &objective.bounds;
         let held = |bounds: &[f64]| -> Vec<f64> {
             let held = bounds.iter().zip(&point.weights);
             held.map(|(&bound, &w)| if w == 0.0 && objective.l1 > 0.0 { 0.0 } else { bound }).collect()
         };
-        if let Some(found) = nearest(&point.weights, &rows, &held(lower), &held(upper), stop)? {
-            return Ok(Some(found));
+        let (low, high) = (held(lower), held(upper));
+        for rows in [all, alone].iter().skip(usize::from(wanted.len() == targets.len())) {
+            for (lower, upper) in [(&low, &high), (lower, upper)] {
+                if let Some(found) = nearest(&point.weights, rows, lower, upper, stop)? {
+                    return Ok(Some(found));
+                }
+            }
         }
-        nearest(&point.weights, &rows, lower, upper, stop)
+        Ok(None)
     }
 
     /// The nonzero multipliers of a proof, by the names of their rows; those of a difference go to both of its rows.

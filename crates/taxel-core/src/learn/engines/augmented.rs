@@ -5,7 +5,9 @@
 //! fixed and every kink smoothed over `delta` mV, the objective is differentiable, and its curvature comes only from the
 //! few rows on their smoothed kinks, the only rows that are ever written out. All other rows enter by one sweep over the
 //! grid (the potential) and one back (a weighted sum of rows). After each round every multiplier is set to the slope
-//! found and `delta` shrinks, until a lower bound proves the objective.
+//! found and `delta` shrinks, until a lower bound proves the objective. How steeply the slope of a smoothed row changes
+//! follows from the range of its multipliers; where these rounds stall, as that range is far wider than the multipliers
+//! are large, it follows from the multipliers found.
 
 mod bound;
 mod line_search;
@@ -28,17 +30,21 @@ const WARM_FROM: f64 = 0.002;
 /// The factor by which a round reduces the smoothing, and its least value in thresholds.
 const SHRINK: f64 = 0.25;
 const SHARPEST: f64 = 1e-8;
-/// Those of hard rows; a round that is not solved in `STEPS_HARD` steps is begun anew with `BLUNTER` times its
-/// smoothing, because slopes of unsolved rounds may be far off.
-const SHRINK_HARD: f64 = 0.5;
-const SHARPEST_HARD: f64 = 1e-9;
-const STEPS_HARD: usize = 40;
+/// Those of rounds by the multipliers, the first of which smooths by `SMOOTH_FROM`; a round that is not solved in
+/// `STEPS_WHOLE` steps is begun anew with `BLUNTER` times its smoothing, because slopes of unsolved rounds may be far off;
+/// over soft rows it goes on with the smoothing of the round before, nearer to where it ended.
+const SMOOTH_FROM: f64 = 0.1;
+const SHRINK_WHOLE: f64 = 0.5;
+const SHARPEST_WHOLE: f64 = 1e-9;
+const STEPS_WHOLE: usize = 40;
 const BLUNTER: f64 = 8.0;
-/// A round counts as solved at this many times its accuracy if `STEPS_HARD` steps end there: rounding leaves no more.
+/// A round counts as solved at this many times its accuracy if `STEPS_WHOLE` steps end there: rounding leaves no more.
 const ROUGH: f64 = 1e3;
+/// Over soft rows also to no more than this share of the objective.
+const ROUGH_SHARE: f64 = 1e-3;
 /// Kinks stay as smooth as they are while the distances from their limits cost less than this share of the accuracy.
 const ENOUGH_MET: f64 = 0.1;
-/// The least change of a hard row's multiplier over its smoothing, as a share of what the objective is per threshold and
+/// The least change of a multiplier over its row's smoothing in rounds by the multipliers, as a share of what the objective is per threshold and
 /// target: all multipliers vanish where B can be met exactly.
 const LEAST_UNIT: f64 = 1e-3;
 /// The norm is smoothed below a length of this share of the weights' scale times the smoothing of the targets in
@@ -48,6 +54,22 @@ const SHORT: f64 = 1e-2;
 /// that of the proximal term.
 const HELD_SHARE: f64 = 1.0;
 const CENTRE_SHARE: f64 = 1e-3;
+/// In rounds by the multipliers, the curvature of the proximal term relative to the smoothing at first, and the factor
+/// of each round that proves little more, and its least value: where the objective is nearly flat, steps must grow.
+const NEAR_CENTRE: f64 = 10.0;
+const FARTHER: f64 = 0.1;
+const FARTHEST: f64 = 1e-9;
+/// There the share of the targets' pull that holds weights at 0 and at their bounds at first, and its factor after each
+/// round that proves little more: the multipliers move far, and stiff terms take twice as many steps.
+const HELD_LESS: f64 = 0.1;
+const STIFFER: f64 = 3.0;
+/// The number of such rounds without a smaller gap after which the search ends.
+const MOST_IDLE: usize = 15;
+/// The most rounds in all.
+const MOST_ROUNDS: usize = 300;
+/// A round is solved to this share of the gap, but no finer than for a gap of this share of the tolerance.
+pub(crate) const ACCURACY: f64 = 0.03;
+pub(crate) const FINEST: f64 = 1e-2;
 /// The largest number of Newton steps in a round, and of rounds.
 const STEPS: usize = 12;
 const ROUNDS: usize = 60;
@@ -65,22 +87,52 @@ pub(crate) struct WarmStart {
     pub(crate) multipliers: Option<Vec<f64>>,
 }
 
-/// The state between two rounds over hard rows; rows may come in between.
+/// The state between two rounds by the multipliers; hard rows may come in between.
 #[derive(Debug, Clone)]
 pub(crate) struct Between {
     pub(crate) weights: Vec<f64>,
     pub(crate) multipliers: Vec<f64>,
     /// The multipliers of l1 and of the bounds; none before the first round.
-    pub(crate) held: Option<Vec<f64>>,
+    held: Option<Vec<f64>>,
     /// How far the kinks are smoothed, in thresholds.
-    pub(crate) smoothing: f64,
+    smoothing: f64,
     /// The curvature of the proximal term relative to the smoothing.
-    pub(crate) nearness: f64,
-    /// As [`HELD_SHARE`], over hard rows.
-    pub(crate) held_share: f64,
+    nearness: f64,
+    /// As [`HELD_SHARE`].
+    held_share: f64,
+    /// The least gap so far, and the number of rounds since.
+    pub(crate) least_gap: f64,
+    idle: usize,
 }
 
-/// The end of a round over hard rows.
+impl Between {
+    /// The state before the first round.
+    pub(crate) fn at(weights: Vec<f64>, multipliers: Vec<f64>) -> Self {
+        Self {
+            weights,
+            multipliers,
+            held: None,
+            smoothing: SMOOTH_FROM,
+            nearness: NEAR_CENTRE,
+            held_share: HELD_LESS,
+            least_gap: f64::INFINITY,
+            idle: 0,
+        }
+    }
+
+    /// Takes note of the gap that a round proved; returns whether too many rounds proved little more.
+    pub(crate) fn is_idle(&mut self, gap: f64) -> bool {
+        self.idle = if gap < 0.9 * self.least_gap { 0 } else { self.idle + 1 };
+        if self.idle > 0 {
+            self.nearness = (FARTHER * self.nearness).max(FARTHEST);
+            self.held_share = (STIFFER * self.held_share).min(1.0);
+        }
+        self.least_gap = self.least_gap.min(gap);
+        self.idle > MOST_IDLE
+    }
+}
+
+/// The end of a round by the multipliers.
 pub(crate) struct Reached {
     /// Weights that violate the rows by about the accuracy reached.
     pub(crate) point: Point,
@@ -88,6 +140,10 @@ pub(crate) struct Reached {
     pub(crate) value: f64,
     pub(crate) proof: Proof,
     pub(crate) state: Between,
+    /// The number of rows on their kinks.
+    rows: usize,
+    /// Whether it was solved to the accuracy.
+    solved: bool,
     pub(crate) stopped: bool,
 }
 
@@ -113,9 +169,9 @@ struct Lagrangian<'a> {
     held: Vec<f64>,
     /// The weights at the beginning of the round, the centre of the proximal term.
     centre: Vec<f64>,
-    /// The change of a multiplier, and the smoothing of the kinks, mV, over which it takes place: silence, targets.
-    unit: [f64; 2],
-    delta: [f64; 2],
+    /// The change of a multiplier, and the smoothing of the kinks, mV, over which it takes place, by kind of row.
+    unit: [f64; 3],
+    delta: [f64; 3],
     /// The least value of the objective so far.
     most: f64,
     /// The scale of differences between weights, mV: the bounds, unless they are far wider than the targets need.
@@ -183,37 +239,74 @@ impl Program<'_> {
                 engine.samples = false;
             }
         }
-        Found { best, proof, rounds, rows, multipliers: engine.multipliers, stopped }
+        let found = Found { best, proof, rounds, rows, multipliers: engine.multipliers, stopped };
+        if stopped { found } else { self.by_multipliers(found, tolerance, progress, stop) }
     }
 
-    /// One round over hard rows, solved until the objective (scaled so that it is about 1) could fall by `accuracy` at
-    /// most.
+    /// Continues by rounds that follow the multipliers until the relative gap is `tolerance`, or until progress ends.
+    fn by_multipliers(
+        &self,
+        mut found: Found,
+        tolerance: f64,
+        progress: &mut dyn FnMut(usize, usize, f64, f64),
+        stop: Stop<'_>,
+    ) -> Found {
+        let mut state = Between::at(found.best.weights.clone(), found.proof.multipliers.clone());
+        let (mut gap, mut ended) = (found.best.gap(found.proof.bound), false);
+        while gap > tolerance && !ended {
+            let least = found.best.parts.sum();
+            let accuracy = ACCURACY * (least - found.proof.bound).max(FINEST * tolerance * least);
+            let Reached { point, proof, state: next, rows, solved, stopped, .. } = self.round(state, accuracy, stop);
+            state = next;
+            found.proof.improve(proof);
+            if point.parts.sum() < least {
+                found.best = point;
+            }
+            found.multipliers.clone_from(&state.multipliers);
+            (found.rounds, found.rows, found.stopped) = (found.rounds + 1, rows, stopped);
+            gap = found.best.gap(found.proof.bound);
+            ended = stopped || found.rounds >= MOST_ROUNDS || solved && state.is_idle(gap);
+            progress(found.rounds, rows, found.best.parts.sum(), gap);
+        }
+        found
+    }
+
+    /// One round by the multipliers, solved until the objective (scaled so that it is about 1) could fall by `accuracy`
+    /// at most.
     pub(crate) fn round(&self, mut state: Between, accuracy: f64, stop: Stop<'_>) -> Reached {
         let at = self.point(state.weights.clone());
+        let rough = if self.is_hard() { f64::INFINITY } else { ROUGH_SHARE * at.parts.sum() };
         let mut engine = Lagrangian::with(self, at, state.multipliers.clone());
+        engine.follow_multipliers();
         engine.smooth(&state);
         match &state.held {
             Some(held) => engine.held.clone_from(held),
             None => engine.balance_multipliers(),
         }
-        let reached = engine.steps(STEPS_HARD, accuracy, stop) || engine.slope().0 <= ROUGH * accuracy;
+        let solved = engine.steps(STEPS_WHOLE, accuracy, stop) || engine.slope().0 <= rough.min(ROUGH * accuracy);
+        let rows = engine.inside.len();
         let point = self.point(engine.candidate());
         let proof = engine.proof();
         let missed = engine.missed(&point);
         let value = point.parts.sum() + missed;
-        if reached {
+        if solved {
             engine.end_round();
             let Lagrangian { weights, multipliers, held, .. } = engine;
-            let smoothing = if missed > ENOUGH_MET * accuracy {
-                (SHRINK_HARD * state.smoothing).max(SHARPEST_HARD)
+            let soft = !self.is_hard() || self.sums() > 0;
+            let smoothing = if soft || missed > ENOUGH_MET * accuracy {
+                (SHRINK_WHOLE * state.smoothing).max(SHARPEST_WHOLE)
             } else {
                 state.smoothing
             };
             state = Between { weights, multipliers, held: Some(held), smoothing, ..state };
-        } else {
+        } else if self.is_hard() {
             state.smoothing *= BLUNTER;
+        } else {
+            state.weights = engine.weights;
+            state.smoothing /= SHRINK_WHOLE;
+            state.nearness = (state.nearness / FARTHER).min(NEAR_CENTRE);
         }
-        Reached { point, value, proof, state, stopped: stop.asked() }
+        Reached { point, value, proof, state, rows, solved, stopped: stop.asked() }
     }
 }
 
@@ -222,7 +315,7 @@ impl<'a> Lagrangian<'a> {
         let at = start.weights.map_or_else(|| zero.clone(), |weights| program.point(weights));
         let warm = start.multipliers.is_some();
         let mut engine = Self::with(program, at, start.multipliers.unwrap_or_default());
-        let from = if warm { [WARM_FROM; 2] } else { [SILENCE_FROM, TARGETS_FROM] };
+        let from = if warm { [WARM_FROM; 3] } else { [SILENCE_FROM, TARGETS_FROM, TARGETS_FROM] };
         engine.delta = from.map(|from| from * program.theta_0);
         engine.sigma = if warm { 500.0 } else { 1.0 } * engine.size(HELD_SHARE);
         engine.rho = if warm { 1e-3 } else { 0.1 } * engine.size(CENTRE_SHARE);
@@ -236,14 +329,6 @@ impl<'a> Lagrangian<'a> {
     fn with(program: &'a Program<'a>, at: Point, mut multipliers: Vec<f64>) -> Self {
         let (n, objective) = (program.trains(), program.objective);
         multipliers.resize(program.rows(), 0.0);
-        let unit = if program.is_hard() {
-            let squares: f64 = multipliers.iter().map(|m| m * m).sum();
-            let count = multipliers.iter().filter(|m| **m != 0.0).count();
-            let least = LEAST_UNIT / (program.theta_0 * program.targets.len() as f64);
-            [if squares > 0.0 { (squares / count as f64).sqrt().max(least) } else { 1.0 }; 2]
-        } else {
-            program.slopes.map(|[low, high]| if low < high { high - low } else { 1.0 })
-        };
         let bounds = &objective.bounds;
         let widest = bounds.upper.iter().zip(&bounds.lower).fold(0.0_f64, |m, (u, l)| m.max(u.max(-l)));
         let zero = program.nearest_to_zero();
@@ -258,18 +343,28 @@ impl<'a> Lagrangian<'a> {
             factors: vec![0.0; multipliers.len()],
             multipliers,
             held: vec![0.0; n],
-            unit,
-            delta: [program.theta_0; 2],
+            unit: program.slopes.map(|[low, high]| if low < high { high - low } else { 1.0 }),
+            delta: [program.theta_0; 3],
             most: f64::INFINITY,
             width,
             sigma: 1.0,
             rho: 1.0,
             gradient: vec![0.0; n],
             inside: vec![],
-            samples: !program.is_hard(),
+            samples: true,
             hessian: vec![0.0; n * n],
             memory: MemBuffer::new(scratch),
         }
+    }
+
+    /// Sets by how much multipliers change over the smoothing to their root mean square, within their ranges.
+    fn follow_multipliers(&mut self) {
+        let squares: f64 = self.multipliers.iter().map(|m| m * m).sum();
+        let count = self.multipliers.iter().filter(|m| **m != 0.0).count();
+        let least = LEAST_UNIT / (self.program.theta_0 * self.program.targets.len() as f64);
+        let mean = if squares > 0.0 { (squares / count as f64).sqrt().max(least) } else { 1.0 };
+        self.unit = self.unit.map(|range| range.min(mean));
+        self.samples = false;
     }
 
     /// The scale of `sigma` and `rho`: the slope of the l1 and l2 terms at a synapse, or a share of the targets' pull,
@@ -278,9 +373,12 @@ impl<'a> Lagrangian<'a> {
         let (program, objective, n) = (self.program, self.program.objective, self.weights.len() as f64);
         self.slopes();
         let mut pull = vec![0.0; self.weights.len()];
-        let of_targets = &self.factors[program.limit.len()..];
-        for (target, factor) in program.targets.iter().zip(of_targets) {
-            add(&mut pull, factor.abs().max(objective.c), target.at);
+        let silent = program.limit.len();
+        for (k, ((row, _), factor)) in program.stored().zip(&self.factors[silent..]).enumerate() {
+            let most = [objective.c, objective.b][program.kind(silent + k) - 1];
+            add(&mut pull, factor.abs().max(most), row);
+        }
+        for target in program.targets.iter().take(self.behind.len()) {
             add(&mut pull, 2.0 * objective.b * objective.kappa * target.threshold, target.behind);
         }
         let most = (dot(&pull, &pull) / n).sqrt();
@@ -289,7 +387,7 @@ impl<'a> Lagrangian<'a> {
 
     /// Sets the smoothing of hard rows, and the other terms accordingly.
     fn smooth(&mut self, state: &Between) {
-        self.delta = [state.smoothing * self.program.theta_0; 2];
+        self.delta = [state.smoothing * self.program.theta_0; 3];
         self.sigma = SILENCE_FROM / state.smoothing * self.size(state.held_share);
         self.rho = state.nearness * state.smoothing * self.size(CENTRE_SHARE);
     }
@@ -311,18 +409,17 @@ impl<'a> Lagrangian<'a> {
         reached
     }
 
-    /// How steeply the slope of a smoothed row changes: silence, targets.
-    fn steep(&self) -> [f64; 2] {
+    /// How steeply the slope of a smoothed row changes, by kind of row.
+    fn steep(&self) -> [f64; 3] {
         std::array::from_fn(|kind| self.unit[kind] / self.delta[kind])
     }
 
     /// Computes the slope of each smoothed row.
     fn slopes(&mut self) {
         let (program, steep) = (self.program, self.steep());
-        let silent = program.limit.len();
         let rows = self.factors.iter_mut().zip(&self.excess).zip(&self.multipliers);
         for (k, ((factor, &x), &multiplier)) in rows.enumerate() {
-            let kind = usize::from(k >= silent);
+            let kind = program.kind(k);
             let [low, high] = program.slopes[kind];
             *factor = (multiplier + x * steep[kind]).clamp(low, high);
         }
@@ -415,8 +512,9 @@ impl<'a> Lagrangian<'a> {
 
     /// What the slopes of the hard rows count their distances from their limits as, at a point.
     fn missed(&self, at: &Point) -> f64 {
-        let counted = self.factors.iter().zip(&at.excess).filter(|(factor, _)| **factor != 0.0);
-        counted.map(|(factor, x)| (factor * x).abs()).sum()
+        let hard = |row: &usize| self.program.slopes[self.program.kind(*row)][1].is_infinite();
+        let counted = (0..self.factors.len()).filter(|row| hard(row) && self.factors[*row] != 0.0);
+        counted.map(|row| (self.factors[row] * at.excess[row]).abs()).sum()
     }
 
     /// Ends a round: sets the multipliers to the slopes found.

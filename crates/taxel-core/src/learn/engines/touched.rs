@@ -32,26 +32,26 @@ impl Relaxed {
         stop: Stop<'_>,
     ) -> Result<bool> {
         let (silent, theta) = (self.silent.len(), self.theta_0);
-        if found.gap > tolerance || found.shares.len() != silent + self.targets.len() {
+        let program = self.program(objective);
+        if found.gap > tolerance || found.shares.len() != program.rows() {
             return Ok(false);
         }
-        let program = self.program(objective);
         let excess = program.point(found.weights.clone()).excess;
-        let within = |row: usize, low: f64| {
-            let share = found.shares[row] - low;
+        let within = |row: usize| {
+            let share = found.shares[row] - program.least_share(row);
             excess[row].abs() <= NEARLY_MET * theta && share > WITHIN && share < 1.0 - WITHIN
         };
-        let (_, low) = objective.kink_of_c();
-        let targets: Vec<usize> = (0..self.targets.len()).filter(|k| within(silent + k, low)).collect();
-        let touched = |row: &usize| within(*row, 0.0) || (-BELOW..WITHIN).contains(&(excess[*row] / theta));
+        let targets: Vec<usize> = (0..program.rows() - silent).filter(|k| within(silent + k)).collect();
+        let touched = |row: &usize| within(*row) || (-BELOW..WITHIN).contains(&(excess[*row] / theta));
         let rows: Vec<usize> = (0..silent).filter(touched).collect();
         let met = targets.iter().all(|k| excess[silent + k].abs() <= 0.1 * self.touch);
         let off = rows.iter().all(|row| excess[*row] <= -0.5 * BELOW * theta);
         if met && off || targets.len() + rows.len() > MOST_TOUCHED * self.trains {
             return Ok(false);
         }
-        let equal: Vec<f64> = targets.iter().flat_map(|k| self.targets.row(*k).at.iter().copied()).collect();
-        let equal_to: Vec<f64> = targets.iter().map(|k| self.targets.thresholds[*k]).collect();
+        let equal: Vec<f64> = targets.iter().flat_map(|k| program.stored_row(*k).iter().copied()).collect();
+        let wanted: Vec<f64> = program.stored().map(|(_, wanted)| wanted).collect();
+        let equal_to: Vec<f64> = targets.iter().map(|k| wanted[*k]).collect();
         let below = self.silent.coefficients(&rows);
         let limit: Vec<f64> = rows.iter().map(|row| self.silent.limit[*row] - BELOW * theta).collect();
         let all = HardRows { equal: &equal, equal_to: &equal_to, below: &below, limit: &limit };

@@ -78,16 +78,17 @@ impl OnlineConeR {
             self.problem = ConeRProblem::without_patterns(parameters, pattern.len());
         }
         let problem = &mut self.problem;
-        let silent = problem.silent_and_free_rows();
+        let [_, before] = problem.rows_by_kind();
         problem.check_trains(self.added, pattern)?;
         problem.push(pattern, PatternDemand { targets, silence, end }, stop)?;
-        let rows = problem.silent_and_free_rows() - silent;
-        let gone = (self.added >= self.window).then(|| problem.drop_first());
+        let mut gone = [0; 3];
+        if self.added >= self.window {
+            [gone, _] = problem.rows_by_kind();
+            problem.drop_first();
+        }
         if let Some((_, shares)) = &mut self.last {
-            shares.make_room(silent, rows);
-            if let Some((rows, targets)) = gone {
-                shares.drop_first(rows, problem.silent_and_free_rows(), targets);
-            }
+            let [_, after] = problem.rows_by_kind();
+            shares.renumber(before, gone, after);
         }
         self.added += 1;
         Ok(())
@@ -111,23 +112,19 @@ impl OnlineConeR {
 }
 
 impl Shares {
-    /// Removes the entries of the first pattern's `rows` and `targets`, and renumbers the others; `silent` silent rows
-    /// remain.
-    fn drop_first(&mut self, rows: usize, silent: usize, targets: usize) {
+    /// Removes the entries of the first `gone` rows of each kind, and renumbers the others for `after` rows a kind.
+    fn renumber(&mut self, before: [usize; 3], gone: [usize; 3], after: [usize; 3]) {
         let mut kept = Self::default();
         for (&row, &value) in self.rows.iter().zip(&self.values) {
-            let target = row >= silent + rows;
-            let gone = if target { row < silent + rows + targets } else { row < rows };
-            if !gone {
-                kept.rows.push(row - rows - if target { targets } else { 0 });
+            let (mut kind, mut place, mut first) = (0, row, 0);
+            while place >= before[kind] {
+                (place, first, kind) = (place - before[kind], first + after[kind], kind + 1);
+            }
+            if place >= gone[kind] {
+                kept.rows.push(first + place - gone[kind]);
                 kept.values.push(value);
             }
         }
         *self = kept;
-    }
-
-    /// Renumbers the targets after `rows` silent rows were added to the `silent` present ones.
-    fn make_room(&mut self, silent: usize, rows: usize) {
-        self.rows.iter_mut().filter(|row| **row >= silent).for_each(|row| *row += rows);
     }
 }

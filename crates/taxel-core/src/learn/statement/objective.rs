@@ -51,6 +51,27 @@ pub enum Sides {
     Below,
 }
 
+impl Sides {
+    /// The slopes below and above a kink whose distances cost `factor` each.
+    pub(crate) fn slopes(self, factor: f64) -> [f64; 2] {
+        [-factor, if self == Self::Both { factor } else { 0.0 }]
+    }
+}
+
+/// How distances add up in B.
+///
+/// Reading: 6.10 prints squares, whose pull vanishes near `kappa` thresholds; under the sum of the distances a large
+/// factor ensures them, as 6.6.2 says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FormB {
+    /// The sum of their squares, as printed.
+    #[default]
+    Square,
+    /// Their sum.
+    Sum,
+}
+
 /// Whether the l2 term is the norm, as printed, or its square.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -70,7 +91,7 @@ pub struct Parts {
     pub l1: f64,
     /// The length of the weights, or its square.
     pub l2: f64,
-    /// The squared distance of the potential after the targets to `kappa` thresholds (6.10).
+    /// The squared distances of the potential after the targets to `kappa` thresholds (6.10), or the distances.
     pub B: f64,
     /// The distances of the potential to the threshold at the targets (6.12).
     pub C: f64,
@@ -95,6 +116,7 @@ pub(crate) struct Objective {
     /// The potential that B aims at after a target, in thresholds.
     pub(crate) kappa: f64,
     pub(crate) norm: Norm,
+    pub(crate) form_b: FormB,
     pub(crate) sides_b: Sides,
     pub(crate) sides_c: Sides,
     pub(crate) bounds: Bounds,
@@ -107,6 +129,7 @@ pub(crate) struct Choice {
     pub(crate) lambdas: [f64; 5],
     pub(crate) kappa: f64,
     pub(crate) norm: Norm,
+    pub(crate) form_b: FormB,
     /// The divisors of B, C and D.
     pub(crate) divisors: (Divisor, DivisorC, DivisorD),
     /// The sides that count in B and in C.
@@ -130,16 +153,17 @@ impl Objective {
         unit: f64,
         d_max: impl FnOnce(&[f64]) -> f64,
     ) -> Self {
-        let Choice { lambdas, kappa, norm, divisors: (of_b, of_c, of_d), sides: (sides_b, sides_c) } = choice;
+        let Choice { lambdas, kappa, norm, form_b, divisors: (of_b, of_c, of_d), sides: (sides_b, sides_c) } = choice;
+        let power = if form_b == FormB::Square { 2 } else { 1 };
         let sum: f64 = lambdas.iter().sum();
         let [l1, l2, b, c, d] = lambdas.map(|l| if sum > 0.0 { l / sum } else { 0.0 });
         let most: Vec<f64> = bounds.lower.iter().zip(&bounds.upper).map(|(l, u)| l.abs().max(u.abs())).collect();
         let over = |share: f64, most: f64| if most > 0.0 { share / most } else { 0.0 };
         let reach = |row: &[f64]| dot(&row.iter().map(|a| a.abs()).collect::<Vec<f64>>(), &most);
-        let lifted = |row: TargetRow<'_>| (reach(row.behind) + kappa * row.threshold).powi(2);
+        let lifted = |row: TargetRow<'_>| (reach(row.behind) + kappa * row.threshold).powi(power);
         let missed = |row: TargetRow<'_>| reach(row.at) + row.threshold;
         let square = dot(&most, &most) + dot(silent, silent);
-        // The number of targets has no unit, so these terms scale with the unit of potentials; B is a sum of squares.
+        // The number of targets has no unit, so these terms scale with the unit of potentials, or with its square.
         let count = targets.len() as f64;
         Self {
             l1: over(l1, most.iter().chain(silent).sum()),
@@ -149,7 +173,7 @@ impl Objective {
             },
             b: match of_b {
                 Divisor::Largest => over(b, targets.iter().map(lifted).sum()),
-                Divisor::Targets => over(b, count) * unit.powi(2),
+                Divisor::Targets => over(b, count) * unit.powi(power),
             },
             c: match of_c {
                 DivisorC::Largest if c > 0.0 => over(c, targets.iter().map(missed).sum()),
@@ -163,6 +187,7 @@ impl Objective {
             },
             kappa,
             norm,
+            form_b,
             sides_b,
             sides_c,
             bounds,
@@ -184,6 +209,21 @@ impl Objective {
         targets.iter().map(|row| dot(row.behind, weights) - self.kappa * row.threshold).collect()
     }
 
+    /// B at these distances of the potentials to `kappa` thresholds, mV.
+    pub(crate) fn b_at(&self, distances: &[f64]) -> f64 {
+        let counted: Vec<f64> = distances.iter().map(|&x| self.counts_in_b(x)).collect();
+        self.b
+            * match self.form_b {
+                FormB::Square => dot(&counted, &counted),
+                FormB::Sum => counted.iter().map(|x| x.abs()).sum(),
+            }
+    }
+
+    /// The difference of objectives that counts as none beside B where every potential is 0.
+    pub(crate) fn nothing_of_b(&self, targets: &Targets) -> f64 {
+        NOTHING * self.b_at(&targets.thresholds.iter().map(|threshold| -self.kappa * threshold).collect::<Vec<_>>())
+    }
+
     /// The distance that counts in B, given that of the potential to `kappa` thresholds, mV.
     pub(crate) fn counts_in_b(&self, distance: f64) -> f64 {
         if self.sides_b == Sides::Both { distance } else { distance.min(0.0) }
@@ -194,16 +234,11 @@ impl Objective {
         if self.sides_c == Sides::Both { distance.abs() } else { (-distance).max(0.0) }
     }
 
-    /// How much the slope of C changes at its kink, and the slope below it as a share of that.
-    pub(crate) fn kink_of_c(&self) -> (f64, f64) {
-        if self.sides_c == Sides::Both { (2.0 * self.c, -0.5) } else { (self.c, -1.0) }
-    }
-
     /// The terms of 6.11 at these weights.
     pub(crate) fn exact_parts(&self, targets: &Targets, weights: &[f64]) -> Parts {
         let (l1, l2) = self.norms(weights);
         let missed = if self.b > 0.0 { self.missing_lift(targets, weights) } else { vec![] };
-        Parts { l1, l2, B: self.b * dot(&missed, &missed), ..Parts::default() }
+        Parts { l1, l2, B: self.b_at(&missed), ..Parts::default() }
     }
 
     /// This objective with every term multiplied by `scale`.

@@ -2,7 +2,7 @@
 //! row is hard. Their value at given weights, and a lower bound on their least value.
 
 use super::grid::SilentRows;
-use super::objective::{NOTHING, Norm, Objective, Parts, relative_gap};
+use super::objective::{FormB, NOTHING, Norm, Objective, Parts, relative_gap};
 use super::targets::Targets;
 use crate::vectors::{add, dot};
 
@@ -47,9 +47,9 @@ impl Rows<'_> {
     }
 }
 
-/// An objective over rows, which are numbered: silence first, then targets.
+/// An objective over rows, which are numbered: silence first, then targets, then, if B is a sum, those after the targets.
 ///
-/// Beside its limit a row of silence, `x` mV above it, costs a slope times `x`, and likewise a target. A row with
+/// Beside its limit a row of silence, `x` mV above it, costs a slope times `x`, and likewise the others. A row with
 /// infinite slopes is hard: no weights that violate it count.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Program<'a> {
@@ -60,8 +60,8 @@ pub(crate) struct Program<'a> {
     /// `B'B` of the rows after the targets, by columns.
     pub(crate) gram: &'a [f64],
     pub(crate) objective: &'a Objective,
-    /// The slopes below and above the limits of silence, and those of targets.
-    pub(crate) slopes: [[f64; 2]; 2],
+    /// The slopes below and above the limits of silence, those of targets, and those of the rows after them.
+    pub(crate) slopes: [[f64; 2]; 3],
     pub(crate) theta_0: f64,
 }
 
@@ -69,9 +69,10 @@ pub(crate) struct Program<'a> {
 #[derive(Debug, Clone)]
 pub(crate) struct Point {
     pub(crate) weights: Vec<f64>,
-    /// Potential minus limit at the silent rows, then potential minus threshold at the targets, mV.
+    /// Potential minus limit at the silent rows, then potential minus threshold at the targets, then, if B is a sum,
+    /// potential minus `kappa` thresholds after them, mV.
     pub(crate) excess: Vec<f64>,
-    /// Potential minus `kappa` thresholds after the targets, mV.
+    /// Potential minus `kappa` thresholds after the targets, mV, if B is a sum of squares.
     pub(crate) behind: Vec<f64>,
     pub(crate) parts: Parts,
 }
@@ -103,14 +104,39 @@ impl Program<'_> {
         self.objective.bounds.lower.len()
     }
 
-    /// The number of rows: silence and targets.
-    pub(crate) fn rows(&self) -> usize {
-        self.limit.len() + self.targets.len()
+    /// The number of rows after targets: none if B is a sum of squares.
+    pub(crate) fn sums(&self) -> usize {
+        if self.objective.form_b == FormB::Sum { self.targets.len() } else { 0 }
     }
 
-    /// The kind of a row: 0 for silence, 1 for a target.
+    /// The number of rows.
+    pub(crate) fn rows(&self) -> usize {
+        self.limit.len() + self.targets.len() + self.sums()
+    }
+
+    /// The kind of a row: 0 for silence, 1 for a target, 2 for a row after one.
     pub(crate) fn kind(&self, row: usize) -> usize {
-        usize::from(row >= self.limit.len())
+        let silent = self.limit.len();
+        usize::from(row >= silent) + usize::from(row >= silent + self.targets.len())
+    }
+
+    /// The least multiplier of a row as a share of its range.
+    pub(crate) fn least_share(&self, row: usize) -> f64 {
+        let [low, high] = self.slopes[self.kind(row)];
+        if low < high { low / (high - low) } else { 0.0 }
+    }
+
+    /// The rows of the targets and those after them: coefficients, and the potential that they ask for, mV.
+    pub(crate) fn stored(&self) -> impl Iterator<Item = (&[f64], f64)> {
+        let kappa = self.objective.kappa;
+        let after = self.targets.iter().take(self.sums()).map(move |row| (row.behind, kappa * row.threshold));
+        self.targets.iter().map(|row| (row.at, row.threshold)).chain(after)
+    }
+
+    /// The coefficients of one of these rows.
+    pub(crate) fn stored_row(&self, k: usize) -> &[f64] {
+        let targets = self.targets;
+        if k < targets.len() { targets.row(k).at } else { targets.row(k - targets.len()).behind }
     }
 
     /// Whether weights that violate a row do not count.
@@ -135,16 +161,16 @@ impl Program<'_> {
 
     /// Adds the sum of all rows, each times its multiplier, to `sum`, one entry per train.
     pub(crate) fn add_rows(&self, multipliers: &[f64], sum: &mut [f64]) {
-        let (silent, targets) = multipliers.split_at(self.limit.len());
+        let (silent, stored) = multipliers.split_at(self.limit.len());
         if self.slopes[0] != [0.0; 2] {
             self.silent.add_sum(silent, sum);
         }
-        for (target, &multiplier) in self.targets.iter().zip(targets) {
-            add(sum, multiplier, target.at);
+        for ((row, _), &multiplier) in self.stored().zip(stored) {
+            add(sum, multiplier, row);
         }
     }
 
-    /// Adds the gradient of B to `sum`, given the potentials after the targets minus `kappa` thresholds.
+    /// Adds the gradient of squares in B to `sum`, given the potentials after the targets minus `kappa` thresholds.
     pub(crate) fn add_slope_of_b(&self, behind: &[f64], sum: &mut [f64]) {
         if self.objective.b > 0.0 {
             for (target, &behind) in self.targets.iter().zip(behind) {
@@ -159,15 +185,15 @@ impl Program<'_> {
         let mut excess = vec![0.0; count];
         self.silent.potential(&weights, &mut excess);
         excess.iter_mut().zip(self.limit).for_each(|(u, limit)| *u -= limit);
-        excess.extend(self.targets.iter().map(|row| dot(row.at, &weights) - row.threshold));
-        let behind = objective.missing_lift(self.targets, &weights);
-        let (silent, targets) = excess.split_at(count);
+        excess.extend(self.stored().map(|(row, wanted)| dot(row, &weights) - wanted));
+        let behind = if self.sums() == 0 { objective.missing_lift(self.targets, &weights) } else { vec![] };
+        let (silent, stored) = excess.split_at(count);
+        let (targets, after) = stored.split_at(self.targets.len());
         let (l1, l2) = objective.norms(&weights);
-        let counted: Vec<f64> = behind.iter().map(|&x| objective.counts_in_b(x)).collect();
         let parts = Parts {
             l1,
             l2,
-            B: objective.b * dot(&counted, &counted),
+            B: objective.b_at(if self.sums() == 0 { &behind } else { after }),
             C: objective.c * targets.iter().map(|&x| objective.c_at_distance(x)).sum::<f64>(),
             D: objective.d * silent.iter().map(|x| x.max(0.0)).sum::<f64>(),
         };
@@ -178,10 +204,11 @@ impl Program<'_> {
     pub(crate) fn proof(&self, at: &Tangents<'_>, most: f64) -> Proof {
         let objective = self.objective;
         let squares = at.behind.iter().map(|&x| 2.0 * objective.b * objective.counts_in_b(x));
+        let after = at.multipliers[self.limit.len() + self.targets.len()..].iter().copied();
         Proof {
             bound: self.bound(at, most),
             multipliers: at.multipliers.to_vec(),
-            behind: squares.collect(),
+            behind: squares.chain(after).collect(),
             pull: match objective.norm {
                 Norm::Square => at.weights.iter().map(|w| 2.0 * objective.l2 * w).collect(),
                 Norm::Norm => at.pull.to_vec(),

@@ -61,14 +61,13 @@ impl Relaxed {
 
     /// 6.14 over all these rows.
     pub(crate) fn program<'a>(&'a self, objective: &'a Objective) -> Program<'a> {
-        let (kink, low) = objective.kink_of_c();
         Program {
             silent: Rows::Grid(&self.silent),
             limit: &self.silent.limit,
             targets: &self.targets,
             gram: &self.gram,
             objective,
-            slopes: [[0.0, objective.d], [low * kink, (low + 1.0) * kink]],
+            slopes: [[0.0, objective.d], objective.sides_c.slopes(objective.c), objective.sides_b.slopes(objective.b)],
             theta_0: self.theta_0,
         }
     }

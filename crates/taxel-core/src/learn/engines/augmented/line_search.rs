@@ -24,8 +24,9 @@ impl Lagrangian<'_> {
         if program.slopes[0] != [0.0; 2] {
             program.silent.potential(direction, &mut rise);
         }
-        rise.extend(program.targets.iter().map(|row| dot(row.at, direction)));
-        let lift: Vec<f64> = program.targets.iter().map(|row| dot(row.behind, direction)).collect();
+        rise.extend(program.stored().map(|(row, _)| dot(row, direction)));
+        let squared = program.targets.iter().take(self.behind.len());
+        let lift: Vec<f64> = squared.map(|row| dot(row.behind, direction)).collect();
         let smooth = {
             let against: f64 =
                 self.weights.iter().zip(&self.centre).zip(direction).map(|((w, c), d)| (w - c) * d).sum();
@@ -84,12 +85,12 @@ impl Lagrangian<'_> {
 
     /// The kinks that a step of length `end` crosses, and the slope of all rows that stay beyond their kinks.
     fn passing(&self, rise: &[f64], end: f64) -> (Vec<PassedKink>, f64) {
-        let (silent, steep) = (self.program.limit.len(), self.steep());
+        let steep = self.steep();
         let mut passing = Vec::new();
         let mut steady = 0.0;
         let rows = self.excess.iter().zip(rise).zip(&self.multipliers);
         for (k, ((&x, &rise), &multiplier)) in rows.enumerate() {
-            let kind = usize::from(k >= silent);
+            let kind = self.program.kind(k);
             let [low, high] = self.program.slopes[kind];
             let (slope, change) = (multiplier + x * steep[kind], rise * steep[kind]);
             let to = slope + end * change;

@@ -7,7 +7,7 @@ use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, MatMut, MatRef, Par};
 
 use super::Lagrangian;
-use crate::learn::statement::{Norm, Sides};
+use crate::learn::statement::{FormB, Norm, Sides};
 use crate::vectors::{add, dot};
 
 /// The curvature of the Lagrangian at its weights `w`: `diagonal + rows rows' - concave w w'`, and `both_sides` times
@@ -68,10 +68,11 @@ impl Lagrangian<'_> {
         let apart = if self.samples { (kept * n).div_ceil(WRITTEN).max(1) } else { 1 };
         let written: Vec<usize> = self.inside[..kept].iter().copied().step_by(apart).collect();
         let mut rows = program.silent.coefficients(&written, n);
-        let [of_silence, of_targets] = self.steep().map(f64::sqrt);
-        rows.iter_mut().for_each(|v| *v *= of_silence * (apart as f64).sqrt());
+        let roots = self.steep().map(f64::sqrt);
+        rows.iter_mut().for_each(|v| *v *= roots[0] * (apart as f64).sqrt());
         for &k in &self.inside[kept..] {
-            rows.extend(program.targets.row(k - silent).at.iter().map(|v| of_targets * v));
+            let root = roots[program.kind(k)];
+            rows.extend(program.stored_row(k - silent).iter().map(|v| root * v));
         }
         let mut count = written.len() + self.inside.len() - kept;
         if o.sides_b == Sides::Below {
@@ -88,7 +89,7 @@ impl Lagrangian<'_> {
         };
         let held = |i: usize| if self.penalty(i, self.weights[i]).1 { self.sigma } else { 0.0 };
         let diagonal = (0..n).map(|i| ridge + self.rho + held(i)).collect();
-        let both_sides = if o.sides_b == Sides::Both { 2.0 * o.b } else { 0.0 };
+        let both_sides = if (o.form_b, o.sides_b) == (FormB::Square, Sides::Both) { 2.0 * o.b } else { 0.0 };
         Curvature { rows, count, both_sides, diagonal, concave }
     }
 
